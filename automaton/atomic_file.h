@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Files that are either complete or not there: written under a temporary name in the same folder, flushed to the
+// device, renamed, and the folder flushed. A full disk, a kill or a power cut leaves the old file or none.
+
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string_view>
+
+namespace nephos {
+
+// Calls `write` with the path of the temporary file, which `write` must create and close; then publishes it.
+// Missing parent folders are created. On any failure the temporary file is removed and Error(io) names `path` and
+// the reason; what `write` throws passes through.
+void write_atomically(const std::filesystem::path& path,
+                      const std::function<void(const std::filesystem::path& temporary)>& write);
+
+// The same for content that is in memory.
+void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
+void write_atomically(const std::filesystem::path& path, std::string_view content);
+
+}  // namespace nephos

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The cellular automaton of D: growth, then extinction and birth, then advection by the wind, one bit an
+// operation for every cell. Same options, same bits: whatever the thread count, SIMD width or interruption.
+//
+//     Automaton automaton(options);
+//     automaton.step();
+//     automaton.cld().get(i, j, k);
+//
+// One object is one simulation; different objects may run in different threads. A step uses the threads of the
+// oneTBB arena that it is called in (tbb::global_control or tbb::task_arena limit them).
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "automaton/lattice.h"
+#include "automaton/options.h"
+
+namespace nephos {
+
+// XXH3-128 of the three planes in canonical order (state_hash.h).
+struct StateHash {
+    std::uint64_t high = 0, low = 0;
+    std::string hex() const;  // 32 lower-case digits
+    bool operator==(const StateHash&) const = default;
+};
+
+// An ellipsoid of the field as it stands now: where, and how strong.
+struct ActiveEllipsoid {
+    Ellipsoid ellipsoid;   // centre_m is the present centre
+    double weight = 1.0;   // fade weight, 0..1
+};
+
+class Automaton {
+  public:
+    // Starts from options.initial. Throws Error(usage) on bad options (see check()).
+    explicit Automaton(const AutomatonOptions& options);
+    // Starts from a given state; throws Error(usage) when its extent is not options.extent.
+    Automaton(const AutomatonOptions& options, Lattice initial);
+    ~Automaton();
+    Automaton(Automaton&&) noexcept;
+    Automaton& operator=(Automaton&&) noexcept;
+
+    void step();
+
+    const AutomatonOptions& options() const;
+    std::uint64_t steps() const;   // steps taken so far
+    double time_s() const;         // steps() * time_step_s
+    BitPlaneView hum() const;
+    BitPlaneView act() const;
+    BitPlaneView cld() const;
+    StateHash hash() const;
+    std::vector<ActiveEllipsoid> ellipsoids() const;  // those alive now
+
+    // Replaces the ellipsoids that were set this way before; they act in the next step and until set again, in
+    // addition to those of options.field. For callers that steer the field themselves. Not part of a checkpoint.
+    void set_external_ellipsoids(std::vector<ActiveEllipsoid> ellipsoids);
+
+    // The complete state as bytes, for checkpoint.h; `restore` throws Error(io) on bytes it did not write.
+    std::vector<std::byte> save() const;
+    void restore(std::span<const std::byte> bytes);
+
+    // Bytes that a simulation with these options holds; to check against memory before constructing one.
+    static std::size_t memory_bytes(const AutomatonOptions& options);
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace nephos

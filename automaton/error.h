@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The one exception type of nephos. Libraries throw it at their boundaries (user input, files, devices);
+// every app catches it once and turns `code` into its exit status. Programmer errors are asserts instead.
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace nephos {
+
+// What went wrong, from the user's point of view. The numbers are the exit codes of the `nephos` command.
+enum class ErrorCode {
+    check = 1,  // a check that the user asked for failed (a hash differs, a file is not what it claims)
+    usage = 2,  // a bad argument or a bad scene: nothing was done
+    io = 3,     // a file could not be read or written, or is damaged
+    gpu = 4,    // no Vulkan device, or it failed
+};
+
+// Where in a text file; line and column count from 1, 0 = unknown.
+struct SourcePosition {
+    std::string file;
+    int line = 0;
+    int column = 0;
+};
+
+class Error : public std::runtime_error {
+  public:
+    Error(ErrorCode code, const std::string& message, SourcePosition where = {})
+        : std::runtime_error(message), code_(code), where_(std::move(where)) {}
+
+    ErrorCode code() const noexcept { return code_; }
+    const SourcePosition& where() const noexcept { return where_; }
+
+  private:
+    ErrorCode code_;
+    SourcePosition where_;
+};
+
+}  // namespace nephos

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// How bits become density, and what is written; plain data, filled by a scene or by another program.
+
+#include <cstdint>
+
+namespace nephos {
+
+// Shape of the weights w(i',j',k',t') along each axis of the smoothing window; all are > 0 inside it.
+enum class SmoothingKernel {
+    box,       // 1
+    tent,      // n0 + 1 - |n'|
+    gaussian,  // exp(-(n'/s)^2 / 2), s = (n0 + 0.5) / 2, as integers of 10 bits: sums stay exact
+};
+
+// Stage 1 of D: the weighted mean of cld over |i'| <= i0, |j'| <= j0, |k'| <= k0, |t'| <= t0.
+struct SmoothingOptions {
+    SmoothingKernel kernel = SmoothingKernel::tent;
+    int i0 = 2, j0 = 2, k0 = 1;  // cells, 0..16
+    int t0 = 1;                  // steps, 0..16; steps that do not exist (before the first) have no weight
+    bool operator==(const SmoothingOptions&) const = default;
+};
+
+struct DensityOptions {
+    SmoothingOptions smoothing;
+    double extinction_per_m = 0.02;     // extinction coefficient at density 1; > 0
+    double metaball_radius_cells = 2.0; // effective radius R of stage 2, 1..8 cells
+    int refine = 1;                     // voxels written per cell and axis, 1..8; above 1 the metaball field is resampled
+    bool half = false;                  // 16-bit floats in the file
+    bool write_state = false;           // also the bool grids hum, act, cld
+    bool write_velocity = false;        // also `vel`, the wind in m/s
+    bool operator==(const DensityOptions&) const = default;
+};
+
+}  // namespace nephos
