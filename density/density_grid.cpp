@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "density/density_grid.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "automaton/error.h"
+#include "density/openvdb_access.h"
+
+namespace nephos {
+
+struct DensityGrid::Impl {
+    openvdb::FloatGrid::Ptr grid;
+    Extent extent;
+    Placement placement;
+};
+
+namespace {
+
+using Node1 = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
+
+void check_placement(const Placement& placement) {
+    if (!(placement.cell_size_m > 0) || !std::isfinite(placement.cell_size_m)) {
+        throw Error(ErrorCode::usage,
+                    "cell size " + std::to_string(placement.cell_size_m) + " m: must be above 0 and finite");
+    }
+}
+
+// Number of blocks along an axis of n voxels.
+int block_count(int n) { return (n + kBlock - 1) / kBlock; }
+
+// Copies the part of a dense array that lies in the block at `origin` into a leaf; false when all of it is 0.
+bool fill_leaf(FloatLeaf& leaf, std::span<const float> values, Extent extent, const openvdb::Coord& origin) {
+    float* out = leaf.buffer().data();
+    std::fill_n(out, kBlockVoxels, 0.0f);
+    const int nx = std::min(kBlock, extent.x - origin.x());
+    const int ny = std::min(kBlock, extent.y - origin.y());
+    const int nz = std::min(kBlock, extent.z - origin.z());
+    for (int z = 0; z < nz; ++z) {
+        for (int y = 0; y < ny; ++y) {
+            const float* row = &values[linear_index(extent, origin.x(), origin.y() + y, origin.z() + z)];
+            for (int x = 0; x < nx; ++x) out[leaf_offset(x, y, z)] = row[x];
+        }
+    }
+    return activate_positive(leaf);
+}
+
+}  // namespace
+
+TreeBuilder::TreeBuilder() : grid_(openvdb::FloatGrid::create(0.0f)), accessor_(grid_->tree()) {}
+
+void TreeBuilder::add(std::unique_ptr<FloatLeaf> leaf) { accessor_.addLeaf(leaf.release()); }
+
+void TreeBuilder::add_tile(const openvdb::Coord& origin, float value) {
+    accessor_.addTile(Node1::LEVEL, origin, value, true);
+}
+
+const openvdb::FloatGrid& OpenvdbAccess::grid(const DensityGrid& density) { return *density.impl_->grid; }
+
+DensityGrid OpenvdbAccess::wrap(openvdb::FloatGrid::Ptr grid, Extent extent, const Placement& placement) {
+    return DensityGrid(
+        std::make_shared<const DensityGrid::Impl>(DensityGrid::Impl{std::move(grid), extent, placement}));
+}
+
+std::unique_ptr<FloatLeaf> uninitialised_leaf(const openvdb::Coord& origin) {
+    auto leaf = std::make_unique<FloatLeaf>(openvdb::PartialCreate(), origin);
+    leaf->allocate();
+    return leaf;
+}
+
+bool activate_positive(FloatLeaf& leaf) {
+    const float* values = leaf.buffer().data();
+    openvdb::util::NodeMask<3> mask;
+    for (int n = 0; n < kBlockVoxels; n += 64) {
+        std::uint64_t word = 0;
+        for (int bit = 0; bit < 64; ++bit) word |= std::uint64_t(values[n + bit] > 0) << bit;
+        mask.getWord<std::uint64_t>(openvdb::Index(n / 64)) = word;
+    }
+    leaf.setValueMask(mask);
+    return !mask.isOff();
+}
+
+std::vector<Block> blocks_of(const DensityGrid& density) {
+    std::vector<Block> blocks;
+    const auto& root = OpenvdbAccess::grid(density).tree().root();
+    for (auto node2 = root.cbeginChildOn(); node2; ++node2) {
+        for (auto node1 = node2->cbeginChildOn(); node1; ++node1) {
+            for (auto leaf = node1->cbeginChildOn(); leaf; ++leaf) {
+                blocks.push_back({leaf->origin(), &*leaf, 0});
+            }
+            for (auto tile = node1->cbeginValueOn(); tile; ++tile) {
+                blocks.push_back({tile.getCoord(), nullptr, *tile});
+            }
+        }
+    }
+    std::ranges::sort(blocks, {}, [](const Block& block) {
+        return std::tuple(block.origin.z(), block.origin.y(), block.origin.x());
+    });
+    return blocks;
+}
+
+DensityGrid::DensityGrid()
+    : impl_(std::make_shared<const Impl>(Impl{openvdb::FloatGrid::create(0.0f), Extent{}, Placement{}})) {}
+
+DensityGrid::DensityGrid(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+
+DensityGrid DensityGrid::from_dense(std::span<const float> values, Extent extent, const Placement& placement) {
+    check_placement(placement);
+    if (extent.x < 0 || extent.y < 0 || extent.z < 0 || values.size() != extent.cells()) {
+        throw Error(ErrorCode::usage, std::to_string(values.size()) + " values for a box of " +
+                                          std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
+                                          std::to_string(extent.z) + " voxels");
+    }
+    const auto bad = std::ranges::find_if_not(values, [](float v) { return v >= 0 && std::isfinite(v); });
+    if (bad != values.end()) {
+        throw Error(ErrorCode::usage, "density " + std::to_string(*bad) + " at position " +
+                                          std::to_string(bad - values.begin()) + ": must be finite and at least 0");
+    }
+    TreeBuilder builder;
+    const int bx = block_count(extent.x), by = block_count(extent.y), bz = block_count(extent.z);
+    std::vector<std::unique_ptr<FloatLeaf>> layer(std::size_t(bx) * std::size_t(by));
+    for (int z = 0; z < bz; ++z) {
+        tbb::parallel_for(tbb::blocked_range<int>(0, by), [&](const tbb::blocked_range<int>& range) {
+            for (int y = range.begin(); y < range.end(); ++y) {
+                for (int x = 0; x < bx; ++x) {
+                    auto leaf = uninitialised_leaf({x * kBlock, y * kBlock, z * kBlock});
+                    if (!fill_leaf(*leaf, values, extent, leaf->origin())) leaf.reset();
+                    layer[std::size_t(y) * std::size_t(bx) + std::size_t(x)] = std::move(leaf);
+                }
+            }
+        });
+        for (auto& leaf : layer) {
+            if (leaf) builder.add(std::move(leaf));
+        }
+    }
+    return OpenvdbAccess::wrap(builder.finish(), extent, placement);
+}
+
+Extent DensityGrid::extent() const { return impl_->extent; }
+
+const Placement& DensityGrid::placement() const { return impl_->placement; }
+
+float DensityGrid::value(int i, int j, int k) const {
+    return impl_->grid->tree().getValue(openvdb::Coord(i, j, k));
+}
+
+std::uint64_t DensityGrid::active_voxels() const { return impl_->grid->tree().activeVoxelCount(); }
+
+VoxelBox DensityGrid::bounding_box() const {
+    openvdb::CoordBBox box;
+    if (!impl_->grid->tree().evalActiveVoxelBoundingBox(box)) return {};
+    return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
+}
+
+float DensityGrid::max_value() const {
+    float largest = 0;
+    for (const Block& block : blocks_of(*this)) {
+        if (!block.leaf) {
+            largest = std::max(largest, block.tile);
+            continue;
+        }
+        const float* values = block.leaf->buffer().data();
+        largest = std::max(largest, *std::max_element(values, values + kBlockVoxels));
+    }
+    return largest;
+}
+
+double DensityGrid::sum() const {
+    double total = 0;
+    for (const Block& block : blocks_of(*this)) {
+        double part = 0;
+        for (int n = 0; n < kBlockVoxels; ++n) part += double(block.value(n));
+        total += part;
+    }
+    return total;
+}
+
+std::vector<float> DensityGrid::to_dense() const {
+    std::vector<float> dense(impl_->extent.cells(), 0.0f);
+    const auto blocks = blocks_of(*this);
+    const Extent extent = impl_->extent;
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t n) {
+        const Block& block = blocks[n];
+        const openvdb::Coord o = block.origin;
+        const int nx = std::min(kBlock, extent.x - o.x());
+        const int ny = std::min(kBlock, extent.y - o.y());
+        const int nz = std::min(kBlock, extent.z - o.z());
+        for (int z = 0; z < nz; ++z) {
+            for (int y = 0; y < ny; ++y) {
+                float* row = &dense[linear_index(extent, o.x(), o.y() + y, o.z() + z)];
+                for (int x = 0; x < nx; ++x) row[x] = block.value(leaf_offset(x, y, z));
+            }
+        }
+    });
+    return dense;
+}
+
+std::size_t DensityGrid::memory_bytes() const { return impl_->grid->memUsage(); }
+
+DensityGrid DensityGrid::with_placement(const Placement& placement) const {
+    check_placement(placement);
+    return OpenvdbAccess::wrap(impl_->grid, impl_->extent, placement);
+}
+
+}  // namespace nephos
