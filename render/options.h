@@ -16,39 +16,40 @@ using Rgb = std::array<double, 3>;
 // Perspective camera. World z is up in the picture; looking straight up or down, y (north) is.
 struct Camera {
     Vec3 position_m{0, -4000, 300};
-    Vec3 target_m{0, 0, 1200};            // must differ from position_m
-    double vertical_fov_deg = 50.0;       // 1..170
-    int width = 640, height = 480;        // pixels, 1..16384
-    double exposure_ev = 0.0;             // stops; the picture is multiplied by 2^ev before tone mapping
+    Vec3 target_m{0, 0, 1200};       // must differ from position_m
+    double vertical_fov_deg = 50.0;  // 1..170
+    int width = 640, height = 480;   // pixels, 1..16384
+    double exposure_ev = 0.0;        // stops; the picture is multiplied by 2^ev before tone mapping
     bool operator==(const Camera&) const = default;
 };
 
 struct Sun {
-    double elevation_deg = 40.0;          // above the horizon, -18..90
-    double azimuth_deg = 135.0;           // where the sun stands, clockwise from north
-    Rgb colour{1.0, 0.96, 0.9};           // >= 0
+    double elevation_deg = 40.0;  // above the horizon, -18..90
+    double azimuth_deg = 135.0;   // where the sun stands, clockwise from north
+    Rgb colour{1.0, 0.96, 0.9};   // >= 0
     bool operator==(const Sun&) const = default;
 };
 
 struct CloudLight {
-    double albedo = 1.0;                  // single-scattering albedo, 0..1
-    double g = 0.5;                       // Henyey-Greenstein asymmetry, (-1, 1); forward is > 0
-    Rgb ambient_top{0.42, 0.52, 0.68};    // light from the sky that a cloud's top sees, >= 0
-    Rgb ambient_base{0.20, 0.24, 0.30};   // ... and its base
+    double albedo = 1.0;                 // single-scattering albedo, 0..1
+    double g = 0.5;                      // Henyey-Greenstein asymmetry, (-1, 1); forward is > 0
+    Rgb ambient_top{0.42, 0.52, 0.68};   // light from the sky that a cloud's top sees, >= 0
+    Rgb ambient_base{0.20, 0.24, 0.30};  // ... and its base
     bool operator==(const CloudLight&) const = default;
 };
 
 // Air between cloud and eye, and the plain sky behind: a gradient from horizon to zenith.
 struct Air {
-    Rgb extinction_per_m{6e-6, 1.2e-5, 2.8e-5};  // aerial perspective beta = exp(-extinction * distance), >= 0
+    Rgb extinction_per_m{6e-6, 1.2e-5,
+                         2.8e-5};  // aerial perspective beta = exp(-extinction * distance), >= 0
     Rgb horizon{0.72, 0.80, 0.90};
     Rgb zenith{0.18, 0.36, 0.74};
     bool operator==(const Air&) const = default;
 };
 
 struct Ground {
-    double height_m = 0.0;                // world z of the plane
-    Rgb albedo{0.12, 0.15, 0.07};         // 0..1
+    double height_m = 0.0;         // world z of the plane
+    Rgb albedo{0.12, 0.15, 0.07};  // 0..1
     bool operator==(const Ground&) const = default;
 };
 
@@ -58,7 +59,7 @@ struct RenderOptions {
     CloudLight light;
     Air air;
     Ground ground;
-    int shadow_map_size = 1024;           // texels on a side, 16..8192
+    int shadow_map_size = 1024;  // texels on a side, 16..8192
     bool operator==(const RenderOptions&) const = default;
 };
 

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// An output stream for OpenEXR that reports every failed write. The library writes its last offset table in a
+// destructor, where an exception is swallowed: a full disk would leave a damaged file and a happy caller.
+// This stream remembers the first failure, and close() throws it. Private to the module.
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include <OpenEXR/ImfIO.h>
+
+namespace nephos {
+
+class CheckedStream : public Imf::OStream {
+  public:
+    // Creates `file`; failures name `reported` (the file the user asked for). Throws Error(io).
+    CheckedStream(const std::filesystem::path& file, const std::filesystem::path& reported);
+    CheckedStream(const CheckedStream&) = delete;
+    CheckedStream& operator=(const CheckedStream&) = delete;
+    ~CheckedStream() override;
+
+    void write(const char bytes[], int count) override;
+    std::uint64_t tellp() override { return position_; }
+    void seekp(std::uint64_t position) override { position_ = position; }
+
+    // Closes the file and throws Error(io) when anything failed before.
+    void close();
+
+  private:
+    [[noreturn]] void fail(int error);
+
+    int descriptor_;
+    std::uint64_t position_ = 0;
+    int first_error_ = 0;
+    std::string reported_;
+};
+
+}  // namespace nephos

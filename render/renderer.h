@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The renderer of D: clouds as metaballs, each drawn as a billboard with a precomputed attenuation texture.
+//
+//     step 0   64 attenuation textures as one array (attenuation_texture.h), once per Renderer
+//     step 1   from the sun: the light that reaches every metaball, and the shadow map
+//     step 2   from the eye: sky and ground, which wears the shadow map, then the billboards back to front:
+//              buffer = buffer * attenuation + colour
+//
+// Offscreen Vulkan 1.3; runs on a software device (lavapipe) as well as on a graphics card. The picture is a
+// function of cloud and options alone: two calls give the same bits on the same device and driver.
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "density/metaballs.h"
+#include "render/options.h"
+#include "render/picture.h"
+
+namespace nephos {
+
+struct DeviceOptions {
+    // Part of a device's name ("llvmpipe") or its number in device_names(). Empty: the environment variable
+    // NEPHOS_DEVICE in the same form; without it a discrete card, then an integrated, a virtual and a
+    // software one.
+    std::string device;
+    // Load the Khronos validation layer with synchronization validation and collect what it says. Slow; for
+    // tests.
+    bool validation = false;
+    // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
+    // the picture; memory on the device is about 24 bytes * tile_size^2.
+    int tile_size = 2048;
+};
+
+// A cloud made of metaballs. Along a ray, extinction (per metre) is
+//     extinction_per_m * normalisation * sum_i density_i f(|x - x_i| / radius_i),
+//     f(a) = 1 - 22/9 a^2 + 17/9 a^4 - 4/9 a^6 for a < 1, else 0 (Wyvill)
+struct MetaballCloud {
+    std::span<const Metaball> metaballs;  // metres; metaballs of density <= 0 draw nothing
+    double extinction_per_m = 0.02;       // at density 1; >= 0
+    double normalisation = 1.0;           // such that a saturated lattice has density 1; >= 0
+};
+
+class Renderer {
+  public:
+    // Opens a device and builds all that does not depend on a picture. Throws Error(gpu) when there is no
+    // Vulkan loader or no device that can do it, saying what to install; Error(usage) when options name an
+    // unknown device.
+    explicit Renderer(const DeviceOptions& options = {});
+    ~Renderer();
+    Renderer(Renderer&&) noexcept;
+    Renderer& operator=(Renderer&&) noexcept;
+
+    // Draws one picture. Many may be drawn with one Renderer, one at a time: not thread-safe, but different
+    // Renderers may work in different threads. Throws Error(usage) on bad options, on metaballs that are not
+    // finite or have no radius, and when the picture does not fit into memory; Error(gpu) when the device
+    // fails, after which this Renderer cannot be used any more.
+    Picture draw(const MetaballCloud& cloud, const RenderOptions& options);
+
+    std::string device_name() const;
+
+    // What the validation layer has said so far; empty without DeviceOptions::validation.
+    std::vector<std::string> validation_messages() const;
+
+    // Test hook: submits a deliberate write-after-write hazard, which the synchronization validation must
+    // report.
+    void provoke_hazard_for_test();
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+// Names of all Vulkan devices of this machine, in the loader's order. Throws Error(gpu) without a Vulkan
+// loader.
+std::vector<std::string> device_names();
+
+}  // namespace nephos
