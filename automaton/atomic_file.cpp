@@ -55,8 +55,9 @@ void write_atomically(const std::filesystem::path& path,
     if (error) fail(folder, "cannot create the folder", error.value());
 
     // Extension last, because some writers choose the format by it; the process number keeps two runs apart.
-    const std::filesystem::path temporary =
-        folder / ("." + path.stem().string() + ".part" + std::to_string(::getpid()) + path.extension().string());
+    std::string name = ".";
+    name.append(path.stem().string()).append(".part").append(std::to_string(::getpid())).append(path.extension());
+    const std::filesystem::path temporary = folder / name;
     try {
         write(temporary);
         flush_to_device(temporary, path, O_RDONLY);

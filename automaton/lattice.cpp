@@ -32,7 +32,7 @@ BitPlane::BitPlane(Extent extent) : extent_(extent) {
     check_extent(extent);
     words_per_row_ = words_of_row(extent);
     word_count_ = words_of_plane(extent);
-    lines_.resize((word_count_ + 7) / 8);
+    lines_.resize((word_count_ + 7) / 8 + 2);
 }
 
 void BitPlane::set(int i, int j, int k, bool value) {
@@ -53,6 +53,6 @@ bool BitPlane::operator==(const BitPlane& other) const {
     return extent_ == other.extent_ && std::ranges::equal(words(), other.words());
 }
 
-std::size_t BitPlane::bytes(Extent extent) { return (words_of_plane(extent) + 7) / 8 * sizeof(Line); }
+std::size_t BitPlane::bytes(Extent extent) { return ((words_of_plane(extent) + 7) / 8 + 2) * sizeof(Line); }
 
 }  // namespace nephos

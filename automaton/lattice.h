@@ -64,7 +64,8 @@ struct BitPlaneView {
     std::size_t word_count() const { return words_per_row * std::size_t(extent.y) * std::size_t(extent.z); }
 };
 
-// One bit plane that owns its memory (64-byte aligned). Not thread-safe for writing to the same row.
+// One bit plane that owns its memory: 64-byte aligned, with 64 bytes of zeros before and after it, so that kernels
+// may load a vector that begins or ends just outside. Not thread-safe for writing to the same row.
 class BitPlane {
   public:
     BitPlane() = default;
@@ -92,8 +93,8 @@ class BitPlane {
   private:
     struct alignas(64) Line { std::uint64_t words[8]; };
 
-    std::uint64_t* data() { return lines_.empty() ? nullptr : lines_.front().words; }
-    const std::uint64_t* data() const { return lines_.empty() ? nullptr : lines_.front().words; }
+    std::uint64_t* data() { return lines_.empty() ? nullptr : lines_[1].words; }
+    const std::uint64_t* data() const { return lines_.empty() ? nullptr : lines_[1].words; }
 
     Extent extent_;
     std::size_t words_per_row_ = 0;

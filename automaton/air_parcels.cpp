@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "automaton/air_parcels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "automaton/random.h"
+
+namespace nephos {
+namespace {
+
+// Order of the numbers drawn for one parcel; each has its own place in the counter.
+enum ParcelDraw : std::uint32_t { kX, kY, kZ, kAxisX, kAxisY, kAxisZ, kYaw, kBirth, kLife, kSide, kAlong };
+
+double draw(const AutomatonOptions& options, const AirParcel& parcel, ParcelDraw what, Range range) {
+    if (range.min == range.max) return range.min;  // also for infinite ones
+    const auto words = philox(options.seed, item_counter(Domain::field, std::uint32_t(parcel.scatter), parcel.index,
+                                                         parcel.generation, what / 4u));
+    return range.min + (range.max - range.min) * unit_interval(words[what % 4u]);
+}
+
+// The parcel of a scatter, at the place and time that its ranges say.
+AirParcel draw_parcel(const AutomatonOptions& options, int scatter, std::uint32_t index, std::uint32_t generation) {
+    const EllipsoidScatter& s = options.field.scatters[std::size_t(scatter)];
+    AirParcel parcel{.ellipsoid = {}, .scatter = scatter, .index = index, .generation = generation, .carried = {}};
+    Ellipsoid& e = parcel.ellipsoid;
+    e.centre_m = {draw(options, parcel, kX, s.x_m), draw(options, parcel, kY, s.y_m),
+                  draw(options, parcel, kZ, s.z_m)};
+    e.semi_axes_m = {draw(options, parcel, kAxisX, s.semi_axis_x_m), draw(options, parcel, kAxisY, s.semi_axis_y_m),
+                     draw(options, parcel, kAxisZ, s.semi_axis_z_m)};
+    e.yaw_deg = draw(options, parcel, kYaw, s.yaw_deg);
+    e.centre = s.centre;
+    e.rim = s.rim;
+    e.birth_s = draw(options, parcel, kBirth, s.birth_s);
+    e.life_s = draw(options, parcel, kLife, s.life_s);
+    e.fade_in_s = s.fade_in_s;
+    e.fade_out_s = s.fade_out_s;
+    e.carried = s.carried;
+    return parcel;
+}
+
+// Half the edges of the axis-parallel box around the ellipsoid, horizontally.
+struct HalfSize {
+    double x, y;
+};
+HalfSize half_size(const Ellipsoid& e) {
+    const SinCos turn = sin_cos_deg(e.yaw_deg);
+    const double a = e.semi_axes_m.x, b = e.semi_axes_m.y;
+    return {std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin),
+            std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos)};
+}
+
+// Sum of displacements along one axis. It never overflows: a periodic box repeats, and beyond an open one lies
+// nothing, so that there the sum may stop at 2^29 cells.
+std::int64_t carry(std::int64_t sum, std::int64_t step, Boundary boundary, int extent) {
+    constexpr std::int64_t kFarAway = std::int64_t{1} << 61;
+    sum += step;
+    return boundary == Boundary::periodic ? sum % (std::int64_t{extent} << 32) : std::clamp(sum, -kFarAway, kFarAway);
+}
+
+Vec3 present_centre(const AirParcel& parcel, double cell_size_m) {
+    const Vec3& born = parcel.ellipsoid.centre_m;
+    return {born.x + double(parcel.carried.x) * 0x1p-32 * cell_size_m,
+            born.y + double(parcel.carried.y) * 0x1p-32 * cell_size_m, born.z};
+}
+
+struct Box {
+    double x0, x1, y0, y1;
+};
+Box box_of(const AutomatonOptions& o) {
+    const Vec3& origin = o.placement.origin_m;
+    return {origin.x, origin.x + o.extent.x * o.placement.cell_size_m, origin.y,
+            origin.y + o.extent.y * o.placement.cell_size_m};
+}
+
+// Whether the whole ellipsoid has left the box downwind, through an open side.
+bool has_left(const AutomatonOptions& options, const AirParcel& parcel, const Velocity& wind) {
+    const Box box = box_of(options);
+    const HalfSize half = half_size(parcel.ellipsoid);
+    const Vec3 centre = present_centre(parcel, options.placement.cell_size_m);
+    const bool left_x = options.boundaries.x == Boundary::open &&
+                        ((wind.east_m_per_s > 0 && centre.x - half.x >= box.x1) ||
+                         (wind.east_m_per_s < 0 && centre.x + half.x <= box.x0));
+    const bool left_y = options.boundaries.y == Boundary::open &&
+                        ((wind.north_m_per_s > 0 && centre.y - half.y >= box.y1) ||
+                         (wind.north_m_per_s < 0 && centre.y + half.y <= box.y0));
+    return left_x || left_y;
+}
+
+// Puts a parcel outside the upwind sides so that it just touches the box. Air enters a side in proportion to the
+// wind across it and to its length; that decides which of two upwind sides it is.
+void place_upwind(const AutomatonOptions& options, AirParcel& parcel, const Velocity& wind) {
+    const Box box = box_of(options);
+    const double inflow_x =
+        options.boundaries.x == Boundary::open ? std::abs(wind.east_m_per_s) * (box.y1 - box.y0) : 0;
+    const double inflow_y =
+        options.boundaries.y == Boundary::open ? std::abs(wind.north_m_per_s) * (box.x1 - box.x0) : 0;
+    Ellipsoid& e = parcel.ellipsoid;
+    const HalfSize half = half_size(e);
+    if (draw(options, parcel, kSide, {0, inflow_x + inflow_y}) < inflow_x) {
+        e.centre_m.x = wind.east_m_per_s > 0 ? box.x0 - half.x : box.x1 + half.x;
+        e.centre_m.y = draw(options, parcel, kAlong, {box.y0, box.y1});
+    } else {
+        e.centre_m.y = wind.north_m_per_s > 0 ? box.y0 - half.y : box.y1 + half.y;
+        e.centre_m.x = draw(options, parcel, kAlong, {box.x0, box.x1});
+    }
+}
+
+}  // namespace
+
+SinCos sin_cos_deg(double degrees) {
+    const double turns = std::floor(degrees / 90 + 0.5);
+    const double r = (degrees - turns * 90) * (3.14159265358979323846 / 180);  // -pi/4..pi/4
+    const double r2 = r * r;
+    double s = 0, c = 0;  // Taylor series; the first term left out is below 2e-17
+    for (int n = 17; n >= 1; n -= 2) s = 1 - s * r2 / ((n + 1.0) * (n + 2.0));
+    for (int n = 16; n >= 0; n -= 2) c = 1 - c * r2 / ((n + 1.0) * (n + 2.0));
+    s *= r;
+    switch (int(std::fmod(turns, 4) + 4) % 4) {
+        case 0: return {s, c};
+        case 1: return {c, -s};
+        case 2: return {-s, -c};
+        default: return {-c, s};
+    }
+}
+
+double fade_weight(const Ellipsoid& e, double time_s) {
+    const double age = time_s - e.birth_s;
+    const double left = e.life_s - age;
+    if (age < 0 || left <= 0) return 0;
+    const double in = e.fade_in_s > 0 ? std::min(age / e.fade_in_s, 1.0) : 1.0;
+    const double out = e.fade_out_s > 0 ? std::min(left / e.fade_out_s, 1.0) : 1.0;
+    return std::min(in, out);
+}
+
+AirParcels::AirParcels(const AutomatonOptions& options) {
+    for (const Ellipsoid& e : options.field.ellipsoids) {
+        parcels_.push_back({.ellipsoid = e, .scatter = -1, .index = 0, .generation = 0, .carried = {}});
+    }
+    for (int s = 0; s < int(options.field.scatters.size()); ++s) {
+        for (int i = 0; i < options.field.scatters[std::size_t(s)].count; ++i) {
+            parcels_.push_back(draw_parcel(options, s, std::uint32_t(i), 0));
+        }
+    }
+}
+
+std::vector<ActiveEllipsoid> AirParcels::active(const AutomatonOptions& options, double time_s) const {
+    std::vector<ActiveEllipsoid> result;
+    for (const AirParcel& parcel : parcels_) {
+        const double weight = fade_weight(parcel.ellipsoid, time_s);
+        if (weight <= 0) continue;
+        result.push_back({parcel.ellipsoid, weight});
+        result.back().ellipsoid.centre_m = present_centre(parcel, options.placement.cell_size_m);
+    }
+    return result;
+}
+
+void AirParcels::advance(const AutomatonOptions& options, double time_s) {
+    const double end_s = time_s + options.time_step_s;
+    for (AirParcel& parcel : parcels_) {
+        const Ellipsoid& e = parcel.ellipsoid;
+        const Velocity wind = e.carried ? wind_at(options.wind, e.centre_m.z, time_s) : Velocity{};
+        if (e.carried && time_s >= e.birth_s) {
+            const Displacement d = displacement_of_step(wind, options.time_step_s, options.placement.cell_size_m);
+            parcel.carried.x = carry(parcel.carried.x, d.x, options.boundaries.x, options.extent.x);
+            parcel.carried.y = carry(parcel.carried.y, d.y, options.boundaries.y, options.extent.y);
+        }
+        if (parcel.scatter < 0 || !options.field.scatters[std::size_t(parcel.scatter)].replace) continue;
+        const bool died = end_s >= e.birth_s + e.life_s;
+        const bool left = end_s >= e.birth_s && has_left(options, parcel, wind);
+        if (!died && !left) continue;
+        parcel = draw_parcel(options, parcel.scatter, parcel.index, parcel.generation + 1);
+        parcel.ellipsoid.birth_s = end_s;
+        if (left) {
+            place_upwind(options, parcel, wind);
+            parcel.ellipsoid.fade_in_s = 0;  // it enters from outside: nothing appears
+        }
+    }
+}
+
+void AirParcels::save(ByteWriter& out) const {
+    out.put(std::uint64_t(parcels_.size()));
+    for (const AirParcel& p : parcels_) {
+        const Ellipsoid& e = p.ellipsoid;
+        for (double value : {e.centre_m.x, e.centre_m.y, e.centre_m.z, e.semi_axes_m.x, e.semi_axes_m.y,
+                             e.semi_axes_m.z, e.yaw_deg, e.birth_s, e.life_s, e.fade_in_s}) {
+            out.put(value);
+        }
+        out.put(p.generation);
+        out.put(p.carried.x);
+        out.put(p.carried.y);
+    }
+}
+
+void AirParcels::restore(ByteReader& in) {
+    if (in.get<std::uint64_t>() != parcels_.size()) {
+        throw Error(ErrorCode::io, "saved state has another number of ellipsoids than the scene");
+    }
+    for (AirParcel& p : parcels_) {  // what a redraw never changes stays as the options made it
+        Ellipsoid& e = p.ellipsoid;
+        for (double* value : {&e.centre_m.x, &e.centre_m.y, &e.centre_m.z, &e.semi_axes_m.x, &e.semi_axes_m.y,
+                              &e.semi_axes_m.z, &e.yaw_deg, &e.birth_s, &e.life_s, &e.fade_in_s}) {
+            *value = in.get<double>();
+        }
+        p.generation = in.get<std::uint32_t>();
+        p.carried.x = in.get<std::int64_t>();
+        p.carried.y = in.get<std::int64_t>();
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The ellipsoids of the probability field over time: those placed by hand and those drawn at random, carried by
+// the wind, fading in and out, and drawn anew when they left or died and the scene wants that.
+
+#include <cstdint>
+#include <vector>
+
+#include "automaton/automaton.h"
+#include "automaton/bytes.h"
+#include "automaton/options.h"
+
+namespace nephos {
+
+// One ellipsoid and where it comes from.
+struct AirParcel {
+    Ellipsoid ellipsoid;             // as born
+    int scatter = -1;                // index in FieldOptions::scatters, -1 when placed by hand
+    std::uint32_t index = 0;         // number within the scatter
+    std::uint32_t generation = 0;    // how often it has been drawn anew
+    Displacement carried;            // by the wind since birth
+    bool operator==(const AirParcel&) const = default;
+};
+
+class AirParcels {
+  public:
+    // The parcels at time 0. `options` must have passed check().
+    explicit AirParcels(const AutomatonOptions& options);
+
+    // Those with weight > 0 at `time_s`, at their present centre, in the order of the options.
+    std::vector<ActiveEllipsoid> active(const AutomatonOptions& options, double time_s) const;
+
+    // Carries every parcel over the step that starts at `time_s`, then replaces those that left or died by its end.
+    void advance(const AutomatonOptions& options, double time_s);
+
+    void save(ByteWriter& out) const;
+    void restore(ByteReader& in);
+
+  private:
+    std::vector<AirParcel> parcels_;
+};
+
+// Fade weight of an ellipsoid at a time: 0 outside its life, 1 in the middle, linear in the fades.
+double fade_weight(const Ellipsoid& ellipsoid, double time_s);
+
+// sin and cos of an angle in degrees by polynomials: the same bits on every machine; error < 1e-15.
+struct SinCos {
+    double sin = 0, cos = 1;
+};
+SinCos sin_cos_deg(double degrees);
+
+}  // namespace nephos

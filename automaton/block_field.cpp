@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "automaton/block_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "automaton/air_parcels.h"
+
+namespace nephos {
+namespace {
+
+std::array<double, 3> as_array(const Probabilities& p) { return {p.hum, p.act, p.ext}; }
+
+int blocks(int cells) { return (cells + kBlockEdge - 1) / kBlockEdge; }
+
+// Blocks that cells with centres in [low, high] lie in, clipped to the lattice; half-open.
+std::pair<int, int> block_range(double low, double high, int cells) {
+    const double first = std::clamp(std::ceil(low - 0.5), 0.0, double(cells));
+    const double last = std::clamp(std::floor(high - 0.5) + 1, 0.0, double(cells));
+    if (first >= last) return {0, 0};
+    return {int(first) / kBlockEdge, blocks(int(last))};
+}
+
+}  // namespace
+
+BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> active) {
+    const auto background = as_array(options.field.background);
+    for (int d = 0; d < 3; ++d) background_[std::size_t(d)] = float(background[std::size_t(d)]);
+    by_slab_.resize(std::size_t(blocks(options.extent.z)));
+
+    const double cell = options.placement.cell_size_m;
+    const auto images = [](Boundary boundary, double half_size_cells, int extent) {
+        return boundary == Boundary::periodic ? int(std::ceil(half_size_cells / extent)) : 0;
+    };
+    for (const ActiveEllipsoid& e : active) {
+        const Vec3& half = e.ellipsoid.semi_axes_m;
+        const double half_xy = std::max(half.x, half.y) / cell;
+        const int nx = images(options.boundaries.x, half_xy, options.extent.x);
+        const int ny = images(options.boundaries.y, half_xy, options.extent.y);
+        const int nz = images(options.boundaries.z, half.z / cell, options.extent.z);
+        for (int x = -nx; x <= nx; ++x) {
+            for (int y = -ny; y <= ny; ++y) {
+                for (int z = -nz; z <= nz; ++z) {
+                    add(options, e,
+                        {double(x) * options.extent.x, double(y) * options.extent.y, double(z) * options.extent.z});
+                }
+            }
+        }
+    }
+    for (std::uint32_t i = 0; i < ellipsoids_.size(); ++i) {
+        for (int bz = ellipsoids_[i].bz0; bz < ellipsoids_[i].bz1; ++bz) by_slab_[std::size_t(bz)].push_back(i);
+    }
+
+    const auto can_be_born = [](const std::array<float, 3>& p) { return p[kHum] > 0 || p[kAct] > 0; };
+    any_birth_ = can_be_born(background_);
+    for (const FieldEllipsoid& e : ellipsoids_) {
+        const std::array<float, 3> centre{e.rim[0] + e.span[0], e.rim[1] + e.span[1], 0};
+        any_birth_ = any_birth_ || can_be_born(e.rim) || can_be_born(centre);
+    }
+    any_extinction_ = background_[kExt] > 0;  // ellipsoids can only lower it
+    anything_ = any_birth_ || any_extinction_;
+}
+
+void BlockField::add(const AutomatonOptions& options, const ActiveEllipsoid& active, Vec3 shift) {
+    const Ellipsoid& e = active.ellipsoid;
+    const double cell = options.placement.cell_size_m;
+    const Vec3& origin = options.placement.origin_m;
+    const SinCos turn = sin_cos_deg(e.yaw_deg);
+    FieldEllipsoid f{};
+    // On a periodic axis the centre is first brought into the box; the images then lie one box to either side.
+    const auto place = [](double cells, Boundary boundary, int extent) {
+        return boundary == Boundary::periodic ? cells - std::floor(cells / extent) * extent : cells;
+    };
+    f.centre_x = place((e.centre_m.x - origin.x) / cell, options.boundaries.x, options.extent.x) + shift.x;
+    f.centre_y = place((e.centre_m.y - origin.y) / cell, options.boundaries.y, options.extent.y) + shift.y;
+    f.centre_z = place((e.centre_m.z - origin.z) / cell, options.boundaries.z, options.extent.z) + shift.z;
+    const double a = e.semi_axes_m.x / cell, b = e.semi_axes_m.y / cell, c = e.semi_axes_m.z / cell;
+    f.xx = turn.cos / a;
+    f.xy = turn.sin / a;
+    f.yx = -turn.sin / b;
+    f.yy = turn.cos / b;
+    f.zz = 1 / c;
+
+    const double half_x = std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin);
+    const double half_y = std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos);
+    std::tie(f.bx0, f.bx1) = block_range(f.centre_x - half_x, f.centre_x + half_x, options.extent.x);
+    std::tie(f.by0, f.by1) = block_range(f.centre_y - half_y, f.centre_y + half_y, options.extent.y);
+    std::tie(f.bz0, f.bz1) = block_range(f.centre_z - c, f.centre_z + c, options.extent.z);
+    if (f.bx0 == f.bx1 || f.by0 == f.by1 || f.bz0 == f.bz1) return;
+
+    // The farthest cell centre of a block is 3.5 cells from the block's centre on each axis.
+    constexpr double kHalf = 3.5;
+    const double reach_a = kHalf * (std::abs(f.xx) + std::abs(f.xy));
+    const double reach_b = kHalf * (std::abs(f.yx) + std::abs(f.yy));
+    const double reach_c = kHalf * f.zz;
+    f.block_reach = float(std::sqrt(reach_a * reach_a + reach_b * reach_b + reach_c * reach_c) * (1 + 1e-5) + 1e-6);
+
+    const auto centre = as_array(e.centre), rim = as_array(e.rim), background = as_array(options.field.background);
+    for (std::size_t d = 0; d < 3; ++d) {
+        f.rim[d] = float(background[d] + active.weight * (rim[d] - background[d]));
+        f.span[d] = float(active.weight * (centre[d] - rim[d]));
+    }
+    ellipsoids_.push_back(f);
+}
+
+void BlockField::collect(int by, int bz, std::vector<const FieldEllipsoid*>& out) const {
+    out.clear();
+    for (std::uint32_t i : by_slab_[std::size_t(bz)]) {
+        const FieldEllipsoid& e = ellipsoids_[i];
+        if (by >= e.by0 && by < e.by1) out.push_back(&e);
+    }
+}
+
+void BlockField::plan_block(int bx, int by, int bz, std::span<const FieldEllipsoid* const> row,
+                            BlockPlan& plan) const {
+    plan.ellipsoids.clear();
+    std::array<float, 3> p_max = background_;
+    std::array<bool, 3> varies{};
+    for (const FieldEllipsoid* e : row) {
+        if (bx < e->bx0 || bx >= e->bx1) continue;
+        const double dx = bx * kBlockEdge + 0.5 - e->centre_x;
+        const double dy = by * kBlockEdge + 0.5 - e->centre_y;
+        const double dz = bz * kBlockEdge + 0.5 - e->centre_z;
+        const BlockEllipsoid seen{.base_a = float(e->xx * dx + e->xy * dy),
+                                  .base_b = float(e->yx * dx + e->yy * dy),
+                                  .base_c = float(e->zz * dz),
+                                  .xx = float(e->xx), .xy = float(e->xy), .yx = float(e->yx), .yy = float(e->yy),
+                                  .zz = float(e->zz), .source = e};
+        // Distance of the block's centre, and so of its nearest and farthest cell at most.
+        const float a = seen.base_a + 3.5f * (seen.xx + seen.xy);
+        const float b = seen.base_b + 3.5f * (seen.yx + seen.yy);
+        const float c = seen.base_c + 3.5f * seen.zz;
+        const float distance = std::sqrt(a * a + b * b + c * c);
+        const float nearest = std::max(0.0f, distance - e->block_reach);
+        const float farthest = distance + e->block_reach;
+        if (nearest >= 1) continue;
+        plan.ellipsoids.push_back(seen);
+
+        const float inner = (1 - nearest * nearest) * (1 - nearest * nearest);
+        const float outer = farthest < 1 ? (1 - farthest * farthest) * (1 - farthest * farthest) : 0;
+        for (std::size_t d = 0; d < 3; ++d) {
+            // Rounding in the evaluation per cell can exceed the bound by a few units in the last place.
+            const float bound = std::max(e->rim[d] + e->span[d] * inner, e->rim[d] + e->span[d] * outer) * 1.00001f;
+            if (d == kExt) {
+                varies[d] = true;
+                if (farthest < 1) p_max[d] = std::min(p_max[d], bound);
+            } else if (bound > background_[d]) {
+                varies[d] = true;
+                p_max[d] = std::max(p_max[d], bound);
+            }
+        }
+    }
+    for (std::size_t d = 0; d < 3; ++d) {
+        DrawPlan& draw = plan.draws[d];
+        draw.p_max = std::min(p_max[d], 1.0f);
+        if (draw.p_max <= 0) {
+            draw.kind = DrawPlan::Kind::none;
+        } else if (varies[d]) {
+            draw.kind = DrawPlan::Kind::varying;
+        } else {
+            draw.kind = draw.p_max >= 1 ? DrawPlan::Kind::certain : DrawPlan::Kind::uniform;
+        }
+    }
+}
+
+float probability_at(const BlockField& field, const BlockPlan& plan, int draw, int dx, int dy, int dz) {
+    float p = field.background()[std::size_t(draw)];
+    for (const BlockEllipsoid& e : plan.ellipsoids) {
+        const float inside = ellipsoid_probability(e, draw, float(dx), float(dy), float(dz));
+        if (inside < 0) continue;
+        p = draw == kExt ? std::min(p, inside) : std::max(p, inside);
+    }
+    return p;
+}
+
+}  // namespace nephos

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The probability field of one step in the form that the kernels read: ellipsoids as matrices in cells, listed by
+// slab of 8 layers, with bounds that tell which blocks of 8x8x8 cells they touch and how large p can become there.
+//
+// Values at a cell are float32, in this order of operations (IEEE, no FMA), for every kernel and for the naive twin:
+//
+//     dx, dy, dz  = cell - corner of its block (0..7)          base = M * (corner + 0.5 - centre), made in double
+//     a = base_a + (dx * xx + dy * xy)     b = base_b + (dx * yx + dy * yy)     c = base_c + dz * zz
+//     u2 = (a*a + b*b) + c*c               s = max(0, 1 - u2)                    p = rim + span * (s*s)
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "automaton/automaton.h"
+#include "automaton/options.h"
+#include "automaton/poisson.h"
+
+namespace nephos {
+
+inline constexpr int kBlockEdge = 8;
+
+// Index into per-draw arrays.
+enum : int { kHum = 0, kAct = 1, kExt = 2 };
+
+// One ellipsoid, in cells. Rows of M turn and scale an offset so that the rim is at length 1.
+struct FieldEllipsoid {
+    double centre_x, centre_y, centre_z;
+    double xx, xy, yx, yy, zz;
+    float block_reach;                     // length of M * (half diagonal of a block's cell centres), rounded up
+    std::array<float, 3> rim, span;        // p at the rim and centre minus rim, fade weight applied
+    int bx0, bx1, by0, by1, bz0, bz1;      // blocks that it can touch, half-open
+};
+
+// One ellipsoid seen from one block: what remains to be evaluated per cell.
+struct BlockEllipsoid {
+    float base_a, base_b, base_c;
+    float xx, xy, yx, yy, zz;
+    const FieldEllipsoid* source;
+};
+
+// What a block has to do for one draw.
+struct DrawPlan {
+    enum class Kind : std::uint8_t {
+        none,     // p = 0 everywhere
+        certain,  // p = 1 everywhere
+        uniform,  // p = background everywhere
+        varying,  // p from the ellipsoids, at most p_max
+    };
+    Kind kind = Kind::none;
+    float p_max = 0;
+};
+
+struct BlockPlan {
+    std::array<DrawPlan, 3> draws;
+    std::vector<BlockEllipsoid> ellipsoids;  // those that touch the block; capacity is reused
+};
+
+class BlockField {
+  public:
+    BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> ellipsoids);
+
+    const std::array<float, 3>& background() const { return background_; }
+    // False when no cell of the lattice can change by chance.
+    bool anything() const { return anything_; }
+    bool any_birth() const { return any_birth_; }
+    bool any_extinction() const { return any_extinction_; }
+    // The ellipsoids that can touch blocks with this by and bz.
+    void collect(int by, int bz, std::vector<const FieldEllipsoid*>& out) const;
+    // Fills `plan` for one block from the ellipsoids collected for its row of blocks.
+    void plan_block(int bx, int by, int bz, std::span<const FieldEllipsoid* const> row, BlockPlan& plan) const;
+
+  private:
+    void add(const AutomatonOptions& options, const ActiveEllipsoid& active, Vec3 shift_cells);
+
+    std::array<float, 3> background_{};
+    bool anything_ = false, any_birth_ = false, any_extinction_ = false;
+    std::vector<FieldEllipsoid> ellipsoids_;
+    std::vector<std::vector<std::uint32_t>> by_slab_;  // indices into ellipsoids_, rising
+};
+
+// p of one draw at offset (dx, dy, dz) cells inside the block, from one ellipsoid; see the file's head.
+inline float ellipsoid_probability(const BlockEllipsoid& e, int draw, float dx, float dy, float dz) {
+    const float a = e.base_a + (dx * e.xx + dy * e.xy);
+    const float b = e.base_b + (dx * e.yx + dy * e.yy);
+    const float c = e.base_c + dz * e.zz;
+    const float u2 = (a * a + b * b) + c * c;
+    const float s = 1.0f - u2 > 0.0f ? 1.0f - u2 : 0.0f;
+    return u2 < 1.0f ? e.source->rim[std::size_t(draw)] + e.source->span[std::size_t(draw)] * (s * s) : -1.0f;
+}
+
+// The same for all ellipsoids of the block and the background: the larger hum and act, the smaller ext.
+float probability_at(const BlockField& field, const BlockPlan& plan, int draw, int dx, int dy, int dz);
+
+}  // namespace nephos

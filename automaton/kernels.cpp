@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "automaton/kernels.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "automaton/kernels.cpp"
+#include <hwy/foreach_target.h>
+// foreach_target.h must come first
+#include <hwy/highway.h>
+
+#include "automaton/births-inl.h"
+#include "automaton/growth-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+
+void step_part_target(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
+    const int z0 = bz * kBlockEdge, z1 = std::min(z0 + kBlockEdge, planes.extent.z);
+    const int y0 = by_begin * kBlockEdge, y1 = std::min(by_end * kBlockEdge, planes.extent.y);
+    const bool quiet = !random.field->anything();
+    // Past the caches only where nothing is read again in this step, rows are whole vectors, and planes are large.
+    constexpr std::size_t kLargePlane = std::size_t{1} << 18;  // words: 2 MiB
+    const std::size_t words = planes.words_per_row * std::size_t(planes.extent.y) * std::size_t(planes.extent.z);
+    if (quiet && planes.words_per_row % kMaxLanes == 0 && words >= kLargePlane) {
+        grow<true>(planes, z0, z1, y0, y1);
+    } else {
+        grow<false>(planes, z0, z1, y0, y1);
+    }
+    if (!quiet) draw_part(planes, random, bz, by_begin, by_end);
+}
+
+const char* target_name() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephos {
+
+HWY_EXPORT(step_part_target);
+HWY_EXPORT(target_name);
+
+SparseTables::SparseTables(const std::array<float, 3>& p) {
+    for (std::size_t d = 0; d < 3; ++d) {
+        if (p[d] < kUniformSparseLimit) background[d] = make_poisson_table(double(p[d]));
+    }
+}
+
+void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
+    HWY_DYNAMIC_DISPATCH(step_part_target)(planes, random, bz, by_begin, by_end);
+}
+
+const char* kernel_target() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
+
+}  // namespace nephos
+#endif

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The step of a part of the lattice: growth, then extinction and birth (D), for some rows of blocks of one slab of
+// 8 layers. Vectorised with Highway and dispatched at run time; every target gives the same bits.
+//
+// hum and cld are updated in place, cell by cell; act is read around each cell and therefore written to a second
+// plane. Different parts may run in different threads: each writes only its own rows.
+
+#include <array>
+#include <cstdint>
+
+#include "automaton/block_field.h"
+#include "automaton/lattice.h"
+#include "automaton/poisson.h"
+
+namespace nephos {
+
+// The planes of one step; all have the same extent.
+struct StepPlanes {
+    Extent extent;
+    std::size_t words_per_row = 0;
+    Boundaries boundaries;
+    const std::uint64_t* act = nullptr;       // at time t
+    std::uint64_t* act_next = nullptr;        // at time t + 1; every word of the part is written
+    std::uint64_t* hum = nullptr;
+    std::uint64_t* cld = nullptr;
+    const std::uint64_t* zero_row = nullptr;  // words_per_row zeros with 64 bytes of zeros before and after
+};
+
+// Distributions that stay the same for a whole simulation.
+struct SparseTables {
+    explicit SparseTables(const std::array<float, 3>& background);
+    PoissonLadder ladder;
+    std::array<PoissonTable, 3> background;  // exactly the background's p; empty above the sparse limit
+};
+
+// Below these the sparse draw is used, from them on the dense one. Part of the random stream (docs/adr/0002).
+inline constexpr float kUniformSparseLimit = 0.125f;
+inline constexpr float kVaryingSparseLimit = float(kSparseLimit);
+
+// The chance of one step.
+struct StepRandom {
+    std::uint64_t seed = 0;
+    std::uint32_t step = 0;
+    const BlockField* field = nullptr;
+    const SparseTables* tables = nullptr;
+};
+
+// Rows of blocks by_begin..by_end of slab bz. Blocks are 8x8x8 cells; the last ones may be cut by the extent.
+void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end);
+
+// Names of the instruction sets that this machine can run, best first; for tests and reports.
+const char* kernel_target();
+
+// A probability as the integer that 32 random bits are compared with; p in 0..1. `kCertain` means always.
+inline constexpr std::uint32_t kCertain = 0xFFFFFFFFu;
+inline std::uint32_t probability_threshold(float p) {
+    return p >= 1.0f ? kCertain : std::uint32_t(std::int32_t(p * 0x1p31f)) << 1;
+}
+
+// -ln(1 - p) in float32 for 0 <= p <= kVaryingSparseLimit; relative error < 1e-6. Same operations in every kernel.
+inline float sparse_rate(float p) {
+    const float z = p / (2.0f - p);
+    const float z2 = z * z;
+    return (z + z) * (1.0f + z2 * (1.0f / 3.0f + z2 * (0.2f + z2 * (1.0f / 7.0f))));
+}
+
+}  // namespace nephos

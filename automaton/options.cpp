@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "automaton/options.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <string>
+
+#include "automaton/error.h"
+
+namespace nephos {
+namespace {
+
+void require(bool good, const std::string& message) {
+    if (!good) throw Error(ErrorCode::usage, message);
+}
+
+std::string number(double value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+}
+
+void require_finite(double value, const std::string& name) {
+    require(std::isfinite(value), name + " = " + number(value) + ": expected a finite number");
+}
+
+void check(const Probabilities& p, const std::string& name) {
+    const auto one = [&](double value, const char* part) {
+        require(value >= 0 && value <= 1, name + "." + part + " = " + number(value) + ": expected 0..1");
+    };
+    one(p.hum, "hum");
+    one(p.act, "act");
+    one(p.ext, "ext");
+}
+
+void check(const Range& r, const std::string& name) {
+    require(r.min <= r.max, name + " = " + number(r.min) + ".." + number(r.max) + ": expected min <= max");
+    require(r.min == r.max || (std::isfinite(r.min) && std::isfinite(r.max)), name + ": expected finite numbers");
+}
+
+void check_life(double birth_s, double life_s, double fade_in_s, double fade_out_s, const std::string& name) {
+    require_finite(birth_s, name + ".birth_s");
+    require(life_s > 0, name + ".life_s = " + number(life_s) + ": expected > 0 s");
+    require(fade_in_s >= 0 && std::isfinite(fade_in_s), name + ".fade_in_s: expected a finite number >= 0 s");
+    require(fade_out_s >= 0 && std::isfinite(fade_out_s), name + ".fade_out_s: expected a finite number >= 0 s");
+}
+
+// The images of an ellipsoid that a periodic axis repeats are all visited, so they must stay few.
+void check_semi_axis(double semi_axis_m, double box_m, bool periodic, const std::string& name) {
+    require(semi_axis_m > 0 && std::isfinite(semi_axis_m),
+            name + " = " + number(semi_axis_m) + ": expected a finite number > 0 m");
+    require(!periodic || semi_axis_m <= 16 * box_m,
+            name + " = " + number(semi_axis_m) + ": at most 16 times the length of a periodic axis");
+}
+
+void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& name) {
+    require_finite(e.centre_m.x, name + ".centre_m.x");
+    require_finite(e.centre_m.y, name + ".centre_m.y");
+    require_finite(e.centre_m.z, name + ".centre_m.z");
+    const double cell = o.placement.cell_size_m;
+    const bool periodic_xy = o.boundaries.x == Boundary::periodic || o.boundaries.y == Boundary::periodic;
+    const double shorter = std::min(o.extent.x, o.extent.y) * cell;
+    check_semi_axis(e.semi_axes_m.x, shorter, periodic_xy, name + ".semi_axes_m.x");
+    check_semi_axis(e.semi_axes_m.y, shorter, periodic_xy, name + ".semi_axes_m.y");
+    check_semi_axis(e.semi_axes_m.z, o.extent.z * cell, o.boundaries.z == Boundary::periodic, name + ".semi_axes_m.z");
+    require_finite(e.yaw_deg, name + ".yaw_deg");
+    check(e.centre, name + ".centre");
+    check(e.rim, name + ".rim");
+    check_life(e.birth_s, e.life_s, e.fade_in_s, e.fade_out_s, name);
+}
+
+void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::string& name) {
+    constexpr int kMaxCount = 100000;
+    require(s.count >= 0 && s.count <= kMaxCount, name + ".count = " + std::to_string(s.count) + ": expected 0..100000");
+    check(s.x_m, name + ".x_m");
+    check(s.y_m, name + ".y_m");
+    check(s.z_m, name + ".z_m");
+    check(s.semi_axis_x_m, name + ".semi_axis_x_m");
+    check(s.semi_axis_y_m, name + ".semi_axis_y_m");
+    check(s.semi_axis_z_m, name + ".semi_axis_z_m");
+    check(s.yaw_deg, name + ".yaw_deg");
+    check(s.birth_s, name + ".birth_s");
+    check(s.life_s, name + ".life_s");
+    for (bool largest : {false, true}) {  // both ends of every range make a valid ellipsoid
+        const auto end = [&](const Range& r) { return largest ? r.max : r.min; };
+        check(Ellipsoid{.centre_m = {end(s.x_m), end(s.y_m), end(s.z_m)},
+                        .semi_axes_m = {end(s.semi_axis_x_m), end(s.semi_axis_y_m), end(s.semi_axis_z_m)},
+                        .yaw_deg = end(s.yaw_deg),
+                        .centre = s.centre,
+                        .rim = s.rim,
+                        .birth_s = end(s.birth_s),
+                        .life_s = end(s.life_s),
+                        .fade_in_s = s.fade_in_s,
+                        .fade_out_s = s.fade_out_s},
+              o, name);
+    }
+}
+
+void check(const Wind& wind, const AutomatonOptions& o) {
+    for (std::size_t i = 0; i < wind.keyframes.size(); ++i) {
+        const WindKeyframe& key = wind.keyframes[i];
+        const std::string name = "wind[" + std::to_string(i) + "]";
+        require_finite(key.time_s, name + ".time_s");
+        require(i == 0 || key.time_s > wind.keyframes[i - 1].time_s, name + ".time_s: expected rising times");
+        require(!key.levels.empty(), name + ".levels: expected at least one level");
+        for (std::size_t l = 0; l < key.levels.size(); ++l) {
+            const WindLevel& level = key.levels[l];
+            const std::string level_name = name + ".levels[" + std::to_string(l) + "]";
+            require_finite(level.height_m, level_name + ".height_m");
+            require_finite(level.velocity.east_m_per_s, level_name + ".east_m_per_s");
+            require_finite(level.velocity.north_m_per_s, level_name + ".north_m_per_s");
+            require(l == 0 || level.height_m > key.levels[l - 1].height_m,
+                    level_name + ".height_m: expected rising heights");
+            // Linear mixing never exceeds the values it mixes: this covers every height and time.
+            displacement_of_step(level.velocity, o.time_step_s, o.placement.cell_size_m);
+        }
+    }
+}
+
+}  // namespace
+
+void check(const AutomatonOptions& o) {
+    for (int n : {o.extent.x, o.extent.y, o.extent.z}) {
+        require(n >= 1 && n <= kMaxExtent, "lattice extent " + std::to_string(n) + ": expected 1..65536 cells");
+    }
+    require(o.placement.cell_size_m > 0 && std::isfinite(o.placement.cell_size_m),
+            "cell_size_m = " + number(o.placement.cell_size_m) + ": expected a finite number > 0 m");
+    require_finite(o.placement.origin_m.x, "origin_m.x");
+    require_finite(o.placement.origin_m.y, "origin_m.y");
+    require_finite(o.placement.origin_m.z, "origin_m.z");
+    require(o.time_step_s > 0 && std::isfinite(o.time_step_s),
+            "time_step_s = " + number(o.time_step_s) + ": expected a finite number > 0 s");
+    check(o.field.background, "field.background");
+    for (std::size_t i = 0; i < o.field.ellipsoids.size(); ++i) {
+        check(o.field.ellipsoids[i], o, "field.ellipsoids[" + std::to_string(i) + "]");
+    }
+    for (std::size_t i = 0; i < o.field.scatters.size(); ++i) {
+        check(o.field.scatters[i], o, "field.scatters[" + std::to_string(i) + "]");
+    }
+    check(o.wind, o);
+}
+
+}  // namespace nephos

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// All randomness of nephos: Philox4x32-10 (Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3") as a
+// pure function of a key and a counter. Nothing here has state, so the numbers do not depend on threads, vector
+// width or the order of work. A counter is never used for two purposes; its layout is (docs/adr/0002):
+//
+//     word 0   bits  0-15 sub-index   16-23 draw   24-31 version of the stream
+//     word 1   step (lattice), generation (field), anything the domain defines
+//     word 2   block x | block y << 16 (lattice), index of the item (other domains)
+//     word 3   bits  0-15 block z (lattice) or group   16-31 domain
+//     key      the 64-bit seed, low word first
+
+#include <Random123/philox.h>
+
+#include <array>
+#include <cstdint>
+
+namespace nephos {
+
+// Changes whenever any bit of any golden hash changes on purpose (docs/adr/0002).
+inline constexpr std::uint32_t kRandomStreamVersion = 1;
+
+// Who draws. Domains never share counters.
+enum class Domain : std::uint32_t {
+    lattice = 0,        // extinction and birth
+    initial_state = 1,  // the first hum and act
+    field = 2,          // ellipsoids drawn at random
+    seeds = 3,          // clouds from base models
+    skies = 4,          // which clouds enter, and where
+};
+
+// What is drawn for a block of 8x8x8 cells. `counts` serves the other three: one counter a block and step.
+enum class Draw : std::uint32_t { counts = 0, hum = 1, act = 2, ext = 3 };
+
+using PhiloxWords = std::array<std::uint32_t, 4>;
+
+// One Philox4x32-10 output: 128 random bits. Thread-safe, pure.
+inline PhiloxWords philox(std::uint64_t seed, const PhiloxWords& counter) {
+    const r123::Philox4x32::ctr_type in = {{counter[0], counter[1], counter[2], counter[3]}};
+    const r123::Philox4x32::key_type key = {{std::uint32_t(seed), std::uint32_t(seed >> 32)}};
+    const auto out = r123::Philox4x32{}(in, key);
+    return {out.v[0], out.v[1], out.v[2], out.v[3]};
+}
+
+constexpr std::uint32_t counter_word_0(std::uint32_t draw, std::uint32_t sub_index) {
+    return sub_index | draw << 16 | kRandomStreamVersion << 24;
+}
+
+// Counter of a block of the lattice; blocks count in units of 8 cells.
+constexpr PhiloxWords block_counter(Domain domain, Draw draw, std::uint32_t step, int bx, int by, int bz,
+                                    std::uint32_t sub_index) {
+    return {counter_word_0(std::uint32_t(draw), sub_index), step, std::uint32_t(bx) | std::uint32_t(by) << 16,
+            std::uint32_t(bz) | std::uint32_t(domain) << 16};
+}
+
+// Counter of an item of another domain: item `index` of `group` (0..65535), drawn anew per `generation`.
+constexpr PhiloxWords item_counter(Domain domain, std::uint32_t group, std::uint32_t index,
+                                   std::uint32_t generation, std::uint32_t sub_index) {
+    return {counter_word_0(0, sub_index), generation, index, group | std::uint32_t(domain) << 16};
+}
+
+// A 32-bit word as a number in [0, 1).
+constexpr double unit_interval(std::uint32_t word) { return word * 0x1p-32; }
+
+}  // namespace nephos
