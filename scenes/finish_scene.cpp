@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// What concerns several sections of a scene.
+
+#include <algorithm>
+#include <cmath>
+
+#include "scenes/schema_sections.h"
+#include "scenes/text.h"
+
+namespace nephos {
+namespace {
+
+// The reader of a section below the scene, or of the scene itself when the file has no such section.
+SectionReader below(const SectionReader& reader, std::string_view name) {
+    const Entry* entry = reader.find(name);
+    if (entry == nullptr || entry->value.kind != Node::Kind::table) return reader;
+    return {reader.document, entry->value, std::string(name), {}};
+}
+
+void check_name(const SectionReader& reader, const Scene& scene) {
+    if (reader.find("name") == nullptr || !reader.sound({"name"})) return;
+    constexpr std::size_t kLongest = 100;
+    const auto allowed = [](char c) {
+        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+        return letter || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+    };
+    const std::string& name = scene.name;
+    const bool starts_well = !name.empty() && name.front() != '.' && name.front() != '-';
+    if (starts_well && name.size() <= kLongest && std::all_of(name.begin(), name.end(), allowed)) return;
+    reader.report("name", "`name` is \"" + shortened(name) + "\", which makes no file names",
+                  "expected 1 to 100 letters, digits, `-`, `_` or `.`, starting with none of `-` and `.`");
+}
+
+void check_wind(const SectionReader& reader, const Scene& scene) {
+    if (!reader.sound({"wind"})) return;
+    const auto& keyframes = scene.automaton.wind.keyframes;
+    for (std::size_t n = 1; n < keyframes.size(); ++n) {
+        if (keyframes[n].time_s > keyframes[n - 1].time_s) continue;
+        const Node& item = reader.find("wind")->value.items[n];
+        const SectionReader profile{reader.document, item, indexed("wind", n), {}};
+        profile.report("time_s", profile.quoted("time_s") + " is " + number_text(keyframes[n].time_s) +
+                                     ", not after the profile before it at " + number_text(keyframes[n - 1].time_s),
+                       "expected times that rise from profile to profile, in seconds");
+    }
+}
+
+// The displacement of one step is held as cells * 2^32 in 64 bits.
+void check_wind_speed(const SectionReader& reader, const Scene& scene) {
+    if (!reader.sound({"wind", "time", "lattice"})) return;
+    constexpr double kMostCells = 1 << 30;
+    double fastest = 0;
+    for (const WindKeyframe& keyframe : scene.automaton.wind.keyframes) {
+        for (const WindLevel& level : keyframe.levels) {
+            fastest = std::max({fastest, std::abs(level.velocity.east_m_per_s), std::abs(level.velocity.north_m_per_s)});
+        }
+    }
+    const double cells = fastest * scene.automaton.time_step_s / scene.automaton.placement.cell_size_m;
+    if (cells <= kMostCells) return;
+    reader.report("wind", "the wind moves " + number_text(cells) + " cells in one step",
+                  "expected at most " + number_text(kMostCells) +
+                      " cells: a shorter `time.step_s`, a larger `lattice.cell_size_m` or less wind");
+}
+
+void check_initial_state(const SectionReader& reader, const Scene& scene) {
+    const SectionReader lattice = below(reader, "lattice");
+    if (!reader.sound({"lattice"}) || !scene.initial_state_file || lattice.find("initial") == nullptr) return;
+    lattice.report("initial", "both `lattice.initial` and `lattice.initial_state` say how the box starts",
+                   "expected one of them");
+}
+
+void check_frames(const SectionReader& reader, const Scene& scene) {
+    if (!reader.sound({"time", "frames"})) return;
+    const SectionReader frames = below(reader, "frames");
+    const double end_s = simulated_time_s(scene);
+    const std::string simulated = number_text(end_s) + " s that `time.steps` = " + std::to_string(scene.steps) +
+                                  " and `time.step_s` = " + number_text(scene.automaton.time_step_s) + " simulate";
+    if (scene.frames.start_s > end_s) {
+        frames.report("start_s", "`frames.start_s` is " + number_text(scene.frames.start_s) + " s, after the " + simulated,
+                      "expected a start within the simulated time, or more steps");
+        return;
+    }
+    if (scene.frames.count == 0) {
+        if (frame_count(scene) < kMaxFrames) return;
+        frames.report("per_second", "the scene has more than " + std::to_string(kMaxFrames) + " frames",
+                      "expected a larger `frames.time_scale`, or a `frames.count`");
+        return;
+    }
+    const double last_s = frame_time_s(scene.frames, scene.frames.count - 1);
+    if (last_s <= end_s) return;
+    Scene all = scene;
+    all.frames.count = 0;
+    frames.report("count", "the last of the " + std::to_string(scene.frames.count) + " frames shows " + number_text(last_s) +
+                               " s, after the " + simulated,
+                  "expected `frames.count` up to " + std::to_string(frame_count(all)) + ", or more steps");
+}
+
+void replace_infinite(Range& range, double low, double size) {
+    if (std::isinf(range.min)) range = {low, low + size};
+}
+
+}  // namespace
+
+void finish_scene(const SectionReader& reader, void* owner) {
+    auto& scene = *static_cast<Scene*>(owner);
+    check_name(reader, scene);
+    check_wind(reader, scene);
+    check_wind_speed(reader, scene);
+    check_initial_state(reader, scene);
+    check_frames(reader, scene);
+    const Placement& placement = scene.automaton.placement;
+    for (EllipsoidScatter& scatter : scene.automaton.field.scatters) {
+        replace_infinite(scatter.x_m, placement.origin_m.x, scene.automaton.extent.x * placement.cell_size_m);
+        replace_infinite(scatter.y_m, placement.origin_m.y, scene.automaton.extent.y * placement.cell_size_m);
+        replace_infinite(scatter.z_m, placement.origin_m.z, scene.automaton.extent.z * placement.cell_size_m);
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The sections of a scene file; see schema.h. Internal to scenes/.
+
+#include "scenes/schema.h"
+
+namespace nephos {
+
+// Owner: Scene.
+const Section& lattice_section();
+const Section& time_section();
+const Section& field_section();
+const Section& density_section();
+const Section& frames_section();
+const Section& camera_section();
+const Section& sun_section();
+const Section& light_section();
+const Section& air_section();
+const Section& ground_section();
+
+// Owner: WindKeyframe.
+const Section& wind_section();
+
+// Checks of values that lie in several sections, and the defaults that depend on them; owner: Scene.
+void finish_scene(const SectionReader& reader, void* owner);
+
+}  // namespace nephos
