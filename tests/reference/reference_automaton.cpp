@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/reference/reference_automaton.h"
+
+#include <Random123/philox.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "automaton/block_field.h"
+#include "automaton/kernels.h"
+
+namespace nephos::reference {
+namespace {
+
+// Value of a cell that may lie outside: the boundary decides.
+std::uint8_t at(const std::vector<std::uint8_t>& plane, const Extent& e, const Boundaries& b, int i, int j, int k) {
+    const auto fold = [](int& n, int size, Boundary boundary) {
+        if (n >= 0 && n < size) return true;
+        n = ((n % size) + size) % size;
+        return boundary == Boundary::periodic;
+    };
+    if (!fold(i, e.x, b.x) || !fold(j, e.y, b.y) || !fold(k, e.z, b.z)) return 0;
+    return plane[linear_index(e, i, j, k)];
+}
+
+// The random 32-bit word `word` of counter (draw, step, block, sub): docs/adr/0002 in one line.
+std::uint32_t random_word(std::uint64_t seed, std::uint32_t draw, std::uint32_t step, int bx, int by, int bz,
+                          std::uint32_t sub, std::uint32_t word) {
+    const r123::Philox4x32::ctr_type counter = {
+        {sub + draw * 65536u + 1u * 16777216u, step, std::uint32_t(bx + by * 65536), std::uint32_t(bz)}};
+    const r123::Philox4x32::key_type key = {{std::uint32_t(seed & 0xFFFFFFFFu), std::uint32_t(seed >> 32)}};
+    return r123::Philox4x32{}(counter, key).v[word];
+}
+
+// Everything about one draw of one block.
+struct BlockDraw {
+    const AutomatonOptions& options;
+    const BlockField& field;
+    const SparseTables& tables;
+    std::uint32_t step;
+    int draw, bx, by, bz;
+    BlockPlan plan;
+
+    std::uint32_t word(std::uint32_t draw_id, std::uint32_t sub, std::uint32_t n) const {
+        return random_word(options.seed, draw_id, step, bx, by, bz, sub, n);
+    }
+    float p(int cell) const { return probability_at(field, plan, draw, cell % 8, cell / 8 % 8, cell / 64); }
+};
+
+// Which of the 512 cells have an event, as the sparse draw decides it.
+std::vector<bool> sparse_events(const BlockDraw& b, const PoissonTable& level, bool uniform) {
+    std::vector<bool> events(512, false);
+    const std::uint32_t uniform_word = b.word(0, 0, std::uint32_t(b.draw));
+    std::uint32_t count = 0;
+    for (std::uint32_t threshold : level.thresholds) count += threshold <= uniform_word ? 1 : 0;
+    for (std::uint32_t e = 0; e < count; ++e) {
+        const std::uint32_t w = b.word(std::uint32_t(b.draw) + 1, e / 4, e % 4);
+        const int cell = int(w % 512);
+        const float u = float(w / 512) + 0.5f;
+        if (uniform || u * (level.rate * 0x1p-23f) < sparse_rate(b.p(cell))) events[std::size_t(cell)] = true;
+    }
+    return events;
+}
+
+// ... and as the dense draw does.
+std::vector<bool> dense_events(const BlockDraw& b) {
+    std::vector<bool> events(512, false);
+    std::uint32_t ties = 0;
+    for (int cell = 0; cell < 512; ++cell) {
+        const std::uint32_t t = probability_threshold(b.p(cell));
+        const std::uint32_t random = b.word(std::uint32_t(b.draw) + 1, std::uint32_t(cell) / 16, std::uint32_t(cell) / 4 % 4);
+        const std::uint32_t byte = (random >> (cell % 4 * 8)) & 255u;
+        if (byte == t >> 24) {
+            const std::uint32_t more = b.word(std::uint32_t(b.draw) + 1, 32 + ties / 4, ties % 4) >> 8;
+            events[std::size_t(cell)] = t == kCertain || more < (t & 0xFFFFFFu);
+            ++ties;
+        } else {
+            events[std::size_t(cell)] = byte < t >> 24;
+        }
+    }
+    return events;
+}
+
+std::vector<bool> events_of(const BlockDraw& b) {
+    const DrawPlan& plan = b.plan.draws[std::size_t(b.draw)];
+    for (int cell = 0; cell < 512; ++cell) {
+        if (b.p(cell) > plan.p_max) throw std::logic_error("a cell exceeds the bound of its block");
+    }
+    switch (plan.kind) {
+        case DrawPlan::Kind::none: return std::vector<bool>(512, false);
+        case DrawPlan::Kind::certain: return std::vector<bool>(512, true);
+        case DrawPlan::Kind::uniform:
+            if (plan.p_max >= kUniformSparseLimit) return dense_events(b);
+            return sparse_events(b, b.tables.background[std::size_t(b.draw)], true);
+        case DrawPlan::Kind::varying: break;
+    }
+    if (plan.p_max >= kVaryingSparseLimit) return dense_events(b);
+    return sparse_events(b, b.tables.ladder.level(double(plan.p_max)), false);
+}
+
+}  // namespace
+
+Cells to_cells(BitPlaneView hum, BitPlaneView act, BitPlaneView cld) {
+    const Extent e = hum.extent;
+    Cells cells{e, {}, {}, {}};
+    for (int k = 0; k < e.z; ++k) {
+        for (int j = 0; j < e.y; ++j) {
+            for (int i = 0; i < e.x; ++i) {
+                cells.hum.push_back(hum.get(i, j, k));
+                cells.act.push_back(act.get(i, j, k));
+                cells.cld.push_back(cld.get(i, j, k));
+            }
+        }
+    }
+    return cells;
+}
+
+Lattice to_lattice(const Cells& cells) {
+    const Extent e = cells.extent;
+    Lattice lattice{BitPlane(e), BitPlane(e), BitPlane(e)};
+    for (int k = 0; k < e.z; ++k) {
+        for (int j = 0; j < e.y; ++j) {
+            for (int i = 0; i < e.x; ++i) {
+                const std::size_t n = linear_index(e, i, j, k);
+                lattice.hum.set(i, j, k, cells.hum[n] != 0);
+                lattice.act.set(i, j, k, cells.act[n] != 0);
+                lattice.cld.set(i, j, k, cells.cld[n] != 0);
+            }
+        }
+    }
+    return lattice;
+}
+
+Cells grow(const Cells& now, const Boundaries& b) {
+    Cells next = now;
+    const Extent e = now.extent;
+    for (int k = 0; k < e.z; ++k) {
+        for (int j = 0; j < e.y; ++j) {
+            for (int i = 0; i < e.x; ++i) {
+                const auto act = [&](int di, int dj, int dk) { return at(now.act, e, b, i + di, j + dj, k + dk); };
+                const std::uint8_t f_act = act(1, 0, 0) | act(-1, 0, 0) | act(0, 1, 0) | act(0, -1, 0) |
+                                           act(0, 0, 1) | act(0, 0, -1) | act(2, 0, 0) | act(-2, 0, 0) |
+                                           act(0, 2, 0) | act(0, -2, 0) | act(0, 0, -2);
+                const std::size_t n = linear_index(e, i, j, k);
+                next.hum[n] = now.hum[n] & (now.act[n] == 0 ? 1 : 0);
+                next.cld[n] = now.cld[n] | now.act[n];
+                next.act[n] = (now.act[n] == 0 ? 1 : 0) & now.hum[n] & f_act;
+            }
+        }
+    }
+    return next;
+}
+
+void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uint32_t step,
+                         const std::vector<ActiveEllipsoid>& ellipsoids) {
+    const BlockField field(options, ellipsoids);
+    const SparseTables tables(field.background());
+    const Extent e = options.extent;
+    for (int bz = 0; bz * 8 < e.z; ++bz) {
+        for (int by = 0; by * 8 < e.y; ++by) {
+            std::vector<const FieldEllipsoid*> row;
+            field.collect(by, bz, row);
+            for (int bx = 0; bx * 8 < e.x; ++bx) {
+                for (int draw = 0; draw < 3; ++draw) {
+                    BlockDraw b{options, field, tables, step, draw, bx, by, bz, {}};
+                    field.plan_block(bx, by, bz, row, b.plan);
+                    const std::vector<bool> events = events_of(b);
+                    for (int cell = 0; cell < 512; ++cell) {
+                        const int i = bx * 8 + cell % 8, j = by * 8 + cell / 8 % 8, k = bz * 8 + cell / 64;
+                        if (i >= e.x || j >= e.y || k >= e.z || !events[std::size_t(cell)]) continue;
+                        const std::size_t n = linear_index(e, i, j, k);
+                        if (draw == 0) cells.hum[n] = 1;  // hum' = hum | (rnd < p_hum)
+                        if (draw == 1) cells.act[n] = 1;  // act' = act | (rnd < p_act)
+                        if (draw == 2) cells.cld[n] = 0;  // cld' = cld & (rnd >= p_ext)
+                    }
+                }
+            }
+        }
+    }
+}
+
+void advect_layer(Cells& cells, const Boundaries& b, int k, std::int64_t dx, std::int64_t dy) {
+    const Extent e = cells.extent;
+    for (auto* plane : {&cells.hum, &cells.act, &cells.cld}) {
+        const std::vector<std::uint8_t> before = *plane;
+        for (int j = 0; j < e.y; ++j) {
+            for (int i = 0; i < e.x; ++i) {
+                std::int64_t from_i = i - dx, from_j = j - dy;
+                if (b.x == Boundary::periodic) from_i = ((from_i % e.x) + e.x) % e.x;
+                if (b.y == Boundary::periodic) from_j = ((from_j % e.y) + e.y) % e.y;
+                const bool inside = from_i >= 0 && from_i < e.x && from_j >= 0 && from_j < e.y;
+                (*plane)[linear_index(e, i, j, k)] =
+                    inside ? before[linear_index(e, int(from_i), int(from_j), k)] : std::uint8_t{0};
+            }
+        }
+    }
+}
+
+double probability(const AutomatonOptions& o, const std::vector<ActiveEllipsoid>& ellipsoids, int draw, int i, int j,
+                   int k) {
+    const auto pick = [draw](const Probabilities& p) { return draw == 0 ? p.hum : draw == 1 ? p.act : p.ext; };
+    const double cell = o.placement.cell_size_m;
+    const double x = o.placement.origin_m.x + (i + 0.5) * cell, y = o.placement.origin_m.y + (j + 0.5) * cell,
+                 z = o.placement.origin_m.z + (k + 0.5) * cell;
+    const double background = pick(o.field.background);
+    double result = background;
+    const auto images = [](Boundary b) { return b == Boundary::periodic ? 4 : 0; };
+    for (const ActiveEllipsoid& a : ellipsoids) {
+        const Ellipsoid& e = a.ellipsoid;
+        const double turn = e.yaw_deg * std::acos(-1.0) / 180;
+        for (int px = -images(o.boundaries.x); px <= images(o.boundaries.x); ++px) {
+            for (int py = -images(o.boundaries.y); py <= images(o.boundaries.y); ++py) {
+                for (int pz = -images(o.boundaries.z); pz <= images(o.boundaries.z); ++pz) {
+                    const double dx = x - e.centre_m.x - px * o.extent.x * cell;
+                    const double dy = y - e.centre_m.y - py * o.extent.y * cell;
+                    const double dz = z - e.centre_m.z - pz * o.extent.z * cell;
+                    const double u2 = std::pow((dx * std::cos(turn) + dy * std::sin(turn)) / e.semi_axes_m.x, 2) +
+                                      std::pow((dy * std::cos(turn) - dx * std::sin(turn)) / e.semi_axes_m.y, 2) +
+                                      std::pow(dz / e.semi_axes_m.z, 2);
+                    if (u2 >= 1) continue;
+                    const double p = pick(e.rim) + (pick(e.centre) - pick(e.rim)) * (1 - u2) * (1 - u2);
+                    const double faded = background + a.weight * (p - background);
+                    result = draw == 2 ? std::min(result, faded) : std::max(result, faded);
+                }
+            }
+        }
+    }
+    return result;
+}
+
+}  // namespace nephos::reference
