@@ -11,7 +11,7 @@ namespace nephos {
 enum class SmoothingKernel {
     box,       // 1
     tent,      // n0 + 1 - |n'|
-    gaussian,  // exp(-(n'/s)^2 / 2), s = (n0 + 0.5) / 2, as integers of 10 bits: sums stay exact
+    gaussian,  // exp(-(n'/s)^2 / 2), s = (n0 + 0.5) / 2, as whole numbers of at most 64: sums stay exact
 };
 
 // Stage 1 of D: the weighted mean of cld over |i'| <= i0, |j'| <= j0, |k'| <= k0, |t'| <= t0.
