@@ -80,6 +80,14 @@ Place place_of(const toml::source_region& region, int origin) {
     return {origin, int(region.begin.line), int(region.begin.column)};
 }
 
+// The parser's words, which start with "Error while parsing ...".
+std::string reason_of(const toml::parse_error& error) {
+    constexpr std::string_view kOpening = "Error while ";
+    std::string_view reason = error.description();
+    if (reason.starts_with(kOpening)) reason.remove_prefix(kOpening.size());
+    return printable(reason);
+}
+
 // Recursion is bounded by find_excessive_nesting().
 Node converted(const toml::node& source, int origin) {
     Node node;
@@ -151,9 +159,9 @@ void Document::report(const Place& place, std::string message, std::string expec
     problems.push_back({where, std::move(message), std::move(expected), excerpt.text, excerpt.caret});
 }
 
-std::optional<Node> Document::parse(int index) { return parse_text(index, origin(index).text); }
+std::optional<Node> Document::parse(int index) { return parse_text(index, origin(index).text, {}); }
 
-std::optional<Node> Document::parse_text(int index, std::string_view text) {
+std::optional<Node> Document::parse_text(int index, std::string_view text, const std::string& expected_value) {
     const Origin& from = origin(index);
     const auto fail_at = [&](std::size_t offset, std::string message, std::string expected) {
         report(place_of_offset(from, index, offset), std::move(message), std::move(expected));
@@ -171,7 +179,7 @@ std::optional<Node> Document::parse_text(int index, std::string_view text) {
     const toml::parse_result result = toml::parse(text, from.label);
     if (!result) {
         const toml::parse_error& error = result.error();
-        report(place_of(error.source(), index), "not valid TOML: " + printable(error.description()));
+        report(place_of(error.source(), index), "not valid TOML: " + reason_of(error), expected_value);
         return std::nullopt;
     }
     return converted(result.table(), index);

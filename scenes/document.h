@@ -59,6 +59,12 @@ struct Entry {
 // "a text", "an array", ...: the kind of a node in a message.
 std::string_view kind_name(Node::Kind kind);
 
+// What the value of an option is to be.
+struct KeyForm {
+    bool takes_text = false;  // a value that starts with no quote and no bracket is the text itself
+    std::string expected;     // "true or false"; empty: the key is not known
+};
+
 // The file, the options, and all problems found so far.
 class Document {
   public:
@@ -75,16 +81,16 @@ class Document {
     // too deeply), the problem is reported and the result is empty.
     std::optional<Node> parse(int origin);
 
-    // Puts "key.path=value" into root. `takes_text` says whether the key of this path (without indices) holds text:
-    // then a value that starts with no quote and no bracket is that text itself. Problems are reported.
-    void set(const std::string& option, bool (*takes_text)(const std::vector<std::string>& path));
+    // Puts "key.path=value" into root. `describe` says what is known of the key of this path (without indices).
+    // Problems are reported.
+    void set(const std::string& option, KeyForm (*describe)(const std::vector<std::string>& path));
 
   private:
     // `text` lies over the origin's text, so that a place in it is the same place in the origin.
-    std::optional<Node> parse_text(int origin, std::string_view text);
+    std::optional<Node> parse_text(int origin, std::string_view text, const std::string& expected);
 
     // The value of an option whose '=' stands at byte `equals`.
-    std::optional<Node> option_value(int origin, std::size_t equals, bool takes_text);
+    std::optional<Node> option_value(int origin, std::size_t equals, const KeyForm& form);
 
     std::deque<Origin> origins_;
 };

@@ -34,7 +34,9 @@ std::string headline(const Problem& problem) {
 }
 
 std::string message_of(const std::vector<Problem>& problems) {
-    return format(std::span<const Problem>(problems));
+    std::string text = format(std::span<const Problem>(problems));
+    text.pop_back();  // a message ends without a newline
+    return text;
 }
 
 SourcePosition first_place(const std::vector<Problem>& problems) {

@@ -35,7 +35,8 @@ std::string format(const Problem& problem);
 std::string format(std::span<const Problem> problems);
 
 // Everything that is wrong with a scene, in the order of the file and then of the options; never empty.
-// what() is format(problems()), where() the place of the first; the code is ErrorCode::usage.
+// what() is format(problems()) without the last newline, where() the place of the first; the code is
+// ErrorCode::usage.
 class SceneErrors : public Error {
   public:
     explicit SceneErrors(std::vector<Problem> problems);

@@ -61,6 +61,39 @@ void check_wind_speed(const SectionReader& reader, const Scene& scene) {
                       " cells: a shorter `time.step_s`, a larger `lattice.cell_size_m` or less wind");
 }
 
+// A periodic axis repeats an ellipsoid, and every image that reaches the box costs time.
+void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
+    if (!reader.sound({"lattice", "field"})) return;
+    constexpr double kMostBoxes = 16;
+    const AutomatonOptions& o = scene.automaton;
+    const double cell_m = o.placement.cell_size_m;
+    const bool horizontal = o.boundaries.x == Boundary::periodic || o.boundaries.y == Boundary::periodic;
+    const double unlimited = std::numeric_limits<double>::infinity();
+    const double most_xy_m = horizontal ? kMostBoxes * cell_m * std::min(o.extent.x, o.extent.y) : unlimited;
+    const double most_z_m = o.boundaries.z == Boundary::periodic ? kMostBoxes * cell_m * o.extent.z : unlimited;
+    const auto check_items = [&](const char* name, const char* x, const char* y, const char* z, auto sizes_of) {
+        const Entry* items = below(reader, "field").find(name);
+        for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n) {
+            const Vec3 sizes = sizes_of(n);
+            const SectionReader item{reader.document, items->value.items[n], indexed(std::string("field.") + name, n), {}};
+            const auto check_one = [&](const char* key, double size_m, double most_m) {
+                if (size_m <= most_m) return;
+                item.report(key, item.quoted(key) + " reaches " + number_text(size_m) + " m along a periodic axis",
+                            "expected at most " + number_text(most_m) + " m, 16 times the lattice");
+            };
+            check_one(x, sizes.x, most_xy_m);
+            check_one(y, sizes.y, most_xy_m);
+            check_one(z, sizes.z, most_z_m);
+        }
+    };
+    check_items("ellipsoids", "semi_axes_m", "semi_axes_m", "semi_axes_m",
+                [&](std::size_t n) { return o.field.ellipsoids[n].semi_axes_m; });
+    check_items("scatters", "semi_axis_x_m", "semi_axis_y_m", "semi_axis_z_m", [&](std::size_t n) {
+        const EllipsoidScatter& scatter = o.field.scatters[n];
+        return Vec3{scatter.semi_axis_x_m.max, scatter.semi_axis_y_m.max, scatter.semi_axis_z_m.max};
+    });
+}
+
 void check_initial_state(const SectionReader& reader, const Scene& scene) {
     const SectionReader lattice = below(reader, "lattice");
     if (!reader.sound({"lattice"}) || !scene.initial_state_file || lattice.find("initial") == nullptr) return;
@@ -105,6 +138,7 @@ void finish_scene(const SectionReader& reader, void* owner) {
     check_name(reader, scene);
     check_wind(reader, scene);
     check_wind_speed(reader, scene);
+    check_periodic_sizes(reader, scene);
     check_initial_state(reader, scene);
     check_frames(reader, scene);
     const Placement& placement = scene.automaton.placement;

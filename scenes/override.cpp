@@ -78,11 +78,11 @@ std::string items_text(std::size_t count) {
 
 }  // namespace
 
-std::optional<Node> Document::option_value(int index, std::size_t equals, bool takes_text) {
+std::optional<Node> Document::option_value(int index, std::size_t equals, const KeyForm& form) {
     const std::string_view option = origin(index).text;
     const std::string_view text = trimmed(option.substr(equals + 1));
     const bool bare = !text.empty() && std::string_view("\"'[{").find(text.front()) == std::string_view::npos;
-    if (bare && takes_text) {
+    if (bare && form.takes_text) {
         Node value;
         value.kind = Node::Kind::text;
         value.text = text;
@@ -95,14 +95,14 @@ std::optional<Node> Document::option_value(int index, std::size_t equals, bool t
     std::string over(equals - 1, ' ');
     over += 'v';
     over += option.substr(equals);
-    std::optional<Node> parsed = parse_text(index, over);
+    std::optional<Node> parsed = parse_text(index, over, form.expected.empty() ? form.expected : "expected " + form.expected);
     if (!parsed) return std::nullopt;
     if (parsed->entries.size() == 1) return std::move(parsed->entries.front().value);
     report({index, 1, int(equals) + 2}, "the option holds more than one value");
     return std::nullopt;
 }
 
-void Document::set(const std::string& option, bool (*takes_text)(const std::vector<std::string>& path)) {
+void Document::set(const std::string& option, KeyForm (*describe)(const std::vector<std::string>& path)) {
     const int index = add_origin("--set " + shortened(option, 100), option, false);
     const ParsedPath path = parse_path(origin(index).text);
     if (path.error_column > 0) {
@@ -113,7 +113,7 @@ void Document::set(const std::string& option, bool (*takes_text)(const std::vect
     for (const PathStep& step : path.steps) {
         if (!step.name.empty()) names.push_back(step.name);
     }
-    std::optional<Node> value = option_value(index, path.equals, takes_text(names));
+    std::optional<Node> value = option_value(index, path.equals, describe(names));
     if (!value) return;
 
     Node* node = &root;

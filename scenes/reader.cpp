@@ -143,11 +143,12 @@ class SceneReader {
     Document& document_;
 };
 
-bool takes_text(const std::vector<std::string>& path) {
+KeyForm describe(const std::vector<std::string>& path) {
     const Key* key = find_key(path);
-    if (key == nullptr) return false;
-    return key->kind == KeyKind::text || key->kind == KeyKind::path || key->kind == KeyKind::word ||
-           key->kind == KeyKind::boundaries;
+    if (key == nullptr) return {};
+    const bool takes_text = key->kind == KeyKind::text || key->kind == KeyKind::path ||
+                            key->kind == KeyKind::word || key->kind == KeyKind::boundaries;
+    return {takes_text, expected_text(*key)};
 }
 
 // Only letters that every file system takes.
@@ -180,16 +181,27 @@ void resolve_initial_state(Scene& scene, const Document& document, const std::fi
     throw SceneErrors(std::move(problems));
 }
 
+// A problem of the file as a whole.
+[[noreturn]] void throw_problem(const std::string& label, std::string message, std::string expected) {
+    Problem problem;
+    problem.where.file = label;
+    problem.message = std::move(message);
+    problem.expected = std::move(expected);
+    std::vector<Problem> problems;
+    problems.push_back(std::move(problem));
+    throw SceneErrors(std::move(problems));
+}
+
 std::string read_text_file(const std::filesystem::path& path) {
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
-        throw Error(ErrorCode::io, path.string() + ": is a folder, expected a scene in TOML", {path.string(), 0, 0});
+        throw Error(ErrorCode::io, path.string() + ": is a folder, expected a scene in TOML");
     }
     errno = 0;
     std::ifstream file(path, std::ios::binary);
     const auto failed = [&] {
         const std::string reason = errno != 0 ? std::strerror(errno) : "unknown error";
-        return Error(ErrorCode::io, path.string() + ": cannot read the scene: " + reason, {path.string(), 0, 0});
+        return Error(ErrorCode::io, path.string() + ": cannot read the scene: " + reason);
     };
     if (!file) throw failed();
     std::string text(kMaxSceneBytes + 1, '\0');
@@ -208,9 +220,8 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
 Scene read_scene_text(std::string_view text, const std::string& label, const std::filesystem::path& folder,
                       std::span<const std::string> overrides) {
     if (text.size() > kMaxSceneBytes) {
-        throw SceneErrors({{{label, 0, 0},
-                            "the file is larger than " + std::to_string(kMaxSceneBytes >> 20) + " MiB",
-                            "expected a scene in TOML", {}, 0}});
+        throw_problem(label, "the file is larger than " + std::to_string(kMaxSceneBytes >> 20) + " MiB",
+                      "expected a scene in TOML");
     }
     Document document;
     const int file = document.add_origin(label, std::string(text), true);
@@ -221,7 +232,7 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
         document.root = std::move(*root);
     }
     const bool readable = document.problems.empty();
-    for (const std::string& option : overrides) document.set(option, &takes_text);
+    for (const std::string& option : overrides) document.set(option, &describe);
     if (!readable) throw_problems(std::move(document.problems));
 
     Scene scene;
@@ -229,6 +240,11 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
     if (!document.problems.empty()) throw_problems(std::move(document.problems));
     if (document.root.find("name") == nullptr) scene.name = name_from(label);
     resolve_initial_state(scene, document, folder);
+    try {
+        check(scene.automaton);  // what this reader overlooked would otherwise pass validation and fail in the run
+    } catch (const Error& error) {
+        throw_problem(label, error.what(), {});
+    }
     return scene;
 }
 

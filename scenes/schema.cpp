@@ -23,7 +23,11 @@ std::string numbers_text(const Key& key, std::string_view what) {
     std::string out(what);
     if (!limits.empty()) out += " " + limits;
     if (key.limits.infinite) out += " or inf";
-    if (!key.unit.empty()) out += ", in " + unit_text(key.unit);
+    if (key.unit == "per step") {
+        out += ", a probability per step";
+    } else if (!key.unit.empty()) {
+        out += ", in " + unit_text(key.unit);
+    }
     return out;
 }
 
@@ -98,7 +102,6 @@ std::string unit_text(std::string_view unit) {
     if (unit == "1/s") return "1/second";
     if (unit == "m/s") return "metres per second";
     if (unit == "s/s") return "simulated seconds per second of film";
-    if (unit == "per step") return "probability per step";
     return std::string(unit);
 }
 

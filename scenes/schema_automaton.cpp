@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sections that decide the bits: lattice, time, field and wind.
 
+#include "automaton/air_parcels.h"
 #include "scenes/schema_build.h"
 #include "scenes/schema_sections.h"
 #include "scenes/text.h"
@@ -64,8 +65,8 @@ void finish_scatter(const SectionReader& reader, void* owner) {
     check_fades(reader, scatter.fade_in_s + scatter.fade_out_s, scatter.life_s.min);
 }
 
-const char* const kCentreEffect = "Probabilities at the centre; towards the rim they change smoothly.";
-const char* const kRimEffect = "Probabilities at the rim.";
+const char* const kCentreEffect = "Probabilities at the centre, as `[field.background]`; towards the rim they change smoothly.";
+const char* const kRimEffect = "Probabilities at the rim, as `[field.background]`.";
 const char* const kCarriedEffect = "Whether it moves with the wind at its centre's height; otherwise it stands still.";
 
 const Section& ellipsoid_section() {
@@ -129,27 +130,11 @@ const Section& scatter_section() {
     return section;
 }
 
-// Where the wind comes from, clockwise from north, as velocity. Polynomials instead of the library's functions:
-// the same bits on every machine, because the velocity decides the bits of the simulation.
+// The wind that comes from a direction, clockwise from north. sin_cos_deg() has the same bits on every machine,
+// which matters because the velocity decides the bits of the simulation.
 Velocity velocity_from(double from_deg, double speed_m_per_s) {
-    constexpr double kRadiansPerDegree = 0.017453292519943295;
-    double quarter = from_deg / 90.0;
-    const auto quarters = static_cast<long long>(quarter < 0 ? quarter - 0.5 : quarter + 0.5);
-    const double x = (from_deg - double(quarters) * 90.0) * kRadiansPerDegree;  // within 45 degrees
-    const double xx = x * x;
-    double sine = 0, cosine = 0;
-    for (int n = 9; n >= 1; --n) {  // Taylor's series in Horner's form; the remainder is below 1e-19
-        sine = (1.0 - sine) * xx / double((2 * n) * (2 * n + 1));
-        cosine = (1.0 - cosine) * xx / double((2 * n - 1) * (2 * n));
-    }
-    sine = x * (1.0 - sine);
-    cosine = 1.0 - cosine;
-    for (long long turn = ((quarters % 4) + 4) % 4; turn > 0; --turn) {
-        const double old_sine = sine;
-        sine = cosine;
-        cosine = -old_sine;
-    }
-    return {-speed_m_per_s * sine + 0.0, -speed_m_per_s * cosine + 0.0};  // + 0.0: no negative zero
+    const SinCos from = sin_cos_deg(from_deg);
+    return {0.0 - speed_m_per_s * from.sin, 0.0 - speed_m_per_s * from.cos};
 }
 
 void finish_level(const SectionReader& reader, void* owner) {

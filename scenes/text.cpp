@@ -75,9 +75,14 @@ std::string shortened(std::string_view text, std::size_t limit) {
 std::string number_text(double value) {
     if (std::isnan(value)) return "nan";
     if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
+    constexpr double kLargestPlain = 1e15, kSmallestPlain = 1e-4;  // beyond, an exponent reads better
+    const double size = std::abs(value);
+    const bool plain = size < kLargestPlain && (size >= kSmallestPlain || size == 0);
     char buffer[32];
-    const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
-    return std::string(buffer, end);
+    char* const limit = buffer + sizeof buffer;
+    const auto end = plain ? std::to_chars(buffer, limit, value, std::chars_format::fixed)
+                           : std::to_chars(buffer, limit, value);
+    return std::string(buffer, end.ptr);
 }
 
 std::string toml_number(double value) {
