@@ -313,10 +313,9 @@ class TilePass {
     // The X row of source row (j, k): expand, sum over t', sum over i'. Returns false when it is all 0.
     bool x_row(int j, int k, T* out) {
         const Tag<T> d;
-        // Only whole vectors around the tile are expanded: `margin` cells on each side.
-        const int lanes = int(hn::Lanes(d));
-        const int margin = std::max(8, (i0_ + lanes - 1) / lanes * lanes);
-        const int from = kWord - (i0_ ? margin : 0);
+        // Around the tile only whole vectors and whole bytes of bits are expanded.
+        const int step = std::max(8, int(hn::Lanes(d)));
+        const int from = kWord - (i0_ + step - 1) / step * step;
         const int count = width_ + 2 * (kWord - from);
         bool any = false;
         for (std::size_t n = 0; n < plan_.planes.size(); ++n) {
