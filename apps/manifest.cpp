@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/manifest.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "apps/version.h"
+#include "automaton/error.h"
+#include "automaton/random.h"
+
+namespace nephos {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormatVersion = 1;
+
+Json vector_json(const Vec3& v) { return {v.x, v.y, v.z}; }
+
+// A path below the run's folder, with forward slashes.
+std::string relative(const RunSettings& settings, const std::filesystem::path& path) {
+    return path.lexically_relative(settings.folder).generic_string();
+}
+
+Json frames_json(const RunSettings& settings, const ManifestState& state, const RunFolder& folder) {
+    const FrameOptions& frames = settings.scene.frames;
+    Json list = Json::array();
+    for (const FrameRecord& frame : state.frames) {
+        Json entry = {{"number", frame.number},
+                      {"time_s", frame.time_s},
+                      {"step", frame.step},
+                      {"state_hash", frame.state_hash},
+                      {"density", relative(settings, folder.density(frame.number))}};
+        if (settings.render && (frames.png || frames.video)) {
+            entry["png"] = relative(settings, folder.picture(frame.number, ".png"));
+        }
+        if (settings.render && frames.exr) entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
+        list.push_back(std::move(entry));
+    }
+    return list;
+}
+
+Json bounds_json(const Scene& scene) {
+    const AutomatonOptions& automaton = scene.automaton;
+    const int refine = scene.density.refine;
+    const Placement& at = automaton.placement;
+    const Extent& cells = automaton.extent;
+    return {{"voxels", {cells.x * refine, cells.y * refine, cells.z * refine}},
+            {"voxel_size_m", at.cell_size_m / refine},
+            {"min_m", vector_json(at.origin_m)},
+            {"max_m",
+             {at.origin_m.x + cells.x * at.cell_size_m, at.origin_m.y + cells.y * at.cell_size_m,
+              at.origin_m.z + cells.z * at.cell_size_m}},
+            {"up_axis", "z"},
+            {"extinction_per_m", scene.density.extinction_per_m}};
+}
+
+}  // namespace
+
+std::string manifest_text(const RunSettings& settings, const ManifestState& state) {
+    const Scene& scene = settings.scene;
+    const RunFolder folder{settings.folder, scene.name};
+    Json json;
+    json["format"] = "nephos run";
+    json["format_version"] = kFormatVersion;
+    json["nephos_version"] = version();
+    json["random_stream_version"] = kRandomStreamVersion;
+    json["complete"] = state.complete;
+    json["scene"] = {{"name", scene.name},
+                     {"file", settings.scene_file},
+                     {"hash", settings.scene_hash},
+                     {"simulation_hash", settings.simulation_hash},
+                     {"seed", std::to_string(scene.automaton.seed)}};
+    json["range"] = {{"last_step", settings.range.last_step},
+                     {"first_frame", settings.range.first_frame},
+                     {"last_frame", settings.range.last_frame},
+                     {"pictures", settings.render}};
+    json["steps"] = {{"reported", state.steps_reported},
+                     {"time_step_s", scene.automaton.time_step_s},
+                     {"state_hash", state.state_hash}};
+    json["bounds"] = bounds_json(scene);
+    json["files"] = {{"statistics", relative(settings, folder.statistics())},
+                     {"checkpoint", relative(settings, folder.checkpoint())}};
+    if (state.complete && settings.render && scene.frames.video) {
+        json["files"]["video"] = relative(settings, folder.video());
+    }
+    json["frames_per_second"] = scene.frames.per_second;
+    json["frames"] = frames_json(settings, state, folder);
+    json["scene_text"] = settings.scene_text;
+    json["timing"] = {{"wall_s", state.wall_s}, {"device", state.device}};
+    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+EarlierRun read_manifest(const std::filesystem::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    if (!stream) throw Error(ErrorCode::io, path.string() + ": cannot open: " + std::strerror(errno));
+    try {
+        const Json json = Json::parse(stream);
+        if (json.at("format") != "nephos run" || json.at("format_version") != kFormatVersion) {
+            throw Error(ErrorCode::io, path.string() + ": is not a manifest of this version of nephos");
+        }
+        EarlierRun run;
+        run.complete = json.at("complete").get<bool>();
+        run.name = json.at("scene").at("name").get<std::string>();
+        run.scene_hash = json.at("scene").at("hash").get<std::string>();
+        run.simulation_hash = json.at("scene").at("simulation_hash").get<std::string>();
+        run.render = json.at("range").at("pictures").get<bool>();
+        run.range.last_step = json.at("range").at("last_step").get<std::uint64_t>();
+        run.range.first_frame = json.at("range").at("first_frame").get<int>();
+        run.range.last_frame = json.at("range").at("last_frame").get<int>();
+        run.steps_reported = json.at("steps").at("reported").get<std::uint64_t>();
+        return run;
+    } catch (const nlohmann::json::exception&) {
+        throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// From a scene to its frames, without files, devices or a command line:
+//
+//     automaton step -> history of the last states -> density q at steps -> frames between steps
+//
+// q at step s needs the states s-t0 .. s+t0, and a frame between two steps needs q at both. The history keeps
+// exactly the states that something still needs; so the automaton runs up to t0 steps ahead of the results, also
+// beyond the scene's last step. A frame therefore never depends on where the run ends.
+//
+//     Pipeline pipeline(scene, simulation_hash);
+//     while (!pipeline.finished()) pipeline.advance(sink);
+//
+// Between any two calls of advance() the pipeline can be saved; one that is restored goes on with the same results.
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "automaton/automaton.h"
+#include "automaton/checkpoint.h"
+#include "density/density_grid.h"
+#include "density/statistics.h"
+#include "scenes/scene.h"
+
+namespace nephos {
+
+// One row of statistics.csv: the state after `step` steps.
+struct StepResult {
+    std::uint64_t step = 0;
+    double time_s = 0;
+    CloudStatistics statistics;  // mean_density is that of q at this step
+    StateHash hash;
+};
+
+// One frame: density at a moment that need not be a step.
+struct FrameResult {
+    int number = 1;          // as in file names, counted from 1
+    double time_s = 0;
+    DensityGrid density;     // one voxel a cell (not refined)
+    std::uint64_t step = 0;  // the last step at or before time_s, whose state the three planes and the hash are
+    StateHash hash;
+    std::optional<BitPlaneView> hum, act, cld;  // only when the scene writes the state; valid during the call
+};
+
+// Receives results in the order of time; a step comes before the frames at or after it.
+class PipelineSink {
+  public:
+    virtual ~PipelineSink() = default;
+    virtual void step(const StepResult& result) = 0;
+    virtual void frame(const FrameResult& result) = 0;
+};
+
+// Which part of the scene is produced. Frames by their number, counted from 1; an empty range (last < first) means
+// no frame at all.
+struct PipelineRange {
+    std::uint64_t last_step = 0;  // steps 0..last_step are reported
+    int first_frame = 1, last_frame = 0;
+    bool operator==(const PipelineRange&) const = default;
+};
+
+// Everything that the scene names; with a range of frames, these and the steps up to the last of them.
+// Throws Error(usage) when the scene has no such frame.
+PipelineRange full_range(const Scene& scene);
+PipelineRange range_of_frames(const Scene& scene, int first, int last);
+
+// A moment in steps: `step` <= moment < step + 1, `fraction` the rest. A moment within 1e-9 of a step is that step:
+// products and quotients of decimal fractions seldom meet it exactly.
+struct Moment {
+    std::uint64_t step = 0;
+    double fraction = 0;
+};
+Moment moment_of(double time_s, double time_step_s);
+
+class Pipeline {
+  public:
+    // At step 0: from the scene's own initial state, or from `initial`. Throws as Automaton.
+    Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
+             std::optional<Lattice> initial = {});
+    // Where `checkpoint` was saved. Throws Error(usage) when it belongs to another simulation, another smoothing
+    // window or another range; Error(io) when its content is damaged.
+    Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
+             const Checkpoint& checkpoint);
+
+    bool finished() const;
+
+    // Does the smallest piece of work that is due: reports one step or one frame, or lets the automaton take a step.
+    // Precondition: not finished().
+    void advance(PipelineSink& sink);
+
+    Checkpoint save() const;
+
+    std::uint64_t steps_taken() const { return automaton_.steps(); }
+    std::uint64_t next_step() const { return next_step_; }  // the first that was not reported yet
+    int next_frame() const { return next_frame_; }          // the first that was not reported yet
+    // Steps that the automaton takes in all, those ahead included.
+    std::uint64_t steps_in_all() const;
+
+    // Bytes that a pipeline for this scene may hold at most, renderer and files not included.
+    static std::size_t memory_bytes(const Scene& scene);
+
+  private:
+    // A past state, as much of it as is still needed.
+    struct Past {
+        std::uint64_t step = 0;
+        CloudStatistics statistics;
+        StateHash hash;
+        BitPlane cld;
+        BitPlane hum, act;  // empty unless the scene writes the state
+    };
+
+    void remember();
+    void forget();
+    bool density_is_due(std::uint64_t step) const;
+    DensityGrid density_at_step(std::uint64_t step);
+    const Past& past(std::uint64_t step) const;
+    void report_step(PipelineSink& sink);
+    void report_frame(PipelineSink& sink);
+    Moment moment_of_frame(int number) const;
+    std::uint64_t lowest_needed() const;
+    void restore_history(const Checkpoint& checkpoint);
+
+    Scene scene_;
+    PipelineRange range_;
+    std::string simulation_hash_;
+    Automaton automaton_;
+    std::deque<Past> history_;  // consecutive steps, the newest last; never empty
+    std::vector<std::pair<std::uint64_t, DensityGrid>> densities_;  // q at steps that are still needed
+    std::uint64_t next_step_ = 0;
+    int next_frame_ = 1;
+};
+
+}  // namespace nephos

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// nephos render: a picture of any fog volume.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "apps/arguments.h"
+#include "apps/commands.h"
+#include "apps/framing.h"
+#include "apps/memory.h"
+#include "apps/terminal.h"
+#include "apps/version.h"
+#include "automaton/error.h"
+#include "density/metaballs.h"
+#include "density/vdb_file.h"
+#include "render/image_file.h"
+#include "render/renderer.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kFar_m = 1e9;
+
+struct RenderArguments {
+    std::string file;
+    std::vector<std::string> out;
+    VdbReadOptions read;
+    SceneArguments scene;
+    View view = View::side;
+    std::optional<Vec3> camera_m, target_m;
+    std::optional<double> fov_deg, exposure_ev, extinction_per_m, albedo, g;
+    std::optional<std::pair<double, double>> sun_deg;
+    std::optional<std::pair<int, int>> size;
+    std::string device;
+    WorkArguments work;
+};
+
+std::string extension_of(const std::string& path) {
+    std::string extension = std::filesystem::path(path).extension().string();
+    for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
+    return extension;
+}
+
+void add_picture_options(CLI::App& command, RenderArguments& a) {
+    const char* group = "Picture";
+    command.add_option("--scene", a.scene.file, "Take camera, sun, air, ground and extinction from a scene")
+        ->type_name("SCENE")
+        ->group(group);
+    command.add_option("--set", a.scene.overrides, "Change a key of that scene; may be repeated")
+        ->type_name("KEY=VALUE")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->needs(command.get_option("--scene"))
+        ->group(group);
+    const auto real = [&](const char* name, const char* type, const char* text, std::optional<double>& target,
+                          double min, double max) {
+        add_value(command, name, type, text, [&target, min, max](const std::string& value) {
+            target = parse_real(value, min, max);
+        })->group(group);
+    };
+    add_value(command, "--size", "WxH", "Width and height in pixels (default: 1280x720)",
+              [&](const std::string& text) { a.size = parse_size(text); })
+        ->group(group);
+    add_value(command, "--view", "VIEW", "Where to look from: side, below or above (default: side)",
+              [&](const std::string& text) {
+                  if (text != "side" && text != "below" && text != "above") {
+                      throw Error(ErrorCode::usage, fmt::format("'{}' is not one of side, below and above", text));
+                  }
+                  a.view = text == "side" ? View::side : text == "below" ? View::below : View::above;
+              })
+        ->group(group);
+    add_value(command, "--camera", "X,Y,Z", "Position of the eye in metres, instead of --view",
+              [&](const std::string& text) { a.camera_m = parse_point(text, -kFar_m, kFar_m); })
+        ->group(group);
+    add_value(command, "--target", "X,Y,Z", "Point to look at in metres (default: middle of the cloud)",
+              [&](const std::string& text) { a.target_m = parse_point(text, -kFar_m, kFar_m); })
+        ->group(group);
+    real("--fov", "DEG", "Vertical field of view, 1 to 170 degrees (default: 50)", a.fov_deg, 1, 170);
+    real("--exposure", "EV", "Stops by which the PNG is brighter, -20 to 20 (default: 0)", a.exposure_ev, -20, 20);
+    add_value(command, "--sun", "ELEV,AZIM",
+              "Where the sun stands: degrees above the horizon (-18 to 90), and clockwise from north (default: 40,135)",
+              [&](const std::string& text) {
+                  const std::vector<double> sun = parse_reals(text, 2, -360, 360);
+                  if (sun[0] < -18 || sun[0] > 90) {
+                      throw Error(ErrorCode::usage, fmt::format("'{}': the elevation is not from -18 to 90", text));
+                  }
+                  a.sun_deg = {sun[0], sun[1]};
+              })
+        ->group(group);
+}
+
+void add_cloud_options(CLI::App& command, RenderArguments& a) {
+    const char* group = "Cloud";
+    command.add_option("--grid", a.read.grid, "Grid to draw (default: density, else the first float grid)")
+        ->type_name("NAME")
+        ->group(group);
+    const auto real = [&](const char* name, const char* type, const char* text, std::optional<double>& target,
+                          double min, double max) {
+        add_value(command, name, type, text, [&target, min, max](const std::string& value) {
+            target = parse_real(value, min, max);
+        })->group(group);
+    };
+    real("--extinction", "PER_M",
+         "Extinction per metre at density 1 (default: what the file says, else chosen so that the cloud is visible)",
+         a.extinction_per_m, 0, 1e9);
+    add_value(command, "--up", "AXIS", "Axis of the file that points up: z or y (default: what the file says, else z)",
+              [&](const std::string& text) {
+                  if (text != "y" && text != "z") {
+                      throw Error(ErrorCode::usage, fmt::format("'{}' is not one of y and z", text));
+                  }
+                  a.read.up_axis = text == "y" ? UpAxis::y : UpAxis::z;
+              })
+        ->group(group);
+    add_value(command, "--scale", "M", "Metres of one unit of the file (default: 1)",
+              [&](const std::string& text) { a.read.metres_per_unit = parse_real(text, 1e-9, 1e9); })
+        ->group(group);
+    real("--albedo", "A", "Part of the light that is scattered and not absorbed, 0 to 1 (default: 1)", a.albedo, 0, 1);
+    real("--g", "G", "Forward scattering of light, -0.99 to 0.99 (default: 0.5)", a.g, -0.99, 0.99);
+}
+
+// What the picture is drawn with: the scene's options, or defaults that fit the cloud, changed by the command line.
+RenderOptions picture_options(const RenderArguments& a, const std::optional<Scene>& scene, const DensityGrid& grid) {
+    RenderOptions options;
+    const WorldBox box = cloud_box(grid);
+    if (scene) {
+        options = scene->render;
+    } else {
+        options.camera.width = 1280;
+        options.camera.height = 720;
+        options.ground.height_m = ground_below(box);
+    }
+    if (a.size) std::tie(options.camera.width, options.camera.height) = *a.size;
+    if (a.fov_deg) options.camera.vertical_fov_deg = *a.fov_deg;
+    if (a.exposure_ev) options.camera.exposure_ev = *a.exposure_ev;
+    if (a.sun_deg) std::tie(options.sun.elevation_deg, options.sun.azimuth_deg) = *a.sun_deg;
+    if (a.albedo) options.light.albedo = *a.albedo;
+    if (a.g) options.light.g = *a.g;
+    if (!scene) frame(options.camera, box, a.view, options.ground.height_m);
+    if (a.camera_m) options.camera.position_m = *a.camera_m;
+    if (a.target_m) options.camera.target_m = *a.target_m;
+    if (options.camera.position_m == options.camera.target_m) {
+        throw Error(ErrorCode::usage, "--camera and --target are the same point");
+    }
+    return options;
+}
+
+int render(const RenderArguments& a) {
+    for (const std::string& out : a.out) {
+        if (extension_of(out) != ".png" && extension_of(out) != ".exr") {
+            throw Error(ErrorCode::usage, fmt::format("--out '{}' does not end with .png or .exr", out));
+        }
+    }
+    const ThreadLimit limit(a.work.threads);
+    std::optional<Scene> scene;
+    if (!a.scene.file.empty()) scene = load_scene(a.scene);
+    const LoadedDensity loaded = load_density(a.file, a.read);
+    const DensityGrid& grid = loaded.density;
+    if (!a.work.quiet) {
+        for (const std::string& note : loaded.notes) print_note(a.file + ": " + note);
+    }
+
+    const double radius = scene ? scene->density.metaball_radius_cells : DensityOptions().metaball_radius_cells;
+    require_memory(grid.active_voxels() * 4 * sizeof(Metaball), fmt::format("{}: drawing its voxels", a.file));
+    double extinction_per_m = 0;
+    if (a.extinction_per_m) {
+        extinction_per_m = *a.extinction_per_m;
+    } else if (scene) {
+        extinction_per_m = scene->density.extinction_per_m;
+    } else if (loaded.metadata) {
+        extinction_per_m = loaded.metadata->extinction_per_m;
+    } else {
+        extinction_per_m = visible_extinction_per_m(grid);
+        if (!a.work.quiet) {
+            print_note(fmt::format("{}: names no extinction; {:.4g} per metre at density 1 is taken, so that the "
+                                   "cloud is visible (--extinction changes it)",
+                                   a.file, extinction_per_m));
+        }
+    }
+    const RenderOptions options = picture_options(a, scene, grid);
+    Renderer renderer(DeviceOptions{.device = a.device});
+    const std::vector<Metaball> balls = metaballs(grid, radius);
+    const Picture picture = renderer.draw({balls, extinction_per_m, metaball_normalisation(radius)}, options);
+
+    PictureMetadata metadata;
+    metadata.scene = std::filesystem::path(a.file).filename().string();
+    metadata.version = version();
+    metadata.extinction_per_m = extinction_per_m;
+    if (loaded.metadata) {
+        metadata.seed = loaded.metadata->seed;
+        metadata.scene_hash = loaded.metadata->scene_hash;
+        metadata.state_hash = loaded.metadata->state_hash;
+        metadata.time_s = loaded.metadata->time_s;
+    }
+    for (const std::string& out : a.out) {
+        if (extension_of(out) == ".exr") {
+            write_exr(out, picture, options, metadata);
+        } else {
+            write_png(out, picture, options, metadata);
+        }
+    }
+    Output output;
+    if (a.work.json) {
+        const Vec3 &eye = options.camera.position_m, &target = options.camera.target_m;
+        const nlohmann::ordered_json json = {{"files", a.out},
+                                             {"grid", loaded.grid_name},
+                                             {"width", picture.width},
+                                             {"height", picture.height},
+                                             {"metaballs", balls.size()},
+                                             {"extinction_per_m", extinction_per_m},
+                                             {"camera_m", {eye.x, eye.y, eye.z}},
+                                             {"target_m", {target.x, target.y, target.z}},
+                                             {"device", renderer.device_name()}};
+        output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    } else {
+        for (const std::string& out : a.out) output.line(out);
+    }
+    return 0;
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app, Action& action) {
+    CLI::App* command = app.add_subcommand("render", "Draw the fog volume of an OpenVDB file, ours or not");
+    const auto a = std::make_shared<RenderArguments>();
+    command->add_option("FILE.vdb", a->file, "OpenVDB file with a float fog volume")->required()->type_name("FILE.vdb");
+    command->add_option("-o,--out", a->out, "Picture to write: .png (tone-mapped) or .exr (all layers); may be repeated")
+        ->required()
+        ->type_name("IMG")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    add_picture_options(*command, *a);
+    add_cloud_options(*command, *a);
+    command->add_option("--device", a->device, "Vulkan device: a part of its name, or its number")->type_name("NAME");
+    add_threads(*command, a->work);
+    add_json(*command, a->work);
+    add_quiet(*command, a->work);
+    command->footer(
+        "Examples:\n"
+        "  nephos render cloud.vdb --out cloud.png\n"
+        "  nephos render cloud.vdb --out cloud.png --view below --sun 8,250 --exposure 1\n"
+        "  nephos render houdini.vdb --up y --scale 100 --extinction 0.05 --out cloud.exr\n"
+        "  nephos render out/cumulus/density/cumulus_0001.vdb --scene scenes/cumulus.toml --out cloud.png");
+    command->callback([a, &action] { action = [a] { return render(*a); }; });
+}
+
+}  // namespace nephos

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/simulation.h"
+
+#include <fmt/format.h>
+
+#include "apps/memory.h"
+#include "density/vdb_file.h"
+
+namespace nephos {
+
+std::optional<Lattice> initial_state(const Scene& scene, const std::string& from) {
+    if (!from.empty()) return read_state(from, scene.automaton.extent);
+    if (scene.initial_state_file) return read_state(*scene.initial_state_file, scene.automaton.extent);
+    return {};
+}
+
+Automaton start_automaton(const Scene& scene, const std::string& scene_file, const std::string& from) {
+    const Extent& extent = scene.automaton.extent;
+    require_memory(Automaton::memory_bytes(scene.automaton),
+                   fmt::format("{}: a lattice of {} x {} x {} cells", scene_file, extent.x, extent.y, extent.z));
+    if (std::optional<Lattice> initial = initial_state(scene, from)) {
+        return Automaton(scene.automaton, std::move(*initial));
+    }
+    return Automaton(scene.automaton);
+}
+
+}  // namespace nephos

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What hash, state and run share: a simulation that fits into memory and starts where the user says.
+
+#include <optional>
+#include <string>
+
+#include "automaton/automaton.h"
+#include "scenes/scene.h"
+
+namespace nephos {
+
+// Most steps of one run: every step number stays exact in a double and in a 32-bit counter of randomness.
+inline constexpr std::uint64_t kMaxSteps = 1'000'000'000;
+
+// The state that the simulation starts from: the file `from`, else the scene's initial_state_file, else nothing (the
+// scene's own start). Throws as read_state().
+std::optional<Lattice> initial_state(const Scene& scene, const std::string& from = {});
+
+// The automaton at step 0, after a check of memory. `scene_file` names the scene in errors.
+Automaton start_automaton(const Scene& scene, const std::string& scene_file, const std::string& from);
+
+}  // namespace nephos
