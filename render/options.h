@@ -2,7 +2,8 @@
 #pragma once
 
 // What a picture needs besides the density: camera, light, air, ground, output; plain data in world units.
-// Colours are linear RGB (Rec. 709 primaries); radiance is in units of the sun's irradiance at the cloud.
+// Colours are linear RGB (Rec. 709 primaries); radiance 1 is that of a white (Lambertian) surface that
+// faces a sun of colour 1.
 
 #include <array>
 #include <string>
@@ -30,15 +31,19 @@ struct Sun {
     bool operator==(const Sun&) const = default;
 };
 
+// How a cloud scatters light (D: the colour of a metaball). With the defaults a thick cloud top in the sun has a radiance
+// of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
-    double albedo = 1.0;                 // single-scattering albedo, 0..1
-    double g = 0.5;                      // Henyey-Greenstein asymmetry, (-1, 1); forward is > 0
-    Rgb ambient_top{0.42, 0.52, 0.68};   // light from the sky that a cloud's top sees, >= 0
-    Rgb ambient_base{0.20, 0.24, 0.30};  // ... and its base
+    double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker
+    double g = 0.5;       // Henyey-Greenstein asymmetry, -0.99..0.99; forward is > 0: brighter rims against the sun
+    // Strength of the sunlight that arrives after many scatterings, 0..10; it reaches deep into a cloud, where the
+    // direct beam does not. 0 = single scattering only, as in D: grey tops, dark bases.
+    double multiple_scattering = 0.75;
+    Rgb ambient_top{0.22, 0.28, 0.38};   // light from the sky that a cloud's top scatters, >= 0
+    Rgb ambient_base{0.13, 0.16, 0.21};  // ... and its base; between them by height
     bool operator==(const CloudLight&) const = default;
 };
 
-// Air between cloud and eye, and the plain sky behind: a gradient from horizon to zenith.
 struct Air {
     Rgb extinction_per_m{6e-6, 1.2e-5,
                          2.8e-5};  // aerial perspective beta = exp(-extinction * distance), >= 0
@@ -62,5 +67,8 @@ struct RenderOptions {
     int shadow_map_size = 1024;  // texels on a side, 16..8192
     bool operator==(const RenderOptions&) const = default;
 };
+
+// Throws Error(usage) naming the first value that is out of its range.
+void check(const RenderOptions& options);
 
 }  // namespace nephos

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/frame_data.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/cloud_preparation.h"
+#include "render/vector_math.h"
+
+namespace nephos {
+namespace {
+
+shader::vec4 to_vec4(const Vec3& v, double w) { return {float(v.x), float(v.y), float(v.z), float(w)}; }
+shader::vec4 to_vec4(const Rgb& c, double scale, double w) {
+    return {float(scale * c[0]), float(scale * c[1]), float(scale * c[2]), float(w)};
+}
+
+// Rows of the map from a point relative to the eye to a shadow map coordinate 0..1.
+shader::vec4 shadow_row(const Vec3& axis, const ShadowFrame& shadow, const Vec3& eye) {
+    const Vec3 row = (1.0 / dot(axis, axis)) * axis;
+    return to_vec4(row, dot(row, eye - shadow.origin_m));
+}
+
+}  // namespace
+
+Daylight daylight(double sun_elevation_deg) {
+    const double x = std::clamp((sun_elevation_deg + 2.0) / 4.0, 0.0, 1.0);
+    const double below = std::max(0.0, 10.0 - sun_elevation_deg);
+    return {x * x * (3.0 - 2.0 * x), std::exp(-0.0079 * below * below)};
+}
+
+double pixels_per_unit(const Camera& camera, const CameraFrame& frame) {
+    return camera.height / (2.0 * frame.half_height);
+}
+
+shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
+                         const Tile& tile) {
+    const Vec3 to_sun = direction_to_sun(options.sun);
+    const Daylight day = daylight(options.sun.elevation_deg);
+    const CloudLight& light = options.light;
+    const double width = options.camera.width, height = options.camera.height;
+    const Vec3& eye = camera.position_m;
+
+    shader::Frame frame;
+    frame.right = to_vec4(camera.half_width * camera.right, 0);
+    frame.up = to_vec4(camera.half_height * camera.up, pixels_per_unit(options.camera, camera));
+    frame.forward = to_vec4(camera.forward, 0);
+    frame.picture = {float(width), float(height), float(tile.x), float(tile.y)};
+    // -1..1 across the picture to -1..1 across the tile.
+    frame.tile = {float(width / tile.width), float(height / tile.height),
+                  float((width - 2.0 * tile.x - tile.width) / tile.width),
+                  float((height - 2.0 * tile.y - tile.height) / tile.height)};
+    frame.to_sun = to_vec4(to_sun, light.g);
+    frame.sunlight = to_vec4(options.sun.colour, day.sun, light.multiple_scattering);
+    frame.ambient_top = to_vec4(light.ambient_top, day.sky, light.albedo);
+    // Diffusion through a slab of optical depth tau lets 1 / (1 + 3/4 (1 - g) tau) through when nothing is absorbed.
+    frame.ambient_base = to_vec4(light.ambient_base, day.sky, 0.75 * (1.0 - light.g));
+    frame.air_extinction = to_vec4(options.air.extinction_per_m, 1.0, 0);
+    frame.horizon = to_vec4(options.air.horizon, day.sky, 0);
+    frame.zenith = to_vec4(options.air.zenith, day.sky, 0);
+
+    // The open sky lights the ground with about the mean of its two colours; radiance of a white surface in it is that.
+    Rgb skylit{}, sunlit{};
+    for (std::size_t c = 0; c < 3; ++c) {
+        skylit[c] = options.ground.albedo[c] * 0.5 * (options.air.horizon[c] + options.air.zenith[c]) * day.sky;
+        sunlit[c] = options.ground.albedo[c] * options.sun.colour[c] * day.sun * std::max(0.0, to_sun.z);
+    }
+    const bool has_ground = eye.z > options.ground.height_m;
+    frame.ground = to_vec4(skylit, 1.0, options.ground.height_m - eye.z);
+    frame.ground_sun = to_vec4(sunlit, 1.0, has_ground ? 1.0 : 0.0);
+    frame.shadow_u = shadow_row(shadow.u_axis_m, shadow, eye);
+    frame.shadow_v = shadow_row(shadow.v_axis_m, shadow, eye);
+    return frame;
+}
+
+}  // namespace nephos

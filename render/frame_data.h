@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Options in the form that shaders read, and the little that is decided on the way: how bright day and dusk are.
+// Private to the module.
+
+#include "render/camera.h"
+#include "render/options.h"
+#include "render/picture.h"
+#include "render/shaders/shared.h"
+
+namespace nephos {
+
+// A rectangle of the picture that is drawn at once, in pixels.
+struct Tile {
+    int x = 0, y = 0, width = 0, height = 0;
+};
+
+// How much of the day's light is left at a sun's elevation.
+struct Daylight {
+    double sun = 1;  // direct: 1 above 2 degrees, 0 below -2 (a cloud in 2 km height sees 1.4 degrees below the horizon)
+    double sky = 1;  // sky, ambient and air light: 1 above 10 degrees, 0.5 near the horizon, 0.002 at -18 (night)
+};
+Daylight daylight(double sun_elevation_deg);
+
+shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
+                         const Tile& tile);
+
+// Size in pixels of a unit at distance 1.
+double pixels_per_unit(const Camera& camera, const CameraFrame& frame);
+
+}  // namespace nephos

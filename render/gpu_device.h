@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// One Vulkan 1.3 device with one queue for graphics and compute, and the way failures become Error(gpu).
+// Private to the module: this header costs three seconds of compile time and is included by .cpp files only.
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <vulkan/vulkan_raii.hpp>
+
+#include "render/renderer.h"
+
+namespace nephos {
+
+// What the validation layer says, from whatever thread it says it.
+struct ValidationLog {
+    mutable std::mutex mutex;
+    std::vector<std::string> messages;
+};
+
+// Members are destroyed from the last to the first: the loader goes last. Movable; everything else keeps references
+// to handles, not to this struct.
+struct GpuDevice {
+    vk::raii::Context context;
+    std::unique_ptr<ValidationLog> log;
+    vk::raii::Instance instance{nullptr};
+    vk::raii::DebugUtilsMessengerEXT messenger{nullptr};
+    vk::raii::PhysicalDevice physical{nullptr};
+    vk::PhysicalDeviceProperties properties;
+    vk::PhysicalDeviceMemoryProperties memory;
+    vk::raii::Device device{nullptr};
+    std::uint32_t queue_family = 0;
+    vk::raii::Queue queue{nullptr};
+    vk::raii::CommandPool pool{nullptr};
+};
+
+// Throws Error(gpu) when there is no loader, no device, or none that can do what the renderer needs.
+GpuDevice open_device(const DeviceOptions& options);
+
+// Records commands with `record`, submits them and waits until they are done.
+void submit_and_wait(const GpuDevice& gpu, const std::function<void(const vk::raii::CommandBuffer&)>& record);
+
+[[noreturn]] void fail_gpu(const std::string& what, vk::Result result);
+
+// Runs `work`; a Vulkan failure in it becomes Error(gpu) "what: VkResult".
+template <class Work>
+decltype(auto) with_gpu_errors(const char* what, Work&& work) {
+    try {
+        return std::forward<Work>(work)();
+    } catch (const vk::SystemError& error) {
+        fail_gpu(what, vk::Result(error.code().value()));
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/gpu_resources.h"
+
+#include <initializer_list>
+
+#include "automaton/error.h"
+
+namespace nephos {
+namespace {
+
+using MemoryFlags = vk::MemoryPropertyFlags;
+using Memory = vk::MemoryPropertyFlagBits;
+
+// The first kind of memory that has one of `wishes`, the most wanted first.
+std::uint32_t memory_type(const GpuDevice& gpu, std::uint32_t allowed, std::initializer_list<MemoryFlags> wishes) {
+    for (const MemoryFlags wish : wishes)
+        for (std::uint32_t i = 0; i < gpu.memory.memoryTypeCount; ++i)
+            if ((allowed >> i & 1u) != 0 && (gpu.memory.memoryTypes[i].propertyFlags & wish) == wish) return i;
+    throw Error(ErrorCode::gpu, "the Vulkan device has no memory of the kind that is needed");
+}
+
+vk::ImageSubresourceRange all_of(const GpuImage& image) {
+    return {vk::ImageAspectFlagBits::eColor, 0, 1, 0, image.layers};
+}
+
+}  // namespace
+
+GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsageFlags usage, HostAccess access) {
+    GpuBuffer buffer;
+    buffer.bytes = bytes;
+    buffer.buffer = vk::raii::Buffer(gpu.device, vk::BufferCreateInfo({}, bytes, usage));
+    const vk::MemoryRequirements needs = buffer.buffer.getMemoryRequirements();
+    const MemoryFlags seen = Memory::eHostVisible | Memory::eHostCoherent;
+    const std::uint32_t type =
+        access == HostAccess::write ? memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eDeviceLocal, seen})
+                                    : memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eHostCached, seen});
+    buffer.memory = vk::raii::DeviceMemory(gpu.device, vk::MemoryAllocateInfo(needs.size, type));
+    buffer.buffer.bindMemory(*buffer.memory, 0);
+    buffer.mapped = static_cast<std::byte*>(buffer.memory.mapMemory(0, VK_WHOLE_SIZE));
+    return buffer;
+}
+
+GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t height, std::uint32_t layers,
+                      vk::Format format, vk::ImageUsageFlags usage) {
+    GpuImage image;
+    image.format = format;
+    image.width = width;
+    image.height = height;
+    image.layers = layers;
+    image.image = vk::raii::Image(
+        gpu.device, vk::ImageCreateInfo({}, vk::ImageType::e2D, format, vk::Extent3D(width, height, 1), 1, layers,
+                                        vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal, usage));
+    const vk::MemoryRequirements needs = image.image.getMemoryRequirements();
+    const std::uint32_t type = memory_type(gpu, needs.memoryTypeBits, {Memory::eDeviceLocal, MemoryFlags{}});
+    image.memory = vk::raii::DeviceMemory(gpu.device, vk::MemoryAllocateInfo(needs.size, type));
+    image.image.bindMemory(*image.memory, 0);
+    const vk::ImageViewType kind = layers > 1 ? vk::ImageViewType::e2DArray : vk::ImageViewType::e2D;
+    image.view =
+        vk::raii::ImageView(gpu.device, vk::ImageViewCreateInfo({}, *image.image, kind, format, {}, all_of(image)));
+    return image;
+}
+
+namespace {
+
+void barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before, const Access& after,
+             vk::ImageLayout old_layout) {
+    const vk::ImageMemoryBarrier2 change(before.stages, before.kinds, after.stages, after.kinds, old_layout,
+                                         vk::ImageLayout::eGeneral, VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED,
+                                         *image.image, all_of(image));
+    commands.pipelineBarrier2(vk::DependencyInfo().setImageMemoryBarriers(change));
+}
+
+}  // namespace
+
+void begin_image(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& after) {
+    barrier(commands, image, {after.stages, {}}, after, vk::ImageLayout::eUndefined);
+}
+
+void image_barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before,
+                   const Access& after) {
+    barrier(commands, image, before, after, vk::ImageLayout::eGeneral);
+}
+
+void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& buffer, const Access& before,
+                    const Access& after) {
+    const vk::BufferMemoryBarrier2 change(before.stages, before.kinds, after.stages, after.kinds,
+                                          VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED, *buffer.buffer, 0,
+                                          VK_WHOLE_SIZE);
+    commands.pipelineBarrier2(vk::DependencyInfo().setBufferMemoryBarriers(change));
+}
+
+}  // namespace nephos

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Buffers, images and the three barriers. Plain structs that own their handles. Private to the module.
+
+#include <cstddef>
+
+#include "render/gpu_device.h"
+
+namespace nephos {
+
+// A buffer in memory that the processor sees too, mapped as long as it lives.
+struct GpuBuffer {
+    vk::raii::DeviceMemory memory{nullptr};
+    vk::raii::Buffer buffer{nullptr};
+    std::byte* mapped = nullptr;
+    std::size_t bytes = 0;
+};
+
+enum class HostAccess { write, read };  // what the processor does with a buffer: decides the kind of memory
+
+GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsageFlags usage, HostAccess access);
+
+// A 2D image (or array of them) in device memory, always in the layout GENERAL once it was cleared: images here are in
+// turn drawn to, sampled and copied from, and GENERAL serves all of it.
+struct GpuImage {
+    vk::raii::DeviceMemory memory{nullptr};
+    vk::raii::Image image{nullptr};
+    vk::raii::ImageView view{nullptr};
+    vk::Format format = vk::Format::eUndefined;
+    std::uint32_t width = 0, height = 0, layers = 1;
+};
+
+GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t height, std::uint32_t layers,
+                      vk::Format format, vk::ImageUsageFlags usage);
+
+// One side of a dependency.
+struct Access {
+    vk::PipelineStageFlags2 stages;
+    vk::AccessFlags2 kinds;
+};
+
+namespace access {
+inline constexpr Access none{vk::PipelineStageFlagBits2::eNone, {}};
+inline constexpr Access draw{vk::PipelineStageFlagBits2::eColorAttachmentOutput,
+                             vk::AccessFlagBits2::eColorAttachmentRead | vk::AccessFlagBits2::eColorAttachmentWrite};
+inline constexpr Access sample_in_compute{vk::PipelineStageFlagBits2::eComputeShader,
+                                          vk::AccessFlagBits2::eShaderSampledRead};
+inline constexpr Access sample_in_fragment{vk::PipelineStageFlagBits2::eFragmentShader,
+                                           vk::AccessFlagBits2::eShaderSampledRead};
+inline constexpr Access copy_from{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferRead};
+inline constexpr Access copy_to{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferWrite};
+inline constexpr Access compute{vk::PipelineStageFlagBits2::eComputeShader,
+                                vk::AccessFlagBits2::eShaderStorageRead | vk::AccessFlagBits2::eShaderStorageWrite};
+inline constexpr Access host{vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead};
+}  // namespace access
+
+// From UNDEFINED to GENERAL: what was in the image is lost.
+void begin_image(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& after);
+// What `before` did to the image is done and visible when `after` begins.
+void image_barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before,
+                   const Access& after);
+void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& buffer, const Access& before,
+                    const Access& after);
+
+}  // namespace nephos

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/renderer.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <new>
+
+#include "automaton/error.h"
+#include "render/attenuation_texture.h"
+#include "render/light_pass.h"
+#include "render/view_pass.h"
+
+namespace nephos {
+namespace {
+
+constexpr int kMaxSlabs = 256;
+
+// Memory that can be used without swapping; 0 when the system does not say.
+std::size_t available_memory_bytes() {
+    std::ifstream file("/proc/meminfo");
+    std::string key, unit;
+    std::size_t kilobytes = 0;
+    while (file >> key >> kilobytes) {
+        std::getline(file, unit);
+        if (key == "MemAvailable:") return kilobytes * 1024;
+    }
+    return 0;
+}
+
+// Bytes in main memory while a picture is drawn, on a device that shares it.
+std::size_t memory_needed(const MetaballCloud& cloud, const RenderOptions& options, int tile_size) {
+    const auto square = [](std::size_t side) { return side * side; };
+    const std::size_t pixels = std::size_t(options.camera.width) * std::size_t(options.camera.height);
+    const std::size_t tile = std::min(pixels, square(std::size_t(tile_size)));
+    // Orders, sort keys and light of a metaball.
+    constexpr std::size_t kPerMetaball = 32 + 8 + 4 * 5;
+    return 20 * pixels + 40 * tile + 12 * square(std::size_t(options.shadow_map_size)) +
+           kPerMetaball * cloud.metaballs.size() + (std::size_t(96) << 20);
+}
+
+void check_memory(const MetaballCloud& cloud, const RenderOptions& options, int tile_size) {
+    const std::size_t needed = memory_needed(cloud, options, tile_size);
+    const std::size_t available = available_memory_bytes();
+    if (available == 0 || needed <= available) return;
+    char text[160];
+    std::snprintf(text, sizeof text, "a picture of %d x %d pixels needs %.1f GiB of memory, %.1f GiB are free",
+                  options.camera.width, options.camera.height, double(needed) / (1 << 30),
+                  double(available) / (1 << 30));
+    throw Error(ErrorCode::usage, text);
+}
+
+GpuImage upload_attenuation(const GpuDevice& gpu) {
+    const std::vector<float> texels = attenuation_textures();
+    const std::size_t bytes = texels.size() * sizeof(float);
+    constexpr std::uint32_t kSide = shader::kAttenuationTexels;
+    GpuImage image = create_image(gpu, kSide, kSide, shader::kAttenuationLevels, vk::Format::eR32Sfloat,
+                                  vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst);
+    const GpuBuffer staging =
+        create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    std::memcpy(staging.mapped, texels.data(), bytes);
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        begin_image(commands, image, access::copy_to);
+        const vk::BufferImageCopy region(0, 0, 0,
+                                         {vk::ImageAspectFlagBits::eColor, 0, 0, shader::kAttenuationLevels},
+                                         {0, 0, 0}, {kSide, kSide, 1});
+        commands.copyBufferToImage(*staging.buffer, *image.image, vk::ImageLayout::eGeneral, region);
+        image_barrier(commands, image, access::copy_to, access::sample_in_fragment);
+    });
+    return image;
+}
+
+Picture allocate_picture(const RenderOptions& options) {
+    Picture picture;
+    picture.width = options.camera.width;
+    picture.height = options.camera.height;
+    picture.beauty.resize(3 * picture.pixels());
+    picture.transmittance.resize(picture.pixels());
+    picture.depth_m.resize(picture.pixels());
+    picture.shadow_size = options.shadow_map_size;
+    return picture;
+}
+
+}  // namespace
+
+struct Renderer::Impl {
+    explicit Impl(const DeviceOptions& device_options);
+
+    Picture draw(const MetaballCloud& cloud, const RenderOptions& options);
+
+    int tile_size;
+    GpuDevice gpu;
+    PipelineLayout layout;
+    vk::raii::Sampler clamped, white_beyond;
+    GpuImage attenuation;
+    LightPass light_pass;
+    ViewPass view_pass;
+};
+
+Renderer::Impl::Impl(const DeviceOptions& device_options)
+    : tile_size(device_options.tile_size),
+      gpu(open_device(device_options)),
+      layout(create_pipeline_layout(gpu)),
+      clamped(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
+      white_beyond(create_sampler(gpu, vk::SamplerAddressMode::eClampToBorder)),
+      attenuation(upload_attenuation(gpu)),
+      light_pass(gpu, layout, attenuation, clamped),
+      view_pass(gpu, layout, attenuation, clamped) {
+    tile_size = std::min(tile_size, int(std::min(gpu.properties.limits.maxImageDimension2D,
+                                                 gpu.properties.limits.maxFramebufferWidth)));
+}
+
+Picture Renderer::Impl::draw(const MetaballCloud& cloud, const RenderOptions& options) {
+    const PreparedCloud prepared = prepare(cloud);
+    const CameraFrame camera = camera_frame(options.camera);
+    Picture picture = allocate_picture(options);
+
+    picture.shadow_frame = shadow_frame(prepared, direction_to_sun(options.sun), options.shadow_map_size);
+    std::vector<float> light(prepared.visible.size());
+    {
+        const SunOrder order = order_from_sun(prepared, picture.shadow_frame, kMaxSlabs);
+        const std::vector<float> ordered = light_pass.run(gpu, order, picture.shadow_frame, options.shadow_map_size);
+        for (std::size_t i = 0; i < ordered.size(); ++i) light[order.source[i]] = ordered[i];
+    }
+    picture.shadow = light_pass.read_shadow_map(gpu);
+    picture.light.assign(cloud.metaballs.size(), 1.0f);
+    for (std::size_t i = 0; i < light.size(); ++i) picture.light[prepared.visible[i]] = light[i];
+
+    const std::vector<shader::ViewBall> balls =
+        order_from_eye(prepared, light, camera, pixels_per_unit(options.camera, camera), options.ground);
+    view_pass.use_shadow_map(gpu, light_pass.shadow_map(), white_beyond);
+    for (int y = 0; y < picture.height; y += tile_size) {
+        for (int x = 0; x < picture.width; x += tile_size) {
+            const Tile tile{x, y, std::min(tile_size, picture.width - x), std::min(tile_size, picture.height - y)};
+            view_pass.draw_tile(gpu, frame_data(options, camera, picture.shadow_frame, tile), tile, balls, picture);
+        }
+    }
+    return picture;
+}
+
+Renderer::Renderer(const DeviceOptions& options) {
+    if (options.tile_size < 16 || options.tile_size > 16384)
+        throw Error(ErrorCode::usage, "device: tile_size must be 16..16384 pixels");
+    impl_ = with_gpu_errors("preparing the renderer", [&] { return std::make_unique<Impl>(options); });
+}
+
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+
+Picture Renderer::draw(const MetaballCloud& cloud, const RenderOptions& options) {
+    check(options);
+    const std::uint32_t limit = impl_->gpu.properties.limits.maxImageDimension2D;
+    if (std::uint32_t(options.shadow_map_size) > limit)
+        throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
+    check_memory(cloud, options, impl_->tile_size);
+    try {
+        return with_gpu_errors("drawing", [&] { return impl_->draw(cloud, options); });
+    } catch (const std::bad_alloc&) {
+        throw Error(ErrorCode::usage, "not enough memory for a picture of this size");
+    }
+}
+
+std::string Renderer::device_name() const { return std::string(impl_->gpu.properties.deviceName.data()); }
+
+std::vector<std::string> Renderer::validation_messages() const {
+    const ValidationLog* log = impl_->gpu.log.get();
+    if (log == nullptr) return {};
+    const std::scoped_lock lock(log->mutex);
+    return log->messages;
+}
+
+// Two copies into the same buffer with no barrier between them.
+void Renderer::provoke_hazard_for_test() {
+    with_gpu_errors("provoking a hazard", [&] {
+        using Usage = vk::BufferUsageFlagBits;
+        const GpuBuffer from = create_buffer(impl_->gpu, 64, Usage::eTransferSrc, HostAccess::write);
+        const GpuBuffer to = create_buffer(impl_->gpu, 64, Usage::eTransferDst, HostAccess::read);
+        submit_and_wait(impl_->gpu, [&](const vk::raii::CommandBuffer& commands) {
+            for (int i = 0; i < 2; ++i) commands.copyBuffer(*from.buffer, *to.buffer, vk::BufferCopy(0, 0, 64));
+        });
+    });
+}
+
+}  // namespace nephos

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.h"
+// Step 2: buffer = buffer * transmittance + colour. Alpha of both outputs is the transmittance, the blend factor.
+#include "attenuation.glsl"
+#include "ray.glsl"
+
+layout(location = 0) in vec2 point;
+layout(location = 1) flat in vec3 diffuse;
+layout(location = 2) flat in vec3 direct;
+layout(location = 3) flat in vec4 shape;
+layout(location = 4) flat in vec4 centre_radius;
+layout(location = 5) flat in uint integrate;
+
+layout(location = 0) out vec4 radiance;
+layout(location = 1) out vec4 depth;
+
+// The part of the ball between the eye and the ground, for balls that reach beyond either. The cross product keeps the
+// distance from the ray exact where a difference of squares would drown in the distance from the eye.
+float integrated_opacity(vec3 ray, float depth_scale) {
+    vec3 centre = centre_radius.xyz / centre_radius.w;
+    vec3 offset = cross(centre, ray);
+    float w = 1.0 - dot(offset, offset);
+    if (w <= 0.0) return 0.0;
+    float half_chord = sqrt(w);
+    float middle = dot(centre, ray);
+    float start = max(-half_chord, -middle);
+    float end = min(half_chord, ground_distance(ray) / centre_radius.w - middle);
+    if (end <= start) return 0.0;
+    return 1.0 - exp(-depth_scale * (column_part(w, end) - column_part(w, start)));
+}
+
+void main() {
+    vec3 ray = fragment_ray();
+    float opacity;
+    if (integrate == kIntegrate) {
+        opacity = integrated_opacity(ray, shape.x);
+    } else {
+        // Where the ray pierces the billboard's plane is farther from the centre than the ray itself.
+        vec2 nearest = point * inversesqrt(1.0 + dot(point, point) * shape.z);
+        opacity = billboard_opacity(nearest, shape.x, shape.y);
+    }
+    // The sunlight travels along -to_sun and goes on towards the eye along -ray.
+    float phase = phase_function(dot(frame.to_sun.xyz, ray), frame.to_sun.w);
+    radiance = vec4((diffuse + direct * phase) * opacity, 1.0 - opacity);
+    depth = vec4(shape.w * opacity, 0.0, 0.0, 1.0 - opacity);
+}

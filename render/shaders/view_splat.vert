@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.h"
+// Step 2: the billboard of a metaball facing the eye, and the light that it scatters.
+#include "attenuation.glsl"
+#include "billboard.glsl"
+#include "frame.glsl"
+
+layout(set = 0, binding = 1, std430) readonly buffer Balls {
+    ViewBall balls[];
+};
+
+layout(location = 0) out vec2 point;              // on the billboard, in radii
+layout(location = 1) flat out vec3 diffuse;       // radiance that does not depend on the ray
+layout(location = 2) flat out vec3 direct;        // radiance per phase function
+layout(location = 3) flat out vec4 shape;         // depth scale, level, (radius / distance)^2, distance
+layout(location = 4) flat out vec4 centre_radius;
+layout(location = 5) flat out uint integrate;
+
+// Two unit vectors perpendicular to n and to each other; steady everywhere but at n.z = 0, where they only turn about n.
+void perpendicular(vec3 n, out vec3 u, out vec3 v) {
+    float sign_z = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (sign_z + n.z);
+    float b = n.x * n.y * a;
+    u = vec3(1.0 + sign_z * n.x * n.x * a, sign_z * b, -sign_z * n.x);
+    v = vec3(b, sign_z + n.y * n.y * a, -n.y);
+}
+
+// Light that arrives along many paths: it decays with the optical depth towards the sun like diffusion through a slab,
+// far slower than the direct beam, and comes from all sides.
+void scattered_light(ViewBall ball, float distance) {
+    float optical_depth = -log(max(ball.light, 1.0e-30));
+    float multiple = frame.sunlight.w / (1.0 + frame.ambient_base.w * optical_depth);
+    vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, ball.height);
+    vec3 beta = exp(-frame.air_extinction.rgb * distance);
+    float albedo = frame.ambient_top.w;
+    diffuse = mix(frame.horizon.rgb, albedo * (frame.sunlight.rgb * multiple + ambient), beta);
+    // A white surface facing the sun has radiance 1 here, 1 / pi of its irradiance: hence pi times the phase function.
+    direct = beta * albedo * kPi * ball.light * frame.sunlight.rgb;
+}
+
+vec4 clip_position(vec3 position, float radius) {
+    float depth = dot(frame.forward.xyz, position);
+    vec2 picture = vec2(dot(frame.right.xyz, position) / dot(frame.right.xyz, frame.right.xyz),
+                        -dot(frame.up.xyz, position) / dot(frame.up.xyz, frame.up.xyz));
+    vec2 tile = picture * frame.tile.xy + depth * frame.tile.zw;
+    // z keeps what is closer than a tiny fraction of the radius to the eye's plane out of the division.
+    return vec4(tile, 0.5 * (depth - 1.0e-4 * radius), depth);
+}
+
+void main() {
+    ViewBall ball = balls[gl_VertexIndex / 6];
+    vec2 corner = square_corner(uint(gl_VertexIndex));
+    vec3 centre = vec3(ball.x, ball.y, ball.z);
+    float distance = length(centre);
+    centre_radius = vec4(centre, ball.radius);
+    scattered_light(ball, distance);
+    bool near = distance < kNearDistance * ball.radius;
+    integrate = near ? kIntegrate : ball.flags;
+    if (near) {
+        // Around or close to the eye there is no useful plane: the whole picture asks for the integral.
+        point = corner;
+        shape = vec4(ball.depth_scale, 0.0, 1.0, distance);
+        gl_Position = vec4(corner, 0.5, 1.0);
+        return;
+    }
+    // Widen what is smaller than a pixel and thin it out: its optical depth times area stays.
+    float radius = max(ball.radius, kMinRadiusPixels * distance / frame.up.w);
+    float thinning = ball.radius / radius;
+    float depth_scale = ball.depth_scale * thinning * thinning;
+    centre_radius.w = radius;
+    float ratio = radius / distance;
+    // Seen from a finite distance the ball's outline is a circle a little larger than its radius.
+    float outline = inversesqrt(max(1.0 - ratio * ratio, 0.1));
+    vec3 u, v;
+    perpendicular(centre / distance, u, v);
+    point = corner * outline;
+    shape = vec4(depth_scale, level_of(depth_scale), ratio * ratio, distance);
+    gl_Position = clip_position(centre + radius * (point.x * u + point.y * v), radius);
+}

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/view_pass.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kBatch = std::size_t(1) << 20;  // metaballs on the device at once: 32 MiB
+constexpr std::array kFormats{vk::Format::eR32G32B32A32Sfloat, vk::Format::eR32Sfloat};
+constexpr float kLeastOpacity = 1.0f / 1024.0f;  // thinner clouds have no depth (picture.h)
+
+}  // namespace
+
+ViewPass::ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+                   const vk::raii::Sampler& sampler)
+    : layout_(&layout),
+      background_(create_graphics_pipeline(gpu, layout, shaders().background_vert, shaders().background_frag, kFormats,
+                                           Blend::none)),
+      splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert, shaders().view_splat_frag, kFormats,
+                                      Blend::over)),
+      bindings_(create_bindings(gpu, layout)),
+      frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer, HostAccess::write)),
+      balls_(create_buffer(gpu, kBatch * sizeof(shader::ViewBall), vk::BufferUsageFlagBits::eStorageBuffer,
+                           HostAccess::write)) {
+    bind_buffer(gpu, bindings_, 0, frame_);
+    bind_buffer(gpu, bindings_, 1, balls_);
+    bind_image(gpu, bindings_, 3, attenuation, sampler);
+}
+
+void ViewPass::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler) {
+    bind_image(gpu, bindings_, 4, map, sampler);
+}
+
+void ViewPass::resize_targets(const GpuDevice& gpu, const Tile& tile) {
+    const std::uint32_t width = std::uint32_t(tile.width), height = std::uint32_t(tile.height);
+    if (radiance_.width >= width && radiance_.height >= height) return;
+    using Usage = vk::ImageUsageFlagBits;
+    const auto target = [&](vk::Format format) {
+        return create_image(gpu, width, height, 1, format, Usage::eColorAttachment | Usage::eTransferSrc);
+    };
+    radiance_ = {};  // the old ones go before the new ones come
+    depth_ = {};
+    radiance_ = target(kFormats[0]);
+    depth_ = target(kFormats[1]);
+    const std::size_t pixels = std::size_t(width) * height;
+    const auto pixel_buffer = [&](std::size_t bytes) {
+        return create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
+    };
+    radiance_pixels_ = pixel_buffer(pixels * 4 * sizeof(float));
+    depth_pixels_ = pixel_buffer(pixels * sizeof(float));
+}
+
+void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
+                         std::span<const shader::ViewBall> balls, Picture& picture) {
+    resize_targets(gpu, tile);
+    std::memcpy(frame_.mapped, &frame, sizeof frame);
+    const std::array<const GpuImage*, 2> targets{&radiance_, &depth_};
+    const vk::Extent2D area{std::uint32_t(tile.width), std::uint32_t(tile.height)};
+    const auto bind = [&](const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& pipeline) {
+        commands.bindPipeline(vk::PipelineBindPoint::eGraphics, *pipeline);
+        commands.bindDescriptorSets(vk::PipelineBindPoint::eGraphics, *layout_->layout, 0, bindings_.set, {});
+    };
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        begin_image(commands, radiance_, access::draw);
+        begin_image(commands, depth_, access::draw);
+        bind(commands, background_);
+        draw_into(commands, targets, area, vk::AttachmentLoadOp::eDontCare, [&] { commands.draw(3, 1, 0, 0); });
+    });
+    for (std::size_t begin = 0; begin < balls.size(); begin += kBatch) {
+        const auto batch = balls.subspan(begin, std::min(kBatch, balls.size() - begin));
+        std::memcpy(balls_.mapped, batch.data(), batch.size_bytes());
+        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+            image_barrier(commands, radiance_, access::draw, access::draw);
+            image_barrier(commands, depth_, access::draw, access::draw);
+            bind(commands, splat_);
+            draw_into(commands, targets, area, vk::AttachmentLoadOp::eLoad,
+                      [&] { commands.draw(6 * std::uint32_t(batch.size()), 1, 0, 0); });
+        });
+    }
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        const vk::BufferImageCopy region(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, 0, 0},
+                                         {area.width, area.height, 1});
+        const auto copy = [&](const GpuImage& image, const GpuBuffer& buffer) {
+            image_barrier(commands, image, access::draw, access::copy_from);
+            commands.copyImageToBuffer(*image.image, vk::ImageLayout::eGeneral, *buffer.buffer, region);
+            buffer_barrier(commands, buffer, access::copy_to, access::host);
+        };
+        copy(radiance_, radiance_pixels_);
+        copy(depth_, depth_pixels_);
+    });
+    store(tile, picture);
+}
+
+void ViewPass::store(const Tile& tile, Picture& picture) const {
+    const auto* radiance = reinterpret_cast<const float*>(radiance_pixels_.mapped);
+    const auto* depth = reinterpret_cast<const float*>(depth_pixels_.mapped);
+    for (int y = 0; y < tile.height; ++y) {
+        std::size_t to = std::size_t(tile.y + y) * std::size_t(picture.width) + std::size_t(tile.x);
+        for (int x = 0; x < tile.width; ++x, ++to, radiance += 4, ++depth) {
+            std::copy_n(radiance, 3, &picture.beauty[3 * to]);
+            const float transmittance = radiance[3];
+            picture.transmittance[to] = transmittance;
+            const float opacity = 1.0f - transmittance;
+            picture.depth_m[to] =
+                opacity >= kLeastOpacity ? *depth / opacity : std::numeric_limits<float>::infinity();
+        }
+    }
+}
+
+}  // namespace nephos
