@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/density_grid.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -35,8 +34,8 @@ void check_placement(const Placement& placement) {
 // Number of blocks along an axis of n voxels.
 int block_count(int n) { return (n + kBlock - 1) / kBlock; }
 
-// Copies the part of a dense array that lies in the block at `origin` into a leaf; false when all of it is 0.
-bool fill_leaf(FloatLeaf& leaf, std::span<const float> values, Extent extent, const openvdb::Coord& origin) {
+// Copies the part of a dense array that lies in the block at `origin` into a leaf.
+void fill_leaf(FloatLeaf& leaf, std::span<const float> values, Extent extent, const openvdb::Coord& origin) {
     float* out = leaf.buffer().data();
     std::fill_n(out, kBlockVoxels, 0.0f);
     const int nx = std::min(kBlock, extent.x - origin.x());
@@ -48,7 +47,6 @@ bool fill_leaf(FloatLeaf& leaf, std::span<const float> values, Extent extent, co
             for (int x = 0; x < nx; ++x) out[leaf_offset(x, y, z)] = row[x];
         }
     }
-    return activate_positive(leaf);
 }
 
 }  // namespace
@@ -59,6 +57,14 @@ void TreeBuilder::add(std::unique_ptr<FloatLeaf> leaf) { accessor_.addLeaf(leaf.
 
 void TreeBuilder::add_tile(const openvdb::Coord& origin, float value) {
     accessor_.addTile(Node1::LEVEL, origin, value, true);
+}
+
+DensityGrid TreeBuilder::finish(Extent extent, const Placement& placement) {
+    if (extent.cells() > 0) {
+        accessor_.setActiveState({0, 0, 0}, true);
+        accessor_.setActiveState({extent.x - 1, extent.y - 1, extent.z - 1}, true);
+    }
+    return OpenvdbAccess::wrap(std::move(grid_), extent, placement);
 }
 
 const openvdb::FloatGrid& OpenvdbAccess::grid(const DensityGrid& density) { return *density.impl_->grid; }
@@ -74,17 +80,38 @@ std::unique_ptr<FloatLeaf> uninitialised_leaf(const openvdb::Coord& origin) {
     return leaf;
 }
 
-bool activate_positive(FloatLeaf& leaf) {
-    const float* values = leaf.buffer().data();
+int Block::positive_count() const {
+    if (!leaf) return kBlockVoxels;
+    const float* values = leaf->buffer().data();
+    return int(std::count_if(values, values + kBlockVoxels, [](float v) { return v > 0; }));
+}
+
+NewBlock NewBlock::from(std::unique_ptr<FloatLeaf> leaf) {
+    const float* values = leaf->buffer().data();
     openvdb::util::NodeMask<3> mask;
+    bool uniform = true;
     for (int n = 0; n < kBlockVoxels; n += 64) {
         std::uint64_t word = 0;
-        for (int bit = 0; bit < 64; ++bit) word |= std::uint64_t(values[n + bit] > 0) << bit;
+        for (int bit = 0; bit < 64; ++bit) {
+            word |= std::uint64_t(values[n + bit] > 0) << bit;
+            uniform = uniform && values[n + bit] == values[0];
+        }
         mask.getWord<std::uint64_t>(openvdb::Index(n / 64)) = word;
     }
-    leaf.setValueMask(mask);
-    return !mask.isOff();
+    if (uniform) return {nullptr, values[0]};
+    leaf->setValueMask(mask);
+    return {std::move(leaf), 0};
 }
+
+void NewBlock::move_to(TreeBuilder& builder, const openvdb::Coord& origin) {
+    if (leaf) {
+        builder.add(std::move(leaf));
+    } else if (tile > 0) {
+        builder.add_tile(origin, tile);
+    }
+}
+
+std::tuple<int, int, int> block_order(const openvdb::Coord& origin) { return {origin.z(), origin.y(), origin.x()}; }
 
 std::vector<Block> blocks_of(const DensityGrid& density) {
     std::vector<Block> blocks;
@@ -99,9 +126,7 @@ std::vector<Block> blocks_of(const DensityGrid& density) {
             }
         }
     }
-    std::ranges::sort(blocks, {}, [](const Block& block) {
-        return std::tuple(block.origin.z(), block.origin.y(), block.origin.x());
-    });
+    std::ranges::sort(blocks, {}, [](const Block& block) { return block_order(block.origin); });
     return blocks;
 }
 
@@ -124,22 +149,19 @@ DensityGrid DensityGrid::from_dense(std::span<const float> values, Extent extent
     }
     TreeBuilder builder;
     const int bx = block_count(extent.x), by = block_count(extent.y), bz = block_count(extent.z);
-    std::vector<std::unique_ptr<FloatLeaf>> layer(std::size_t(bx) * std::size_t(by));
+    std::vector<NewBlock> layer(std::size_t(bx) * std::size_t(by));
     for (int z = 0; z < bz; ++z) {
-        tbb::parallel_for(tbb::blocked_range<int>(0, by), [&](const tbb::blocked_range<int>& range) {
-            for (int y = range.begin(); y < range.end(); ++y) {
-                for (int x = 0; x < bx; ++x) {
-                    auto leaf = uninitialised_leaf({x * kBlock, y * kBlock, z * kBlock});
-                    if (!fill_leaf(*leaf, values, extent, leaf->origin())) leaf.reset();
-                    layer[std::size_t(y) * std::size_t(bx) + std::size_t(x)] = std::move(leaf);
-                }
-            }
+        const auto origin = [&](std::size_t n) {
+            return openvdb::Coord(int(n) % bx * kBlock, int(n) / bx * kBlock, z * kBlock);
+        };
+        tbb::parallel_for(std::size_t{0}, layer.size(), [&](std::size_t n) {
+            auto leaf = uninitialised_leaf(origin(n));
+            fill_leaf(*leaf, values, extent, origin(n));
+            layer[n] = NewBlock::from(std::move(leaf));
         });
-        for (auto& leaf : layer) {
-            if (leaf) builder.add(std::move(leaf));
-        }
+        for (std::size_t n = 0; n < layer.size(); ++n) layer[n].move_to(builder, origin(n));
     }
-    return OpenvdbAccess::wrap(builder.finish(), extent, placement);
+    return builder.finish(extent, placement);
 }
 
 Extent DensityGrid::extent() const { return impl_->extent; }
@@ -150,11 +172,24 @@ float DensityGrid::value(int i, int j, int k) const {
     return impl_->grid->tree().getValue(openvdb::Coord(i, j, k));
 }
 
-std::uint64_t DensityGrid::active_voxels() const { return impl_->grid->tree().activeVoxelCount(); }
+std::uint64_t DensityGrid::active_voxels() const {
+    std::uint64_t count = 0;
+    for (const Block& block : blocks_of(*this)) count += std::uint64_t(block.positive_count());
+    return count;
+}
 
 VoxelBox DensityGrid::bounding_box() const {
     openvdb::CoordBBox box;
-    if (!impl_->grid->tree().evalActiveVoxelBoundingBox(box)) return {};
+    for (const Block& block : blocks_of(*this)) {
+        if (!block.leaf) {
+            box.expand(block.origin, kBlock);
+            continue;
+        }
+        for (auto voxel = block.leaf->cbeginValueOn(); voxel; ++voxel) {
+            if (*voxel > 0) box.expand(voxel.getCoord());
+        }
+    }
+    if (box.empty()) return {};
     return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
 }
 

@@ -51,6 +51,108 @@ double sum_of_fields(const std::vector<Tap>& taps) {
     return sum;
 }
 
+// Samples the field at the voxels of fine blocks. Every cell is cut the same way, so refine^3 sets of taps serve all voxels.
+class Resampler {
+  public:
+    Resampler(const DensityGrid& grid, int refine, double radius)
+        : grid_(OpenvdbAccess::grid(grid)), refine_(refine), reach_(int(std::ceil(radius))),
+          side_((kBlock - 1) / refine + 2 + 2 * reach_) {
+        for (int pz = 0; pz < refine; ++pz) {
+            for (int py = 0; py < refine; ++py) {
+                for (int px = 0; px < refine; ++px) add_phase({(px + 0.5) / refine, (py + 0.5) / refine, (pz + 0.5) / refine}, radius);
+            }
+        }
+    }
+
+    // Fine blocks that a cloud cell may reach, in block order.
+    std::vector<openvdb::Coord> blocks(const DensityGrid& grid, Extent fine) const {
+        std::vector<openvdb::Coord> result;
+        for (const Block& block : blocks_of(grid)) {
+            if (block.positive_count() == 0) continue;
+            const auto low = [&](int o) { return std::max(0, (o - reach_) * refine_) & ~(kBlock - 1); };
+            const auto end = [&](int o, int size) { return std::min(size, (o + kBlock + reach_) * refine_); };
+            const openvdb::Coord o = block.origin;
+            for (int z = low(o.z()); z < end(o.z(), fine.z); z += kBlock) {
+                for (int y = low(o.y()); y < end(o.y(), fine.y); y += kBlock) {
+                    for (int x = low(o.x()); x < end(o.x(), fine.x); x += kBlock) result.emplace_back(x, y, z);
+                }
+            }
+        }
+        std::ranges::sort(result, {}, block_order);
+        result.erase(std::unique(result.begin(), result.end()), result.end());
+        return result;
+    }
+
+    NewBlock sample(const openvdb::Coord& origin, Extent fine) const {
+        const openvdb::Coord corner = first_cell(origin);
+        std::vector<float> cells(std::size_t(side_) * std::size_t(side_) * std::size_t(side_));
+        if (!gather(corner, cells)) return {};
+        auto leaf = uninitialised_leaf(origin);
+        float* out = leaf->buffer().data();
+        for (int n = 0; n < kBlockVoxels; ++n) {
+            const openvdb::Coord voxel = origin + openvdb::Coord(n >> 6, n >> 3 & 7, n & 7);
+            const bool inside = voxel.x() < fine.x && voxel.y() < fine.y && voxel.z() < fine.z;
+            out[n] = inside ? value(voxel, corner, cells) : 0.0f;
+        }
+        return NewBlock::from(std::move(leaf));
+    }
+
+  private:
+    struct Phase {
+        std::vector<std::ptrdiff_t> offsets;  // into the gathered cells, from the voxel's own cell
+        std::vector<double> fields;
+        double sum = 0;
+    };
+
+    void add_phase(const Vec3& point, double radius) {
+        const auto taps = taps_around(point, radius);
+        Phase phase;
+        for (const Tap& tap : taps) {
+            phase.offsets.push_back((std::ptrdiff_t(tap.k) * side_ + tap.j) * side_ + tap.i);
+            phase.fields.push_back(tap.field);
+        }
+        phase.sum = sum_of_fields(taps);
+        phases_.push_back(std::move(phase));
+    }
+
+    openvdb::Coord first_cell(const openvdb::Coord& origin) const {
+        return openvdb::Coord(origin.x() / refine_, origin.y() / refine_, origin.z() / refine_).offsetBy(-reach_);
+    }
+
+    bool gather(const openvdb::Coord& corner, std::vector<float>& cells) const {
+        auto voxels = grid_.getConstAccessor();
+        bool any = false;
+        float* out = cells.data();
+        for (int z = 0; z < side_; ++z) {
+            for (int y = 0; y < side_; ++y) {
+                for (int x = 0; x < side_; ++x) {
+                    *out = voxels.getValue(corner + openvdb::Coord(x, y, z));
+                    any = any || *out > 0;
+                    ++out;
+                }
+            }
+        }
+        return any;
+    }
+
+    float value(const openvdb::Coord& voxel, const openvdb::Coord& corner, const std::vector<float>& cells) const {
+        const int px = voxel.x() % refine_, py = voxel.y() % refine_, pz = voxel.z() % refine_;
+        const Phase& phase = phases_[std::size_t((pz * refine_ + py) * refine_ + px)];
+        const openvdb::Coord cell =
+            openvdb::Coord(voxel.x() / refine_, voxel.y() / refine_, voxel.z() / refine_) - corner;
+        const float* own = cells.data() + (std::ptrdiff_t(cell.z()) * side_ + cell.y()) * side_ + cell.x();
+        double sum = 0;
+        for (std::size_t n = 0; n < phase.offsets.size(); ++n) sum += double(own[phase.offsets[n]]) * phase.fields[n];
+        return float(sum / phase.sum);
+    }
+
+    const openvdb::FloatGrid& grid_;
+    const int refine_;
+    const int reach_;  // cells that a tap may lie away
+    const int side_;   // of the cube of cells that one fine block needs
+    std::vector<Phase> phases_;
+};
+
 }  // namespace
 
 // In w = 1 - a^2 the polynomial is w^2 (5 + 4 w) / 9: the same values without cancellation at the rim.
@@ -76,7 +178,7 @@ std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells) {
     const auto blocks = blocks_of(grid);
     std::vector<std::size_t> first(blocks.size() + 1, 0);
     for (std::size_t n = 0; n < blocks.size(); ++n) {
-        first[n + 1] = first[n] + (blocks[n].leaf ? blocks[n].leaf->onVoxelCount() : kBlockVoxels);
+        first[n + 1] = first[n] + std::size_t(blocks[n].positive_count());
     }
     const Vec3 origin = grid.placement().origin_m;
     const double size = grid.placement().cell_size_m;
@@ -86,11 +188,11 @@ std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells) {
         Metaball* out = balls.data() + first[n];
         for (int xyz = 0; xyz < kBlockVoxels; ++xyz) {  // x fastest
             const int x = xyz & 7, y = xyz >> 3 & 7, z = xyz >> 6;
-            if (!block.active(leaf_offset(x, y, z))) continue;
+            const float q = block.value(leaf_offset(x, y, z));
+            if (!(q > 0)) continue;
             *out++ = {float(origin.x + (block.origin.x() + x + 0.5) * size),
                       float(origin.y + (block.origin.y() + y + 0.5) * size),
-                      float(origin.z + (block.origin.z() + z + 0.5) * size), float(radius_cells * size),
-                      block.value(leaf_offset(x, y, z))};
+                      float(origin.z + (block.origin.z() + z + 0.5) * size), float(radius_cells * size), q};
         }
     });
     return balls;
@@ -113,6 +215,28 @@ double density_at(const DensityGrid& grid, const Vec3& position_m, double radius
     double sum = 0;
     for (const Tap& tap : taps) sum += double(voxels.getValue({tap.i, tap.j, tap.k})) * tap.field;
     return sum / sum_of_fields(taps);
+}
+
+DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells) {
+    check_radius(radius_cells);
+    if (refine < 1 || refine > kMaxRefine) {
+        throw Error(ErrorCode::usage, "refinement of " + std::to_string(refine) + " voxels per cell: must be 1..8");
+    }
+    const Extent coarse = grid.extent();
+    if (std::int64_t{std::max({coarse.x, coarse.y, coarse.z})} * refine > std::numeric_limits<int>::max() - kBlock) {
+        throw Error(ErrorCode::usage, "a refinement of " + std::to_string(refine) + " gives too many voxels on an axis");
+    }
+    const Extent fine{coarse.x * refine, coarse.y * refine, coarse.z * refine};
+    const Resampler resampler(grid, refine, radius_cells);
+    const auto origins = resampler.blocks(grid, fine);
+    std::vector<NewBlock> blocks(origins.size());
+    tbb::parallel_for(std::size_t{0}, origins.size(),
+                      [&](std::size_t n) { blocks[n] = resampler.sample(origins[n], fine); });
+    TreeBuilder builder;
+    for (std::size_t n = 0; n < blocks.size(); ++n) blocks[n].move_to(builder, origins[n]);
+    Placement placement = grid.placement();
+    placement.cell_size_m /= refine;
+    return builder.finish(fine, placement);
 }
 
 }  // namespace nephos

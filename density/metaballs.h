@@ -25,6 +25,8 @@ namespace nephos {
 // Radii that every function here takes, in voxel edges of the grid: below 1 a point could lie in no metaball.
 inline constexpr double kMinMetaballRadius = 1.0;
 inline constexpr double kMaxMetaballRadius = 8.0;
+// Voxels per cell and axis that resample() makes at most.
+inline constexpr int kMaxRefine = 8;
 
 struct Metaball {
     float x, y, z;   // centre, world metres

@@ -3,12 +3,16 @@
 
 // The OpenVDB tree behind a DensityGrid, for the .cpp files of this module (not installed).
 //
-// Invariants of a wrapped tree: background 0; a value is active exactly when it is above 0; inactive values are 0; nothing
-// active outside 0 .. extent-1; tiles are never larger than one leaf (8x8x8), so that a tree is a set of blocks.
+// Invariants of a wrapped tree:
+// - background 0, inactive values 0, nothing active outside 0 .. extent-1;
+// - a value is active exactly when it is above 0, but for the two extreme corners, voxel 0 and voxel extent-1, which are
+//   always active: so the active bounds, which OpenVDB and its users take for the grid's bounds, are the extent's;
+// - tiles are exactly one leaf large (8x8x8), so that a tree is a set of blocks. A block of one value is a tile.
 
 #include <openvdb/openvdb.h>
 
 #include <memory>
+#include <tuple>
 #include <vector>
 
 #include "density/density_grid.h"
@@ -30,7 +34,7 @@ struct Block {
     float tile = 0;
 
     float value(int offset) const { return leaf ? leaf->buffer().data()[offset] : tile; }
-    bool active(int offset) const { return !leaf || leaf->valueMask().isOn(openvdb::Index(offset)); }
+    int positive_count() const;  // values above 0
 };
 
 // Takes finished blocks one by one and hangs them into a new tree. Not thread-safe: blocks are made in parallel
@@ -38,9 +42,11 @@ struct Block {
 class TreeBuilder {
   public:
     TreeBuilder();
+    // The leaf's mask must be set.
     void add(std::unique_ptr<FloatLeaf> leaf);
-    void add_tile(const openvdb::Coord& origin, float value);
-    openvdb::FloatGrid::Ptr finish() { return std::move(grid_); }
+    void add_tile(const openvdb::Coord& origin, float value);  // value > 0
+    // Activates the corners and hands over the grid.
+    DensityGrid finish(Extent extent, const Placement& placement);
 
   private:
     openvdb::FloatGrid::Ptr grid_;
@@ -53,13 +59,22 @@ struct OpenvdbAccess {
     static DensityGrid wrap(openvdb::FloatGrid::Ptr grid, Extent extent, const Placement& placement);
 };
 
-// All blocks with an active value, ordered by z, y, x of their origins.
+// All blocks of the tree, ordered by z, y, x of their origins. A corner's block may have no value above 0.
 std::vector<Block> blocks_of(const DensityGrid& density);
+// Position of a block in that order.
+std::tuple<int, int, int> block_order(const openvdb::Coord& origin);
+
+// What a parallel computation of one block yields: at most one of leaf and tile.
+struct NewBlock {
+    std::unique_ptr<FloatLeaf> leaf;
+    float tile = 0;
+
+    // A leaf whose values are all set, masks not: empty when all are 0, a tile when all are the same.
+    static NewBlock from(std::unique_ptr<FloatLeaf> leaf);
+    void move_to(TreeBuilder& builder, const openvdb::Coord& origin);
+};
 
 // A leaf at `origin` whose values are not yet set and whose voxels are all inactive.
 std::unique_ptr<FloatLeaf> uninitialised_leaf(const openvdb::Coord& origin);
-
-// Sets the value mask to the values above 0. Returns whether there is any.
-bool activate_positive(FloatLeaf& leaf);
 
 }  // namespace nephos

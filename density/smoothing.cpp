@@ -139,6 +139,22 @@ class TileBlocks final : public BlockSink {
     std::vector<openvdb::Coord> saturated_;
 };
 
+// The blocks of two grids by position; where one has none, a tile of 0 stands in.
+std::vector<std::pair<Block, Block>> pair_blocks(const std::vector<Block>& a, const std::vector<Block>& b) {
+    std::vector<std::pair<Block, Block>> pairs;
+    auto left = a.begin(), right = b.begin();
+    while (left != a.end() || right != b.end()) {
+        const bool take_left = right == b.end() || (left != a.end() && block_order(left->origin) <= block_order(right->origin));
+        const bool take_right = left == a.end() || (right != b.end() && block_order(right->origin) <= block_order(left->origin));
+        const openvdb::Coord origin = take_left ? left->origin : right->origin;
+        const Block nothing{origin, nullptr, 0};
+        pairs.emplace_back(take_left ? *left : nothing, take_right ? *right : nothing);
+        if (take_left) ++left;
+        if (take_right) ++right;
+    }
+    return pairs;
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> kernel_weights(SmoothingKernel kernel, int radius) {
@@ -165,7 +181,7 @@ DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& o
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t n) { smooth_tile(plan, tiles[n], blocks[n]); });
     TreeBuilder builder;
     for (TileBlocks& tile : blocks) tile.move_to(builder);
-    return OpenvdbAccess::wrap(builder.finish(), plan.extent, placement);
+    return builder.finish(plan.extent, placement);
 }
 
 void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& options, const Boundaries& boundaries,
@@ -179,6 +195,32 @@ void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& op
     const auto tiles = make_tiles(plan, 1, 32);
     tbb::parallel_for(std::size_t{0}, tiles.size(),
                       [&](std::size_t n) { smooth_tile(plan, tiles[n], out.data(), stream); });
+}
+
+DensityGrid mix(const DensityGrid& a, const DensityGrid& b, double fraction) {
+    if (!(fraction >= 0 && fraction <= 1)) {
+        throw Error(ErrorCode::usage, "fraction " + std::to_string(fraction) + " between two steps: must be 0..1");
+    }
+    if (!(a.extent() == b.extent()) || !(a.placement() == b.placement())) {
+        throw Error(ErrorCode::usage, "only grids of the same extent and placement can be mixed");
+    }
+    if (fraction == 0) return a;
+    if (fraction == 1) return b;
+    const auto pairs = pair_blocks(blocks_of(a), blocks_of(b));
+    std::vector<NewBlock> blocks(pairs.size());
+    tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t n) {
+        auto leaf = uninitialised_leaf(pairs[n].first.origin);
+        float* out = leaf->buffer().data();
+        const float f = float(fraction);
+        for (int v = 0; v < kBlockVoxels; ++v) {
+            const float from = pairs[n].first.value(v), to = pairs[n].second.value(v);
+            out[v] = from + (to - from) * f;
+        }
+        blocks[n] = NewBlock::from(std::move(leaf));
+    });
+    TreeBuilder builder;
+    for (std::size_t n = 0; n < blocks.size(); ++n) blocks[n].move_to(builder, pairs[n].first.origin);
+    return builder.finish(a.extent(), a.placement());
 }
 
 }  // namespace nephos
