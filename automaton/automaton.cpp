@@ -100,7 +100,7 @@ void Automaton::Impl::draw_initial_state() {
         for (int by = 0; by < blocks(extent.y); ++by) {
             field.collect(by, bz, row);
             for (int bx = 0; bx < blocks(extent.x); ++bx) {
-                field.plan_block(bx, by, bz, row, plan);
+                field.plan_blocks(bx, by, bz, row, std::span(&plan, 1));
                 if (plan.draws[kHum].kind == DrawPlan::Kind::none && plan.draws[kAct].kind == DrawPlan::Kind::none) {
                     continue;
                 }

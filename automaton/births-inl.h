@@ -22,6 +22,8 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "automaton/kernels.h"
@@ -32,48 +34,67 @@ HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-inline constexpr std::size_t kMaxLanes = 8;  // of 64 bits, in the widest vector
+inline constexpr int kMaxLanes = 8;  // of 64 bits, in the widest vector
+
+// Blocks are taken in segments of 64 along x: their events fill 64 rows of 64 bytes a draw, which stay in the
+// first-level cache, and everything below has a fixed size.
+inline constexpr int kSegmentBlocks = 64;
+inline constexpr int kSegmentWords = kSegmentBlocks * kBlockEdge / 64;
+inline constexpr int kMaxCounters = 512;  // queued before the sparse draws are run
 
 // One sparse draw of one block.
 struct SparseJob {
-    int bx;
+    int block;          // in the segment
     int draw;           // kHum, kAct, kExt
     int events;
-    std::size_t first;  // its first word
+    int first;          // its first counter in the queue
     bool accept_all;    // p is the level itself in every cell
     float rate_unit;    // rate of the level * 2^-23
 };
 
-// Memory that a thread reuses from one row of blocks to the next.
+// Memory of one thread.
 struct BirthScratch {
+    // Cells that have an event: bit i of byte `block` of row y + 8 z is the cell i of that block. 0 between segments.
+    std::uint64_t events[3][64][kSegmentWords] = {};
+    std::uint64_t counters[kMaxCounters + kMaxLanes];             // packed, see philox-inl.h
+    std::uint32_t words[4 * (kMaxCounters + kMaxLanes) + 16];     // 16 more: the last vector of events reads beyond
+    std::uint32_t counts[4 * (kSegmentBlocks + kMaxLanes)];
+    std::uint64_t cloudy[kSegmentWords];                          // a byte a block: not 0 when it holds any cld
+    SparseJob jobs[3 * kSegmentBlocks];
+    int job_count = 0, counter_count = 0;
+    bool dirty[3] = {};                                           // draws with events in this segment
     std::vector<const FieldEllipsoid*> row;
-    std::vector<BlockPlan> plans;
-    std::vector<std::uint64_t> word0, word2;  // counters
-    std::vector<std::uint32_t> counts, words;
-    std::vector<std::uint64_t> cloudy;        // a byte a block: not 0 when the block holds any cld
-    std::vector<SparseJob> jobs;
+    std::vector<BlockPlan> plans = std::vector<BlockPlan>(kSegmentBlocks);
 };
 
-// A row of blocks: where its 64 rows of cells lie, and its planes.
-struct BlockRow {
+// A segment of a row of blocks: where its 64 rows of cells lie, and its planes.
+struct Segment {
     const StepPlanes& planes;
     const StepRandom& random;
     const PhiloxKeys& keys;
     int by, bz;
-    std::array<std::ptrdiff_t, 64> row_word;  // first word of cell row y + 8 z, -1 outside the lattice
-    std::array<std::uint64_t*, 3> target;     // plane that a draw changes
+    int bx0 = 0, blocks = 0;                                      // first block and number of blocks, <= 64
+    std::array<std::ptrdiff_t, 64> row_word{};                    // first word of cell row y + 8 z; -1 outside
+
+    PhiloxBatch batch() const {
+        return {keys, random.step, std::uint32_t(bz) | std::uint32_t(Domain::lattice) << 16};
+    }
+    std::uint64_t counter(Draw draw, int block, std::uint32_t sub) const {
+        const std::uint32_t word2 = std::uint32_t(bx0 + block) | std::uint32_t(by) << 16;
+        return pack_counter(counter_word_0(std::uint32_t(draw), sub), word2);
+    }
 };
 
-inline std::uint32_t draw_word(int draw) { return std::uint32_t(draw) + std::uint32_t(Draw::hum); }
+inline Draw draw_of(int draw) { return Draw(std::uint32_t(draw) + std::uint32_t(Draw::hum)); }
 
-// Changes one cell of block bx.
-HWY_INLINE void apply_event(const BlockRow& r, int bx, int draw, std::uint32_t cell) {
-    const std::ptrdiff_t at = r.row_word[cell >> 3];
-    const int x = bx * kBlockEdge + int(cell & 7);
-    if (at < 0 || x >= r.planes.extent.x) return;
-    std::uint64_t& word = r.target[std::size_t(draw)][at + x / 64];
-    const std::uint64_t bit = std::uint64_t{1} << (x % 64);
-    word = draw == kExt ? word & ~bit : word | bit;
+inline std::uint8_t* event_bytes(BirthScratch& s, int draw, int block) {
+    return reinterpret_cast<std::uint8_t*>(s.events[draw]) + block;
+}
+
+// Marks a cell (x + 8 y + 64 z in its block); `bytes` comes from event_bytes().
+HWY_INLINE void mark(std::uint8_t* bytes, std::uint32_t cell) {
+    std::uint8_t& byte = bytes[(cell >> 3) * kSegmentBlocks];
+    byte = std::uint8_t(byte | 1u << (cell & 7));
 }
 
 // p of up to a vector of cells of a block; the operations and their order are those of block_field.h.
@@ -96,21 +117,24 @@ HWY_INLINE V probability_of_cells(DF d, const BlockPlan& plan, int draw, float b
 }
 
 // Runs one sparse job whose words are ready.
-inline void run_sparse(const BlockRow& r, const SparseJob& job, const BlockPlan& plan, const std::uint32_t* words) {
+inline void run_sparse(const Segment& g, const SparseJob& job, BirthScratch& s) {
+    const std::uint32_t* words = s.words + 4 * job.first;
+    std::uint8_t* bytes = event_bytes(s, job.draw, job.block);
     if (job.accept_all) {
-        for (int e = 0; e < job.events; ++e) apply_event(r, job.bx, job.draw, words[e] & 511u);
+        for (int e = 0; e < job.events; ++e) mark(bytes, words[e] & 511u);
         return;
     }
     const hn::ScalableTag<float> d;
     const hn::RebindToUnsigned<decltype(d)> du;
     const hn::RebindToSigned<decltype(d)> di;
-    const std::size_t lanes = hn::Lanes(d);
-    const float background = r.random.field->background()[std::size_t(job.draw)];
+    const int lanes = int(hn::Lanes(d));
+    const BlockPlan& plan = s.plans[std::size_t(job.block)];
+    const float background = g.random.field->background()[std::size_t(job.draw)];
     const auto seven = hn::Set(du, 7);
     const auto one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f);
-    for (std::size_t e = 0; e < std::size_t(job.events); e += lanes) {
+    const auto to_float = [&](auto v) { return hn::ConvertTo(d, hn::BitCast(di, v)); };
+    for (int e = 0; e < job.events; e += lanes) {
         const auto word = hn::LoadU(du, words + e);
-        const auto to_float = [&](auto v) { return hn::ConvertTo(d, hn::BitCast(di, v)); };
         const auto dx = to_float(hn::And(word, seven));
         const auto dy = to_float(hn::And(hn::ShiftRight<3>(word), seven));
         const auto dz = to_float(hn::And(hn::ShiftRight<6>(word), seven));
@@ -124,201 +148,224 @@ inline void run_sparse(const BlockRow& r, const SparseJob& job, const BlockPlan&
         const auto rate = hn::Mul(hn::Add(z, z), series);
         const auto uniform = hn::Add(to_float(hn::ShiftRight<9>(word)), hn::Set(d, 0.5f));
         const auto accepted = hn::Lt(hn::Mul(uniform, hn::Set(d, job.rate_unit)), rate);
-        std::uint8_t bytes[8] = {};
-        hn::StoreMaskBits(d, accepted, bytes);
-        std::uint32_t bits = std::uint32_t(bytes[0]) | std::uint32_t(bytes[1]) << 8;
-        const std::size_t left = std::size_t(job.events) - e;
-        if (left < lanes) bits &= (1u << left) - 1;
-        for (; bits != 0; bits &= bits - 1) {
-            apply_event(r, job.bx, job.draw, words[e + std::size_t(std::countr_zero(bits))] & 511u);
-        }
+        std::uint8_t mask[8] = {};
+        hn::StoreMaskBits(d, accepted, mask);
+        std::uint32_t bits = std::uint32_t(mask[0]) | std::uint32_t(mask[1]) << 8;
+        if (job.events - e < lanes) bits &= (1u << (job.events - e)) - 1;
+        for (; bits != 0; bits &= bits - 1) mark(bytes, words[e + std::countr_zero(bits)] & 511u);
     }
 }
 
-// Thresholds of the 512 cells of a block, x fastest.
-inline void dense_thresholds(const BlockRow& r, const BlockPlan& plan, int draw,
-                             std::array<std::uint32_t, kBlockCells>& out) {
-    const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
-    if (draw_plan.kind != DrawPlan::Kind::varying) {
-        out.fill(probability_threshold(draw_plan.p_max));
-        return;
-    }
+// Makes the words of all queued sparse draws and runs them.
+inline void run_queue(const Segment& g, BirthScratch& s) {
+    philox_counters(g.batch(), s.counters, s.counter_count, s.words);
+    for (int j = 0; j < s.job_count; ++j) run_sparse(g, s.jobs[j], s);
+    s.job_count = 0;
+    s.counter_count = 0;
+}
+
+// Queues a sparse draw with its counters.
+inline void queue_sparse(const Segment& g, int block, int draw, const DrawPlan& plan, BirthScratch& s) {
+    const SparseTables& tables = *g.random.tables;
+    const bool uniform = plan.kind == DrawPlan::Kind::uniform;
+    const PoissonTable& table =
+        uniform ? tables.background[std::size_t(draw)] : tables.ladder.level(plan.p_max);
+    const int events = table.events(s.counts[4 * block + draw]);
+    if (events == 0) return;
+    const int counters = (events + 3) / 4;
+    if (s.counter_count + counters > kMaxCounters) run_queue(g, s);
+    s.jobs[s.job_count++] = {block, draw, events, s.counter_count, uniform, table.rate * 0x1p-23f};
+    const std::uint64_t first = g.counter(draw_of(draw), block, 0);
+    for (int c = 0; c < counters; ++c) s.counters[s.counter_count + c] = first + std::uint64_t(c);
+    s.counter_count += counters;
+    s.dirty[draw] = true;
+}
+
+// Thresholds of the 512 cells of a block, x fastest, and their top bytes.
+struct DenseThresholds {
+    std::array<std::uint32_t, kBlockCells> full;
+    std::array<std::uint8_t, kBlockCells> top;
+};
+
+inline void make_thresholds(const Segment& g, const BlockPlan& plan, int draw, DenseThresholds& out) {
     const hn::CappedTag<float, 8> d;
     const std::size_t lanes = hn::Lanes(d);
-    const float background = r.random.field->background()[std::size_t(draw)];
+    const float background = g.random.field->background()[std::size_t(draw)];
     HWY_ALIGN std::array<float, 8> p;
-    for (int row = 0; row < 64; ++row) {
+    for (std::size_t row = 0; row < 64; ++row) {
         const auto dy = hn::Set(d, float(row & 7)), dz = hn::Set(d, float(row >> 3));
         for (std::size_t x = 0; x < 8; x += lanes) {
             const auto dx = hn::Iota(d, float(x));
             hn::Store(probability_of_cells(d, plan, draw, background, dx, dy, dz), d, p.data() + x);
         }
-        for (std::size_t x = 0; x < 8; ++x) out[std::size_t(row) * 8 + x] = probability_threshold(p[x]);
+        for (std::size_t x = 0; x < 8; ++x) out.full[row * 8 + x] = probability_threshold(p[x]);
     }
+    for (std::size_t c = 0; c < kBlockCells; ++c) out.top[c] = std::uint8_t(out.full[c] >> 24);
 }
 
-// Compares the 512 random bytes with the top bytes; one bit a cell, and the cells where they tie.
-inline void compare_bytes(const std::uint8_t* random, const std::uint8_t* top, std::uint8_t* less, std::uint8_t* tie) {
+// A bit a cell of a block, 64 cells (a layer) a word.
+using BlockBits = std::array<std::uint64_t, kBlockCells / 64>;
+
+// Compares the 512 random bytes with `top(cell)`: cells below it, and cells that tie.
+template <class Top>
+HWY_INLINE void compare_bytes(const std::uint8_t* random, const Top& top, BlockBits& less, BlockBits& tie) {
 #if HWY_TARGET == HWY_SCALAR  // one lane does not fill a byte of mask bits
+    const hn::ScalableTag<std::uint8_t> d;
+    less.fill(0);
+    tie.fill(0);
     for (std::size_t c = 0; c < kBlockCells; ++c) {
-        less[c / 8] = std::uint8_t(less[c / 8] | int(random[c] < top[c]) << (c % 8));
-        tie[c / 8] = std::uint8_t(tie[c / 8] | int(random[c] == top[c]) << (c % 8));
+        const std::uint8_t threshold = hn::GetLane(top(d, c));
+        less[c / 64] |= std::uint64_t{random[c] < threshold} << (c % 64);
+        tie[c / 64] |= std::uint64_t{random[c] == threshold} << (c % 64);
     }
 #else
-    const hn::ScalableTag<std::uint8_t> d;
-    const std::size_t lanes = hn::Lanes(d);
-    for (std::size_t c = 0; c < kBlockCells; c += lanes) {
-        const auto value = hn::LoadU(d, random + c), threshold = hn::LoadU(d, top + c);
-        hn::StoreMaskBits(d, hn::Lt(value, threshold), less + c / 8);
-        hn::StoreMaskBits(d, hn::Eq(value, threshold), tie + c / 8);
+    const hn::CappedTag<std::uint8_t, 64> d;
+    for (std::size_t c = 0; c < kBlockCells; c += hn::Lanes(d)) {
+        const auto value = hn::LoadU(d, random + c), threshold = top(d, c);
+        hn::StoreMaskBits(d, hn::Lt(value, threshold), reinterpret_cast<std::uint8_t*>(less.data()) + c / 8);
+        hn::StoreMaskBits(d, hn::Eq(value, threshold), reinterpret_cast<std::uint8_t*>(tie.data()) + c / 8);
     }
 #endif
 }
 
 // Decides tied cells by 24 more bits each, in rising order of cells, from counter sub-index 32 on.
-inline void resolve_ties(const BlockRow& r, int bx, int draw, const std::array<std::uint32_t, kBlockCells>& threshold,
-                         const std::uint8_t* tie, std::uint8_t* less) {
-    PhiloxWords words{};
+template <class Threshold>
+HWY_INLINE void resolve_ties(const Segment& g, int block, int draw, const Threshold& threshold, const BlockBits& tie,
+                             BlockBits& less) {
+    constexpr std::uint32_t kBatch = 16;  // words made at once; two ties are expected
+    std::uint64_t counters[kMaxLanes];
+    std::uint32_t words[4 * kMaxLanes];
     std::uint32_t used = 0;
-    for (std::size_t byte = 0; byte < kBlockCells / 8; ++byte) {
-        for (std::uint32_t bits = tie[byte]; bits != 0; bits &= bits - 1) {
-            const int lane = std::countr_zero(bits);
-            if (used % 4 == 0) {
-                words = philox(r.random.seed, block_counter(Domain::lattice, Draw(draw_word(draw)), r.random.step, bx,
-                                                            r.by, r.bz, 32 + used / 4));
+    for (std::size_t layer = 0; layer < tie.size(); ++layer) {
+        for (std::uint64_t bits = tie[layer]; bits != 0; bits &= bits - 1) {
+            if (used % kBatch == 0) {
+                for (std::uint32_t c = 0; c < kMaxLanes; ++c) {
+                    counters[c] = g.counter(draw_of(draw), block, 32 + used / 4 + c);
+                }
+                philox_counters(g.batch(), counters, kBatch / 4, words);
             }
-            const std::uint32_t t = threshold[byte * 8 + std::size_t(lane)];
-            const bool event = t == kCertain || (words[used % 4] >> 8) < (t & 0xFFFFFFu);
-            less[byte] = std::uint8_t(less[byte] | int(event) << lane);
+            const int cell = std::countr_zero(bits);
+            const std::uint32_t t = threshold(layer * 64 + std::size_t(cell));
+            const bool event = t == kCertain || (words[used % kBatch] >> 8) < (t & 0xFFFFFFu);
+            less[layer] |= std::uint64_t{event} << cell;
             ++used;
         }
     }
 }
 
-// Changes the cells of block bx whose bit in `events` (a byte a row of 8 cells) is set.
-inline void apply_block(const BlockRow& r, int bx, int draw, const std::uint8_t* events) {
-    const int cells = std::min(kBlockEdge, r.planes.extent.x - bx * kBlockEdge);
-    const std::uint64_t inside = (1u << cells) - 1;
-    std::uint64_t* plane = r.target[std::size_t(draw)];
-    for (std::size_t row = 0; row < 64; ++row) {
-        if (r.row_word[row] < 0) continue;
-        const std::uint64_t bits = (events[row] & inside) << (bx % 8 * 8);
-        std::uint64_t& word = plane[r.row_word[row] + bx / 8];
-        word = draw == kExt ? word & ~bits : word | bits;
-    }
-}
-
-inline void run_dense(const BlockRow& r, int bx, int draw, const BlockPlan& plan) {
-    HWY_ALIGN std::array<std::uint8_t, kBlockCells / 8 + 8> less{}, tie{};  // 8 more: StoreMaskBits may write them
-    if (plan.draws[std::size_t(draw)].kind == DrawPlan::Kind::certain) {
-        less.fill(0xFF);
-        return apply_block(r, bx, draw, less.data());
-    }
-    HWY_ALIGN std::array<std::uint64_t, 32> word0, word2;
-    HWY_ALIGN std::array<std::uint32_t, kBlockCells / 4> random;
-    for (std::uint32_t sub = 0; sub < 32; ++sub) {
-        word0[sub] = counter_word_0(draw_word(draw), sub);
-        word2[sub] = std::uint32_t(bx) | std::uint32_t(r.by) << 16;
-    }
-    const PhiloxBatch batch{r.keys, r.random.step, std::uint32_t(r.bz) | std::uint32_t(Domain::lattice) << 16};
-    philox_counters(batch, word0.data(), word2.data(), 32, random.data());
-
-    HWY_ALIGN std::array<std::uint32_t, kBlockCells> threshold;
-    HWY_ALIGN std::array<std::uint8_t, kBlockCells> top;
-    dense_thresholds(r, plan, draw, threshold);
-    for (std::size_t c = 0; c < kBlockCells; ++c) top[c] = std::uint8_t(threshold[c] >> 24);
-    compare_bytes(reinterpret_cast<const std::uint8_t*>(random.data()), top.data(), less.data(), tie.data());
-    resolve_ties(r, bx, draw, threshold, tie.data(), less.data());
-    apply_block(r, bx, draw, less.data());
-}
-
-// Which blocks of the row hold any cld: the others need no extinction.
-inline void find_cloudy(const BlockRow& r, std::vector<std::uint64_t>& any) {
-    const hn::ScalableTag<std::uint64_t> d;
-    const std::size_t words = r.planes.words_per_row, lanes = hn::Lanes(d);
-    any.assign(words, 0);
-    for (std::ptrdiff_t at : r.row_word) {
-        if (at < 0) continue;
-        std::size_t w = 0;
-        for (; w + lanes <= words; w += lanes) {
-            hn::StoreU(hn::Or(hn::LoadU(d, any.data() + w), hn::LoadU(d, r.planes.cld + at + w)), d, any.data() + w);
-        }
-        for (; w < words; ++w) any[w] |= r.planes.cld[std::size_t(at) + w];
-    }
-}
-
-// The counts of the three draws of every block: counts[4 * bx + draw] are uniform words.
-inline void draw_counts(const BlockRow& r, int blocks, BirthScratch& s) {
-    const std::size_t padded = std::size_t(blocks) + kMaxLanes;
-    s.word0.assign(padded, counter_word_0(std::uint32_t(Draw::counts), 0));
-    s.word2.resize(padded);
-    s.counts.resize(4 * padded);
-    for (std::size_t bx = 0; bx < padded; ++bx) s.word2[bx] = std::uint32_t(bx) | std::uint32_t(r.by) << 16;
-    const PhiloxBatch batch{r.keys, r.random.step, std::uint32_t(r.bz) | std::uint32_t(Domain::lattice) << 16};
-    philox_counters(batch, s.word0.data(), s.word2.data(), std::size_t(blocks), s.counts.data());
-}
-
-// Queues a sparse draw with its counters, or runs a dense one at once.
-inline void start_draw(const BlockRow& r, int bx, int draw, const BlockPlan& plan, BirthScratch& s) {
+inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& plan, BirthScratch& s) {
+    s.dirty[draw] = true;
     const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
-    const bool uniform = draw_plan.kind == DrawPlan::Kind::uniform;
-    const float limit = uniform ? kUniformSparseLimit : kVaryingSparseLimit;
-    if (draw_plan.kind == DrawPlan::Kind::certain || draw_plan.p_max >= limit) return run_dense(r, bx, draw, plan);
+    HWY_ALIGN BlockBits less, tie;
+    if (draw_plan.kind == DrawPlan::Kind::certain) {
+        less.fill(~std::uint64_t{0});
+    } else {
+        HWY_ALIGN std::uint64_t counters[32];
+        HWY_ALIGN std::uint32_t random[kBlockCells / 4];
+        const std::uint64_t first = g.counter(draw_of(draw), block, 0);
+        for (std::uint64_t sub = 0; sub < 32; ++sub) counters[sub] = first + sub;
+        philox_counters(g.batch(), counters, 32, random);
+        const auto* bytes = reinterpret_cast<const std::uint8_t*>(random);
+        if (draw_plan.kind == DrawPlan::Kind::uniform) {
+            const std::uint32_t t = probability_threshold(draw_plan.p_max);
+            compare_bytes(bytes, [t](auto d, std::size_t) { return hn::Set(d, std::uint8_t(t >> 24)); }, less, tie);
+            resolve_ties(g, block, draw, [t](std::size_t) { return t; }, tie, less);
+        } else {
+            HWY_ALIGN DenseThresholds t;
+            make_thresholds(g, plan, draw, t);
+            compare_bytes(bytes, [&t](auto d, std::size_t c) { return hn::LoadU(d, t.top.data() + c); }, less, tie);
+            resolve_ties(g, block, draw, [&t](std::size_t c) { return t.full[c]; }, tie, less);
+        }
+    }
+    std::uint8_t* out = event_bytes(s, draw, block);
+    const auto* rows = reinterpret_cast<const std::uint8_t*>(less.data());
+    for (std::size_t row = 0; row < 64; ++row) out[row * kSegmentBlocks] = rows[row];
+}
 
-    const SparseTables& tables = *r.random.tables;
-    const PoissonTable& table =
-        uniform ? tables.background[std::size_t(draw)] : tables.ladder.level(double(draw_plan.p_max));
-    const int events = table.events(s.counts[4 * std::size_t(bx) + std::size_t(draw)]);
-    if (events == 0) return;
-    s.jobs.push_back({bx, draw, events, 4 * s.word0.size(), uniform, table.rate * 0x1p-23f});
-    for (std::uint32_t sub = 0; sub * 4 < std::uint32_t(events); ++sub) {
-        s.word0.push_back(counter_word_0(draw_word(draw), sub));
-        s.word2.push_back(std::uint32_t(bx) | std::uint32_t(r.by) << 16);
+// Which blocks of the segment hold any cld: the others need no extinction.
+inline void find_cloudy(const Segment& g, std::uint64_t* any) {
+    const int words = (g.blocks + 7) / 8;
+    const std::uint64_t* cld = g.planes.cld + g.bx0 / 8;
+    std::fill_n(any, kSegmentWords, std::uint64_t{0});
+    for (std::ptrdiff_t at : g.row_word) {
+        if (at < 0) continue;
+        if (words == kSegmentWords) {  // a fixed length, so that it becomes a few vectors
+            for (int w = 0; w < kSegmentWords; ++w) any[w] |= cld[at + w];
+        } else {
+            for (int w = 0; w < words; ++w) any[w] |= cld[at + w];
+        }
     }
 }
 
-inline void draw_row(const BlockRow& r, BirthScratch& s) {
-    const BlockField& field = *r.random.field;
-    const int blocks = (r.planes.extent.x + kBlockEdge - 1) / kBlockEdge;
-    field.collect(r.by, r.bz, s.row);
-    if (field.any_extinction()) find_cloudy(r, s.cloudy);
-    draw_counts(r, blocks, s);
-
-    s.plans.resize(std::size_t(blocks));
-    s.jobs.clear();
-    s.word0.clear();
-    s.word2.clear();
-    for (int bx = 0; bx < blocks; ++bx) {
-        BlockPlan& plan = s.plans[std::size_t(bx)];
-        field.plan_block(bx, r.by, r.bz, s.row, plan);
-        for (int draw = 0; draw < 3; ++draw) {
-            if (plan.draws[std::size_t(draw)].kind == DrawPlan::Kind::none) continue;
-            if (draw == kExt && (s.cloudy[std::size_t(bx) / 8] >> (bx % 8 * 8) & 0xFF) == 0) continue;
-            start_draw(r, bx, draw, plan, s);
+// Puts the events of the segment into the planes and forgets them.
+inline void merge_events(const Segment& g, BirthScratch& s) {
+    const int words = (g.blocks + 7) / 8;
+    const int cells_left = g.planes.extent.x - g.bx0 * kBlockEdge;
+    const std::uint64_t last = cells_left >= words * 64 ? ~std::uint64_t{0}
+                                                        : (std::uint64_t{1} << (cells_left % 64)) - 1;
+    std::uint64_t* const planes[3] = {g.planes.hum, g.planes.act_next, g.planes.cld};
+    for (int draw = 0; draw < 3; ++draw) {
+        if (!s.dirty[draw]) continue;
+        s.dirty[draw] = false;
+        for (std::size_t row = 0; row < 64; ++row) {
+            std::uint64_t* events = s.events[draw][row];
+            if (g.row_word[row] >= 0) {
+                std::uint64_t* out = planes[draw] + g.row_word[row] + g.bx0 / 8;
+                events[words - 1] &= last;
+                if (draw == kExt) {
+                    for (int w = 0; w < words; ++w) out[w] &= ~events[w];
+                } else {
+                    for (int w = 0; w < words; ++w) out[w] |= events[w];
+                }
+            }
+            std::fill_n(events, kSegmentWords, std::uint64_t{0});
         }
     }
-    const std::size_t counters = s.word0.size();
-    s.word0.resize(counters + kMaxLanes);
-    s.word2.resize(counters + kMaxLanes);
-    s.words.resize(4 * (counters + kMaxLanes) + 16);  // 16 more: the last event vector may read beyond its job
-    const PhiloxBatch batch{r.keys, r.random.step, std::uint32_t(r.bz) | std::uint32_t(Domain::lattice) << 16};
-    philox_counters(batch, s.word0.data(), s.word2.data(), counters, s.words.data());
-    for (const SparseJob& job : s.jobs) run_sparse(r, job, s.plans[std::size_t(job.bx)], s.words.data() + job.first);
+}
+
+inline void draw_segment(const Segment& g, BirthScratch& s) {
+    const BlockField& field = *g.random.field;
+    if (field.any_extinction()) find_cloudy(g, s.cloudy);
+    std::uint64_t counters[kSegmentBlocks + kMaxLanes];
+    for (int b = 0; b < kSegmentBlocks + kMaxLanes; ++b) counters[b] = g.counter(Draw::counts, b, 0);
+    philox_counters(g.batch(), counters, g.blocks, s.counts);
+
+    field.plan_blocks(g.bx0, g.by, g.bz, s.row, std::span(s.plans).first(std::size_t(g.blocks)));
+    for (int b = 0; b < g.blocks; ++b) {
+        const BlockPlan& plan = s.plans[std::size_t(b)];
+        for (int draw = 0; draw < 3; ++draw) {
+            const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
+            if (draw_plan.kind == DrawPlan::Kind::none) continue;
+            if (draw == kExt && (s.cloudy[b / 8] >> (b % 8 * 8) & 0xFF) == 0) continue;
+            if (is_sparse(draw_plan)) {
+                queue_sparse(g, b, draw, draw_plan, s);
+            } else {
+                run_dense(g, b, draw, plan, s);
+            }
+        }
+    }
+    run_queue(g, s);
+    merge_events(g, s);
 }
 
 // Rows of blocks by_begin..by_end of slab bz.
 inline void draw_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
     const PhiloxKeys keys(random.seed);
-    BirthScratch scratch;
+    const auto scratch = std::make_unique<BirthScratch>();
+    const int all_blocks = (planes.extent.x + kBlockEdge - 1) / kBlockEdge;
     for (int by = by_begin; by < by_end; ++by) {
-        BlockRow row{planes, random, keys, by, bz, {}, {planes.hum, planes.act_next, planes.cld}};
+        Segment segment{planes, random, keys, by, bz};
         for (int i = 0; i < 64; ++i) {
             const int j = by * kBlockEdge + i % 8, k = bz * kBlockEdge + i / 8;
             const bool inside = j < planes.extent.y && k < planes.extent.z;
-            row.row_word[std::size_t(i)] =
+            segment.row_word[std::size_t(i)] =
                 inside ? (std::ptrdiff_t(k) * planes.extent.y + j) * std::ptrdiff_t(planes.words_per_row) : -1;
         }
-        draw_row(row, scratch);
+        random.field->collect(by, bz, scratch->row);
+        for (segment.bx0 = 0; segment.bx0 < all_blocks; segment.bx0 += kSegmentBlocks) {
+            segment.blocks = std::min(kSegmentBlocks, all_blocks - segment.bx0);
+            draw_segment(segment, *scratch);
+        }
     }
 }
 

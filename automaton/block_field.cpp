@@ -27,7 +27,13 @@ std::pair<int, int> block_range(double low, double high, int cells) {
 
 BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> active) {
     const auto background = as_array(options.field.background);
-    for (int d = 0; d < 3; ++d) background_[std::size_t(d)] = float(background[std::size_t(d)]);
+    for (std::size_t d = 0; d < 3; ++d) {
+        background_[d] = float(background[d]);
+        if (background_[d] > 0) {
+            background_plan_[d] = {background_[d] < 1 ? DrawPlan::Kind::uniform : DrawPlan::Kind::certain,
+                                   background_[d]};
+        }
+    }
     by_slab_.resize(std::size_t(blocks(options.extent.z)));
 
     const double cell = options.placement.cell_size_m;
@@ -113,54 +119,57 @@ void BlockField::collect(int by, int bz, std::vector<const FieldEllipsoid*>& out
     }
 }
 
-void BlockField::plan_block(int bx, int by, int bz, std::span<const FieldEllipsoid* const> row,
-                            BlockPlan& plan) const {
-    plan.ellipsoids.clear();
-    std::array<float, 3> p_max = background_;
-    std::array<bool, 3> varies{};
+void BlockField::plan_blocks(int bx0, int by, int bz, std::span<const FieldEllipsoid* const> row,
+                             std::span<BlockPlan> plans) const {
+    for (BlockPlan& plan : plans) {
+        plan.draws = background_plan_;
+        plan.ellipsoids.clear();
+    }
+    const int bx1 = bx0 + int(plans.size());
     for (const FieldEllipsoid* e : row) {
-        if (bx < e->bx0 || bx >= e->bx1) continue;
-        const double dx = bx * kBlockEdge + 0.5 - e->centre_x;
         const double dy = by * kBlockEdge + 0.5 - e->centre_y;
         const double dz = bz * kBlockEdge + 0.5 - e->centre_z;
-        const BlockEllipsoid seen{.base_a = float(e->xx * dx + e->xy * dy),
-                                  .base_b = float(e->yx * dx + e->yy * dy),
-                                  .base_c = float(e->zz * dz),
-                                  .xx = float(e->xx), .xy = float(e->xy), .yx = float(e->yx), .yy = float(e->yy),
-                                  .zz = float(e->zz), .source = e};
-        // Distance of the block's centre, and so of its nearest and farthest cell at most.
-        const float a = seen.base_a + 3.5f * (seen.xx + seen.xy);
-        const float b = seen.base_b + 3.5f * (seen.yx + seen.yy);
-        const float c = seen.base_c + 3.5f * seen.zz;
-        const float distance = std::sqrt(a * a + b * b + c * c);
-        const float nearest = std::max(0.0f, distance - e->block_reach);
-        const float farthest = distance + e->block_reach;
-        if (nearest >= 1) continue;
-        plan.ellipsoids.push_back(seen);
-
-        const float inner = (1 - nearest * nearest) * (1 - nearest * nearest);
-        const float outer = farthest < 1 ? (1 - farthest * farthest) * (1 - farthest * farthest) : 0;
-        for (std::size_t d = 0; d < 3; ++d) {
-            // Rounding in the evaluation per cell can exceed the bound by a few units in the last place.
-            const float bound = std::max(e->rim[d] + e->span[d] * inner, e->rim[d] + e->span[d] * outer) * 1.00001f;
-            if (d == kExt) {
-                varies[d] = true;
-                if (farthest < 1) p_max[d] = std::min(p_max[d], bound);
-            } else if (bound > background_[d]) {
-                varies[d] = true;
-                p_max[d] = std::max(p_max[d], bound);
-            }
+        for (int bx = std::max(bx0, e->bx0); bx < std::min(bx1, e->bx1); ++bx) {
+            const double dx = bx * kBlockEdge + 0.5 - e->centre_x;
+            add_to_plan({.base_a = float(e->xx * dx + e->xy * dy),
+                         .base_b = float(e->yx * dx + e->yy * dy),
+                         .base_c = float(e->zz * dz),
+                         .xx = float(e->xx), .xy = float(e->xy), .yx = float(e->yx), .yy = float(e->yy),
+                         .zz = float(e->zz), .source = e},
+                        plans[std::size_t(bx - bx0)]);
         }
     }
+}
+
+// Takes an ellipsoid into a block's plan unless the block lies outside it, and widens the bounds.
+void BlockField::add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const {
+    const FieldEllipsoid& e = *seen.source;
+    // Distance of the block's centre, and so of its nearest and farthest cell at most.
+    const float a = seen.base_a + 3.5f * (seen.xx + seen.xy);
+    const float b = seen.base_b + 3.5f * (seen.yx + seen.yy);
+    const float c = seen.base_c + 3.5f * seen.zz;
+    const float distance = std::sqrt(a * a + b * b + c * c);
+    const float nearest = std::max(0.0f, distance - e.block_reach);
+    const float farthest = distance + e.block_reach;
+    if (nearest >= 1) return;
+    plan.ellipsoids.push_back(seen);
+
+    const float inner = (1 - nearest * nearest) * (1 - nearest * nearest);
+    const float outer = farthest < 1 ? (1 - farthest * farthest) * (1 - farthest * farthest) : 0;
     for (std::size_t d = 0; d < 3; ++d) {
+        // Rounding in the evaluation per cell can exceed the bound by a few units in the last place.
+        const float highest = std::max(e.rim[d] + e.span[d] * inner, e.rim[d] + e.span[d] * outer) * 1.00001f;
+        const float bound = std::clamp(highest, 0.0f, 1.0f);
         DrawPlan& draw = plan.draws[d];
-        draw.p_max = std::min(p_max[d], 1.0f);
-        if (draw.p_max <= 0) {
-            draw.kind = DrawPlan::Kind::none;
-        } else if (varies[d]) {
+        if (d == kExt) {  // the smallest wins: from the background down, everywhere only if the block lies inside
+            if (draw.kind == DrawPlan::Kind::none) continue;
             draw.kind = DrawPlan::Kind::varying;
-        } else {
-            draw.kind = draw.p_max >= 1 ? DrawPlan::Kind::certain : DrawPlan::Kind::uniform;
+            if (farthest < 1) draw.p_max = std::min(draw.p_max, bound);
+            if (draw.p_max <= 0) draw.kind = DrawPlan::Kind::none;
+        } else if (bound > draw.p_max) {
+            draw = {DrawPlan::Kind::varying, bound};
+        } else if (draw.kind != DrawPlan::Kind::none && bound > background_[d]) {
+            draw.kind = DrawPlan::Kind::varying;
         }
     }
 }

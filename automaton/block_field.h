@@ -70,13 +70,16 @@ class BlockField {
     bool any_extinction() const { return any_extinction_; }
     // The ellipsoids that can touch blocks with this by and bz.
     void collect(int by, int bz, std::vector<const FieldEllipsoid*>& out) const;
-    // Fills `plan` for one block from the ellipsoids collected for its row of blocks.
-    void plan_block(int bx, int by, int bz, std::span<const FieldEllipsoid* const> row, BlockPlan& plan) const;
+    // Fills the plans of blocks bx0, bx0 + 1, ... from the ellipsoids collected for their row of blocks.
+    void plan_blocks(int bx0, int by, int bz, std::span<const FieldEllipsoid* const> row,
+                     std::span<BlockPlan> plans) const;
 
   private:
     void add(const AutomatonOptions& options, const ActiveEllipsoid& active, Vec3 shift_cells);
+    void add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const;
 
     std::array<float, 3> background_{};
+    std::array<DrawPlan, 3> background_plan_;
     bool anything_ = false, any_birth_ = false, any_extinction_ = false;
     std::vector<FieldEllipsoid> ellipsoids_;
     std::vector<std::vector<std::uint32_t>> by_slab_;  // indices into ellipsoids_, rising

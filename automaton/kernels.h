@@ -39,6 +39,11 @@ struct SparseTables {
 inline constexpr float kUniformSparseLimit = 0.125f;
 inline constexpr float kVaryingSparseLimit = float(kSparseLimit);
 
+inline bool is_sparse(const DrawPlan& plan) {
+    if (plan.kind == DrawPlan::Kind::uniform) return plan.p_max < kUniformSparseLimit;
+    return plan.kind == DrawPlan::Kind::varying && plan.p_max < kVaryingSparseLimit;
+}
+
 // The chance of one step.
 struct StepRandom {
     std::uint64_t seed = 0;
@@ -50,7 +55,7 @@ struct StepRandom {
 // Rows of blocks by_begin..by_end of slab bz. Blocks are 8x8x8 cells; the last ones may be cut by the extent.
 void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end);
 
-// Names of the instruction sets that this machine can run, best first; for tests and reports.
+// Name of the instruction set in use; for tests and reports.
 const char* kernel_target();
 
 // A probability as the integer that 32 random bits are compared with; p in 0..1. `kCertain` means always.

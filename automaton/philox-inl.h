@@ -12,6 +12,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -21,18 +22,19 @@ HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The key of each round, in the low half of a 64-bit word.
+// The key of each round, in the low half of every lane of the widest vector.
 struct PhiloxKeys {
     explicit PhiloxKeys(std::uint64_t seed) {
         std::uint32_t k0 = std::uint32_t(seed), k1 = std::uint32_t(seed >> 32);
         for (std::size_t round = 0; round < 10; ++round) {
-            key0[round] = k0;
-            key1[round] = k1;
+            std::fill_n(key0[round], 8, std::uint64_t{k0});
+            std::fill_n(key1[round], 8, std::uint64_t{k1});
             k0 += 0x9E3779B9u;  // golden ratio and sqrt(3) - 1, as the paper's key schedule
             k1 += 0xBB67AE85u;
         }
     }
-    std::array<std::uint64_t, 10> key0, key1;
+    alignas(64) std::uint64_t key0[10][8];
+    alignas(64) std::uint64_t key1[10][8];
 };
 
 // Counters that share the words 1 (step) and 3 (slab, domain).
@@ -41,16 +43,24 @@ struct PhiloxBatch {
     std::uint32_t word1, word3;
 };
 
-// out[4*i .. 4*i+3] = Philox of (word0[i], word1, word2[i], word3). The arrays must be readable and writable up to
-// the next multiple of the vector's lanes.
-HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* HWY_RESTRICT word0,
-                                const std::uint64_t* HWY_RESTRICT word2, std::size_t count,
+// One vector of counters on their way through the rounds.
+template <class D>
+struct PhiloxState {
+    hn::Vec<D> w0, w1, w2, w3;
+};
+
+// Words 0 and 2 of a counter in one 64-bit number.
+inline std::uint64_t pack_counter(std::uint32_t word0, std::uint32_t word2) { return word0 | std::uint64_t{word2} << 32; }
+
+// out[4*i .. 4*i+3] = Philox of the counter with packed[i]. Both arrays must reach up to the next multiple of the
+// vector's lanes.
+HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* HWY_RESTRICT packed, int count,
                                 std::uint32_t* HWY_RESTRICT out) {
 #if HWY_TARGET == HWY_SCALAR  // one lane: no 32-bit halves to multiply
-    const std::uint64_t seed = batch.keys.key0[0] | batch.keys.key1[0] << 32;
-    for (std::size_t i = 0; i < count; ++i) {
-        const PhiloxWords words = philox(seed, {std::uint32_t(word0[i]), batch.word1, std::uint32_t(word2[i]), batch.word3});
-        for (std::size_t w = 0; w < 4; ++w) out[4 * i + w] = words[w];
+    const std::uint64_t seed = batch.keys.key0[0][0] | batch.keys.key1[0][0] << 32;
+    for (int i = 0; i < count; ++i) {
+        const auto words = philox(seed, {std::uint32_t(packed[i]), batch.word1, std::uint32_t(packed[i] >> 32), batch.word3});
+        std::copy(words.begin(), words.end(), out + 4 * i);
     }
 #else
     const hn::ScalableTag<std::uint64_t> d;
@@ -58,22 +68,42 @@ HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* H
     const auto m0 = hn::BitCast(d32, hn::Set(d, 0xD2511F53u));
     const auto m1 = hn::BitCast(d32, hn::Set(d, 0xCD9E8D57u));
     const auto low = hn::Set(d, 0xFFFFFFFFu);
-    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-        auto x0 = hn::LoadU(d, word0 + i);
-        auto x1 = hn::Set(d, batch.word1);
-        auto x2 = hn::LoadU(d, word2 + i);
-        auto x3 = hn::Set(d, batch.word3);
+    const auto start = [&](const std::uint64_t* at) HWY_ATTR {
+        const auto both = hn::LoadU(d, at);
+        return PhiloxState<decltype(d)>{both, hn::Set(d, std::uint64_t{batch.word1}), hn::ShiftRight<32>(both),
+                                        hn::Set(d, std::uint64_t{batch.word3})};
+    };
+    const auto advance = [&](PhiloxState<decltype(d)>& x, std::size_t round) HWY_ATTR {
+        const auto product0 = hn::MulEven(hn::BitCast(d32, x.w0), m0);
+        const auto product1 = hn::MulEven(hn::BitCast(d32, x.w2), m1);
+        // The key meets the older word first: the chain from round to round is multiply, shift, exclusive or.
+        const auto keyed0 = hn::Xor(x.w1, hn::Load(d, batch.keys.key0[round]));
+        const auto keyed1 = hn::Xor(x.w3, hn::Load(d, batch.keys.key1[round]));
+        x.w0 = hn::Xor(hn::ShiftRight<32>(product1), keyed0);
+        x.w2 = hn::Xor(hn::ShiftRight<32>(product0), keyed1);
+        x.w1 = product1;
+        x.w3 = product0;
+    };
+    const auto finish = [&](const PhiloxState<decltype(d)>& x, std::uint32_t* to) HWY_ATTR {
+        const auto words01 = hn::Or(hn::And(x.w0, low), hn::ShiftLeft<32>(x.w1));
+        const auto words23 = hn::Or(hn::And(x.w2, low), hn::ShiftLeft<32>(x.w3));
+        hn::StoreInterleaved2(words01, words23, d, reinterpret_cast<std::uint64_t*>(to));
+    };
+    const int lanes = int(hn::Lanes(d));
+    int i = 0;
+    for (; i + lanes < count; i += 2 * lanes) {  // two at a time hide each other's latency
+        auto x = start(packed + i), y = start(packed + i + lanes);
         for (std::size_t round = 0; round < 10; ++round) {
-            const auto product0 = hn::MulEven(hn::BitCast(d32, x0), m0);
-            const auto product1 = hn::MulEven(hn::BitCast(d32, x2), m1);
-            x0 = hn::Xor(hn::Xor(hn::ShiftRight<32>(product1), x1), hn::Set(d, batch.keys.key0[round]));
-            x2 = hn::Xor(hn::Xor(hn::ShiftRight<32>(product0), x3), hn::Set(d, batch.keys.key1[round]));
-            x1 = product1;
-            x3 = product0;
+            advance(x, round);
+            advance(y, round);
         }
-        const auto words01 = hn::Or(hn::And(x0, low), hn::ShiftLeft<32>(x1));
-        const auto words23 = hn::Or(hn::And(x2, low), hn::ShiftLeft<32>(x3));
-        hn::StoreInterleaved2(words01, words23, d, reinterpret_cast<std::uint64_t*>(out + 4 * i));
+        finish(x, out + 4 * i);
+        finish(y, out + 4 * (i + lanes));
+    }
+    if (i < count) {
+        auto x = start(packed + i);
+        for (std::size_t round = 0; round < 10; ++round) advance(x, round);
+        finish(x, out + 4 * i);
     }
 #endif
 }

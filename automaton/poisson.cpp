@@ -2,10 +2,16 @@
 #include "automaton/poisson.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 
 namespace nephos {
+namespace {
+
+constexpr int kLowestOctave = -26;
+
+}  // namespace
 
 double event_rate(double p) {
     assert(p >= 0 && p <= kSparseLimit);
@@ -35,11 +41,16 @@ PoissonTable make_poisson_table(double p) {
         if (n > mean && probability * 0x1p32 < 0.5) break;
         probability *= mean / (n + 1);
     }
+    assert(table.thresholds.size() < 256);
+    for (std::size_t byte = 0; byte < table.start.size(); ++byte) {
+        const auto lowest = std::uint32_t(byte << 24);
+        table.start[byte] = std::uint8_t(std::ranges::upper_bound(table.thresholds, lowest) - table.thresholds.begin());
+    }
     return table;
 }
 
 PoissonLadder::PoissonLadder() {
-    for (int octave = -26; octave < -2; ++octave) {
+    for (int octave = kLowestOctave; octave < -2; ++octave) {
         for (double mantissa : {1.0, 1.25, 1.5, 1.75}) {
             tables_.push_back(make_poisson_table(std::ldexp(mantissa, octave)));
         }
@@ -47,9 +58,11 @@ PoissonLadder::PoissonLadder() {
     tables_.push_back(make_poisson_table(kSparseLimit));
 }
 
-const PoissonTable& PoissonLadder::level(double p) const {
-    assert(p <= kSparseLimit);
-    return *std::ranges::lower_bound(tables_, p, {}, &PoissonTable::p);
+const PoissonTable& PoissonLadder::level(float p) const {
+    assert(p <= float(kSparseLimit));
+    // Exponent and two bits of mantissa, rounded up, are the number of the level.
+    const int number = int((std::bit_cast<std::uint32_t>(p) + 0x1FFFFFu) >> 21) - ((127 + kLowestOctave) << 2);
+    return tables_[std::size_t(std::max(number, 0))];
 }
 
 }  // namespace nephos

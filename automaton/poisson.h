@@ -9,6 +9,7 @@
 //
 // p_level comes from a ladder (4 levels an octave, 2^-26 to 1/4), so that the tables are made once.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -23,20 +24,13 @@ struct PoissonTable {
     float rate = 0;                          // -ln(1 - p), events per cell
     std::vector<std::uint32_t> thresholds;   // thresholds[n] = floor(2^32 * P(N <= n)), rising
 
+    std::array<std::uint8_t, 256> start{};   // number of thresholds <= the lowest word with that top byte
+
     // Number of events for a uniform 32-bit word: how many thresholds are <= word.
     int events(std::uint32_t word) const {
-        int n = 0;
-        const int size = int(thresholds.size());
-        if (rate > 0.02f) {  // more than 10 events expected: halve the interval first
-            int length = size;
-            while (length > 1) {
-                const int half = length / 2;
-                n += thresholds[std::size_t(n + half - 1)] <= word ? half : 0;
-                length -= half;
-            }
-        }
-        while (n < size && thresholds[std::size_t(n)] <= word) ++n;
-        return n;
+        std::size_t n = start[word >> 24];
+        while (n < thresholds.size() && thresholds[n] <= word) ++n;
+        return int(n);
     }
 };
 
@@ -52,7 +46,7 @@ class PoissonLadder {
   public:
     PoissonLadder();
     // The lowest level with table.p >= p; p must be in 0..kSparseLimit.
-    const PoissonTable& level(double p) const;
+    const PoissonTable& level(float p) const;
 
   private:
     std::vector<PoissonTable> tables_;

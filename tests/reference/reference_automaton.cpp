@@ -96,7 +96,7 @@ std::vector<bool> events_of(const BlockDraw& b) {
         case DrawPlan::Kind::varying: break;
     }
     if (plan.p_max >= kVaryingSparseLimit) return dense_events(b);
-    return sparse_events(b, b.tables.ladder.level(double(plan.p_max)), false);
+    return sparse_events(b, b.tables.ladder.level(plan.p_max), false);
 }
 
 }  // namespace
@@ -164,7 +164,7 @@ void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uin
             for (int bx = 0; bx * 8 < e.x; ++bx) {
                 for (int draw = 0; draw < 3; ++draw) {
                     BlockDraw b{options, field, tables, step, draw, bx, by, bz, {}};
-                    field.plan_block(bx, by, bz, row, b.plan);
+                    field.plan_blocks(bx, by, bz, row, std::span(&b.plan, 1));
                     const std::vector<bool> events = events_of(b);
                     for (int cell = 0; cell < 512; ++cell) {
                         const int i = bx * 8 + cell % 8, j = by * 8 + cell / 8 % 8, k = bz * 8 + cell / 64;
