@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Going on from any step gives the bits of the uninterrupted run; a damaged file is refused with its reason.
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "automaton/atomic_file.h"
+#include "automaton/automaton.h"
+#include "automaton/checkpoint.h"
+#include "automaton/error.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+class TemporaryFolder {
+  public:
+    TemporaryFolder() : path_(fs::temp_directory_path() / ("nephos_test_" + std::to_string(::getpid()))) {
+        fs::remove_all(path_);
+        fs::create_directories(path_);
+    }
+    ~TemporaryFolder() { fs::remove_all(path_); }
+    fs::path operator/(const char* name) const { return path_ / name; }
+    const fs::path& path() const { return path_; }
+
+  private:
+    fs::path path_;
+};
+
+AutomatonOptions stormy_options() {
+    AutomatonOptions o{.extent = {77, 60, 19}};
+    o.wind.keyframes = {{0, {{0, {13, -7}}, {900, {31, 4}}}}, {300, {{0, {-9, 22}}}}};
+    o.boundaries.x = Boundary::periodic;
+    o.field.background.ext = 0.05;
+    o.field.scatters = {{.count = 9, .x_m = {0, 3800}, .y_m = {0, 3000}, .z_m = {100, 800},
+                         .semi_axis_x_m = {200, 600}, .semi_axis_y_m = {200, 400}, .semi_axis_z_m = {100, 200},
+                         .yaw_deg = {0, 90}, .birth_s = {0, 100}, .life_s = {100, 500}, .fade_in_s = 50,
+                         .fade_out_s = 50, .replace = true}};
+    return o;
+}
+
+Checkpoint checkpoint_of(const Automaton& automaton) {
+    return {.simulation_hash = std::string(32, 'a'),
+            .steps = automaton.steps(),
+            .state = automaton.hash(),
+            .automaton = automaton.save(),
+            .history = {std::byte{1}, std::byte{2}}};
+}
+
+TEST(Checkpoint, ResumesAtEveryStep) {
+    const TemporaryFolder folder;
+    const AutomatonOptions options = stormy_options();
+    Automaton whole(options);
+    std::vector<StateHash> expected{whole.hash()};
+    for (int step = 0; step < 60; ++step) {
+        whole.step();
+        expected.push_back(whole.hash());
+    }
+    for (std::size_t stop : {0u, 1u, 13u, 29u, 30u, 59u}) {
+        Automaton first(options);
+        while (first.steps() < stop) first.step();
+        write_checkpoint(folder / "state", checkpoint_of(first));
+        const Checkpoint read = read_checkpoint(folder / "state");
+        EXPECT_EQ(read.steps, stop);
+        EXPECT_EQ(read.state, expected[stop]);
+        EXPECT_EQ(read.history.size(), 2u);
+        Automaton second(options);
+        second.restore(read.automaton);
+        EXPECT_EQ(second.hash(), expected[stop]);
+        while (second.steps() < 60) second.step();
+        EXPECT_EQ(second.hash(), expected[60]) << "resumed at step " << stop;
+        EXPECT_EQ(second.save(), whole.save());
+    }
+}
+
+std::string reason_of(const fs::path& path) {
+    try {
+        read_checkpoint(path);
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::io);
+        EXPECT_NE(std::string(error.what()).find(path.string()), std::string::npos);
+        return error.what();
+    }
+    ADD_FAILURE() << "a damaged checkpoint was accepted";
+    return {};
+}
+
+TEST(Checkpoint, RefusesDamagedFiles) {
+    const TemporaryFolder folder;
+    write_checkpoint(folder / "good", checkpoint_of(Automaton(stormy_options())));
+    EXPECT_TRUE(is_checkpoint(folder / "good"));
+    std::ifstream in(folder / "good", std::ios::binary);
+    const std::string good{std::istreambuf_iterator<char>(in), {}};
+
+    const auto with = [&](const std::string& content) {
+        write_atomically(folder / "bad", content);
+        return reason_of(folder / "bad");
+    };
+    for (std::size_t size = 0; size < good.size(); size += size < 200 ? 1 : 997) with(good.substr(0, size));
+    for (std::size_t at = 0; at < good.size(); at += at < 200 ? 1 : 997) {
+        std::string changed = good;
+        changed[at] = char(changed[at] ^ 0x10);
+        with(changed);
+    }
+    EXPECT_NE(with("").find("ends early"), std::string::npos);
+    EXPECT_NE(with("not a checkpoint at all").find("not a nephos checkpoint"), std::string::npos);
+    EXPECT_NE(with(good + "x").find("after its end"), std::string::npos);
+    EXPECT_NE(reason_of(folder / "missing").find("no such file"), std::string::npos);
+    EXPECT_NE(reason_of(folder.path()).find("is not a file"), std::string::npos);
+    EXPECT_FALSE(is_checkpoint(folder / "missing"));
+    EXPECT_FALSE(is_checkpoint(folder.path()));
+}
+
+TEST(Checkpoint, StateOfAnotherSceneIsRefused) {
+    AutomatonOptions other = stormy_options();
+    other.extent.x = 78;
+    EXPECT_THROW(Automaton(other).restore(Automaton(stormy_options()).save()), Error);
+    other = stormy_options();
+    other.field.scatters[0].count = 3;
+    EXPECT_THROW(Automaton(other).restore(Automaton(stormy_options()).save()), Error);
+}
+
+// A full disk, as a limit on the size of files: nothing new appears and what was there stays.
+TEST(AtomicFile, KeepsTheOldFileWhenTheDiskIsFull) {
+    const TemporaryFolder folder;
+    write_atomically(folder / "file", "old content");
+    rlimit before{};
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+    const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{1000, before.rlim_max};
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+    EXPECT_THROW(write_atomically(folder / "file", std::string(5000, 'x')), Error);
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+    std::signal(SIGXFSZ, old_handler);
+
+    std::ifstream in(folder / "file");
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "old content");
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1) << "a temporary file was left behind";
+}
+
+TEST(AtomicFile, MakesFoldersAndNamesWhatFails) {
+    const TemporaryFolder folder;
+    write_atomically(folder / "a/b/c.txt", "content");
+    EXPECT_TRUE(fs::exists(folder / "a/b/c.txt"));
+    EXPECT_THROW(write_atomically(folder / "a/b/c.txt/below-a-file", "content"), Error);
+    EXPECT_THROW(write_atomically(folder / "a/b", "over a folder"), Error);
+}
+
+}  // namespace
+}  // namespace nephos

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Wind, advection and the carried parcels of air: closed forms and the naive twin.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "automaton/advection.h"
+#include "automaton/air_parcels.h"
+#include "automaton/automaton.h"
+#include "automaton/error.h"
+#include "tests/reference/reference_automaton.h"
+
+namespace nephos {
+namespace {
+
+TEST(Wind, IsPiecewiseLinearInHeightAndTime) {
+    const Wind wind{{{0, {{100, {10, 0}}, {300, {30, -4}}}}, {60, {{0, {0, 0}}}}}};
+    EXPECT_EQ(wind_at(wind, 200, 0), (Velocity{20, -2}));
+    EXPECT_EQ(wind_at(wind, 0, -5), (Velocity{10, 0}));
+    EXPECT_EQ(wind_at(wind, 999, 0), (Velocity{30, -4}));
+    EXPECT_EQ(wind_at(wind, 300, 30), (Velocity{15, -2}));
+    EXPECT_EQ(wind_at(wind, 300, 1e9), (Velocity{0, 0}));
+    EXPECT_EQ(wind_at({}, 300, 0), (Velocity{0, 0}));
+}
+
+TEST(Wind, RefusesWhatNoLatticeCanHold) {
+    EXPECT_THROW(displacement_of_step({1e15, 0}, 1, 1), Error);
+    EXPECT_THROW(displacement_of_step({std::nan(""), 0}, 1, 1), Error);
+    EXPECT_EQ(displacement_of_step({-0.25, 3}, 1, 1).whole_x(), -1);
+}
+
+// After n steps a layer has moved floor(n * speed) cells: 0.3 cells a step for 1000 steps is 300 cells, or 299 where
+// 0.3 rounds down to a multiple of 2^-32, and never anything else.
+TEST(Advection, NeverDrifts) {
+    AutomatonOptions o{.extent = {400, 3, 1}};
+    o.placement.cell_size_m = 1;
+    o.time_step_s = 1;
+    o.field.background = {0, 0, 0};
+    o.wind.keyframes = {{0, {{0, {0.3, 0}}}}};
+    Lattice start{BitPlane(o.extent), BitPlane(o.extent), BitPlane(o.extent)};
+    start.cld.set(5, 1, 0, true);
+    Automaton automaton(o, std::move(start));
+    const std::int64_t step = std::llround(0.3 * 0x1p32);
+    for (std::int64_t n = 1; n <= 1000; ++n) {
+        automaton.step();
+        ASSERT_TRUE(automaton.cld().get(5 + int((n * step) >> 32), 1, 0)) << "step " << n;
+    }
+}
+
+TEST(Advection, EqualsTheNaiveTwin) {
+    std::mt19937 engine(3);
+    const auto integer = [&](int low, int high) { return std::uniform_int_distribution<>(low, high)(engine); };
+    for (int round = 0; round < 300; ++round) {
+        const Extent e{integer(1, 200), integer(1, 12), 2};
+        const Boundaries b{integer(0, 1) ? Boundary::open : Boundary::periodic,
+                           integer(0, 1) ? Boundary::open : Boundary::periodic, Boundary::open};
+        BitPlane plane(e);
+        for (int j = 0; j < e.y; ++j) {
+            for (int i = 0; i < e.x; ++i) plane.set(i, j, 1, integer(0, 1) == 1);
+        }
+        const int reach = integer(0, 1) ? 3 : 70000;
+        const std::int64_t dx = integer(-reach, reach), dy = integer(-reach, reach);
+        reference::Cells twin = reference::to_cells(plane.view(), plane.view(), plane.view());
+        reference::advect_layer(twin, b, 1, dx, dy);
+        std::vector<std::uint64_t> scratch;
+        shift_layer(plane, 1, dx, dy, b, scratch);
+        ASSERT_EQ(reference::to_cells(plane.view(), plane.view(), plane.view()), twin)
+            << e.x << " x " << e.y << " by " << dx << ", " << dy;
+        const auto words = plane.words();
+        if (e.x % 64 != 0) {
+            ASSERT_EQ(words.back() >> (e.x % 64), 0u) << "padding is not 0";
+        }
+    }
+}
+
+TEST(SinCos, AgreesWithTheLibrary) {
+    for (double degrees = -725; degrees < 1000; degrees += 0.37) {
+        const SinCos value = sin_cos_deg(degrees);
+        EXPECT_NEAR(value.sin, std::sin(degrees * std::acos(-1.0) / 180), 4e-15 * (1 + std::abs(degrees) / 90));
+        EXPECT_NEAR(value.cos, std::cos(degrees * std::acos(-1.0) / 180), 4e-15 * (1 + std::abs(degrees) / 90));
+    }
+    EXPECT_EQ(sin_cos_deg(90).cos, 0);
+    EXPECT_EQ(sin_cos_deg(-180).cos, -1);
+}
+
+TEST(AirParcels, FadeInAndOut) {
+    Ellipsoid e;
+    e.birth_s = 100;
+    e.life_s = 50;
+    e.fade_in_s = 10;
+    e.fade_out_s = 20;
+    EXPECT_EQ(fade_weight(e, 99), 0);
+    EXPECT_EQ(fade_weight(e, 105), 0.5);
+    EXPECT_EQ(fade_weight(e, 120), 1);
+    EXPECT_EQ(fade_weight(e, 140), 0.5);
+    EXPECT_EQ(fade_weight(e, 150), 0);
+    EXPECT_EQ(fade_weight(Ellipsoid{}, 1e12), 1);
+}
+
+AutomatonOptions carried_options(Velocity wind) {
+    AutomatonOptions o{.extent = {100, 80, 10}};  // 5000 x 4000 m
+    o.wind.keyframes = {{0, {{0, wind}}}};
+    o.field.scatters = {{.count = 20, .x_m = {0, 5000}, .y_m = {0, 4000}, .z_m = {250, 250},
+                         .semi_axis_x_m = {300, 300}, .semi_axis_y_m = {300, 300}, .semi_axis_z_m = {200, 200},
+                         .replace = true}};
+    return o;
+}
+
+TEST(AirParcels, AreCarriedUnlessFixed) {
+    AutomatonOptions o = carried_options({20, -5});
+    o.field.scatters.clear();
+    Ellipsoid e;
+    e.centre_m = {100, 200, 300};
+    o.field.ellipsoids = {e, e};
+    o.field.ellipsoids[1].carried = false;
+    Automaton automaton(o);
+    for (int step = 0; step < 7; ++step) automaton.step();
+    EXPECT_NEAR(automaton.ellipsoids()[0].ellipsoid.centre_m.x, 100 + 20 * 70, 1e-6);
+    EXPECT_NEAR(automaton.ellipsoids()[0].ellipsoid.centre_m.y, 200 - 5 * 70, 1e-6);
+    EXPECT_EQ(automaton.ellipsoids()[1].ellipsoid.centre_m, (Vec3{100, 200, 300}));
+}
+
+// Whatever the wind's direction, parcels that left come back on the upwind sides and their number stays.
+TEST(AirParcels, AreReplacedUpwind) {
+    for (int degrees = 0; degrees < 360; degrees += 30) {
+        const SinCos direction = sin_cos_deg(degrees);
+        const Velocity wind{40 * direction.cos, 40 * direction.sin};
+        const AutomatonOptions o = carried_options(wind);
+        AirParcels parcels(o);
+        for (int step = 0; step < 400; ++step) {
+            const auto before = parcels.active(o, step * o.time_step_s);
+            parcels.advance(o, step * o.time_step_s);
+            const auto after = parcels.active(o, (step + 1) * o.time_step_s);
+            ASSERT_EQ(after.size(), 20u);
+            for (std::size_t i = 0; i < after.size(); ++i) {
+                const Vec3 &from = before[i].ellipsoid.centre_m, &to = after[i].ellipsoid.centre_m;
+                const double moved = (to.x - from.x) * wind.east_m_per_s + (to.y - from.y) * wind.north_m_per_s;
+                if (moved >= 0) continue;  // carried on
+                const bool touches_west = std::abs(to.x + 300) < 1e-6, touches_east = std::abs(to.x - 5300) < 1e-6;
+                const bool touches_south = std::abs(to.y + 300) < 1e-6, touches_north = std::abs(to.y - 4300) < 1e-6;
+                EXPECT_TRUE((touches_west && wind.east_m_per_s > 0) || (touches_east && wind.east_m_per_s < 0) ||
+                            (touches_south && wind.north_m_per_s > 0) || (touches_north && wind.north_m_per_s < 0))
+                    << degrees << " degrees: " << to.x << ", " << to.y;
+                EXPECT_EQ(after[i].weight, 1);
+            }
+        }
+    }
+}
+
+TEST(Options, EachProblemIsNamed) {
+    const auto reason = [](auto change) -> std::string {
+        AutomatonOptions o = carried_options({1, 1});
+        change(o);
+        try {
+            check(o);
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::usage);
+            return error.what();
+        }
+        return "accepted";
+    };
+    EXPECT_EQ(reason([](auto&) {}), "accepted");
+    EXPECT_NE(reason([](auto& o) { o.extent.y = 0; }).find("1..65536"), std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.placement.cell_size_m = 0; }).find("cell_size_m"), std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.time_step_s = std::nan(""); }).find("time_step_s"), std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.field.background.ext = 1.5; }).find("field.background.ext"), std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.field.scatters[0].semi_axis_y_m.min = -1; }).find("scatters[0]"),
+              std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.field.scatters[0].x_m = {2, 1}; }).find("min <= max"), std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.wind.keyframes[0].levels.push_back({0, {}}); }).find("rising heights"),
+              std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.wind.keyframes.push_back({0, {{0, {}}}}); }).find("rising times"),
+              std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.wind.keyframes[0].levels[0].velocity.east_m_per_s = 1e30; }).find("2^30"),
+              std::string::npos);
+}
+
+}  // namespace
+}  // namespace nephos
