@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Checks of user input in this module: one line a rule, every message with the value and what was expected.
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "automaton/error.h"
+#include "automaton/field.h"
+
+namespace nephos {
+
+[[noreturn]] inline void usage_error(const std::string& message) { throw Error(ErrorCode::usage, message); }
+
+inline std::string text_of(double value) {
+    char buffer[32];
+    std::snprintf(buffer, sizeof buffer, "%g", value);
+    return buffer;
+}
+
+// Throws unless min <= value <= max; false for NaN too.
+inline void require_in(const std::string& what, double value, double min, double max) {
+    if (value >= min && value <= max) return;
+    usage_error(what + " is " + text_of(value) + ", expected " + text_of(min) + ".." + text_of(max));
+}
+
+inline void require_positive(const std::string& what, double value) {
+    if (value > 0 && std::isfinite(value)) return;
+    usage_error(what + " is " + text_of(value) + ", expected a number above 0");
+}
+
+// Throws unless lowest <= min <= max <= highest.
+inline void require_range(const std::string& what, double min, double max, double lowest, double highest) {
+    if (min > max)
+        usage_error(what + ": the minimum " + text_of(min) + " is above the maximum " + text_of(max));
+    require_in(what + ": the minimum", min, lowest, highest);
+    require_in(what + ": the maximum", max, lowest, highest);
+}
+
+}  // namespace nephos

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "seeds/coupling.h"
+
+#include <algorithm>
+
+#include "seeds/checks.h"
+
+namespace nephos {
+
+void check(const CouplingOptions& options) {
+    require_in("coupling: strength", options.strength, 0, 1);
+    require_in("coupling: size scale", options.size_scale, 1e-3, 1e3);
+    require_in("coupling: smallest semi-axis (m)", options.min_semi_axis_m, 0, 1e6);
+    require_in("coupling: size at birth", options.size_at_birth, 0, 1);
+    for (const Probabilities& p : {options.centre, options.rim}) {
+        require_in("coupling: p_hum", p.hum, 0, 1);
+        require_in("coupling: p_act", p.act, 0, 1);
+        require_in("coupling: p_ext", p.ext, 0, 1);
+    }
+}
+
+void append_ellipsoids(std::vector<ActiveEllipsoid>& out, const BaseModel& model, const Cloud& cloud,
+                       const Vec3& position_m, double phase, double softness,
+                       const CouplingOptions& options) {
+    for (const SeedBox& box : cloud.boxes) {
+        const double grown = phase_weight(box.distance, phase, softness);
+        const double weight = options.strength * model.seeds[box.seed].strength * grown;
+        if (weight <= 0) continue;
+        const double scale =
+            options.size_scale / 2 * (options.size_at_birth + (1 - options.size_at_birth) * grown);
+        const auto semi_axis = [&](double edge) { return std::max(edge * scale, options.min_semi_axis_m); };
+        ActiveEllipsoid& active = out.emplace_back();
+        active.weight = weight;
+        active.ellipsoid.centre_m = {position_m.x + box.centre_m.x, position_m.y + box.centre_m.y,
+                                     position_m.z + box.centre_m.z};
+        active.ellipsoid.semi_axes_m = {semi_axis(box.size_m.x), semi_axis(box.size_m.y),
+                                        semi_axis(box.size_m.z)};
+        active.ellipsoid.centre = options.centre;
+        active.ellipsoid.rim = options.rim;
+    }
+}
+
+std::vector<ActiveEllipsoid> ellipsoids_of(const SkySimulation& sky, const CouplingOptions& options) {
+    check(options);
+    std::size_t boxes = 0;
+    for (const SkyCloud& c : sky.clouds()) boxes += sky.shape(c).boxes.size();
+    std::vector<ActiveEllipsoid> out;
+    out.reserve(options.strength > 0 ? boxes : 0);
+    for (const SkyCloud& c : sky.clouds()) {
+        append_ellipsoids(out, sky.model(c), sky.shape(c), sky.position_m(c), c.phase,
+                          sky.options().formation_softness, options);
+    }
+    return out;
+}
+
+}  // namespace nephos

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The ten genera of clouds and the two ragged (fractus) forms: names, WMO abbreviations, and the heights of
+// their bases above ground (T, chapter 2, tables 1 and 2, and annex). Where T gives both the group's heights
+// and the genus's own, the range is what both allow; Ns and Cb have their own heights everywhere ("often
+// 0.9-3 km", "0.7-1.5 km"), although T's table lists Ns with the middle group.
+
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "automaton/field.h"
+
+namespace nephos {
+
+enum class Genus { Ci, Cs, Cc, As, Ac, Ns, St, Sc, Cu, Cb, StFra, CuFra };
+inline constexpr int kGenusCount = 12;
+
+// The belts of the earth that T's table 2 tells apart.
+enum class Region { tropical, temperate, polar };
+
+// Heights of the group's bases: up to 2 km, 2-8 km, 3-18 km, depending on the region.
+enum class HeightGroup { low, middle, high };
+
+struct GenusFacts {
+    Genus genus;
+    std::string_view abbreviation;  // WMO: "Cu", "Cb", ...; the fractus forms are "St fra" and "Cu fra"
+    std::string_view name;          // "cumulus"
+    HeightGroup group;
+    Range base_tropical_m, base_temperate_m, base_polar_m;  // of the base, above ground
+    std::optional<Range> top_m;                             // usual top above ground, where T gives one
+};
+
+// All of them, in the order of the enum. Thread-safe, as everything here.
+std::span<const GenusFacts> genera();
+
+const GenusFacts& facts_of(Genus genus);
+Range base_height_m(Genus genus, Region region);
+
+// Heights of the whole group in a region (T, table 2).
+Range group_height_m(HeightGroup group, Region region);
+
+// By abbreviation ("Cb", "St fra") or name ("cumulonimbus"), whatever the case.
+// Throws Error(usage) that lists the abbreviations and names the nearest one.
+Genus genus_from_name(std::string_view text);
+
+// "tropical", "temperate" or "polar", whatever the case. Throws Error(usage).
+Region region_from_name(std::string_view text);
+
+}  // namespace nephos

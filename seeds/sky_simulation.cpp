@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "seeds/sky_simulation.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "automaton/bytes.h"
+#include "seeds/checks.h"
+#include "seeds/climate.h"
+#include "seeds/draw.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::uint64_t kStateMark = 0x3130594b5348504e;  // "NPHSKY01"
+
+double metres(std::int64_t fixed) { return double(fixed) * 0x1p-32; }
+std::int64_t fixed(double value_m) { return std::llround(value_m * 0x1p32); }
+
+double advanced(double phase, double time_step_s, double duration_s) {
+    return duration_s > 0 ? std::min(1.0, phase + time_step_s / duration_s) : 1;
+}
+double receded(double phase, double time_step_s, double duration_s) {
+    return duration_s > 0 ? std::max(0.0, phase - time_step_s / duration_s) : 0;
+}
+
+}  // namespace
+
+SkySimulation::SkySimulation(const SkyOptions& options) : options_(options) {
+    check(options_);
+    make_shapes();
+    const std::size_t sky = nearest_sky(options_.skies, state());
+    for (int i = 0; i < options_.skies[sky].clouds; ++i) {
+        SkyCloud cloud = new_cloud(sky);
+        cloud.phase = 1;
+        place_inside(cloud);
+        clouds_.push_back(cloud);
+    }
+}
+
+void SkySimulation::make_shapes() {
+    const WorldRectangle& w = options_.world;
+    // How many shapes of each model any sky uses; skies that share a model share its shapes.
+    std::vector<int> generated(options_.models.size(), 0);
+    for (const Sky& sky : options_.skies) {
+        for (const SkyModel& m : sky.models) generated[m.model] = std::max(generated[m.model], m.generated);
+    }
+    std::vector<std::uint32_t> first(options_.models.size(), 0);
+    for (std::size_t m = 0; m < options_.models.size(); ++m) {
+        first[m] = std::uint32_t(shapes_.size());
+        for (std::uint32_t number = 0; number < std::uint32_t(generated[m]); ++number) {
+            Cloud cloud = reproduce(options_.models[m], options_.seed, std::uint32_t(m), number);
+            const double width = cloud.high_m.x - cloud.low_m.x, depth = cloud.high_m.y - cloud.low_m.y;
+            if (width > w.max_x_m - w.min_x_m || depth > w.max_y_m - w.min_y_m) {
+                usage_error("layer \"" + options_.name + "\": cloud " + std::to_string(number) +
+                            " of base model \"" + options_.models[m].name + "\" is " + text_of(width) +
+                            " x " + text_of(depth) + " m, larger than the world of " +
+                            text_of(w.max_x_m - w.min_x_m) + " x " + text_of(w.max_y_m - w.min_y_m) + " m");
+            }
+            shapes_.push_back({m, number, std::move(cloud)});
+        }
+    }
+    for (const Sky& sky : options_.skies) {
+        auto& entry = first_shape_.emplace_back();
+        for (const SkyModel& m : sky.models) entry.push_back(first[m.model]);
+    }
+}
+
+double SkySimulation::state() const { return state_at(options_.schedule, time_s()); }
+
+std::size_t SkySimulation::count() const {
+    return std::size_t(std::ranges::count_if(clouds_, [](const SkyCloud& c) { return !c.dissolving; }));
+}
+
+Vec3 SkySimulation::position_m(const SkyCloud& cloud) const {
+    return {metres(cloud.place.x), metres(cloud.place.y), cloud.base_m};
+}
+
+Sphere SkySimulation::sphere(const SkyCloud& cloud) const {
+    const Vec3 p = position_m(cloud);
+    const Cloud& c = shape(cloud);
+    return {{p.x + c.centre_m.x, p.y + c.centre_m.y, p.z + c.centre_m.z}, c.radius_m};
+}
+
+Displacement SkySimulation::wind_step(const SkyCloud& cloud, double time_s) const {
+    const Velocity v = wind_at(options_.wind, cloud.base_m + shape(cloud).centre_m.z, time_s);
+    return displacement_of_step(v, options_.time_step_s, 1);
+}
+
+void SkySimulation::step() {
+    move_clouds();
+    const std::size_t before = count();
+    retire_clouds();
+    ++steps_;
+    adjust_number(before - count());
+}
+
+void SkySimulation::move_clouds() {
+    const double now = time_s();
+    const double middle_m = (options_.base_height_m.min + options_.base_height_m.max) / 2;
+    const Displacement air =
+        displacement_of_step(wind_at(options_.wind, middle_m, now), options_.time_step_s, 1);
+    // Unsigned: the sum of a very long simulation wraps around instead of overflowing.
+    carried_ = {std::int64_t(std::uint64_t(carried_.x) + std::uint64_t(air.x)),
+                std::int64_t(std::uint64_t(carried_.y) + std::uint64_t(air.y))};
+    for (SkyCloud& c : clouds_) {
+        const Displacement d = wind_step(c, now);
+        c.place = {c.place.x + d.x, c.place.y + d.y};
+        c.phase = c.dissolving ? receded(c.phase, options_.time_step_s, options_.dissolution_s)
+                               : advanced(c.phase, options_.time_step_s, options_.formation_s);
+    }
+}
+
+// Whether the whole cloud is beyond a side that the wind does not bring it back through.
+bool SkySimulation::outside(const SkyCloud& cloud, const Displacement& wind) const {
+    const Cloud& c = shape(cloud);
+    const Vec3 p = position_m(cloud);
+    const WorldRectangle& w = options_.world;
+    return (p.x + c.low_m.x >= w.max_x_m && wind.x >= 0) || (p.x + c.high_m.x <= w.min_x_m && wind.x <= 0) ||
+           (p.y + c.low_m.y >= w.max_y_m && wind.y >= 0) || (p.y + c.high_m.y <= w.min_y_m && wind.y <= 0);
+}
+
+void SkySimulation::retire_clouds() {
+    const double now = time_s();
+    const WorldRectangle& w = options_.world;
+    const double reach = std::max(w.max_x_m - w.min_x_m, w.max_y_m - w.min_y_m);
+    std::erase_if(clouds_, [&](SkyCloud& c) {
+        if (c.dissolving && c.phase <= 0) return true;
+        if (!outside(c, wind_step(c, now))) return false;
+        if (options_.cross_edges_whole || options_.dissolution_s <= 0) return true;
+        c.dissolving = true;
+        const Vec3 p =
+            position_m(c);  // far away it goes at once: its place must stay in the range of numbers
+        return p.x < w.min_x_m - 2 * reach || p.x > w.max_x_m + 2 * reach || p.y < w.min_y_m - 2 * reach ||
+               p.y > w.max_y_m + 2 * reach;
+    });
+}
+
+// Brings the number of clouds to that of the present state; `left` have left in this step.
+void SkySimulation::adjust_number(std::size_t left) {
+    const std::size_t target = std::size_t(clouds_at(options_.skies, state()));
+    std::size_t present = count();
+    if (present > target) return dissolve(present - target);
+    for (; present < target; ++present) {
+        const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::cloud, born_);
+        SkyCloud cloud = new_cloud(draw_sky(words[0]));
+        if (left > 0 && place_upwind(cloud)) {
+            --left;
+            if (options_.cross_edges_whole) cloud.phase = 1;
+        } else {
+            place_inside(cloud);
+        }
+        clouds_.push_back(cloud);
+    }
+}
+
+void SkySimulation::dissolve(std::size_t number) {
+    std::vector<std::size_t> candidates;
+    for (std::size_t i = 0; i < clouds_.size(); ++i) {
+        if (!clouds_[i].dissolving) candidates.push_back(i);
+    }
+    for (; number > 0; --number) {
+        const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::dissolve, dissolved_++);
+        const std::uint32_t chosen = draw_below(words[0], std::uint32_t(candidates.size()));
+        clouds_[candidates[chosen]].dissolving = true;
+        candidates[chosen] = candidates.back();
+        candidates.pop_back();
+    }
+    if (options_.dissolution_s <= 0) std::erase_if(clouds_, [](const SkyCloud& c) { return c.dissolving; });
+}
+
+std::size_t SkySimulation::draw_sky(std::uint32_t word) const {
+    const SkyShares shares = shares_at(options_.skies, state());
+    const bool lower = unit_interval(word) < shares.lower_share;
+    const std::size_t drawn = lower ? shares.lower : shares.upper,
+                      other = lower ? shares.upper : shares.lower;
+    return options_.skies[drawn].models.empty() ? other : drawn;
+}
+
+// A cloud of a sky that has models, not yet placed; phase 0 unless formation takes no time.
+SkyCloud SkySimulation::new_cloud(std::size_t sky) {
+    const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::cloud, born_);
+    const std::vector<SkyModel>& models = options_.skies[sky].models;
+    const std::uint32_t entry = draw_below(words[1], std::uint32_t(models.size()));
+    SkyCloud cloud;
+    cloud.serial = born_++;
+    cloud.sky = std::uint32_t(sky);
+    cloud.shape = first_shape_[sky][entry] + draw_below(words[2], std::uint32_t(models[entry].generated));
+    cloud.base_m = draw_in(words[3], options_.base_height_m);
+    cloud.phase = options_.formation_s > 0 ? 0 : 1;
+    return cloud;
+}
+
+void SkySimulation::place_inside(SkyCloud& cloud) const {
+    const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::place, cloud.serial);
+    const Vec3& centre = shape(cloud).centre_m;
+    const WorldRectangle& w = options_.world;
+    cloud.place = {fixed(draw_in(words[0], {w.min_x_m, w.max_x_m}) - centre.x),
+                   fixed(draw_in(words[1], {w.min_y_m, w.max_y_m}) - centre.y)};
+}
+
+// Places a cloud outside an upwind side, so that it gets inside during the next step; false in calm air.
+bool SkySimulation::place_upwind(SkyCloud& cloud) const {
+    const Displacement wind = wind_step(cloud, time_s());
+    if (wind.x == 0 && wind.y == 0) return false;
+    const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::place, cloud.serial);
+    const Cloud& c = shape(cloud);
+    const WorldRectangle& w = options_.world;
+    // Places of the origin at which the cloud touches the world's sides from outside.
+    const double west = w.min_x_m - c.high_m.x, east = w.max_x_m - c.low_m.x;
+    const double south = w.min_y_m - c.high_m.y, north = w.max_y_m - c.low_m.y;
+    const double dx = metres(wind.x), dy = metres(wind.y);
+    const double inflow_x = std::abs(dx) * (north - south), inflow_y = std::abs(dy) * (east - west);
+    double x, y;
+    if (unit_interval(words[0]) * (inflow_x + inflow_y) < inflow_x) {
+        x = dx > 0 ? west : east;
+        y = draw_in(words[1], {south, north});
+    } else {
+        x = draw_in(words[1], {west, east});
+        y = dy > 0 ? south : north;
+    }
+    // It crosses the side at some time of the next step; faster wind than the world is wide must not carry it
+    // past.
+    double way = 1;
+    if (std::abs(dx) > east - west) way = (east - west) / std::abs(dx);
+    if (std::abs(dy) > north - south) way = std::min(way, (north - south) / std::abs(dy));
+    const double back = unit_interval(words[2]) * way - 1;
+    cloud.place = {fixed(x + back * dx), fixed(y + back * dy)};
+    return true;
+}
+
+std::vector<std::byte> SkySimulation::save() const {
+    ByteWriter out;
+    const std::uint64_t drawn = std::uint64_t{dissolved_} << 32 | born_;
+    out.put(std::array<std::uint64_t, 7>{kStateMark, shapes_.size(), steps_, drawn, std::uint64_t(carried_.x),
+                                         std::uint64_t(carried_.y), clouds_.size()});
+    for (const SkyCloud& c : clouds_) {
+        out.put(c.serial);
+        out.put(c.shape);
+        out.put(c.sky);
+        out.put(c.place.x);
+        out.put(c.place.y);
+        out.put(c.base_m);
+        out.put(c.phase);
+        out.put(std::uint8_t(c.dissolving));
+    }
+    return out.take();
+}
+
+void SkySimulation::restore(std::span<const std::byte> bytes) {
+    const auto bad = [](const char* what) { throw Error(ErrorCode::io, std::string("saved sky: ") + what); };
+    ByteReader in(bytes);
+    const auto [mark, shapes, steps, drawn, carried_x, carried_y, count] =
+        in.get<std::array<std::uint64_t, 7>>();
+    if (mark != kStateMark) bad("not the state of a sky");
+    if (shapes != shapes_.size()) bad("from a scene with another number of clouds");
+    const auto born = std::uint32_t(drawn), dissolved = std::uint32_t(drawn >> 32);
+    std::vector<SkyCloud> clouds;
+    for (std::uint64_t left = count; left > 0; --left) {
+        SkyCloud c;
+        c.serial = in.get<std::uint32_t>();
+        c.shape = in.get<std::uint32_t>();
+        c.sky = in.get<std::uint32_t>();
+        c.place.x = in.get<std::int64_t>();
+        c.place.y = in.get<std::int64_t>();
+        c.base_m = in.get<double>();
+        c.phase = in.get<double>();
+        const auto dissolving = in.get<std::uint8_t>();
+        const bool places = std::abs(metres(c.place.x)) < 0x1p31 && std::abs(metres(c.place.y)) < 0x1p31;
+        if (c.serial >= born || c.shape >= shapes_.size() || c.sky >= options_.skies.size() || !places ||
+            !std::isfinite(c.base_m) || !(c.phase >= 0 && c.phase <= 1) || dissolving > 1) {
+            bad("a cloud of it is impossible");
+        }
+        c.dissolving = dissolving != 0;
+        clouds.push_back(c);
+    }
+    if (!in.rest().empty()) bad("more bytes than expected");
+    clouds_ = std::move(clouds);
+    steps_ = steps;
+    born_ = born;
+    dissolved_ = dissolved;
+    carried_ = {std::int64_t(carried_x), std::int64_t(carried_y)};
+}
+
+}  // namespace nephos

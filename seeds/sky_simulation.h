@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// One layer of the sky over time (T, chapter 3.4): clouds drift with the wind, leave the world downwind and
+// enter it on the opposite side; those that enter now come from the skies that bracket the state of the
+// atmosphere, so that a change of weather comes over the horizon, while the clouds that are there stay.
+//
+//     SkySimulation sky(options);       // strewn at random, from the sky nearest to the initial state
+//     sky.step();                       // together with the automaton's step
+//     for (const SkyCloud& cloud : sky.clouds()) ... sky.shape(cloud), sky.position_m(cloud), cloud.phase ...
+//
+// A step: every cloud moves by the wind at its centre's height and the step's begin; phases advance; clouds
+// that have left go; then the number of clouds is brought to that of the state (climate.h): for each that
+// left one enters upwind (where its shape just reaches the edge, at a random place of the way of one step, so
+// that fast wind leaves no gaps; the two upwind sides share them as the air that crosses them), further ones
+// form inside, and superfluous ones, drawn among all, dissolve inside. In calm air new clouds form inside.
+// Wind that crosses the world in one step replaces every cloud in every step. A sky without base models lets
+// no cloud enter: the other bracketing sky then has all of them.
+//
+// Positions are fixed-point sums of whole displacements (automaton/wind.h): nothing drifts, and the state can
+// be saved and restored exactly. One object is one simulation; no function is safe to call while another
+// thread steps.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "automaton/wind.h"
+#include "seeds/cloud.h"
+#include "seeds/sky.h"
+
+namespace nephos {
+
+// One of the shapes that the layer's skies use, made when the simulation starts.
+struct CloudShape {
+    std::size_t model = 0;     // index in SkyOptions::models
+    std::uint32_t number = 0;  // of the cloud made from it
+    Cloud cloud;
+};
+
+// One cloud in the sky.
+struct SkyCloud {
+    std::uint32_t serial = 0;  // unique in its layer, rises with the time of birth
+    std::uint32_t shape = 0;   // index in SkySimulation::shapes()
+    std::uint32_t sky = 0;     // index in SkyOptions::skies that it came from
+    Displacement place;        // of the model's origin in the world, metres * 2^32
+    double base_m = 0;         // world z of the model's origin
+    double phase = 1;          // 0 nothing .. 1 the whole cloud (cloud.h, phase_weight)
+    bool dissolving = false;   // no longer one of the sky's number
+    bool operator==(const SkyCloud&) const = default;
+};
+
+class SkySimulation {
+  public:
+    // Throws Error(usage) on options that check() refuses, and when a cloud is larger than the world.
+    explicit SkySimulation(const SkyOptions& options);
+
+    // One step of options().time_step_s. Throws Error(usage) when the wind moves a cloud by more than 2^30 m.
+    void step();
+
+    const SkyOptions& options() const { return options_; }
+    std::uint64_t steps() const { return steps_; }
+    double time_s() const { return double(steps_) * options_.time_step_s; }
+    double state() const;  // of the atmosphere, 0..1, now
+
+    std::span<const SkyCloud> clouds() const { return clouds_; }  // oldest first
+    std::size_t count() const;                                    // those that are not dissolving
+    std::span<const CloudShape> shapes() const { return shapes_; }
+    const Cloud& shape(const SkyCloud& cloud) const { return shapes_[cloud.shape].cloud; }
+    const BaseModel& model(const SkyCloud& cloud) const {
+        return options_.models[shapes_[cloud.shape].model];
+    }
+    Vec3 position_m(const SkyCloud& cloud) const;  // world position of the model's origin
+    Sphere sphere(const SkyCloud& cloud) const;    // around the cloud, in the world
+
+    // How far the air at the middle of the base heights has moved since the start, metres * 2^32 (wraps
+    // around).
+    const Displacement& carried() const { return carried_; }
+
+    // The complete state; `restore` throws Error(io) on bytes that no simulation with these options wrote,
+    // and then leaves the simulation as it was.
+    std::vector<std::byte> save() const;
+    void restore(std::span<const std::byte> bytes);
+
+  private:
+    void make_shapes();
+    void move_clouds();
+    void retire_clouds();
+    void adjust_number(std::size_t left);
+    void dissolve(std::size_t number);
+    SkyCloud new_cloud(std::size_t sky);
+    std::size_t draw_sky(std::uint32_t word) const;
+    void place_inside(SkyCloud& cloud) const;
+    bool place_upwind(SkyCloud& cloud) const;
+    Displacement wind_step(const SkyCloud& cloud, double time_s) const;
+    bool outside(const SkyCloud& cloud, const Displacement& wind) const;
+
+    SkyOptions options_;
+    std::vector<CloudShape> shapes_;
+    std::vector<std::vector<std::uint32_t>>
+        first_shape_;  // [sky][entry of its models]: index of its number 0
+    std::vector<SkyCloud> clouds_;
+    std::uint64_t steps_ = 0;
+    std::uint32_t born_ = 0;       // clouds made so far, those entering, forming and strewn
+    std::uint32_t dissolved_ = 0;  // clouds drawn to dissolve so far
+    Displacement carried_;
+};
+
+}  // namespace nephos

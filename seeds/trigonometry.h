@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Sine, cosine and angle of a vector from additions, multiplications, divisions and square roots alone, so
+// that clouds have the same bits with every C library and processor (libm's functions may differ in the last
+// bit). Angles are in degrees, whose reduction to a quarter turn is exact.
+
+#include <cmath>
+
+namespace nephos {
+
+// A turn by an angle: (cos, sin) of it.
+struct Rotation {
+    double cos = 1, sin = 0;
+};
+
+// Absolute error below 4e-16. |degrees| up to 1e6; pure.
+inline Rotation rotation_of_degrees(double degrees) {
+    const double quarters = std::floor(degrees / 90 + 0.5);
+    const double r = (degrees - quarters * 90) * (3.14159265358979323846 / 180);  // -pi/4 .. pi/4
+    const double q = r * r;
+    // Taylor series by Horner's rule; the first terms left out are below 1e-18.
+    const double s =
+        r * (1 + q * (-1.0 / 6 +
+                      q * (1.0 / 120 + q * (-1.0 / 5040 +
+                                            q * (1.0 / 362880 + q * (-1.0 / 39916800 +
+                                                                     q * (1.0 / 6227020800.0 +
+                                                                          q * (-1.0 / 1307674368000.0))))))));
+    const double c =
+        1 + q * (-1.0 / 2 +
+                 q * (1.0 / 24 +
+                      q * (-1.0 / 720 + q * (1.0 / 40320 + q * (-1.0 / 3628800 +
+                                                                q * (1.0 / 479001600 +
+                                                                     q * (-1.0 / 87178291200.0 +
+                                                                          q * (1.0 / 20922789888000.0))))))));
+    switch (static_cast<long long>(quarters) & 3) {
+        case 0:
+            return {c, s};
+        case 1:
+            return {-s, c};
+        case 2:
+            return {-c, -s};
+        default:
+            return {s, -c};
+    }
+}
+
+// Angle of the vector (x, y) from the x axis, counter-clockwise, -180..180; 0 for the null vector.
+// Error below 1e-12 degrees.
+inline double degrees_of_vector(double x, double y) {
+    const double length = std::sqrt(x * x + y * y);
+    if (!(length > 0)) return 0;
+    // Three times tan(a/2) = tan a / (1 + sqrt(1 + tan^2 a)), the first one from the sides: |a| <= 90 degrees
+    // after it.
+    const double absolute = x < 0 ? -x : x;
+    double t = y / (length + absolute);
+    t = t / (1 + std::sqrt(1 + t * t));
+    t = t / (1 + std::sqrt(1 + t * t));  // |t| <= tan(pi/16) < 0.2
+    const double q = t * t;
+    double series = 0;
+    for (int n = 21; n >= 1; n -= 2) series = 1.0 / n - q * series;
+    const double angle = 8 * t * series * (180 / 3.14159265358979323846);
+    if (x >= 0) return angle;
+    return y < 0 ? -180 - angle : 180 - angle;
+}
+
+}  // namespace nephos
