@@ -47,7 +47,62 @@ void smooth(std::vector<std::uint32_t>& water, Extent e, const Boundaries& b, in
 // Sums over the columns of a patch, in cells from its first column.
 struct Sums {
     double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, water = 0;
+    bool starts = false;  // one of them has water enough to start rain
 };
+
+// A column, unwrapped: it keeps counting through a periodic side.
+struct Column {
+    int i, j;
+};
+
+// Smoothed water of the columns that are in no patch yet; 0 = taken.
+struct WaterMap {
+    Extent extent;
+    Boundaries boundaries;
+    std::vector<std::uint32_t> water;  // sums over the smoothing square
+    double keep, start;                // thresholds in the same unit, above 0
+    std::vector<Column> queue;         // of the patch at hand
+
+    bool is_wet(std::uint32_t sum) const { return sum >= keep; }
+};
+
+// Index within 0..n-1 or -1 for outside.
+int inside(int i, int n, Boundary boundary) {
+    if (i >= 0 && i < n) return i;
+    return boundary == Boundary::periodic ? (i % n + n) % n : -1;
+}
+
+// Takes all wet columns that hang together with the wet column (i0, j0).
+Sums take_patch(WaterMap& map, int i0, int j0) {
+    Sums sums;
+    const auto visit = [&](int i, int j) {
+        const int wi = inside(i, map.extent.x, map.boundaries.x),
+                  wj = inside(j, map.extent.y, map.boundaries.y);
+        if (wi < 0 || wj < 0) return;
+        std::uint32_t& here = map.water[linear_index(map.extent, wi, wj, 0)];
+        if (!map.is_wet(here)) return;
+        const double x = i - i0, y = j - j0;
+        sums.n += 1;
+        sums.x += x;
+        sums.y += y;
+        sums.xx += x * x;
+        sums.xy += x * y;
+        sums.yy += y * y;
+        sums.water += here;
+        sums.starts = sums.starts || here >= map.start;
+        here = 0;
+        map.queue.push_back({i, j});
+    };
+    map.queue.clear();
+    visit(i0, j0);
+    for (std::size_t q = 0; q < map.queue.size(); ++q) {
+        const Column c = map.queue[q];
+        for (int dj = -1; dj <= 1; ++dj) {
+            for (int di = -1; di <= 1; ++di) visit(c.i + di, c.j + dj);
+        }
+    }
+    return sums;
+}
 
 RainPatch patch_of(const Sums& s, int first_i, int first_j, const Placement& placement, double water_scale) {
     const double h = placement.cell_size_m;
@@ -60,7 +115,7 @@ RainPatch patch_of(const Sums& s, int first_i, int first_j, const Placement& pla
             (s.yy / s.n - my * my + 1.0 / 12) * h * h,
             s.n * h * h,
             s.water / s.n * water_scale,
-            false};
+            s.starts};
 }
 
 // Radius of the circle with the patch's mean variance: how near is near.
@@ -133,57 +188,19 @@ std::vector<std::uint32_t> column_counts(const BitPlaneView& cld) {
 
 std::vector<RainPatch> find_patches(const BitPlaneView& cld, const Placement& placement,
                                     const Boundaries& boundaries, const RainFinderOptions& options) {
-    const Extent e = cld.extent;
     std::vector<std::uint32_t> water = column_counts(cld);
-    smooth(water, e, boundaries, options.smooth_columns);
-    const double window = (2.0 * options.smooth_columns + 1) * (2.0 * options.smooth_columns + 1);
-    const double scale = placement.cell_size_m / window;  // sum of counts -> metres
-
-    struct Step {
-        int i, j;  // column, unwrapped: keeps counting through a periodic side
-    };
-    std::vector<Step> queue;
+    smooth(water, cld.extent, boundaries, options.smooth_columns);
+    const double edge = 2.0 * options.smooth_columns + 1;
+    const double scale = placement.cell_size_m / (edge * edge);
+    WaterMap map{
+        cld.extent, boundaries, std::move(water), options.keep_water_m / scale, options.start_water_m / scale,
+        {}};
     std::vector<RainPatch> patches;
-    const auto wet = [&](std::uint32_t sum) { return sum * scale >= options.keep_water_m; };
-    for (int j0 = 0; j0 < e.y; ++j0) {
-        for (int i0 = 0; i0 < e.x; ++i0) {
-            if (!wet(water[linear_index(e, i0, j0, 0)])) continue;
-            Sums sums;
-            bool starts = false;
-            const auto visit = [&](int i, int j) {
-                int wi = i, wj = j;
-                if (wi < 0 || wi >= e.x) {
-                    if (boundaries.x != Boundary::periodic) return;
-                    wi = (wi % e.x + e.x) % e.x;
-                }
-                if (wj < 0 || wj >= e.y) {
-                    if (boundaries.y != Boundary::periodic) return;
-                    wj = (wj % e.y + e.y) % e.y;
-                }
-                std::uint32_t& here = water[linear_index(e, wi, wj, 0)];
-                if (!wet(here)) return;
-                const double x = i - i0, y = j - j0;
-                sums.n += 1;
-                sums.x += x;
-                sums.y += y;
-                sums.xx += x * x;
-                sums.xy += x * y;
-                sums.yy += y * y;
-                sums.water += here;
-                starts = starts || here * scale >= options.start_water_m;
-                here = 0;  // taken
-                queue.push_back({i, j});
-            };
-            queue.clear();
-            visit(i0, j0);
-            for (std::size_t q = 0; q < queue.size(); ++q) {
-                const Step s = queue[q];
-                for (int dj = -1; dj <= 1; ++dj) {
-                    for (int di = -1; di <= 1; ++di) visit(s.i + di, s.j + dj);
-                }
-            }
-            RainPatch patch = patch_of(sums, i0, j0, placement, scale);
-            patch.starts = starts;
+    for (int j = 0; j < cld.extent.y; ++j) {
+        for (int i = 0; i < cld.extent.x; ++i) {
+            if (!map.is_wet(map.water[linear_index(cld.extent, i, j, 0)])) continue;
+            const Sums sums = take_patch(map, i, j);
+            const RainPatch patch = patch_of(sums, i, j, placement, scale);
             if (patch.area_m2 >= options.min_area_m2) patches.push_back(patch);
         }
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "seeds/coupling.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "tests/seeds/fixtures.h"
@@ -80,6 +82,65 @@ TEST(Coupling, WholeSky) {
     test::expect_error(ErrorCode::usage, "strength", [&] { (void)ellipsoids_of(sky, {.strength = -1}); });
     test::expect_error(ErrorCode::usage, "size scale", [&] { (void)ellipsoids_of(sky, {.size_scale = 0}); });
     test::expect_error(ErrorCode::usage, "p_hum", [&] { (void)ellipsoids_of(sky, {.centre = {2, 0, 0}}); });
+}
+
+// The automaton follows: without clouds nothing grows, with them cloud grows inside the ellipsoids, it moves
+// with them, and it is gone some time after they have dissolved.
+TEST(Coupling, DrivesTheAutomaton) {
+    SkyOptions options = test::small_sky();
+    options.world = {0, 0, 6400, 6400};
+    options.models = {test::single_box_model(600)};
+    options.skies = {{"clear", 0, 0, {}}, {"some", 1, 6, {{0, 1}}}};
+    options.schedule = {{0, 1}, {600, 1}, {610, 0}};
+    options.wind = test::constant_wind(5, 0);
+    options.base_height_m = {500, 500};
+    SkySimulation sky(options);
+    AutomatonOptions lattice;
+    lattice.extent = {128, 128, 20};
+    lattice.placement = {{0, 0, 0}, 50};
+    lattice.wind = options.wind;
+    lattice.field.background = {0, 0, 0.1};
+    Automaton coupled(lattice), alone(lattice);
+    const CouplingOptions coupling{.centre = {0.3, 0.05, 0.05}};
+    const auto count = [](const BitPlaneView& plane) {
+        std::size_t cells = 0;
+        for (std::size_t w = 0; w < plane.word_count(); ++w)
+            cells += std::size_t(std::popcount(plane.words[w]));
+        return cells;
+    };
+    for (int step = 0; step < 60; ++step) {
+        coupled.set_external_ellipsoids(ellipsoids_of(sky, coupling));
+        coupled.step();
+        alone.step();
+        sky.step();
+    }
+    EXPECT_EQ(count(alone.cld()), 0u);
+    EXPECT_GT(count(coupled.cld()), 500u);
+    // Cloud may creep out by its own growth, but most of it is where the ellipsoids are now.
+    const auto ellipsoids = ellipsoids_of(sky, coupling);
+    std::size_t inside = 0, all = 0;
+    const BitPlaneView cld = coupled.cld();
+    for (int k = 0; k < 20; ++k) {
+        for (int j = 0; j < 128; ++j) {
+            for (int i = 0; i < 128; ++i) {
+                if (!cld.get(i, j, k)) continue;
+                ++all;
+                inside += std::ranges::any_of(ellipsoids, [&](const ActiveEllipsoid& a) {
+                    const Vec3 &c = a.ellipsoid.centre_m, &s = a.ellipsoid.semi_axes_m;
+                    return std::hypot((i * 50 + 25 - c.x) / s.x, (j * 50 + 25 - c.y) / s.y,
+                                      (k * 50 + 25 - c.z) / s.z) < 1.2;
+                });
+            }
+        }
+    }
+    EXPECT_GT(double(inside) / double(all), 0.9);
+    for (int step = 0; step < 120; ++step) {
+        sky.step();
+        coupled.set_external_ellipsoids(ellipsoids_of(sky, coupling));
+        coupled.step();
+    }
+    EXPECT_TRUE(sky.clouds().empty());
+    EXPECT_LT(count(coupled.cld()), 50u);
 }
 
 }  // namespace
