@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/density_grid.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <tuple>
 #include <utility>
+
+#include <tbb/parallel_for.h>
 
 #include "automaton/error.h"
 #include "density/openvdb_access.h"
@@ -111,7 +111,9 @@ void NewBlock::move_to(TreeBuilder& builder, const openvdb::Coord& origin) {
     }
 }
 
-std::tuple<int, int, int> block_order(const openvdb::Coord& origin) { return {origin.z(), origin.y(), origin.x()}; }
+std::tuple<int, int, int> block_order(const openvdb::Coord& origin) {
+    return {origin.z(), origin.y(), origin.x()};
+}
 
 std::vector<Block> blocks_of(const DensityGrid& density) {
     std::vector<Block> blocks;
@@ -135,17 +137,19 @@ DensityGrid::DensityGrid()
 
 DensityGrid::DensityGrid(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 
-DensityGrid DensityGrid::from_dense(std::span<const float> values, Extent extent, const Placement& placement) {
+DensityGrid DensityGrid::from_dense(std::span<const float> values, Extent extent,
+                                    const Placement& placement) {
     check_placement(placement);
     if (extent.x < 0 || extent.y < 0 || extent.z < 0 || values.size() != extent.cells()) {
         throw Error(ErrorCode::usage, std::to_string(values.size()) + " values for a box of " +
-                                          std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
-                                          std::to_string(extent.z) + " voxels");
+                                          std::to_string(extent.x) + " x " + std::to_string(extent.y) +
+                                          " x " + std::to_string(extent.z) + " voxels");
     }
     const auto bad = std::ranges::find_if_not(values, [](float v) { return v >= 0 && std::isfinite(v); });
     if (bad != values.end()) {
         throw Error(ErrorCode::usage, "density " + std::to_string(*bad) + " at position " +
-                                          std::to_string(bad - values.begin()) + ": must be finite and at least 0");
+                                          std::to_string(bad - values.begin()) +
+                                          ": must be finite and at least 0");
     }
     TreeBuilder builder;
     const int bx = block_count(extent.x), by = block_count(extent.y), bz = block_count(extent.z);

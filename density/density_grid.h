@@ -3,12 +3,12 @@
 
 // A sparse box of density values: what smoothing makes out of bits, what files hold and what is drawn.
 //
-// Voxels have the index space of the lattice: (0, 0, 0) is the lowest corner, x east, y north, z up, and a voxel's
-// centre lies at origin + (i+0.5, j+0.5, k+0.5) * voxel size. Only voxels with a value above 0 take memory; all others
-// read as 0. Underneath is an OpenVDB float tree, which stays out of this header.
+// Voxels have the index space of the lattice: (0, 0, 0) is the lowest corner, x east, y north, z up, and a
+// voxel's centre lies at origin + (i+0.5, j+0.5, k+0.5) * voxel size. Only voxels with a value above 0 take
+// memory; all others read as 0. Underneath is an OpenVDB float tree, which stays out of this header.
 //
-// A DensityGrid is an immutable value: copies share the voxels, and every function here may be called from several
-// threads at once.
+// A DensityGrid is an immutable value: copies share the voxels, and every function here may be called from
+// several threads at once.
 
 #include <array>
 #include <cstddef>
@@ -36,13 +36,14 @@ class DensityGrid {
     DensityGrid();
 
     // From extent.cells() values, x fastest. Values are kept as they are; 0 stays empty.
-    // Throws Error(usage) when the number of values is not extent.cells(), when a value is negative or not finite,
-    // or when cell_size_m is not above 0.
+    // Throws Error(usage) when the number of values is not extent.cells(), when a value is negative or not
+    // finite, or when cell_size_m is not above 0.
     static DensityGrid from_dense(std::span<const float> values, Extent extent, const Placement& placement);
 
     // Bounds of the voxels, the same for every grid of a sequence however much of it is cloud.
     Extent extent() const;
-    // World position; cell_size_m is the edge of a voxel (a refined grid has smaller voxels than the lattice cells).
+    // World position; cell_size_m is the edge of a voxel (a refined grid has smaller voxels than the lattice
+    // cells).
     const Placement& placement() const;
 
     // Value of one voxel; 0 outside the extent. For many values to_dense() is far faster.

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/metaballs.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <string>
+
+#include <tbb/parallel_for.h>
 
 #include "automaton/error.h"
 #include "density/openvdb_access.h"
@@ -51,15 +51,19 @@ double sum_of_fields(const std::vector<Tap>& taps) {
     return sum;
 }
 
-// Samples the field at the voxels of fine blocks. Every cell is cut the same way, so refine^3 sets of taps serve all voxels.
+// Samples the field at the voxels of fine blocks. Every cell is cut the same way, so refine^3 sets of taps
+// serve all voxels.
 class Resampler {
   public:
     Resampler(const DensityGrid& grid, int refine, double radius)
-        : grid_(OpenvdbAccess::grid(grid)), refine_(refine), reach_(int(std::ceil(radius))),
+        : grid_(OpenvdbAccess::grid(grid)),
+          refine_(refine),
+          reach_(int(std::ceil(radius))),
           side_((kBlock - 1) / refine + 2 + 2 * reach_) {
         for (int pz = 0; pz < refine; ++pz) {
             for (int py = 0; py < refine; ++py) {
-                for (int px = 0; px < refine; ++px) add_phase({(px + 0.5) / refine, (py + 0.5) / refine, (pz + 0.5) / refine}, radius);
+                for (int px = 0; px < refine; ++px)
+                    add_phase({(px + 0.5) / refine, (py + 0.5) / refine, (pz + 0.5) / refine}, radius);
             }
         }
     }
@@ -74,7 +78,8 @@ class Resampler {
             const openvdb::Coord o = block.origin;
             for (int z = low(o.z()); z < end(o.z(), fine.z); z += kBlock) {
                 for (int y = low(o.y()); y < end(o.y(), fine.y); y += kBlock) {
-                    for (int x = low(o.x()); x < end(o.x(), fine.x); x += kBlock) result.emplace_back(x, y, z);
+                    for (int x = low(o.x()); x < end(o.x(), fine.x); x += kBlock)
+                        result.emplace_back(x, y, z);
                 }
             }
         }
@@ -116,7 +121,8 @@ class Resampler {
     }
 
     openvdb::Coord first_cell(const openvdb::Coord& origin) const {
-        return openvdb::Coord(origin.x() / refine_, origin.y() / refine_, origin.z() / refine_).offsetBy(-reach_);
+        return openvdb::Coord(origin.x() / refine_, origin.y() / refine_, origin.z() / refine_)
+            .offsetBy(-reach_);
     }
 
     bool gather(const openvdb::Coord& corner, std::vector<float>& cells) const {
@@ -135,14 +141,16 @@ class Resampler {
         return any;
     }
 
-    float value(const openvdb::Coord& voxel, const openvdb::Coord& corner, const std::vector<float>& cells) const {
+    float value(const openvdb::Coord& voxel, const openvdb::Coord& corner,
+                const std::vector<float>& cells) const {
         const int px = voxel.x() % refine_, py = voxel.y() % refine_, pz = voxel.z() % refine_;
         const Phase& phase = phases_[std::size_t((pz * refine_ + py) * refine_ + px)];
         const openvdb::Coord cell =
             openvdb::Coord(voxel.x() / refine_, voxel.y() / refine_, voxel.z() / refine_) - corner;
         const float* own = cells.data() + (std::ptrdiff_t(cell.z()) * side_ + cell.y()) * side_ + cell.x();
         double sum = 0;
-        for (std::size_t n = 0; n < phase.offsets.size(); ++n) sum += double(own[phase.offsets[n]]) * phase.fields[n];
+        for (std::size_t n = 0; n < phase.offsets.size(); ++n)
+            sum += double(own[phase.offsets[n]]) * phase.fields[n];
         return float(sum / phase.sum);
     }
 
@@ -220,11 +228,14 @@ double density_at(const DensityGrid& grid, const Vec3& position_m, double radius
 DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells) {
     check_radius(radius_cells);
     if (refine < 1 || refine > kMaxRefine) {
-        throw Error(ErrorCode::usage, "refinement of " + std::to_string(refine) + " voxels per cell: must be 1..8");
+        throw Error(ErrorCode::usage,
+                    "refinement of " + std::to_string(refine) + " voxels per cell: must be 1..8");
     }
     const Extent coarse = grid.extent();
-    if (std::int64_t{std::max({coarse.x, coarse.y, coarse.z})} * refine > std::numeric_limits<int>::max() - kBlock) {
-        throw Error(ErrorCode::usage, "a refinement of " + std::to_string(refine) + " gives too many voxels on an axis");
+    if (std::int64_t{std::max({coarse.x, coarse.y, coarse.z})} * refine >
+        std::numeric_limits<int>::max() - kBlock) {
+        throw Error(ErrorCode::usage,
+                    "a refinement of " + std::to_string(refine) + " gives too many voxels on an axis");
     }
     const Extent fine{coarse.x * refine, coarse.y * refine, coarse.z * refine};
     const Resampler resampler(grid, refine, radius_cells);

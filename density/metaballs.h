@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Stage 2 of D: the continuous density between cells. Every cell with q > 0 carries a metaball of effective radius R,
-// whose field falls from 1 at the centre to 0 at R (Wyvill; Nishita):
+// Stage 2 of D: the continuous density between cells. Every cell with q > 0 carries a metaball of effective
+// radius R, whose field falls from 1 at the centre to 0 at R (Wyvill; Nishita):
 //
 //     f(a) = 1 - 22/9 a^2 + 17/9 a^4 - 4/9 a^6,   a = distance / R
 //
 // Two normalisations, for two uses:
 // - density_at() and resample() divide by the sum of f over all lattice points in reach, cloud or not:
-//   D(x) = sum q f / sum f. Both sums run in the same order, so a saturated neighbourhood gives 1 exactly, everywhere.
+//   D(x) = sum q f / sum f. Both sums run in the same order, so a saturated neighbourhood gives 1 exactly,
+//   everywhere.
 // - a renderer that adds up metaballs has no such sum at hand. It scales every metaball by
-//   metaball_normalisation(R): then sum q f has the mean q in a uniform region, and the ripple around the mean is what
-//   the lattice leaves (below 1 % from R = 2 cells upwards, see the tests).
+//   metaball_normalisation(R): then sum q f has the mean q in a uniform region, and the ripple around the
+//   mean is what the lattice leaves (below 1 % from R = 2 cells upwards, see the tests).
 //
 // Functions are pure and thread-safe.
 
@@ -29,22 +30,22 @@ inline constexpr double kMaxMetaballRadius = 8.0;
 inline constexpr int kMaxRefine = 8;
 
 struct Metaball {
-    float x, y, z;   // centre, world metres
-    float radius;    // effective radius R, metres
-    float density;   // q of its voxel, above 0
+    float x, y, z;  // centre, world metres
+    float radius;   // effective radius R, metres
+    float density;  // q of its voxel, above 0
     bool operator==(const Metaball&) const = default;
 };
 
 // f above; a >= 0. 0 from a = 1 on.
 double metaball_field(double a);
 
-// The integral of f along the straight line that passes the centre at distance b R, in units of R; 0 from b = 1 on.
-// Closed form with h = sqrt(1 - b^2) (half the chord).
+// The integral of f along the straight line that passes the centre at distance b R, in units of R; 0 from b =
+// 1 on. Closed form with h = sqrt(1 - b^2) (half the chord).
 double metaball_line_integral(double b);
 
-// One cell's volume over the integral of f over its ball: 2835 / (736 pi R^3), R in voxel edges. With it, the extinction
-// extinction_per_m * metaball_normalisation(R) * sum q f along a ray through a saturated region is extinction_per_m
-// on average.
+// One cell's volume over the integral of f over its ball: 2835 / (736 pi R^3), R in voxel edges. With it, the
+// extinction extinction_per_m * metaball_normalisation(R) * sum q f along a ray through a saturated region is
+// extinction_per_m on average.
 double metaball_normalisation(double radius_cells);
 
 // One metaball per voxel with q > 0: blocks of 8x8x8 voxels by z, y, x, and inside a block x fastest.
@@ -56,7 +57,8 @@ std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells);
 double density_at(const DensityGrid& grid, const Vec3& position_m, double radius_cells);
 
 // D sampled at the centres of voxels `refine` times smaller than the grid's. Throws Error(usage) when
-// refine is outside 1..8, the radius is out of range, or the result would have more than 2^31 - 1 voxels on an axis.
+// refine is outside 1..8, the radius is out of range, or the result would have more than 2^31 - 1 voxels on
+// an axis.
 DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells);
 
 }  // namespace nephos

@@ -5,15 +5,18 @@
 //
 // Invariants of a wrapped tree:
 // - background 0, inactive values 0, nothing active outside 0 .. extent-1;
-// - a value is active exactly when it is above 0, but for the two extreme corners, voxel 0 and voxel extent-1, which are
-//   always active: so the active bounds, which OpenVDB and its users take for the grid's bounds, are the extent's;
-// - tiles are exactly one leaf large (8x8x8), so that a tree is a set of blocks. A block of one value is a tile.
-
-#include <openvdb/openvdb.h>
+// - a value is active exactly when it is above 0, but for the two extreme corners, voxel 0 and voxel
+// extent-1, which are
+//   always active: so the active bounds, which OpenVDB and its users take for the grid's bounds, are the
+//   extent's;
+// - tiles are exactly one leaf large (8x8x8), so that a tree is a set of blocks. A block of one value is a
+// tile.
 
 #include <memory>
 #include <tuple>
 #include <vector>
+
+#include <openvdb/openvdb.h>
 
 #include "density/density_grid.h"
 
@@ -21,7 +24,7 @@ namespace nephos {
 
 using FloatLeaf = openvdb::FloatTree::LeafNodeType;
 
-inline constexpr int kBlock = 8;                 // voxels along the edge of a leaf
+inline constexpr int kBlock = 8;  // voxels along the edge of a leaf
 inline constexpr int kBlockVoxels = 512;
 
 // Offset of voxel (x, y, z) in a leaf's arrays: z runs fastest in OpenVDB.
@@ -37,8 +40,8 @@ struct Block {
     int positive_count() const;  // values above 0
 };
 
-// Takes finished blocks one by one and hangs them into a new tree. Not thread-safe: blocks are made in parallel
-// and handed over in a fixed order.
+// Takes finished blocks one by one and hangs them into a new tree. Not thread-safe: blocks are made in
+// parallel and handed over in a fixed order.
 class TreeBuilder {
   public:
     TreeBuilder();

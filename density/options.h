@@ -24,12 +24,12 @@ struct SmoothingOptions {
 
 struct DensityOptions {
     SmoothingOptions smoothing;
-    double extinction_per_m = 0.02;     // extinction coefficient at density 1; > 0
-    double metaball_radius_cells = 2.0; // effective radius R of stage 2, 1..8 cells
-    int refine = 1;                     // voxels written per cell and axis, 1..8; above 1 the metaball field is resampled
-    bool half = false;                  // 16-bit floats in the file
-    bool write_state = false;           // also the bool grids hum, act, cld
-    bool write_velocity = false;        // also `vel`, the wind in m/s
+    double extinction_per_m = 0.02;      // extinction coefficient at density 1; > 0
+    double metaball_radius_cells = 2.0;  // effective radius R of stage 2, 1..8 cells
+    int refine = 1;     // voxels written per cell and axis, 1..8; above 1 the metaball field is resampled
+    bool half = false;  // 16-bit floats in the file
+    bool write_state = false;     // also the bool grids hum, act, cld
+    bool write_velocity = false;  // also `vel`, the wind in m/s
     bool operator==(const DensityOptions&) const = default;
 };
 

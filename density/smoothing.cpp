@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/smoothing.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
+
+#include <tbb/parallel_for.h>
 
 #include "automaton/error.h"
 #include "density/openvdb_access.h"
@@ -17,17 +17,19 @@ namespace {
 
 constexpr int kMaxRadius = 16;
 constexpr int kGaussianPeak = 64;
-constexpr std::size_t kStreamBytes = std::size_t{8} << 20;  // results above this do not fit beside their input
+constexpr std::size_t kStreamBytes = std::size_t{8}
+                                     << 20;  // results above this do not fit beside their input
 
 void check_radius(int radius, const char* name) {
     if (radius < 0 || radius > kMaxRadius) {
-        throw Error(ErrorCode::usage, std::string("smoothing radius ") + name + " = " + std::to_string(radius) +
-                                          ": must be 0.." + std::to_string(kMaxRadius));
+        throw Error(ErrorCode::usage, std::string("smoothing radius ") + name + " = " +
+                                          std::to_string(radius) + ": must be 0.." +
+                                          std::to_string(kMaxRadius));
     }
 }
 
-// exp(-x) for 0 <= x < 8 from IEEE sums and products alone, so that weights are the same whatever the C library:
-// the Taylor series at x / 256, squared eight times.
+// exp(-x) for 0 <= x < 8 from IEEE sums and products alone, so that weights are the same whatever the C
+// library: the Taylor series at x / 256, squared eight times.
 double exp_of_minus(double x) {
     const double y = -x / 256;
     double term = 1, sum = 1;
@@ -45,7 +47,8 @@ double sum_of(const std::vector<std::uint32_t>& weights) {
     return sum;
 }
 
-// The smallest float whose product with float(total) is at least 1: then min(1, ..) makes a saturated window exactly 1.
+// The smallest float whose product with float(total) is at least 1: then min(1, ..) makes a saturated window
+// exactly 1.
 float reciprocal_of(double total) {
     const float whole = float(total);
     float r = float(1.0 / double(whole));
@@ -67,7 +70,8 @@ void check_planes(std::span<const TimedPlane> planes, int t0) {
         }
         auto&& twice = seen[std::size_t(plane.step_offset + t0)];
         if (twice) {
-            throw Error(ErrorCode::usage, "step offset " + std::to_string(plane.step_offset) + " is given twice");
+            throw Error(ErrorCode::usage,
+                        "step offset " + std::to_string(plane.step_offset) + " is given twice");
         }
         twice = true;
     }
@@ -94,14 +98,15 @@ SmoothingPlan make_plan(std::span<const TimedPlane> planes, const SmoothingOptio
     plan.total = sum_of(plan.wx) * sum_of(plan.wy) * sum_of(plan.wz) * sum_of(plan.plane_weights);
     plan.reciprocal = reciprocal_of(plan.total);
     const bool unit = options.kernel == SmoothingKernel::box;
-    plan.type = unit && plan.total < 256 ? SumType::u8
-                : plan.total < 65536     ? SumType::u16
+    plan.type = unit && plan.total < 256    ? SumType::u8
+                : plan.total < 65536        ? SumType::u16
                 : plan.total < 2147483648.0 ? SumType::u32
                                             : SumType::f64;
     return plan;
 }
 
-// Tiles in the order y, x. Width and depth balance the halo rows, which neighbours compute twice, against the cache.
+// Tiles in the order y, x. Width and depth balance the halo rows, which neighbours compute twice, against the
+// cache.
 std::vector<SmoothingTile> make_tiles(const SmoothingPlan& plan, int words, int rows) {
     std::vector<SmoothingTile> tiles;
     const int row_words = (plan.extent.x + 63) / 64;
@@ -144,8 +149,10 @@ std::vector<std::pair<Block, Block>> pair_blocks(const std::vector<Block>& a, co
     std::vector<std::pair<Block, Block>> pairs;
     auto left = a.begin(), right = b.begin();
     while (left != a.end() || right != b.end()) {
-        const bool take_left = right == b.end() || (left != a.end() && block_order(left->origin) <= block_order(right->origin));
-        const bool take_right = left == a.end() || (right != b.end() && block_order(right->origin) <= block_order(left->origin));
+        const bool take_left =
+            right == b.end() || (left != a.end() && block_order(left->origin) <= block_order(right->origin));
+        const bool take_right =
+            left == a.end() || (right != b.end() && block_order(right->origin) <= block_order(left->origin));
         const openvdb::Coord origin = take_left ? left->origin : right->origin;
         const Block nothing{origin, nullptr, 0};
         pairs.emplace_back(take_left ? *left : nothing, take_right ? *right : nothing);
@@ -163,29 +170,35 @@ std::vector<std::uint32_t> kernel_weights(SmoothingKernel kernel, int radius) {
     for (int n = -radius; n <= radius; ++n) {
         const double x = n / ((radius + 0.5) / 2);
         switch (kernel) {
-            case SmoothingKernel::box: weights.push_back(1); break;
-            case SmoothingKernel::tent: weights.push_back(std::uint32_t(radius + 1 - std::abs(n))); break;
+            case SmoothingKernel::box:
+                weights.push_back(1);
+                break;
+            case SmoothingKernel::tent:
+                weights.push_back(std::uint32_t(radius + 1 - std::abs(n)));
+                break;
             case SmoothingKernel::gaussian:
-                weights.push_back(std::uint32_t(std::max(1.0, std::floor(kGaussianPeak * exp_of_minus(x * x / 2) + 0.5))));
+                weights.push_back(
+                    std::uint32_t(std::max(1.0, std::floor(kGaussianPeak * exp_of_minus(x * x / 2) + 0.5))));
                 break;
         }
     }
     return weights;
 }
 
-DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& options, const Placement& placement,
-                   const Boundaries& boundaries) {
+DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& options,
+                   const Placement& placement, const Boundaries& boundaries) {
     const SmoothingPlan plan = make_plan(planes, options, boundaries);
     const auto tiles = make_tiles(plan, 1, 32);
     std::vector<TileBlocks> blocks(tiles.size());
-    tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t n) { smooth_tile(plan, tiles[n], blocks[n]); });
+    tbb::parallel_for(std::size_t{0}, tiles.size(),
+                      [&](std::size_t n) { smooth_tile(plan, tiles[n], blocks[n]); });
     TreeBuilder builder;
     for (TileBlocks& tile : blocks) tile.move_to(builder);
     return builder.finish(plan.extent, placement);
 }
 
-void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& options, const Boundaries& boundaries,
-                  std::span<float> out) {
+void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& options,
+                  const Boundaries& boundaries, std::span<float> out) {
     const SmoothingPlan plan = make_plan(planes, options, boundaries);
     if (out.size() != plan.extent.cells()) {
         throw Error(ErrorCode::usage, "room for " + std::to_string(out.size()) + " values, but the box has " +
@@ -199,7 +212,8 @@ void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& op
 
 DensityGrid mix(const DensityGrid& a, const DensityGrid& b, double fraction) {
     if (!(fraction >= 0 && fraction <= 1)) {
-        throw Error(ErrorCode::usage, "fraction " + std::to_string(fraction) + " between two steps: must be 0..1");
+        throw Error(ErrorCode::usage,
+                    "fraction " + std::to_string(fraction) + " between two steps: must be 0..1");
     }
     if (!(a.extent() == b.extent()) || !(a.placement() == b.placement())) {
         throw Error(ErrorCode::usage, "only grids of the same extent and placement can be mixed");

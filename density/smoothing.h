@@ -3,18 +3,19 @@
 
 // Stage 1 of D: bits to density, the weighted space-time mean
 //
-//     q(i,j,k,t) = sum over |i'|<=i0, |j'|<=j0, |k'|<=k0, |t'|<=t0 of w(i',j',k',t') cld(i+i',j+j',k+k',t+t') / W
+//     q(i,j,k,t) = sum over |i'|<=i0, |j'|<=j0, |k'|<=k0, |t'|<=t0 of w(i',j',k',t') cld(i+i',j+j',k+k',t+t')
+//     / W
 //
-// with W the sum of the weights of all cells of the window, at every step that was given. Weights are a product of one integer
-// kernel per axis (kernel_weights), so sums are exact whatever the order, and
+// with W the sum of the weights of all cells of the window, at every step that was given. Weights are a
+// product of one integer kernel per axis (kernel_weights), so sums are exact whatever the order, and
 //
 //     q = min(1, float(sum) * r),   r = 1 / float(W) rounded towards 1 or above
 //
-// is 1 exactly where every cell of the window is cloud, and above 0 exactly where one is. Beyond an open boundary cells are 0,
-// so density falls towards it; a periodic axis wraps.
+// is 1 exactly where every cell of the window is cloud, and above 0 exactly where one is. Beyond an open
+// boundary cells are 0, so density falls towards it; a periodic axis wraps.
 //
-// The result does not depend on the number of threads or the instruction set. Functions are thread-safe and use the
-// oneTBB arena that they are called in.
+// The result does not depend on the number of threads or the instruction set. Functions are thread-safe and
+// use the oneTBB arena that they are called in.
 
 #include <cstdint>
 #include <span>
@@ -38,18 +39,18 @@ struct TimedPlane {
 std::vector<std::uint32_t> kernel_weights(SmoothingKernel kernel, int radius);
 
 // q as a sparse grid; placement.cell_size_m is the cell's edge.
-// Throws Error(usage) when a radius is outside 0..16, when there is no plane, when planes differ in extent, or when an
-// offset is outside the window or given twice.
-DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& options, const Placement& placement,
-                   const Boundaries& boundaries);
+// Throws Error(usage) when a radius is outside 0..16, when there is no plane, when planes differ in extent,
+// or when an offset is outside the window or given twice.
+DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& options,
+                   const Placement& placement, const Boundaries& boundaries);
 
 // The same values as a dense array of extent.cells() floats, x fastest, into `out`.
 // Throws as smooth(), and Error(usage) when out.size() is not extent.cells().
-void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& options, const Boundaries& boundaries,
-                  std::span<float> out);
+void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& options,
+                  const Boundaries& boundaries, std::span<float> out);
 
-// The grid at `fraction` of the way from a (0) to b (1), each voxel a + (b - a) * fraction (D: frames between steps).
-// Throws Error(usage) when extents or placements differ, or when fraction is outside 0..1.
+// The grid at `fraction` of the way from a (0) to b (1), each voxel a + (b - a) * fraction (D: frames between
+// steps). Throws Error(usage) when extents or placements differ, or when fraction is outside 0..1.
 DensityGrid mix(const DensityGrid& a, const DensityGrid& b, double fraction);
 
 }  // namespace nephos

@@ -19,16 +19,18 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kWord = 64;      // cells per word
+constexpr int kWord = 64;  // cells per word
 constexpr int kMaxRadius = 16;
 
 // Vectors of at most one word's cells, so that a word is a whole number of them.
 template <class T>
 using Tag = hn::CappedTag<T, kWord>;
 
-// out[n] = sum over d of weights[d] * lines[d][n]; weights are symmetric; kUnit: all 1. kRadius < 0: `radius`.
+// out[n] = sum over d of weights[d] * lines[d][n]; weights are symmetric; kUnit: all 1. kRadius < 0:
+// `radius`.
 template <class T, bool kUnit, int kRadius>
-HWY_INLINE void weighted_sum_of(const T* const* lines, const T* weights, int radius, int count, T* HWY_RESTRICT out) {
+HWY_INLINE void weighted_sum_of(const T* const* lines, const T* weights, int radius, int count,
+                                T* HWY_RESTRICT out) {
     const Tag<T> d;
     const int r = kRadius < 0 ? radius : kRadius;
     for (int n = 0; n < count; n += int(hn::Lanes(d))) {
@@ -48,10 +50,14 @@ void weighted_sum(const T* const* lines, const std::vector<T>& weights, int coun
     const int radius = int(weights.size()) / 2;
     const T* w = weights.data();
     switch (radius) {
-        case 0: return weighted_sum_of<T, kUnit, 0>(lines, w, 0, count, out);
-        case 1: return weighted_sum_of<T, kUnit, 1>(lines, w, 1, count, out);
-        case 2: return weighted_sum_of<T, kUnit, 2>(lines, w, 2, count, out);
-        default: return weighted_sum_of<T, kUnit, -1>(lines, w, radius, count, out);
+        case 0:
+            return weighted_sum_of<T, kUnit, 0>(lines, w, 0, count, out);
+        case 1:
+            return weighted_sum_of<T, kUnit, 1>(lines, w, 1, count, out);
+        case 2:
+            return weighted_sum_of<T, kUnit, 2>(lines, w, 2, count, out);
+        default:
+            return weighted_sum_of<T, kUnit, -1>(lines, w, radius, count, out);
     }
 }
 
@@ -107,7 +113,8 @@ HWY_INLINE void to_floats(const T* HWY_RESTRICT sums, int count, float reciproca
 
 // Transposes one 8x8x8 block of S rows, s[z][y][x], to OpenVDB's order, block[x][y][z].
 template <class T>
-HWY_INLINE void transpose_block(const T* s, std::size_t stride_y, std::size_t stride_z, T* HWY_RESTRICT block) {
+HWY_INLINE void transpose_block(const T* s, std::size_t stride_y, std::size_t stride_z,
+                                T* HWY_RESTRICT block) {
     for (int z = 0; z < 8; ++z) {
         for (int y = 0; y < 8; ++y) {
             const T* row = s + std::size_t(z) * stride_z + std::size_t(y) * stride_y;
@@ -163,7 +170,8 @@ HWY_INLINE void transpose_block(const std::uint16_t* s, std::size_t stride_y, st
             return hn::BitCast(d32, high ? hn::InterleaveUpper(d, a, b) : hn::InterleaveLower(d, a, b));
         };
         for (int h = 0; h < 2; ++h) {
-            const auto z01 = half(0, h != 0), z23 = half(2, h != 0), z45 = half(4, h != 0), z67 = half(6, h != 0);
+            const auto z01 = half(0, h != 0), z23 = half(2, h != 0), z45 = half(4, h != 0),
+                       z67 = half(6, h != 0);
             const auto a = hn::BitCast(d64, hn::InterleaveLower(d32, z01, z23));   // x 0, 1; z 0..3
             const auto b = hn::BitCast(d64, hn::InterleaveUpper(d32, z01, z23));   // x 2, 3; z 0..3
             const auto a4 = hn::BitCast(d64, hn::InterleaveLower(d32, z45, z67));  // x 0, 1; z 4..7
@@ -258,7 +266,8 @@ class TilePass {
         bool any = false;
         for (int k = z - k0_; k < last; ++k) any = any || !ring_empty_[slot(k)];
         if (!any) return false;
-        for (int level = 0; level < levels; ++level) sum_level(z + level, s + std::size_t(level) * plane_size());
+        for (int level = 0; level < levels; ++level)
+            sum_level(z + level, s + std::size_t(level) * plane_size());
         return true;
     }
 
@@ -276,8 +285,8 @@ class TilePass {
         return wrapped < 0 ? wrapped + size : wrapped;
     }
 
-    // Words first_word - 1 .. first_word + words of row (j, k) of a plane, with what lies beyond the box's ends in x.
-    // Returns whether a bit that the tile needs may be 1.
+    // Words first_word - 1 .. first_word + words of row (j, k) of a plane, with what lies beyond the box's
+    // ends in x. Returns whether a bit that the tile needs may be 1.
     bool load_bits(const BitPlaneView& plane, int j, int k, std::uint64_t* bits) const {
         const std::uint64_t* row = plane.row(j, k);
         const int words_per_row = int(plane.words_per_row);
@@ -293,7 +302,7 @@ class TilePass {
 
     std::uint64_t wrap_ends(const std::uint64_t* row, std::uint64_t* bits) const {
         const int nx = plan_.extent.x;
-        const int first = (tile_.first_word - 1) * kWord;        // cell of bit 0
+        const int first = (tile_.first_word - 1) * kWord;  // cell of bit 0
         const int end = first + (tile_.words + 2) * kWord;
         std::uint64_t any = 0;
         const auto wrap = [&](int cell) {
@@ -387,9 +396,9 @@ class TilePass {
     const int i0_, j0_, k0_;
     const int width_;  // cells in a row
     const int slots_;
-    int next_ = -kMaxRadius;               // first level whose slot is not filled
+    int next_ = -kMaxRadius;  // first level whose slot is not filled
     hwy::AlignedFreeUniquePtr<T[]> x_rows_, ring_, zero_, expanded_;
-    std::vector<bool> ring_empty_;         // the plane in the slot is all 0; its memory is then undefined
+    std::vector<bool> ring_empty_;  // the plane in the slot is all 0; its memory is then undefined
 };
 
 template <class T, bool kUnit>
@@ -446,7 +455,8 @@ void rows_of_tile(const SmoothingPlan& plan, const SmoothingTile& tile, float* o
     for (int z = 0; z < plan.extent.z; ++z) {
         if (!pass.sums(z, 1, s.get())) std::fill_n(s.get(), pass.plane_size(), T{0});
         for (int n = 0; n < rows; ++n) {
-            write_row(s.get() + std::size_t(n) * std::size_t(pass.width()), pass.width(), cells, plan.reciprocal, stream,
+            write_row(s.get() + std::size_t(n) * std::size_t(pass.width()), pass.width(), cells,
+                      plan.reciprocal, stream,
                       out + linear_index(plan.extent, first_cell, tile.first_row + n, z));
         }
     }
@@ -457,19 +467,27 @@ void rows_of_tile(const SmoothingPlan& plan, const SmoothingTile& tile, float* o
 
 void tile_to_blocks(const SmoothingPlan& plan, const SmoothingTile& tile, BlockSink& sink) {
     switch (plan.type) {
-        case SumType::u8: return blocks_of_tile<std::uint8_t, true>(plan, tile, sink);
-        case SumType::u16: return blocks_of_tile<std::uint16_t, false>(plan, tile, sink);
-        case SumType::u32: return blocks_of_tile<std::uint32_t, false>(plan, tile, sink);
-        case SumType::f64: return blocks_of_tile<double, false>(plan, tile, sink);
+        case SumType::u8:
+            return blocks_of_tile<std::uint8_t, true>(plan, tile, sink);
+        case SumType::u16:
+            return blocks_of_tile<std::uint16_t, false>(plan, tile, sink);
+        case SumType::u32:
+            return blocks_of_tile<std::uint32_t, false>(plan, tile, sink);
+        case SumType::f64:
+            return blocks_of_tile<double, false>(plan, tile, sink);
     }
 }
 
 void tile_to_rows(const SmoothingPlan& plan, const SmoothingTile& tile, float* out, bool stream) {
     switch (plan.type) {
-        case SumType::u8: return rows_of_tile<std::uint8_t, true>(plan, tile, out, stream);
-        case SumType::u16: return rows_of_tile<std::uint16_t, false>(plan, tile, out, stream);
-        case SumType::u32: return rows_of_tile<std::uint32_t, false>(plan, tile, out, stream);
-        case SumType::f64: return rows_of_tile<double, false>(plan, tile, out, stream);
+        case SumType::u8:
+            return rows_of_tile<std::uint8_t, true>(plan, tile, out, stream);
+        case SumType::u16:
+            return rows_of_tile<std::uint16_t, false>(plan, tile, out, stream);
+        case SumType::u32:
+            return rows_of_tile<std::uint32_t, false>(plan, tile, out, stream);
+        case SumType::f64:
+            return rows_of_tile<double, false>(plan, tile, out, stream);
     }
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a researcher plots over time: how many cells are humid, active and cloud, how much of the sky they cover, and
-// between which heights.
+// What a researcher plots over time: how many cells are humid, active and cloud, how much of the sky they
+// cover, and between which heights.
 
 #include <cstdint>
 
@@ -13,14 +13,17 @@ namespace nephos {
 
 struct CloudStatistics {
     std::uint64_t hum = 0, act = 0, cld = 0;  // cells that are 1
-    double cover = 0;         // fraction of the columns with at least one cloud cell: cloud cover seen from above, 0..1
-    double base_m = 0;        // world z of the lower face of the lowest cloud cell; NaN without cloud
-    double top_m = 0;         // world z of the upper face of the highest cloud cell; NaN without cloud
-    double mean_density = 0;  // mean over all cells of the box: of the density grid where one is given, else of cld
+    double cover =
+        0;  // fraction of the columns with at least one cloud cell: cloud cover seen from above, 0..1
+    double base_m = 0;  // world z of the lower face of the lowest cloud cell; NaN without cloud
+    double top_m = 0;   // world z of the upper face of the highest cloud cell; NaN without cloud
+    double mean_density =
+        0;  // mean over all cells of the box: of the density grid where one is given, else of cld
 };
 
 // Statistics of one state. With `density` (of the same region, at any refinement) mean_density is the grid's.
-// Throws Error(usage) when the planes differ in extent. Thread-safe; does not depend on the number of threads.
+// Throws Error(usage) when the planes differ in extent. Thread-safe; does not depend on the number of
+// threads.
 CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& act, const BitPlaneView& cld,
                                  const Placement& placement, const DensityGrid* density = nullptr);
 

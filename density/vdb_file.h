@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Density grids as OpenVDB files: written so that any program that reads OpenVDB understands them, read so that no file, however
-// damaged or large, can take the program down.
+// Density grids as OpenVDB files: written so that any program that reads OpenVDB understands them, read so
+// that no file, however damaged or large, can take the program down.
 //
-// World and index space of a file: metres, right-handed, z up; OpenVDB's index (i, j, k) is the CENTRE of voxel (i, j, k),
-// so the transform is: world = (i, j, k) * voxel + origin + voxel / 2. All grids of a file share it.
+// World and index space of a file: metres, right-handed, z up; OpenVDB's index (i, j, k) is the CENTRE of
+// voxel (i, j, k), so the transform is: world = (i, j, k) * voxel + origin + voxel / 2. All grids of a file
+// share it.
 //
-// | grid            | type  | class      | content                                                              |
+// | grid            | type  | class      | content |
 // |-----------------|-------|------------|----------------------------------------------------------------------|
-// | `density`       | float | fog volume | 0..1, float or half; the two extreme corners are active with value 0 |
-// | `hum act cld`   | bool  |            | active and true where the bit is 1; on request                       |
-// | `vel`           | vec3s |            | wind in m/s (east, north, 0), in every 8x8x8 block that holds density; on request |
+// | `density`       | float | fog volume | 0..1, float or half; the two extreme corners are active with value
+// 0 | | `hum act cld`   | bool  |            | active and true where the bit is 1; on request | | `vel` |
+// vec3s |            | wind in m/s (east, north, 0), in every 8x8x8 block that holds density; on request |
 //
 // The two corner voxels of `density` make the active bounds, and with them OpenVDB's own `file_bbox_min` and
-// `file_bbox_max`, the same in every file of a sequence, clouds or none. Where density is refined, one cell is
-// refine^3 equal voxels in the bool grids.
+// `file_bbox_max`, the same in every file of a sequence, clouds or none. Where density is refined, one cell
+// is refine^3 equal voxels in the bool grids.
 //
 // Metadata, in the file and in each grid:
 //
@@ -33,7 +34,8 @@
 // | nephos_version                | string | version of nephos that wrote the file                      |
 // | nephos_random_stream_version  | int32  | version of the random stream                               |
 // | nephos_refine                 | int32  | voxels per cell and axis                                   |
-// | nephos_bbox_min, nephos_bbox_max | vec3i | bounds of the voxels, both included; constant over a sequence |
+// | nephos_bbox_min, nephos_bbox_max | vec3i | bounds of the voxels, both included; constant over a sequence
+// |
 
 #include <cstddef>
 #include <cstdint>
@@ -66,14 +68,14 @@ struct VdbMetadata {
 // What goes into one file. At least one of `density`, `hum`, `act`, `cld` must be there. Nothing is owned.
 struct VdbContent {
     const DensityGrid* density = nullptr;
-    bool half = false;                      // density as 16-bit floats
+    bool half = false;  // density as 16-bit floats
     std::optional<BitPlaneView> hum, act, cld;
-    Placement cells;                        // of the bit planes; must agree with density's placement and extent / refine
-    const Wind* wind = nullptr;             // writes `vel` at metadata.time_s; needs density
+    Placement cells;             // of the bit planes; must agree with density's placement and extent / refine
+    const Wind* wind = nullptr;  // writes `vel` at metadata.time_s; needs density
 };
 
-// Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content contradicts itself,
-// Error(io) naming the path when the file cannot be written (full disk included).
+// Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content
+// contradicts itself, Error(io) naming the path when the file cannot be written (full disk included).
 void write_vdb(const std::filesystem::path& path, const VdbContent& content, const VdbMetadata& metadata);
 
 // NAME_0001.vdb: path of one frame of a sequence, frames counted from 1; at least four digits.
@@ -88,14 +90,14 @@ enum class UpAxis {
 
 // How much a file may cost before it is given up.
 struct VdbReadLimits {
-    std::size_t memory_bytes = 0;  // for the reading process; 0 = three quarters of the memory that is free
+    std::size_t memory_bytes = 0;  // for the reading process; 0 = half of the memory that is free
     double seconds = 120;          // wall clock, > 0
 };
 
 struct VdbReadOptions {
-    std::string grid;               // name of the grid; empty: `density`, else the first float grid
+    std::string grid;  // name of the grid; empty: `density`, else the first float grid
     UpAxis up_axis = UpAxis::automatic;
-    double metres_per_unit = 1.0;   // world units of the file; > 0
+    double metres_per_unit = 1.0;  // world units of the file; > 0
     VdbReadLimits limits;
 };
 
@@ -104,14 +106,15 @@ struct LoadedDensity {
     DensityGrid density;
     std::string grid_name;
     std::optional<VdbMetadata> metadata;  // when nephos wrote the file
-    std::vector<std::string> notes;       // one sentence for each thing that was adapted (negative values set to 0 ...)
+    std::vector<std::string>
+        notes;  // one sentence for each thing that was adapted (negative values set to 0 ...)
 };
 
-// Reads any float or half fog volume (also double). Bounds are nephos_bbox where present, else the active bounds, moved so that
-// voxel (0, 0, 0) is the lowest corner. The transform must have cubic voxels and axes along the world's (any
-// order and direction). Everything untrusted happens in a child process with limits on memory and time, which
-// sends the voxels back; this process never parses the file.
-// Throws Error(io) naming the path and what was wrong with it; Error(usage) on bad options.
+// Reads any float or half fog volume (also double). Bounds are nephos_bbox where present, else the active
+// bounds, moved so that voxel (0, 0, 0) is the lowest corner. The transform must have cubic voxels and axes
+// along the world's (any order and direction). Everything untrusted happens in a child process with limits on
+// memory and time, which sends the voxels back; this process never parses the file. Throws Error(io) naming
+// the path and what was wrong with it; Error(usage) on bad options.
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 
@@ -122,17 +125,17 @@ Lattice read_state(const std::filesystem::path& path, Extent extent, const VdbRe
 // One grid as `nephos info` lists it.
 struct VdbGridInfo {
     std::string name;
-    std::string type;                 // "float", "half", "bool", "vec3s" ...
-    std::string grid_class;           // "fog volume", "level set", "unknown" ...
-    Vec3 voxel_size;                  // world units
+    std::string type;        // "float", "half", "bool", "vec3s" ...
+    std::string grid_class;  // "fog volume", "level set", "unknown" ...
+    Vec3 voxel_size;         // world units
     VoxelBox active_box;
     std::uint64_t active_voxels = 0;
     std::vector<std::pair<std::string, std::string>> metadata;  // name, value as text; by name
 };
 
 struct VdbInfo {
-    std::string file_version;         // "10.0/224": library and format
-    std::vector<VdbGridInfo> grids;   // in the file's order
+    std::string file_version;        // "10.0/224": library and format
+    std::vector<VdbGridInfo> grids;  // in the file's order
     std::vector<std::pair<std::string, std::string>> metadata;
 };
 

@@ -30,8 +30,8 @@ struct NaiveSum {
     std::uint64_t sum = 0, total = 0;
 };
 
-inline NaiveSum naive_sum(std::span<const TimedPlane> planes, const SmoothingOptions& o, const Boundaries& boundaries,
-                          int i, int j, int k) {
+inline NaiveSum naive_sum(std::span<const TimedPlane> planes, const SmoothingOptions& o,
+                          const Boundaries& boundaries, int i, int j, int k) {
     const auto wx = kernel_weights(o.kernel, o.i0), wy = kernel_weights(o.kernel, o.j0);
     const auto wz = kernel_weights(o.kernel, o.k0), wt = kernel_weights(o.kernel, o.t0);
     NaiveSum result;
@@ -39,8 +39,9 @@ inline NaiveSum naive_sum(std::span<const TimedPlane> planes, const SmoothingOpt
         for (int dk = -o.k0; dk <= o.k0; ++dk) {
             for (int dj = -o.j0; dj <= o.j0; ++dj) {
                 for (int di = -o.i0; di <= o.i0; ++di) {
-                    const std::uint64_t w = std::uint64_t{wx[std::size_t(di + o.i0)]} * wy[std::size_t(dj + o.j0)] *
-                                            wz[std::size_t(dk + o.k0)] * wt[std::size_t(plane.step_offset + o.t0)];
+                    const std::uint64_t w = std::uint64_t{wx[std::size_t(di + o.i0)]} *
+                                            wy[std::size_t(dj + o.j0)] * wz[std::size_t(dk + o.k0)] *
+                                            wt[std::size_t(plane.step_offset + o.t0)];
                     result.total += w;
                     if (naive_cell(plane.cld, i + di, j + dj, k + dk, boundaries)) result.sum += w;
                 }

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Smoothing against its naive twin on random bits, and the promises of its header: saturated is exactly 1, above 0
-// exactly where a cell of the window is cloud, the same bits whatever the number of threads.
+// Smoothing against its naive twin on random bits, and the promises of its header: saturated is exactly 1,
+// above 0 exactly where a cell of the window is cloud, the same bits whatever the number of threads.
 
 #include "density/smoothing.h"
-
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <numeric>
 #include <string>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include "automaton/error.h"
 #include "tests/density/naive_smoothing.h"
@@ -24,17 +24,19 @@ using test::naive_smooth;
 using test::random_plane;
 
 constexpr Boundary kOpen = Boundary::open, kPeriodic = Boundary::periodic;
-constexpr SmoothingKernel kKernels[] = {SmoothingKernel::box, SmoothingKernel::tent, SmoothingKernel::gaussian};
+constexpr SmoothingKernel kKernels[] = {SmoothingKernel::box, SmoothingKernel::tent,
+                                        SmoothingKernel::gaussian};
 
 std::string describe(const Extent& e, const SmoothingOptions& o, const Boundaries& b, std::uint64_t seed) {
-    return "extent " + std::to_string(e.x) + "x" + std::to_string(e.y) + "x" + std::to_string(e.z) + " kernel " +
-           std::to_string(int(o.kernel)) + " radii " + std::to_string(o.i0) + " " + std::to_string(o.j0) + " " +
-           std::to_string(o.k0) + " " + std::to_string(o.t0) + " periodic " + std::to_string(int(b.x)) +
-           std::to_string(int(b.y)) + std::to_string(int(b.z)) + " seed " + std::to_string(seed);
+    return "extent " + std::to_string(e.x) + "x" + std::to_string(e.y) + "x" + std::to_string(e.z) +
+           " kernel " + std::to_string(int(o.kernel)) + " radii " + std::to_string(o.i0) + " " +
+           std::to_string(o.j0) + " " + std::to_string(o.k0) + " " + std::to_string(o.t0) + " periodic " +
+           std::to_string(int(b.x)) + std::to_string(int(b.y)) + std::to_string(int(b.z)) + " seed " +
+           std::to_string(seed);
 }
 
-// Dense and sparse form against the twin: equal to a relative 2^-22 (one rounding of r, one of the product, one of the sum),
-// 0 where the twin is 0, and bit for bit equal to each other.
+// Dense and sparse form against the twin: equal to a relative 2^-22 (one rounding of r, one of the product,
+// one of the sum), 0 where the twin is 0, and bit for bit equal to each other.
 void expect_matches_twin(std::span<const TimedPlane> planes, const SmoothingOptions& options,
                          const Boundaries& boundaries, std::uint64_t seed) {
     const Extent extent = planes.front().cld.extent;
@@ -60,9 +62,11 @@ TEST(Smoothing, MatchesNaiveTwinForEveryKernelAndBoundary) {
     std::uint64_t seed = 1;
     for (SmoothingKernel kernel : kKernels) {
         for (int periodic = 0; periodic < 8; ++periodic) {
-            for (const Extent extent : {Extent{37, 19, 13}, Extent{70, 9, 5}, Extent{1, 1, 1}, Extent{5, 40, 3}}) {
+            for (const Extent extent :
+                 {Extent{37, 19, 13}, Extent{70, 9, 5}, Extent{1, 1, 1}, Extent{5, 40, 3}}) {
                 const BitPlane plane = random_plane(extent, 0.3, ++seed);
-                const Boundaries boundaries{periodic & 1 ? kPeriodic : kOpen, periodic & 2 ? kPeriodic : kOpen,
+                const Boundaries boundaries{periodic & 1 ? kPeriodic : kOpen,
+                                            periodic & 2 ? kPeriodic : kOpen,
                                             periodic & 4 ? kPeriodic : kOpen};
                 const TimedPlane timed[] = {{plane.view(), 0}};
                 expect_matches_twin(timed, {kernel, 2, 2, 1, 0}, boundaries, seed);
@@ -73,7 +77,9 @@ TEST(Smoothing, MatchesNaiveTwinForEveryKernelAndBoundary) {
 
 TEST(Smoothing, MatchesNaiveTwinForRandomWindows) {
     std::mt19937_64 random(7);
-    const auto draw = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    const auto draw = [&](int low, int high) {
+        return std::uniform_int_distribution<int>(low, high)(random);
+    };
     for (std::uint64_t seed = 100; seed < 160; ++seed) {
         const Extent extent{draw(1, 140), draw(1, 20), draw(1, 20)};
         SmoothingOptions options{kKernels[draw(0, 2)], draw(0, 4), draw(0, 4), draw(0, 3), draw(0, 2)};
@@ -103,7 +109,8 @@ TEST(Smoothing, MatchesNaiveTwinForLargestWindows) {
     }
 }
 
-// The tile grid: more than one tile in x and in y, blocks without any bit between, and bits in the last cells.
+// The tile grid: more than one tile in x and in y, blocks without any bit between, and bits in the last
+// cells.
 TEST(Smoothing, MatchesNaiveTwinAcrossTiles) {
     const Extent extent{203, 75, 26};
     BitPlane plane(extent);
@@ -132,9 +139,11 @@ TEST(Smoothing, SaturatedIsExactlyOne) {
     for (SmoothingKernel kernel : kKernels) {
         for (int radius : {0, 1, 2, 3, 5, 8, 11, 16}) {
             for (int variant = 0; variant < 3; ++variant) {
-                const SmoothingOptions options{kernel, radius, variant == 1 ? 0 : radius, variant == 2 ? 1 : radius, 1};
+                const SmoothingOptions options{kernel, radius, variant == 1 ? 0 : radius,
+                                               variant == 2 ? 1 : radius, 1};
                 SCOPED_TRACE(describe(extent, options, {}, 0));
-                const std::span<const TimedPlane> planes = variant == 2 ? std::span<const TimedPlane>(three) : one;
+                const std::span<const TimedPlane> planes =
+                    variant == 2 ? std::span<const TimedPlane>(three) : one;
                 std::vector<float> dense(extent.cells());
                 smooth_dense(planes, options, {kPeriodic, kPeriodic, kPeriodic}, dense);
                 for (float q : dense) ASSERT_EQ(q, 1.0f);
@@ -142,7 +151,8 @@ TEST(Smoothing, SaturatedIsExactlyOne) {
                 for (int k = options.k0; k < extent.z - options.k0; ++k) {
                     for (int j = options.j0; j < extent.y - options.j0; ++j) {
                         for (int i = options.i0; i < extent.x - options.i0; ++i) {
-                            ASSERT_EQ(dense[linear_index(extent, i, j, k)], 1.0f) << i << " " << j << " " << k;
+                            ASSERT_EQ(dense[linear_index(extent, i, j, k)], 1.0f)
+                                << i << " " << j << " " << k;
                         }
                     }
                 }
@@ -207,7 +217,8 @@ TEST(Smoothing, KernelWeightsAreAsDocumented) {
         ASSERT_EQ(weights.size(), std::size_t(2 * radius + 1));
         for (int n = -radius; n <= radius; ++n) {
             const double x = n / ((radius + 0.5) / 2);
-            EXPECT_EQ(weights[std::size_t(n + radius)], std::uint32_t(std::lround(64 * std::exp(-x * x / 2))));
+            EXPECT_EQ(weights[std::size_t(n + radius)],
+                      std::uint32_t(std::lround(64 * std::exp(-x * x / 2))));
             EXPECT_GT(weights[std::size_t(n + radius)], 0u);
         }
     }
@@ -216,7 +227,8 @@ TEST(Smoothing, KernelWeightsAreAsDocumented) {
 TEST(Smoothing, RejectsWhatMakesNoSense) {
     const BitPlane a(Extent{8, 8, 8}), b(Extent{8, 8, 9});
     std::vector<float> dense(512);
-    const auto code_of = [&](std::span<const TimedPlane> planes, const SmoothingOptions& options, std::size_t room) {
+    const auto code_of = [&](std::span<const TimedPlane> planes, const SmoothingOptions& options,
+                             std::size_t room) {
         try {
             smooth_dense(planes, options, {}, std::span<float>(dense).first(room));
         } catch (const Error& error) {

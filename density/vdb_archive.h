@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Reading an OpenVDB file with every stream error reported (not installed; to be used inside a sandbox only).
+// io::File does not check its stream: a truncated file yields voxels that were never read. This archive reads
+// the same format through OpenVDB's own code from a stream with exceptions switched on, never delays loading,
+// and checks offsets before it follows them.
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/GridDescriptor.h>
+#include <openvdb/io/io.h>
+#include <openvdb/openvdb.h>
+
+namespace nephos {
+
+class VdbArchive : public openvdb::io::Archive {
+  public:
+    // Reads everything but the grids. Throws std::exception of some kind when the file is not sound.
+    explicit VdbArchive(const std::filesystem::path& path);
+
+    struct Entry {
+        openvdb::io::GridDescriptor descriptor;
+        openvdb::GridBase::Ptr header;  // metadata and transform, no voxels
+    };
+    const std::vector<Entry>& entries() const { return entries_; }
+    const openvdb::MetaMap& metadata() const { return metadata_; }
+
+    // The grid with its voxels.
+    openvdb::GridBase::Ptr read(std::size_t n);
+
+  private:
+    void read_offsets(std::int32_t count);
+    void read_sequence(std::int32_t count);
+    void check_offsets(const openvdb::io::GridDescriptor& descriptor) const;
+
+    std::ifstream stream_;
+    std::int64_t file_size_ = 0;
+    openvdb::io::StreamMetadata::Ptr stream_metadata_;
+    openvdb::MetaMap metadata_;
+    std::vector<Entry> entries_;
+    std::vector<openvdb::GridBase::Ptr> sequence_;  // all grids, when the file has no offsets
+};
+
+}  // namespace nephos

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// From the index space of any OpenVDB file to that of a DensityGrid (not installed; runs inside the sandbox):
+// axes permuted and turned round so that x is east, y north and z up, bounds moved so that they begin at
+// voxel 0. Voxels that are not cubes, or do not lie along the axes, are resampled.
+
+#include <cstdint>
+#include <functional>
+
+#include <openvdb/openvdb.h>
+
+#include "automaton/lattice.h"
+
+namespace nephos {
+
+// Receives the result: the geometry first, then the blocks, each once, in any order.
+struct DensityReceiver {
+    std::function<void(const Extent&, const Placement&)> begin;
+    std::function<void(const openvdb::Coord& origin, const float* values)>
+        leaf;                                                             // 512 values, OpenVDB's order
+    std::function<void(const openvdb::Coord& origin, float value)> tile;  // an 8x8x8 block of one value
+};
+
+struct ForeignGrid {
+    const openvdb::FloatGrid* grid = nullptr;
+    openvdb::CoordBBox bounds;  // of the voxels to take, in the file's index space
+    bool y_up = false;
+    double metres_per_unit = 1;
+    std::size_t memory_bytes = 0;  // no result larger than this
+};
+
+struct ForeignResult {
+    bool resampled = false;
+    std::uint64_t negative = 0;  // values below 0 that became 0
+};
+
+// Throws std::runtime_error when the grid cannot be represented: not linear, too large, not finite.
+ForeignResult convert_foreign(const ForeignGrid& foreign, const DensityReceiver& receiver);
+
+}  // namespace nephos

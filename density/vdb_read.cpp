@@ -1,0 +1,481 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+
+#include "automaton/error.h"
+#include "density/metaballs.h"
+#include "density/openvdb_access.h"
+#include "density/sandbox.h"
+#include "density/vdb_archive.h"
+#include "density/vdb_file.h"
+#include "density/vdb_foreign.h"
+#include "density/vdb_metadata.h"
+
+namespace nephos {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+
+// What follows in the stream of blocks.
+enum class Record : std::uint8_t { end, leaf, tile };
+
+constexpr std::size_t kMaxMetadataText = 1000;
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what) {
+    throw Error(ErrorCode::io, path.string() + ": " + what);
+}
+
+// What can be said about a file without OpenVDB.
+void check_file(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto status = std::filesystem::status(path, error);
+    if (!std::filesystem::exists(status)) fail(path, error ? error.message() : "there is no such file");
+    if (std::filesystem::is_directory(status)) fail(path, "it is a folder, not a file");
+    if (!std::filesystem::is_regular_file(status)) fail(path, "it is not a regular file");
+    std::ifstream stream(path, std::ios::binary);
+    if (!stream) fail(path, std::string("cannot be opened: ") + std::strerror(errno));
+    std::array<char, 8> magic{};
+    stream.read(magic.data(), magic.size());
+    if (stream.gcount() == 0) fail(path, "the file is empty");
+    constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
+    if (stream.gcount() != std::streamsize(magic.size()) || magic != kMagic)
+        fail(path, "it is not an OpenVDB file");
+}
+
+// Runs the child's part on the opened archive, with stream errors put into words.
+void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
+                const std::function<void(VdbArchive&, SandboxWriter&)>& child,
+                const std::function<void(SandboxReader&)>& parent) {
+    check_file(path);
+    openvdb::initialize();  // before the fork, so that the child finds it done
+    run_sandboxed(
+        path, limits,
+        [&](SandboxWriter& writer) {
+            try {
+                VdbArchive archive(path);
+                child(archive, writer);
+            } catch (const std::ios_base::failure&) {
+                throw std::runtime_error("it is truncated or damaged");
+            } catch (const openvdb::Exception& error) {
+                throw std::runtime_error(std::string("it is damaged or not supported: ") + error.what());
+            }
+        },
+        parent);
+}
+
+template <class Grid>
+bool is(const openvdb::GridBase& grid) {
+    return grid.isType<Grid>();
+}
+
+bool is_fog(const openvdb::GridBase& grid) {
+    return (is<openvdb::FloatGrid>(grid) || is<openvdb::DoubleGrid>(grid)) &&
+           grid.getGridClass() != openvdb::GRID_LEVEL_SET;
+}
+
+std::string names_of(const VdbArchive& archive) {
+    std::string names;
+    for (const auto& entry : archive.entries()) {
+        names += (names.empty() ? "`" : ", `") + entry.descriptor.gridName() + "` (" +
+                 entry.header->valueType() + ")";
+    }
+    return names.empty() ? "none" : names;
+}
+
+std::size_t choose_grid(const VdbArchive& archive, const std::string& wanted) {
+    const auto& entries = archive.entries();
+    const auto find = [&](const auto& matches) {
+        return std::size_t(std::ranges::find_if(entries, matches) - entries.begin());
+    };
+    const std::string name = wanted.empty() ? "density" : wanted;
+    std::size_t n = find([&](const auto& e) { return e.descriptor.gridName() == name && is_fog(*e.header); });
+    if (n < entries.size()) return n;
+    if (!wanted.empty()) {
+        n = find([&](const auto& e) { return e.descriptor.gridName() == name; });
+        throw std::runtime_error(n < entries.size()
+                                     ? "grid `" + name + "` is not a float fog volume"
+                                     : "there is no grid `" + name + "`; it has " + names_of(archive));
+    }
+    n = find([](const auto& e) { return is_fog(*e.header); });
+    if (n == entries.size())
+        throw std::runtime_error("there is no float fog volume in it; it has " + names_of(archive));
+    return n;
+}
+
+// Bounds and counts that the file states must be bearable before any voxel is read.
+void check_stated_size(const openvdb::GridBase& header, std::size_t memory_bytes) {
+    const auto low = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MIN);
+    const auto high = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MAX);
+    for (int a = 0; low && high && a < 3; ++a) {
+        const std::int64_t size = std::int64_t{(*high)[a]} - (*low)[a] + 1;
+        if (size > std::int64_t{kMaxExtent} * kMaxRefine) {
+            throw std::runtime_error("its bounds of " + std::to_string(size) +
+                                     " voxels on an axis are too large");
+        }
+    }
+    const auto voxels = meta_value<std::int64_t>(header, openvdb::GridBase::META_FILE_VOXEL_COUNT);
+    if (voxels && *voxels > std::int64_t(memory_bytes / sizeof(float))) {
+        throw std::runtime_error("its " + std::to_string(*voxels) +
+                                 " voxels do not fit into the memory that is allowed");
+    }
+}
+
+openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
+    if (const auto typed = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return typed;
+    const auto typed = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
+    if (!typed) throw std::runtime_error("it is damaged: a grid changed its type");
+    auto result = openvdb::FloatGrid::create(openvdb::FloatTree::Ptr(new openvdb::FloatTree(typed->tree())));
+    result->setTransform(grid->transformPtr());
+    return result;
+}
+
+// The bounds that nephos wrote where they are there and hold all voxels, else those of the active voxels.
+CoordBBox bounds_of(const openvdb::FloatGrid& grid, const openvdb::GridBase& header) {
+    CoordBBox active;
+    const bool any = grid.tree().evalActiveVoxelBoundingBox(active);
+    const auto low = meta_value<openvdb::Vec3i>(header, kMetaBoxMin);
+    const auto high = meta_value<openvdb::Vec3i>(header, kMetaBoxMax);
+    if (low && high) {
+        const CoordBBox stated(Coord((*low)[0], (*low)[1], (*low)[2]),
+                               Coord((*high)[0], (*high)[1], (*high)[2]));
+        if (!stated.empty() && (!any || stated.isInside(active))) return stated;
+    }
+    return any ? active : CoordBBox(Coord(0), Coord(0));
+}
+
+bool has_y_up(const openvdb::GridBase& header, const openvdb::MetaMap& file, UpAxis wanted) {
+    if (wanted != UpAxis::automatic) return wanted == UpAxis::y;
+    auto stated = meta_value<std::string>(header, kMetaUpAxis);
+    if (!stated) stated = meta_value<std::string>(file, kMetaUpAxis);
+    return stated == "y";
+}
+
+void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& metadata) {
+    writer.value(std::uint8_t(metadata.has_value()));
+    if (!metadata) return;
+    writer.value(metadata->extinction_per_m);
+    writer.value(metadata->time_s);
+    writer.value(metadata->time_step_s);
+    writer.value(metadata->frames_per_second);
+    writer.value(metadata->seed);
+    writer.value(metadata->random_stream_version);
+    for (const std::string* text :
+         {&metadata->scene_hash, &metadata->state_hash, &metadata->nephos_version}) {
+        writer.text(clamp_message(*text, kMaxMetadataText));
+    }
+}
+
+std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
+    if (reader.value<std::uint8_t>() == 0) return std::nullopt;
+    VdbMetadata metadata;
+    metadata.extinction_per_m = reader.value<double>();
+    metadata.time_s = reader.value<double>();
+    metadata.time_step_s = reader.value<double>();
+    metadata.frames_per_second = reader.value<double>();
+    metadata.seed = reader.value<std::uint64_t>();
+    metadata.random_stream_version = reader.value<int>();
+    for (std::string* text : {&metadata.scene_hash, &metadata.state_hash, &metadata.nephos_version})
+        *text = reader.text();
+    return metadata;
+}
+
+// In the child: header, geometry, blocks, counts.
+void send_density(VdbArchive& archive, const VdbReadOptions& options, SandboxWriter& writer) {
+    const std::size_t memory_bytes = memory_limit(options.limits);
+    const std::size_t n = choose_grid(archive, options.grid);
+    const openvdb::GridBase& header = *archive.entries()[n].header;
+    check_stated_size(header, memory_bytes);
+    const auto grid = as_float(archive.read(n));
+    if (grid->background() != 0.0f) {
+        throw std::runtime_error("its background is " + std::to_string(grid->background()) +
+                                 ", not 0: it is no fog volume");
+    }
+    if (grid->activeVoxelCount() > memory_bytes / sizeof(float)) throw std::bad_alloc();
+    writer.text(archive.entries()[n].descriptor.gridName());
+    auto metadata = from_meta_map(header);
+    send_metadata(writer, metadata ? metadata : from_meta_map(archive.metadata()));
+
+    const auto coord = [&](const Coord& c) {
+        for (int a = 0; a < 3; ++a) writer.value(std::int32_t(c[a]));
+    };
+    DensityReceiver receiver;
+    receiver.begin = [&](const Extent& extent, const Placement& placement) {
+        writer.value(extent);
+        writer.value(placement);
+    };
+    receiver.leaf = [&](const Coord& origin, const float* values) {
+        writer.value(Record::leaf);
+        coord(origin);
+        writer.bytes(values, kBlockVoxels * sizeof(float));
+    };
+    receiver.tile = [&](const Coord& origin, float value) {
+        writer.value(Record::tile);
+        coord(origin);
+        writer.value(value);
+    };
+    const bool y_up = has_y_up(header, archive.metadata(), options.up_axis);
+    const ForeignGrid foreign{grid.get(), bounds_of(*grid, header), y_up, options.metres_per_unit,
+                              memory_bytes};
+    const ForeignResult result = convert_foreign(foreign, receiver);
+    writer.value(Record::end);
+    writer.value(result);
+}
+
+Coord receive_origin(SandboxReader& reader, const Extent& extent) {
+    const auto x = reader.value<std::int32_t>(), y = reader.value<std::int32_t>(),
+               z = reader.value<std::int32_t>();
+    const bool inside = x >= 0 && y >= 0 && z >= 0 && x < extent.x && y < extent.y && z < extent.z;
+    if (!inside || ((x | y | z) & (kBlock - 1)) != 0)
+        throw std::runtime_error("the reading process sent a misplaced block");
+    return {x, y, z};
+}
+
+// In the parent: builds the grid from what the child sends.
+LoadedDensity receive_density(SandboxReader& reader) {
+    LoadedDensity loaded;
+    loaded.grid_name = clamp_message(reader.text(), kMaxMetadataText);
+    loaded.metadata = receive_metadata(reader);
+    const auto extent = reader.value<Extent>();
+    const auto placement = reader.value<Placement>();
+    if (extent.x < 1 || extent.y < 1 || extent.z < 1 || !(placement.cell_size_m > 0)) {
+        throw std::runtime_error("the reading process sent an impossible size");
+    }
+    TreeBuilder builder;
+    for (;;) {
+        const auto record = reader.value<Record>();
+        if (record == Record::end) break;
+        const Coord origin = receive_origin(reader, extent);
+        if (record == Record::tile) {
+            NewBlock{nullptr, reader.value<float>()}.move_to(builder, origin);
+            continue;
+        }
+        auto leaf = uninitialised_leaf(origin);
+        reader.bytes(leaf->buffer().data(), kBlockVoxels * sizeof(float));
+        NewBlock::from(std::move(leaf)).move_to(builder, origin);
+    }
+    const auto result = reader.value<ForeignResult>();
+    loaded.density = builder.finish(extent, placement);
+    if (result.resampled) {
+        loaded.notes.push_back("its voxels are not cubes along the axes: resampled to voxels of " +
+                               std::to_string(placement.cell_size_m) + " m");
+    }
+    if (result.negative > 0) {
+        loaded.notes.push_back(std::to_string(result.negative) + " values below 0 were set to 0");
+    }
+    return loaded;
+}
+
+// In the child: the blocks of one bool or mask tree.
+template <class Tree>
+void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& name, SandboxWriter& writer) {
+    if (tree.background()) throw std::runtime_error("the background of grid `" + name + "` is true");
+    CoordBBox active;
+    if (tree.evalActiveVoxelBoundingBox(active) && !allowed.isInside(active)) {
+        throw std::runtime_error("grid `" + name + "` has voxels outside the " +
+                                 std::to_string(allowed.dim().x()) + " x " +
+                                 std::to_string(allowed.dim().y()) + " x " +
+                                 std::to_string(allowed.dim().z()) + " voxels of the scene");
+    }
+    const auto send = [&](const Coord& origin, const std::uint64_t(&words)[8]) {
+        writer.value(Record::leaf);
+        for (int a = 0; a < 3; ++a) writer.value(std::int32_t(origin[a]));
+        writer.bytes(words, sizeof words);
+    };
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+        std::uint64_t words[8] = {};
+        for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) {
+            if (*voxel) words[voxel.pos() >> 6] |= std::uint64_t{1} << (voxel.pos() & 63);
+        }
+        send(leaf->origin(), words);
+    }
+    std::uint64_t full[8];
+    std::fill_n(full, 8, ~std::uint64_t{0});
+    auto tile = tree.cbeginValueOn();
+    tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        if (!*tile) continue;
+        const CoordBBox box = tile.getBoundingBox();
+        for (int z = box.min().z(); z <= box.max().z(); z += kBlock) {
+            for (int y = box.min().y(); y <= box.max().y(); y += kBlock) {
+                for (int x = box.min().x(); x <= box.max().x(); x += kBlock) send({x, y, z}, full);
+            }
+        }
+    }
+    writer.value(Record::end);
+}
+
+constexpr const char* kStateGrids[] = {"hum", "act", "cld"};
+
+void send_state(VdbArchive& archive, Extent extent, SandboxWriter& writer) {
+    for (const char* name : kStateGrids) {
+        const auto& entries = archive.entries();
+        const auto entry =
+            std::ranges::find_if(entries, [&](const auto& e) { return e.descriptor.gridName() == name; });
+        if (entry == entries.end()) {
+            throw std::runtime_error(std::string("there is no grid `") + name +
+                                     "`; a state needs hum, act and cld; it has " + names_of(archive));
+        }
+        const int refine = meta_value<int>(*entry->header, kMetaRefine).value_or(1);
+        if (refine < 1 || refine > kMaxRefine)
+            throw std::runtime_error("it is damaged: nephos_refine is out of range");
+        writer.value(refine);
+        const Coord last(extent.x * refine - 1, extent.y * refine - 1, extent.z * refine - 1);
+        const auto grid = archive.read(std::size_t(entry - entries.begin()));
+        if (const auto bits = openvdb::gridPtrCast<openvdb::BoolGrid>(grid)) {
+            send_bits(bits->tree(), {Coord(0), last}, name, writer);
+        } else if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) {
+            send_bits(mask->tree(), {Coord(0), last}, name, writer);
+        } else {
+            throw std::runtime_error(std::string("grid `") + name + "` is of type " + grid->valueType() +
+                                     ", not bool");
+        }
+    }
+}
+
+void receive_plane(SandboxReader& reader, BitPlane& plane) {
+    const Extent extent = plane.extent();
+    const int refine = reader.value<int>();
+    if (refine < 1 || refine > kMaxRefine)
+        throw std::runtime_error("the reading process sent an impossible refinement");
+    const Extent voxels{extent.x * refine, extent.y * refine, extent.z * refine};
+    while (reader.value<Record>() != Record::end) {
+        const Coord origin = receive_origin(reader, voxels);
+        std::uint64_t words[8];
+        reader.bytes(words, sizeof words);
+        for (int n = 0; n < kBlockVoxels; ++n) {
+            if ((words[n >> 6] >> (n & 63) & 1) == 0) continue;
+            const Coord v = origin + Coord(n >> 6, n >> 3 & 7, n & 7);
+            if (v.x() >= voxels.x || v.y() >= voxels.y || v.z() >= voxels.z) {
+                throw std::runtime_error("the reading process sent a misplaced voxel");
+            }
+            if (v.x() % refine == 0 && v.y() % refine == 0 && v.z() % refine == 0) {
+                plane.set(v.x() / refine, v.y() / refine, v.z() / refine, true);
+            }
+        }
+    }
+}
+
+using TextPairs = std::vector<std::pair<std::string, std::string>>;
+
+void send_texts(const openvdb::MetaMap& map, SandboxWriter& writer) {
+    writer.value(std::uint32_t(map.metaCount()));
+    for (auto entry = map.beginMeta(); entry != map.endMeta(); ++entry) {  // a std::map: ordered by name
+        writer.text(clamp_message(entry->first, kMaxMetadataText));
+        writer.text(clamp_message(entry->second->str(), kMaxMetadataText));
+    }
+}
+
+TextPairs receive_texts(SandboxReader& reader) {
+    TextPairs texts;
+    for (auto left = reader.value<std::uint32_t>(); left > 0; --left) {
+        std::string name = reader.text();
+        texts.emplace_back(std::move(name), reader.text());
+    }
+    return texts;
+}
+
+// Active bounds and count: as the file states them, else from the voxels.
+void send_size(VdbArchive& archive, std::size_t n, SandboxWriter& writer) {
+    const openvdb::GridBase& header = *archive.entries()[n].header;
+    const auto low = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MIN);
+    const auto high = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MAX);
+    const auto stated = meta_value<std::int64_t>(header, openvdb::GridBase::META_FILE_VOXEL_COUNT);
+    VoxelBox box;
+    std::uint64_t voxels = 0;
+    if (low && high && stated) {
+        box = {{(*low)[0], (*low)[1], (*low)[2]}, {(*high)[0], (*high)[1], (*high)[2]}};
+        voxels = std::uint64_t(*stated);
+    } else {
+        const auto grid = archive.read(n);
+        voxels = grid->activeVoxelCount();
+        const CoordBBox active = grid->evalActiveVoxelBoundingBox();
+        if (voxels > 0) {
+            box = {{active.min().x(), active.min().y(), active.min().z()},
+                   {active.max().x(), active.max().y(), active.max().z()}};
+        }
+    }
+    writer.value(box);
+    writer.value(voxels);
+}
+
+void send_info(VdbArchive& archive, SandboxWriter& writer) {
+    writer.text(archive.version());
+    writer.value(std::uint32_t(archive.entries().size()));
+    for (std::size_t n = 0; n < archive.entries().size(); ++n) {
+        const auto& [descriptor, header] = archive.entries()[n];
+        const bool half = descriptor.saveFloatAsHalf();
+        const std::string type = header->valueType();
+        writer.text(clamp_message(descriptor.gridName()));
+        writer.text(clamp_message(!half ? type : type == "float" ? "half" : type + " as half"));
+        writer.text(openvdb::GridBase::gridClassToString(header->getGridClass()));
+        const openvdb::Vec3d size = header->transform().voxelSize();
+        writer.value(Vec3{size.x(), size.y(), size.z()});
+        send_size(archive, n, writer);
+        send_texts(*header, writer);
+    }
+    send_texts(archive.metadata(), writer);
+}
+
+VdbInfo receive_info(SandboxReader& reader) {
+    VdbInfo info;
+    info.file_version = reader.text();
+    for (auto left = reader.value<std::uint32_t>(); left > 0; --left) {
+        VdbGridInfo grid;
+        grid.name = reader.text();
+        grid.type = reader.text();
+        grid.grid_class = reader.text();
+        grid.voxel_size = reader.value<Vec3>();
+        grid.active_box = reader.value<VoxelBox>();
+        grid.active_voxels = reader.value<std::uint64_t>();
+        grid.metadata = receive_texts(reader);
+        info.grids.push_back(std::move(grid));
+    }
+    info.metadata = receive_texts(reader);
+    return info;
+}
+
+}  // namespace
+
+LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options) {
+    if (!(options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit))) {
+        throw Error(ErrorCode::usage,
+                    std::to_string(options.metres_per_unit) + " metres per unit: must be above 0");
+    }
+    LoadedDensity loaded;
+    in_sandbox(
+        path, options.limits,
+        [&](VdbArchive& archive, SandboxWriter& writer) { send_density(archive, options, writer); },
+        [&](SandboxReader& reader) { loaded = receive_density(reader); });
+    return loaded;
+}
+
+DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options) {
+    return load_density(path, options).density;
+}
+
+Lattice read_state(const std::filesystem::path& path, Extent extent, const VdbReadLimits& limits) {
+    Lattice lattice;
+    in_sandbox(
+        path, limits,
+        [&](VdbArchive& archive, SandboxWriter& writer) { send_state(archive, extent, writer); },
+        [&](SandboxReader& reader) {
+            lattice = {BitPlane(extent), BitPlane(extent), BitPlane(extent)};
+            for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) receive_plane(reader, *plane);
+        });
+    return lattice;
+}
+
+VdbInfo read_vdb_info(const std::filesystem::path& path, const VdbReadLimits& limits) {
+    VdbInfo info;
+    in_sandbox(
+        path, limits, [&](VdbArchive& archive, SandboxWriter& writer) { send_info(archive, writer); },
+        [&](SandboxReader& reader) { info = receive_info(reader); });
+    return info;
+}
+
+}  // namespace nephos
