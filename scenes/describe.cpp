@@ -62,7 +62,7 @@ Json key_json(const Key& key, const void* owner) {
         case KeyKind::integer:
         case KeyKind::count: return number_json(key, "integer");
         case KeyKind::seed:
-            return any_of({{"type", "integer"}, {"minimum", 0}},
+            return any_of({{"type", "integer"}, {"minimum", 0}, {"maximum", 0x7fffffffffffffff}},
                           {{"type", "string"}, {"pattern", "^([0-9]{1,20}|0[xX][0-9a-fA-F]{1,16})$"}});
         case KeyKind::number: return number_json(key, "number");
         case KeyKind::text:
@@ -95,6 +95,10 @@ Json section_json(const Section& section, const void* owner) {
     Json json{{"type", "object"}, {"additionalProperties", false}, {"properties", std::move(properties)}};
     if (!required.empty()) json["required"] = std::move(required);
     if (!dependencies.empty()) json["dependencies"] = std::move(dependencies);
+    for (const Key& key : section.keys) {
+        if (key.replaced_by.empty()) continue;
+        json["not"] = {{"required", {key.name, key.replaced_by}}};  // no section has two such pairs
+    }
     return json;
 }
 

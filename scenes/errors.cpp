@@ -96,6 +96,11 @@ SceneErrors::SceneErrors(std::vector<Problem> problems)
 std::string_view closest_word(std::string_view word, std::span<const std::string_view> candidates) {
     constexpr std::size_t kLongestWord = 64;  // longer ones are no slip of the fingers, and the cost is quadratic
     if (word.empty() || word.size() > kLongestWord) return {};
+    for (const std::string_view candidate : candidates) {  // the unit was left out: "elevation"
+        if (candidate.size() > word.size() && candidate.starts_with(word) && candidate[word.size()] == '_') {
+            return candidate;
+        }
+    }
     std::string_view best;
     int best_distance = 2 * std::max(1, int(word.size() + 1) / 3) + 1;
     for (const std::string_view candidate : candidates) {

@@ -47,7 +47,8 @@ class SceneErrors : public Error {
 };
 
 // The candidate that was probably meant by `word`: the one with the smallest edit distance (insertion, deletion,
-// replacement, swap of neighbours; case counts half), if that is small for the word's length; otherwise empty.
+// replacement, swap of neighbours; case counts half), if that is small for the word's length; before all others
+// one that only adds a unit ("elevation_deg" for "elevation"). Otherwise empty.
 std::string_view closest_word(std::string_view word, std::span<const std::string_view> candidates);
 
 }  // namespace nephos

@@ -94,13 +94,6 @@ void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
     });
 }
 
-void check_initial_state(const SectionReader& reader, const Scene& scene) {
-    const SectionReader lattice = below(reader, "lattice");
-    if (!reader.sound({"lattice"}) || !scene.initial_state_file || lattice.find("initial") == nullptr) return;
-    lattice.report("initial", "both `lattice.initial` and `lattice.initial_state` say how the box starts",
-                   "expected one of them");
-}
-
 void check_frames(const SectionReader& reader, const Scene& scene) {
     if (!reader.sound({"time", "frames"})) return;
     const SectionReader frames = below(reader, "frames");
@@ -114,8 +107,10 @@ void check_frames(const SectionReader& reader, const Scene& scene) {
     }
     if (scene.frames.count == 0) {
         if (frame_count(scene) < kMaxFrames) return;
-        frames.report("per_second", "the scene has more than " + std::to_string(kMaxFrames) + " frames",
-                      "expected a larger `frames.time_scale`, or a `frames.count`");
+        const bool with_scale = frames.find("time_scale") != nullptr;
+        const SectionReader at = with_scale ? frames : below(reader, "time");
+        at.report(with_scale ? "time_scale" : "steps", "the scene has more than " + std::to_string(kMaxFrames) + " frames",
+                  "expected a larger `frames.time_scale`, fewer `time.steps`, or a `frames.count`");
         return;
     }
     const double last_s = frame_time_s(scene.frames, scene.frames.count - 1);
@@ -139,7 +134,6 @@ void finish_scene(const SectionReader& reader, void* owner) {
     check_wind(reader, scene);
     check_wind_speed(reader, scene);
     check_periodic_sizes(reader, scene);
-    check_initial_state(reader, scene);
     check_frames(reader, scene);
     const Placement& placement = scene.automaton.placement;
     for (EllipsoidScatter& scatter : scene.automaton.field.scatters) {

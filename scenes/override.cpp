@@ -53,8 +53,9 @@ ParsedPath parse_path(std::string_view option) {
             path.steps.push_back({{}, index, int(digits)});
             ++at;
         }
-        if (at < option.size() && option[at] == '=') {
-            path.equals = at;
+        const std::size_t equals = option.find_first_not_of(" \t", at);
+        if (equals != std::string_view::npos && option[equals] == '=') {
+            path.equals = equals;
             return path;
         }
         if (at == option.size()) return failed("the option has no `=`");

@@ -122,13 +122,19 @@ class SceneReader {
                          "expected " + expected_text(key));
     }
 
-    // Required keys, and keys that need each other.
+    // Required keys, keys that need each other, and keys that exclude each other.
     void check_presence(const Section& section, SectionReader& reader) {
         for (const Key& key : section.keys) {
             const bool present = reader.find(key.name) != nullptr;
             if (key.required && !present && !full()) {
                 document_.report(reader.table.place, reader.quoted(key.name) + " is missing",
                                  "expected " + expected_text(key));
+                reader.failed.push_back(key.name);
+            }
+            if (present && !key.replaced_by.empty() && reader.find(key.replaced_by) != nullptr && !full()) {
+                reader.report(key.name, reader.quoted(key.name) + " and " + enclosed(key.replaced_by, '`') +
+                                            " exclude each other",
+                              "expected one of them");
                 reader.failed.push_back(key.name);
             }
             for (const std::string& other : key.together_with) {

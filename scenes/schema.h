@@ -68,6 +68,7 @@ struct Key {
     int (*word_index)(const void* value) = nullptr;
     void (*set_word)(void* value, int index) = nullptr;
     std::vector<std::string> together_with;     // keys that must be there with this one
+    std::string replaced_by;                    // a key that takes this one's place: only one of both may be there
 
     const Section* section = nullptr;           // table, tables
     int min_items = 0, max_items = 0;           // tables

@@ -234,9 +234,12 @@ const Section& lattice_section() {
              "origin_m", "m", between(-kFarthest_m, kFarthest_m),
              "Where the lower south-west corner of the box stands; its third number is the height of the lowest clouds."),
          boundaries,
-         word<&Scene::automaton, &AutomatonOptions::initial>(
-             "initial", {"empty", "field"},
-             "How the box starts: without any vapour or cloud, or with vapour and activation drawn from the field.", "D"),
+         replaced(word<&Scene::automaton, &AutomatonOptions::initial>(
+                      "initial", {"empty", "field"},
+                      "How the box starts: without any vapour or cloud, or with vapour and activation drawn from the "
+                      "field.",
+                      "D"),
+                  "initial_state"),
          default_is(key<&Scene::initial_state_file>(
                         "initial_state", "", kAny,
                         "A VDB file whose bool grids `hum`, `act` and `cld` are the start, instead of `initial`; "

@@ -160,10 +160,14 @@ inline Key together(Key key, std::vector<std::string> with) {
     return key;
 }
 
+inline Key replaced(Key key, std::string by) {
+    key.replaced_by = std::move(by);
+    return key;
+}
+
 inline constexpr Limits kAny{};
 constexpr Limits between(double min, double max) { return {min, max}; }
 constexpr Limits above(double min, double max) { return {min, max, true}; }
-constexpr Limits inside(double min, double max) { return {min, max, true, true}; }
 constexpr Limits or_infinite(Limits limits) {
     limits.max = std::numeric_limits<double>::infinity();
     limits.infinite = true;

@@ -140,14 +140,19 @@ const Section& light_section() {
         "Light in clouds",
         "How clouds scatter light.",
         {render_key<&RenderOptions::light, &CloudLight::albedo>(
-             "albedo", "", between(0, 1), "Share of the light that is scattered and not absorbed.", "D, step 1"),
+             "albedo", "", between(0, 1), "Share of the light that is scattered and not absorbed; below 1 the whole cloud is darker.", "D, step 1"),
          render_key<&RenderOptions::light, &CloudLight::g>(
-             "g", "", inside(-1, 1), "Asymmetry of the phase function: above 0 light goes forward, so clouds before the sun shine.",
+             "g", "", between(-0.99, 0.99),
+             "Asymmetry of the phase function: above 0 light goes forward, so the rims of clouds before the sun shine.",
              "S, phase function"),
+         render_key<&RenderOptions::light, &CloudLight::multiple_scattering>(
+             "multiple_scattering", "", between(0, 10),
+             "Strength of the sunlight that arrives after many scatterings and reaches deep into a cloud; 0 is single "
+             "scattering alone, with grey tops and dark bases."),
          render_key<&RenderOptions::light, &CloudLight::ambient_top>(
-             "ambient_top", "", kLight, "Light of the sky that the top of a cloud sees, linear colour."),
+             "ambient_top", "", kLight, "Light of the sky that the top of a cloud scatters, linear colour."),
          render_key<&RenderOptions::light, &CloudLight::ambient_base>(
-             "ambient_base", "", kLight, "Light that the base of a cloud sees, linear colour.")},
+             "ambient_base", "", kLight, "The same at its base; between them by height.")},
         nullptr};
     return section;
 }

@@ -32,16 +32,21 @@ std::string seed_text(std::uint64_t seed) {
     return "\"0x" + digits + "\"";
 }
 
-bool is_written(const Key& key, const void* owner) {
+bool has_value(const Key& key, const void* owner) {
     if (key.value == nullptr) return false;
     if (key.kind == KeyKind::tables) return key.size(value_of(key, owner)) > 0;
     return key.kind != KeyKind::path || as<std::optional<std::filesystem::path>>(value_of(key, owner)).has_value();
 }
 
+bool is_written(const Section& section, const Key& key, const void* owner) {
+    const Key* other = key.replaced_by.empty() ? nullptr : section.find(key.replaced_by);
+    return has_value(key, owner) && (other == nullptr || !has_value(*other, owner));
+}
+
 std::string inline_table(const Section& section, const void* owner) {
     std::vector<std::string> entries;
     for (const Key& key : section.keys) {
-        if (!is_written(key, owner)) continue;
+        if (!is_written(section, key, owner)) continue;
         entries.push_back(key.name + " = " + value_text(key, value_of(key, owner)));
     }
     std::string out = "{";
@@ -60,7 +65,7 @@ std::string array_of_tables(const Key& key, const void* vector) {
 void write_plain_keys(std::string& out, const Section& section, const void* owner) {
     for (const Key& key : section.keys) {
         const bool nested = key.kind == KeyKind::table || key.kind == KeyKind::tables;
-        if (nested || !is_written(key, owner)) continue;
+        if (nested || !is_written(section, key, owner)) continue;
         out += key.name + " = " + value_text(key, value_of(key, owner)) + "\n";
     }
 }
@@ -76,7 +81,7 @@ bool has_plain_keys(const Section& section) {
 void write_section(std::string& out, const Section& section, const void* owner, const std::string& path) {
     write_plain_keys(out, section, owner);
     for (const Key& key : section.keys) {
-        if ((key.kind != KeyKind::table && key.kind != KeyKind::tables) || !is_written(key, owner)) continue;
+        if ((key.kind != KeyKind::table && key.kind != KeyKind::tables) || !is_written(section, key, owner)) continue;
         const std::string key_path = path.empty() ? key.name : path + "." + key.name;
         const void* value = value_of(key, owner);
         if (key.kind == KeyKind::table) {
@@ -88,7 +93,7 @@ void write_section(std::string& out, const Section& section, const void* owner, 
             out += "\n[[" + key_path + "]]\n";
             const void* element = key.element(value, n);
             for (const Key& inner : key.section->keys) {
-                if (!is_written(inner, element)) continue;
+                if (!is_written(*key.section, inner, element)) continue;
                 out += inner.name + " = " + value_text(inner, value_of(inner, element)) + "\n";
             }
         }

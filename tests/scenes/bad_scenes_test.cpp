@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every scene in tests/scenes/bad has its messages beside it, NAME.txt for NAME.toml: what a user sees, to the letter.
+// After a deliberate change of a message, run with NEPHOS_UPDATE_GOLDEN=1 and read the difference.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "scenes/reader.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kFolder = fs::path(NEPHOS_SOURCE_DIR) / "tests/scenes/bad";
+
+std::string content(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+}
+
+std::vector<fs::path> bad_scenes() {
+    std::vector<fs::path> paths;
+    for (const auto& entry : fs::directory_iterator(kFolder)) {
+        if (entry.path().extension() == ".toml") paths.push_back(entry.path());
+    }
+    std::sort(paths.begin(), paths.end());
+    return paths;
+}
+
+// The label is the bare file name, so that messages do not depend on where the checkout lies.
+std::string messages_of(const fs::path& path) {
+    try {
+        read_scene_text(content(path), path.filename().string());
+    } catch (const SceneErrors& errors) {
+        EXPECT_EQ(errors.code(), ErrorCode::usage);
+        return format(errors.problems());
+    }
+    return "no error\n";
+}
+
+TEST(BadScenes, MessagesAreTheExpectedOnes) {
+    const bool update = std::getenv("NEPHOS_UPDATE_GOLDEN") != nullptr;
+    const std::vector<fs::path> paths = bad_scenes();
+    ASSERT_GE(paths.size(), 40u) << "the corpus is missing";
+    for (const fs::path& path : paths) {
+        SCOPED_TRACE(path.filename().string());
+        fs::path golden = path;
+        golden.replace_extension(".txt");
+        const std::string messages = messages_of(path);
+        EXPECT_NE(messages, "no error\n");
+        if (update) std::ofstream(golden, std::ios::binary) << messages;
+        EXPECT_EQ(messages, content(golden));
+    }
+}
+
+// Every problem is found in one pass: as many as are in the file.
+TEST(BadScenes, AllProblemsAreFoundInOnePass) {
+    try {
+        read_scene(kFolder / "wrong_types.toml");
+        FAIL() << "no error";
+    } catch (const SceneErrors& errors) {
+        EXPECT_EQ(errors.problems().size(), 17u);
+        int line = 0;
+        for (const Problem& problem : errors.problems()) {
+            EXPECT_GE(problem.where.line, line) << "in the order of the file";
+            line = problem.where.line;
+            EXPECT_FALSE(problem.source_line.empty());
+            EXPECT_GT(problem.caret, 0);
+        }
+    }
+}
+
+TEST(BadScenes, FilesThatCannotBeReadAreInputErrors) {
+    const auto code_of = [](const fs::path& path) {
+        try {
+            read_scene(path);
+        } catch (const Error& error) {
+            EXPECT_NE(std::string(error.what()).find(path.string()), std::string::npos) << error.what();
+            return error.code();
+        }
+        return ErrorCode::check;
+    };
+    EXPECT_EQ(code_of(kFolder / "no such file.toml"), ErrorCode::io);
+    EXPECT_EQ(code_of(kFolder), ErrorCode::io);
+    EXPECT_EQ(code_of("/dev/zero"), ErrorCode::usage) << "endless: refused at the size limit";
+}
+
+// 100 MB of valid TOML: refused without reading it to the end.
+TEST(BadScenes, HugeFileIsRefusedAtOnce) {
+    const fs::path path = fs::path(testing::TempDir()) / "nephos_huge_scene.toml";
+    {
+        std::ofstream file(path, std::ios::binary);
+        const std::string block(1 << 20, '\n');
+        for (int n = 0; n < 100; ++n) file << block;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    EXPECT_THROW(read_scene(path), SceneErrors);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+    fs::remove(path);
+}
+
+// The worst that fits into the size limit: time and messages stay bounded.
+TEST(BadScenes, WorstCasesOfTheAllowedSizeEndInTime) {
+    const auto problems_of = [](const std::string& text) -> std::size_t {
+        try {
+            read_scene_text(text, "worst.toml");
+        } catch (const SceneErrors& errors) {
+            EXPECT_LT(std::string(errors.what()).size(), 2u << 20);
+            return errors.problems().size();
+        }
+        return 0;
+    };
+    const auto repeated = [](const auto& line_of) {
+        std::string text;
+        for (int n = 0; text.size() < kMaxSceneBytes - 100; ++n) line_of(n, text);
+        return text;
+    };
+    const auto start = std::chrono::steady_clock::now();
+    EXPECT_EQ(problems_of(repeated([](int n, std::string& out) { ((out += "key") += std::to_string(n)) += " = 1\n"; })), 1000u);
+    EXPECT_EQ(problems_of(repeated([](int n, std::string& out) { ((out += "a") += std::to_string(n)) += ".b = 1\n"; })), 1u);
+    EXPECT_EQ(problems_of("name = [" + repeated([](int, std::string& out) { out += "1,"; }) + "]\n"), 1u);
+    EXPECT_EQ(problems_of("name = \"" + std::string(kMaxSceneBytes - 100, 'x') + "\"\n"), 1u);
+    EXPECT_EQ(problems_of("sun.elevation_deg = [" + std::string(kMaxSceneBytes - 100, '[')), 1u);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+}
+
+}  // namespace
+}  // namespace nephos

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+// The description of the keys is complete and its products are up to date: every field of every option struct has a
+// key, every key reads and writes its field, and the JSON Schema and the reference in the tree are the generated ones.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include "scenes/describe.h"
+#include "scenes/reader.h"
+#include "scenes/schema.h"
+#include "scenes/writer.h"
+
+namespace nephos {
+namespace {
+
+std::string content(const std::string& path) {
+    std::ifstream file(std::string(NEPHOS_SOURCE_DIR) + "/" + path, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+}
+
+TEST(Description, FilesInTheTreeAreTheGeneratedOnes) {
+    const char* const advice = "the keys have changed: build the target scene_descriptions";
+    EXPECT_TRUE(content("scenes/nephos.schema.json") == scene_json_schema()) << advice;
+    EXPECT_TRUE(content("docs/scene-reference.md") == scene_reference()) << advice;
+}
+
+// Anything, for counting the members of an aggregate: T{Anything, Anything, ...} works for up to that many.
+struct Anything {
+    template <typename T>
+    operator T() const;
+};
+
+template <typename T, typename... Members>
+constexpr std::size_t member_count() {
+    if constexpr (requires { T{Members{}..., Anything{}}; }) {
+        return member_count<T, Members..., Anything>();
+    } else {
+        return sizeof...(Members);
+    }
+}
+
+std::size_t keys_at(const std::vector<std::string>& path) {
+    const Key* key = find_key(path);
+    if (key == nullptr || key->section == nullptr) return 0;
+    std::size_t count = 0;
+    for (const Key& inner : key->section->keys) count += inner.value != nullptr;
+    return count;
+}
+
+// A field that somebody adds to an option struct must become a key, too. Whoever comes here: add it to
+// scenes/schema_automaton.cpp or scenes/schema_output.cpp and build the target scene_descriptions.
+TEST(Description, EveryOptionHasAKey) {
+    EXPECT_EQ(keys_at({"density"}), member_count<DensityOptions>());
+    EXPECT_EQ(keys_at({"density", "smoothing"}), member_count<SmoothingOptions>());
+    EXPECT_EQ(keys_at({"frames"}), member_count<FrameOptions>());
+    EXPECT_EQ(keys_at({"camera"}), member_count<Camera>());
+    EXPECT_EQ(keys_at({"light"}), member_count<CloudLight>());
+    EXPECT_EQ(keys_at({"air"}), member_count<Air>());
+    EXPECT_EQ(keys_at({"ground"}), member_count<Ground>());
+    // [sun] also holds the size of the shadow map, the one plain member of RenderOptions.
+    EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 1);
+    EXPECT_EQ(member_count<RenderOptions>(), 6u);
+    EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
+    EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
+    EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());
+    EXPECT_EQ(keys_at({"field", "scatters"}), member_count<EllipsoidScatter>());
+    EXPECT_EQ(keys_at({"wind"}), member_count<WindKeyframe>());
+    // A level's velocity has two keys.
+    EXPECT_EQ(keys_at({"wind", "levels"}), member_count<WindLevel>() - 1 + member_count<Velocity>());
+    // [lattice]: extent, placement (two keys), boundaries, initial, and Scene::initial_state_file.
+    EXPECT_EQ(keys_at({"lattice"}), member_count<Placement>() + 4);
+    // The others of AutomatonOptions: time.step_s, seed, field, wind.
+    EXPECT_EQ(member_count<AutomatonOptions>(), 8u);
+    EXPECT_EQ(keys_at({"time"}), 2u);
+    EXPECT_EQ(member_count<Scene>(), 7u);
+}
+
+// A scene with one of everything.
+Scene full_scene() {
+    return read_scene_text(R"(
+name = "full"
+[[field.ellipsoids]]
+centre_m = [1, 2, 3]
+life_s = 500
+[[field.scatters]]
+count = 7
+life_s = [400, 600]
+x_m = [0, 5]
+semi_axis_x_m = 300
+[[wind]]
+levels = [{ height_m = 100, east_m_per_s = 2 }, { height_m = 400, north_m_per_s = 3 }]
+)",
+                           "full.toml");
+}
+
+double changed(double value, const Limits& limits) {
+    const auto allowed = [&](double v) {
+        return v != value && v >= limits.min && v <= limits.max && (v != limits.min || !limits.above_min) &&
+               (v != limits.max || !limits.below_max);
+    };
+    for (const double candidate : {value * 1.001, value * 0.999, 0.25, -0.25, 300.0}) {
+        if (std::isfinite(candidate) && allowed(candidate)) return candidate;
+    }
+    ADD_FAILURE() << "no other value than " << value;
+    return value;
+}
+
+int changed_integer(int value, const Limits& limits) { return value + 1 <= limits.max ? value + 1 : value - 1; }
+
+template <typename T>
+T& as(void* value) {
+    return *static_cast<T*>(value);
+}
+
+// Gives a key's value another one that is allowed.
+void change(const Key& key, void* value) {
+    switch (key.kind) {
+        case KeyKind::boolean: as<bool>(value) = !as<bool>(value); break;
+        case KeyKind::integer: as<int>(value) = changed_integer(as<int>(value), key.limits); break;
+        case KeyKind::count: as<std::uint64_t>(value) += 3; break;
+        case KeyKind::seed: as<std::uint64_t>(value) = 0x8000000000000005; break;
+        case KeyKind::number: as<double>(value) = changed(as<double>(value), key.limits); break;
+        case KeyKind::text: as<std::string>(value) += "-other"; break;
+        case KeyKind::path: as<std::optional<std::filesystem::path>>(value) = "/a folder/\"state\"\t\xE9\x9B\xB2.vdb"; break;
+        case KeyKind::word: key.set_word(value, key.word_index(value) == 0 ? 1 : 0); break;
+        case KeyKind::extent: as<Extent>(value).y += 1; break;
+        case KeyKind::vector: as<Vec3>(value).z = changed(as<Vec3>(value).z, key.limits); break;
+        case KeyKind::colour: as<Rgb>(value)[1] = changed(as<Rgb>(value)[1], key.limits); break;
+        case KeyKind::range:
+            as<Range>(value).min = changed(std::min(as<Range>(value).min, 400.0), key.limits);
+            as<Range>(value).max = std::max(as<Range>(value).min, std::min(as<Range>(value).max, 1e6));
+            break;
+        case KeyKind::boundaries: as<Boundaries>(value).z = Boundary::periodic; break;
+        case KeyKind::table:
+        case KeyKind::tables: break;
+    }
+}
+
+// Calls `visit` for every key that holds a value, with the place of the value in the scene.
+void for_every_value(const Section& section, void* owner, const std::string& path,
+                     const std::function<void(const Key&, void*, const std::string&)>& visit) {
+    for (const Key& key : section.keys) {
+        if (key.value == nullptr) continue;
+        void* value = key.value(owner);
+        const std::string here = path + "/" + key.name;
+        if (key.kind == KeyKind::table) {
+            for_every_value(*key.section, value, here, visit);
+        } else if (key.kind == KeyKind::tables) {
+            for (std::size_t n = 0; n < key.size(value); ++n) {
+                void* element = const_cast<void*>(key.element(value, n));
+                for_every_value(*key.section, element, here + "/" + std::to_string(n), visit);
+            }
+        } else {
+            visit(key, value, here);
+        }
+    }
+}
+
+// Every value, changed alone, is written, read back as it was, and seen by the hash; and no two keys share a value.
+TEST(Description, EveryKeyReadsAndWritesItsOwnValue) {
+    std::set<std::string> hashes{scene_hash(full_scene())};
+    std::set<const void*> values;
+    Scene layout = full_scene();
+    std::vector<std::string> paths;
+    for_every_value(scene_section(), &layout, "", [&](const Key&, void* value, const std::string& path) {
+        EXPECT_TRUE(values.insert(value).second) << path << " shares its value with another key";
+        paths.push_back(path);
+    });
+    EXPECT_GT(paths.size(), 80u);
+    for (const std::string& wanted : paths) {
+        SCOPED_TRACE(wanted);
+        Scene scene = full_scene();
+        for_every_value(scene_section(), &scene, "", [&](const Key& key, void* value, const std::string& path) {
+            if (path == wanted) change(key, value);
+        });
+        const std::string text = to_toml(scene);
+        EXPECT_TRUE(hashes.insert(scene_hash(scene)).second) << "the hash does not see it";
+        EXPECT_EQ(read_scene_text(text, "again.toml"), scene) << text;
+        EXPECT_EQ(to_toml(read_scene_text(text, "again.toml")), text);
+    }
+}
+
+// What a user is told must be there: each key has its effect, each number with a dimension its unit.
+TEST(Description, EveryKeyIsExplained) {
+    std::function<void(const Section&, const std::string&)> visit = [&](const Section& section, const std::string& path) {
+        for (const Key& key : section.keys) {
+            const std::string here = path + "/" + key.name;
+            EXPECT_FALSE(key.effect.empty()) << here;
+            EXPECT_FALSE(expected_text(key).empty()) << here;
+            for (const auto& [suffix, unit] : {std::pair{"_m", "m"}, {"_s", "s"}, {"_deg", "deg"}, {"_per_m", "1/m"},
+                                               {"_m_per_s", "m/s"}, {"_cells", "cells"}}) {
+                const std::string end = suffix;
+                const bool ends = key.name.ends_with(end);
+                const bool longer = key.name.ends_with("_per" + end) || key.name.ends_with("_m_per_s");
+                if (ends && (!longer || end.size() > 2)) {
+                    EXPECT_EQ(key.unit, unit) << here;
+                }
+            }
+            if (key.section != nullptr) visit(*key.section, here);
+        }
+    };
+    visit(scene_section(), "");
+}
+
+}  // namespace
+}  // namespace nephos
