@@ -16,14 +16,15 @@ float attenuation_depth_scale(int layer) {
 std::vector<float> attenuation_textures() {
     constexpr int kTexels = int(shader::kAttenuationTexels);
     std::vector<float> texels;
-    texels.reserve(shader::kAttenuationLevels * kTexels * kTexels);
+    texels.reserve(2 * shader::kAttenuationLevels * kTexels * kTexels);
     for (int layer = 0; layer < int(shader::kAttenuationLevels); ++layer) {
-        const float depth_scale = attenuation_depth_scale(layer);
+        const float here = attenuation_depth_scale(layer), next = attenuation_depth_scale(layer + 1);
         for (int j = 0; j < kTexels; ++j) {
             for (int i = 0; i < kTexels; ++i) {
                 const float x = float(i) / float(kTexels - 1), y = float(j) / float(kTexels - 1);
                 const float w = std::max(0.0f, 1.0f - x * x - y * y);
-                texels.push_back(-std::expm1(-depth_scale * shader::column(w)));
+                for (const float depth_scale : {here, next})
+                    texels.push_back(-std::expm1(-depth_scale * shader::column(w)));
             }
         }
     }

@@ -25,10 +25,12 @@ void check(const Metaball& ball, std::size_t index) {
     if (!finite || !(ball.radius > 0))
         throw Error(ErrorCode::usage, "metaball " + std::to_string(index) +
                                           ": expected finite numbers and a radius above 0, got radius " +
-                                          std::to_string(ball.radius) + ", density " + std::to_string(ball.density));
+                                          std::to_string(ball.radius) + ", density " +
+                                          std::to_string(ball.density));
 }
 
-// Sorts by a key that is not negative, then by index: as one integer, because the bits of floats >= 0 rise with them.
+// Sorts by a key that is not negative, then by index: as one integer, because the bits of floats >= 0 rise
+// with them.
 class KeyedOrder {
   public:
     explicit KeyedOrder(std::size_t count) { entries_.reserve(count); }
@@ -107,7 +109,8 @@ PreparedCloud prepare(const MetaballCloud& cloud) {
 Vec3 direction_to_sun(const Sun& sun) {
     constexpr double kRadians = std::numbers::pi / 180.0;
     const double elevation = sun.elevation_deg * kRadians, azimuth = sun.azimuth_deg * kRadians;
-    return {std::sin(azimuth) * std::cos(elevation), std::cos(azimuth) * std::cos(elevation), std::sin(elevation)};
+    return {std::sin(azimuth) * std::cos(elevation), std::cos(azimuth) * std::cos(elevation),
+            std::sin(elevation)};
 }
 
 ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size) {
@@ -132,8 +135,8 @@ ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int sha
     const double grow = double(shadow_size) / (shadow_size - 4);
     const double width = along_u.size() * grow, height = along_v.size() * grow;
     ShadowFrame frame;
-    frame.origin_m = (along_u.middle() - 0.5 * width) * u + (along_v.middle() - 0.5 * height) * v +
-                     along_sun.max * to_sun;
+    frame.origin_m =
+        (along_u.middle() - 0.5 * width) * u + (along_v.middle() - 0.5 * height) * v + along_sun.max * to_sun;
     frame.u_axis_m = width * u;
     frame.v_axis_m = height * v;
     frame.direction = -to_sun;
@@ -164,7 +167,6 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
     const double slabs = std::min(wanted, double(max_slabs));
     const double per_metre = range.size() > 0 ? slabs / range.size() : 0.0;
     order.balls.reserve(count);
-    order.source.reserve(count);
     double current = -1;
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t source = by_distance[i];
@@ -172,19 +174,25 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
         const Vec3 offset = centre_of(ball) - middle;
         const double position = (double(distance[source]) - range.min) * per_metre;
         const double slab = std::min(std::floor(position), slabs - 1.0);
-        if (slab != current) order.slabs.push_back({std::uint32_t(i), std::uint32_t(i)});
+        if (slab != current) order.slabs.push_back({std::uint32_t(i), 0, std::uint32_t(i)});
         current = slab;
         ++order.slabs.back().end;
-        order.balls.push_back({float(dot(u, offset)), float(dot(v, offset)), ball.radius, cloud.depth_scale[source],
-                               float(position - slab), 0, 0, 0});
-        order.source.push_back(source);
+        order.balls.push_back({float(dot(u, offset)), float(dot(v, offset)), ball.radius,
+                               cloud.depth_scale[source], float(position - slab), source, 0, 0});
+    }
+    const auto is_thin = [](const shader::LightBall& ball) {
+        return ball.depth_scale <= shader::kMaxDepthScale;
+    };
+    for (Slab& slab : order.slabs) {
+        const auto first = order.balls.begin();
+        slab.dense =
+            std::uint32_t(std::stable_partition(first + slab.begin, first + slab.end, is_thin) - first);
     }
     return order;
 }
 
-std::vector<shader::ViewBall> order_from_eye(const PreparedCloud& cloud, std::span<const float> light,
-                                             const CameraFrame& camera, double pixels_per_unit,
-                                             const Ground& ground) {
+EyeOrder order_from_eye(const PreparedCloud& cloud, std::span<const float> light, const CameraFrame& camera,
+                        double pixels_per_unit, const Ground& ground) {
     const Frustum frustum(camera);
     const bool above_ground = camera.position_m.z > ground.height_m;
     KeyedOrder by_distance(cloud.visible.size());
@@ -201,18 +209,27 @@ std::vector<shader::ViewBall> order_from_eye(const PreparedCloud& cloud, std::sp
     by_distance.sort();
 
     const double height_scale = cloud.top_m > cloud.base_m ? 1.0 / (cloud.top_m - cloud.base_m) : 0.0;
-    std::vector<shader::ViewBall> balls;
-    balls.reserve(by_distance.size());
+    EyeOrder order;
+    order.balls.reserve(by_distance.size());
     for (std::size_t i = by_distance.size(); i-- > 0;) {
         const std::uint32_t source = by_distance[i];
         const Metaball& ball = cloud.metaballs[cloud.visible[source]];
         const Vec3 offset = centre_of(ball) - camera.position_m;
-        const bool touches_ground = above_ground && ball.z - ball.radius < ground.height_m;
-        balls.push_back({float(offset.x), float(offset.y), float(offset.z), ball.radius, cloud.depth_scale[source],
-                         light[source], float((ball.z - cloud.base_m) * height_scale),
-                         touches_ground ? shader::kIntegrate : 0u});
+        shader::uint flags = 0;
+        if (length(offset) < double(shader::kNearDistance) * ball.radius)
+            flags |= shader::kAround | shader::kIntegrate;
+        if (above_ground && ball.z - ball.radius < ground.height_m) flags |= shader::kIntegrate;
+        if (cloud.depth_scale[source] > shader::kMaxDepthScale) flags |= shader::kIntegrate;
+        const bool integrate = flags != 0;
+        const std::uint32_t index = std::uint32_t(order.balls.size());
+        if (order.runs.empty() || order.runs.back().integrate != integrate)
+            order.runs.push_back({index, index, integrate});
+        ++order.runs.back().end;
+        order.balls.push_back({float(offset.x), float(offset.y), float(offset.z), ball.radius,
+                               cloud.depth_scale[source], light[source],
+                               float((ball.z - cloud.base_m) * height_scale), flags});
     }
-    return balls;
+    return order;
 }
 
 }  // namespace nephos

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What happens to a cloud before the device sees it: checks, optical depth scales, bounds, the frame of the shadow map,
-// and the two orders (from the sun, and from far to near of the eye). No Vulkan here. Private to the module.
+// What happens to a cloud before the device sees it: checks, optical depth scales, bounds, the frame of the
+// shadow map, and the two orders (from the sun, and from far to near of the eye). No Vulkan here. Private to
+// the module.
 //
-// Every order is total: equal distances are ordered by index, so a picture never depends on how a sort is done.
+// Every order is total: equal distances are ordered by index, so a picture never depends on how a sort is
+// done.
 
 #include <cstdint>
 #include <span>
@@ -20,9 +22,9 @@ namespace nephos {
 // The metaballs that draw anything.
 struct PreparedCloud {
     std::span<const Metaball> metaballs;
-    std::vector<std::uint32_t> visible;    // indices into metaballs, rising
-    std::vector<float> depth_scale;        // one for each of `visible`: extinction at the centre * radius
-    double base_m = 0, top_m = 0;          // world z of the lowest and highest centre
+    std::vector<std::uint32_t> visible;  // indices into metaballs, rising
+    std::vector<float> depth_scale;      // one for each of `visible`: extinction at the centre * radius
+    double base_m = 0, top_m = 0;        // world z of the lowest and highest centre
 };
 
 // Throws Error(usage) when a metaball is not finite, has no radius, or there are more than 2^31 of them.
@@ -34,24 +36,34 @@ Vec3 direction_to_sun(const Sun& sun);
 // The smallest frame along the sun's rays around all visible metaballs, with a margin of two texels.
 ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size);
 
-// Consecutive metaballs in the order from the sun.
+// Consecutive metaballs in the order from the sun. Within a slab order does not matter (light is read before
+// and behind it); those too dense for the textures come last.
 struct Slab {
-    std::uint32_t begin = 0, end = 0;
+    std::uint32_t begin = 0, dense = 0, end = 0;  // begin <= dense <= end; [dense, end) are too dense
 };
 
 struct SunOrder {
-    std::vector<shader::LightBall> balls;  // nearest to the sun first
-    std::vector<std::uint32_t> source;     // for each: its place in PreparedCloud::visible
+    std::vector<shader::LightBall> balls;  // nearest to the sun first, slab by slab
     std::vector<Slab> slabs;               // none is empty; together they are all of balls
 };
 
 // Slabs of equal thickness: half the mean radius, but at most `max_slabs` of them.
 SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, int max_slabs);
 
+// Consecutive metaballs in the order from the eye that one pipeline draws.
+struct Run {
+    std::uint32_t begin = 0, end = 0;
+    bool integrate = false;  // all of them have shader::kIntegrate, or none has
+};
+
+struct EyeOrder {
+    std::vector<shader::ViewBall> balls;  // farthest first
+    std::vector<Run> runs;                // none is empty; together they are all of balls
+};
+
 // Metaballs that the camera can see, far ones first. `light` has one entry for each of cloud.visible;
 // `pixels_per_unit` is the size in pixels of a unit at distance 1.
-std::vector<shader::ViewBall> order_from_eye(const PreparedCloud& cloud, std::span<const float> light,
-                                             const CameraFrame& camera, double pixels_per_unit,
-                                             const Ground& ground);
+EyeOrder order_from_eye(const PreparedCloud& cloud, std::span<const float> light, const CameraFrame& camera,
+                        double pixels_per_unit, const Ground& ground);
 
 }  // namespace nephos

@@ -75,7 +75,11 @@ Imf::Header picture_header(const Picture& picture, const RenderOptions& options,
 }
 
 Imf::Header shadow_header(const Picture& picture, const PictureMetadata& metadata) {
-    Imf::Header header(picture.shadow_size, picture.shadow_size);
+    // All parts of a file must share display window and chromaticities; the size is in the data window.
+    Imf::Header header(picture.width, picture.height);
+    const int last = picture.shadow_size - 1;
+    header.dataWindow() = Imath::Box2i(Imath::V2i(0, 0), Imath::V2i(last, last));
+    Imf::addChromaticities(header, Imf::Chromaticities());
     header.setName("shadow");
     header.setType(Imf::SCANLINEIMAGE);
     header.compression() = Imf::ZIP_COMPRESSION;

@@ -76,10 +76,8 @@ std::string joined(int digits, Values... values) {
 }
 
 std::string matrix_text(const Imath::M44f& m) {
-    std::string text;
-    for (int row = 0; row < 4; ++row)
-        text += (row == 0 ? "" : " ") + joined(9, m[row][0], m[row][1], m[row][2], m[row][3]);
-    return text;
+    const auto row = [&](int i) { return joined(9, m[i][0], m[i][1], m[i][2], m[i][3]); };
+    return joined(9, row(0), row(1), row(2), row(3));
 }
 
 std::string attribute_text(const Imf::Attribute& attribute) {

@@ -53,16 +53,19 @@ shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera
     frame.to_sun = to_vec4(to_sun, light.g);
     frame.sunlight = to_vec4(options.sun.colour, day.sun, light.multiple_scattering);
     frame.ambient_top = to_vec4(light.ambient_top, day.sky, light.albedo);
-    // Diffusion through a slab of optical depth tau lets 1 / (1 + 3/4 (1 - g) tau) through when nothing is absorbed.
+    // Diffusion through a slab of optical depth tau lets 1 / (1 + 3/4 (1 - g) tau) through when nothing is
+    // absorbed.
     frame.ambient_base = to_vec4(light.ambient_base, day.sky, 0.75 * (1.0 - light.g));
     frame.air_extinction = to_vec4(options.air.extinction_per_m, 1.0, 0);
     frame.horizon = to_vec4(options.air.horizon, day.sky, 0);
     frame.zenith = to_vec4(options.air.zenith, day.sky, 0);
 
-    // The open sky lights the ground with about the mean of its two colours; radiance of a white surface in it is that.
+    // The open sky lights the ground with about the mean of its two colours; radiance of a white surface in
+    // it is that.
     Rgb skylit{}, sunlit{};
     for (std::size_t c = 0; c < 3; ++c) {
-        skylit[c] = options.ground.albedo[c] * 0.5 * (options.air.horizon[c] + options.air.zenith[c]) * day.sky;
+        skylit[c] =
+            options.ground.albedo[c] * 0.5 * (options.air.horizon[c] + options.air.zenith[c]) * day.sky;
         sunlit[c] = options.ground.albedo[c] * options.sun.colour[c] * day.sun * std::max(0.0, to_sun.z);
     }
     const bool has_ground = eye.z > options.ground.height_m;

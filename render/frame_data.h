@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Options in the form that shaders read, and the little that is decided on the way: how bright day and dusk are.
-// Private to the module.
+// Options in the form that shaders read, and the little that is decided on the way: how bright day and dusk
+// are. Private to the module.
 
 #include "render/camera.h"
 #include "render/options.h"
@@ -18,8 +18,10 @@ struct Tile {
 
 // How much of the day's light is left at a sun's elevation.
 struct Daylight {
-    double sun = 1;  // direct: 1 above 2 degrees, 0 below -2 (a cloud in 2 km height sees 1.4 degrees below the horizon)
-    double sky = 1;  // sky, ambient and air light: 1 above 10 degrees, 0.5 near the horizon, 0.002 at -18 (night)
+    double sun = 1;  // direct: 1 above 2 degrees, 0 below -2 (a cloud in 2 km height sees 1.4 degrees below
+                     // the horizon)
+    double sky =
+        1;  // sky, ambient and air light: 1 above 10 degrees, 0.5 near the horizon, 0.002 at -18 (night)
 };
 Daylight daylight(double sun_elevation_deg);
 

@@ -14,9 +14,11 @@ namespace {
 
 constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 constexpr const char* kInstall =
-    "install a Vulkan driver: the packages libvulkan1 and mesa-vulkan-drivers bring one that needs no graphics card";
+    "install a Vulkan driver: the packages libvulkan1 and mesa-vulkan-drivers bring one that needs no "
+    "graphics card";
 
-VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
+                                          VkDebugUtilsMessageTypeFlagsEXT,
                                           const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
     auto* log = static_cast<ValidationLog*>(user);
     const std::scoped_lock lock(log->mutex);
@@ -24,17 +26,19 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
     return VK_FALSE;
 }
 
+// No performance advice: it wants images to change layouts, and GENERAL is a choice here (gpu_resources.h).
 vk::DebugUtilsMessengerCreateInfoEXT messenger_info(ValidationLog* log) {
     using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
     using Type = vk::DebugUtilsMessageTypeFlagBitsEXT;
-    return {{}, Severity::eWarning | Severity::eError, Type::eValidation | Type::ePerformance, on_message, log};
+    return {{}, Severity::eWarning | Severity::eError, Type::eValidation, on_message, log};
 }
 
 vk::raii::Context load_vulkan() {
     try {
         return vk::raii::Context();
     } catch (const std::runtime_error&) {
-        throw Error(ErrorCode::gpu, std::string("the Vulkan loader libvulkan.so.1 was not found; ") + kInstall);
+        throw Error(ErrorCode::gpu,
+                    std::string("the Vulkan loader libvulkan.so.1 was not found; ") + kInstall);
     }
 }
 
@@ -52,7 +56,8 @@ vk::raii::Instance create_instance(const vk::raii::Context& context, ValidationL
         throw Error(ErrorCode::gpu, std::string("no layer ") + kValidationLayer +
                                         ": install the package vulkan-validationlayers");
     constexpr const char* kLayers[] = {kValidationLayer};
-    constexpr const char* kExtensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+    constexpr const char* kExtensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME,
+                                           VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
     info.setPEnabledLayerNames(kLayers).setPEnabledExtensionNames(kExtensions);
     const std::array enabled{vk::ValidationFeatureEnableEXT::eSynchronizationValidation};
     vk::ValidationFeaturesEXT features;
@@ -74,7 +79,8 @@ std::string missing_abilities(const vk::raii::PhysicalDevice& physical) {
     const auto lacks = [&](vk::Format format, vk::FormatFeatureFlags needed) {
         return (physical.getFormatProperties(format).optimalTilingFeatures & needed) != needed;
     };
-    if (lacks(vk::Format::eR32G32B32A32Sfloat, Feature::eColorAttachmentBlend)) return "blending of 32-bit colours";
+    if (lacks(vk::Format::eR32G32B32A32Sfloat, Feature::eColorAttachmentBlend))
+        return "blending of 32-bit colours";
     if (lacks(vk::Format::eR32Sfloat, Feature::eColorAttachmentBlend | Feature::eSampledImageFilterLinear))
         return "blending and filtering of 32-bit floats";
     return {};
@@ -90,11 +96,16 @@ std::optional<std::uint32_t> find_queue_family(const vk::raii::PhysicalDevice& p
 
 int preference(vk::PhysicalDeviceType type) {
     switch (type) {
-        case vk::PhysicalDeviceType::eDiscreteGpu: return 4;
-        case vk::PhysicalDeviceType::eIntegratedGpu: return 3;
-        case vk::PhysicalDeviceType::eVirtualGpu: return 2;
-        case vk::PhysicalDeviceType::eCpu: return 1;
-        default: return 0;
+        case vk::PhysicalDeviceType::eDiscreteGpu:
+            return 4;
+        case vk::PhysicalDeviceType::eIntegratedGpu:
+            return 3;
+        case vk::PhysicalDeviceType::eVirtualGpu:
+            return 2;
+        case vk::PhysicalDeviceType::eCpu:
+            return 1;
+        default:
+            return 0;
     }
 }
 
@@ -107,7 +118,8 @@ bool is_named(const std::string& wanted, std::size_t number, const std::string& 
     return wanted == std::to_string(number) || name.find(wanted) != std::string::npos;
 }
 
-vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevice>& devices, std::string wanted) {
+vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevice>& devices,
+                                       std::string wanted) {
     if (devices.empty()) throw Error(ErrorCode::gpu, std::string("no Vulkan device; ") + kInstall);
     const char* environment = std::getenv("NEPHOS_DEVICE");
     if (wanted.empty() && environment != nullptr) wanted = environment;
@@ -119,8 +131,8 @@ vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevic
         const std::string name = name_of(devices[i]);
         if (!wanted.empty() && !is_named(wanted, i, name)) continue;
         named = true;
-        const std::string missing =
-            find_queue_family(devices[i]) ? missing_abilities(devices[i]) : "a queue for graphics and compute";
+        const std::string missing = find_queue_family(devices[i]) ? missing_abilities(devices[i])
+                                                                  : "a queue for graphics and compute";
         if (!missing.empty()) {
             reasons += "; " + name + " lacks " + missing;
         } else if (best == nullptr || preference(devices[i].getProperties().deviceType) >
@@ -144,6 +156,7 @@ vk::raii::Device create_device(const vk::raii::PhysicalDevice& physical, std::ui
     vk::PhysicalDeviceVulkan13Features features;
     features.dynamicRendering = true;
     features.synchronization2 = true;
+    features.maintenance4 = true;  // core, always there in 1.3; compute shaders name their group size its way
     vk::DeviceCreateInfo info({}, queue);
     info.pNext = &features;
     return {physical, info};
@@ -157,7 +170,8 @@ void fail_gpu(const std::string& what, vk::Result result) {
 
 GpuDevice open_device(const DeviceOptions& options) {
     return with_gpu_errors("opening the device", [&] {
-        GpuDevice gpu{load_vulkan(), options.validation ? std::make_unique<ValidationLog>() : nullptr};
+        GpuDevice gpu{load_vulkan()};
+        if (options.validation) gpu.log = std::make_unique<ValidationLog>();
         gpu.instance = create_instance(gpu.context, gpu.log.get());
         if (gpu.log != nullptr)
             gpu.messenger = vk::raii::DebugUtilsMessengerEXT(gpu.instance, messenger_info(gpu.log.get()));
@@ -168,12 +182,14 @@ GpuDevice open_device(const DeviceOptions& options) {
         gpu.device = create_device(gpu.physical, gpu.queue_family);
         gpu.queue = vk::raii::Queue(gpu.device, gpu.queue_family, 0);
         gpu.pool = vk::raii::CommandPool(
-            gpu.device, vk::CommandPoolCreateInfo(vk::CommandPoolCreateFlagBits::eTransient, gpu.queue_family));
+            gpu.device,
+            vk::CommandPoolCreateInfo(vk::CommandPoolCreateFlagBits::eTransient, gpu.queue_family));
         return gpu;
     });
 }
 
-void submit_and_wait(const GpuDevice& gpu, const std::function<void(const vk::raii::CommandBuffer&)>& record) {
+void submit_and_wait(const GpuDevice& gpu,
+                     const std::function<void(const vk::raii::CommandBuffer&)>& record) {
     vk::raii::CommandBuffers buffers(
         gpu.device, vk::CommandBufferAllocateInfo(*gpu.pool, vk::CommandBufferLevel::ePrimary, 1));
     const vk::raii::CommandBuffer& commands = buffers.front();
@@ -195,7 +211,8 @@ std::vector<std::string> device_names() {
         const vk::raii::Instance instance = create_instance(context, nullptr);
         std::vector<std::string> names;
         try {
-            for (const auto& physical : vk::raii::PhysicalDevices(instance)) names.push_back(name_of(physical));
+            for (const auto& physical : vk::raii::PhysicalDevices(instance))
+                names.push_back(name_of(physical));
         } catch (const vk::InitializationFailedError&) {
             // what the loader says when no driver is installed: an empty list
         }

@@ -23,9 +23,11 @@ struct ValidationLog {
     std::vector<std::string> messages;
 };
 
-// Members are destroyed from the last to the first: the loader goes last. Movable; everything else keeps references
-// to handles, not to this struct.
+// Members are destroyed from the last to the first: the loader goes last. Movable; everything else keeps
+// references to handles, not to this struct.
 struct GpuDevice {
+    explicit GpuDevice(vk::raii::Context loader) : context(std::move(loader)) {}
+
     vk::raii::Context context;
     std::unique_ptr<ValidationLog> log;
     vk::raii::Instance instance{nullptr};

@@ -42,9 +42,9 @@ vk::PipelineColorBlendAttachmentState blend_state(Blend blend) {
 }  // namespace
 
 const ShaderSet& shaders() {
-    static constexpr ShaderSet kShaders{spirv::light_splat_vert, spirv::light_splat_frag, spirv::light_sample_comp,
-                                        spirv::background_vert,  spirv::background_frag,  spirv::view_splat_vert,
-                                        spirv::view_splat_frag};
+    static constexpr ShaderSet kShaders{
+        spirv::light_splat_vert, spirv::light_splat_frag, spirv::light_sample_comp, spirv::background_vert,
+        spirv::background_frag,  spirv::view_splat_vert,  spirv::view_splat_frag};
     return kShaders;
 }
 
@@ -62,17 +62,24 @@ PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
     PipelineLayout result;
     result.set = vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
     const vk::PushConstantRange constants(all, 0, sizeof(shader::LightStep));
-    result.layout = vk::raii::PipelineLayout(gpu.device, vk::PipelineLayoutCreateInfo({}, *result.set, constants));
+    result.layout =
+        vk::raii::PipelineLayout(gpu.device, vk::PipelineLayoutCreateInfo({}, *result.set, constants));
     return result;
 }
 
-vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode vertex,
-                                            ShaderCode fragment, std::span<const vk::Format> attachments, Blend blend) {
+vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
+                                            ShaderCode vertex, ShaderCode fragment,
+                                            std::span<const vk::Format> attachments, Blend blend,
+                                            bool exact) {
     const vk::raii::ShaderModule vertex_module = create_module(gpu, vertex);
     const vk::raii::ShaderModule fragment_module = create_module(gpu, fragment);
+    const vk::Bool32 exact_value = exact ? VK_TRUE : VK_FALSE;
+    const vk::SpecializationMapEntry entry(0, 0, sizeof exact_value);
+    const vk::SpecializationInfo constants(1, &entry, sizeof exact_value, &exact_value);
     const std::array stages{
         vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eVertex, *vertex_module, "main"),
-        vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eFragment, *fragment_module, "main")};
+        vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eFragment, *fragment_module, "main",
+                                          &constants)};
     const vk::PipelineVertexInputStateCreateInfo no_vertices;
     const vk::PipelineInputAssemblyStateCreateInfo triangles({}, vk::PrimitiveTopology::eTriangleList);
     const vk::PipelineViewportStateCreateInfo viewport({}, 1, nullptr, 1, nullptr);
@@ -85,7 +92,8 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
     const std::array dynamic_states{vk::DynamicState::eViewport, vk::DynamicState::eScissor};
     const vk::PipelineDynamicStateCreateInfo dynamic({}, dynamic_states);
     vk::PipelineRenderingCreateInfo rendering;
-    rendering.setColorAttachmentCount(std::uint32_t(attachments.size())).setPColorAttachmentFormats(attachments.data());
+    rendering.setColorAttachmentCount(std::uint32_t(attachments.size()))
+        .setPColorAttachmentFormats(attachments.data());
 
     vk::GraphicsPipelineCreateInfo info;
     info.setStages(stages).setPVertexInputState(&no_vertices).setPInputAssemblyState(&triangles);
@@ -95,7 +103,8 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
     return {gpu.device, nullptr, info};
 }
 
-vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code) {
+vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
+                                           ShaderCode code) {
     const vk::raii::ShaderModule module = create_module(gpu, code);
     const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main");
     return {gpu.device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *layout.layout)};
@@ -110,12 +119,14 @@ Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
     // Allocated without RAII: the set goes with its pool.
     const vk::Device device = *gpu.device;
     const vk::DescriptorSetAllocateInfo info(*bindings.pool, *layout.set);
-    const vk::Result result = device.allocateDescriptorSets(&info, &bindings.set, *gpu.device.getDispatcher());
+    const vk::Result result =
+        device.allocateDescriptorSets(&info, &bindings.set, *gpu.device.getDispatcher());
     if (result != vk::Result::eSuccess) fail_gpu("allocating descriptors", result);
     return bindings;
 }
 
-void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, const GpuBuffer& buffer) {
+void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
+                 const GpuBuffer& buffer) {
     const vk::DescriptorType type =
         binding == 0 ? vk::DescriptorType::eUniformBuffer : vk::DescriptorType::eStorageBuffer;
     const vk::DescriptorBufferInfo info(*buffer.buffer, 0, VK_WHOLE_SIZE);
@@ -126,7 +137,8 @@ void bind_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t bi
                 const vk::raii::Sampler& sampler) {
     const vk::DescriptorImageInfo info(*sampler, *image.view, vk::ImageLayout::eGeneral);
     gpu.device.updateDescriptorSets(
-        vk::WriteDescriptorSet(bindings.set, binding, 0, vk::DescriptorType::eCombinedImageSampler, info), {});
+        vk::WriteDescriptorSet(bindings.set, binding, 0, vk::DescriptorType::eCombinedImageSampler, info),
+        {});
 }
 
 vk::raii::Sampler create_sampler(const GpuDevice& gpu, vk::SamplerAddressMode beyond) {

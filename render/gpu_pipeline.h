@@ -35,11 +35,15 @@ enum class Blend {
     over,      // dst = src + dst * alpha of src; alpha of dst = alpha of both multiplied
 };
 
-// Triangles over the whole of the attachments' area; viewport and scissor are dynamic.
-vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode vertex,
-                                            ShaderCode fragment, std::span<const vk::Format> attachments, Blend blend);
+// Draws triangles; viewport and scissor are dynamic. `exact` becomes specialization constant 0 of the
+// fragment shader.
+vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
+                                            ShaderCode vertex, ShaderCode fragment,
+                                            std::span<const vk::Format> attachments, Blend blend,
+                                            bool exact = false);
 
-vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code);
+vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
+                                           ShaderCode code);
 
 // A pool with room for one set of the layout above, and the set.
 struct Bindings {
@@ -48,7 +52,8 @@ struct Bindings {
 };
 Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout);
 
-void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, const GpuBuffer& buffer);
+void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
+                 const GpuBuffer& buffer);
 void bind_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, const GpuImage& image,
                 const vk::raii::Sampler& sampler);
 

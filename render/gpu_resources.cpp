@@ -12,10 +12,12 @@ using MemoryFlags = vk::MemoryPropertyFlags;
 using Memory = vk::MemoryPropertyFlagBits;
 
 // The first kind of memory that has one of `wishes`, the most wanted first.
-std::uint32_t memory_type(const GpuDevice& gpu, std::uint32_t allowed, std::initializer_list<MemoryFlags> wishes) {
+std::uint32_t memory_type(const GpuDevice& gpu, std::uint32_t allowed,
+                          std::initializer_list<MemoryFlags> wishes) {
     for (const MemoryFlags wish : wishes)
         for (std::uint32_t i = 0; i < gpu.memory.memoryTypeCount; ++i)
-            if ((allowed >> i & 1u) != 0 && (gpu.memory.memoryTypes[i].propertyFlags & wish) == wish) return i;
+            if ((allowed >> i & 1u) != 0 && (gpu.memory.memoryTypes[i].propertyFlags & wish) == wish)
+                return i;
     throw Error(ErrorCode::gpu, "the Vulkan device has no memory of the kind that is needed");
 }
 
@@ -25,15 +27,17 @@ vk::ImageSubresourceRange all_of(const GpuImage& image) {
 
 }  // namespace
 
-GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsageFlags usage, HostAccess access) {
+GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsageFlags usage,
+                        HostAccess access) {
     GpuBuffer buffer;
     buffer.bytes = bytes;
     buffer.buffer = vk::raii::Buffer(gpu.device, vk::BufferCreateInfo({}, bytes, usage));
     const vk::MemoryRequirements needs = buffer.buffer.getMemoryRequirements();
     const MemoryFlags seen = Memory::eHostVisible | Memory::eHostCoherent;
     const std::uint32_t type =
-        access == HostAccess::write ? memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eDeviceLocal, seen})
-                                    : memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eHostCached, seen});
+        access == HostAccess::write
+            ? memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eDeviceLocal, seen})
+            : memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eHostCached, seen});
     buffer.memory = vk::raii::DeviceMemory(gpu.device, vk::MemoryAllocateInfo(needs.size, type));
     buffer.buffer.bindMemory(*buffer.memory, 0);
     buffer.mapped = static_cast<std::byte*>(buffer.memory.mapMemory(0, VK_WHOLE_SIZE));
@@ -48,25 +52,26 @@ GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t h
     image.height = height;
     image.layers = layers;
     image.image = vk::raii::Image(
-        gpu.device, vk::ImageCreateInfo({}, vk::ImageType::e2D, format, vk::Extent3D(width, height, 1), 1, layers,
-                                        vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal, usage));
+        gpu.device,
+        vk::ImageCreateInfo({}, vk::ImageType::e2D, format, vk::Extent3D(width, height, 1), 1, layers,
+                            vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal, usage));
     const vk::MemoryRequirements needs = image.image.getMemoryRequirements();
     const std::uint32_t type = memory_type(gpu, needs.memoryTypeBits, {Memory::eDeviceLocal, MemoryFlags{}});
     image.memory = vk::raii::DeviceMemory(gpu.device, vk::MemoryAllocateInfo(needs.size, type));
     image.image.bindMemory(*image.memory, 0);
     const vk::ImageViewType kind = layers > 1 ? vk::ImageViewType::e2DArray : vk::ImageViewType::e2D;
-    image.view =
-        vk::raii::ImageView(gpu.device, vk::ImageViewCreateInfo({}, *image.image, kind, format, {}, all_of(image)));
+    image.view = vk::raii::ImageView(
+        gpu.device, vk::ImageViewCreateInfo({}, *image.image, kind, format, {}, all_of(image)));
     return image;
 }
 
 namespace {
 
-void barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before, const Access& after,
-             vk::ImageLayout old_layout) {
+void barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before,
+             const Access& after, vk::ImageLayout old_layout) {
     const vk::ImageMemoryBarrier2 change(before.stages, before.kinds, after.stages, after.kinds, old_layout,
-                                         vk::ImageLayout::eGeneral, VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED,
-                                         *image.image, all_of(image));
+                                         vk::ImageLayout::eGeneral, VK_QUEUE_FAMILY_IGNORED,
+                                         VK_QUEUE_FAMILY_IGNORED, *image.image, all_of(image));
     commands.pipelineBarrier2(vk::DependencyInfo().setImageMemoryBarriers(change));
 }
 

@@ -19,10 +19,11 @@ struct GpuBuffer {
 
 enum class HostAccess { write, read };  // what the processor does with a buffer: decides the kind of memory
 
-GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsageFlags usage, HostAccess access);
+GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsageFlags usage,
+                        HostAccess access);
 
-// A 2D image (or array of them) in device memory, always in the layout GENERAL once it was cleared: images here are in
-// turn drawn to, sampled and copied from, and GENERAL serves all of it.
+// A 2D image (or array of them) in device memory, always in the layout GENERAL once it was cleared: images
+// here are in turn drawn to, sampled and copied from, and GENERAL serves all of it.
 struct GpuImage {
     vk::raii::DeviceMemory memory{nullptr};
     vk::raii::Image image{nullptr};
@@ -42,16 +43,18 @@ struct Access {
 
 namespace access {
 inline constexpr Access none{vk::PipelineStageFlagBits2::eNone, {}};
-inline constexpr Access draw{vk::PipelineStageFlagBits2::eColorAttachmentOutput,
-                             vk::AccessFlagBits2::eColorAttachmentRead | vk::AccessFlagBits2::eColorAttachmentWrite};
+inline constexpr Access draw{
+    vk::PipelineStageFlagBits2::eColorAttachmentOutput,
+    vk::AccessFlagBits2::eColorAttachmentRead | vk::AccessFlagBits2::eColorAttachmentWrite};
 inline constexpr Access sample_in_compute{vk::PipelineStageFlagBits2::eComputeShader,
                                           vk::AccessFlagBits2::eShaderSampledRead};
 inline constexpr Access sample_in_fragment{vk::PipelineStageFlagBits2::eFragmentShader,
                                            vk::AccessFlagBits2::eShaderSampledRead};
 inline constexpr Access copy_from{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferRead};
 inline constexpr Access copy_to{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferWrite};
-inline constexpr Access compute{vk::PipelineStageFlagBits2::eComputeShader,
-                                vk::AccessFlagBits2::eShaderStorageRead | vk::AccessFlagBits2::eShaderStorageWrite};
+inline constexpr Access compute{
+    vk::PipelineStageFlagBits2::eComputeShader,
+    vk::AccessFlagBits2::eShaderStorageRead | vk::AccessFlagBits2::eShaderStorageWrite};
 inline constexpr Access host{vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead};
 }  // namespace access
 

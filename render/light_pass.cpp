@@ -28,11 +28,15 @@ LightPass::LightPass(const GpuDevice& gpu, const PipelineLayout& layout, const G
       sampler_(&sampler),
       splat_(create_graphics_pipeline(gpu, layout, shaders().light_splat_vert, shaders().light_splat_frag,
                                       std::array{kFormat}, Blend::multiply)),
+      dense_splat_(create_graphics_pipeline(gpu, layout, shaders().light_splat_vert,
+                                            shaders().light_splat_frag, std::array{kFormat}, Blend::multiply,
+                                            true)),
       sample_(create_compute_pipeline(gpu, layout, shaders().light_sample_comp)),
       bindings_(create_bindings(gpu, layout)),
       balls_(create_buffer(gpu, kBatch * sizeof(shader::LightBall), vk::BufferUsageFlagBits::eStorageBuffer,
                            HostAccess::write)),
-      light_(create_buffer(gpu, kBatch * sizeof(float), vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::read)) {
+      light_(create_buffer(gpu, kBatch * sizeof(float), vk::BufferUsageFlagBits::eStorageBuffer,
+                           HostAccess::read)) {
     bind_buffer(gpu, bindings_, 1, balls_);
     bind_buffer(gpu, bindings_, 2, light_);
     bind_image(gpu, bindings_, 3, attenuation, sampler);
@@ -71,12 +75,15 @@ std::vector<float> LightPass::run(const GpuDevice& gpu, const SunOrder& order, c
         batch.slabs.clear();
         begin = end;
     };
-    // A batch ends at a slab's end where it can; a slab larger than a batch is cut, and its second part sees the first.
+    // A batch ends at a slab's end where it can; a slab larger than a batch is cut, and its second part sees
+    // the first.
     for (const Slab& slab : order.slabs) {
         if (slab.end - begin > kBatch) flush(slab.begin);
         for (std::size_t from = slab.begin; from < slab.end;) {
             const std::size_t to = std::min<std::size_t>(slab.end, from + kBatch);
-            batch.slabs.push_back({std::uint32_t(from - begin), std::uint32_t(to - begin)});
+            const std::size_t dense = std::clamp<std::size_t>(slab.dense, from, to);
+            batch.slabs.push_back(
+                {std::uint32_t(from - begin), std::uint32_t(dense - begin), std::uint32_t(to - begin)});
             if (to < slab.end) flush(to);
             from = to;
         }
@@ -92,27 +99,35 @@ void LightPass::run_batch(const GpuDevice& gpu, const Batch& batch, std::span<fl
 }
 
 void LightPass::record(const vk::raii::CommandBuffer& commands, const Batch& batch) const {
-    constexpr vk::ShaderStageFlags kAll =
-        vk::ShaderStageFlagBits::eVertex | vk::ShaderStageFlagBits::eFragment | vk::ShaderStageFlagBits::eCompute;
+    constexpr vk::ShaderStageFlags kAll = vk::ShaderStageFlagBits::eVertex |
+                                          vk::ShaderStageFlagBits::eFragment |
+                                          vk::ShaderStageFlagBits::eCompute;
     for (const auto point : {vk::PipelineBindPoint::eGraphics, vk::PipelineBindPoint::eCompute})
         commands.bindDescriptorSets(point, *layout_->layout, 0, bindings_.set, {});
-    commands.bindPipeline(vk::PipelineBindPoint::eGraphics, *splat_);
     commands.bindPipeline(vk::PipelineBindPoint::eCompute, *sample_);
     commands.pushConstants<shader::LightStep>(*layout_->layout, kAll, 0, batch.step);
 
     const std::array<const GpuImage*, 1> attachments{&map_};
     const auto sample = [&](std::uint32_t first, std::uint32_t middle, std::uint32_t end) {
         const std::array<std::uint32_t, 3> range{first, middle, end};
-        commands.pushConstants<std::uint32_t>(*layout_->layout, kAll, offsetof(shader::LightStep, first), range);
+        commands.pushConstants<std::uint32_t>(*layout_->layout, kAll, offsetof(shader::LightStep, first),
+                                              range);
         commands.dispatch((end - first + shader::kComputeGroup - 1) / shader::kComputeGroup, 1, 1);
+    };
+    const auto draw = [&](const vk::raii::Pipeline& pipeline, std::uint32_t begin, std::uint32_t end) {
+        if (begin == end) return;
+        commands.bindPipeline(vk::PipelineBindPoint::eGraphics, *pipeline);
+        commands.draw(6 * (end - begin), 1, 6 * begin, 0);
     };
     image_barrier(commands, map_, access::draw, access::sample_in_compute);
     sample(0, 0, batch.slabs.front().end);
     for (std::size_t i = 0; i < batch.slabs.size(); ++i) {
         const Slab& slab = batch.slabs[i];
         image_barrier(commands, map_, access::sample_in_compute, access::draw);
-        draw_into(commands, attachments, {map_.width, map_.height}, vk::AttachmentLoadOp::eLoad,
-                  [&] { commands.draw(6 * (slab.end - slab.begin), 1, 6 * slab.begin, 0); });
+        draw_into(commands, attachments, {map_.width, map_.height}, vk::AttachmentLoadOp::eLoad, [&] {
+            draw(splat_, slab.begin, slab.dense);
+            draw(dense_splat_, slab.dense, slab.end);
+        });
         image_barrier(commands, map_, access::draw, access::sample_in_compute);
         buffer_barrier(commands, light_, access::compute, access::compute);
         sample(slab.begin, slab.end, i + 1 < batch.slabs.size() ? batch.slabs[i + 1].end : slab.end);

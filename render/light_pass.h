@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Step 1 of D. A square buffer, seen along the sun's rays, starts at 1. The metaballs come slab by slab from the sun;
-// before a slab is drawn the light under its centres is read, then its billboards are multiplied into the buffer, and
-// the light is read once more behind it (light_sample.comp says why). What is left is the shadow map.
+// Step 1 of D. A square buffer, seen along the sun's rays, starts at 1. The metaballs come slab by slab from
+// the sun; before a slab is drawn the light under its centres is read, then its billboards are multiplied
+// into the buffer, and the light is read once more behind it (light_sample.comp says why). What is left is
+// the shadow map.
 //
-// The buffer holds transmittance in 32-bit floats: a product keeps a relative error of about 1e-7 per metaball down to
-// an optical depth of 87, so neither the order nor the number of metaballs shows. Private to the module.
+// The buffer holds transmittance in 32-bit floats: a product keeps a relative error of about 1e-7 per
+// metaball down to an optical depth of 87, so neither the order nor the number of metaballs shows. Private to
+// the module.
 
 #include <span>
 #include <vector>
@@ -22,7 +24,8 @@ class LightPass {
               const vk::raii::Sampler& sampler);
 
     // Leaves the shadow map in shadow_map() and returns the light at the centres, in the order of `order`.
-    std::vector<float> run(const GpuDevice& gpu, const SunOrder& order, const ShadowFrame& frame, int shadow_size);
+    std::vector<float> run(const GpuDevice& gpu, const SunOrder& order, const ShadowFrame& frame,
+                           int shadow_size);
 
     const GpuImage& shadow_map() const { return map_; }
     // The shadow map in main memory; row 0 has the smallest v.
@@ -36,7 +39,7 @@ class LightPass {
 
     const PipelineLayout* layout_;
     const vk::raii::Sampler* sampler_;
-    vk::raii::Pipeline splat_, sample_;
+    vk::raii::Pipeline splat_, dense_splat_, sample_;
     Bindings bindings_;
     GpuBuffer balls_, light_;
     GpuImage map_;

@@ -49,7 +49,8 @@ void check(const RenderOptions& options) {
     require(within(light.multiple_scattering, 0, 10), "light.multiple_scattering", "0..10");
     check_colour(light.ambient_top, "light.ambient_top");
     check_colour(light.ambient_base, "light.ambient_base");
-    require(colour_within(options.air.extinction_per_m, 1), "air.extinction_per_m", "three numbers from 0 to 1 per metre");
+    require(colour_within(options.air.extinction_per_m, 1), "air.extinction_per_m",
+            "three numbers from 0 to 1 per metre");
     check_colour(options.air.horizon, "air.horizon");
     check_colour(options.air.zenith, "air.zenith");
     require(std::isfinite(options.ground.height_m), "ground.height_m", "finite metres");

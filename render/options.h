@@ -31,13 +31,14 @@ struct Sun {
     bool operator==(const Sun&) const = default;
 };
 
-// How a cloud scatters light (D: the colour of a metaball). With the defaults a thick cloud top in the sun has a radiance
-// of about 1, white at exposure 0, and its base is a bluish grey.
+// How a cloud scatters light (D: the colour of a metaball). With the defaults a thick cloud top in the sun
+// has a radiance of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
     double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker
-    double g = 0.5;       // Henyey-Greenstein asymmetry, -0.99..0.99; forward is > 0: brighter rims against the sun
-    // Strength of the sunlight that arrives after many scatterings, 0..10; it reaches deep into a cloud, where the
-    // direct beam does not. 0 = single scattering only, as in D: grey tops, dark bases.
+    double g =
+        0.5;  // Henyey-Greenstein asymmetry, -0.99..0.99; forward is > 0: brighter rims against the sun
+    // Strength of the sunlight that arrives after many scatterings, 0..10; it reaches deep into a cloud,
+    // where the direct beam does not. 0 = single scattering only, as in D: grey tops, dark bases.
     double multiple_scattering = 0.75;
     Rgb ambient_top{0.22, 0.28, 0.38};   // light from the sky that a cloud's top scatters, >= 0
     Rgb ambient_base{0.13, 0.16, 0.21};  // ... and its base; between them by height

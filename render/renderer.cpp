@@ -45,7 +45,8 @@ void check_memory(const MetaballCloud& cloud, const RenderOptions& options, int 
     const std::size_t available = available_memory_bytes();
     if (available == 0 || needed <= available) return;
     char text[160];
-    std::snprintf(text, sizeof text, "a picture of %d x %d pixels needs %.1f GiB of memory, %.1f GiB are free",
+    std::snprintf(text, sizeof text,
+                  "a picture of %d x %d pixels needs %.1f GiB of memory, %.1f GiB are free",
                   options.camera.width, options.camera.height, double(needed) / (1 << 30),
                   double(available) / (1 << 30));
     throw Error(ErrorCode::usage, text);
@@ -55,7 +56,7 @@ GpuImage upload_attenuation(const GpuDevice& gpu) {
     const std::vector<float> texels = attenuation_textures();
     const std::size_t bytes = texels.size() * sizeof(float);
     constexpr std::uint32_t kSide = shader::kAttenuationTexels;
-    GpuImage image = create_image(gpu, kSide, kSide, shader::kAttenuationLevels, vk::Format::eR32Sfloat,
+    GpuImage image = create_image(gpu, kSide, kSide, shader::kAttenuationLevels, vk::Format::eR32G32Sfloat,
                                   vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst);
     const GpuBuffer staging =
         create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
@@ -120,20 +121,23 @@ Picture Renderer::Impl::draw(const MetaballCloud& cloud, const RenderOptions& op
     std::vector<float> light(prepared.visible.size());
     {
         const SunOrder order = order_from_sun(prepared, picture.shadow_frame, kMaxSlabs);
-        const std::vector<float> ordered = light_pass.run(gpu, order, picture.shadow_frame, options.shadow_map_size);
-        for (std::size_t i = 0; i < ordered.size(); ++i) light[order.source[i]] = ordered[i];
+        const std::vector<float> ordered =
+            light_pass.run(gpu, order, picture.shadow_frame, options.shadow_map_size);
+        for (std::size_t i = 0; i < ordered.size(); ++i) light[order.balls[i].source] = ordered[i];
     }
     picture.shadow = light_pass.read_shadow_map(gpu);
     picture.light.assign(cloud.metaballs.size(), 1.0f);
     for (std::size_t i = 0; i < light.size(); ++i) picture.light[prepared.visible[i]] = light[i];
 
-    const std::vector<shader::ViewBall> balls =
+    const EyeOrder order =
         order_from_eye(prepared, light, camera, pixels_per_unit(options.camera, camera), options.ground);
     view_pass.use_shadow_map(gpu, light_pass.shadow_map(), white_beyond);
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {
-            const Tile tile{x, y, std::min(tile_size, picture.width - x), std::min(tile_size, picture.height - y)};
-            view_pass.draw_tile(gpu, frame_data(options, camera, picture.shadow_frame, tile), tile, balls, picture);
+            const Tile tile{x, y, std::min(tile_size, picture.width - x),
+                            std::min(tile_size, picture.height - y)};
+            view_pass.draw_tile(gpu, frame_data(options, camera, picture.shadow_frame, tile), tile, order,
+                                picture);
         }
     }
     return picture;
@@ -178,7 +182,8 @@ void Renderer::provoke_hazard_for_test() {
         const GpuBuffer from = create_buffer(impl_->gpu, 64, Usage::eTransferSrc, HostAccess::write);
         const GpuBuffer to = create_buffer(impl_->gpu, 64, Usage::eTransferDst, HostAccess::read);
         submit_and_wait(impl_->gpu, [&](const vk::raii::CommandBuffer& commands) {
-            for (int i = 0; i < 2; ++i) commands.copyBuffer(*from.buffer, *to.buffer, vk::BufferCopy(0, 0, 64));
+            for (int i = 0; i < 2; ++i)
+                commands.copyBuffer(*from.buffer, *to.buffer, vk::BufferCopy(0, 0, 64));
         });
     });
 }

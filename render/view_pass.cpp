@@ -18,12 +18,15 @@ constexpr float kLeastOpacity = 1.0f / 1024.0f;  // thinner clouds have no depth
 ViewPass::ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
                    const vk::raii::Sampler& sampler)
     : layout_(&layout),
-      background_(create_graphics_pipeline(gpu, layout, shaders().background_vert, shaders().background_frag, kFormats,
-                                           Blend::none)),
-      splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert, shaders().view_splat_frag, kFormats,
-                                      Blend::over)),
+      background_(create_graphics_pipeline(gpu, layout, shaders().background_vert, shaders().background_frag,
+                                           kFormats, Blend::none)),
+      splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert, shaders().view_splat_frag,
+                                      kFormats, Blend::over)),
+      integrated_splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert,
+                                                 shaders().view_splat_frag, kFormats, Blend::over, true)),
       bindings_(create_bindings(gpu, layout)),
-      frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer, HostAccess::write)),
+      frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
+                           HostAccess::write)),
       balls_(create_buffer(gpu, kBatch * sizeof(shader::ViewBall), vk::BufferUsageFlagBits::eStorageBuffer,
                            HostAccess::write)) {
     bind_buffer(gpu, bindings_, 0, frame_);
@@ -54,33 +57,46 @@ void ViewPass::resize_targets(const GpuDevice& gpu, const Tile& tile) {
     depth_pixels_ = pixel_buffer(pixels * sizeof(float));
 }
 
-void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
-                         std::span<const shader::ViewBall> balls, Picture& picture) {
-    resize_targets(gpu, tile);
-    std::memcpy(frame_.mapped, &frame, sizeof frame);
-    const std::array<const GpuImage*, 2> targets{&radiance_, &depth_};
-    const vk::Extent2D area{std::uint32_t(tile.width), std::uint32_t(tile.height)};
-    const auto bind = [&](const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& pipeline) {
-        commands.bindPipeline(vk::PipelineBindPoint::eGraphics, *pipeline);
-        commands.bindDescriptorSets(vk::PipelineBindPoint::eGraphics, *layout_->layout, 0, bindings_.set, {});
-    };
+void ViewPass::bind(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& pipeline) const {
+    commands.bindPipeline(vk::PipelineBindPoint::eGraphics, *pipeline);
+    commands.bindDescriptorSets(vk::PipelineBindPoint::eGraphics, *layout_->layout, 0, bindings_.set, {});
+}
+
+void ViewPass::draw_background(const GpuDevice& gpu, vk::Extent2D area) const {
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_image(commands, radiance_, access::draw);
         begin_image(commands, depth_, access::draw);
         bind(commands, background_);
-        draw_into(commands, targets, area, vk::AttachmentLoadOp::eDontCare, [&] { commands.draw(3, 1, 0, 0); });
+        const std::array<const GpuImage*, 2> targets{&radiance_, &depth_};
+        draw_into(commands, targets, area, vk::AttachmentLoadOp::eDontCare,
+                  [&] { commands.draw(3, 1, 0, 0); });
     });
-    for (std::size_t begin = 0; begin < balls.size(); begin += kBatch) {
-        const auto batch = balls.subspan(begin, std::min(kBatch, balls.size() - begin));
-        std::memcpy(balls_.mapped, batch.data(), batch.size_bytes());
+}
+
+void ViewPass::draw_balls(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order) const {
+    const std::array<const GpuImage*, 2> targets{&radiance_, &depth_};
+    auto run = order.runs.begin();
+    for (std::size_t begin = 0; begin < order.balls.size(); begin += kBatch) {
+        const std::size_t end = std::min(order.balls.size(), begin + kBatch);
+        std::memcpy(balls_.mapped, order.balls.data() + begin, (end - begin) * sizeof(shader::ViewBall));
+        const auto draws = [&](const vk::raii::CommandBuffer& commands) {
+            for (; run != order.runs.end() && run->begin < end; ++run) {
+                const std::size_t from = std::max<std::size_t>(run->begin, begin),
+                                  to = std::min<std::size_t>(run->end, end);
+                bind(commands, run->integrate ? integrated_splat_ : splat_);
+                commands.draw(6 * std::uint32_t(to - from), 1, 6 * std::uint32_t(from - begin), 0);
+                if (run->end > end) break;  // the rest of this run is in the next batch
+            }
+        };
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
             image_barrier(commands, radiance_, access::draw, access::draw);
             image_barrier(commands, depth_, access::draw, access::draw);
-            bind(commands, splat_);
-            draw_into(commands, targets, area, vk::AttachmentLoadOp::eLoad,
-                      [&] { commands.draw(6 * std::uint32_t(batch.size()), 1, 0, 0); });
+            draw_into(commands, targets, area, vk::AttachmentLoadOp::eLoad, [&] { draws(commands); });
         });
     }
+}
+
+void ViewPass::read_back(const GpuDevice& gpu, vk::Extent2D area) const {
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         const vk::BufferImageCopy region(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, 0, 0},
                                          {area.width, area.height, 1});
@@ -92,6 +108,16 @@ void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const
         copy(radiance_, radiance_pixels_);
         copy(depth_, depth_pixels_);
     });
+}
+
+void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
+                         const EyeOrder& order, Picture& picture) {
+    resize_targets(gpu, tile);
+    std::memcpy(frame_.mapped, &frame, sizeof frame);
+    const vk::Extent2D area{std::uint32_t(tile.width), std::uint32_t(tile.height)};
+    draw_background(gpu, area);
+    draw_balls(gpu, area, order);
+    read_back(gpu, area);
     store(tile, picture);
 }
 

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Step 2 of D, tile by tile: background, then billboards back to front. Two attachments in 32-bit floats: radiance with
-// the clouds' transmittance in alpha, and the distance weighted by what the eye sees of each metaball, which the same
-// blending accumulates. Private to the module.
-
-#include <span>
+// Step 2 of D, tile by tile: background, then billboards back to front. Two attachments in 32-bit floats:
+// radiance with the clouds' transmittance in alpha, and the distance weighted by what the eye sees of each
+// metaball, which the same blending accumulates. Private to the module.
 
 #include "render/cloud_preparation.h"
 #include "render/frame_data.h"
@@ -21,16 +19,20 @@ class ViewPass {
     // The map that the ground wears; in the layout GENERAL and readable by fragment shaders.
     void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
 
-    // Draws `balls`, far ones first, and stores the tile's pixels in the picture.
-    void draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
-                   std::span<const shader::ViewBall> balls, Picture& picture);
+    // Draws one tile and stores its pixels in the picture.
+    void draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile, const EyeOrder& order,
+                   Picture& picture);
 
   private:
     void resize_targets(const GpuDevice& gpu, const Tile& tile);
+    void bind(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& pipeline) const;
+    void draw_background(const GpuDevice& gpu, vk::Extent2D area) const;
+    void draw_balls(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order) const;
+    void read_back(const GpuDevice& gpu, vk::Extent2D area) const;
     void store(const Tile& tile, Picture& picture) const;
 
     const PipelineLayout* layout_;
-    vk::raii::Pipeline background_, splat_;
+    vk::raii::Pipeline background_, splat_, integrated_splat_;
     Bindings bindings_;
     GpuBuffer frame_, balls_, radiance_pixels_, depth_pixels_;
     GpuImage radiance_, depth_;

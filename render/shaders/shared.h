@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What C++ and GLSL both read: the structs in buffers, the constants, and the formulas that tests check in C++.
-// Positions are relative to the eye (view pass) or to the middle of the shadow map (light pass), in metres: single
-// precision keeps millimetres near the camera wherever it stands in the world.
+// What C++ and GLSL both read: the structs in buffers, the constants, and the formulas that tests check in
+// C++. Positions are relative to the eye (view pass) or to the middle of the shadow map (light pass), in
+// metres: single precision keeps millimetres near the camera wherever it stands in the world.
 #ifndef NEPHOS_RENDER_SHADERS_SHARED_H
 #define NEPHOS_RENDER_SHADERS_SHARED_H
 
@@ -24,14 +24,15 @@ using std::sqrt;
 #define NEPHOS_FUNCTION
 #endif
 
-NEPHOS_CONST uint kAttenuationLevels = 64u;    // textures in the array
-NEPHOS_CONST uint kAttenuationTexels = 64u;    // on each side of one texture
-NEPHOS_CONST float kMaxDepthScale = 32.0f;     // depth scale of the last level, see level_of()
-NEPHOS_CONST float kNearDistance = 1.5f;       // in radii: nearer metaballs are integrated, not textured
-NEPHOS_CONST float kMinRadiusPixels = 0.75f;   // smaller billboards are widened to it and thinned out
+NEPHOS_CONST uint kAttenuationLevels = 64u;   // textures in the array
+NEPHOS_CONST uint kAttenuationTexels = 64u;   // on each side of one texture
+NEPHOS_CONST float kMaxDepthScale = 32.0f;    // depth scale of the last level, see level_of()
+NEPHOS_CONST float kNearDistance = 1.5f;      // in radii: nearer metaballs are integrated, not textured
+NEPHOS_CONST float kMinRadiusPixels = 0.75f;  // smaller billboards are widened to it and thinned out
 NEPHOS_CONST float kPi = 3.14159265358979f;
-NEPHOS_CONST uint kComputeGroup = 64u;         // invocations in a work group
-NEPHOS_CONST uint kIntegrate = 1u;             // flag: take the partial integral along the ray
+NEPHOS_CONST uint kComputeGroup = 64u;  // invocations in a work group
+NEPHOS_CONST uint kIntegrate = 1u;      // flag: evaluate the integral along the ray, do not use the textures
+NEPHOS_CONST uint kAround = 2u;         // flag: around or close to the eye, covers the whole picture
 
 // A metaball as the eye sees it; 32 bytes.
 struct ViewBall {
@@ -45,11 +46,12 @@ struct ViewBall {
 
 // A metaball as the sun sees it; 32 bytes.
 struct LightBall {
-    float u, v;         // metres in the plane of the shadow map, from its middle
-    float radius;       // metres
+    float u, v;    // metres in the plane of the shadow map, from its middle
+    float radius;  // metres
     float depth_scale;
-    float fraction;     // where in its slab the centre lies: 0 at the side of the sun, 1 at the far side
-    float pad0, pad1, pad2;
+    float fraction;  // where in its slab the centre lies: 0 at the side of the sun, 1 at the far side
+    uint source;     // its place in the cloud; not used by shaders
+    uint pad0, pad1;
 };
 
 // Push constants of the light pass.
@@ -64,26 +66,26 @@ struct LightStep {
 
 // Everything about one picture (or tile of it) that shaders need.
 struct Frame {
-    vec4 right;          // xyz: the camera's axis * half the picture's width at distance 1
-    vec4 up;             // xyz: likewise; w: pixels per unit at distance 1
-    vec4 forward;        // xyz: unit
-    vec4 picture;        // width, height of the picture; column and row of the tile's corner, pixels
-    vec4 tile;           // clip position in the tile = position in the picture * tile.xy + tile.zw
-    vec4 to_sun;         // xyz: unit; w: asymmetry g
-    vec4 sunlight;       // rgb: colour of the direct sun; w: strength of multiple scattering
-    vec4 ambient_top;    // rgb; w: albedo of the cloud
-    vec4 ambient_base;   // rgb; w: decay of diffuse light per optical depth
-    vec4 air_extinction; // rgb: per metre
-    vec4 horizon;        // rgb: sky at the horizon, and light of the air itself
-    vec4 zenith;         // rgb
-    vec4 ground;         // rgb: radiance of the ground under open sky without the sun; w: height above the eye (< 0)
-    vec4 ground_sun;     // rgb: what the unshaded sun adds; w: 1 = there is a ground
-    vec4 shadow_u;       // shadow map coordinate 0..1 of a point p: dot(xyz, p) + w
+    vec4 right;           // xyz: the camera's axis * half the picture's width at distance 1
+    vec4 up;              // xyz: likewise; w: pixels per unit at distance 1
+    vec4 forward;         // xyz: unit
+    vec4 picture;         // width, height of the picture; column and row of the tile's corner, pixels
+    vec4 tile;            // clip position in the tile = position in the picture * tile.xy + tile.zw
+    vec4 to_sun;          // xyz: unit; w: asymmetry g
+    vec4 sunlight;        // rgb: colour of the direct sun; w: strength of multiple scattering
+    vec4 ambient_top;     // rgb; w: albedo of the cloud
+    vec4 ambient_base;    // rgb; w: decay of diffuse light per optical depth
+    vec4 air_extinction;  // rgb: per metre
+    vec4 horizon;         // rgb: sky at the horizon, and light of the air itself
+    vec4 zenith;          // rgb
+    vec4 ground;  // rgb: radiance of the ground under open sky without the sun; w: height above the eye (< 0)
+    vec4 ground_sun;  // rgb: what the unshaded sun adds; w: 1 = there is a ground
+    vec4 shadow_u;    // shadow map coordinate 0..1 of a point p: dot(xyz, p) + w
     vec4 shadow_v;
 };
 
-// The field of a metaball with u = 1 - a^2 is f = u^2 (5 + 4 u) / 9. Along a line at distance b from the centre, with
-// w = 1 - b^2 (square of half the chord) and s from -sqrt(w) to sqrt(w), u = w - s^2 and
+// The field of a metaball with u = 1 - a^2 is f = u^2 (5 + 4 u) / 9. Along a line at distance b from the
+// centre, with w = 1 - b^2 (square of half the chord) and s from -sqrt(w) to sqrt(w), u = w - s^2 and
 //
 //     integral of (w - s^2)^2 = 16/15 w^(5/2),   of (w - s^2)^3 = 32/35 w^(7/2),   so
 //     column(w) = w^(5/2) (16/27 + 128/315 w),   in units of the radius
@@ -99,15 +101,17 @@ NEPHOS_FUNCTION float column_part(float w, float s) {
     return s * (5.0f / 9.0f * square + 4.0f / 9.0f * cube);
 }
 
-// Henyey-Greenstein phase function, per steradian; integrates to 1 over the sphere. cos_theta is the cosine of the
-// angle between the directions of travel before and after: 1 = straight on. Forward scattering is g > 0.
+// Henyey-Greenstein phase function, per steradian; integrates to 1 over the sphere. cos_theta is the cosine
+// of the angle between the directions of travel before and after: 1 = straight on. Forward scattering is g >
+// 0.
 NEPHOS_FUNCTION float phase_function(float cos_theta, float g) {
     float base = 1.0f + g * g - 2.0f * g * cos_theta;
     return (1.0f - g * g) / (4.0f * kPi * base * sqrt(base));
 }
 
 #ifdef __cplusplus
-static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 && offsetof(ViewBall, flags) == 28);
+static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&
+              offsetof(ViewBall, flags) == 28);
 static_assert(sizeof(LightBall) == 32 && offsetof(LightBall, fraction) == 16);
 static_assert(sizeof(LightStep) == 32 && offsetof(LightStep, first) == 16 && offsetof(LightStep, end) == 24);
 static_assert(sizeof(Frame) == 16 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240);

@@ -6,12 +6,14 @@
 #include "attenuation.glsl"
 #include "ray.glsl"
 
+// Metaballs with kIntegrate have a pipeline of their own.
+layout(constant_id = 0) const bool kExact = false;
+
 layout(location = 0) in vec2 point;
 layout(location = 1) flat in vec3 diffuse;
 layout(location = 2) flat in vec3 direct;
 layout(location = 3) flat in vec4 shape;
 layout(location = 4) flat in vec4 centre_radius;
-layout(location = 5) flat in uint integrate;
 
 layout(location = 0) out vec4 radiance;
 layout(location = 1) out vec4 depth;
@@ -34,12 +36,12 @@ float integrated_opacity(vec3 ray, float depth_scale) {
 void main() {
     vec3 ray = fragment_ray();
     float opacity;
-    if (integrate == kIntegrate) {
+    if (kExact) {
         opacity = integrated_opacity(ray, shape.x);
     } else {
         // Where the ray pierces the billboard's plane is farther from the centre than the ray itself.
         vec2 nearest = point * inversesqrt(1.0 + dot(point, point) * shape.z);
-        opacity = billboard_opacity(nearest, shape.x, shape.y);
+        opacity = billboard_opacity(nearest, shape.y);
     }
     // The sunlight travels along -to_sun and goes on towards the eye along -ray.
     float phase = phase_function(dot(frame.to_sun.xyz, ray), frame.to_sun.w);

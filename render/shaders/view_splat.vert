@@ -16,7 +16,6 @@ layout(location = 1) flat out vec3 diffuse;       // radiance that does not depe
 layout(location = 2) flat out vec3 direct;        // radiance per phase function
 layout(location = 3) flat out vec4 shape;         // depth scale, level, (radius / distance)^2, distance
 layout(location = 4) flat out vec4 centre_radius;
-layout(location = 5) flat out uint integrate;
 
 // Two unit vectors perpendicular to n and to each other; steady everywhere but at n.z = 0, where they only turn about n.
 void perpendicular(vec3 n, out vec3 u, out vec3 v) {
@@ -56,10 +55,8 @@ void main() {
     float distance = length(centre);
     centre_radius = vec4(centre, ball.radius);
     scattered_light(ball, distance);
-    bool near = distance < kNearDistance * ball.radius;
-    integrate = near ? kIntegrate : ball.flags;
-    if (near) {
-        // Around or close to the eye there is no useful plane: the whole picture asks for the integral.
+    if ((ball.flags & kAround) != 0u) {
+        // There is no useful plane: the whole picture asks for the integral.
         point = corner;
         shape = vec4(ball.depth_scale, 0.0, 1.0, distance);
         gl_Position = vec4(corner, 0.5, 1.0);
