@@ -278,15 +278,4 @@ void Pipeline::restore_history(const Checkpoint& checkpoint) {
     if (!good) throw Error(ErrorCode::io, "the checkpoint's history is damaged");
 }
 
-std::size_t Pipeline::memory_bytes(const Scene& scene) {
-    const Extent& extent = scene.automaton.extent;
-    const auto states = std::size_t(2 * scene.density.smoothing.t0 + 3);
-    const std::size_t planes = scene.density.write_state ? 3 : 1;
-    const auto refine = std::size_t(scene.density.refine);
-    // At the worst every voxel is cloud: q at two steps and between them, and the refined grid of a frame.
-    const std::size_t grids = 3 + (refine > 1 ? refine * refine * refine : 0);
-    return Automaton::memory_bytes(scene.automaton) + states * planes * BitPlane::bytes(extent) +
-           grids * extent.cells() * sizeof(float);
-}
-
 }  // namespace nephos

@@ -100,9 +100,6 @@ class Pipeline {
     // Steps that the automaton takes in all, those ahead included.
     std::uint64_t steps_in_all() const;
 
-    // Bytes that a pipeline for this scene may hold at most, renderer and files not included.
-    static std::size_t memory_bytes(const Scene& scene);
-
   private:
     // A past state, as much of it as is still needed.
     struct Past {

@@ -11,7 +11,7 @@
 #include "apps/arguments.h"
 #include "apps/commands.h"
 #include "apps/framing.h"
-#include "apps/memory.h"
+#include "apps/simulation.h"
 #include "apps/terminal.h"
 #include "apps/version.h"
 #include "automaton/error.h"

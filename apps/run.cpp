@@ -10,12 +10,12 @@
 
 #include "apps/arguments.h"
 #include "apps/commands.h"
-#include "apps/memory.h"
 #include "apps/run_folder.h"
 #include "apps/signals.h"
 #include "apps/simulation.h"
 #include "apps/terminal.h"
 #include "automaton/error.h"
+#include "scenes/memory.h"
 #include "scenes/writer.h"
 
 namespace nephos {
@@ -44,9 +44,7 @@ RunSettings settings_of(const RunArguments& a) {
     settings.resume = a.resume;
     settings.overwrite = a.overwrite;
     settings.checkpoint_every_s = a.checkpoint_every_s;
-    const Extent& extent = scene.automaton.extent;
-    require_memory(Pipeline::memory_bytes(scene), fmt::format("{}: a lattice of {} x {} x {} cells with its densities",
-                                                              a.scene.file, extent.x, extent.y, extent.z));
+    check_memory(scene, settings.render);
     settings.initial = initial_state(scene);
     const std::string initial_hash =
         settings.initial ? Automaton(scene.automaton, *settings.initial).hash().hex() : std::string();
@@ -182,7 +180,7 @@ void add_run_command(CLI::App& app, Action& action) {
         "\n"
         "Examples:\n"
         "  nephos run scenes/cumulus.toml\n"
-        "  nephos run scenes/stratus.toml --out /tmp/st --no-render --set simulation.steps=500\n"
+        "  nephos run scenes/stratus.toml --out /tmp/st --no-render --set time.steps=500\n"
         "  nephos run scenes/cumulus.toml --resume");
     command->callback([a, &action] { action = [a] { return run(*a); }; });
 }

@@ -3,10 +3,18 @@
 
 #include <fmt/format.h>
 
-#include "apps/memory.h"
+#include "automaton/error.h"
 #include "density/vdb_file.h"
+#include "scenes/memory.h"
 
 namespace nephos {
+
+void require_memory(std::size_t bytes, const std::string& what) {
+    const AvailableMemory available = available_memory();
+    if (bytes <= available.bytes) return;
+    throw Error(ErrorCode::usage, fmt::format("{} takes about {}, but {} ({}) are all there is", what, bytes_text(bytes),
+                                              bytes_text(available.bytes), available.limit));
+}
 
 std::optional<Lattice> initial_state(const Scene& scene, const std::string& from) {
     if (!from.empty()) return read_state(from, scene.automaton.extent);

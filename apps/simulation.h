@@ -3,6 +3,8 @@
 
 // What hash, state and run share: a simulation that fits into memory and starts where the user says.
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -13,6 +15,9 @@ namespace nephos {
 
 // Most steps of one run: every step number stays exact in a double and in a 32-bit counter of randomness.
 inline constexpr std::uint64_t kMaxSteps = 1'000'000'000;
+
+// Throws Error(usage) unless `bytes` of memory are available; `what` starts the sentence.
+void require_memory(std::size_t bytes, const std::string& what);
 
 // The state that the simulation starts from: the file `from`, else the scene's initial_state_file, else nothing (the
 // scene's own start). Throws as read_state().

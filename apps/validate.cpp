@@ -9,11 +9,10 @@
 
 #include "apps/arguments.h"
 #include "apps/commands.h"
-#include "apps/memory.h"
-#include "apps/pipeline.h"
 #include "apps/terminal.h"
 #include "automaton/error.h"
 #include "scenes/errors.h"
+#include "scenes/memory.h"
 #include "scenes/writer.h"
 
 namespace nephos {
@@ -43,14 +42,14 @@ Json scene_json(const std::string& file, const Scene& scene) {
             {"steps", scene.steps},
             {"frames", frame_count(scene)},
             {"scene_hash", scene_hash(scene)},
-            {"memory_bytes", Pipeline::memory_bytes(scene)}};
+            {"memory_bytes", memory_estimate_bytes(scene)}};
 }
 
 std::string summary(const std::string& file, const Scene& scene) {
     const Extent& cells = scene.automaton.extent;
     return fmt::format("{}: valid: {} x {} x {} cells, {} steps, {} frames, up to {} of memory, scene hash {}", file,
                        cells.x, cells.y, cells.z, scene.steps, frame_count(scene),
-                       human_bytes(Pipeline::memory_bytes(scene)), scene_hash(scene));
+                       human_bytes(memory_estimate_bytes(scene)), scene_hash(scene));
 }
 
 int validate(const ValidateArguments& a) {

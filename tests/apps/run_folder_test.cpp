@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// A run on disk without pictures: what is written, and that a run which was stopped anywhere and resumed leaves the
+// same folder as one that was not.
+
+#include "apps/run_folder.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "apps/statistics_file.h"
+#include "automaton/error.h"
+#include "density/vdb_file.h"
+#include "scenes/writer.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RunFolderTest : public testing::Test {
+  protected:
+    void SetUp() override {
+        const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+        base_ = fs::temp_directory_path() /
+                ("nephos run " + std::string(info->name()) + " " + std::to_string(::getpid()));
+        fs::create_directories(base_);
+    }
+    void TearDown() override { fs::remove_all(base_); }
+
+    RunSettings settings(const std::string& folder) const {
+        RunSettings s;
+        s.scene.name = "small";
+        s.scene.automaton.extent = {32, 24, 12};
+        s.scene.automaton.field.background = {0.15, 0.01, 0.05};
+        s.scene.steps = 6;
+        s.scene.frames.per_second = 1;
+        s.scene.frames.time_scale = 15;
+        s.scene.density.write_state = true;
+        s.scene_file = "small.toml";
+        s.scene_text = to_toml(s.scene);
+        s.scene_hash = scene_hash(s.scene);
+        s.simulation_hash = simulation_hash(s.scene);
+        s.range = full_range(s.scene);
+        s.render = false;
+        s.folder = base_ / folder;
+        return s;
+    }
+
+    fs::path base_;
+};
+
+std::string content(const fs::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    EXPECT_TRUE(stream) << path;
+    std::stringstream text;
+    text << stream.rdbuf();
+    return text.str();
+}
+
+// Everything but wall time; a VDB file has a random identifier, so its voxels and metadata are compared.
+void expect_same_folders(const fs::path& a, const fs::path& b) {
+    EXPECT_EQ(content(a / "statistics.csv"), content(b / "statistics.csv"));
+    auto ja = nlohmann::json::parse(content(a / "manifest.json"));
+    auto jb = nlohmann::json::parse(content(b / "manifest.json"));
+    ja.erase("timing");
+    jb.erase("timing");
+    EXPECT_EQ(ja, jb);
+    EXPECT_EQ(content(a / "checkpoint.nephos"), content(b / "checkpoint.nephos"));
+    ASSERT_FALSE(ja["frames"].empty());
+    for (const auto& frame : ja["frames"]) {
+        const std::string file = frame["density"].get<std::string>();
+        const LoadedDensity da = load_density(a / file), db = load_density(b / file);
+        EXPECT_EQ(da.density.to_dense(), db.density.to_dense()) << file;
+        EXPECT_GT(da.density.max_value() + float(frame["number"] == 1), 0) << file;
+        ASSERT_TRUE(da.metadata && db.metadata) << file;
+        EXPECT_EQ(*da.metadata, *db.metadata) << file;
+    }
+}
+
+RunObserver stop_after(int pieces) {
+    RunObserver observer;
+    observer.stop = [left = pieces]() mutable { return left-- <= 0; };
+    return observer;
+}
+
+TEST_F(RunFolderTest, WritesEveryFileAndNamesItInTheManifest) {
+    const RunSettings s = settings("out");
+    const RunReport report = run_scene(s, {});
+    EXPECT_TRUE(report.complete);
+    EXPECT_EQ(report.steps_reported, 7u);
+    EXPECT_EQ(report.frames, 5);  // 0, 15, 30, 45, 60 s
+    const auto manifest = nlohmann::json::parse(content(s.folder / "manifest.json"));
+    EXPECT_EQ(manifest["complete"], true);
+    EXPECT_EQ(manifest["scene_text"], s.scene_text);
+    EXPECT_EQ(manifest["scene"]["hash"], s.scene_hash);
+    ASSERT_EQ(manifest["frames"].size(), 5u);
+    EXPECT_EQ(manifest["frames"][1]["density"], "density/small_0002.vdb");
+    EXPECT_EQ(manifest["frames"][1]["time_s"], 15.0);
+    EXPECT_EQ(manifest["bounds"]["voxels"], nlohmann::json({32, 24, 12}));
+    std::size_t files = 0;
+    for (const auto& entry : fs::recursive_directory_iterator(s.folder)) files += entry.is_regular_file();
+    EXPECT_EQ(files, 5u + 3u) << "no other and no temporary file";
+
+    // The bounds and the state's hash are in each file.
+    for (int frame = 1; frame <= 5; ++frame) {
+        const LoadedDensity loaded = load_density(s.folder / manifest["frames"][frame - 1]["density"].get<std::string>());
+        EXPECT_EQ(loaded.density.extent(), s.scene.automaton.extent);
+        EXPECT_EQ(loaded.metadata->state_hash, manifest["frames"][frame - 1]["state_hash"].get<std::string>());
+        EXPECT_EQ(loaded.metadata->time_s, 15.0 * (frame - 1));
+    }
+    // The last row: step 6 with the hash that the report names.
+    const std::string rows = read_statistics(s.folder / "statistics.csv", 7);
+    EXPECT_EQ(hash_in_row(rows), report.state_hash);
+    EXPECT_NE(rows.find("\n6,60,"), std::string::npos);
+}
+
+TEST_F(RunFolderTest, StoppedAnywhereAndResumedIsTheSame) {
+    RunSettings whole = settings("whole");
+    ASSERT_TRUE(run_scene(whole, {}).complete);
+    for (int pieces = 0; pieces < 40; ++pieces) {
+        RunSettings s = settings("stopped");
+        s.overwrite = true;
+        const RunReport first = run_scene(s, stop_after(pieces));
+        s.overwrite = false;
+        s.resume = true;
+        const RunReport second = run_scene(s, {});
+        ASSERT_TRUE(second.complete);
+        expect_same_folders(whole.folder, s.folder);
+        if (first.complete) {
+            EXPECT_GT(pieces, 15);
+            return;
+        }
+    }
+    FAIL() << "the run never came to its end";
+}
+
+TEST_F(RunFolderTest, StoppedAgainAndAgainIsTheSame) {
+    RunSettings whole = settings("whole");
+    ASSERT_TRUE(run_scene(whole, {}).complete);
+    RunSettings s = settings("bits");
+    int rounds = 0;
+    while (!run_scene(s, stop_after(2)).complete) {
+        s.resume = true;
+        ASSERT_LT(++rounds, 40);
+    }
+    EXPECT_GT(rounds, 5);
+    expect_same_folders(whole.folder, s.folder);
+}
+
+// What a power cut leaves: results that are newer than the checkpoint.
+TEST_F(RunFolderTest, ResultsThatAreNewerThanTheCheckpointAreReplaced) {
+    RunSettings whole = settings("whole");
+    ASSERT_TRUE(run_scene(whole, {}).complete);
+    RunSettings s = settings("cut");
+    ASSERT_FALSE(run_scene(s, stop_after(8)).complete);
+    fs::copy_file(whole.folder / "statistics.csv", s.folder / "statistics.csv", fs::copy_options::overwrite_existing);
+    fs::copy_file(whole.folder / "density/small_0005.vdb", s.folder / "density/small_0005.vdb");
+    s.resume = true;
+    ASSERT_TRUE(run_scene(s, {}).complete);
+    expect_same_folders(whole.folder, s.folder);
+}
+
+std::string error_of(const RunSettings& s, ErrorCode code) {
+    try {
+        run_scene(s, {});
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), code) << error.what();
+        return error.what();
+    }
+    ADD_FAILURE() << "no error";
+    return "";
+}
+
+TEST_F(RunFolderTest, RefusesToResumeWhatDoesNotFit) {
+    RunSettings s = settings("out");
+    s.resume = true;
+    EXPECT_NE(error_of(s, ErrorCode::io).find("checkpoint.nephos"), std::string::npos);
+    s.resume = false;
+    ASSERT_FALSE(run_scene(s, stop_after(9)).complete);
+    EXPECT_NE(error_of(s, ErrorCode::usage).find("--resume"), std::string::npos) << "it would throw work away";
+
+    s.resume = true;
+    RunSettings other = s;
+    other.scene.automaton.seed = 99;
+    other.scene_hash = scene_hash(other.scene);
+    other.simulation_hash = simulation_hash(other.scene);
+    EXPECT_NE(error_of(other, ErrorCode::usage).find("another scene"), std::string::npos);
+    RunSettings range = s;
+    range.range = range_of_frames(range.scene, 1, 2);
+    EXPECT_NE(error_of(range, ErrorCode::usage).find("--frames"), std::string::npos);
+
+    RunSettings damaged = s;
+    fs::resize_file(s.folder / "checkpoint.nephos", fs::file_size(s.folder / "checkpoint.nephos") / 2);
+    EXPECT_NE(error_of(damaged, ErrorCode::io).find("checkpoint.nephos"), std::string::npos);
+}
+
+TEST_F(RunFolderTest, RefusesToResumeWhenResultsAreGone) {
+    RunSettings s = settings("out");
+    ASSERT_FALSE(run_scene(s, stop_after(12)).complete);
+    s.resume = true;
+    ASSERT_TRUE(fs::remove(s.folder / "density/small_0001.vdb"));
+    EXPECT_NE(error_of(s, ErrorCode::io).find("small_0001.vdb"), std::string::npos);
+    std::ofstream(s.folder / "statistics.csv") << kStatisticsHeader << "0,0,1,1,1\n";
+    EXPECT_NE(error_of(s, ErrorCode::io).find("statistics.csv"), std::string::npos);
+}
+
+// A shorter run after a longer one: nothing of the longer one stays, and nothing of others is touched.
+TEST_F(RunFolderTest, AnEarlierRunOfTheSameNameIsReplaced) {
+    RunSettings s = settings("out");
+    ASSERT_TRUE(run_scene(s, {}).complete);
+    std::ofstream(s.folder / "density/notes.txt") << "mine";
+    std::ofstream(s.folder / "density/other_0001.vdb") << "mine";
+    RunSettings shorter = s;
+    shorter.range = range_of_frames(s.scene, 1, 2);
+    ASSERT_TRUE(run_scene(shorter, {}).complete);
+    EXPECT_TRUE(fs::exists(s.folder / "density/small_0002.vdb"));
+    EXPECT_FALSE(fs::exists(s.folder / "density/small_0003.vdb"));
+    EXPECT_TRUE(fs::exists(s.folder / "density/notes.txt"));
+    EXPECT_TRUE(fs::exists(s.folder / "density/other_0001.vdb"));
+}
+
+TEST_F(RunFolderTest, AFolderThatCannotBeMadeIsFoundBeforeAnything) {
+    RunSettings s = settings("file");
+    std::ofstream(s.folder) << "a file";
+    EXPECT_NE(error_of(s, ErrorCode::io).find(s.folder.string()), std::string::npos);
+}
+
+}  // namespace
+}  // namespace nephos
