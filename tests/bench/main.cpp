@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// ./bench: prints the tables of the README. Nothing here passes or fails: figures are for people to judge.
+
+#include <fmt/core.h>
+
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "automaton/kernels.h"
+#include "tests/bench/automaton_bench.h"
+#include "tests/bench/density_bench.h"
+
+namespace {
+
+std::string processor() {
+    std::ifstream info("/proc/cpuinfo");
+    for (std::string line; std::getline(info, line);) {
+        if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+    }
+    return "unknown processor";
+}
+
+void print(const std::vector<nephos::bench::BenchRow>& rows) {
+    fmt::print("| work | nephos, ms | other, ms | ratio | target | note |\n|---|---|---|---|---|---|\n");
+    for (const auto& row : rows) {
+        const bool faster = row.target.find("faster") != std::string::npos;
+        const double ratio = faster ? row.other_ms / row.ours_ms : row.ours_ms / row.other_ms;
+        fmt::print("| {} | {:.3g} | {:.3g} | {:.2f}x{} | {} | {} |\n", row.work, row.ours_ms, row.other_ms, ratio,
+                   faster ? " faster" : "", row.target, row.note);
+        std::fflush(stdout);
+    }
+    fmt::print("\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    using namespace nephos::bench;
+    const std::filesystem::path source = NEPHOS_SOURCE_DIR;
+    const std::filesystem::path programs = std::filesystem::canonical("/proc/self/exe").parent_path();
+    const std::pair<const char*, std::function<std::vector<BenchRow>()>> groups[] = {
+        {"automaton", [&] { return automaton_rows(source, programs); }},
+        {"density", [] { return nephos::bench::density_bench_rows(); }},
+    };
+    if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {
+        fmt::print("Usage: ./bench [GROUP ...]\n\nPrints medians of nephos and of what it is compared with, measured in "
+                   "turn.\nGroups:");
+        for (const auto& group : groups) fmt::print(" {}", group.first);
+        fmt::print(". Without a name, all.\n");
+        return 0;
+    }
+    try {
+        fmt::print("{}, kernels for {}; one thread unless said; medians of runs in turn\n\n", processor(),
+                   nephos::kernel_target());
+        for (const auto& [name, measure] : groups) {
+            bool wanted = argc == 1;
+            for (int i = 1; i < argc; ++i) wanted = wanted || std::strcmp(argv[i], name) == 0;
+            if (!wanted) continue;
+            fmt::print("### {}\n\n", name);
+            std::fflush(stdout);
+            print(measure());
+        }
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "error: {}\n", error.what());
+        return 1;
+    }
+}
