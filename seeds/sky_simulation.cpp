@@ -15,6 +15,10 @@ namespace {
 
 constexpr std::uint64_t kStateMark = 0x3130594b5348504e;  // "NPHSKY01"
 
+// Fastest wind: places, which lie within the world (1e8 m) and a few such steps, then never leave 64 bits.
+constexpr double kMaxStep = 5e8;
+constexpr double kMaxPlace = 1.5e9;
+
 double metres(std::int64_t fixed) { return double(fixed) * 0x1p-32; }
 std::int64_t fixed(double value_m) { return std::llround(value_m * 0x1p32); }
 
@@ -85,7 +89,13 @@ Sphere SkySimulation::sphere(const SkyCloud& cloud) const {
 
 Displacement SkySimulation::wind_step(const SkyCloud& cloud, double time_s) const {
     const Velocity v = wind_at(options_.wind, cloud.base_m + shape(cloud).centre_m.z, time_s);
-    return displacement_of_step(v, options_.time_step_s, 1);
+    const Displacement d = displacement_of_step(v, options_.time_step_s, 1);
+    if (std::abs(metres(d.x)) > kMaxStep || std::abs(metres(d.y)) > kMaxStep) {
+        usage_error("layer \"" + options_.name + "\": the wind moves clouds by " + text_of(metres(d.x)) +
+                    ", " + text_of(metres(d.y)) + " m in one step, at most " + text_of(kMaxStep) +
+                    " m are possible");
+    }
+    return d;
 }
 
 void SkySimulation::step() {
@@ -267,7 +277,8 @@ void SkySimulation::restore(std::span<const std::byte> bytes) {
         c.base_m = in.get<double>();
         c.phase = in.get<double>();
         const auto dissolving = in.get<std::uint8_t>();
-        const bool places = std::abs(metres(c.place.x)) < 0x1p31 && std::abs(metres(c.place.y)) < 0x1p31;
+        const bool places =
+            std::abs(metres(c.place.x)) < kMaxPlace && std::abs(metres(c.place.y)) < kMaxPlace;
         if (c.serial >= born || c.shape >= shapes_.size() || c.sky >= options_.skies.size() || !places ||
             !std::isfinite(c.base_m) || !(c.phase >= 0 && c.phase <= 1) || dissolving > 1) {
             bad("a cloud of it is impossible");

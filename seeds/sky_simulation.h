@@ -56,7 +56,7 @@ class SkySimulation {
     // Throws Error(usage) on options that check() refuses, and when a cloud is larger than the world.
     explicit SkySimulation(const SkyOptions& options);
 
-    // One step of options().time_step_s. Throws Error(usage) when the wind moves a cloud by more than 2^30 m.
+    // One step of options().time_step_s. Throws Error(usage) when the wind moves a cloud by more than 5e8 m.
     void step();
 
     const SkyOptions& options() const { return options_; }

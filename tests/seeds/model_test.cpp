@@ -180,6 +180,9 @@ TEST(Reproduction, IsAFunctionOfItsName) {
     EXPECT_NE(cloud, reproduce(model, 2, 2, 3));
     EXPECT_NE(cloud, reproduce(model, 1, 3, 3));
     EXPECT_NE(cloud, reproduce(model, 1, 2, 4));
+    std::set<double> places;  // no two boxes of a cloud share their draws
+    for (const SeedBox& box : cloud.boxes) places.insert(box.centre_m.x);
+    EXPECT_EQ(places.size(), cloud.boxes.size());
     std::set<double> radii;
     for (std::uint32_t number = 0; number < 500; ++number)
         radii.insert(reproduce(model, 1, 2, number).radius_m);

@@ -310,6 +310,67 @@ TEST(RainFinder, LimitsAndSavedState) {
     });
 }
 
+// A square of n x n columns has the variance of the full square, n^2 / 12, not that of the columns' centres.
+TEST(RainFinder, ColumnsAreSquares) {
+    BitPlane plane(kExtent);
+    for (int j = 20; j < 24; ++j) {
+        for (int i = 30; i < 34; ++i) {
+            for (int k = 0; k < 8; ++k) plane.set(i, j, k, true);
+        }
+    }
+    const auto patches = find_patches(plane.view(), kPlacement, {}, quick());
+    ASSERT_EQ(patches.size(), 1u);
+    EXPECT_DOUBLE_EQ(patches[0].xx_m2, 200.0 * 200 / 12);
+    EXPECT_DOUBLE_EQ(patches[0].yy_m2, 200.0 * 200 / 12);
+    EXPECT_DOUBLE_EQ(patches[0].xy_m2, 0);
+    EXPECT_DOUBLE_EQ(patches[0].area_m2, 200 * 200);
+    EXPECT_DOUBLE_EQ(patches[0].water_m, 400);
+    EXPECT_DOUBLE_EQ(patches[0].x_m, -1000 + 32 * 50);
+}
+
+// Listed from one intensity, until another: a patch whose rain lies between them stays only if it was listed.
+TEST(RainFinder, ListingHasTwoThresholds) {
+    RainFinderOptions options = quick();
+    options.report_from_mm_per_h = 7;   // 350 m of water
+    options.report_until_mm_per_h = 5;  // 250 m
+    BitPlane middle(kExtent), strong(kExtent), weak(kExtent);
+    fill(middle, 50, 40, 15, 10, 0, 6);
+    fill(strong, 50, 40, 15, 10, 0, 8);
+    fill(weak, 50, 40, 15, 10, 0, 4);
+    RainFinder finder(options, kExtent, kPlacement, {});
+    const auto listed_after = [&](const BitPlane& plane) {
+        finder.update(plane.view(), 10, 0, 0);
+        return finder.areas().size();
+    };
+    EXPECT_EQ(listed_after(middle), 0u);
+    EXPECT_EQ(listed_after(strong), 1u);
+    EXPECT_EQ(listed_after(middle), 1u);
+    EXPECT_EQ(listed_after(weak), 0u);
+    EXPECT_EQ(listed_after(middle), 0u);
+}
+
+// Two neighbours drift by nearly half their distance: each goes on as the nearest patch, whatever the order.
+TEST(RainFinder, ClosestPairsFirst) {
+    for (double shift : {-7.0, 7.0}) {
+        BitPlane before(kExtent), after(kExtent);
+        fill(before, 40, 40, 9, 9, 0, 8);
+        fill(before, 60, 40, 9.5, 9, 0, 8);
+        fill(after, 40 + shift, 40, 9.5, 9, 0, 8);
+        fill(after, 60 + shift, 40, 9, 9, 0, 8);
+        RainFinder finder(quick(), kExtent, kPlacement, {});
+        finder.update(before.view(), 10, 0, 0);
+        const auto old = finder.areas();
+        finder.update(after.view(), 10, 0, 0);
+        const auto now = finder.areas();
+        ASSERT_EQ(old.size(), 2u);
+        ASSERT_EQ(now.size(), 2u);
+        for (int a = 0; a < 2; ++a) {
+            EXPECT_EQ(now[std::size_t(a)].id, old[std::size_t(a)].id);
+            EXPECT_NEAR(now[std::size_t(a)].x_m - old[std::size_t(a)].x_m, shift * 50, 25);
+        }
+    }
+}
+
 // All columns wet: one area, no hang, also with periodic sides.
 TEST(RainFinder, WholeWorld) {
     BitPlane plane(kExtent);

@@ -256,9 +256,20 @@ TEST(SkySimulation, WindCrossesTheWorldInOneStep) {
             ASSERT_LT(sky.clouds().size(), 5000u);
         }
     }
-    options.wind = constant_wind(1e30, 0);
-    SkySimulation sky(options);
-    test::expect_error(ErrorCode::usage, "wind", [&] { sky.step(); });
+    for (double speed : {6e7, 1e30, -6e7, double(NAN)}) {
+        options.wind = constant_wind(0, speed);
+        SkySimulation sky(options);
+        test::expect_error(ErrorCode::usage, "wind", [&] { sky.step(); });
+    }
+    // The fastest that is possible, in a world at the end of the numbers, turning about: no overflow.
+    options.world = {9e7, 9e7, 9e7 + 6000, 9e7 + 6000};
+    options.wind = {{{0, {{0, {4.9e7, 4.9e7}}}}, {50, {{0, {-4.9e7, -4.9e7}}}}}};
+    for (bool whole : {true, false}) {
+        options.cross_edges_whole = whole;
+        SkySimulation sky(options);
+        for (int step = 0; step < 20; ++step) sky.step();
+        EXPECT_EQ(sky.count(), 40u);
+    }
 }
 
 // Every cloud of a layer moves with the wind at its own height.
