@@ -12,7 +12,7 @@
 
 #include "automaton/kernels.h"
 #include "tests/bench/automaton_bench.h"
-#include "tests/bench/density_bench.h"
+#include "tests/bench/seeds_bench.h"
 
 namespace {
 
@@ -44,7 +44,7 @@ int main(int argc, char** argv) {
     const std::filesystem::path programs = std::filesystem::canonical("/proc/self/exe").parent_path();
     const std::pair<const char*, std::function<std::vector<BenchRow>()>> groups[] = {
         {"automaton", [&] { return automaton_rows(source, programs); }},
-        {"density", [] { return nephos::bench::density_bench_rows(); }},
+        {"seeds", [] { return seeds_rows(); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {
         fmt::print("Usage: ./bench [GROUP ...]\n\nPrints medians of nephos and of what it is compared with, measured in "
