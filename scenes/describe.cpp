@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "scenes/schema.h"
@@ -52,28 +53,40 @@ Json word_json(const Key& key) {
     return {{"type", "string"}, {"enum", std::move(words)}};
 }
 
-Json any_of(Json first, Json second) { return {{"anyOf", Json::array({std::move(first), std::move(second)})}}; }
+Json any_of(Json first, Json second) {
+    return {{"anyOf", Json::array({std::move(first), std::move(second)})}};
+}
 
 Json section_json(const Section& section, const void* owner);
 
 Json key_json(const Key& key, const void* owner) {
     switch (key.kind) {
-        case KeyKind::boolean: return {{"type", "boolean"}};
+        case KeyKind::boolean:
+            return {{"type", "boolean"}};
         case KeyKind::integer:
-        case KeyKind::count: return number_json(key, "integer");
+        case KeyKind::count:
+            return number_json(key, "integer");
         case KeyKind::seed:
             return any_of({{"type", "integer"}, {"minimum", 0}, {"maximum", 0x7fffffffffffffff}},
                           {{"type", "string"}, {"pattern", "^([0-9]{1,20}|0[xX][0-9a-fA-F]{1,16})$"}});
-        case KeyKind::number: return number_json(key, "number");
+        case KeyKind::number:
+            return number_json(key, "number");
         case KeyKind::text:
-        case KeyKind::path: return {{"type", "string"}};
-        case KeyKind::word: return word_json(key);
-        case KeyKind::extent: return array_json(number_json(key, "integer"), 3);
+        case KeyKind::path:
+            return {{"type", "string"}};
+        case KeyKind::word:
+            return word_json(key);
+        case KeyKind::extent:
+            return array_json(number_json(key, "integer"), 3);
         case KeyKind::vector:
-        case KeyKind::colour: return array_json(number_json(key, "number"), 3);
-        case KeyKind::range: return any_of(number_json(key, "number"), array_json(number_json(key, "number"), 2));
-        case KeyKind::boundaries: return any_of(word_json(key), array_json(word_json(key), 3));
-        case KeyKind::table: return section_json(*key.section, key.value(const_cast<void*>(owner)));
+        case KeyKind::colour:
+            return array_json(number_json(key, "number"), 3);
+        case KeyKind::range:
+            return any_of(number_json(key, "number"), array_json(number_json(key, "number"), 2));
+        case KeyKind::boundaries:
+            return any_of(word_json(key), array_json(word_json(key), 3));
+        case KeyKind::table:
+            return section_json(*key.section, key.value(const_cast<void*>(owner)));
         case KeyKind::tables:
             return {{"type", "array"},
                     {"items", section_json(*key.section, key.element_defaults)},
@@ -104,21 +117,35 @@ Json section_json(const Section& section, const void* owner) {
 
 std::string type_text(const Key& key) {
     switch (key.kind) {
-        case KeyKind::boolean: return "boolean";
+        case KeyKind::boolean:
+            return "boolean";
         case KeyKind::integer:
-        case KeyKind::count: return "integer";
-        case KeyKind::seed: return "integer or text";
-        case KeyKind::number: return "number";
-        case KeyKind::text: return "text";
-        case KeyKind::path: return "file";
-        case KeyKind::word: return "word";
-        case KeyKind::extent: return "3 integers";
-        case KeyKind::vector: return "3 numbers";
-        case KeyKind::colour: return "linear RGB";
-        case KeyKind::range: return "[min, max] or number";
-        case KeyKind::boundaries: return "3 words or 1";
-        case KeyKind::table: return "table";
-        case KeyKind::tables: return "array of tables";
+        case KeyKind::count:
+            return "integer";
+        case KeyKind::seed:
+            return "integer or text";
+        case KeyKind::number:
+            return "number";
+        case KeyKind::text:
+            return "text";
+        case KeyKind::path:
+            return "file";
+        case KeyKind::word:
+            return "word";
+        case KeyKind::extent:
+            return "3 integers";
+        case KeyKind::vector:
+            return "3 numbers";
+        case KeyKind::colour:
+            return "linear RGB";
+        case KeyKind::range:
+            return "[min, max] or number";
+        case KeyKind::boundaries:
+            return "3 words or 1";
+        case KeyKind::table:
+            return "table";
+        case KeyKind::tables:
+            return "array of tables";
     }
     return {};
 }
@@ -148,8 +175,8 @@ void add_section(std::string& out, const Section& section, const void* owner, co
     out += "| key | type | unit | range | default | effect | source |\n|---|---|---|---|---|---|---|\n";
     for (const Key& key : section.keys) {
         out += "| " + enclosed(key.name, '`');
-        for (const std::string& cell :
-             {type_text(key), key.unit, range_text(key), default_cell(key, owner, header.empty()), key.effect, key.source}) {
+        for (const std::string& cell : {type_text(key), key.unit, range_text(key),
+                                        default_cell(key, owner, header.empty()), key.effect, key.source}) {
             out += " | " + cell;
         }
         out += " |\n";
@@ -166,7 +193,8 @@ void add_nested(std::string& out, const Section& section, const void* owner, con
         const bool many = key.kind == KeyKind::tables;
         const std::string key_path = path.empty() ? key.name : path + "." + key.name;
         const void* inner = many ? key.element_defaults : key.value(const_cast<void*>(owner));
-        add_section(out, *key.section, inner, enclosed((many ? "[[" : "[") + key_path + (many ? "]]" : "]"), '`'));
+        add_section(out, *key.section, inner,
+                    enclosed((many ? "[[" : "[") + key_path + (many ? "]]" : "]"), '`'));
         add_nested(out, *key.section, inner, key_path, done);
     }
 }

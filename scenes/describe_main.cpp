@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the generated descriptions of the scene format into the source tree, whose root is the only argument.
+// Writes the generated descriptions of the scene format into the source tree, whose root is the only
+// argument.
 
 #include <cstdio>
 

@@ -2,13 +2,14 @@
 #include "scenes/document.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include "scenes/nesting.h"
 #include "scenes/text.h"
 
-// A parse failure is returned, not thrown, and the parser's own asserts are off: the text is a user's, and no text
-// may end the program.
+// A parse failure is returned, not thrown, and the parser's own asserts are off: the text is a user's, and no
+// text may end the program.
 #define TOML_EXCEPTIONS 0
 #define TOML_ASSERT(expr) static_assert(true)
 #define TOML_ENABLE_FORMATTERS 0
@@ -95,8 +96,12 @@ Node converted(const toml::node& source, int origin) {
     if (const auto* table = source.as_table()) {
         node.kind = Node::Kind::table;
         for (const auto& [key, value] : *table) {
-            node.entries.push_back({std::string(key.str()), place_of(key.source(), origin), converted(value, origin)});
+            node.entries.push_back(
+                {std::string(key.str()), place_of(key.source(), origin), converted(value, origin)});
         }
+        std::sort(node.entries.begin(), node.entries.end(), [](const Entry& a, const Entry& b) {
+            return std::tie(a.place.line, a.place.column) < std::tie(b.place.line, b.place.column);
+        });
     } else if (const auto* array = source.as_array()) {
         node.kind = Node::Kind::array;
         for (const auto& value : *array) node.items.push_back(converted(value, origin));
@@ -127,19 +132,24 @@ const Entry* Node::find(std::string_view name) const {
     return nullptr;
 }
 
-Entry* Node::find(std::string_view name) {
-    return const_cast<Entry*>(std::as_const(*this).find(name));
-}
+Entry* Node::find(std::string_view name) { return const_cast<Entry*>(std::as_const(*this).find(name)); }
 
 std::string_view kind_name(Node::Kind kind) {
     switch (kind) {
-        case Node::Kind::boolean: return "a truth value";
-        case Node::Kind::integer: return "an integer";
-        case Node::Kind::number: return "a number";
-        case Node::Kind::text: return "a text";
-        case Node::Kind::date: return "a date or time";
-        case Node::Kind::array: return "an array";
-        case Node::Kind::table: return "a table";
+        case Node::Kind::boolean:
+            return "a truth value";
+        case Node::Kind::integer:
+            return "an integer";
+        case Node::Kind::number:
+            return "a number";
+        case Node::Kind::text:
+            return "a text";
+        case Node::Kind::date:
+            return "a date or time";
+        case Node::Kind::array:
+            return "an array";
+        case Node::Kind::table:
+            return "a table";
     }
     return "a value";
 }
@@ -161,7 +171,8 @@ void Document::report(const Place& place, std::string message, std::string expec
 
 std::optional<Node> Document::parse(int index) { return parse_text(index, origin(index).text, {}); }
 
-std::optional<Node> Document::parse_text(int index, std::string_view text, const std::string& expected_value) {
+std::optional<Node> Document::parse_text(int index, std::string_view text,
+                                         const std::string& expected_value) {
     const Origin& from = origin(index);
     const auto fail_at = [&](std::size_t offset, std::string message, std::string expected) {
         report(place_of_offset(from, index, offset), std::move(message), std::move(expected));

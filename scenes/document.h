@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// TOML text as a small tree of nodes that know where they stand, so that the file and the --set options can be
-// merged and every message can point at its place. The only place that knows the TOML parser is document.cpp.
+// TOML text as a small tree of nodes that know where they stand, so that the file and the --set options can
+// be merged and every message can point at its place. The only place that knows the TOML parser is
+// document.cpp.
 
 #include <cstdint>
 #include <deque>
@@ -17,7 +18,7 @@ namespace nephos {
 
 // A text that nodes come from: the scene file or one --set option.
 struct Origin {
-    std::string label;    // "scenes/cumulus.toml" or "--set density.half=maybe"
+    std::string label;  // "scenes/cumulus.toml" or "--set density.half=maybe"
     std::string text;
     bool is_file = true;
     std::vector<std::size_t> line_starts;  // byte offsets
@@ -43,7 +44,7 @@ struct Node {
     double number = 0;
     std::string text;
     std::vector<Node> items;     // array
-    std::vector<Entry> entries;  // table, in no particular order
+    std::vector<Entry> entries;  // table, in the order of the text
 
     const Entry* find(std::string_view name) const;
     Entry* find(std::string_view name);
@@ -77,12 +78,12 @@ class Document {
 
     void report(const Place& place, std::string message, std::string expected = {});
 
-    // Parses the text of an origin. On a syntax error, or a text that no sensible scene contains (not UTF-8, nested
-    // too deeply), the problem is reported and the result is empty.
+    // Parses the text of an origin. On a syntax error, or a text that no sensible scene contains (not UTF-8,
+    // nested too deeply), the problem is reported and the result is empty.
     std::optional<Node> parse(int origin);
 
-    // Puts "key.path=value" into root. `describe` says what is known of the key of this path (without indices).
-    // Problems are reported.
+    // Puts "key.path=value" into root. `describe` says what is known of the key of this path (without
+    // indices). Problems are reported.
     void set(const std::string& option, KeyForm (*describe)(const std::vector<std::string>& path));
 
   private:

@@ -94,7 +94,8 @@ SceneErrors::SceneErrors(std::vector<Problem> problems)
     : Error(ErrorCode::usage, message_of(problems), first_place(problems)), problems_(std::move(problems)) {}
 
 std::string_view closest_word(std::string_view word, std::span<const std::string_view> candidates) {
-    constexpr std::size_t kLongestWord = 64;  // longer ones are no slip of the fingers, and the cost is quadratic
+    constexpr std::size_t kLongestWord =
+        64;  // longer ones are no slip of the fingers, and the cost is quadratic
     if (word.empty() || word.size() > kLongestWord) return {};
     for (const std::string_view candidate : candidates) {  // the unit was left out: "elevation"
         if (candidate.size() > word.size() && candidate.starts_with(word) && candidate[word.size()] == '_') {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The problems of a scene: all of them in one exception, each with its place, its source line and what was expected.
+// The problems of a scene: all of them in one exception, each with its place, its source line and what was
+// expected.
 
 #include <span>
 #include <string>
@@ -14,7 +15,8 @@ namespace nephos {
 
 // One thing that is wrong with a scene.
 struct Problem {
-    SourcePosition where;     // the file, or the whole option "--set key=value" with line 0; columns count characters
+    SourcePosition
+        where;  // the file, or the whole option "--set key=value" with line 0; columns count characters
     std::string message;      // one sentence without a full stop, naming the key by its path
     std::string expected;     // what would be right, with unit and range, or the "did you mean"; may be empty
     std::string source_line;  // the line it stands in, shortened around the place when long; printable UTF-8
@@ -46,9 +48,9 @@ class SceneErrors : public Error {
     std::vector<Problem> problems_;
 };
 
-// The candidate that was probably meant by `word`: the one with the smallest edit distance (insertion, deletion,
-// replacement, swap of neighbours; case counts half), if that is small for the word's length; before all others
-// one that only adds a unit ("elevation_deg" for "elevation"). Otherwise empty.
+// The candidate that was probably meant by `word`: the one with the smallest edit distance (insertion,
+// deletion, replacement, swap of neighbours; case counts half), if that is small for the word's length;
+// before all others one that only adds a unit ("elevation_deg" for "elevation"). Otherwise empty.
 std::string_view closest_word(std::string_view word, std::span<const std::string_view> candidates);
 
 }  // namespace nephos

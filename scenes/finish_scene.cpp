@@ -38,8 +38,9 @@ void check_wind(const SectionReader& reader, const Scene& scene) {
         if (keyframes[n].time_s > keyframes[n - 1].time_s) continue;
         const Node& item = reader.find("wind")->value.items[n];
         const SectionReader profile{reader.document, item, indexed("wind", n), {}};
-        profile.report("time_s", profile.quoted("time_s") + " is " + number_text(keyframes[n].time_s) +
-                                     ", not after the profile before it at " + number_text(keyframes[n - 1].time_s),
+        profile.report("time_s",
+                       profile.quoted("time_s") + " is " + number_text(keyframes[n].time_s) +
+                           ", not after the profile before it at " + number_text(keyframes[n - 1].time_s),
                        "expected times that rise from profile to profile, in seconds");
     }
 }
@@ -51,7 +52,8 @@ void check_wind_speed(const SectionReader& reader, const Scene& scene) {
     double fastest = 0;
     for (const WindKeyframe& keyframe : scene.automaton.wind.keyframes) {
         for (const WindLevel& level : keyframe.levels) {
-            fastest = std::max({fastest, std::abs(level.velocity.east_m_per_s), std::abs(level.velocity.north_m_per_s)});
+            fastest = std::max(
+                {fastest, std::abs(level.velocity.east_m_per_s), std::abs(level.velocity.north_m_per_s)});
         }
     }
     const double cells = fastest * scene.automaton.time_step_s / scene.automaton.placement.cell_size_m;
@@ -70,15 +72,19 @@ void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
     const bool horizontal = o.boundaries.x == Boundary::periodic || o.boundaries.y == Boundary::periodic;
     const double unlimited = std::numeric_limits<double>::infinity();
     const double most_xy_m = horizontal ? kMostBoxes * cell_m * std::min(o.extent.x, o.extent.y) : unlimited;
-    const double most_z_m = o.boundaries.z == Boundary::periodic ? kMostBoxes * cell_m * o.extent.z : unlimited;
-    const auto check_items = [&](const char* name, const char* x, const char* y, const char* z, auto sizes_of) {
+    const double most_z_m =
+        o.boundaries.z == Boundary::periodic ? kMostBoxes * cell_m * o.extent.z : unlimited;
+    const auto check_items = [&](const char* name, const char* x, const char* y, const char* z,
+                                 auto sizes_of) {
         const Entry* items = below(reader, "field").find(name);
         for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n) {
             const Vec3 sizes = sizes_of(n);
-            const SectionReader item{reader.document, items->value.items[n], indexed(std::string("field.") + name, n), {}};
+            const SectionReader item{
+                reader.document, items->value.items[n], indexed(std::string("field.") + name, n), {}};
             const auto check_one = [&](const char* key, double size_m, double most_m) {
                 if (size_m <= most_m) return;
-                item.report(key, item.quoted(key) + " reaches " + number_text(size_m) + " m along a periodic axis",
+                item.report(key,
+                            item.quoted(key) + " reaches " + number_text(size_m) + " m along a periodic axis",
                             "expected at most " + number_text(most_m) + " m, 16 times the lattice");
             };
             check_one(x, sizes.x, most_xy_m);
@@ -98,18 +104,22 @@ void check_frames(const SectionReader& reader, const Scene& scene) {
     if (!reader.sound({"time", "frames"})) return;
     const SectionReader frames = below(reader, "frames");
     const double end_s = simulated_time_s(scene);
-    const std::string simulated = number_text(end_s) + " s that `time.steps` = " + std::to_string(scene.steps) +
-                                  " and `time.step_s` = " + number_text(scene.automaton.time_step_s) + " simulate";
+    const std::string simulated =
+        number_text(end_s) + " s that `time.steps` = " + std::to_string(scene.steps) +
+        " and `time.step_s` = " + number_text(scene.automaton.time_step_s) + " simulate";
     if (scene.frames.start_s > end_s) {
-        frames.report("start_s", "`frames.start_s` is " + number_text(scene.frames.start_s) + " s, after the " + simulated,
-                      "expected a start within the simulated time, or more steps");
+        frames.report(
+            "start_s",
+            "`frames.start_s` is " + number_text(scene.frames.start_s) + " s, after the " + simulated,
+            "expected a start within the simulated time, or more steps");
         return;
     }
     if (scene.frames.count == 0) {
         if (frame_count(scene) < kMaxFrames) return;
         const bool with_scale = frames.find("time_scale") != nullptr;
         const SectionReader at = with_scale ? frames : below(reader, "time");
-        at.report(with_scale ? "time_scale" : "steps", "the scene has more than " + std::to_string(kMaxFrames) + " frames",
+        at.report(with_scale ? "time_scale" : "steps",
+                  "the scene has more than " + std::to_string(kMaxFrames) + " frames",
                   "expected a larger `frames.time_scale`, fewer `time.steps`, or a `frames.count`");
         return;
     }
@@ -117,8 +127,9 @@ void check_frames(const SectionReader& reader, const Scene& scene) {
     if (last_s <= end_s) return;
     Scene all = scene;
     all.frames.count = 0;
-    frames.report("count", "the last of the " + std::to_string(scene.frames.count) + " frames shows " + number_text(last_s) +
-                               " s, after the " + simulated,
+    frames.report("count",
+                  "the last of the " + std::to_string(scene.frames.count) + " frames shows " +
+                      number_text(last_s) + " s, after the " + simulated,
                   "expected `frames.count` up to " + std::to_string(frame_count(all)) + ", or more steps");
 }
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scenes/memory.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <charconv>
 #include <fstream>
 #include <limits>
 #include <optional>
 #include <sstream>
+
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "automaton/automaton.h"
 #include "automaton/error.h"
@@ -19,16 +19,14 @@ namespace {
 
 constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
-constexpr double kPlannedCover = 0.5;        // share of voxels that are cloud
-constexpr double kBytesPerVoxel = 4.5;       // a float, and the masks and nodes of the tree above it
-constexpr double kGrids = 3;                 // two steps and the frame between them
-constexpr double kBytesPerMetaball = 64;     // itself, its colour, its keys while sorting, on the device too
-constexpr double kBytesPerPixel = 96;        // layers of the picture on both sides, and the files being written
+constexpr double kPlannedCover = 0.5;     // share of voxels that are cloud
+constexpr double kBytesPerVoxel = 4.5;    // a float, and the masks and nodes of the tree above it
+constexpr double kGrids = 3;              // two steps and the frame between them
+constexpr double kBytesPerMetaball = 64;  // itself, its colour, its keys while sorting, on the device too
+constexpr double kBytesPerPixel = 96;     // layers of the picture on both sides, and the files being written
 constexpr double kBytesPerShadowTexel = 16;
 
-std::size_t saturated(double bytes) {
-    return bytes < double(kUnlimited) ? std::size_t(bytes) : kUnlimited;
-}
+std::size_t saturated(double bytes) { return bytes < double(kUnlimited) ? std::size_t(bytes) : kUnlimited; }
 
 std::size_t sum(std::size_t a, std::size_t b) { return a > kUnlimited - b ? kUnlimited : a + b; }
 
@@ -132,7 +130,8 @@ MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
     const Extent& extent = scene.automaton.extent;
     const double refine = scene.density.refine;
     const double voxels = double(extent.x) * extent.y * extent.z * refine * refine * refine * kPlannedCover;
-    const double window = 2.0 * scene.density.smoothing.t0 + 2;  // the steps around both neighbours of a frame
+    const double window =
+        2.0 * scene.density.smoothing.t0 + 2;  // the steps around both neighbours of a frame
     MemoryEstimate estimate;
     estimate.automaton = Automaton::memory_bytes(scene.automaton);
     estimate.density = saturated(window * double(BitPlane::bytes(extent)) + voxels * kGrids * kBytesPerVoxel);
@@ -184,7 +183,8 @@ std::string bytes_text(std::size_t bytes) {
         ++unit;
     }
     char buffer[32];
-    const auto end = std::to_chars(buffer, buffer + sizeof buffer, amount, std::chars_format::fixed, unit == 0 ? 0 : 1);
+    const auto end =
+        std::to_chars(buffer, buffer + sizeof buffer, amount, std::chars_format::fixed, unit == 0 ? 0 : 1);
     return std::string(buffer, end.ptr) + " " + kUnits[unit];
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Whether a scene fits into memory, asked before anything is allocated: a run that is too large is refused with both
-// figures, instead of being killed half-way.
+// Whether a scene fits into memory, asked before anything is allocated: a run that is too large is refused
+// with both figures, instead of being killed half-way.
 
 #include <cstddef>
 #include <filesystem>
@@ -12,9 +12,9 @@
 
 namespace nephos {
 
-// Bytes that a run of a scene takes at its peak, by part; the largest std::size_t when they exceed it. Planes of bits
-// are exact. What grows with the clouds is reckoned with half of all voxels being cloud, more than any sky that has
-// gaps.
+// Bytes that a run of a scene takes at its peak, by part; the largest std::size_t when they exceed it. Planes
+// of bits are exact. What grows with the clouds is reckoned with half of all voxels being cloud, more than
+// any sky that has gaps.
 struct MemoryEstimate {
     std::size_t automaton = 0;  // planes of bits and the work areas beside them
     std::size_t density = 0;    // planes of the time window, grids of two steps and of the frame between them
@@ -34,12 +34,12 @@ struct AvailableMemory {
 };
 
 // Reads MemAvailable, the limits of the control groups that the process is in (version 2 and 1, what can be
-// reclaimed counts as free) and RLIMIT_AS. `root` is where the file system starts, for tests. What cannot be read
-// does not limit; with nothing to read, bytes is the largest std::size_t.
+// reclaimed counts as free) and RLIMIT_AS. `root` is where the file system starts, for tests. What cannot be
+// read does not limit; with nothing to read, bytes is the largest std::size_t.
 AvailableMemory available_memory(const std::filesystem::path& root = "/");
 
-// Throws Error(usage) that names both figures, the largest part and the keys that it depends on, when the scene needs
-// more than is available.
+// Throws Error(usage) that names both figures, the largest part and the keys that it depends on, when the
+// scene needs more than is available.
 void check_memory(const Scene& scene, const AvailableMemory& available, bool with_pictures = true);
 void check_memory(const Scene& scene, bool with_pictures = true);
 

@@ -41,7 +41,7 @@ bool continues_key(char c) {
 
 std::optional<NestingProblem> find_excessive_nesting(std::string_view text) {
     int depth = 0, dots = 0;
-    std::size_t dotted_keys = 0;
+    std::size_t dotted_keys = 0, values = 0;
     for (std::size_t at = 0; at < text.size();) {
         const char c = text[at];
         if (c == '"' || c == '\'') {
@@ -58,10 +58,15 @@ std::optional<NestingProblem> find_excessive_nesting(std::string_view text) {
         if (c == '=' && dots > 0 && ++dotted_keys > kMaxDottedKeys) {
             return NestingProblem{at, "more than " + std::to_string(kMaxDottedKeys) + " dotted keys"};
         }
-        if (c == '[' || c == '{') ++depth;
+        const bool opens = c == '[' || c == '{';
+        if ((opens || c == ',' || c == '=') && ++values > kMaxValues) {
+            return NestingProblem{at, "more than " + std::to_string(kMaxValues) + " values"};
+        }
+        if (opens) ++depth;
         if ((c == ']' || c == '}') && depth > 0) --depth;
         if (depth > kMaxBracketDepth) {
-            return NestingProblem{at, "values nested deeper than " + std::to_string(kMaxBracketDepth) + " levels"};
+            return NestingProblem{
+                at, "values nested deeper than " + std::to_string(kMaxBracketDepth) + " levels"};
         }
         if (c != '.' && !continues_key(c)) dots = 0;
         ++at;

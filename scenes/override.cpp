@@ -12,9 +12,9 @@ namespace {
 
 // One step down the tree: into a table by name or into an array by index.
 struct PathStep {
-    std::string name;       // empty: by index
+    std::string name;  // empty: by index
     std::size_t index = 0;
-    int column = 1;         // where it stands in the option
+    int column = 1;  // where it stands in the option
 };
 
 struct ParsedPath {
@@ -41,7 +41,8 @@ ParsedPath parse_path(std::string_view option) {
     while (path.steps.size() < kMaxSteps) {
         const std::size_t start = at;
         while (at < option.size() && is_key_character(option[at])) ++at;
-        if (at == start) return failed(at == option.size() ? "the option has no `=`" : "expected the name of a key");
+        if (at == start)
+            return failed(at == option.size() ? "the option has no `=`" : "expected the name of a key");
         path.steps.push_back({std::string(option.substr(start, at - start)), 0, int(start) + 1});
         while (at < option.size() && option[at] == '[') {
             const std::size_t digits = ++at;
@@ -96,7 +97,8 @@ std::optional<Node> Document::option_value(int index, std::size_t equals, const 
     std::string over(equals - 1, ' ');
     over += 'v';
     over += option.substr(equals);
-    std::optional<Node> parsed = parse_text(index, over, form.expected.empty() ? form.expected : "expected " + form.expected);
+    std::optional<Node> parsed =
+        parse_text(index, over, form.expected.empty() ? form.expected : "expected " + form.expected);
     if (!parsed) return std::nullopt;
     if (parsed->entries.size() == 1) return std::move(parsed->entries.front().value);
     report({index, 1, int(equals) + 2}, "the option holds more than one value");
@@ -123,7 +125,8 @@ void Document::set(const std::string& option, KeyForm (*describe)(const std::vec
         const Place place{index, 1, step.column};
         if (!step.name.empty()) {
             if (node->kind != Node::Kind::table) {
-                report(place, enclosed(reached, '`') + " is " + std::string(kind_name(node->kind)) + ", it has no keys");
+                report(place, enclosed(reached, '`') + " is " + std::string(kind_name(node->kind)) +
+                                  ", it has no keys");
                 return;
             }
             Entry* entry = node->find(step.name);

@@ -26,11 +26,16 @@ struct Reading {
 // What a node is, for "... is X": its value when it is short.
 std::string node_text(const Node& node) {
     switch (node.kind) {
-        case Node::Kind::boolean: return node.boolean ? "true" : "false";
-        case Node::Kind::integer: return std::to_string(node.integer);
-        case Node::Kind::number: return number_text(node.number);
-        case Node::Kind::text: return "the text " + enclosed(shortened(node.text), '"');
-        default: return std::string(kind_name(node.kind));
+        case Node::Kind::boolean:
+            return node.boolean ? "true" : "false";
+        case Node::Kind::integer:
+            return std::to_string(node.integer);
+        case Node::Kind::number:
+            return number_text(node.number);
+        case Node::Kind::text:
+            return "the text " + enclosed(shortened(node.text), '"');
+        default:
+            return std::string(kind_name(node.kind));
     }
 }
 
@@ -69,7 +74,8 @@ std::optional<std::int64_t> integer_of(const Reading& reading, const Node& node)
         reading.report(node.place, "is " + node_text(node));
         return std::nullopt;
     }
-    // The limits of integers are below 2^53, where doubles are exact; a larger number is too large in any case.
+    // The limits of integers are below 2^53, where doubles are exact; a larger number is too large in any
+    // case.
     if (!check_limits(reading, node.place, double(node.integer))) return std::nullopt;
     return node.integer;
 }
@@ -80,7 +86,8 @@ const std::vector<Node>* three_items(const Reading& reading, const Node& node) {
         reading.report(node.place, "is " + node_text(node));
     } else if (node.items.size() != 3) {
         const std::size_t size = node.items.size();
-        reading.report(node.place, "has " + std::to_string(size) + (size == 1 ? " item" : " items") + ", not 3");
+        reading.report(node.place,
+                       "has " + std::to_string(size) + (size == 1 ? " item" : " items") + ", not 3");
     } else {
         return &node.items;
     }
@@ -113,7 +120,8 @@ void read_range(const Reading& reading, const Node& node, Range& range) {
     }
     if (node.items.size() != 2) {
         const std::size_t size = node.items.size();
-        reading.report(node.place, "has " + std::to_string(size) + (size == 1 ? " item" : " items") + ", not 2");
+        reading.report(node.place,
+                       "has " + std::to_string(size) + (size == 1 ? " item" : " items") + ", not 2");
         return;
     }
     const auto min = number_of({reading.document, reading.key, indexed(reading.path, 0)}, node.items[0]);
@@ -142,7 +150,8 @@ std::optional<int> word_of(const Reading& reading, const Node& node) {
     const std::string_view meant = closest_word(node.text, words);
     std::string expected = reading.expected();
     if (!meant.empty()) expected += "; did you mean " + enclosed(meant, '"') + "?";
-    reading.document.report(node.place, enclosed(reading.path, '`') + " is " + enclosed(shortened(node.text), '"'), expected);
+    reading.document.report(
+        node.place, enclosed(reading.path, '`') + " is " + enclosed(shortened(node.text), '"'), expected);
     return std::nullopt;
 }
 
@@ -210,11 +219,15 @@ void read_value(Document& document, const Key& key, const Node& node, const std:
             if (const auto number = integer_of(reading, node)) as<int>(value) = int(*number);
             break;
         case KeyKind::count:
-            if (const auto number = integer_of(reading, node)) as<std::uint64_t>(value) = std::uint64_t(*number);
+            if (const auto number = integer_of(reading, node))
+                as<std::uint64_t>(value) = std::uint64_t(*number);
             break;
-        case KeyKind::seed: read_seed(reading, node, as<std::uint64_t>(value)); break;
+        case KeyKind::seed:
+            read_seed(reading, node, as<std::uint64_t>(value));
+            break;
         case KeyKind::number:
-            if (const auto number = number_of(reading, node); number && value != nullptr) as<double>(value) = *number;
+            if (const auto number = number_of(reading, node); number && value != nullptr)
+                as<double>(value) = *number;
             break;
         case KeyKind::text:
             if (node.kind == Node::Kind::text) {
@@ -223,7 +236,9 @@ void read_value(Document& document, const Key& key, const Node& node, const std:
                 reading.report(node.place, "is " + node_text(node));
             }
             break;
-        case KeyKind::path: read_path(reading, node, as<std::optional<std::filesystem::path>>(value)); break;
+        case KeyKind::path:
+            read_path(reading, node, as<std::optional<std::filesystem::path>>(value));
+            break;
         case KeyKind::word:
             if (const auto word = word_of(reading, node)) key.set_word(value, *word);
             break;
@@ -233,15 +248,21 @@ void read_value(Document& document, const Key& key, const Node& node, const std:
             }
             break;
         case KeyKind::vector:
-            if (const auto n = read_three(reading, node, number_of)) as<Vec3>(value) = {(*n)[0], (*n)[1], (*n)[2]};
+            if (const auto n = read_three(reading, node, number_of))
+                as<Vec3>(value) = {(*n)[0], (*n)[1], (*n)[2]};
             break;
         case KeyKind::colour:
             if (const auto n = read_three(reading, node, number_of)) as<Rgb>(value) = *n;
             break;
-        case KeyKind::range: read_range(reading, node, as<Range>(value)); break;
-        case KeyKind::boundaries: read_boundaries(reading, node, as<Boundaries>(value)); break;
+        case KeyKind::range:
+            read_range(reading, node, as<Range>(value));
+            break;
+        case KeyKind::boundaries:
+            read_boundaries(reading, node, as<Boundaries>(value));
+            break;
         case KeyKind::table:
-        case KeyKind::tables: break;
+        case KeyKind::tables:
+            break;
     }
 }
 

@@ -16,7 +16,7 @@
 namespace nephos {
 namespace {
 
-// More are counted, but not described: a file of garbage keys would otherwise fill the memory with messages.
+// A file of garbage keys would otherwise fill the memory with messages.
 constexpr std::size_t kMostProblems = 1000;
 
 std::string key_path(const std::string& section_path, const std::string& name) {
@@ -57,10 +57,12 @@ class SceneReader {
             const std::size_t before = document_.problems.size();
             if (full()) break;
             if (const Key* key = section.find(entry.name)) {
-                read_key(*key, entry, key_path(path, key->name), key->value != nullptr ? key->value(owner) : nullptr);
+                read_key(*key, entry, key_path(path, key->name),
+                         key->value != nullptr ? key->value(owner) : nullptr);
             } else {
                 const std::string in = path.empty() ? "a scene" : enclosed(path, '`');
-                document_.report(entry.place, "unknown key " + enclosed(shortened(entry.name), '`') + " in " + in,
+                document_.report(entry.place,
+                                 "unknown key " + enclosed(shortened(entry.name), '`') + " in " + in,
                                  advice_on_unknown_key(section, entry.name));
             }
             if (document_.problems.size() > before) reader.failed.push_back(entry.name);
@@ -68,7 +70,8 @@ class SceneReader {
         check_presence(section, reader);
         const std::size_t before = document_.problems.size();
         const bool whole_scene = path.empty();
-        if (section.finish != nullptr && (whole_scene || reader.failed.empty())) section.finish(reader, owner);
+        if (section.finish != nullptr && (whole_scene || reader.failed.empty()))
+            section.finish(reader, owner);
         return reader.failed.empty() && document_.problems.size() == before;
     }
 
@@ -92,7 +95,8 @@ class SceneReader {
 
     void read_tables(const Key& key, const Node& node, const std::string& path, void* value) {
         if (node.kind == Node::Kind::table) {
-            document_.report(node.place, enclosed(path, '`') + " is one table", "expected an array: write [[" + path + "]]");
+            document_.report(node.place, enclosed(path, '`') + " is one table",
+                             "expected an array: write [[" + path + "]]");
             return;
         }
         if (node.kind != Node::Kind::array) {
@@ -100,8 +104,9 @@ class SceneReader {
             return;
         }
         if (int(node.items.size()) < key.min_items || node.items.size() > std::size_t(key.max_items)) {
-            document_.report(node.place, enclosed(path, '`') + " has " + std::to_string(node.items.size()) + " items",
-                             "expected " + std::to_string(key.min_items) + " to " + std::to_string(key.max_items));
+            document_.report(
+                node.place, enclosed(path, '`') + " has " + std::to_string(node.items.size()) + " items",
+                "expected " + std::to_string(key.min_items) + " to " + std::to_string(key.max_items));
             return;
         }
         for (std::size_t n = 0; n < node.items.size() && !full(); ++n) {
@@ -110,9 +115,10 @@ class SceneReader {
             if (node.items[n].kind == Node::Kind::table) {
                 read_section(*key.section, node.items[n], item_path, element);
             } else {
-                document_.report(node.items[n].place,
-                                 enclosed(item_path, '`') + " is " + std::string(kind_name(node.items[n].kind)),
-                                 "expected a table");
+                document_.report(
+                    node.items[n].place,
+                    enclosed(item_path, '`') + " is " + std::string(kind_name(node.items[n].kind)),
+                    "expected a table");
             }
         }
     }
@@ -132,8 +138,9 @@ class SceneReader {
                 reader.failed.push_back(key.name);
             }
             if (present && !key.replaced_by.empty() && reader.find(key.replaced_by) != nullptr && !full()) {
-                reader.report(key.name, reader.quoted(key.name) + " and " + enclosed(key.replaced_by, '`') +
-                                            " exclude each other",
+                reader.report(key.name,
+                              reader.quoted(key.name) + " and " + enclosed(key.replaced_by, '`') +
+                                  " exclude each other",
                               "expected one of them");
                 reader.failed.push_back(key.name);
             }
@@ -184,6 +191,12 @@ void resolve_initial_state(Scene& scene, const Document& document, const std::fi
     };
     std::stable_sort(problems.begin(), problems.end(),
                      [&](const Problem& a, const Problem& b) { return order(a) < order(b); });
+    if (problems.size() >= kMostProblems) {
+        Problem more;
+        more.where.file = problems.front().where.file;
+        more.message = "too many errors, only the first " + std::to_string(problems.size()) + " are listed";
+        problems.push_back(std::move(more));
+    }
     throw SceneErrors(std::move(problems));
 }
 
@@ -233,7 +246,8 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
     const int file = document.add_origin(label, std::string(text), true);
     if (std::optional<Node> root = document.parse(file)) {
         if (root->entries.empty() && overrides.empty()) {
-            document.report({file, 1, 1}, "the scene is empty", "expected at least one of its keys, such as `name`");
+            document.report({file, 1, 1}, "the scene is empty",
+                            "expected at least one of its keys, such as `name`");
         }
         document.root = std::move(*root);
     }
@@ -247,7 +261,8 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
     if (document.root.find("name") == nullptr) scene.name = name_from(label);
     resolve_initial_state(scene, document, folder);
     try {
-        check(scene.automaton);  // what this reader overlooked would otherwise pass validation and fail in the run
+        check(scene.automaton);  // what this reader overlooked would otherwise pass validation and fail in
+                                 // the run
     } catch (const Error& error) {
         throw_problem(label, error.what(), {});
     }

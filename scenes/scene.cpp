@@ -12,8 +12,8 @@ double frame_time_s(const FrameOptions& frames, int index) {
 int frame_count(const Scene& scene) {
     if (scene.frames.count > 0) return scene.frames.count;
     const double end_s = simulated_time_s(scene);
-    // The quotient is only a first guess: the frame that it names is accepted or refused by its own time, so that
-    // this function and a check of frame_time_s() against the end never disagree by a rounding.
+    // The quotient is only a first guess: the frame that it names is accepted or refused by its own time, so
+    // that this function and a check of frame_time_s() against the end never disagree by a rounding.
     const double guess = (end_s - scene.frames.start_s) * scene.frames.per_second / scene.frames.time_scale;
     if (!(guess > -1.0)) return 0;
     if (guess >= double(kMaxFrames)) return kMaxFrames;

@@ -15,9 +15,9 @@
 
 namespace nephos {
 
-// Which moments of the simulation become frames (a density file and a picture each), and what is written of them.
-// Frame n, counted from 0, shows the simulated time start_s + n * time_scale / per_second, whatever the time step
-// is: between two steps the density is interpolated.
+// Which moments of the simulation become frames (a density file and a picture each), and what is written of
+// them. Frame n, counted from 0, shows the simulated time start_s + n * time_scale / per_second, whatever the
+// time step is: between two steps the density is interpolated.
 struct FrameOptions {
     double per_second = 24.0;  // frames of one second of film, > 0, at most 1000
     double time_scale = 60.0;  // simulated seconds that pass in one second of film, > 0
@@ -30,7 +30,7 @@ struct FrameOptions {
 };
 
 struct Scene {
-    std::string name;         // base name of what is written; letters, digits, '-', '_' and '.'
+    std::string name;  // base name of what is written; letters, digits, '-', '_' and '.'
     AutomatonOptions automaton;
     std::uint64_t steps = 240;  // length of the simulation
     // A VDB file whose bool grids hum, act and cld are the state at step 0, instead of automaton.initial.

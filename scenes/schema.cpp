@@ -107,21 +107,33 @@ std::string unit_text(std::string_view unit) {
 
 std::string expected_text(const Key& key) {
     switch (key.kind) {
-        case KeyKind::boolean: return "true or false";
+        case KeyKind::boolean:
+            return "true or false";
         case KeyKind::integer:
-        case KeyKind::count: return numbers_text(key, "an integer");
+        case KeyKind::count:
+            return numbers_text(key, "an integer");
         case KeyKind::seed:
             return "an integer from 0 to 9223372036854775807, or a text such as \"0xffffffffffffffff\"";
-        case KeyKind::number: return numbers_text(key, "a number");
-        case KeyKind::text: return "a text";
-        case KeyKind::path: return "the name of a file";
-        case KeyKind::word: return quoted_words(key);
-        case KeyKind::extent: return "[x, y, z], each " + numbers_text(key, "an integer");
-        case KeyKind::vector: return "[x, y, z], each " + numbers_text(key, "a number");
-        case KeyKind::colour: return "[red, green, blue], each " + numbers_text(key, "a number");
-        case KeyKind::range: return "[min, max] or one number for both, each " + numbers_text(key, "a number");
-        case KeyKind::boundaries: return "[x, y, z] or one word for all, each " + quoted_words(key);
-        case KeyKind::table: return "a table of keys";
+        case KeyKind::number:
+            return numbers_text(key, "a number");
+        case KeyKind::text:
+            return "a text";
+        case KeyKind::path:
+            return "the name of a file";
+        case KeyKind::word:
+            return quoted_words(key);
+        case KeyKind::extent:
+            return "[x, y, z], each " + numbers_text(key, "an integer");
+        case KeyKind::vector:
+            return "[x, y, z], each " + numbers_text(key, "a number");
+        case KeyKind::colour:
+            return "[red, green, blue], each " + numbers_text(key, "a number");
+        case KeyKind::range:
+            return "[min, max] or one number for both, each " + numbers_text(key, "a number");
+        case KeyKind::boundaries:
+            return "[x, y, z] or one word for all, each " + quoted_words(key);
+        case KeyKind::table:
+            return "a table of keys";
         case KeyKind::tables: {
             std::string out = "an array of tables";
             if (key.min_items > 0) out += ", at least " + std::to_string(key.min_items);
@@ -134,24 +146,25 @@ std::string expected_text(const Key& key) {
 const Section& scene_section() {
     using namespace schema_build;
     static const Section section = [] {
-        Key name = default_is(key<&Scene::name>("name", "", kAny,
-                                                "Base name of the files that are written: letters, digits, `-`, `_` and `.`."),
-                              "the name of the scene's file");
+        Key name = default_is(
+            key<&Scene::name>("name", "", kAny,
+                              "Base name of the files that are written: letters, digits, `-`, `_` and `.`."),
+            "the name of the scene's file");
         Key seed = key<&Scene::automaton, &AutomatonOptions::seed>(
             "seed", "", kAny,
             "Start of all randomness: the same seed gives the same clouds, bit for bit, on every machine.");
         seed.kind = KeyKind::seed;
-        return Section{"Scene",
-                       "",
-                       {name, seed, group("lattice", lattice_section()), group("time", time_section()),
-                        group("field", field_section()),
-                        tables<&Scene::automaton, &AutomatonOptions::wind, &Wind::keyframes>("wind", wind_section(), 0,
-                                                                                             10'000),
-                        group("density", density_section()), group("frames", frames_section()),
-                        group("camera", camera_section()), group("sun", sun_section()),
-                        group("light", light_section()), group("air", air_section()),
-                        group("ground", ground_section())},
-                       &finish_scene};
+        return Section{
+            "Scene",
+            "",
+            {name, seed, group("lattice", lattice_section()), group("time", time_section()),
+             group("field", field_section()),
+             tables<&Scene::automaton, &AutomatonOptions::wind, &Wind::keyframes>("wind", wind_section(), 0,
+                                                                                  10'000),
+             group("density", density_section()), group("frames", frames_section()),
+             group("camera", camera_section()), group("sun", sun_section()), group("light", light_section()),
+             group("air", air_section()), group("ground", ground_section())},
+            &finish_scene};
     }();
     return section;
 }

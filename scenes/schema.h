@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The description of every key of a scene: its name, type, unit, range, default, effect and source, and where its
-// value lies in the option structs. Reading, checking, writing, the JSON Schema and the reference page all walk
-// this one description, so that none of them can drift from the others.
+// The description of every key of a scene: its name, type, unit, range, default, effect and source, and where
+// its value lies in the option structs. Reading, checking, writing, the JSON Schema and the reference page
+// all walk this one description, so that none of them can drift from the others.
 //
 //     Section (a table of the file)  -- keys -->  Key  -- section -->  Section of a nested table
 //
-// A key knows its value by a function from the section's owner to the value: sections such as [lattice] have the
-// Scene itself as owner and reach into its parts; the elements of an array of tables own themselves.
+// A key knows its value by a function from the section's owner to the value: sections such as [lattice] have
+// the Scene itself as owner and reach into its parts; the elements of an array of tables own themselves.
 
 #include <cstdint>
 #include <limits>
@@ -23,18 +23,18 @@ namespace nephos {
 
 // What a key holds: the form in the file, and the C++ type behind Key::value.
 enum class KeyKind {
-    boolean,     // true or false                                           bool
-    integer,     //                                                         int
-    count,       // an integer >= 0                                         std::uint64_t
-    seed,        // an integer >= 0, or a text with all 64 bits             std::uint64_t
-    number,      //                                                         double
-    text,        //                                                         std::string
-    path,        // the name of a file                                      std::optional<std::filesystem::path>
-    word,        // one of Key::words                                       an enum with values 0, 1, 2 ...
-    extent,      // [x, y, z], integers                                     Extent
-    vector,      // [x, y, z]                                               Vec3
-    colour,      // [red, green, blue], linear                              Rgb
-    range,       // [min, max], or one number for both                      Range
+    boolean,  // true or false                                           bool
+    integer,  //                                                         int
+    count,    // an integer >= 0                                         std::uint64_t
+    seed,     // an integer >= 0, or a text with all 64 bits             std::uint64_t
+    number,   //                                                         double
+    text,     //                                                         std::string
+    path,     // the name of a file                                      std::optional<std::filesystem::path>
+    word,     // one of Key::words                                       an enum with values 0, 1, 2 ...
+    extent,   // [x, y, z], integers                                     Extent
+    vector,   // [x, y, z]                                               Vec3
+    colour,   // [red, green, blue], linear                              Rgb
+    range,    // [min, max], or one number for both                      Range
     boundaries,  // [x, y, z] of Key::words, or one for all                 Boundaries
     table,       // a table, described by Key::section                      its owner
     tables,      // any number of tables, each described by Key::section    std::vector of owners
@@ -54,26 +54,27 @@ struct Section;
 struct Key {
     std::string name;
     KeyKind kind{};
-    std::string unit;    // "m", "deg", "cells", ...; empty: none
+    std::string unit;  // "m", "deg", "cells", ...; empty: none
     Limits limits;
     std::string effect;  // what it does, in a sentence or two
     std::string source;  // where it comes from: "D, advection"; empty: nephos' own
 
-    // The value within its section's owner; null for a key that Section::finish reads (another form of the same).
+    // The value within its section's owner; null for a key that Section::finish reads (another form of the
+    // same).
     void* (*value)(void* owner) = nullptr;
 
     bool required = false;
-    std::string default_text;                   // what a missing key means, where no constant says it
-    std::vector<std::string_view> words;        // in the order of the enum's values
+    std::string default_text;             // what a missing key means, where no constant says it
+    std::vector<std::string_view> words;  // in the order of the enum's values
     int (*word_index)(const void* value) = nullptr;
     void (*set_word)(void* value, int index) = nullptr;
-    std::vector<std::string> together_with;     // keys that must be there with this one
-    std::string replaced_by;                    // a key that takes this one's place: only one of both may be there
+    std::vector<std::string> together_with;  // keys that must be there with this one
+    std::string replaced_by;  // a key that takes this one's place: only one of both may be there
 
-    const Section* section = nullptr;           // table, tables
-    int min_items = 0, max_items = 0;           // tables
-    const void* element_defaults = nullptr;     // tables: an element as append() makes it
-    void* (*append)(void* vector) = nullptr;    // adds an element with the section's defaults and returns it
+    const Section* section = nullptr;         // table, tables
+    int min_items = 0, max_items = 0;         // tables
+    const void* element_defaults = nullptr;   // tables: an element as append() makes it
+    void* (*append)(void* vector) = nullptr;  // adds an element with the section's defaults and returns it
     std::size_t (*size)(const void* vector) = nullptr;
     const void* (*element)(const void* vector, std::size_t index) = nullptr;
 };
@@ -82,8 +83,9 @@ struct Key {
 struct SectionReader {
     Document& document;
     const Node& table;
-    std::string path;                 // of the section, "" at the top
-    std::vector<std::string> failed;  // its keys that have problems already; their values are still the defaults
+    std::string path;  // of the section, "" at the top
+    std::vector<std::string>
+        failed;  // its keys that have problems already; their values are still the defaults
 
     // Whether all of these keys were read without a problem, or are missing.
     bool sound(std::initializer_list<std::string_view> names) const;
@@ -103,8 +105,8 @@ struct Section {
     std::string title;
     std::string effect;
     std::vector<Key> keys;
-    // Checks what concerns several keys, and reads keys without a value. Called when every key was read without a
-    // problem; for the whole scene always, with SectionReader::failed. May be null.
+    // Checks what concerns several keys, and reads keys without a value. Called when every key was read
+    // without a problem; for the whole scene always, with SectionReader::failed. May be null.
     void (*finish)(const SectionReader& reader, void* owner) = nullptr;
 
     const Key* find(std::string_view name) const;

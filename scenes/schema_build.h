@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How the tables of schema_keys.cpp are written down: a key is built from pointers to members, from which its kind
-// and the way to its value follow. Internal to scenes/.
+// How the tables of schema_keys.cpp are written down: a key is built from pointers to members, from which its
+// kind and the way to its value follow. Internal to scenes/.
 
 #include <array>
 #include <filesystem>
@@ -46,18 +46,30 @@ inline void* whole_owner(void* owner) { return owner; }
 
 template <typename T>
 constexpr KeyKind kind_of() {
-    if constexpr (std::is_same_v<T, bool>) return KeyKind::boolean;
-    else if constexpr (std::is_same_v<T, int>) return KeyKind::integer;
-    else if constexpr (std::is_same_v<T, std::uint64_t>) return KeyKind::count;
-    else if constexpr (std::is_same_v<T, double>) return KeyKind::number;
-    else if constexpr (std::is_same_v<T, std::string>) return KeyKind::text;
-    else if constexpr (std::is_same_v<T, std::optional<std::filesystem::path>>) return KeyKind::path;
-    else if constexpr (std::is_same_v<T, Extent>) return KeyKind::extent;
-    else if constexpr (std::is_same_v<T, Vec3>) return KeyKind::vector;
-    else if constexpr (std::is_same_v<T, std::array<double, 3>>) return KeyKind::colour;
-    else if constexpr (std::is_same_v<T, Range>) return KeyKind::range;
-    else if constexpr (std::is_same_v<T, Boundaries>) return KeyKind::boundaries;
-    else static_assert(!sizeof(T), "no kind of key for this type");
+    if constexpr (std::is_same_v<T, bool>)
+        return KeyKind::boolean;
+    else if constexpr (std::is_same_v<T, int>)
+        return KeyKind::integer;
+    else if constexpr (std::is_same_v<T, std::uint64_t>)
+        return KeyKind::count;
+    else if constexpr (std::is_same_v<T, double>)
+        return KeyKind::number;
+    else if constexpr (std::is_same_v<T, std::string>)
+        return KeyKind::text;
+    else if constexpr (std::is_same_v<T, std::optional<std::filesystem::path>>)
+        return KeyKind::path;
+    else if constexpr (std::is_same_v<T, Extent>)
+        return KeyKind::extent;
+    else if constexpr (std::is_same_v<T, Vec3>)
+        return KeyKind::vector;
+    else if constexpr (std::is_same_v<T, std::array<double, 3>>)
+        return KeyKind::colour;
+    else if constexpr (std::is_same_v<T, Range>)
+        return KeyKind::range;
+    else if constexpr (std::is_same_v<T, Boundaries>)
+        return KeyKind::boundaries;
+    else
+        static_assert(!sizeof(T), "no kind of key for this type");
 }
 
 inline Key plain_key(KeyKind kind, std::string name, std::string unit, Limits limits, std::string effect,
@@ -75,7 +87,8 @@ inline Key plain_key(KeyKind kind, std::string name, std::string unit, Limits li
 template <auto... Members>
 Key key(std::string name, std::string unit, Limits limits, std::string effect, std::string source = {}) {
     constexpr KeyKind kind = kind_of<typename Chain<Members...>::value_type>();
-    Key made = plain_key(kind, std::move(name), std::move(unit), limits, std::move(effect), std::move(source));
+    Key made =
+        plain_key(kind, std::move(name), std::move(unit), limits, std::move(effect), std::move(source));
     made.value = &value_at<Members...>;
     return made;
 }

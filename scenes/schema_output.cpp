@@ -15,13 +15,15 @@ constexpr double kFarthest_m = 1e7;
 constexpr Limits kLight = between(0, 1000);
 
 template <auto... Members>
-Key density_key(std::string name, std::string unit, Limits limits, std::string effect, std::string source = {}) {
+Key density_key(std::string name, std::string unit, Limits limits, std::string effect,
+                std::string source = {}) {
     return key<&Scene::density, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
                                             std::move(source));
 }
 
 template <auto... Members>
-Key render_key(std::string name, std::string unit, Limits limits, std::string effect, std::string source = {}) {
+Key render_key(std::string name, std::string unit, Limits limits, std::string effect,
+               std::string source = {}) {
     return key<&Scene::render, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
                                            std::move(source));
 }
@@ -31,14 +33,15 @@ const Section& smoothing_section() {
     static const Section section{
         "Smoothing",
         "The window in space and time over which cloud cells are averaged to a density.",
-        {word<&SmoothingOptions::kernel>("kernel", {"box", "tent", "gaussian"},
-                                         "Weights in the window: all the same, falling to the edge, or bell-shaped.",
-                                         "D, density"),
-         key<&SmoothingOptions::i0>("i0", "cells", kReach, "Reach towards east and west; larger is softer.", "D, density"),
+        {word<&SmoothingOptions::kernel>(
+             "kernel", {"box", "tent", "gaussian"},
+             "Weights in the window: all the same, falling to the edge, or bell-shaped.", "D, density"),
+         key<&SmoothingOptions::i0>("i0", "cells", kReach, "Reach towards east and west; larger is softer.",
+                                    "D, density"),
          key<&SmoothingOptions::j0>("j0", "cells", kReach, "Reach towards north and south.", "D, density"),
          key<&SmoothingOptions::k0>("k0", "cells", kReach, "Reach up and down.", "D, density"),
-         key<&SmoothingOptions::t0>("t0", "steps", kReach, "Reach in time; larger makes clouds change more calmly.",
-                                    "D, density")},
+         key<&SmoothingOptions::t0>("t0", "steps", kReach,
+                                    "Reach in time; larger makes clouds change more calmly.", "D, density")},
         nullptr};
     return section;
 }
@@ -62,14 +65,17 @@ const Section& density_section() {
                                                             smoothing_section().effect),
          density_key<&DensityOptions::extinction_per_m>(
              "extinction_per_m", "1/m", above(0, 100),
-             "Extinction coefficient where the density is 1: larger makes clouds more opaque. Also in every file."),
+             "Extinction coefficient where the density is 1: larger makes clouds more opaque. Also in every "
+             "file."),
          density_key<&DensityOptions::metaball_radius_cells>(
-             "metaball_radius_cells", "cells", between(1, 8), "Effective radius of a metaball; larger is softer.",
-             "D, density"),
+             "metaball_radius_cells", "cells", between(1, 8),
+             "Effective radius of a metaball; larger is softer.", "D, density"),
          density_key<&DensityOptions::refine>(
              "refine", "voxels per cell", between(1, 8),
-             "Voxels written per cell and axis; above 1 the field of metaballs is sampled on a finer grid.", "D, density"),
-         density_key<&DensityOptions::half>("half", "", kAny, "Write 16-bit floats: half the size, 3 digits."),
+             "Voxels written per cell and axis; above 1 the field of metaballs is sampled on a finer grid.",
+             "D, density"),
+         density_key<&DensityOptions::half>("half", "", kAny,
+                                            "Write 16-bit floats: half the size, 3 digits."),
          density_key<&DensityOptions::write_state>("write_state", "", kAny,
                                                    "Write also the bool grids `hum`, `act` and `cld`."),
          density_key<&DensityOptions::write_velocity>("write_velocity", "", kAny,
@@ -85,13 +91,16 @@ const Section& frames_section() {
         "`start_s` + n * `time_scale` / `per_second`, whatever the time step is.",
         {key<&Scene::frames, &FrameOptions::per_second>("per_second", "1/s", above(0, 1000),
                                                         "Frames of one second of film.", "D, density"),
-         key<&Scene::frames, &FrameOptions::time_scale>("time_scale", "s/s", above(0, 1e6),
-                                                        "Simulated seconds in one second of film: 1 is real time."),
-         key<&Scene::frames, &FrameOptions::start_s>("start_s", "s", between(0, 1e15),
-                                                     "Simulated time of the first frame: skips the growing of the clouds."),
-         key<&Scene::frames, &FrameOptions::count>("count", "", between(0, kMaxFrames),
-                                                   "Number of frames; 0: as many as the simulated time holds."),
-         key<&Scene::frames, &FrameOptions::png>("png", "", kAny, "Write a tone-mapped picture of each frame."),
+         key<&Scene::frames, &FrameOptions::time_scale>(
+             "time_scale", "s/s", above(0, 1e6), "Simulated seconds in one second of film: 1 is real time."),
+         key<&Scene::frames, &FrameOptions::start_s>(
+             "start_s", "s", between(0, 1e15),
+             "Simulated time of the first frame: skips the growing of the clouds."),
+         key<&Scene::frames, &FrameOptions::count>(
+             "count", "", between(0, kMaxFrames),
+             "Number of frames; 0: as many as the simulated time holds."),
+         key<&Scene::frames, &FrameOptions::png>("png", "", kAny,
+                                                 "Write a tone-mapped picture of each frame."),
          key<&Scene::frames, &FrameOptions::exr>("exr", "", kAny,
                                                  "Write a linear picture of each frame with all layers."),
          key<&Scene::frames, &FrameOptions::video>("video", "", kAny,
@@ -106,14 +115,17 @@ const Section& camera_section() {
     static const Section section{
         "Camera",
         "A perspective camera; height is up in the picture.",
-        {render_key<&RenderOptions::camera, &Camera::position_m>("position_m", "m", kWorld, "Where it stands."),
+        {render_key<&RenderOptions::camera, &Camera::position_m>("position_m", "m", kWorld,
+                                                                 "Where it stands."),
          render_key<&RenderOptions::camera, &Camera::target_m>("target_m", "m", kWorld, "What it looks at."),
-         render_key<&RenderOptions::camera, &Camera::vertical_fov_deg>("vertical_fov_deg", "deg", between(1, 170),
-                                                                       "Angle from the picture's lower to its upper edge."),
-         render_key<&RenderOptions::camera, &Camera::width>("width", "pixels", kPixels, "Width of the picture."),
-         render_key<&RenderOptions::camera, &Camera::height>("height", "pixels", kPixels, "Height of the picture."),
-         render_key<&RenderOptions::camera, &Camera::exposure_ev>("exposure_ev", "stops", between(-30, 30),
-                                                                  "Each stop doubles the brightness of the picture.")},
+         render_key<&RenderOptions::camera, &Camera::vertical_fov_deg>(
+             "vertical_fov_deg", "deg", between(1, 170), "Angle from the picture's lower to its upper edge."),
+         render_key<&RenderOptions::camera, &Camera::width>("width", "pixels", kPixels,
+                                                            "Width of the picture."),
+         render_key<&RenderOptions::camera, &Camera::height>("height", "pixels", kPixels,
+                                                             "Height of the picture."),
+         render_key<&RenderOptions::camera, &Camera::exposure_ev>(
+             "exposure_ev", "stops", between(-30, 30), "Each stop doubles the brightness of the picture.")},
         &finish_camera};
     return section;
 }
@@ -126,11 +138,11 @@ const Section& sun_section() {
                                                               "Height above the horizon."),
          render_key<&RenderOptions::sun, &Sun::azimuth_deg>("azimuth_deg", "deg", between(-360, 360),
                                                             "Where it stands, clockwise from north."),
-         render_key<&RenderOptions::sun, &Sun::colour>("colour", "", kLight, "Its linear colour and strength.",
-                                                       "D, step 1"),
-         render_key<&RenderOptions::shadow_map_size>("shadow_map_size", "texels", between(16, 8192),
-                                                     "Side of the map of the clouds' shadow; larger is sharper.",
-                                                     "D, step 1")},
+         render_key<&RenderOptions::sun, &Sun::colour>("colour", "", kLight,
+                                                       "Its linear colour and strength.", "D, step 1"),
+         render_key<&RenderOptions::shadow_map_size>(
+             "shadow_map_size", "texels", between(16, 8192),
+             "Side of the map of the clouds' shadow; larger is sharper.", "D, step 1")},
         nullptr};
     return section;
 }
@@ -140,14 +152,18 @@ const Section& light_section() {
         "Light in clouds",
         "How clouds scatter light.",
         {render_key<&RenderOptions::light, &CloudLight::albedo>(
-             "albedo", "", between(0, 1), "Share of the light that is scattered and not absorbed; below 1 the whole cloud is darker.", "D, step 1"),
+             "albedo", "", between(0, 1),
+             "Share of the light that is scattered and not absorbed; below 1 the whole cloud is darker.",
+             "D, step 1"),
          render_key<&RenderOptions::light, &CloudLight::g>(
              "g", "", between(-0.99, 0.99),
-             "Asymmetry of the phase function: above 0 light goes forward, so the rims of clouds before the sun shine.",
+             "Asymmetry of the phase function: above 0 light goes forward, so the rims of clouds before the "
+             "sun shine.",
              "S, phase function"),
          render_key<&RenderOptions::light, &CloudLight::multiple_scattering>(
              "multiple_scattering", "", between(0, 10),
-             "Strength of the sunlight that arrives after many scatterings and reaches deep into a cloud; 0 is single "
+             "Strength of the sunlight that arrives after many scatterings and reaches deep into a cloud; 0 "
+             "is single "
              "scattering alone, with grey tops and dark bases."),
          render_key<&RenderOptions::light, &CloudLight::ambient_top>(
              "ambient_top", "", kLight, "Light of the sky that the top of a cloud scatters, linear colour."),
@@ -163,23 +179,25 @@ const Section& air_section() {
         "The air between cloud and eye, and the sky behind.",
         {render_key<&RenderOptions::air, &Air::extinction_per_m>(
              "extinction_per_m", "1/m", between(0, 1),
-             "Extinction of the air for red, green and blue: larger veils what is far away.", "D, light shafts (beta)"),
-         render_key<&RenderOptions::air, &Air::horizon>("horizon", "", kLight,
-                                                        "Linear colour of the sky at the horizon, also of the veil."),
-         render_key<&RenderOptions::air, &Air::zenith>("zenith", "", kLight, "Linear colour of the sky overhead.")},
+             "Extinction of the air for red, green and blue: larger veils what is far away.",
+             "D, light shafts (beta)"),
+         render_key<&RenderOptions::air, &Air::horizon>(
+             "horizon", "", kLight, "Linear colour of the sky at the horizon, also of the veil."),
+         render_key<&RenderOptions::air, &Air::zenith>("zenith", "", kLight,
+                                                       "Linear colour of the sky overhead.")},
         nullptr};
     return section;
 }
 
 const Section& ground_section() {
-    static const Section section{
-        "Ground",
-        "The plane that wears the clouds' shadow.",
-        {render_key<&RenderOptions::ground, &Ground::height_m>("height_m", "m", between(-1e5, 1e5), "Its height."),
-         render_key<&RenderOptions::ground, &Ground::albedo>("albedo", "", between(0, 1),
-                                                             "Share of the light that it reflects: red, green, blue.",
-                                                             "D, step 2")},
-        nullptr};
+    static const Section section{"Ground",
+                                 "The plane that wears the clouds' shadow.",
+                                 {render_key<&RenderOptions::ground, &Ground::height_m>(
+                                      "height_m", "m", between(-1e5, 1e5), "Its height."),
+                                  render_key<&RenderOptions::ground, &Ground::albedo>(
+                                      "albedo", "", between(0, 1),
+                                      "Share of the light that it reflects: red, green, blue.", "D, step 2")},
+                                 nullptr};
     return section;
 }
 

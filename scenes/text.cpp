@@ -66,7 +66,8 @@ std::string printable(std::string_view text) {
 
 std::string shortened(std::string_view text, std::size_t limit) {
     std::size_t offset = 0;
-    for (std::size_t n = 0; n < limit && offset < text.size(); ++n) offset += character_at(text, offset).bytes.size();
+    for (std::size_t n = 0; n < limit && offset < text.size(); ++n)
+        offset += character_at(text, offset).bytes.size();
     std::string out = printable(text.substr(0, offset));
     if (offset < text.size()) out += "...";
     return out;

@@ -26,7 +26,8 @@ std::size_t find_invalid_utf8(std::string_view text);
 // Columns that a character takes in a terminal: 0 (combining), 1 or 2 (East Asian wide, emoji).
 int display_width(char32_t code);
 
-// The text without control characters and invalid bytes (each becomes U+FFFD), so that it can be shown; tabs stay.
+// The text without control characters and invalid bytes (each becomes U+FFFD), so that it can be shown; tabs
+// stay.
 std::string printable(std::string_view text);
 
 // A text for a message: printable, at most `limit` characters and then an ellipsis.

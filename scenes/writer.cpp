@@ -35,7 +35,8 @@ std::string seed_text(std::uint64_t seed) {
 bool has_value(const Key& key, const void* owner) {
     if (key.value == nullptr) return false;
     if (key.kind == KeyKind::tables) return key.size(value_of(key, owner)) > 0;
-    return key.kind != KeyKind::path || as<std::optional<std::filesystem::path>>(value_of(key, owner)).has_value();
+    return key.kind != KeyKind::path ||
+           as<std::optional<std::filesystem::path>>(value_of(key, owner)).has_value();
 }
 
 bool is_written(const Section& section, const Key& key, const void* owner) {
@@ -77,11 +78,13 @@ bool has_plain_keys(const Section& section) {
     return false;
 }
 
-// Tables of the file get a header each, the elements of an array of tables too; what lies in them stands inline.
+// Tables of the file get a header each, the elements of an array of tables too; what lies in them stands
+// inline.
 void write_section(std::string& out, const Section& section, const void* owner, const std::string& path) {
     write_plain_keys(out, section, owner);
     for (const Key& key : section.keys) {
-        if ((key.kind != KeyKind::table && key.kind != KeyKind::tables) || !is_written(section, key, owner)) continue;
+        if ((key.kind != KeyKind::table && key.kind != KeyKind::tables) || !is_written(section, key, owner))
+            continue;
         const std::string key_path = path.empty() ? key.name : path + "." + key.name;
         const void* value = value_of(key, owner);
         if (key.kind == KeyKind::table) {
@@ -122,13 +125,20 @@ std::string value_text(const Key& key, const void* value) {
         return array_text(items);
     };
     switch (key.kind) {
-        case KeyKind::boolean: return as<bool>(value) ? "true" : "false";
-        case KeyKind::integer: return std::to_string(as<int>(value));
-        case KeyKind::count: return std::to_string(as<std::uint64_t>(value));
-        case KeyKind::seed: return seed_text(as<std::uint64_t>(value));
-        case KeyKind::number: return toml_number(as<double>(value));
-        case KeyKind::text: return toml_string(as<std::string>(value));
-        case KeyKind::word: return toml_string(key.words[std::size_t(key.word_index(value))]);
+        case KeyKind::boolean:
+            return as<bool>(value) ? "true" : "false";
+        case KeyKind::integer:
+            return std::to_string(as<int>(value));
+        case KeyKind::count:
+            return std::to_string(as<std::uint64_t>(value));
+        case KeyKind::seed:
+            return seed_text(as<std::uint64_t>(value));
+        case KeyKind::number:
+            return toml_number(as<double>(value));
+        case KeyKind::text:
+            return toml_string(as<std::string>(value));
+        case KeyKind::word:
+            return toml_string(key.words[std::size_t(key.word_index(value))]);
         case KeyKind::path: {
             const auto& path = as<std::optional<std::filesystem::path>>(value);
             return path ? toml_string(path->generic_string()) : std::string();
@@ -154,8 +164,10 @@ std::string value_text(const Key& key, const void* value) {
             const auto& boundaries = as<Boundaries>(value);
             return words({boundaries.x, boundaries.y, boundaries.z});
         }
-        case KeyKind::table: return inline_table(*key.section, value);
-        case KeyKind::tables: return array_of_tables(key, value);
+        case KeyKind::table:
+            return inline_table(*key.section, value);
+        case KeyKind::tables:
+            return array_of_tables(key, value);
     }
     return {};
 }

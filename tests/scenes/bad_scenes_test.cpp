@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every scene in tests/scenes/bad has its messages beside it, NAME.txt for NAME.toml: what a user sees, to the letter.
-// After a deliberate change of a message, run with NEPHOS_UPDATE_GOLDEN=1 and read the difference.
-
-#include <gtest/gtest.h>
+// Every scene in tests/scenes/bad has its messages beside it, NAME.txt for NAME.toml: what a user sees, to
+// the letter. After a deliberate change of a message, run with NEPHOS_UPDATE_GOLDEN=1 and read the
+// difference.
 
 #include <algorithm>
 #include <chrono>
@@ -12,6 +11,8 @@
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include "scenes/reader.h"
 
@@ -127,9 +128,14 @@ TEST(BadScenes, WorstCasesOfTheAllowedSizeEndInTime) {
         return text;
     };
     const auto start = std::chrono::steady_clock::now();
-    EXPECT_EQ(problems_of(repeated([](int n, std::string& out) { ((out += "key") += std::to_string(n)) += " = 1\n"; })), 1000u);
-    EXPECT_EQ(problems_of(repeated([](int n, std::string& out) { ((out += "a") += std::to_string(n)) += ".b = 1\n"; })), 1u);
+    EXPECT_EQ(problems_of(repeated(
+                  [](int n, std::string& out) { ((out += "key") += std::to_string(n)) += " = 1\n"; })),
+              1001u);
+    EXPECT_EQ(problems_of(repeated(
+                  [](int n, std::string& out) { ((out += "a") += std::to_string(n)) += ".b = 1\n"; })),
+              1u);
     EXPECT_EQ(problems_of("name = [" + repeated([](int, std::string& out) { out += "1,"; }) + "]\n"), 1u);
+    EXPECT_EQ(problems_of(repeated([](int, std::string& out) { out += "[[a]]\n"; })), 1u);
     EXPECT_EQ(problems_of("name = \"" + std::string(kMaxSceneBytes - 100, 'x') + "\"\n"), 1u);
     EXPECT_EQ(problems_of("sun.elevation_deg = [" + std::string(kMaxSceneBytes - 100, '[')), 1u);
     EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));

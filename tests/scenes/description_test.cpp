@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The description of the keys is complete and its products are up to date: every field of every option struct has a
-// key, every key reads and writes its field, and the JSON Schema and the reference in the tree are the generated ones.
-
-#include <gtest/gtest.h>
+// The description of the keys is complete and its products are up to date: every field of every option struct
+// has a key, every key reads and writes its field, and the JSON Schema and the reference in the tree are the
+// generated ones.
 
 #include <cmath>
 #include <fstream>
@@ -10,6 +9,8 @@
 #include <set>
 #include <sstream>
 #include <string>
+
+#include <gtest/gtest.h>
 
 #include "scenes/describe.h"
 #include "scenes/reader.h"
@@ -113,7 +114,9 @@ double changed(double value, const Limits& limits) {
     return value;
 }
 
-int changed_integer(int value, const Limits& limits) { return value + 1 <= limits.max ? value + 1 : value - 1; }
+int changed_integer(int value, const Limits& limits) {
+    return value + 1 <= limits.max ? value + 1 : value - 1;
+}
 
 template <typename T>
 T& as(void* value) {
@@ -123,24 +126,49 @@ T& as(void* value) {
 // Gives a key's value another one that is allowed.
 void change(const Key& key, void* value) {
     switch (key.kind) {
-        case KeyKind::boolean: as<bool>(value) = !as<bool>(value); break;
-        case KeyKind::integer: as<int>(value) = changed_integer(as<int>(value), key.limits); break;
-        case KeyKind::count: as<std::uint64_t>(value) += 3; break;
-        case KeyKind::seed: as<std::uint64_t>(value) = 0x8000000000000005; break;
-        case KeyKind::number: as<double>(value) = changed(as<double>(value), key.limits); break;
-        case KeyKind::text: as<std::string>(value) += "-other"; break;
-        case KeyKind::path: as<std::optional<std::filesystem::path>>(value) = "/a folder/\"state\"\t\xE9\x9B\xB2.vdb"; break;
-        case KeyKind::word: key.set_word(value, key.word_index(value) == 0 ? 1 : 0); break;
-        case KeyKind::extent: as<Extent>(value).y += 1; break;
-        case KeyKind::vector: as<Vec3>(value).z = changed(as<Vec3>(value).z, key.limits); break;
-        case KeyKind::colour: as<Rgb>(value)[1] = changed(as<Rgb>(value)[1], key.limits); break;
+        case KeyKind::boolean:
+            as<bool>(value) = !as<bool>(value);
+            break;
+        case KeyKind::integer:
+            as<int>(value) = changed_integer(as<int>(value), key.limits);
+            break;
+        case KeyKind::count:
+            as<std::uint64_t>(value) += 3;
+            break;
+        case KeyKind::seed:
+            as<std::uint64_t>(value) = 0x8000000000000005;
+            break;
+        case KeyKind::number:
+            as<double>(value) = changed(as<double>(value), key.limits);
+            break;
+        case KeyKind::text:
+            as<std::string>(value) += "-other";
+            break;
+        case KeyKind::path:
+            as<std::optional<std::filesystem::path>>(value) = "/a folder/\"state\"\t\xE9\x9B\xB2.vdb";
+            break;
+        case KeyKind::word:
+            key.set_word(value, key.word_index(value) == 0 ? 1 : 0);
+            break;
+        case KeyKind::extent:
+            as<Extent>(value).y += 1;
+            break;
+        case KeyKind::vector:
+            as<Vec3>(value).z = changed(as<Vec3>(value).z, key.limits);
+            break;
+        case KeyKind::colour:
+            as<Rgb>(value)[1] = changed(as<Rgb>(value)[1], key.limits);
+            break;
         case KeyKind::range:
             as<Range>(value).min = changed(std::min(as<Range>(value).min, 400.0), key.limits);
             as<Range>(value).max = std::max(as<Range>(value).min, std::min(as<Range>(value).max, 1e6));
             break;
-        case KeyKind::boundaries: as<Boundaries>(value).z = Boundary::periodic; break;
+        case KeyKind::boundaries:
+            as<Boundaries>(value).z = Boundary::periodic;
+            break;
         case KeyKind::table:
-        case KeyKind::tables: break;
+        case KeyKind::tables:
+            break;
     }
 }
 
@@ -164,7 +192,8 @@ void for_every_value(const Section& section, void* owner, const std::string& pat
     }
 }
 
-// Every value, changed alone, is written, read back as it was, and seen by the hash; and no two keys share a value.
+// Every value, changed alone, is written, read back as it was, and seen by the hash; and no two keys share a
+// value.
 TEST(Description, EveryKeyReadsAndWritesItsOwnValue) {
     std::set<std::string> hashes{scene_hash(full_scene())};
     std::set<const void*> values;
@@ -178,9 +207,10 @@ TEST(Description, EveryKeyReadsAndWritesItsOwnValue) {
     for (const std::string& wanted : paths) {
         SCOPED_TRACE(wanted);
         Scene scene = full_scene();
-        for_every_value(scene_section(), &scene, "", [&](const Key& key, void* value, const std::string& path) {
-            if (path == wanted) change(key, value);
-        });
+        for_every_value(scene_section(), &scene, "",
+                        [&](const Key& key, void* value, const std::string& path) {
+                            if (path == wanted) change(key, value);
+                        });
         const std::string text = to_toml(scene);
         EXPECT_TRUE(hashes.insert(scene_hash(scene)).second) << "the hash does not see it";
         EXPECT_EQ(read_scene_text(text, "again.toml"), scene) << text;
@@ -190,13 +220,18 @@ TEST(Description, EveryKeyReadsAndWritesItsOwnValue) {
 
 // What a user is told must be there: each key has its effect, each number with a dimension its unit.
 TEST(Description, EveryKeyIsExplained) {
-    std::function<void(const Section&, const std::string&)> visit = [&](const Section& section, const std::string& path) {
+    std::function<void(const Section&, const std::string&)> visit = [&](const Section& section,
+                                                                        const std::string& path) {
         for (const Key& key : section.keys) {
             const std::string here = path + "/" + key.name;
             EXPECT_FALSE(key.effect.empty()) << here;
             EXPECT_FALSE(expected_text(key).empty()) << here;
-            for (const auto& [suffix, unit] : {std::pair{"_m", "m"}, {"_s", "s"}, {"_deg", "deg"}, {"_per_m", "1/m"},
-                                               {"_m_per_s", "m/s"}, {"_cells", "cells"}}) {
+            for (const auto& [suffix, unit] : {std::pair{"_m", "m"},
+                                               {"_s", "s"},
+                                               {"_deg", "deg"},
+                                               {"_per_m", "1/m"},
+                                               {"_m_per_s", "m/s"},
+                                               {"_cells", "cells"}}) {
                 const std::string end = suffix;
                 const bool ends = key.name.ends_with(end);
                 const bool longer = key.name.ends_with("_per" + end) || key.name.ends_with("_m_per_s");

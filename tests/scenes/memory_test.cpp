@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // A scene that does not fit is refused with both figures, whatever it is that limits the memory.
 
-#include <gtest/gtest.h>
-#include <sys/resource.h>
+#include "scenes/memory.h"
 
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <string>
 
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
 #include "automaton/automaton.h"
 #include "automaton/error.h"
-#include "scenes/memory.h"
 
 namespace nephos {
 namespace {
@@ -48,12 +49,14 @@ TEST(AvailableMemory, IsTheFreeMemoryOfTheMachine) {
 TEST(AvailableMemory, IsWhatControlGroupsOfVersion2Leave) {
     FakeSystem system;
     system.file("proc/meminfo", "MemAvailable: 9000000 kB\n").file("proc/self/cgroup", "0::/outer/inner\n");
-    system.file("sys/fs/cgroup/outer/inner/memory.max", "max\n").file("sys/fs/cgroup/outer/inner/memory.current", "5\n");
+    system.file("sys/fs/cgroup/outer/inner/memory.max", "max\n")
+        .file("sys/fs/cgroup/outer/inner/memory.current", "5\n");
     EXPECT_EQ(system.available().bytes, std::size_t(9000000) * 1024);
     // The limit of an outer group holds, too; files in the cache count as free.
     system.file("sys/fs/cgroup/outer/memory.max", std::to_string(100 * kMebi))
         .file("sys/fs/cgroup/outer/memory.current", std::to_string(70 * kMebi))
-        .file("sys/fs/cgroup/outer/memory.stat", "anon 5\ninactive_file " + std::to_string(20 * kMebi) + "\n");
+        .file("sys/fs/cgroup/outer/memory.stat",
+              "anon 5\ninactive_file " + std::to_string(20 * kMebi) + "\n");
     EXPECT_EQ(system.available().bytes, 50 * kMebi);
     EXPECT_EQ(system.available().limit, "memory limit of the control group");
     system.file("sys/fs/cgroup/memory.max", std::to_string(30 * kMebi))
@@ -66,13 +69,15 @@ TEST(AvailableMemory, IsWhatControlGroupsOfVersion1Leave) {
     system.file("proc/self/cgroup", "5:cpu,cpuacct:/a\n4:memory:/job\n")
         .file("sys/fs/cgroup/memory/job/memory.limit_in_bytes", std::to_string(64 * kMebi))
         .file("sys/fs/cgroup/memory/job/memory.usage_in_bytes", std::to_string(60 * kMebi))
-        .file("sys/fs/cgroup/memory/job/memory.stat", "total_inactive_file " + std::to_string(8 * kMebi) + "\n");
+        .file("sys/fs/cgroup/memory/job/memory.stat",
+              "total_inactive_file " + std::to_string(8 * kMebi) + "\n");
     EXPECT_EQ(system.available().bytes, 12 * kMebi);
 }
 
 TEST(AvailableMemory, SurvivesAnyContent) {
     FakeSystem system;
-    system.file("proc/meminfo", "MemAvailable: lots\n").file("proc/self/cgroup", "::\nnonsense\n0::/../..\n:memory:\n");
+    system.file("proc/meminfo", "MemAvailable: lots\n")
+        .file("proc/self/cgroup", "::\nnonsense\n0::/../..\n:memory:\n");
     EXPECT_EQ(system.available().bytes, kMost);
 }
 
@@ -122,8 +127,8 @@ TEST(CheckMemory, NamesBothFiguresAndWhatToChange) {
         EXPECT_EQ(error.code(), ErrorCode::usage);
         const std::string message = error.what();
         for (const std::string& part : {bytes_text(memory_estimate_bytes(scene)), std::string("3.0 GiB"),
-                                        std::string("free memory of the machine"), std::string("lattice.cells"),
-                                        std::string("4096 x 4096 x 1024")}) {
+                                        std::string("free memory of the machine"),
+                                        std::string("lattice.cells"), std::string("4096 x 4096 x 1024")}) {
             EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
         }
     }

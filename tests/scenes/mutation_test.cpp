@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random damage to valid scenes and options: the outcome is always a Scene or a SceneErrors, never anything else.
-
-#include <gtest/gtest.h>
+// Random damage to valid scenes and options: the outcome is always a Scene or a SceneErrors, never anything
+// else.
 
 #include <fstream>
 #include <random>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include "scenes/reader.h"
 #include "scenes/writer.h"
@@ -23,12 +24,65 @@ std::string content(const std::string& path) {
 }
 
 // What parsers stumble over.
-const std::vector<std::string> kTokens{
-    "[", "]", "{", "}", "[[", "]]", "\"", "'", "\"\"\"", "'''", "\\", "\\u", "\\UFFFFFFFF", "\\xe9", "=", ".", ",", "#",
-    "\n", "\r", "\r\n", "\t", " ", "inf", "-inf", "nan", "+nan", "1e999", "-0", "0x", "0o7", "0b1", "1_000", "__", "1.", ".5",
-    "9223372036854775807", "9223372036854775808", "-9223372036854775808", "true", "1979-05-27T07:32:00Z", "07:32:00",
-    "2000-02-30", "\xEF\xBB\xBF", "\xC3", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xE2\x80\xAE", "\x1b[31m", std::string(1, '\0'),
-    "a.b.c.d = 1\n", "[lattice]\n", "[[wind]]\n", "wind = 1\n", "levels = []", "{}", "[]", "[[[[[[[[", "{a={a={a={a="};
+const std::vector<std::string> kTokens{"[",
+                                       "]",
+                                       "{",
+                                       "}",
+                                       "[[",
+                                       "]]",
+                                       "\"",
+                                       "'",
+                                       "\"\"\"",
+                                       "'''",
+                                       "\\",
+                                       "\\u",
+                                       "\\UFFFFFFFF",
+                                       "\\xe9",
+                                       "=",
+                                       ".",
+                                       ",",
+                                       "#",
+                                       "\n",
+                                       "\r",
+                                       "\r\n",
+                                       "\t",
+                                       " ",
+                                       "inf",
+                                       "-inf",
+                                       "nan",
+                                       "+nan",
+                                       "1e999",
+                                       "-0",
+                                       "0x",
+                                       "0o7",
+                                       "0b1",
+                                       "1_000",
+                                       "__",
+                                       "1.",
+                                       ".5",
+                                       "9223372036854775807",
+                                       "9223372036854775808",
+                                       "-9223372036854775808",
+                                       "true",
+                                       "1979-05-27T07:32:00Z",
+                                       "07:32:00",
+                                       "2000-02-30",
+                                       "\xEF\xBB\xBF",
+                                       "\xC3",
+                                       "\xED\xA0\x80",
+                                       "\xF4\x90\x80\x80",
+                                       "\xE2\x80\xAE",
+                                       "\x1b[31m",
+                                       std::string(1, '\0'),
+                                       "a.b.c.d = 1\n",
+                                       "[lattice]\n",
+                                       "[[wind]]\n",
+                                       "wind = 1\n",
+                                       "levels = []",
+                                       "{}",
+                                       "[]",
+                                       "[[[[[[[[",
+                                       "{a={a={a={a="};
 
 class Damage {
   public:
@@ -47,11 +101,21 @@ class Damage {
         const std::size_t at = place(text);
         const std::size_t length = std::min(std::size_t(number(1, 30)), text.size() - at);
         switch (number(0, 5)) {
-            case 0: text.insert(at, 1, char(number(0, 255))); break;
-            case 1: text.erase(at, length); break;
-            case 2: text.insert(at, kTokens[std::size_t(number(0, int(kTokens.size()) - 1))]); break;
-            case 3: text.insert(place(text), text.substr(at, length)); break;
-            case 4: text.replace(at, length, kTokens[std::size_t(number(0, int(kTokens.size()) - 1))]); break;
+            case 0:
+                text.insert(at, 1, char(number(0, 255)));
+                break;
+            case 1:
+                text.erase(at, length);
+                break;
+            case 2:
+                text.insert(at, kTokens[std::size_t(number(0, int(kTokens.size()) - 1))]);
+                break;
+            case 3:
+                text.insert(place(text), text.substr(at, length));
+                break;
+            case 4:
+                text.replace(at, length, kTokens[std::size_t(number(0, int(kTokens.size()) - 1))]);
+                break;
             default:
                 if (at < text.size()) text[at] = char(text[at] ^ (1 << number(0, 7)));
         }
@@ -85,8 +149,9 @@ void read_damaged(const std::string& text, const std::vector<std::string>& optio
 
 TEST(Mutation, DamagedScenesAreScenesOrErrors) {
     constexpr int kRounds = 1500;
-    for (const char* name : {"scenes/cumulus.toml", "scenes/cumulus-by-hand.toml", "tests/scenes/bad/wind_forms.toml",
-                             "tests/scenes/bad/utf8.toml", "tests/scenes/bad/wrong_types.toml"}) {
+    for (const char* name :
+         {"scenes/cumulus.toml", "scenes/cumulus-by-hand.toml", "tests/scenes/bad/wind_forms.toml",
+          "tests/scenes/bad/utf8.toml", "tests/scenes/bad/wrong_types.toml"}) {
         SCOPED_TRACE(name);
         const std::string text = content(name);
         ASSERT_FALSE(text.empty());

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a scene file says is what the Scene holds: every form of every value, defaults, options, file names.
 
-#include <gtest/gtest.h>
+#include "scenes/reader.h"
 
 #include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
 
-#include "scenes/reader.h"
+#include <gtest/gtest.h>
+
 #include "scenes/writer.h"
 
 namespace nephos {
@@ -29,7 +30,9 @@ std::string messages_of(const std::string& text, const std::vector<std::string>&
     return {};
 }
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
 
 // A key that is not given has the default of the option structs, the name comes from the file.
 TEST(Reader, MissingKeysHaveTheDefaultsOfTheStructs) {
@@ -93,7 +96,8 @@ colour = [0, 0.5, 1000]
 )");
     EXPECT_EQ(scene.automaton.seed, 0xFFFFFFFFFFFFFFFEu);
     EXPECT_EQ(scene.automaton.extent, (Extent{1, 65536, 3}));
-    EXPECT_EQ(scene.automaton.boundaries, (Boundaries{Boundary::periodic, Boundary::periodic, Boundary::periodic}));
+    EXPECT_EQ(scene.automaton.boundaries,
+              (Boundaries{Boundary::periodic, Boundary::periodic, Boundary::periodic}));
     const FieldOptions& field = scene.automaton.field;
     EXPECT_EQ(field.scatters[0].x_m, (Range{5, 5}));
     EXPECT_EQ(field.scatters[0].y_m, (Range{-1, 2.5}));
@@ -110,8 +114,11 @@ colour = [0, 0.5, 1000]
 // 270 degrees is a west wind: it blows towards east. Multiples of 90 degrees are exact.
 TEST(Reader, WindByDirectionIsWhatPilotsMean) {
     const auto wind = [](const std::string& from_deg) {
-        return scene_of("[[wind]]\nlevels = [{ height_m = 0, speed_m_per_s = 8, from_deg = " + from_deg + " }]")
-            .automaton.wind.keyframes.at(0).levels.at(0).velocity;
+        return scene_of("[[wind]]\nlevels = [{ height_m = 0, speed_m_per_s = 8, from_deg = " + from_deg +
+                        " }]")
+            .automaton.wind.keyframes.at(0)
+            .levels.at(0)
+            .velocity;
     };
     EXPECT_EQ(wind("270"), (Velocity{8, 0}));
     EXPECT_EQ(wind("0"), (Velocity{0, -8}));
@@ -124,12 +131,14 @@ TEST(Reader, WindByDirectionIsWhatPilotsMean) {
     EXPECT_NEAR(wind("200").east_m_per_s, -8 * std::sin(200 * 3.14159265358979 / 180), 1e-12);
 }
 
-// File names: of the scene from the scene's folder, of an option from the current folder, absolute ones as they are.
+// File names: of the scene from the scene's folder, of an option from the current folder, absolute ones as
+// they are.
 TEST(Reader, FileNamesStartFromWhereTheyAreWritten) {
     const std::string text = "[lattice]\ninitial_state = \"states/../start.vdb\"";
     EXPECT_EQ(scene_of(text).initial_state_file, "folder/start.vdb");
     EXPECT_EQ(scene_of("seed = 1", {"lattice.initial_state=start.vdb"}).initial_state_file, "start.vdb");
-    EXPECT_EQ(scene_of("[lattice]\ninitial_state = \"/data/start.vdb\"").initial_state_file, "/data/start.vdb");
+    EXPECT_EQ(scene_of("[lattice]\ninitial_state = \"/data/start.vdb\"").initial_state_file,
+              "/data/start.vdb");
 }
 
 TEST(Reader, ByteOrderMarkAndCarriageReturnsDoNotMatter) {
@@ -146,9 +155,10 @@ steps = 5
 [[wind]]
 levels = [{ height_m = 0, east_m_per_s = 1 }, { height_m = 900, east_m_per_s = 2 }]
 )";
-    const Scene scene = scene_of(text, {"time.steps=50", "wind[0].levels[1].height_m=800", "density.half=true",
-                                        "lattice.initial=empty", "name=by-hand", "lattice.boundaries=periodic",
-                                        "sun.colour=[1, 2, 3]", "field.scatters=[{count=3}]", "time.steps = 60"});
+    const Scene scene =
+        scene_of(text, {"time.steps=50", "wind[0].levels[1].height_m=800", "density.half=true",
+                        "lattice.initial=empty", "name=by-hand", "lattice.boundaries=periodic",
+                        "sun.colour=[1, 2, 3]", "field.scatters=[{count=3}]", "time.steps = 60"});
     EXPECT_EQ(scene.steps, 60u) << "the last one counts";
     EXPECT_EQ(scene.automaton.wind.keyframes[0].levels[1].height_m, 800);
     EXPECT_EQ(scene.automaton.wind.keyframes[0].levels[1].velocity.east_m_per_s, 2);
@@ -166,11 +176,12 @@ TEST(Options, ReplaceWrongValuesToo) {
 }
 
 TEST(Options, MessagesNameTheOption) {
-    EXPECT_EQ(messages_of("seed = 1", {"density.half=maybe"}),
-              "--set density.half=maybe: error: not valid TOML: parsing value: could not determine value type\n"
-              "  | density.half=maybe\n"
-              "  |              ^\n"
-              "  = expected true or false\n\n1 error\n");
+    EXPECT_EQ(
+        messages_of("seed = 1", {"density.half=maybe"}),
+        "--set density.half=maybe: error: not valid TOML: parsing value: could not determine value type\n"
+        "  | density.half=maybe\n"
+        "  |              ^\n"
+        "  = expected true or false\n\n1 error\n");
     EXPECT_EQ(messages_of("seed = 1", {"density.half=1"}),
               "--set density.half=1: error: `density.half` is 1\n"
               "  | density.half=1\n"
@@ -185,8 +196,9 @@ TEST(Options, MessagesNameTheOption) {
 }
 
 TEST(Options, BadPathsAreRefused) {
-    for (const char* option : {"", "=", "steps", "time.steps", "time..steps=1", ".steps=1", "time.=1", "wind[=1",
-                               "wind[x]=1", "wind[]=1", "wind[99999999999]=1", "wind]=1", "a b=1", "\xC3\xA4=1"}) {
+    for (const char* option :
+         {"", "=", "steps", "time.steps", "time..steps=1", ".steps=1", "time.=1", "wind[=1", "wind[x]=1",
+          "wind[]=1", "wind[99999999999]=1", "wind]=1", "a b=1", "\xC3\xA4=1"}) {
         SCOPED_TRACE(option);
         const std::string messages = messages_of("seed = 1", {option});
         EXPECT_TRUE(contains(messages, std::string("--set ") + option + ": error: ")) << messages;
@@ -263,12 +275,15 @@ TEST(Hashes, CoverWhatTheySay) {
     EXPECT_NE(scene_hash(scene), scene_hash(longer));
     EXPECT_EQ(simulation_hash(scene), simulation_hash(longer));
     EXPECT_EQ(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.name = "x"; })));
-    EXPECT_EQ(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.render.sun.elevation_deg = 3; })));
+    EXPECT_EQ(simulation_hash(scene),
+              simulation_hash(with([](Scene& s) { s.render.sun.elevation_deg = 3; })));
     EXPECT_EQ(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.frames.count = 3; })));
     EXPECT_NE(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.automaton.seed = 9; })));
     EXPECT_NE(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.density.smoothing.t0 = 0; })));
-    EXPECT_NE(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.automaton.field.scatters[0].count = 4; })));
-    EXPECT_NE(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.initial_state_file = "a.vdb"; })));
+    EXPECT_NE(simulation_hash(scene),
+              simulation_hash(with([](Scene& s) { s.automaton.field.scatters[0].count = 4; })));
+    EXPECT_NE(simulation_hash(scene),
+              simulation_hash(with([](Scene& s) { s.initial_state_file = "a.vdb"; })));
     EXPECT_NE(simulation_hash(scene, "0123"), simulation_hash(scene, "4567"));
 }
 

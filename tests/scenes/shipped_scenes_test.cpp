@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every scene in scenes/ loads, says what its name promises, and survives being written and read again.
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include "scenes/memory.h"
 #include "scenes/reader.h"
