@@ -42,12 +42,32 @@ vk::raii::Context load_vulkan() {
     }
 }
 
+[[noreturn]] void fail_without_driver() {
+    throw Error(ErrorCode::gpu, std::string("no Vulkan device; ") + kInstall);
+}
+
+vk::raii::Instance instance_from(const vk::raii::Context& context, const vk::InstanceCreateInfo& info) {
+    try {
+        return {context, info};
+    } catch (const vk::IncompatibleDriverError&) {
+        fail_without_driver();  // what the loader says when it finds no driver at all
+    }
+}
+
+std::vector<vk::raii::PhysicalDevice> physical_devices(const vk::raii::Instance& instance) {
+    try {
+        return vk::raii::PhysicalDevices(instance);
+    } catch (const vk::InitializationFailedError&) {
+        fail_without_driver();  // drivers, but no device that one of them knows
+    }
+}
+
 vk::raii::Instance create_instance(const vk::raii::Context& context, ValidationLog* log) {
     if (context.enumerateInstanceVersion() < VK_API_VERSION_1_3)
         throw Error(ErrorCode::gpu, "the Vulkan loader is older than version 1.3");
     const vk::ApplicationInfo application("nephos", 1, "nephos", 1, VK_API_VERSION_1_3);
     vk::InstanceCreateInfo info({}, &application);
-    if (log == nullptr) return {context, info};
+    if (log == nullptr) return instance_from(context, info);
 
     const auto layers = context.enumerateInstanceLayerProperties();
     const bool present = std::ranges::any_of(
@@ -65,7 +85,7 @@ vk::raii::Instance create_instance(const vk::raii::Context& context, ValidationL
     const vk::DebugUtilsMessengerCreateInfoEXT messages = messenger_info(log);
     features.pNext = &messages;  // hears what creating and destroying the instance says
     info.pNext = &features;
-    return {context, info};
+    return instance_from(context, info);
 }
 
 // Everything the renderer asks of a device; empty when it is all there.
@@ -120,7 +140,7 @@ bool is_named(const std::string& wanted, std::size_t number, const std::string& 
 
 vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevice>& devices,
                                        std::string wanted) {
-    if (devices.empty()) throw Error(ErrorCode::gpu, std::string("no Vulkan device; ") + kInstall);
+    if (devices.empty()) fail_without_driver();
     const char* environment = std::getenv("NEPHOS_DEVICE");
     if (wanted.empty() && environment != nullptr) wanted = environment;
 
@@ -175,7 +195,7 @@ GpuDevice open_device(const DeviceOptions& options) {
         gpu.instance = create_instance(gpu.context, gpu.log.get());
         if (gpu.log != nullptr)
             gpu.messenger = vk::raii::DebugUtilsMessengerEXT(gpu.instance, messenger_info(gpu.log.get()));
-        gpu.physical = choose_device(vk::raii::PhysicalDevices(gpu.instance), options.device);
+        gpu.physical = choose_device(physical_devices(gpu.instance), options.device);
         gpu.properties = gpu.physical.getProperties();
         gpu.memory = gpu.physical.getMemoryProperties();
         gpu.queue_family = find_queue_family(gpu.physical).value();
@@ -210,12 +230,7 @@ std::vector<std::string> device_names() {
         const vk::raii::Context context = load_vulkan();
         const vk::raii::Instance instance = create_instance(context, nullptr);
         std::vector<std::string> names;
-        try {
-            for (const auto& physical : vk::raii::PhysicalDevices(instance))
-                names.push_back(name_of(physical));
-        } catch (const vk::InitializationFailedError&) {
-            // what the loader says when no driver is installed: an empty list
-        }
+        for (const auto& physical : physical_devices(instance)) names.push_back(name_of(physical));
         return names;
     });
 }

@@ -54,7 +54,11 @@ class Renderer {
     Renderer(Renderer&&) noexcept;
     Renderer& operator=(Renderer&&) noexcept;
 
-    // Draws one picture. Many may be drawn with one Renderer, one at a time: not thread-safe, but different
+    // Draws one picture. Metaballs smaller than 1.25 pixels are widened to that radius and thinned out by the
+    // same area, in the picture as in the shadow map: a distant cloud is smooth instead of a sparkle of
+    // points.
+    //
+    // Many may be drawn with one Renderer, one at a time: not thread-safe, but different
     // Renderers may work in different threads. Throws Error(usage) on bad options, on metaballs that are not
     // finite or have no radius, and when the picture does not fit into memory; Error(gpu) when the device
     // fails, after which this Renderer cannot be used any more.
@@ -74,8 +78,7 @@ class Renderer {
     std::unique_ptr<Impl> impl_;
 };
 
-// Names of all Vulkan devices of this machine, in the loader's order. Throws Error(gpu) without a Vulkan
-// loader.
+// Names of all Vulkan devices of this machine, in the loader's order. Throws Error(gpu) when there is none.
 std::vector<std::string> device_names();
 
 }  // namespace nephos

@@ -6,8 +6,13 @@
 
 layout(set = 0, binding = 3) uniform sampler2DArray attenuation_textures;
 
+// Layer below a depth scale, plus the share of the layer above: linear in the depth scale between the two.
 float level_of(float depth_scale) {
-    return float(kAttenuationLevels - 1u) * pow(min(depth_scale / kMaxDepthScale, 1.0), 1.0 / 3.0);
+    const float last = float(kAttenuationLevels - 1u);
+    float scaled = min(depth_scale / kMaxDepthScale, 1.0) * (last * last * last);
+    float layer = min(floor(pow(scaled, 1.0 / 3.0)), last - 1.0);
+    float below = layer * layer * layer, step = 3.0 * layer * (layer + 1.0) + 1.0;
+    return layer + clamp((scaled - below) / step, 0.0, 1.0);
 }
 
 // Opacity at a point of the billboard, in units of the radius from its middle.

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// Closed forms and conventions: phase function, line integral, attenuation textures, dusk, tone curve.
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "render/attenuation_texture.h"
+#include "render/frame_data.h"
+#include "render/shaders/shared.h"
+#include "render/tone_map.h"
+#include "tests/render/reference_render.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// All that is scattered goes somewhere: the integral over the sphere is 1, whatever the asymmetry.
+TEST(Phase, IntegratesToOne) {
+    for (const float g : {-0.9f, -0.3f, 0.0f, 0.5f, 0.85f, 0.99f}) {
+        constexpr int kSteps = 2000000;
+        double sum = 0;
+        for (int i = 0; i < kSteps; ++i)
+            sum += double(shader::phase_function(float(-1 + (i + 0.5) * 2.0 / kSteps), g));
+        EXPECT_NEAR(2 * kPi * sum * 2.0 / kSteps, 1.0, 2e-3) << "g = " << g;
+    }
+}
+
+// The mean cosine of Henyey and Greenstein is g itself; this also fixes the sign: forward is g > 0.
+TEST(Phase, MeanCosineIsG) {
+    for (const float g : {-0.6f, 0.0f, 0.5f, 0.8f}) {
+        constexpr int kSteps = 200000;
+        double sum = 0;
+        for (int i = 0; i < kSteps; ++i) {
+            const double cosine = -1 + (i + 0.5) * 2.0 / kSteps;
+            sum += cosine * double(shader::phase_function(float(cosine), g));
+        }
+        EXPECT_NEAR(2 * kPi * sum * 2.0 / kSteps, double(g), 1e-4) << "g = " << g;
+    }
+    EXPECT_GT(shader::phase_function(1, 0.5f), shader::phase_function(-1, 0.5f));
+    EXPECT_NEAR(shader::phase_function(0.3f, 0), 1 / (4 * kPi), 1e-7);
+}
+
+TEST(Column, IsTheIntegralOfTheField) {
+    for (double b = 0; b < 1; b += 0.05) {
+        const Metaball ball{0, 0, 0, 1, 1};
+        const double numeric = reference::column_m(ball, {{b, 0, -5}, {0, 0, 1}});
+        EXPECT_NEAR(shader::column(float(1 - b * b)), numeric, 1e-6) << "b = " << b;
+        const double half = reference::column_m(ball, {{b, 0, 0.3}, {0, 0, 1}});
+        const float w = float(1 - b * b);
+        if (w > 0.09f) {
+            EXPECT_NEAR(shader::column_part(w, std::sqrt(w)) - shader::column_part(w, 0.3f), half, 1e-6) << b;
+        }
+    }
+}
+
+TEST(AttenuationTextures, HoldTheOpacityOfEachLevel) {
+    const std::vector<float> texels = attenuation_textures();
+    constexpr std::size_t kSide = shader::kAttenuationTexels, kLevels = shader::kAttenuationLevels;
+    ASSERT_EQ(texels.size(), 2 * kSide * kSide * kLevels);
+    EXPECT_EQ(attenuation_depth_scale(0), 0.0f);
+    EXPECT_EQ(attenuation_depth_scale(kLevels - 1), shader::kMaxDepthScale);
+    for (const std::size_t layer : {std::size_t(1), std::size_t(20), std::size_t(63)}) {
+        for (const std::size_t i : {std::size_t(0), std::size_t(30), std::size_t(50), std::size_t(63)}) {
+            const double x = double(i) / 63, y = 20.0 / 63;
+            const double column = reference::column_m({0, 0, 0, 1, 1}, {{x, y, -5}, {0, 0, 1}});
+            const double expected = 1 - std::exp(-double(attenuation_depth_scale(int(layer))) * column);
+            EXPECT_NEAR(texels[2 * ((layer * kSide + 20) * kSide + i)], expected, 1e-6) << layer << ' ' << i;
+        }
+    }
+    for (std::size_t layer = 0; layer + 1 < kLevels; ++layer) {  // the second value is the next layer's first
+        const std::size_t texel = (layer * kSide + 5) * kSide + 7;
+        EXPECT_EQ(texels[2 * texel + 1], texels[2 * (texel + kSide * kSide)]) << layer;
+    }
+}
+
+TEST(Daylight, FadesThroughDusk) {
+    EXPECT_EQ(daylight(40).sun, 1.0);
+    EXPECT_EQ(daylight(40).sky, 1.0);
+    EXPECT_NEAR(daylight(0).sun, 0.5, 1e-12);
+    EXPECT_EQ(daylight(-3).sun, 0.0);
+    EXPECT_LT(daylight(-18).sky, 0.01);
+    EXPECT_GT(daylight(-18).sky, 0.0);
+    for (double e = -18; e < 90; e += 0.25) {
+        EXPECT_LE(daylight(e).sun, daylight(e + 0.25).sun) << e;
+        EXPECT_LE(daylight(e).sky, daylight(e + 0.25).sky) << e;
+    }
+}
+
+TEST(ToneMap, IsTheIdentityThenRollsOff) {
+    EXPECT_EQ(tone_map(0.0f), 0.0f);
+    EXPECT_EQ(tone_map(-1.0f), 0.0f);
+    EXPECT_EQ(tone_map(std::numeric_limits<float>::quiet_NaN()), 0.0f);
+    EXPECT_EQ(tone_map(0.3f), 0.3f);
+    EXPECT_EQ(tone_map(0.5f), 0.5f);
+    EXPECT_NEAR((tone_map(0.501f) - tone_map(0.5f)) / 0.001f, 1.0f, 0.01f);
+    EXPECT_LE(tone_map(1e30f), 1.0f);
+    for (float x = 0; x < 4; x += 0.01f) EXPECT_LT(tone_map(x), tone_map(x + 0.01f)) << x;
+    EXPECT_NEAR(encode_srgb(0.0031308f), 0.04045f, 1e-5);
+    EXPECT_NEAR(encode_srgb(0.5f), 0.735357f, 1e-5);
+    EXPECT_FLOAT_EQ(encode_srgb(1.0f), 1.0f);
+}
+
+// Over an 8x8 block the dither is without bias: the mean of the bytes is the exact value.
+TEST(ToneMap, DitherKeepsTheMean) {
+    Picture picture;
+    picture.width = picture.height = 8;
+    picture.beauty.assign(3 * 64, 0.2f);
+    double sum = 0;
+    for (const std::uint8_t byte : to_srgb8(picture, 0)) sum += byte;
+    EXPECT_NEAR(sum / (3 * 64), 255.0 * double(encode_srgb(0.2f)), 0.02);
+    picture.beauty.assign(3 * 64, 0.0f);
+    for (const std::uint8_t byte : to_srgb8(picture, 0)) ASSERT_EQ(byte, 0);
+}
+
+TEST(ToneMap, AppliesTheExposure) {
+    Picture picture;
+    picture.width = picture.height = 1;
+    picture.beauty = {0.05f, 0.1f, 0.2f};
+    Picture doubled = picture;
+    for (float& value : doubled.beauty) value *= 2;
+    EXPECT_EQ(to_srgb8(picture, 1.0), to_srgb8(doubled, 0.0));
+}
+
+}  // namespace
+}  // namespace nephos

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// Videos through the ffmpeg command: a real file, and every way it can go wrong.
+
+#include "render/video.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "automaton/error.h"
+#include "render/image_file.h"
+#include "tests/render/temporary_folder.h"
+
+namespace nephos {
+namespace {
+
+bool has_ffmpeg() {
+    return std::system("command -v ffmpeg > /dev/null && command -v ffprobe > /dev/null") == 0;
+}
+
+std::string output_of(const std::string& command) {
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"), ::pclose);
+    std::string text;
+    char line[256];
+    while (pipe != nullptr && std::fgets(line, sizeof line, pipe.get()) != nullptr) text += line;
+    return text;
+}
+
+// The environment's PATH for the time of a test.
+class PathOverride {
+  public:
+    explicit PathOverride(const std::string& value) : before_(std::getenv("PATH")) {
+        ::setenv("PATH", value.c_str(), 1);
+    }
+    PathOverride(const PathOverride&) = delete;
+    PathOverride& operator=(const PathOverride&) = delete;
+    ~PathOverride() { ::setenv("PATH", before_.c_str(), 1); }
+
+  private:
+    std::string before_;
+};
+
+void put_command(const std::filesystem::path& folder, const char* script) {
+    const std::filesystem::path file = folder / "ffmpeg";
+    std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "w"), std::fclose);
+    std::fputs(script, stream.get());
+    stream.reset();
+    std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+}
+
+std::string message_of(const std::filesystem::path& path, int frames, int width = 64, int height = 48) {
+    int left = frames;
+    try {
+        write_mp4(path, {width, height, 10, 18}, [&](std::span<std::uint8_t> rgb) {
+            std::memset(rgb.data(), left, rgb.size());
+            return left-- > 0;
+        });
+    } catch (const Error& error) {
+        return error.what();
+    }
+    return {};
+}
+
+TEST(Video, EncodesPngFilesInOrder) {
+    if (!has_ffmpeg()) GTEST_SKIP() << "ffmpeg is not here";
+    const TemporaryFolder folder;
+    std::vector<std::filesystem::path> files;
+    for (int i = 0; i < 5; ++i) {
+        Picture picture;
+        picture.width = 65;  // odd: padded to 66 x 48
+        picture.height = 47;
+        picture.beauty.assign(3 * picture.pixels(), 0.05f * float(i + 1));
+        files.push_back(folder.path() / (std::to_string(i) + ".png"));
+        write_png(files.back(), picture, {}, {});
+    }
+    const std::filesystem::path video = folder.path() / "a b;c.mp4";
+    encode_mp4(video, files, 12.5);
+    const std::string facts = output_of(
+        "ffprobe -v error -count_frames -select_streams v -show_entries "
+        "stream=codec_name,width,height,pix_fmt,nb_read_frames,r_frame_rate -of csv=p=0 '" +
+        video.string() + "'");
+    EXPECT_EQ(facts, "h264,66,48,yuv420p,25/2,5\n");
+    const std::string gray = output_of("ffmpeg -v error -i '" + video.string() +
+                                       "' -vf scale=1:1 -f rawvideo -pix_fmt gray - | od -An -tu1");
+    int levels[5] = {};
+    ASSERT_EQ(std::sscanf(gray.c_str(), "%d %d %d %d %d", &levels[0], &levels[1], &levels[2], &levels[3],
+                          &levels[4]),
+              5)
+        << gray;
+    for (int i = 1; i < 5; ++i) EXPECT_GT(levels[i], levels[i - 1]) << gray;
+}
+
+TEST(Video, SameFramesGiveTheSameFile) {
+    if (!has_ffmpeg()) GTEST_SKIP() << "ffmpeg is not here";
+    const TemporaryFolder folder;
+    EXPECT_EQ(message_of(folder.path() / "a.mp4", 3), "");
+    EXPECT_EQ(message_of(folder.path() / "b.mp4", 3), "");
+    EXPECT_EQ(std::system(("cmp '" + (folder.path() / "a.mp4").string() + "' '" +
+                           (folder.path() / "b.mp4").string() + "'")
+                              .c_str()),
+              0);
+}
+
+TEST(Video, MissingCommandSaysWhatToInstall) {
+    const TemporaryFolder folder;
+    const PathOverride path(folder.path().string());
+    const std::string message = message_of(folder.path() / "a.mp4", 2);
+    EXPECT_NE(message.find("install the package ffmpeg"), std::string::npos) << message;
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(Video, FailingCommandIsAnErrorWithItsMessage) {
+    const TemporaryFolder folder, commands;
+    put_command(commands.path(), "#!/bin/sh\necho 'no such encoder' >&2\ncat > /dev/null\nexit 3\n");
+    const PathOverride path(commands.path().string() + ":/usr/bin:/bin");
+    const std::string message = message_of(folder.path() / "a.mp4", 2);
+    EXPECT_NE(message.find("status 3"), std::string::npos) << message;
+    EXPECT_NE(message.find("no such encoder"), std::string::npos) << message;
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+// A command that goes away while frames are sent would raise SIGPIPE; the process must live and get an error.
+TEST(Video, DyingCommandRaisesNoSignal) {
+    const TemporaryFolder folder, commands;
+    put_command(commands.path(), "#!/bin/sh\nexec 0<&-\nexit 1\n");
+    const PathOverride path(commands.path().string() + ":/usr/bin:/bin");
+    EXPECT_NE(message_of(folder.path() / "a.mp4", 50, 640, 480), "");
+    put_command(commands.path(), "#!/bin/sh\nexec 0<&-\nexit 0\n");  // even when it claims success
+    EXPECT_NE(message_of(folder.path() / "a.mp4", 50, 640, 480), "");
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(Video, NoFrameAndBadOptionsAreErrors) {
+    const TemporaryFolder folder;
+    EXPECT_NE(message_of(folder.path() / "a.mp4", 0).find("at least one frame"), std::string::npos);
+    EXPECT_NE(message_of(folder.path() / "a.mp4", 1, 0, 48).find("width"), std::string::npos);
+    EXPECT_THROW(encode_mp4(folder.path() / "a.mp4", {}, 25), Error);
+}
+
+}  // namespace
+}  // namespace nephos
