@@ -11,8 +11,8 @@
 //   D(x) = sum q f / sum f. Both sums run in the same order, so a saturated neighbourhood gives 1 exactly,
 //   everywhere.
 // - a renderer that adds up metaballs has no such sum at hand. It scales every metaball by
-//   metaball_normalisation(R): then sum q f has the mean q in a uniform region, and the ripple around the
-//   mean is what the lattice leaves (below 1 % from R = 2 cells upwards, see the tests).
+//   metaball_normalisation(R): then sum q f has the mean q in a uniform region, with a ripple around it that is at
+//   most 2.2 % at R = 2 voxel edges, 0.5 % at 3 (and -59 % .. +23 % at 1, where metaballs hardly overlap).
 //
 // Functions are pure and thread-safe.
 

@@ -4,6 +4,11 @@
 #include <algorithm>
 #include <cstring>
 
+// Machines without AVX2 run the portable form: rare by now, and every target costs seconds to compile.
+#ifndef HWY_DISABLED_TARGETS
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
+#endif
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "density/smoothing_kernel.cpp"
 #include <hwy/foreach_target.h>

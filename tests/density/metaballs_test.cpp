@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The metaball field against its polynomial, its integrals against quadrature, and the two normalisations
+// against what they promise: exactly 1 in saturated regions, the right extinction on average.
+
+#include "density/metaballs.h"
+
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "automaton/error.h"
+
+namespace nephos {
+namespace {
+
+DensityGrid uniform_grid(Extent extent, float value, const Placement& placement = {}) {
+    return DensityGrid::from_dense(std::vector<float>(extent.cells(), value), extent, placement);
+}
+
+DensityGrid random_grid(Extent extent, std::uint64_t seed, const Placement& placement = {}) {
+    std::mt19937_64 random(seed);
+    std::vector<float> values(extent.cells());
+    for (float& v : values) v = random() % 3 ? 0.0f : float(random() % 1000 + 1) / 1000.0f;
+    return DensityGrid::from_dense(values, extent, placement);
+}
+
+// The polynomial of SOURCES: 1 - 22/9 a^2 + 17/9 a^4 - 4/9 a^6.
+TEST(Metaballs, FieldIsThePolynomial) {
+    EXPECT_EQ(metaball_field(0), 1.0);
+    EXPECT_EQ(metaball_field(1), 0.0);
+    EXPECT_EQ(metaball_field(1.5), 0.0);
+    EXPECT_NEAR(metaball_field(0.5), 0.5, 1e-15);  // the wyvill field's half-way point
+    double previous = 1;
+    for (int n = 1; n <= 1000; ++n) {
+        const double a = n / 1000.0, s = a * a;
+        EXPECT_NEAR(metaball_field(a), 1 - 22.0 / 9 * s + 17.0 / 9 * s * s - 4.0 / 9 * s * s * s, 1e-14);
+        EXPECT_LT(metaball_field(a), previous);
+        previous = metaball_field(a);
+    }
+}
+
+// Midpoint rule with 20000 points along the chord.
+TEST(Metaballs, LineIntegralMatchesQuadrature) {
+    for (double b : {0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 1.0, 2.0}) {
+        double sum = 0;
+        constexpr int kPoints = 20000;
+        for (int n = 0; n < kPoints; ++n) {
+            const double s = -1 + (n + 0.5) * 2 / kPoints;
+            sum += metaball_field(std::sqrt(b * b + s * s)) * 2 / kPoints;
+        }
+        EXPECT_NEAR(metaball_line_integral(b), sum, 1e-7) << b;
+    }
+}
+
+TEST(Metaballs, NormalisationIsTheCellOverTheIntegral) {
+    for (double radius : {1.0, 2.0, 3.7}) {
+        double integral = 0;
+        constexpr int kShells = 20000;
+        for (int n = 0; n < kShells; ++n) {
+            const double a = (n + 0.5) / kShells;
+            integral += metaball_field(a) * 4 * std::numbers::pi * a * a / kShells;
+        }
+        EXPECT_NEAR(metaball_normalisation(radius) * integral * radius * radius * radius, 1.0, 1e-7);
+    }
+}
+
+// A renderer adds up, along a ray, the line integrals of the metaballs that the ray passes. Over many
+// parallel rays through a saturated slab the mean must be the slab's thickness, and no ray may differ by more
+// than the documented ripple.
+TEST(Metaballs, RaysThroughASaturatedRegionSeeItsThickness) {
+    for (const auto& [radius, ripple] : {std::pair{2.0, 0.022}, std::pair{3.0, 0.005}}) {
+        constexpr int kLevels = 20, kRays = 16;
+        double mean = 0;
+        const int reach = int(std::ceil(radius)) + 1;
+        for (int ray = 0; ray < kRays * kRays; ++ray) {
+            const double x = (ray % kRays + 0.5) / kRays, y = (ray / kRays + 0.5) / kRays;
+            double depth = 0;  // of kLevels layers of cells, in cell edges
+            for (int j = -reach; j <= reach; ++j) {
+                for (int i = -reach; i <= reach; ++i) {
+                    const double b = std::hypot(i + 0.5 - x, j + 0.5 - y) / radius;
+                    depth += kLevels * radius * metaball_line_integral(b);
+                }
+            }
+            depth *= metaball_normalisation(radius);
+            EXPECT_NEAR(depth, kLevels, kLevels * ripple);
+            mean += depth / (kRays * kRays);
+        }
+        EXPECT_NEAR(mean, kLevels, kLevels * 1e-3);
+    }
+}
+
+TEST(Metaballs, SaturatedIsExactlyOneAnywhere) {
+    const Extent extent{24, 24, 24};
+    const Placement placement{{-100, 30, 7}, 12.5};
+    const DensityGrid grid = uniform_grid(extent, 1.0f, placement);
+    std::mt19937_64 random(3);
+    for (double radius : {1.0, 1.3, 2.0, 3.5, 8.0}) {
+        std::uniform_real_distribution<double> inside(radius + 0.5, 24 - radius - 0.5);
+        for (int n = 0; n < 50; ++n) {
+            const Vec3 point{placement.origin_m.x + inside(random) * 12.5,
+                             placement.origin_m.y + inside(random) * 12.5,
+                             placement.origin_m.z + inside(random) * 12.5};
+            ASSERT_EQ(density_at(grid, point, radius), 1.0) << radius;
+        }
+        const DensityGrid fine = resample(grid, 2, radius);
+        const int margin = int(2 * radius) + 2;
+        for (int k = margin; k < 48 - margin; ++k) ASSERT_EQ(fine.value(k, 24, 24), 1.0f) << radius;
+        EXPECT_EQ(fine.max_value(), 1.0f);
+    }
+}
+
+// At the rim D falls, far away it is 0, and nothing odd happens for points that are no numbers.
+TEST(Metaballs, DensityVanishesOutside) {
+    const DensityGrid grid = uniform_grid({8, 8, 8}, 1.0f, {{0, 0, 0}, 10});
+    const double face = density_at(grid, {40, 40, 80}, 2);
+    EXPECT_GT(face, 0.3);
+    EXPECT_LT(face, 0.7);
+    EXPECT_EQ(density_at(grid, {40, 40, 101}, 2), 0.0);
+    EXPECT_EQ(density_at(grid, {1e300, 40, 40}, 2), 0.0);
+    EXPECT_EQ(density_at(grid, {std::nan(""), 40, 40}, 2), 0.0);
+}
+
+// The twin of density_at: every voxel of the grid, straight from the formula.
+TEST(Metaballs, DensityMatchesTheSumOverAllCells) {
+    const Extent extent{9, 7, 6};
+    const Placement placement{{5, -3, 100}, 4};
+    const DensityGrid grid = random_grid(extent, 11, placement);
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> unit(-0.3, 1.3);
+    for (int n = 0; n < 100; ++n) {
+        const Vec3 p{5 + unit(random) * 36, -3 + unit(random) * 28, 100 + unit(random) * 24};
+        const double radius = 1 + (n % 4) * 0.9;
+        double sum = 0, weight = 0;
+        for (int k = -12; k < 20; ++k) {
+            for (int j = -12; j < 20; ++j) {
+                for (int i = -14; i < 24; ++i) {
+                    const double dx = 5 + (i + 0.5) * 4 - p.x, dy = -3 + (j + 0.5) * 4 - p.y,
+                                 dz = 100 + (k + 0.5) * 4 - p.z;
+                    const double f = metaball_field(std::sqrt(dx * dx + dy * dy + dz * dz) / (radius * 4));
+                    weight += f;
+                    sum += f * double(grid.value(i, j, k));
+                }
+            }
+        }
+        EXPECT_NEAR(density_at(grid, p, radius), sum / weight, 1e-12);
+    }
+}
+
+TEST(Metaballs, ResampledVoxelsAreTheFieldAtTheirCentres) {
+    const Extent extent{13, 9, 11};
+    const Placement placement{{50, 60, 70}, 8};
+    const DensityGrid grid = random_grid(extent, 21, placement);
+    for (const auto& [refine, radius] :
+         {std::pair{1, 2.0}, std::pair{2, 1.0}, std::pair{3, 2.5}, std::pair{8, 1.5}}) {
+        const DensityGrid fine = resample(grid, refine, radius);
+        ASSERT_EQ(fine.extent(), (Extent{13 * refine, 9 * refine, 11 * refine}));
+        EXPECT_EQ(fine.placement().origin_m, placement.origin_m);
+        EXPECT_DOUBLE_EQ(fine.placement().cell_size_m, 8.0 / refine);
+        const auto dense = fine.to_dense();
+        std::uint64_t active = 0;
+        for (int k = 0; k < fine.extent().z; ++k) {
+            for (int j = 0; j < fine.extent().y; ++j) {
+                for (int i = 0; i < fine.extent().x; ++i) {
+                    const float value = dense[linear_index(fine.extent(), i, j, k)];
+                    active += value > 0;
+                    if ((i + 3 * j + 7 * k) % (refine > 3 ? 97 : 5) != 0) continue;
+                    const double size = 8.0 / refine;
+                    const Vec3 centre{50 + (i + 0.5) * size, 60 + (j + 0.5) * size, 70 + (k + 0.5) * size};
+                    ASSERT_NEAR(value, density_at(grid, centre, radius), 1e-6) << i << " " << j << " " << k;
+                }
+            }
+        }
+        EXPECT_EQ(fine.active_voxels(), active);
+    }
+}
+
+TEST(Metaballs, OnePerVoxelInDocumentedOrder) {
+    const Extent extent{19, 10, 9};
+    const Placement placement{{1000, -500, 250}, 20};
+    const DensityGrid grid = random_grid(extent, 31, placement);
+    const auto balls = metaballs(grid, 2.5);
+    std::vector<Metaball> expected;
+    for (int bz = 0; bz < 9; bz += 8) {
+        for (int by = 0; by < 10; by += 8) {
+            for (int bx = 0; bx < 19; bx += 8) {
+                for (int n = 0; n < 512; ++n) {
+                    const int i = bx + n % 8, j = by + n / 8 % 8, k = bz + n / 64;
+                    const float q = grid.value(i, j, k);
+                    if (i >= 19 || j >= 10 || k >= 9 || q == 0) continue;
+                    expected.push_back({float(1000 + (i + 0.5) * 20), float(-500 + (j + 0.5) * 20),
+                                        float(250 + (k + 0.5) * 20), 50.0f, q});
+                }
+            }
+        }
+    }
+    EXPECT_EQ(balls, expected);
+    EXPECT_EQ(balls.size(), grid.active_voxels());
+    // Tiles (blocks of one value) and leaves give the same list.
+    const auto full = metaballs(uniform_grid({16, 16, 16}, 0.5f), 2);
+    ASSERT_EQ(full.size(), 4096u);
+    EXPECT_EQ(full[1].x - full[0].x, 50.0f);
+    EXPECT_TRUE(metaballs(DensityGrid(), 2).empty());
+}
+
+TEST(Metaballs, RejectRadiiOutOfRange) {
+    const DensityGrid grid = uniform_grid({4, 4, 4}, 1.0f);
+    for (double radius : {0.99, 8.01, std::nan("")}) {
+        EXPECT_THROW(metaballs(grid, radius), Error) << radius;
+        EXPECT_THROW(density_at(grid, {}, radius), Error) << radius;
+        EXPECT_THROW(resample(grid, 2, radius), Error) << radius;
+    }
+    EXPECT_THROW(resample(grid, 0, 2), Error);
+    EXPECT_THROW(resample(grid, 9, 2), Error);
+}
+
+}  // namespace
+}  // namespace nephos

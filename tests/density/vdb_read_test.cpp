@@ -1,0 +1,494 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Files that others made, and files that nobody should have made.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "automaton/error.h"
+#include "density/smoothing.h"
+#include "density/vdb_file.h"
+#include "tests/density/naive_smoothing.h"
+#include "tests/density/vdb_test_files.h"
+
+namespace nephos {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using test::TemporaryFolder;
+using test::write_with_openvdb;
+
+// A fog volume as another program may make it: at an odd place, with tiles large and small, values above 1.
+FloatGrid::Ptr foreign_fog() {
+    auto grid = FloatGrid::create(0.0f);
+    grid->setName("density");
+    grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(2.5));
+    auto voxels = grid->getAccessor();
+    std::mt19937 random(4);
+    for (int n = 0; n < 3000; ++n) {
+        const Coord c(int(random() % 50) - 13, int(random() % 41) - 29, int(random() % 23) + 5);
+        voxels.setValue(c, float(random() % 1000 + 1) / 500.0f);
+    }
+    grid->tree().addTile(1, Coord(-8, -16, 16), 0.75f, true);
+    grid->tree().addTile(1, Coord(40, 8, 8), 1.0f, true);
+    return grid;
+}
+
+// Every voxel of `loaded` against the file's grid: (i, j, k) there is index(i, j, k) here.
+template <class Map>
+void expect_same_voxels(const FloatGrid& grid, const DensityGrid& loaded, const Map& index) {
+    std::uint64_t active = 0;
+    for (auto value = grid.cbeginValueOn(); value; ++value) {
+        for (auto c = value.getBoundingBox().begin(); c; ++c) {
+            const Coord at = index(*c);
+            ASSERT_EQ(loaded.value(at.x(), at.y(), at.z()), *value) << *c;
+            active += *value > 0;
+        }
+    }
+    EXPECT_EQ(loaded.active_voxels(), active);
+}
+
+std::string error_of(const std::filesystem::path& path, const VdbReadOptions& options = {}) {
+    try {
+        load_density(path, options);
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::io);
+        EXPECT_NE(std::string(error.what()).find(path.filename().string()), std::string::npos)
+            << error.what();
+        return error.what();
+    }
+    return "";
+}
+
+// A file of nephos' own; returns the grid in it.
+DensityGrid write_own(const std::filesystem::path& path) {
+    const Extent extent{33, 20, 11};
+    const BitPlane plane = test::random_plane(extent, 0.1, 8);
+    const TimedPlane timed[] = {{plane.view(), 0}};
+    const Placement placement{{-100, 200, 50}, 25};
+    const DensityGrid grid = smooth(timed, {SmoothingKernel::box, 1, 1, 1, 0}, placement, {});
+    VdbContent content;
+    content.density = &grid;
+    content.hum = content.act = content.cld = plane.view();
+    content.cells = placement;
+    write_vdb(path, content, {0.03, 7, 2, 24, 99, "a", "b", "c", 3});
+    return grid;
+}
+
+TEST(VdbRead, OwnFilesComeBackAsTheyWere) {
+    const TemporaryFolder folder;
+    const DensityGrid grid = write_own(folder / "own.vdb");
+    const LoadedDensity loaded = load_density(folder / "own.vdb");
+    EXPECT_EQ(loaded.density.to_dense(), grid.to_dense());
+    EXPECT_EQ(loaded.density.extent(), grid.extent());
+    EXPECT_EQ(loaded.density.placement(), grid.placement());
+    EXPECT_EQ(loaded.grid_name, "density");
+    ASSERT_TRUE(loaded.metadata);
+    EXPECT_EQ(*loaded.metadata, (VdbMetadata{0.03, 7, 2, 24, 99, "a", "b", "c", 3}));
+    EXPECT_TRUE(loaded.notes.empty());
+    const Lattice state = read_state(folder / "own.vdb", grid.extent());
+    EXPECT_EQ(state.cld, test::random_plane(grid.extent(), 0.1, 8));
+}
+
+TEST(VdbRead, ForeignVoxelsKeepValuesAndPlace) {
+    const TemporaryFolder folder;
+    const auto grid = foreign_fog();
+    write_with_openvdb(folder / "fog.vdb", {grid});
+    const LoadedDensity loaded = load_density(folder / "fog.vdb");
+    const CoordBBox box = grid->evalActiveVoxelBoundingBox();
+    EXPECT_EQ(loaded.density.extent(), (Extent{box.dim().x(), box.dim().y(), box.dim().z()}));
+    EXPECT_FALSE(loaded.metadata);
+    expect_same_voxels(*grid, loaded.density, [&](const Coord& c) { return c - box.min(); });
+    const Placement placement = loaded.density.placement();
+    EXPECT_DOUBLE_EQ(placement.cell_size_m, 2.5);
+    const openvdb::Vec3d corner = grid->indexToWorld(box.min().asVec3d() - 0.5);
+    EXPECT_NEAR(placement.origin_m.x, corner.x(), 1e-9);
+    EXPECT_NEAR(placement.origin_m.y, corner.y(), 1e-9);
+    EXPECT_NEAR(placement.origin_m.z, corner.z(), 1e-9);
+}
+
+TEST(VdbRead, YUpFilesArePermuted) {
+    const TemporaryFolder folder;
+    const auto grid = foreign_fog();
+    write_with_openvdb(folder / "fog.vdb", {grid});
+    VdbReadOptions options;
+    options.up_axis = UpAxis::y;
+    options.metres_per_unit = 2;
+    const LoadedDensity loaded = load_density(folder / "fog.vdb", options);
+    const CoordBBox box = grid->evalActiveVoxelBoundingBox();
+    EXPECT_EQ(loaded.density.extent(), (Extent{box.dim().x(), box.dim().z(), box.dim().y()}));
+    expect_same_voxels(*grid, loaded.density, [&](const Coord& c) {
+        return Coord(c.x() - box.min().x(), box.max().z() - c.z(), c.y() - box.min().y());
+    });
+    // World: x stays, the file's z points south, its y up; twice as large.
+    const Placement placement = loaded.density.placement();
+    EXPECT_DOUBLE_EQ(placement.cell_size_m, 5.0);
+    EXPECT_NEAR(placement.origin_m.x, 2 * 2.5 * (box.min().x() - 0.5), 1e-9);
+    EXPECT_NEAR(placement.origin_m.y, 2 * 2.5 * (-box.max().z() - 0.5), 1e-9);
+    EXPECT_NEAR(placement.origin_m.z, 2 * 2.5 * (box.min().y() - 0.5), 1e-9);
+    // The file may say so itself.
+    grid->insertMeta("nephos_up_axis", openvdb::StringMetadata("y"));
+    write_with_openvdb(folder / "said.vdb", {grid});
+    EXPECT_EQ(load_density(folder / "said.vdb").density.extent(), loaded.density.extent());
+}
+
+// Axes in another order and direction in the transform itself.
+TEST(VdbRead, PermutedTransformsArePermuted) {
+    const TemporaryFolder folder;
+    const auto grid = foreign_fog();
+    // Index x runs along world z, y against world x, z along world y.
+    const openvdb::Mat4d matrix(0, 0, 4, 0, -4, 0, 0, 0, 0, 4, 0, 0, 10, 20, 30, 1);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
+    write_with_openvdb(folder / "turned.vdb", {grid});
+    const LoadedDensity loaded = load_density(folder / "turned.vdb");
+    EXPECT_TRUE(loaded.notes.empty());
+    const DensityGrid& density = loaded.density;
+    for (auto value = grid->cbeginValueOn(); value; ++value) {
+        for (auto c = value.getBoundingBox().begin(); c; ++c) {
+            const openvdb::Vec3d w = grid->indexToWorld(*c);
+            const Placement p = density.placement();
+            const auto at = [](double world, double origin, double size) {
+                return int(std::floor((world - origin) / size));
+            };
+            ASSERT_EQ(density.value(at(w.x(), p.origin_m.x, 4), at(w.y(), p.origin_m.y, 4),
+                                    at(w.z(), p.origin_m.z, 4)),
+                      *value);
+        }
+    }
+}
+
+// A field that is linear in space survives trilinear resampling: rotated, and with voxels that are no cubes.
+TEST(VdbRead, SkewedVoxelsAreResampled) {
+    const TemporaryFolder folder;
+    for (bool rotated : {true, false}) {
+        auto transform = openvdb::math::Transform::createLinearTransform(1.0);
+        if (rotated) {
+            transform->preRotate(0.5, openvdb::math::Z_AXIS);
+        } else {
+            transform->preScale(openvdb::Vec3d(1, 2, 3));
+        }
+        auto grid = FloatGrid::create(0.0f);
+        grid->setName("density");
+        grid->setTransform(transform);
+        const auto field = [](const openvdb::Vec3d& w) {
+            return 2.0 + 0.01 * w.x() + 0.02 * w.y() - 0.01 * w.z();
+        };
+        auto voxels = grid->getAccessor();
+        for (auto c = CoordBBox(Coord(-10, 3, 0), Coord(25, 33, 20)).begin(); c; ++c) {
+            voxels.setValue(*c, float(field(grid->indexToWorld(*c))));
+        }
+        write_with_openvdb(folder / "skewed.vdb", {grid});
+        const LoadedDensity loaded = load_density(folder / "skewed.vdb");
+        EXPECT_EQ(loaded.notes.size(), 1u);
+        const Placement p = loaded.density.placement();
+        EXPECT_NEAR(p.cell_size_m, 1.0, 1e-9);
+        int checked = 0;
+        for (auto c = CoordBBox(Coord(-9, 4, 1), Coord(24, 32, 19)).begin(); c; ++c) {
+            // The voxel whose centre is nearest; compare at that centre when it lies inside the old voxels.
+            const openvdb::Vec3d w = grid->indexToWorld(*c);
+            const int i = int(std::floor(w.x() - p.origin_m.x)), j = int(std::floor(w.y() - p.origin_m.y));
+            const int k = int(std::floor(w.z() - p.origin_m.z));
+            const openvdb::Vec3d centre(p.origin_m.x + i + 0.5, p.origin_m.y + j + 0.5,
+                                        p.origin_m.z + k + 0.5);
+            ASSERT_NEAR(loaded.density.value(i, j, k), field(centre), 1e-4);
+            ++checked;
+        }
+        EXPECT_GT(checked, 10000);
+    }
+}
+
+TEST(VdbRead, FindsTheGridThatIsMeant) {
+    const TemporaryFolder folder;
+    auto first = foreign_fog(), second = foreign_fog();
+    first->setName("smoke");
+    second->setName("density");
+    second->setTransform(openvdb::math::Transform::createLinearTransform(9.0));
+    auto bits = openvdb::BoolGrid::create(false);
+    bits->setName("mask");
+    write_with_openvdb(folder / "two.vdb", {bits, first, second});
+    EXPECT_EQ(load_density(folder / "two.vdb").grid_name, "density");
+    VdbReadOptions options;
+    options.grid = "smoke";
+    EXPECT_EQ(load_density(folder / "two.vdb", options).density.placement().cell_size_m, 2.5);
+    options.grid = "mask";
+    EXPECT_NE(error_of(folder / "two.vdb", options).find("not a float fog volume"), std::string::npos);
+    options.grid = "fire";
+    EXPECT_NE(error_of(folder / "two.vdb", options).find("smoke"), std::string::npos);
+    write_with_openvdb(folder / "one.vdb", {bits, first});
+    EXPECT_EQ(load_density(folder / "one.vdb").grid_name, "smoke");
+}
+
+TEST(VdbRead, OtherKindsOfFloats) {
+    const TemporaryFolder folder;
+    const auto grid = foreign_fog();
+    const CoordBBox box = grid->evalActiveVoxelBoundingBox();
+    const auto index = [&](const Coord& c) { return c - box.min(); };
+    // Double precision.
+    auto wide = openvdb::DoubleGrid::create(openvdb::DoubleTree::Ptr(new openvdb::DoubleTree(grid->tree())));
+    wide->setName("density");
+    wide->setTransform(grid->transformPtr());
+    write_with_openvdb(folder / "double.vdb", {wide});
+    expect_same_voxels(*grid, read_density(folder / "double.vdb"), index);
+    // Two grids that share one tree; the one that is asked for is the instance.
+    auto twin = FloatGrid::create(grid->treePtr());
+    twin->setName("twin");
+    twin->setTransform(openvdb::math::Transform::createLinearTransform(7.0));
+    write_with_openvdb(folder / "shared.vdb", {grid, twin});
+    VdbReadOptions options;
+    options.grid = "twin";
+    expect_same_voxels(*grid, read_density(folder / "shared.vdb", options), index);
+    EXPECT_DOUBLE_EQ(read_density(folder / "shared.vdb", options).placement().cell_size_m, 7.0);
+    // A stream without offsets.
+    {
+        std::ofstream stream(folder / "stream.vdb", std::ios::binary);
+        openvdb::io::Stream(stream).write(openvdb::GridCPtrVec{grid, twin});
+    }
+    expect_same_voxels(*grid, read_density(folder / "stream.vdb"), index);
+    // Half.
+    grid->setSaveFloatAsHalf(true);
+    write_with_openvdb(folder / "half.vdb", {grid});
+    const DensityGrid half = read_density(folder / "half.vdb");
+    for (auto value = grid->cbeginValueOn(); value; ++value) {
+        const Coord at = index(value.getCoord());
+        ASSERT_NEAR(half.value(at.x(), at.y(), at.z()), *value, *value * 0x1p-11);
+    }
+}
+
+TEST(VdbRead, NegativeValuesBecomeZeroAndAreNoted) {
+    const TemporaryFolder folder;
+    auto grid = foreign_fog();
+    grid->tree().setValue(Coord(0, 0, 10), -0.5f);
+    grid->tree().setValue(Coord(1, 0, 10), -0.25f);
+    write_with_openvdb(folder / "negative.vdb", {grid});
+    const LoadedDensity loaded = load_density(folder / "negative.vdb");
+    ASSERT_EQ(loaded.notes.size(), 1u);
+    EXPECT_EQ(loaded.notes[0], "2 values below 0 were set to 0");
+}
+
+TEST(VdbRead, RefusesWhatIsNoFogVolume) {
+    const TemporaryFolder folder;
+    write_with_openvdb(folder / "sphere.vdb",
+                       {openvdb::tools::createLevelSetSphere<FloatGrid>(10, {0, 0, 0}, 0.5f)});
+    EXPECT_NE(error_of(folder / "sphere.vdb").find("no float fog volume"), std::string::npos);
+    auto fog = foreign_fog();
+    fog->tree().setValue(Coord(0, 0, 10), std::numeric_limits<float>::quiet_NaN());
+    write_with_openvdb(folder / "nan.vdb", {fog});
+    EXPECT_NE(error_of(folder / "nan.vdb").find("finite"), std::string::npos);
+    auto everywhere = FloatGrid::create(0.5f);
+    everywhere->setName("density");
+    write_with_openvdb(folder / "background.vdb", {everywhere});
+    EXPECT_NE(error_of(folder / "background.vdb").find("background"), std::string::npos);
+    auto frustum = foreign_fog();
+    frustum->setTransform(
+        openvdb::math::Transform::createFrustumTransform(openvdb::BBoxd({0, 0, 0}, {50, 50, 50}), 0.5, 10));
+    write_with_openvdb(folder / "frustum.vdb", {frustum});
+    EXPECT_NE(error_of(folder / "frustum.vdb").find("frustum"), std::string::npos);
+    write_with_openvdb(folder / "none.vdb", {});
+    EXPECT_NE(error_of(folder / "none.vdb"), "");
+    VdbReadOptions options;
+    options.metres_per_unit = 0;
+    EXPECT_THROW(load_density(folder / "nan.vdb", options), Error);
+}
+
+TEST(VdbRead, HugeBoundsAreRefusedBeforeTheyCostMemory) {
+    const TemporaryFolder folder;
+    auto far = FloatGrid::create(0.0f);
+    far->setName("density");
+    far->tree().setValue(Coord(-2000000000), 1.0f);
+    far->tree().setValue(Coord(2000000000), 1.0f);
+    write_with_openvdb(folder / "far.vdb", {far});
+    EXPECT_NE(error_of(folder / "far.vdb").find("too large"), std::string::npos)
+        << error_of(folder / "far.vdb");
+    // The same without OpenVDB's statistics in the file.
+    {
+        openvdb::io::File file((folder / "silent.vdb").string());
+        file.setGridStatsMetadataEnabled(false);
+        file.write(openvdb::GridPtrVec{far});
+    }
+    EXPECT_NE(error_of(folder / "silent.vdb").find("too large"), std::string::npos);
+    auto full = FloatGrid::create(0.0f);
+    full->setName("density");
+    full->tree().addTile(3, Coord(0), 1.0f, true);  // 4096^3 voxels in a few bytes
+    write_with_openvdb(folder / "full.vdb", {full});
+    EXPECT_NE(error_of(folder / "full.vdb").find("memory"), std::string::npos)
+        << error_of(folder / "full.vdb");
+    VdbReadOptions options;
+    options.limits.seconds = 1e-3;
+    write_with_openvdb(folder / "fog.vdb", {foreign_fog()});
+    EXPECT_NE(error_of(folder / "fog.vdb", options).find("longer"), std::string::npos);
+}
+
+TEST(VdbRead, WhatIsNoFileIsAClearError) {
+    const TemporaryFolder folder;
+    EXPECT_NE(error_of(folder / "missing.vdb"), "");
+    std::filesystem::create_directory(folder / "folder.vdb");
+    EXPECT_NE(error_of(folder / "folder.vdb").find("folder"), std::string::npos);
+    test::write_bytes(folder / "empty.vdb", {});
+    EXPECT_NE(error_of(folder / "empty.vdb").find("empty"), std::string::npos);
+    test::write_bytes(folder / "text.vdb", std::vector<char>(5000, 'x'));
+    EXPECT_NE(error_of(folder / "text.vdb").find("not an OpenVDB file"), std::string::npos);
+    ASSERT_EQ(::mkfifo((folder / "pipe.vdb").c_str(), 0600), 0);
+    EXPECT_NE(error_of(folder / "pipe.vdb").find("regular"), std::string::npos);
+    std::filesystem::create_symlink(folder / "loop.vdb", folder / "loop.vdb");
+    EXPECT_NE(error_of(folder / "loop.vdb"), "");
+}
+
+TEST(VdbRead, UnreadableFileIsAClearError) {
+    if (::geteuid() == 0) GTEST_SKIP() << "root may read every file";
+    const TemporaryFolder folder;
+    write_own(folder / "secret.vdb");
+    std::filesystem::permissions(folder / "secret.vdb", std::filesystem::perms::none);
+    EXPECT_NE(error_of(folder / "secret.vdb").find("Permission denied"), std::string::npos);
+}
+
+// A real file cut off anywhere: always an error, never a crash, a hang or a silent half.
+TEST(VdbRead, TruncatedFilesAreErrors) {
+    const TemporaryFolder folder;
+    write_own(folder / "whole.vdb");
+    const auto bytes = test::bytes_of(folder / "whole.vdb");
+    ASSERT_EQ(error_of(folder / "whole.vdb"), "");
+    const std::size_t step = std::max<std::size_t>(1, bytes.size() / 150);
+    for (std::size_t size = 0; size < bytes.size(); size += size < 64 ? 7 : step) {
+        test::write_bytes(folder / "cut.vdb", {bytes.begin(), bytes.begin() + std::ptrdiff_t(size)});
+        const std::string message = error_of(folder / "cut.vdb");
+        EXPECT_NE(message, "") << "cut at byte " << size;
+        EXPECT_LT(message.size(), 600u) << "cut at byte " << size;
+    }
+    test::write_bytes(folder / "cut.vdb", {bytes.begin(), bytes.end() - 1});
+    EXPECT_NE(error_of(folder / "cut.vdb"), "");
+    EXPECT_THROW(read_state(folder / "cut.vdb", {33, 20, 11}), Error);
+    EXPECT_THROW(read_vdb_info(folder / "cut.vdb"), Error);
+}
+
+// Bytes changed at random: a grid or an error, within the limits.
+TEST(VdbRead, DamagedFilesNeverTakeTheProcessDown) {
+    const TemporaryFolder folder;
+    write_own(folder / "whole.vdb");
+    const auto bytes = test::bytes_of(folder / "whole.vdb");
+    std::mt19937 random(17);
+    VdbReadOptions options;
+    options.limits.memory_bytes = std::size_t{512} << 20;
+    options.limits.seconds = 20;
+    int errors = 0;
+    for (int n = 0; n < 120; ++n) {
+        auto damaged = bytes;
+        // The first half of the damage lies in the headers, where lengths and offsets are.
+        const std::size_t reach = n % 2 ? damaged.size() : std::min<std::size_t>(damaged.size(), 1200);
+        for (int m = 0; m < 1 + n % 8; ++m) damaged[8 + random() % (reach - 8)] = char(random());
+        test::write_bytes(folder / "damaged.vdb", damaged);
+        const std::string message = error_of(folder / "damaged.vdb", options);
+        errors += !message.empty();
+        EXPECT_LT(message.size(), 600u);
+    }
+    EXPECT_GT(errors, 20);
+}
+
+TEST(VdbRead, StatesOfOthersAndWhatIsMissing) {
+    const TemporaryFolder folder;
+    const Extent extent{12, 10, 9};
+    const auto bool_grid = [](const char* name, const Coord& c) {
+        auto grid = openvdb::BoolGrid::create(false);
+        grid->setName(name);
+        grid->tree().setValue(c, true);
+        return grid;
+    };
+    auto hum = bool_grid("hum", {11, 9, 8}), act = bool_grid("act", {0, 0, 0});
+    hum->tree().addTile(1, Coord(0), true, true);
+    act->tree().setValue(Coord(1, 1, 1), false);  // active, but false
+    auto cld = openvdb::MaskGrid::create();
+    cld->setName("cld");
+    cld->tree().setValueOn(Coord(3, 4, 5));
+    write_with_openvdb(folder / "state.vdb", {hum, act, cld});
+    const Lattice state = read_state(folder / "state.vdb", extent);
+    EXPECT_EQ(state.hum.count(), 513u);
+    EXPECT_TRUE(state.hum.get(11, 9, 8) && state.hum.get(7, 7, 7) && !state.hum.get(8, 7, 7));
+    EXPECT_EQ(state.act.count(), 1u);
+    EXPECT_TRUE(state.act.get(0, 0, 0));
+    EXPECT_EQ(state.cld.count(), 1u);
+    EXPECT_TRUE(state.cld.get(3, 4, 5));
+    const auto message = [&](Extent e) {
+        try {
+            read_state(folder / "state.vdb", e);
+        } catch (const Error& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_NE(message({11, 10, 9}).find("outside"), std::string::npos);
+    write_with_openvdb(folder / "state.vdb", {hum, cld});
+    EXPECT_NE(message(extent).find("`act`"), std::string::npos);
+    act->tree().setValue(Coord(-1, 0, 0), true);
+    write_with_openvdb(folder / "state.vdb", {hum, act, cld});
+    EXPECT_NE(message(extent).find("outside"), std::string::npos);
+    auto fog = foreign_fog();
+    fog->setName("act");
+    write_with_openvdb(folder / "state.vdb", {hum, fog, cld});
+    EXPECT_NE(message(extent).find("not bool"), std::string::npos);
+}
+
+TEST(VdbRead, InfoListsEveryGrid) {
+    const TemporaryFolder folder;
+    const DensityGrid grid = write_own(folder / "own.vdb");
+    const VdbInfo info = read_vdb_info(folder / "own.vdb");
+    EXPECT_EQ(info.file_version, "10.0/224");
+    ASSERT_EQ(info.grids.size(), 4u);
+    const VdbGridInfo& density = info.grids[0];
+    EXPECT_EQ(density.name, "density");
+    EXPECT_EQ(density.type, "float");
+    EXPECT_EQ(density.grid_class, "fog volume");
+    EXPECT_EQ(density.voxel_size, (Vec3{25, 25, 25}));
+    EXPECT_EQ(density.active_box, (VoxelBox{{0, 0, 0}, {32, 19, 10}}));
+    EXPECT_EQ(info.grids[3].name, "cld");
+    EXPECT_EQ(info.grids[3].type, "bool");
+    const auto has = [](const auto& metadata, const std::string& name, const std::string& value) {
+        return std::ranges::find(metadata, std::pair(name, value)) != metadata.end();
+    };
+    EXPECT_TRUE(has(density.metadata, "nephos_seed", "99"));
+    EXPECT_TRUE(has(info.metadata, "nephos_scene_hash", "a"));
+    // Without statistics in the file they are counted.
+    auto fog = foreign_fog();
+    fog->setSaveFloatAsHalf(true);
+    {
+        openvdb::io::File file((folder / "silent.vdb").string());
+        file.setGridStatsMetadataEnabled(false);
+        file.write(openvdb::GridPtrVec{fog});
+    }
+    const VdbInfo counted = read_vdb_info(folder / "silent.vdb");
+    EXPECT_EQ(counted.grids[0].active_voxels, fog->activeVoxelCount());
+    EXPECT_EQ(counted.grids[0].type, "half");
+    EXPECT_EQ(counted.grids[0].active_box.min[0], fog->evalActiveVoxelBoundingBox().min().x());
+}
+
+// The cloud data set of Walt Disney Animation Studios, where it lies beside the checkout.
+TEST(VdbRead, DisneyCloud) {
+    const std::filesystem::path path =
+        std::filesystem::path(NEPHOS_SOURCE_DIR) / "../shared/data/wdas_cloud_sixteenth.vdb";
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there";
+    const auto file = test::read_with_openvdb(path);
+    const auto grid = file.get<FloatGrid>("density");
+    ASSERT_TRUE(grid);
+    const CoordBBox box = grid->evalActiveVoxelBoundingBox();
+    VdbReadOptions options;
+    options.up_axis = UpAxis::y;
+    const LoadedDensity loaded = load_density(path, options);
+    EXPECT_EQ(loaded.density.extent(), (Extent{126, 154, 86}));
+    expect_same_voxels(*grid, loaded.density, [&](const Coord& c) {
+        return Coord(c.x() - box.min().x(), box.max().z() - c.z(), c.y() - box.min().y());
+    });
+    EXPECT_EQ(read_vdb_info(path).grids.at(0).active_voxels, 415642u);
+    EXPECT_EQ(read_density(path).extent(), (Extent{126, 86, 154}));
+}
+
+}  // namespace
+}  // namespace nephos
