@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Writes one VDB file of every kind and, beside it, what must be in it as plain arrays and JSON, for
+// read_with_pyopenvdb.py:
+//
+//     write_sample_files FOLDER
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "density/metaballs.h"
+#include "density/smoothing.h"
+#include "density/vdb_file.h"
+#include "tests/density/naive_smoothing.h"
+
+namespace {
+
+using namespace nephos;
+
+// Raw 32-bit floats, x fastest.
+void write_array(const std::filesystem::path& path, const std::vector<float>& values) {
+    std::ofstream stream(path, std::ios::binary);
+    stream.exceptions(std::ios::badbit | std::ios::failbit);
+    stream.write(reinterpret_cast<const char*>(values.data()),
+                 std::streamsize(values.size() * sizeof(float)));
+}
+
+// The bits of a plane at `refine` voxels per cell, as floats.
+std::vector<float> as_array(const BitPlane& plane, int refine) {
+    const Extent cells = plane.extent(), voxels{cells.x * refine, cells.y * refine, cells.z * refine};
+    std::vector<float> values(voxels.cells());
+    for (int k = 0; k < voxels.z; ++k) {
+        for (int j = 0; j < voxels.y; ++j) {
+            for (int i = 0; i < voxels.x; ++i) {
+                values[linear_index(voxels, i, j, k)] = plane.get(i / refine, j / refine, k / refine);
+            }
+        }
+    }
+    return values;
+}
+
+void write_json(const std::filesystem::path& path, Extent e, double voxel_m, bool half, int refine,
+                const std::vector<float>& speeds) {
+    std::ofstream stream(path);
+    stream.exceptions(std::ios::badbit | std::ios::failbit);
+    stream << "{\"extent\": [" << e.x << ", " << e.y << ", " << e.z << "], \"voxel_m\": " << voxel_m
+           << ", \"origin_m\": [-300, 1200, 450], \"half\": " << (half ? "true" : "false")
+           << ", \"refine\": " << refine << ", \"speed_by_level\": [";
+    for (std::size_t n = 0; n < speeds.size(); ++n) stream << (n ? ", " : "") << speeds[n];
+    stream << "]}\n";
+}
+
+void write_samples(const std::filesystem::path& folder) {
+    const Extent extent{45, 30, 18};
+    const Placement placement{{-300, 1200, 450}, 32};
+    const BitPlane hum = test::random_plane(extent, 0.5, 1), act = test::random_plane(extent, 0.03, 2);
+    BitPlane cld = test::random_plane(extent, 0.01, 3);
+    for (int k = 0; k < 18; ++k) {
+        for (int j = 0; j < 20; ++j) {
+            for (int i = 0; i < 20; ++i) cld.set(i, j, k, true);
+        }
+    }
+    const TimedPlane timed[] = {{cld.view(), 0}};
+    const DensityGrid coarse = smooth(timed, {SmoothingKernel::gaussian, 1, 1, 1, 0}, placement, {});
+    Wind wind;
+    wind.keyframes = {{0, {{0, {3, -1}}, {2000, {23, -1}}}}};
+    const VdbMetadata metadata{0.04, 33.5, 5, 24, 12345678901234567890u, "scene", "state", "0.1.0", 1};
+    for (const auto& [name, half, refine] :
+         {std::tuple{"float", false, 1}, {"half", true, 1}, {"refined", false, 2}}) {
+        const DensityGrid density = refine == 1 ? coarse : resample(coarse, refine, 1.5);
+        VdbContent content{&density, half, hum.view(), act.view(), cld.view(), placement, &wind};
+        write_vdb(folder / (std::string(name) + ".vdb"), content, metadata);
+        write_array(folder / (std::string(name) + ".density"), density.to_dense());
+        write_array(folder / (std::string(name) + ".hum"), as_array(hum, refine));
+        write_array(folder / (std::string(name) + ".act"), as_array(act, refine));
+        write_array(folder / (std::string(name) + ".cld"), as_array(cld, refine));
+        std::vector<float> speeds;
+        const double size = density.placement().cell_size_m;
+        for (int k = 0; k < density.extent().z; ++k) {
+            speeds.push_back(float(wind_at(wind, 450 + (k + 0.5) * size, metadata.time_s).east_m_per_s));
+        }
+        write_json(folder / (std::string(name) + ".json"), density.extent(), size, half, refine, speeds);
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    if (argc != 2) {
+        std::fprintf(stderr, "usage: %s FOLDER\n", argv[0]);
+        return 2;
+    }
+    try {
+        std::filesystem::create_directories(argv[1]);
+        write_samples(argv[1]);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "%s\n", error.what());
+        return 1;
+    }
+    return 0;
+}
