@@ -25,11 +25,6 @@ constexpr std::int64_t kFractionMask = 0xFFFFFFFF;
 
 int blocks(int cells) { return (cells + kBlockEdge - 1) / kBlockEdge; }
 
-std::array<float, 3> background_of(const AutomatonOptions& options) {
-    const Probabilities& p = options.field.background;
-    return {float(p.hum), float(p.act), float(p.ext)};
-}
-
 // Rows of blocks per task: about 4 KiB of each layer, so that a task's planes stay in the second-level cache.
 int rows_per_task(const BitPlane& plane) {
     return int(std::clamp<std::size_t>(4096 / (plane.words_per_row() * 8 * kBlockEdge), 1, 8));
@@ -60,7 +55,7 @@ std::string StateHash::hex() const {
 
 struct Automaton::Impl {
     Impl(const AutomatonOptions& o, Lattice initial)
-        : options(o), lattice(std::move(initial)), parcels(o), tables(background_of(o)) {
+        : options(o), lattice(std::move(initial)), parcels(o) {
         check_extents(options, lattice);
         act_next = BitPlane(options.extent);
         zero_row.assign(lattice.hum.words_per_row() + 16, 0);
@@ -82,7 +77,7 @@ struct Automaton::Impl {
     Lattice lattice;
     BitPlane act_next;
     AirParcels parcels;
-    SparseTables tables;
+    PoissonLadder ladder;
     std::vector<std::uint64_t> zero_row;
     std::vector<Displacement> fraction;  // of a cell that each layer has moved beyond whole cells, 0..1
     std::vector<ActiveEllipsoid> external;
@@ -132,7 +127,7 @@ void Automaton::Impl::grow_and_draw() {
                             .hum = lattice.hum.words().data(),
                             .cld = lattice.cld.words().data(),
                             .zero_row = zero_row.data() + 8};
-    const StepRandom random{options.seed, std::uint32_t(steps), &field, &tables};
+    const StepRandom random{options.seed, std::uint32_t(steps), &field, &ladder};
     const int rows = rows_per_task(lattice.hum), all_rows = blocks(options.extent.y);
     const int parts = (all_rows + rows - 1) / rows;
     tbb::parallel_for(0, blocks(options.extent.z) * parts, [&](int task) {

@@ -43,14 +43,21 @@ HWY_INLINE const std::uint64_t* act_row(const StepPlanes& p, int j, int k) {
 }
 
 // Neighbours of a periodic row across its ends: at most the two cells at either end are concerned.
-HWY_NOINLINE void wrap_row(const std::uint64_t* act, const std::uint64_t* hum_next, std::uint64_t* act_next, int nx) {
-    for (int i : {0, 1, nx - 2, nx - 1}) {
-        if (i < 0 || i >= nx) continue;
-        for (int di : {-2, -1, 1, 2}) {
-            const int n = ((i + di) % nx + nx) % nx;
-            const std::uint64_t bit = (act[n / 64] >> (n % 64)) & (hum_next[i / 64] >> (i % 64)) & 1u;
-            act_next[i / 64] |= bit << (i % 64);
-        }
+inline void wrap_row(const std::uint64_t* act, const std::uint64_t* hum_next, std::uint64_t* act_next, int nx) {
+    const auto get = [act](int i) { return (act[i / 64] >> (i % 64)) & 1u; };
+    const auto feed = [&](int i, std::uint64_t bit) {
+        act_next[i / 64] |= (bit << (i % 64)) & hum_next[i / 64];
+    };
+    if (nx >= 4) {
+        const std::uint64_t first = get(0), second = get(1), last = get(nx - 1), last_but_one = get(nx - 2);
+        feed(0, last | last_but_one);
+        feed(1, last);
+        feed(nx - 1, first | second);
+        feed(nx - 2, first);
+        return;
+    }
+    for (int i = 0; i < nx; ++i) {  // so narrow that a cell meets others, and itself, around the axis
+        for (int di : {-2, -1, 1, 2}) feed(i, get(((i + di) % nx + nx) % nx));
     }
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "automaton/kernels.h"
 
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "automaton/kernels.cpp"
 #include <hwy/foreach_target.h>
@@ -39,10 +41,13 @@ namespace nephos {
 HWY_EXPORT(step_part_target);
 HWY_EXPORT(target_name);
 
-SparseTables::SparseTables(const std::array<float, 3>& p) {
-    for (std::size_t d = 0; d < 3; ++d) {
-        if (p[d] < kUniformSparseLimit) background[d] = make_poisson_table(double(p[d]));
+float sparse_rate_bound(const BlockPlan& plan, unsigned draws) {
+    float sum = 0;
+    for (unsigned d = 0; d < 3; ++d) {
+        // Rounding of the rates in the cells may exceed that of the bound by a few units in the last place.
+        if ((draws >> d & 1) != 0) sum += sparse_rate(std::min(plan.draws[d].p_max, kVaryingSparseLimit)) * 1.00001f;
     }
+    return sum;
 }
 
 void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {

@@ -28,28 +28,24 @@ struct StepPlanes {
     const std::uint64_t* zero_row = nullptr;  // words_per_row zeros with 64 bytes of zeros before and after
 };
 
-// Distributions that stay the same for a whole simulation.
-struct SparseTables {
-    explicit SparseTables(const std::array<float, 3>& background);
-    PoissonLadder ladder;
-    std::array<PoissonTable, 3> background;  // exactly the background's p; empty above the sparse limit
-};
-
-// Below these the sparse draw is used, from them on the dense one. Part of the random stream (docs/adr/0002).
-inline constexpr float kUniformSparseLimit = 0.125f;
-inline constexpr float kVaryingSparseLimit = float(kSparseLimit);
+// Below these a draw is sparse, from them on dense. Part of the random stream (docs/adr/0002).
+inline constexpr float kUniformSparseLimit = 0.125f;  // p is the background's in the whole block
+inline constexpr float kVaryingSparseLimit = 0.25f;   // p varies: evaluating it in every cell would cost more
 
 inline bool is_sparse(const DrawPlan& plan) {
     if (plan.kind == DrawPlan::Kind::uniform) return plan.p_max < kUniformSparseLimit;
     return plan.kind == DrawPlan::Kind::varying && plan.p_max < kVaryingSparseLimit;
 }
 
+// At least the sum over a block's sparse draws (a bit each in `draws`) of the rate in any of its cells.
+float sparse_rate_bound(const BlockPlan& plan, unsigned draws);
+
 // The chance of one step.
 struct StepRandom {
     std::uint64_t seed = 0;
     std::uint32_t step = 0;
     const BlockField* field = nullptr;
-    const SparseTables* tables = nullptr;
+    const PoissonLadder* ladder = nullptr;
 };
 
 // Rows of blocks by_begin..by_end of slab bz. Blocks are 8x8x8 cells; the last ones may be cut by the extent.
@@ -64,7 +60,8 @@ inline std::uint32_t probability_threshold(float p) {
     return p >= 1.0f ? kCertain : std::uint32_t(std::int32_t(p * 0x1p31f)) << 1;
 }
 
-// -ln(1 - p) in float32 for 0 <= p <= kVaryingSparseLimit; relative error < 1e-6. Same operations in every kernel.
+// -ln(1 - p) in float32 for 0 <= p <= kVaryingSparseLimit, by the series of 2 artanh(p / (2 - p)); relative error
+// < 1e-6. Same operations in every kernel.
 inline float sparse_rate(float p) {
     const float z = p / (2.0f - p);
     const float z2 = z * z;

@@ -30,8 +30,8 @@ enum class Domain : std::uint32_t {
     skies = 4,          // which clouds enter, and where
 };
 
-// What is drawn for a block of 8x8x8 cells. `counts` serves the other three: one counter a block and step.
-enum class Draw : std::uint32_t { counts = 0, hum = 1, act = 2, ext = 3 };
+// What is drawn for a block of 8x8x8 cells: the number of sparse events, the events, and the dense draws.
+enum class Draw : std::uint32_t { counts = 0, hum = 1, act = 2, ext = 3, sparse = 4 };
 
 using PhiloxWords = std::array<std::uint32_t, 4>;
 

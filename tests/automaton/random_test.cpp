@@ -45,6 +45,9 @@ TEST(Counters, AreNeverUsedTwice) {
                     use(block_counter(Domain::lattice, draw, step, bx, by, bz, sub));
                 }
             }
+            for (std::uint32_t sub = 0; sub < 512; ++sub) {
+                use(block_counter(Domain::lattice, Draw::sparse, step, bx, by, bz, sub));
+            }
         }
     }
     for (std::uint32_t cell = 0; cell < 512; ++cell) {
@@ -63,17 +66,18 @@ TEST(Counters, AreNeverUsedTwice) {
 }
 
 TEST(Poisson, TablesHaveTheRightDistribution) {
-    for (double p : {1e-8, 1e-4, 0.01, 0.0625, 0.2, 0.25}) {
-        const PoissonTable table = make_poisson_table(p);
-        EXPECT_NEAR(double(table.rate), -std::log1p(-p), 1e-7 * p) << p;
-        const double mean = -512 * std::log1p(-p);
-        double probability = std::exp(-mean), cumulative = 0;
+    for (double rate : {1e-8, 1e-4, 0.01, 0.0625, 0.3, 1.0}) {
+        const PoissonTable table = make_poisson_table(rate);
+        const double mean = 512 * rate;
+        double cumulative = 0, probability = 0;
         for (std::size_t n = 0; n < table.thresholds.size(); ++n) {
+            probability = std::exp(double(n) * std::log(mean) - mean - std::lgamma(double(n) + 1));
             cumulative += probability;
-            EXPECT_NEAR(table.thresholds[n] * 0x1p-32, cumulative, 1e-9) << "p " << p << ", n " << n;
-            probability *= mean / double(n + 1);
+            EXPECT_NEAR(table.thresholds[n] * 0x1p-32, cumulative, 1e-9) << "rate " << rate << ", n " << n;
         }
-        EXPECT_GT(cumulative + probability, 1 - 1e-9) << "p " << p << ": more events than the table holds";
+        const double next = std::exp(double(table.thresholds.size()) * std::log(mean) - mean -
+                                     std::lgamma(double(table.thresholds.size()) + 1));
+        EXPECT_GT(cumulative + next, 1 - 1e-9) << "rate " << rate << ": more events than the table holds";
     }
 }
 
@@ -88,22 +92,21 @@ TEST(Poisson, CountsThresholdsAtOrBelowTheWord) {
 
 TEST(Poisson, LadderGivesTheLowestLevelThatSuffices) {
     const PoissonLadder ladder;
-    for (float p = 1e-9f; p <= 0.25f; p *= 1.013f) {
-        const PoissonTable& level = ladder.level(p);
-        EXPECT_GE(float(level.p), p);
-        if (level.p > 0x1p-26) {
-            EXPECT_LE(float(level.p), 1.2500002f * p);
+    for (float rate = 1e-9f; rate <= 1.0f; rate *= 1.013f) {
+        const PoissonTable& level = ladder.level(rate);
+        EXPECT_GE(level.rate, double(rate));
+        if (level.rate > 0x1p-28) {
+            EXPECT_LE(level.rate, 1.2500002 * double(rate));
         }
     }
-    EXPECT_EQ(ladder.level(0.25f).p, 0.25);
-    EXPECT_EQ(ladder.level(0.125f).p, 0.125);
-    EXPECT_EQ(ladder.level(0.0f).p, 0x1p-26);
+    EXPECT_EQ(ladder.level(1.0f).rate, 1);
+    EXPECT_EQ(ladder.level(0.125f).rate, 0.125);
+    EXPECT_EQ(ladder.level(0.0f).rate, 0x1p-28);
 }
 
 TEST(SparseRate, IsMinusLogOfOneMinusP) {
     for (float p = 0; p <= 0.25f; p += 0.0007f) {
         EXPECT_NEAR(sparse_rate(p), -std::log1p(-double(p)), 1e-6 * double(p));
-        EXPECT_NEAR(event_rate(double(p)), -std::log1p(-double(p)), 1e-15);
     }
 }
 

@@ -4,11 +4,13 @@
 #include <Random123/philox.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
 #include "automaton/block_field.h"
 #include "automaton/kernels.h"
+#include "automaton/poisson.h"
 
 namespace nephos::reference {
 namespace {
@@ -33,70 +35,72 @@ std::uint32_t random_word(std::uint64_t seed, std::uint32_t draw, std::uint32_t 
     return r123::Philox4x32{}(counter, key).v[word];
 }
 
-// Everything about one draw of one block.
-struct BlockDraw {
+// Everything about one block in one step.
+struct BlockDraws {
     const AutomatonOptions& options;
     const BlockField& field;
-    const SparseTables& tables;
     std::uint32_t step;
-    int draw, bx, by, bz;
+    int bx, by, bz;
     BlockPlan plan;
 
     std::uint32_t word(std::uint32_t draw_id, std::uint32_t sub, std::uint32_t n) const {
         return random_word(options.seed, draw_id, step, bx, by, bz, sub, n);
     }
-    float p(int cell) const { return probability_at(field, plan, draw, cell % 8, cell / 8 % 8, cell / 64); }
+    float p(int draw, int cell) const {
+        const float value = probability_at(field, plan, draw, cell % 8, cell / 8 % 8, cell / 64);
+        if (value > plan.draws[std::size_t(draw)].p_max) throw std::logic_error("a cell exceeds the bound of its block");
+        return value;
+    }
 };
 
-// Which of the 512 cells have an event, as the sparse draw decides it.
-std::vector<bool> sparse_events(const BlockDraw& b, const PoissonTable& level, bool uniform) {
-    std::vector<bool> events(512, false);
-    const std::uint32_t uniform_word = b.word(0, 0, std::uint32_t(b.draw));
-    std::uint32_t count = 0;
-    for (std::uint32_t threshold : level.thresholds) count += threshold <= uniform_word ? 1 : 0;
-    for (std::uint32_t e = 0; e < count; ++e) {
-        const std::uint32_t w = b.word(std::uint32_t(b.draw) + 1, e / 4, e % 4);
-        const int cell = int(w % 512);
-        const float u = float(w / 512) + 0.5f;
-        if (uniform || u * (level.rate * 0x1p-23f) < sparse_rate(b.p(cell))) events[std::size_t(cell)] = true;
-    }
-    return events;
-}
+using Events = std::array<std::vector<bool>, 3>;  // per draw, which of the 512 cells have one
 
-// ... and as the dense draw does.
-std::vector<bool> dense_events(const BlockDraw& b) {
-    std::vector<bool> events(512, false);
-    std::uint32_t ties = 0;
-    for (int cell = 0; cell < 512; ++cell) {
-        const std::uint32_t t = probability_threshold(b.p(cell));
-        const std::uint32_t random = b.word(std::uint32_t(b.draw) + 1, std::uint32_t(cell) / 16, std::uint32_t(cell) / 4 % 4);
-        const std::uint32_t byte = (random >> (cell % 4 * 8)) & 255u;
-        if (byte == t >> 24) {
-            const std::uint32_t more = b.word(std::uint32_t(b.draw) + 1, 32 + ties / 4, ties % 4) >> 8;
-            events[std::size_t(cell)] = t == kCertain || more < (t & 0xFFFFFFu);
-            ++ties;
-        } else {
-            events[std::size_t(cell)] = byte < t >> 24;
+// All sparse draws of the block at once: Poisson events, each of one kind or none by the rates of its cell.
+void sparse_events(const BlockDraws& b, unsigned draws, const PoissonLadder& ladder, Events& events) {
+    const PoissonTable& level = ladder.level(sparse_rate_bound(b.plan, draws));
+    const std::uint32_t uniform = b.word(0, 0, 0);
+    std::uint32_t count = 0;
+    for (std::uint32_t threshold : level.thresholds) count += threshold <= uniform ? 1 : 0;
+    for (std::uint32_t e = 0; e < count; ++e) {
+        const int cell = int(b.word(4, e / 2, e % 2 * 2) % 512);
+        const float v = float(std::int32_t(b.word(4, e / 2, e % 2 * 2 + 1) / 2)) * (float(level.rate) * 0x1p-31f);
+        float sum = 0;
+        for (int draw = 0; draw < 3; ++draw) {
+            if ((draws >> draw & 1) == 0) continue;
+            sum += sparse_rate(b.p(draw, cell));
+            if (v < sum) {
+                events[std::size_t(draw)][std::size_t(cell)] = true;
+                break;
+            }
         }
     }
-    return events;
 }
 
-std::vector<bool> events_of(const BlockDraw& b) {
-    const DrawPlan& plan = b.plan.draws[std::size_t(b.draw)];
-    for (int cell = 0; cell < 512; ++cell) {
-        if (b.p(cell) > plan.p_max) throw std::logic_error("a cell exceeds the bound of its block");
+void dense_events(const BlockDraws& b, int draw, Events& events) {
+    for (std::uint32_t cell = 0; cell < 512; ++cell) {
+        const std::uint32_t t = probability_threshold(b.p(draw, int(cell)));
+        const std::uint32_t byte = (b.word(std::uint32_t(draw) + 1, cell / 16, cell / 4 % 4) >> (cell % 4 * 8)) & 255u;
+        const std::uint32_t more = b.word(std::uint32_t(draw) + 1, 32 + cell / 4, cell % 4) >> 8;
+        events[std::size_t(draw)][cell] =
+            byte < t >> 24 || (byte == t >> 24 && (t == kCertain || more < (t & 0xFFFFFFu)));
     }
-    switch (plan.kind) {
-        case DrawPlan::Kind::none: return std::vector<bool>(512, false);
-        case DrawPlan::Kind::certain: return std::vector<bool>(512, true);
-        case DrawPlan::Kind::uniform:
-            if (plan.p_max >= kUniformSparseLimit) return dense_events(b);
-            return sparse_events(b, b.tables.background[std::size_t(b.draw)], true);
-        case DrawPlan::Kind::varying: break;
+}
+
+Events events_of(const BlockDraws& b, const PoissonLadder& ladder, bool any_cloud) {
+    Events events;
+    events.fill(std::vector<bool>(512, false));
+    unsigned sparse = 0;
+    for (int draw = 0; draw < 3; ++draw) {
+        const DrawPlan& plan = b.plan.draws[std::size_t(draw)];
+        if (plan.kind == DrawPlan::Kind::none || (draw == kExt && !any_cloud)) continue;
+        if (is_sparse(plan)) {
+            sparse |= 1u << draw;
+        } else {
+            dense_events(b, draw, events);
+        }
     }
-    if (plan.p_max >= kVaryingSparseLimit) return dense_events(b);
-    return sparse_events(b, b.tables.ladder.level(plan.p_max), false);
+    if (sparse != 0) sparse_events(b, sparse, ladder, events);
+    return events;
 }
 
 }  // namespace
@@ -155,25 +159,28 @@ Cells grow(const Cells& now, const Boundaries& b) {
 void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uint32_t step,
                          const std::vector<ActiveEllipsoid>& ellipsoids) {
     const BlockField field(options, ellipsoids);
-    const SparseTables tables(field.background());
+    const PoissonLadder ladder;
     const Extent e = options.extent;
     for (int bz = 0; bz * 8 < e.z; ++bz) {
         for (int by = 0; by * 8 < e.y; ++by) {
             std::vector<const FieldEllipsoid*> row;
             field.collect(by, bz, row);
             for (int bx = 0; bx * 8 < e.x; ++bx) {
-                for (int draw = 0; draw < 3; ++draw) {
-                    BlockDraw b{options, field, tables, step, draw, bx, by, bz, {}};
-                    field.plan_blocks(bx, by, bz, row, std::span(&b.plan, 1));
-                    const std::vector<bool> events = events_of(b);
-                    for (int cell = 0; cell < 512; ++cell) {
-                        const int i = bx * 8 + cell % 8, j = by * 8 + cell / 8 % 8, k = bz * 8 + cell / 64;
-                        if (i >= e.x || j >= e.y || k >= e.z || !events[std::size_t(cell)]) continue;
-                        const std::size_t n = linear_index(e, i, j, k);
-                        if (draw == 0) cells.hum[n] = 1;  // hum' = hum | (rnd < p_hum)
-                        if (draw == 1) cells.act[n] = 1;  // act' = act | (rnd < p_act)
-                        if (draw == 2) cells.cld[n] = 0;  // cld' = cld & (rnd >= p_ext)
-                    }
+                BlockDraws b{options, field, step, bx, by, bz, {}};
+                field.plan_blocks(bx, by, bz, row, std::span(&b.plan, 1));
+                std::vector<std::pair<int, std::size_t>> inside;  // cell of the block, cell of the lattice
+                bool any_cloud = false;
+                for (int cell = 0; cell < 512; ++cell) {
+                    const int i = bx * 8 + cell % 8, j = by * 8 + cell / 8 % 8, k = bz * 8 + cell / 64;
+                    if (i >= e.x || j >= e.y || k >= e.z) continue;
+                    inside.emplace_back(cell, linear_index(e, i, j, k));
+                    any_cloud = any_cloud || cells.cld[inside.back().second] != 0;
+                }
+                const Events events = events_of(b, ladder, any_cloud);
+                for (const auto& [cell, n] : inside) {
+                    if (events[kHum][std::size_t(cell)]) cells.hum[n] = 1;  // hum' = hum | (rnd < p_hum)
+                    if (events[kAct][std::size_t(cell)]) cells.act[n] = 1;  // act' = act | (rnd < p_act)
+                    if (events[kExt][std::size_t(cell)]) cells.cld[n] = 0;  // cld' = cld & (rnd >= p_ext)
                 }
             }
         }
