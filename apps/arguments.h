@@ -4,7 +4,7 @@
 // What the subcommands have in common: options that several of them take, and the checked conversion of values, so
 // that a bad one is an Error(usage) that says what was given and what was expected.
 
-#include <CLI/App.hpp>
+#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
 #include <limits>

@@ -4,7 +4,7 @@
 // The subcommands of `nephos`. Each function adds one to the parser, with its options; when it is chosen, parsing
 // leaves in `action` what main() is to do. The action returns the exit status, or throws.
 
-#include <CLI/App.hpp>
+#include <CLI/CLI.hpp>
 #include <functional>
 
 namespace nephos {

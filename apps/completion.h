@@ -3,7 +3,7 @@
 
 // Completion scripts for shells, generated from the parser itself, so that they cannot drift from it.
 
-#include <CLI/App.hpp>
+#include <CLI/CLI.hpp>
 #include <string>
 
 namespace nephos {

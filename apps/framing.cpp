@@ -12,11 +12,23 @@ constexpr double kEyeHeight_m = 2.0;
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-// Half the angle of the widest cone around the view direction that lies within the picture.
-double half_angle(const Camera& camera) {
-    const double vertical = radians(camera.vertical_fov_deg) / 2;
-    const double horizontal = std::atan(std::tan(vertical) * camera.width / camera.height);
-    return std::min(vertical, horizontal);
+double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+// How far in front of the box's middle the eye must be for every corner to be within the picture, looking along
+// `forward` with `right` and `up` as the picture's axes (all unit).
+double fitting_distance(const Camera& camera, const WorldBox& box, const Vec3& forward, const Vec3& right,
+                        const Vec3& up) {
+    const double vertical = std::tan(radians(camera.vertical_fov_deg) / 2);
+    const double horizontal = vertical * camera.width / camera.height;
+    const Vec3 half{(box.max_m.x - box.min_m.x) / 2, (box.max_m.y - box.min_m.y) / 2, (box.max_m.z - box.min_m.z) / 2};
+    double distance = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vec3 p{corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z};
+        const double across = std::max(std::abs(dot(p, right)) / horizontal, std::abs(dot(p, up)) / vertical);
+        distance = std::max(distance, across - dot(p, forward));
+    }
+    constexpr double kMargin = 1.05;
+    return kMargin * distance;
 }
 
 }  // namespace
@@ -42,21 +54,22 @@ double ground_below(const WorldBox& box) {
 void frame(Camera& camera, const WorldBox& box, View view, double ground_m) {
     const Vec3 centre{(box.min_m.x + box.max_m.x) / 2, (box.min_m.y + box.max_m.y) / 2,
                       (box.min_m.z + box.max_m.z) / 2};
-    const double dx = box.max_m.x - box.min_m.x, dy = box.max_m.y - box.min_m.y, dz = box.max_m.z - box.min_m.z;
-    const double radius = std::sqrt(dx * dx + dy * dy + dz * dz) / 2;
-    const double distance = radius / std::sin(half_angle(camera));
     camera.target_m = centre;
     switch (view) {
         case View::side: {
-            const double elevation = radians(6);
-            camera.position_m = {centre.x, centre.y - distance * std::cos(elevation),
-                                 centre.z + distance * std::sin(elevation)};
+            const double sine = std::sin(radians(6)), cosine = std::cos(radians(6));
+            const double distance = fitting_distance(camera, box, {0, cosine, -sine}, {1, 0, 0}, {0, sine, cosine});
+            camera.position_m = {centre.x, centre.y - distance * cosine, centre.z + distance * sine};
             break;
         }
         case View::below:
-            camera.position_m = {centre.x, box.min_m.y - 0.25 * dy, ground_m + kEyeHeight_m};
+            camera.position_m = {centre.x, box.min_m.y - (box.max_m.y - box.min_m.y) / 4, ground_m + kEyeHeight_m};
             break;
-        case View::above: camera.position_m = {centre.x, centre.y, centre.z + distance}; break;
+        case View::above: {
+            const double distance = fitting_distance(camera, box, {0, 0, -1}, {1, 0, 0}, {0, 1, 0});
+            camera.position_m = {centre.x, centre.y, centre.z + distance};
+            break;
+        }
     }
     camera.position_m.z = std::max(camera.position_m.z, ground_m + kEyeHeight_m);
     // Only when the box is a point on the ground below the eye.

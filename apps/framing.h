@@ -25,8 +25,8 @@ enum class View {
     above,  // straight from above, north up
 };
 
-// Sets position and target of `camera` so that the sphere around the box fills the picture; keeps its field of view
-// and size. The eye stays at least 2 m above `ground_m`.
+// Sets position and target of `camera` so that the box just fits into the picture (View::below: stands close and looks
+// at its middle); keeps its field of view and size. The eye stays at least 2 m above `ground_m`.
 void frame(Camera& camera, const WorldBox& box, View view, double ground_m);
 
 // 0, or below the box when the box reaches below 0 (volumes that are centred at the origin).

@@ -3,7 +3,7 @@
 
 // The text of --help: one page a command, wrapped to the terminal.
 
-#include <CLI/App.hpp>
+#include <CLI/CLI.hpp>
 #include <string>
 
 namespace nephos {

@@ -4,7 +4,7 @@
 //
 //     0 done    1 a check failed    2 usage or scene    3 input or output    4 GPU    130 Ctrl-C    143 SIGTERM
 
-#include <CLI/App.hpp>
+#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <new>
 #include <string>
@@ -46,8 +46,10 @@ std::string suggestion(const CLI::App& app, const std::string& word) {
 }
 
 std::string explain(const CLI::App& app, const CLI::ParseError& error) {
-    if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
-        const std::vector<std::string> words = app.remaining(true);
+    const std::vector<std::string> words = app.remaining(true);
+    // A command that is misspelt is to the parser one that is missing.
+    const bool no_command = app.get_parent() == nullptr && !words.empty();
+    if (no_command || dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
         const std::string word = words.empty() ? "" : words.front();
         const char* kind = word.starts_with("-") ? "unknown option" : "unexpected argument";
         if (app.get_parent() == nullptr && !word.starts_with("-")) kind = "unknown command";

@@ -124,7 +124,7 @@ std::string human_count(std::uint64_t count) {
     std::string digits = std::to_string(count);
     for (std::size_t at = digits.size(); at > 3;) {
         at -= 3;
-        digits.insert(at, ",");
+        digits.insert(at, 1, ',');
     }
     return digits;
 }
@@ -149,7 +149,7 @@ void ProgressBar::update(std::uint64_t done, std::string_view detail) {
     const double elapsed_s = std::chrono::duration<double>(now - begin_).count();
     // One column stays free: some terminals wrap when the last one is written.
     const int width = terminal_width(stderr, 80) - 1;
-    print_message("\r" + text(unit_, start_, done, total_, elapsed_s, detail, width, unicode_) + "\033[K");
+    print_message(fmt::format("\r{}\033[K", text(unit_, start_, done, total_, elapsed_s, detail, width, unicode_)));
 }
 
 void ProgressBar::clear() {
@@ -172,14 +172,14 @@ std::string ProgressBar::text(std::string_view unit, std::uint64_t start, std::u
 
     const int room = width - int(left.size() + right.size()) - 4;
     if (room < 5) {
-        std::string line = left + "  " + right;
+        std::string line = fmt::format("{}  {}", left, right);
         if (int(line.size()) > width) line.resize(std::size_t(std::max(0, width)));
         return line;
     }
     const int columns = std::min(room, 40);
     const int filled = int(std::floor(fraction * columns));
-    return left + "  " + repeat(unicode ? "━" : "#", filled) + repeat(unicode ? "─" : "-", columns - filled) + "  " +
-           right;
+    return fmt::format("{}  {}{}  {}", left, repeat(unicode ? "━" : "#", filled),
+                       repeat(unicode ? "─" : "-", columns - filled), right);
 }
 
 }  // namespace nephos
