@@ -54,8 +54,9 @@ shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera
     frame.sunlight = to_vec4(options.sun.colour, day.sun, light.multiple_scattering);
     frame.ambient_top = to_vec4(light.ambient_top, day.sky, light.albedo);
     // Diffusion through a slab of optical depth tau lets 1 / (1 + 3/4 (1 - g) tau) through when nothing is
-    // absorbed.
-    frame.ambient_base = to_vec4(light.ambient_base, day.sky, 0.75 * (1.0 - light.g));
+    // absorbed. A cloud is no slab and loses light through its sides as well: twice the decay shows its
+    // relief.
+    frame.ambient_base = to_vec4(light.ambient_base, day.sky, 1.5 * (1.0 - light.g));
     frame.air_extinction = to_vec4(options.air.extinction_per_m, 1.0, 0);
     frame.horizon = to_vec4(options.air.horizon, day.sky, 0);
     frame.zenith = to_vec4(options.air.zenith, day.sky, 0);

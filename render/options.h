@@ -35,21 +35,23 @@ struct Sun {
 // has a radiance of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
     double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker
-    double g =
-        0.5;  // Henyey-Greenstein asymmetry, -0.99..0.99; forward is > 0: brighter rims against the sun
-    // Strength of the sunlight that arrives after many scatterings, 0..10; it reaches deep into a cloud,
-    // where the direct beam does not. 0 = single scattering only, as in D: grey tops, dark bases.
-    double multiple_scattering = 0.75;
-    Rgb ambient_top{0.22, 0.28, 0.38};   // light from the sky that a cloud's top scatters, >= 0
-    Rgb ambient_base{0.13, 0.16, 0.21};  // ... and its base; between them by height
+    // Henyey-Greenstein asymmetry, -0.99..0.99. Forward is > 0: brighter rims against the sun, and sunlight
+    // that reaches deeper.
+    double g = 0.5;
+    // Strength of the sunlight that arrives after many scatterings, 0..10; it reaches far into a cloud, where
+    // the direct beam does not. 0 = single scattering only, as in D: grey tops, dark bases.
+    double multiple_scattering = 1.0;
+    Rgb ambient_top{0.19, 0.24, 0.33};   // light from the sky that a cloud's top scatters, >= 0
+    Rgb ambient_base{0.11, 0.14, 0.19};  // ... and its base; between them by height
     bool operator==(const CloudLight&) const = default;
 };
 
 struct Air {
-    Rgb extinction_per_m{6e-6, 1.2e-5,
-                         2.8e-5};  // aerial perspective beta = exp(-extinction * distance), >= 0
-    Rgb horizon{0.72, 0.80, 0.90};
-    Rgb zenith{0.18, 0.36, 0.74};
+    // Aerial perspective: beta = exp(-extinction * distance) of the light of clouds and ground arrives, >= 0;
+    // the rest is the colour of the horizon.
+    Rgb extinction_per_m{1.4e-5, 1.8e-5, 2.6e-5};
+    Rgb horizon{0.72, 0.80, 0.90};  // >= 0
+    Rgb zenith{0.18, 0.36, 0.74};   // >= 0
     bool operator==(const Air&) const = default;
 };
 
