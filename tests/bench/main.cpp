@@ -12,6 +12,8 @@
 
 #include "automaton/kernels.h"
 #include "tests/bench/automaton_bench.h"
+#include "tests/bench/density_bench.h"
+#include "tests/bench/memory_bench.h"
 #include "tests/bench/seeds_bench.h"
 
 namespace {
@@ -44,6 +46,8 @@ int main(int argc, char** argv) {
     const std::filesystem::path programs = std::filesystem::canonical("/proc/self/exe").parent_path();
     const std::pair<const char*, std::function<std::vector<BenchRow>()>> groups[] = {
         {"automaton", [&] { return automaton_rows(source, programs); }},
+        {"density", [] { return density_bench_rows(); }},
+        {"memory", [&] { return memory_rows(source, programs / "../../apps/nephos"); }},
         {"seeds", [] { return seeds_rows(); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {
