@@ -17,7 +17,7 @@ namespace {
 enum class Value { none, file, folder, shell, free };
 
 Value value_of(const CLI::Option& option) {
-    if (option.get_type_size() == 0) return Value::none;
+    if (option.get_items_expected_max() == 0) return Value::none;  // a flag
     const std::string type = option.get_type_name();
     if (type == "DIR") return Value::folder;
     if (type == "SHELL") return Value::shell;
@@ -73,8 +73,8 @@ std::string bash_command(const CLI::App& command) {
         const std::string pattern = bash_pattern(command, kind);
         if (!pattern.empty()) out += fmt::format("                {}) {} ;;\n", pattern, action);
     };
-    branch(Value::file, "COMPREPLY=($(compgen -f -- \"$current\")); return");
-    branch(Value::folder, "COMPREPLY=($(compgen -d -- \"$current\")); return");
+    branch(Value::file, "mapfile -t COMPREPLY < <(compgen -f -- \"$current\"); return");
+    branch(Value::folder, "mapfile -t COMPREPLY < <(compgen -d -- \"$current\"); return");
     branch(Value::free, "return");
     out += "            esac\n";
     std::vector<std::string> words;
@@ -117,8 +117,7 @@ std::string bash_script(const CLI::App& app) {
         "    fi\n"
         "    COMPREPLY=($(compgen -W \"$positionals\" -- \"$current\"))\n"
         "    if [[ $files ]]; then\n"
-        "        IFS=$'\\n'\n"
-        "        COMPREPLY+=($(compgen -f -- \"$current\"))\n"
+        "        mapfile -t -O ${#COMPREPLY[@]} COMPREPLY < <(compgen -f -- \"$current\")\n"
         "    fi\n"
         "}\n"
         "complete -o filenames -F _nephos nephos\n";

@@ -21,14 +21,14 @@ double fitting_distance(const Camera& camera, const WorldBox& box, const Vec3& f
     const double vertical = std::tan(radians(camera.vertical_fov_deg) / 2);
     const double horizontal = vertical * camera.width / camera.height;
     const Vec3 half{(box.max_m.x - box.min_m.x) / 2, (box.max_m.y - box.min_m.y) / 2, (box.max_m.z - box.min_m.z) / 2};
+    constexpr double kMargin = 1.05;
     double distance = 0;
     for (int corner = 0; corner < 8; ++corner) {
         const Vec3 p{corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z};
         const double across = std::max(std::abs(dot(p, right)) / horizontal, std::abs(dot(p, up)) / vertical);
-        distance = std::max(distance, across - dot(p, forward));
+        distance = std::max(distance, kMargin * across - dot(p, forward));
     }
-    constexpr double kMargin = 1.05;
-    return kMargin * distance;
+    return distance;
 }
 
 }  // namespace

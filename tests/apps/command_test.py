@@ -490,7 +490,8 @@ class Signals(Case):
     def test_a_resumed_run_is_the_uninterrupted_one(self):
         changes = ["--set", "time.steps=400", "--no-render"]
         whole = self.start("run", self.long, *changes, "--out", "whole", "--threads", "1")
-        self.assertEqual(whole.wait(timeout=120), 0, whole.stderr.read())
+        _, errors = whole.communicate(timeout=120)
+        self.assertEqual(whole.returncode, 0, errors)
         self.interrupt(signal.SIGINT, self.long, *changes, "--out", "stopped")
         # Without --resume it is not thrown away.
         self.refused(2, "run", self.long, *changes, "--out", "stopped", says="--resume")
@@ -677,7 +678,7 @@ class Completion(Case):
         result = subprocess.run(["bash", "--norc", "-u", "-c", script], cwd=self.folder, capture_output=True, text=True,
                                 timeout=60)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
-        return result.stdout.split("\n")[:-1]
+        return [line for line in result.stdout.split("\n") if line]
 
     def test_bash(self):
         self.assertIn("run", self.completed("r"))
@@ -686,6 +687,8 @@ class Completion(Case):
         self.assertIn("--resume", self.completed("run", "--re"))
         self.assertEqual(self.completed("run", "ti"), ["tiny.toml"])
         self.assertEqual(self.completed("completion", "z"), ["zsh"])
+        self.assertEqual(self.completed("run", "--json", "--no-r"), ["--no-render"])  # after a flag
+        self.assertEqual(self.completed("run", "--seed", ""), [])  # a value that nobody can guess
         (self.folder / "a folder").mkdir()
         self.assertEqual(self.completed("run", "tiny.toml", "--out", "a"), ["a folder"])
 
