@@ -225,8 +225,6 @@ const Section& wind_section() {
 }
 
 const Section& field_section() {
-    using Field = Chain<&Scene::automaton, &AutomatonOptions::field>;
-    static_assert(std::is_same_v<Field::value_type, FieldOptions>);
     static const Section section{
         "Probability field",
         "How likely vapour, activation and extinction are: the same everywhere, plus ellipsoids of humid "

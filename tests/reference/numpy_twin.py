@@ -120,42 +120,60 @@ class Parcel:
         return x, y, c
 
 
+def segments(first, last, size, periodic):
+    """The cells first..last of an axis as [(slice, index of its first cell)]; a periodic axis wraps round."""
+    if not periodic:
+        first, last = max(first, 0), min(last, size - 1)
+        return [(slice(first, last + 1), first)] if first <= last else []
+    last = min(last, first + size - 1)
+    pieces = []
+    while first <= last:
+        inside = first % size
+        length = min(last - first + 1, size - inside)
+        pieces.append((slice(inside, inside + length), first))
+        first += length
+    return pieces
+
+
+def add_parcel(field, scene, parcel, weight):
+    """Overlapping parcels: the larger hum and act, the smaller ext. Works on slices, in single precision."""
+    cell, origin, reach = scene.cell_m, scene.origin_m, parcel.reach_m()
+    pieces = []
+    for axis in range(3):
+        first = math.floor((parcel.centre_m[axis] - reach[axis] - origin[axis]) / cell)
+        last = math.ceil((parcel.centre_m[axis] + reach[axis] - origin[axis]) / cell)
+        pieces.append(segments(first, last, scene.shape[2 - axis], scene.periodic[axis]))
+
+    def offsets(axis, piece):
+        place, first = piece
+        cells = np.arange(first, first + place.stop - place.start)
+        return (origin[axis] + (cells + 0.5) * cell - parcel.centre_m[axis]).astype(np.float32)
+
+    cosine, sine = np.float32(math.cos(parcel.yaw)), np.float32(math.sin(parcel.yaw))
+    a, b, c = (np.float32(1 / axis) for axis in parcel.semi_axes_m)
+    for in_x in pieces[0]:
+        for in_y in pieces[1]:
+            x, y = offsets(0, in_x)[None, :], offsets(1, in_y)[:, None]
+            flat = ((cosine * x + sine * y) * a) ** 2 + ((cosine * y - sine * x) * b) ** 2
+            for in_z in pieces[2]:
+                square = flat[None, :, :] + ((offsets(2, in_z) * c) ** 2)[:, None, None]
+                inside = square < 1
+                bump = (1 - square) ** 2
+                where = (in_z[0], in_y[0], in_x[0])
+                for plane, part, combine in zip(field, range(3), (np.maximum, np.maximum, np.minimum)):
+                    background, rim = scene.background[part], parcel.rim[part]
+                    base = np.float32(background + weight * (rim - background))
+                    p = base + np.float32(weight * (parcel.centre[part] - rim)) * bump
+                    combine(plane[where], p, out=plane[where], where=inside)
+
+
 def probability_field(scene, parcels, time_s):
-    """The three probabilities of every cell; overlapping parcels: the larger hum and act, the smaller ext."""
-    shape = scene.shape
-    background = scene.background
-    field = [np.full(shape, p, np.float32) for p in background]
-    cell, origin = scene.cell_m, scene.origin_m
+    """The three probabilities of every cell: the background, and where parcels are, theirs."""
+    field = [np.full(scene.shape, p, np.float32) for p in scene.background]
     for parcel in parcels:
         weight = parcel.weight(time_s)
-        if weight == 0:
-            continue
-        reach = parcel.reach_m()
-        axes, boxes = [], []
-        for axis in range(3):
-            size = shape[2 - axis]
-            first = math.floor((parcel.centre_m[axis] - reach[axis] - origin[axis]) / cell)
-            last = math.ceil((parcel.centre_m[axis] + reach[axis] - origin[axis]) / cell)
-            if scene.periodic[axis]:
-                index = np.arange(first, min(last, first + size - 1) + 1)
-            else:
-                index = np.arange(max(first, 0), min(last, size - 1) + 1)
-            axes.append(origin[axis] + (index + 0.5) * cell - parcel.centre_m[axis])
-            boxes.append(index % size)
-        if any(len(box) == 0 for box in boxes):
-            continue
-        x, y = axes[0][None, None, :], axes[1][None, :, None]
-        along = math.cos(parcel.yaw) * x + math.sin(parcel.yaw) * y
-        across = math.cos(parcel.yaw) * y - math.sin(parcel.yaw) * x
-        a, b, c = parcel.semi_axes_m
-        square = (along / a) ** 2 + (across / b) ** 2 + (axes[2][:, None, None] / c) ** 2
-        inside = square < 1
-        bump = (1 - square) ** 2
-        where = np.ix_(boxes[2], boxes[1], boxes[0])
-        for plane, part, combine in zip(field, range(3), (np.maximum, np.maximum, np.minimum)):
-            p = parcel.rim[part] + (parcel.centre[part] - parcel.rim[part]) * bump
-            p = background[part] + weight * (p - background[part])
-            plane[where] = np.where(inside, combine(plane[where], p), plane[where])
+        if weight > 0:
+            add_parcel(field, scene, parcel, weight)
     return field
 
 
@@ -314,10 +332,12 @@ class Simulation:
 
 # The load of scenes/cumulus.toml, for timing without a scene.
 DEFAULT_TABLES = {
-    "lattice": {"boundaries": ["periodic", "periodic", "open"]},
-    "field": {"scatters": [{"count": 40, "z_m": [250, 350], "semi_axis_x_m": [400, 900], "semi_axis_y_m": [400, 900],
-                            "semi_axis_z_m": [200, 500]}]},
-    "wind": [{"levels": [{"height_m": 0, "east_m_per_s": 5}, {"height_m": 1000, "east_m_per_s": 8}]}],
+    "lattice": {"cell_size_m": 40, "origin_m": [0, 0, 1000], "boundaries": ["periodic", "periodic", "open"]},
+    "field": {"background": {"ext": 0.3},
+              "scatters": [{"count": 52, "z_m": [1000, 1060], "semi_axis_x_m": [350, 900], "semi_axis_y_m": [350, 700],
+                            "semi_axis_z_m": [250, 720], "rim": {"hum": 0.01, "ext": 0.35}}]},
+    "wind": [{"levels": [{"height_m": 1000, "from_deg": 260, "speed_m_per_s": 5},
+                         {"height_m": 1800, "from_deg": 275, "speed_m_per_s": 8}]}],
 }
 
 
