@@ -220,7 +220,8 @@ inline void make_thresholds(const Segment& g, const BlockPlan& plan, int draw, i
     const auto which = std::size_t(draw);
     const auto background = hn::Set(d, g.random.field->background()[which]);
     const auto dz = hn::Set(d, float(layer));
-    HWY_ALIGN std::array<float, 8> p;
+    const hn::RebindToSigned<decltype(d)> di;
+    const hn::RebindToUnsigned<decltype(d)> du;
     for (std::size_t row = 0; row < 8; ++row) {
         if ((wanted >> (8 * row) & 0xFF) == 0) continue;
         const auto dy = hn::Set(d, float(row));
@@ -229,9 +230,12 @@ inline void make_thresholds(const Segment& g, const BlockPlan& plan, int draw, i
             for (const BlockEllipsoid& e : plan.ellipsoids) {
                 value = combine(d, e, which, locate(d, e, hn::Iota(d, float(x)), dy, dz), value);
             }
-            hn::Store(value, d, p.data() + x);
+            // probability_threshold() of kernels.h
+            const auto scaled = hn::ConvertTo(di, hn::Mul(value, hn::Set(d, 0x1p31f)));
+            const auto threshold = hn::ShiftLeft<1>(hn::BitCast(du, scaled));
+            const auto certain = hn::RebindMask(du, hn::Ge(value, hn::Set(d, 1.0f)));
+            hn::StoreU(hn::IfThenElse(certain, hn::Set(du, kCertain), threshold), du, out.full.data() + row * 8 + x);
         }
-        for (std::size_t x = 0; x < 8; ++x) out.full[row * 8 + x] = probability_threshold(p[x]);
     }
     for (std::size_t c = 0; c < 64; ++c) out.top[c] = std::uint8_t(out.full[c] >> 24);
 }

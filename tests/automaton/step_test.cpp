@@ -124,6 +124,23 @@ TEST(Step, EqualsTheNaiveTwinOnRandomScenes) {
     }
 }
 
+// The largest extent on each axis in turn; the last block of an axis has the coordinate 8191.
+TEST(Step, EqualsTheNaiveTwinOnTheLongestAxes) {
+    for (const Extent extent : {Extent{65536, 2, 1}, Extent{3, 65536, 1}, Extent{5, 1, 65536}}) {
+        Dice dice(unsigned(extent.x));
+        AutomatonOptions o;
+        o.extent = extent;
+        o.boundaries = {Boundary::periodic, Boundary::open, Boundary::periodic};
+        o.field.background = {0.02, 0.003, 0.3};
+        Automaton automaton(o, any_lattice(dice, extent));
+        reference::Cells twin = reference::to_cells(automaton.hum(), automaton.act(), automaton.cld());
+        automaton.step();
+        twin = reference::grow(twin, o.boundaries);
+        reference::extinguish_and_bear(twin, o, 0, {});
+        ASSERT_EQ(reference::to_cells(automaton.hum(), automaton.act(), automaton.cld()), twin) << extent.x;
+    }
+}
+
 std::vector<std::string> hashes_of(const AutomatonOptions& options, int steps) {
     Automaton automaton(options);
     std::vector<std::string> hashes{automaton.hash().hex()};
