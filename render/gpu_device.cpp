@@ -133,9 +133,10 @@ std::string name_of(const vk::raii::PhysicalDevice& physical) {
     return std::string(physical.getProperties().deviceName.data());
 }
 
-// True when `wanted` is the device's number or a part of its name.
+// True when `wanted` is the device's number or, unless it is a number, a part of its name.
 bool is_named(const std::string& wanted, std::size_t number, const std::string& name) {
-    return wanted == std::to_string(number) || name.find(wanted) != std::string::npos;
+    if (wanted.find_first_not_of("0123456789") == std::string::npos) return wanted == std::to_string(number);
+    return name.find(wanted) != std::string::npos;
 }
 
 vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevice>& devices,
