@@ -6,14 +6,12 @@
 //
 // OpenEXR: two parts, 32-bit float, ZIP.
 //
-//     part "picture"   R, G, B                   beauty again, as 16-bit floats: the layer every viewer opens
-//     first
-//                      beauty.R, .G, .B          linear Rec. 709, exposure not applied
-//                      transmittance.Y           of the clouds, 1 = none
-//                      depth.Z                   metres along the ray, infinity without cloud (picture.h)
-//     part "shadow"    shadow.Y                  the square shadow map, its frame in the attributes
-//     shadowOrigin,
-//                                                shadowU, shadowV, shadowDirection
+//     part "picture"   R, G, B            beauty as 16-bit floats: the layer that every viewer opens first
+//                      beauty.R, .G, .B   linear Rec. 709, exposure not applied
+//                      transmittance.Y    of the clouds, 1 = none
+//                      depth.Z            metres along the ray, infinity without cloud (picture.h)
+//     part "shadow"    shadow.Y           the square shadow map; where it lies is told by the attributes
+//                                         shadowOrigin, shadowU, shadowV, shadowDirection
 //
 // Attributes of both: scene, seed, sceneHash, stateHash, nephosVersion, time, extinctionPerMetre; of
 // "picture" also the standard worldToCamera, framesPerSecond and chromaticities, and verticalFieldOfView
