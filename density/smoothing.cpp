@@ -105,9 +105,11 @@ SmoothingPlan make_plan(std::span<const TimedPlane> planes, const SmoothingOptio
     return plan;
 }
 
-// Tiles in the order y, x. Width and depth balance the halo rows, which neighbours compute twice, against the
-// cache.
-std::vector<SmoothingTile> make_tiles(const SmoothingPlan& plan, int words, int rows) {
+// Tiles in the order y, x. Wide ones write long rows; deep ones repeat fewer halo rows; both at once leave
+// the cache.
+std::vector<SmoothingTile> make_tiles(const SmoothingPlan& plan) {
+    const int words = std::min((plan.extent.x + 63) / 64, kMaxWords);
+    const int rows = words <= kMaxWords / 2 ? kMaxRows : kMaxRows / 2;
     std::vector<SmoothingTile> tiles;
     const int row_words = (plan.extent.x + 63) / 64;
     const int all_rows = (plan.extent.y + kBlock - 1) / kBlock * kBlock;
@@ -188,7 +190,7 @@ std::vector<std::uint32_t> kernel_weights(SmoothingKernel kernel, int radius) {
 DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& options,
                    const Placement& placement, const Boundaries& boundaries) {
     const SmoothingPlan plan = make_plan(planes, options, boundaries);
-    const auto tiles = make_tiles(plan, 1, 32);
+    const auto tiles = make_tiles(plan);
     std::vector<TileBlocks> blocks(tiles.size());
     tbb::parallel_for(std::size_t{0}, tiles.size(),
                       [&](std::size_t n) { smooth_tile(plan, tiles[n], blocks[n]); });
@@ -205,7 +207,7 @@ void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& op
                                           std::to_string(plan.extent.cells()) + " cells");
     }
     const bool stream = out.size_bytes() > kStreamBytes;
-    const auto tiles = make_tiles(plan, 1, 32);
+    const auto tiles = make_tiles(plan);
     tbb::parallel_for(std::size_t{0}, tiles.size(),
                       [&](std::size_t n) { smooth_tile(plan, tiles[n], out.data(), stream); });
 }

@@ -21,7 +21,8 @@
 
 namespace nephos {
 
-inline constexpr int kMaxWords = 4;  // of a tile
+// Largest tile.
+inline constexpr int kMaxWords = 8;
 inline constexpr int kMaxRows = 64;
 
 enum class SumType { u8, u16, u32, f64 };

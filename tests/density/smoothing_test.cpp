@@ -5,11 +5,14 @@
 
 #include "density/smoothing.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <string>
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
@@ -206,6 +209,56 @@ TEST(Smoothing, DoesNotDependOnThreads) {
         results.push_back(smooth(timed, options, Placement{}, {}).to_dense());
     }
     for (const auto& result : results) EXPECT_EQ(result, results.front());
+}
+
+// Every instruction set that this machine has, and the portable form: bit for bit the same.
+TEST(Smoothing, DoesNotDependOnTheInstructionSet) {
+    const Extent extent{203, 41, 19};
+    const BitPlane plane = random_plane(extent, 0.3, 13);
+    const TimedPlane timed[] = {{plane.view(), 0}};
+    const SmoothingOptions windows[] = {{SmoothingKernel::box, 2, 2, 2, 0},        // 8-bit sums
+                                        {SmoothingKernel::tent, 2, 2, 1, 1},       // 16 bit
+                                        {SmoothingKernel::gaussian, 2, 2, 2, 0},   // 32 bit
+                                        {SmoothingKernel::gaussian, 5, 5, 5, 1}};  // double
+    const std::int64_t supported = hwy::SupportedTargets();
+    int targets = 0;
+    std::vector<std::vector<float>> expected;
+    for (std::int64_t target = HWY_SCALAR; target > 0; target >>= 1) {
+        if ((target & (supported | HWY_SCALAR)) == 0) continue;
+        hwy::SetSupportedTargetsForTest(target);
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+        for (std::size_t n = 0; n < std::size(windows); ++n) {
+            std::vector<float> dense(extent.cells());
+            smooth_dense(timed, windows[n], {}, dense);
+            EXPECT_EQ(smooth(timed, windows[n], Placement{}, {}).to_dense(), dense)
+                << hwy::TargetName(target);
+            if (expected.size() == n) expected.push_back(dense);
+            EXPECT_EQ(dense, expected[n]) << hwy::TargetName(target) << " window " << n;
+        }
+        ++targets;
+    }
+    hwy::SetSupportedTargetsForTest(0);
+    hwy::GetChosenTarget().DeInit();
+    EXPECT_GE(targets, 1);
+}
+
+// Streaming stores, odd row lengths and any alignment of the result: the same values as in a small box.
+TEST(Smoothing, LargeResultsEqualSmallOnes) {
+    for (const Extent extent : {Extent{256, 150, 60}, Extent{301, 130, 60}, Extent{600, 70, 60}}) {
+        const BitPlane plane = random_plane(extent, 0.1, 4);
+        const TimedPlane timed[] = {{plane.view(), 0}};
+        const SmoothingOptions options{SmoothingKernel::box, 2, 2, 2, 0};
+        const auto expected = smooth(timed, options, Placement{}, {}).to_dense();
+        for (std::size_t shift : {1, 2, 5, 16}) {
+            std::vector<float> room(extent.cells() + 32, -1.0f);
+            const std::span<float> out(room.data() + shift, extent.cells());
+            smooth_dense(timed, options, {}, out);
+            EXPECT_TRUE(std::equal(out.begin(), out.end(), expected.begin()))
+                << extent.x << " shift " << shift;
+            EXPECT_EQ(room[shift - 1], -1.0f);
+            EXPECT_EQ(room[shift + extent.cells()], -1.0f);
+        }
+    }
 }
 
 TEST(Smoothing, KernelWeightsAreAsDocumented) {

@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Vector code of smoothing_kernel.cpp, compiled once per instruction set (not installed): bits to integers,
+// weighted sums of rows, integers to floats, and blocks into OpenVDB's order.
+
+#if defined(NEPHOS_DENSITY_SMOOTHING_VECTORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_DENSITY_SMOOTHING_VECTORS_INL_H_
+#undef NEPHOS_DENSITY_SMOOTHING_VECTORS_INL_H_
+#else
+#define NEPHOS_DENSITY_SMOOTHING_VECTORS_INL_H_
+#endif
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kWord = 64;  // cells per word
+
+// Vectors of at most one word's cells, so that a word is a whole number of them.
+template <class T>
+using Tag = hn::CappedTag<T, kWord>;
+
+// How many floats lie before the next cache line; streaming stores fill whole lines, so that the
+// write-combining buffers empty at once.
+HWY_INLINE int floats_to_line(const float* out) {
+    constexpr std::uintptr_t kLine = 64;  // bytes
+    const std::uintptr_t misfit = reinterpret_cast<std::uintptr_t>(out) % kLine;
+    return int((kLine - misfit) % kLine / sizeof(float));
+}
+
+// out[n] = sum over d of weights[d] * lines[d][n]; weights are symmetric; kUnit: all 1. kRadius < 0:
+// `radius`.
+template <class T, bool kUnit, int kRadius>
+HWY_INLINE void weighted_sum_of(const T* const* lines, const T* weights, int radius, int count,
+                                T* HWY_RESTRICT out) {
+    const Tag<T> d;
+    const int r = kRadius < 0 ? radius : kRadius;
+    const int lanes = int(hn::Lanes(d));
+    const auto sum_at = [&](int n) {
+        auto sum = hn::LoadU(d, lines[r] + n);
+        if constexpr (!kUnit) sum = hn::Mul(sum, hn::Set(d, weights[r]));
+        for (int m = 1; m <= r; ++m) {
+            auto pair = hn::Add(hn::LoadU(d, lines[r - m] + n), hn::LoadU(d, lines[r + m] + n));
+            if constexpr (!kUnit) pair = hn::Mul(pair, hn::Set(d, weights[r - m]));
+            sum = hn::Add(sum, pair);
+        }
+        hn::StoreU(sum, d, out + n);
+    };
+    int n = 0;
+    for (; n + 2 * lanes <= count; n += 2 * lanes) {
+        sum_at(n);
+        sum_at(n + lanes);
+    }
+    for (; n < count; n += lanes) sum_at(n);
+}
+
+template <class T, bool kUnit>
+void weighted_sum(const T* const* lines, const std::vector<T>& weights, int count, T* out) {
+    const int radius = int(weights.size()) / 2;
+    const T* w = weights.data();
+    switch (radius) {
+        case 0:
+            return weighted_sum_of<T, kUnit, 0>(lines, w, 0, count, out);
+        case 1:
+            return weighted_sum_of<T, kUnit, 1>(lines, w, 1, count, out);
+        case 2:
+            return weighted_sum_of<T, kUnit, 2>(lines, w, 2, count, out);
+        default:
+            return weighted_sum_of<T, kUnit, -1>(lines, w, radius, count, out);
+    }
+}
+
+// The mask of the lanes from bit n on.
+template <class D>
+HWY_INLINE hn::Mask<D> mask_at(D d, const std::uint8_t* bits, int n) {
+    if (hn::Lanes(d) >= 8) return hn::LoadMaskBits(d, bits + unsigned(n) / 8);
+    // LoadMaskBits starts at bit 0 of a byte, so vectors below 8 lanes need theirs moved there.
+    const std::uint8_t moved[8] = {std::uint8_t(bits[n / 8] >> (n % 8))};
+    return hn::LoadMaskBits(d, moved);
+}
+
+// values[n] = (kAdd: +=) weight where bit n of `bits` is 1, 0 elsewhere. count is a multiple of 8 and of the
+// lanes.
+template <class T, bool kAdd>
+HWY_INLINE void expand_bits(const std::uint8_t* bits, int count, T weight, T* HWY_RESTRICT values) {
+    if constexpr (sizeof(T) == 8) {
+        for (int n = 0; n < count; ++n) {
+            const T value = (bits[n / 8] >> (n % 8) & 1) ? weight : T{0};
+            values[n] = kAdd ? values[n] + value : value;
+        }
+    } else {
+        const Tag<T> d;
+        const int lanes = int(hn::Lanes(d));
+        const auto w = hn::Set(d, weight);
+        for (int n = 0; n < count; n += lanes) {
+            auto value = hn::IfThenElseZero(mask_at(d, bits, n), w);
+            if constexpr (kAdd) value = hn::Add(value, hn::LoadU(d, values + n));
+            hn::StoreU(value, d, values + n);
+        }
+    }
+}
+
+// Eight rows of running sums: out[m][n] = lines[m][n] + .. + lines[m + 2 radius][n], m = 0..7.
+template <class T>
+void running_sums(const T* const* lines, int radius, int count, T* HWY_RESTRICT out) {
+    const Tag<T> d;
+    for (int n = 0; n < count; n += int(hn::Lanes(d))) {
+        auto sum = hn::LoadU(d, lines[0] + n);
+        for (int m = 1; m < 2 * radius; ++m) sum = hn::Add(sum, hn::LoadU(d, lines[m] + n));
+        for (int m = 0; m < 8; ++m) {
+            if (radius > 0) sum = hn::Add(sum, hn::LoadU(d, lines[m + 2 * radius] + n));
+            hn::StoreU(sum, d, out + std::ptrdiff_t(m) * count + n);
+            sum = radius > 0 ? hn::Sub(sum, hn::LoadU(d, lines[m] + n))
+                             : hn::LoadU(d, lines[std::min(m + 1, 7)] + n);
+        }
+    }
+}
+
+// A vector of floats and the sums that become one.
+template <class T>
+using FloatTag = hn::CappedTag<float, sizeof(T) == 8 ? Tag<double>::kPrivateN : std::size_t{kWord}>;
+
+template <class T>
+HWY_INLINE hn::Vec<FloatTag<T>> converted(const T* HWY_RESTRICT sums, float reciprocal) {
+    const FloatTag<T> d;
+    const hn::Rebind<std::int32_t, decltype(d)> di;
+    const hn::Rebind<T, decltype(d)> dt;
+    const auto sum = hn::LoadU(dt, sums);
+    auto value = hn::Zero(d);
+    if constexpr (sizeof(T) == 8) {
+        value = hn::DemoteTo(d, sum);
+    } else if constexpr (sizeof(T) == 4) {
+        value = hn::ConvertTo(d, hn::BitCast(di, sum));  // sums are below 2^31
+    } else {
+        value = hn::ConvertTo(d, hn::PromoteTo(di, sum));
+    }
+    return hn::Min(hn::Mul(value, hn::Set(d, reciprocal)), hn::Set(d, 1.0f));
+}
+
+// out[n] = min(1, float(sums[n]) * reciprocal). kStream: past the caches.
+template <class T, bool kStream>
+HWY_INLINE void to_floats(const T* HWY_RESTRICT sums, int count, float reciprocal, float* HWY_RESTRICT out) {
+    const FloatTag<T> d;
+    const int lanes = int(hn::Lanes(d));
+    const auto up_to = [&](int n, int end) {
+        for (; n + lanes <= end; n += lanes) hn::StoreU(converted(sums + n, reciprocal), d, out + n);
+        for (; n < end; ++n) out[n] = std::min(float(sums[n]) * reciprocal, 1.0f);
+    };
+    const auto store = [&](int n) {
+        const auto value = converted(sums + n, reciprocal);
+        if constexpr (kStream) {
+            hn::Stream(value, d, out + n);
+        } else {
+            hn::StoreU(value, d, out + n);
+        }
+    };
+    int n = kStream ? std::min(count, floats_to_line(out)) : 0;
+    up_to(0, n);
+    for (; n + 4 * lanes <= count; n += 4 * lanes) {
+        store(n);
+        store(n + lanes);
+        store(n + 2 * lanes);
+        store(n + 3 * lanes);
+    }
+    for (; n + lanes <= count; n += lanes) store(n);
+    up_to(n, count);
+}
+
+// The same for the 512 values of a block.
+template <class T>
+HWY_INLINE void block_to_floats(const T* HWY_RESTRICT sums, float reciprocal, float* HWY_RESTRICT out) {
+    const FloatTag<T> d;
+    for (std::size_t n = 0; n < 512; n += hn::Lanes(d))
+        hn::StoreU(converted(sums + n, reciprocal), d, out + n);
+}
+
+// Transposes one 8x8x8 block of S rows, s[z][y][x], to OpenVDB's order, block[x][y][z].
+template <class T>
+HWY_INLINE void transpose_block(const T* s, std::size_t stride_y, std::size_t stride_z,
+                                T* HWY_RESTRICT block) {
+    for (int z = 0; z < 8; ++z) {
+        for (int y = 0; y < 8; ++y) {
+            const T* row = s + std::size_t(z) * stride_z + std::size_t(y) * stride_y;
+            for (int x = 0; x < 8; ++x) block[x * 64 + y * 8 + z] = row[x];
+        }
+    }
+}
+
+#if HWY_TARGET != HWY_SCALAR
+// The narrow types in vectors: three rounds of interleaving turn 8 rows of z into 8 rows of x.
+HWY_INLINE void transpose_block(const std::uint8_t* s, std::size_t stride_y, std::size_t stride_z,
+                                std::uint8_t* HWY_RESTRICT block) {
+    const hn::FixedTag<std::uint8_t, 8> d8;
+    const hn::FixedTag<std::uint8_t, 16> d;
+    const hn::FixedTag<std::uint16_t, 8> d16;
+    const hn::FixedTag<std::uint32_t, 4> d32;
+    for (int y = 0; y < 8; ++y) {
+        const auto pair = [&](int z) {  // x0 z, x0 z+1, x1 z, x1 z+1 ...
+            const std::uint8_t* row = s + std::size_t(z) * stride_z + std::size_t(y) * stride_y;
+            const auto a = hn::ZeroExtendVector(d, hn::LoadU(d8, row));
+            const auto b = hn::ZeroExtendVector(d, hn::LoadU(d8, row + stride_z));
+            return hn::BitCast(d16, hn::InterleaveLower(d, a, b));
+        };
+        const auto z01 = pair(0), z23 = pair(2), z45 = pair(4), z67 = pair(6);
+        const auto lower = hn::BitCast(d32, hn::InterleaveLower(d16, z01, z23));   // x 0..3, z 0..3
+        const auto upper = hn::BitCast(d32, hn::InterleaveUpper(d16, z01, z23));   // x 4..7, z 0..3
+        const auto lower4 = hn::BitCast(d32, hn::InterleaveLower(d16, z45, z67));  // x 0..3, z 4..7
+        const auto upper4 = hn::BitCast(d32, hn::InterleaveUpper(d16, z45, z67));  // x 4..7, z 4..7
+        const auto store = [&](int x, auto v) {
+            const auto bytes = hn::BitCast(d, v);
+            hn::StoreU(hn::LowerHalf(d8, bytes), d8, block + x * 64 + y * 8);
+            hn::StoreU(hn::UpperHalf(d8, bytes), d8, block + (x + 1) * 64 + y * 8);
+        };
+        store(0, hn::InterleaveLower(d32, lower, lower4));
+        store(2, hn::InterleaveUpper(d32, lower, lower4));
+        store(4, hn::InterleaveLower(d32, upper, upper4));
+        store(6, hn::InterleaveUpper(d32, upper, upper4));
+    }
+}
+
+HWY_INLINE void transpose_block(const std::uint16_t* s, std::size_t stride_y, std::size_t stride_z,
+                                std::uint16_t* HWY_RESTRICT block) {
+    const hn::FixedTag<std::uint16_t, 8> d;
+    const hn::FixedTag<std::uint32_t, 4> d32;
+    const hn::FixedTag<std::uint64_t, 2> d64;
+    for (int y = 0; y < 8; ++y) {
+        const auto row = [&](int z) {
+            return hn::LoadU(d, s + std::size_t(z) * stride_z + std::size_t(y) * stride_y);
+        };
+        // x 4h .. 4h+3 with z and z+1, as 32-bit pairs.
+        const auto half = [&](int z, bool high) {
+            const auto a = row(z), b = row(z + 1);
+            return hn::BitCast(d32, high ? hn::InterleaveUpper(d, a, b) : hn::InterleaveLower(d, a, b));
+        };
+        for (int h = 0; h < 2; ++h) {
+            const auto z01 = half(0, h != 0), z23 = half(2, h != 0), z45 = half(4, h != 0),
+                       z67 = half(6, h != 0);
+            const auto a = hn::BitCast(d64, hn::InterleaveLower(d32, z01, z23));   // x 0, 1; z 0..3
+            const auto b = hn::BitCast(d64, hn::InterleaveUpper(d32, z01, z23));   // x 2, 3; z 0..3
+            const auto a4 = hn::BitCast(d64, hn::InterleaveLower(d32, z45, z67));  // x 0, 1; z 4..7
+            const auto b4 = hn::BitCast(d64, hn::InterleaveUpper(d32, z45, z67));  // x 2, 3; z 4..7
+            std::uint16_t* out = block + h * 4 * 64 + y * 8;
+            hn::StoreU(hn::BitCast(d, hn::InterleaveLower(d64, a, a4)), d, out);
+            hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(d64, a, a4)), d, out + 64);
+            hn::StoreU(hn::BitCast(d, hn::InterleaveLower(d64, b, b4)), d, out + 128);
+            hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(d64, b, b4)), d, out + 192);
+        }
+    }
+}
+#endif
+
+// mask: where block[n] is not 0. Returns whether all 512 are `total`.
+template <class T>
+HWY_INLINE bool classify_block(const T* block, T total, std::uint64_t (&mask)[8]) {
+    if constexpr (HWY_TARGET != HWY_SCALAR && sizeof(T) <= 2) {  // whole bytes of mask
+        const Tag<T> d;
+        const int lanes = int(hn::Lanes(d));
+        auto least = hn::Set(d, total);
+        auto* bytes = reinterpret_cast<std::uint8_t*>(mask);
+        for (int n = 0; n < 512; n += lanes) {
+            const auto v = hn::LoadU(d, block + n);
+            least = hn::Min(least, v);
+            hn::StoreMaskBits(d, hn::Ne(v, hn::Zero(d)), bytes + n / 8);
+        }
+        return hn::AllTrue(d, hn::Eq(least, hn::Set(d, total)));
+    } else {
+        bool full = true;
+        for (int word = 0; word < 8; ++word) {
+            mask[word] = 0;
+            for (int bit = 0; bit < 64; ++bit) {
+                const T v = block[word * 64 + bit];
+                mask[word] |= std::uint64_t(v != T{0}) << bit;
+                full = full && v == total;
+            }
+        }
+        return full;
+    }
+}
+
+template <class T>
+bool block_is_zero(const T* s, std::size_t stride_y, std::size_t stride_z) {
+    constexpr int kParts = sizeof(T);  // 8 * sizeof(T) bytes in 8-byte parts
+    std::uint64_t any = 0;
+    for (int z = 0; z < 8; ++z) {
+        for (int y = 0; y < 8; ++y) {
+            std::uint64_t parts[kParts];
+            std::memcpy(parts, s + std::size_t(z) * stride_z + std::size_t(y) * stride_y, sizeof(parts));
+            for (std::uint64_t part : parts) any |= part;
+        }
+    }
+    return any == 0;
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace nephos
+HWY_AFTER_NAMESPACE();
+
+#endif
