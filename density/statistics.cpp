@@ -1,22 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/statistics.h"
 
-#include <bit>
 #include <limits>
 #include <vector>
 
 #include "automaton/error.h"
+#include "density/bit_count.h"
 
 namespace nephos {
 namespace {
 
-std::uint64_t count_bits(const std::uint64_t* words, std::size_t count) {
-    std::uint64_t bits = 0;
-    for (std::size_t n = 0; n < count; ++n) bits += std::uint64_t(std::popcount(words[n]));
-    return bits;
-}
-
-std::uint64_t count_bits(const BitPlaneView& plane) { return count_bits(plane.words, plane.word_count()); }
+std::uint64_t count_plane(const BitPlaneView& plane) { return count_bits(plane.words, plane.word_count()); }
 
 }  // namespace
 
@@ -27,8 +21,8 @@ CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& ac
         throw Error(ErrorCode::usage, "the planes of a state differ in extent");
     }
     CloudStatistics result;
-    result.hum = count_bits(hum);
-    result.act = count_bits(act);
+    result.hum = count_plane(hum);
+    result.act = count_plane(act);
     int lowest = -1, highest = -1;
     const std::size_t level_words = cld.words_per_row * std::size_t(extent.y);
     std::vector<std::uint64_t> columns(level_words, 0);

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Counting bits in vectors (not installed): std::popcount is a table look-up where the compiler may not
+// assume the instruction.
+
+#include <cstddef>
+#include <cstdint>
+
+namespace nephos {
+
+// Number of 1 bits in `count` words.
+std::uint64_t count_bits(const std::uint64_t* words, std::size_t count);
+
+}  // namespace nephos
