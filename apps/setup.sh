@@ -19,10 +19,10 @@ missing_packages() {
     wanted=$(while read -r group package _; do
         case " $* " in *" $group "*) printf '%s\n' "$package" ;; esac
     done <"$root/packages.txt" | sort -u)
-    local installed
+    local states
     # shellcheck disable=SC2086  # package names, one word each
-    installed=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $wanted 2>/dev/null | sed -n 's/^installed //p')
-    comm -23 <(printf '%s\n' "$wanted") <(sort -u <<<"$installed")
+    states=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $wanted 2>/dev/null) || true  # 1: some are unknown
+    comm -23 <(printf '%s\n' "$wanted") <(sed -n 's/^installed //p' <<<"$states" | sort -u)
 }
 
 # install_packages GROUP...: asks nothing; needs root or a sudo that needs no password.
@@ -31,9 +31,10 @@ install_packages() {
         fail "this system has no apt-get: nephos is built and tested on Debian 12 (bookworm)." \
             "The packages it needs are listed in $root/packages.txt"
     fi
-    local missing
-    mapfile -t missing < <(missing_packages "$@")
-    ((${#missing[@]} > 0)) || return 0
+    local names missing
+    names=$(missing_packages "$@")  # not by process substitution, which would hide a failure
+    [[ -n $names ]] || return 0
+    mapfile -t missing <<<"$names"
 
     local as_root=()
     if [[ $(id -u) != 0 ]]; then

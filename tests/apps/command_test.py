@@ -712,7 +712,8 @@ class SetUp(Case):
         installed = [line.split()[1] for line in (SOURCE / "packages.txt").read_text().splitlines()
                      if line and not line.startswith("#")]
         installed = [name for name in installed if name not in missing]
-        self.stand_in("dpkg-query", "printf 'installed %s\\n' " + " ".join(installed))
+        # As the real one: a package that it does not know makes the status 1.
+        self.stand_in("dpkg-query", f"printf 'installed %s\\n' {' '.join(installed)}\nexit {int(bool(missing))}")
         self.stand_in("apt-get", f'printf "%s\\n" "$DEBIAN_FRONTEND $*" >> "{self.folder}/apt.log"')
         self.stand_in("id", f"echo {0 if root_user else 1000}")
         self.stand_in("sudo", 'test "$1" = -n && shift && exec "$@"' if sudo else "exit 1")
