@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/arguments.h"
 
-#include <fmt/format.h>
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include "apps/terminal.h"
 #include "automaton/error.h"
@@ -71,9 +71,11 @@ std::vector<double> parse_reals(const std::string& text, std::size_t count, doub
     std::vector<double> numbers(parts.size());
     bool good = parts.size() == count;
     for (std::size_t n = 0; good && n < count; ++n) {
-        good = convert(parts[n], numbers[n]) && std::isfinite(numbers[n]) && numbers[n] >= min && numbers[n] <= max;
+        good = convert(parts[n], numbers[n]) && std::isfinite(numbers[n]) && numbers[n] >= min &&
+               numbers[n] <= max;
     }
-    if (!good) refuse(text, fmt::format("{} numbers from {:g} to {:g} with commas between them", count, min, max));
+    if (!good)
+        refuse(text, fmt::format("{} numbers from {:g} to {:g} with commas between them", count, min, max));
     return numbers;
 }
 
@@ -87,8 +89,9 @@ FrameRange parse_frames(const std::string& text) {
     const std::size_t dots = text.find("..");
     const std::string first = text.substr(0, dots);
     const std::string last = dots == text.npos ? first : text.substr(dots + 2);
-    const bool good = (first.empty() || convert(first, range.first)) && (last.empty() || convert(last, range.last)) &&
-                      !(first.empty() && last.empty()) && range.first >= 1 && range.last >= range.first;
+    const bool good = (first.empty() || convert(first, range.first)) &&
+                      (last.empty() || convert(last, range.last)) && !(first.empty() && last.empty()) &&
+                      range.first >= 1 && range.last >= range.first;
     if (!good) refuse(text, "a range of frames: A..B (from A to B, counted from 1), A.., ..B or A");
     return range;
 }
@@ -96,8 +99,8 @@ FrameRange parse_frames(const std::string& text) {
 std::pair<int, int> parse_size(const std::string& text) {
     int width = 0, height = 0;
     const std::vector<std::string> parts = split(text, 'x');
-    const bool good = parts.size() == 2 && convert(parts[0], width) && convert(parts[1], height) && width >= 1 &&
-                      height >= 1 && width <= 16384 && height <= 16384;
+    const bool good = parts.size() == 2 && convert(parts[0], width) && convert(parts[1], height) &&
+                      width >= 1 && height >= 1 && width <= 16384 && height <= 16384;
     if (!good) refuse(text, "a size like 1280x720 (width x height in pixels, each from 1 to 16384)");
     return {width, height};
 }
@@ -126,13 +129,15 @@ void add_scene_changes(CLI::App& command, SceneArguments& arguments) {
         ->expected(1)
         ->allow_extra_args(false)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    add_value(command, "--seed", "N", "Seed of all randomness, instead of the scene's", [&](const std::string& text) {
-        arguments.seed = parse_unsigned(text, 0, std::numeric_limits<std::uint64_t>::max());
-    });
+    add_value(command, "--seed", "N", "Seed of all randomness, instead of the scene's",
+              [&](const std::string& text) {
+                  arguments.seed = parse_unsigned(text, 0, std::numeric_limits<std::uint64_t>::max());
+              });
 }
 
 void add_threads(CLI::App& command, WorkArguments& arguments) {
-    add_value(command, "-j,--threads", "N", "Threads to use; the results are the same whatever it is (default: all cores)",
+    add_value(command, "-j,--threads", "N",
+              "Threads to use; the results are the same whatever it is (default: all cores)",
               [&](const std::string& text) { arguments.threads = int(parse_integer(text, 1, kMaxThreads)); });
 }
 
@@ -168,7 +173,8 @@ void print_scene_errors(const SceneErrors& errors) {
 
 ThreadLimit::ThreadLimit(int threads) {
     if (threads > 0) {
-        control_ = new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+        control_ =
+            new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
     }
 }
 

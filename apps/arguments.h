@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the subcommands have in common: options that several of them take, and the checked conversion of values, so
-// that a bad one is an Error(usage) that says what was given and what was expected.
+// What the subcommands have in common: options that several of them take, and the checked conversion of
+// values, so that a bad one is an Error(usage) that says what was given and what was expected.
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -12,6 +11,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "automaton/lattice.h"
 #include "scenes/errors.h"
@@ -47,8 +48,8 @@ void add_threads(CLI::App& command, WorkArguments& arguments);
 void add_json(CLI::App& command, WorkArguments& arguments);
 void add_quiet(CLI::App& command, WorkArguments& arguments);
 
-// An option `--name VALUE` whose value `use` takes; `use` throws Error(usage) with a message that starts with the
-// value ("'abc' is not ..."), which add_value completes with the option's name.
+// An option `--name VALUE` whose value `use` takes; `use` throws Error(usage) with a message that starts with
+// the value ("'abc' is not ..."), which add_value completes with the option's name.
 CLI::Option* add_value(CLI::App& command, const std::string& name, const std::string& type,
                        const std::string& description, std::function<void(const std::string&)> use);
 
@@ -56,10 +57,10 @@ CLI::Option* add_value(CLI::App& command, const std::string& name, const std::st
 std::int64_t parse_integer(const std::string& text, std::int64_t min, std::int64_t max);
 std::uint64_t parse_unsigned(const std::string& text, std::uint64_t min, std::uint64_t max);
 double parse_real(const std::string& text, double min, double max);
-Vec3 parse_point(const std::string& text, double min, double max);    // "X,Y,Z"
+Vec3 parse_point(const std::string& text, double min, double max);  // "X,Y,Z"
 std::vector<double> parse_reals(const std::string& text, std::size_t count, double min, double max);
-FrameRange parse_frames(const std::string& text);                     // "A..B", "A..", "..B" or "A"
-std::pair<int, int> parse_size(const std::string& text);              // "WIDTHxHEIGHT"
+FrameRange parse_frames(const std::string& text);         // "A..B", "A..", "..B" or "A"
+std::pair<int, int> parse_size(const std::string& text);  // "WIDTHxHEIGHT"
 
 // The scene with its changes applied. Throws as read_scene().
 Scene load_scene(const SceneArguments& arguments);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The subcommands of `nephos`. Each function adds one to the parser, with its options; when it is chosen, parsing
-// leaves in `action` what main() is to do. The action returns the exit status, or throws.
+// The subcommands of `nephos`. Each function adds one to the parser, with its options; when it is chosen,
+// parsing leaves in `action` what main() is to do. The action returns the exit status, or throws.
+
+#include <functional>
 
 #include <CLI/CLI.hpp>
-#include <functional>
 
 namespace nephos {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/completion.h"
 
-#include <fmt/format.h>
-
 #include <memory>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "apps/commands.h"
 #include "apps/terminal.h"
@@ -128,22 +128,33 @@ std::string bash_script(const CLI::App& app) {
 std::string zsh_spec(const CLI::Option& option) {
     std::string value;
     switch (value_of(option)) {
-        case Value::none: break;
-        case Value::file: value = fmt::format(":{}:_files", option.get_type_name()); break;
-        case Value::folder: value = fmt::format(":{}:_files -/", option.get_type_name()); break;
-        case Value::shell: value = ":shell:(bash zsh fish)"; break;
-        case Value::free: value = fmt::format(":{}: ", summary(option.get_type_name())); break;
+        case Value::none:
+            break;
+        case Value::file:
+            value = fmt::format(":{}:_files", option.get_type_name());
+            break;
+        case Value::folder:
+            value = fmt::format(":{}:_files -/", option.get_type_name());
+            break;
+        case Value::shell:
+            value = ":shell:(bash zsh fish)";
+            break;
+        case Value::free:
+            value = fmt::format(":{}: ", summary(option.get_type_name()));
+            break;
     }
     if (option.get_positional()) {
         const char* repeat = option.get_expected_max() > 1 ? "*" : "";
         return fmt::format("            '{}{}' \\\n", repeat, value);
     }
     const std::vector<std::string> names = names_of(option);
-    const bool repeated = option.get_multi_option_policy() == CLI::MultiOptionPolicy::TakeAll && !value.empty();
+    const bool repeated =
+        option.get_multi_option_policy() == CLI::MultiOptionPolicy::TakeAll && !value.empty();
     std::string out;
     for (const std::string& name : names) {
         const std::string others = repeated ? "*" : fmt::format("({})", join(names, " "));
-        out += fmt::format("            '{}{}[{}]{}' \\\n", others, name, summary(option.get_description()), value);
+        out += fmt::format("            '{}{}[{}]{}' \\\n", others, name, summary(option.get_description()),
+                           value);
     }
     return out;
 }
@@ -191,23 +202,34 @@ std::string fish_option(const CLI::Option& option, const std::string& condition)
     for (const std::string& name : option.get_snames()) out += " -s " + name;
     for (const std::string& name : option.get_lnames()) out += " -l " + name;
     switch (value_of(option)) {
-        case Value::none: break;
-        case Value::file: out += " -r -F"; break;
-        case Value::folder: out += " -x -a '(__fish_complete_directories)'"; break;
-        case Value::shell: out += " -x -a 'bash zsh fish'"; break;
-        case Value::free: out += " -x"; break;
+        case Value::none:
+            break;
+        case Value::file:
+            out += " -r -F";
+            break;
+        case Value::folder:
+            out += " -x -a '(__fish_complete_directories)'";
+            break;
+        case Value::shell:
+            out += " -x -a 'bash zsh fish'";
+            break;
+        case Value::free:
+            out += " -x";
+            break;
     }
     return out + fmt::format(" -d '{}'\n", summary(option.get_description()));
 }
 
 std::string fish_script(const CLI::App& app) {
     std::string out =
-        "# fish completion for nephos; to use it: nephos completion fish > ~/.config/fish/completions/nephos.fish\n"
+        "# fish completion for nephos; to use it: nephos completion fish > "
+        "~/.config/fish/completions/nephos.fish\n"
         "complete -c nephos -f\n";
-    for (const CLI::Option* option : options_of(app, false)) out += fish_option(*option, "__fish_use_subcommand");
+    for (const CLI::Option* option : options_of(app, false))
+        out += fish_option(*option, "__fish_use_subcommand");
     for (const CLI::App* command : commands_of(app)) {
-        out += fmt::format("complete -c nephos -n '__fish_use_subcommand' -a {} -d '{}'\n", command->get_name(),
-                           summary(command->get_description()));
+        out += fmt::format("complete -c nephos -n '__fish_use_subcommand' -a {} -d '{}'\n",
+                           command->get_name(), summary(command->get_description()));
         const std::string condition = "__fish_seen_subcommand_from " + command->get_name();
         for (const CLI::Option* option : options_of(*command, false)) out += fish_option(*option, condition);
         for (const CLI::Option* option : options_of(*command, true)) {

@@ -3,8 +3,9 @@
 
 // Completion scripts for shells, generated from the parser itself, so that they cannot drift from it.
 
-#include <CLI/CLI.hpp>
 #include <string>
+
+#include <CLI/CLI.hpp>
 
 namespace nephos {
 

@@ -2,12 +2,12 @@
 
 // nephos hash: the state hash after every step, to compare machines, versions and thread counts.
 
-#include <fmt/format.h>
-
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <memory>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.h"
@@ -55,8 +55,9 @@ int hash(const HashArguments& a) {
         const std::string line = fmt::format("{} {}", step, automaton.hash().hex());
         if (!a.check.empty() && (step >= expected.size() || expected[step] != line)) {
             output.flush();
-            throw Error(ErrorCode::check, fmt::format("{}: step {} should be '{}', but is '{}'", a.check, step,
-                                                      step < expected.size() ? expected[step] : "(no line)", line));
+            throw Error(ErrorCode::check,
+                        fmt::format("{}: step {} should be '{}', but is '{}'", a.check, step,
+                                    step < expected.size() ? expected[step] : "(no line)", line));
         }
         if (a.work.json) {
             hashes.push_back(automaton.hash().hex());
@@ -90,9 +91,8 @@ void add_hash_command(CLI::App& app, Action& action) {
     CLI::App* command = app.add_subcommand("hash", "Print the state hash after every step of a scene");
     const auto a = std::make_shared<HashArguments>();
     add_scene_arguments(*command, a->scene);
-    add_value(*command, "-n,--steps", "N", "Steps to take (default: the scene's)", [a](const std::string& text) {
-        a->steps = parse_unsigned(text, 0, kMaxSteps);
-    });
+    add_value(*command, "-n,--steps", "N", "Steps to take (default: the scene's)",
+              [a](const std::string& text) { a->steps = parse_unsigned(text, 0, kMaxSteps); });
     command->add_option("--from", a->from, "VDB file with the bool grids hum, act and cld to start from")
         ->type_name("FILE.vdb");
     command->add_option("--check", a->check, "File with the lines to expect; a difference is exit status 1")
@@ -101,7 +101,8 @@ void add_hash_command(CLI::App& app, Action& action) {
     add_json(*command, a->work);
     add_quiet(*command, a->work);
     command->footer(
-        "Prints a line `step hash` for each of the steps 0 to N. The hash is XXH3-128 of the planes hum, act and cld\n"
+        "Prints a line `step hash` for each of the steps 0 to N. The hash is XXH3-128 of the planes hum, act "
+        "and cld\n"
         "and does not depend on threads, instruction set or compiler.\n"
         "\n"
         "Examples:\n"

@@ -36,7 +36,8 @@ void wrap(std::string& out, const std::string& text, int at, int indent, int wid
 
 using Rows = std::vector<std::pair<std::string, std::string>>;
 
-// Two columns under a heading: "  label   description". Labels that are too long for theirs get a line of their own.
+// Two columns under a heading: "  label   description". Labels that are too long for theirs get a line of
+// their own.
 void table(std::string& out, const std::string& heading, const Rows& rows, int width) {
     if (rows.empty()) return;
     out += '\n' + styled(heading, Style::bold, colours_on(stdout)) + '\n';
@@ -75,7 +76,8 @@ std::string usage_line(const CLI::App& app) {
     bool options = false;
     for (const CLI::Option* option : app.get_options()) {
         if (option->get_positional()) {
-            const std::string name = option->get_name(true, false) + (option->get_expected_max() > 1 ? "..." : "");
+            const std::string name =
+                option->get_name(true, false) + (option->get_expected_max() > 1 ? "..." : "");
             line += option->get_required() ? " " + name : " [" + name + "]";
         } else if (option->get_required()) {
             line += " " + option_label(*option);
@@ -94,7 +96,8 @@ std::string HelpPage::make_help(const CLI::App* app, std::string, CLI::AppFormat
     out += '\n' + styled("Usage:", Style::bold, colours_on(stdout)) + ' ' + usage_line(*app) + '\n';
 
     Rows commands;
-    for (const CLI::App* sub : app->get_subcommands({})) commands.emplace_back(sub->get_name(), sub->get_description());
+    for (const CLI::App* sub : app->get_subcommands({}))
+        commands.emplace_back(sub->get_name(), sub->get_description());
     table(out, "Commands:", commands, width);
 
     Rows positionals;
@@ -113,7 +116,8 @@ std::string HelpPage::make_help(const CLI::App* app, std::string, CLI::AppFormat
     }
     table(out, "Arguments:", positionals, width);
     // The general group (help) last, under the others.
-    std::stable_partition(groups.begin(), groups.end(), [](const auto& group) { return group.first != "General"; });
+    std::stable_partition(groups.begin(), groups.end(),
+                          [](const auto& group) { return group.first != "General"; });
     for (const auto& [heading, rows] : groups) table(out, heading + ":", rows, width);
 
     if (!app->get_footer().empty()) out += '\n' + app->get_footer() + '\n';

@@ -3,8 +3,9 @@
 
 // The text of --help: one page a command, wrapped to the terminal.
 
-#include <CLI/CLI.hpp>
 #include <string>
+
+#include <CLI/CLI.hpp>
 
 namespace nephos {
 

@@ -2,14 +2,14 @@
 
 // nephos info: what a file says about itself, whatever its name is.
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.h"
@@ -44,9 +44,10 @@ FileKind kind_of(const std::string& path) {
     if (bytes.starts_with(std::string_view(" BDV\0\0\0\0", 8))) return FileKind::vdb;
     if (bytes.starts_with("\x76\x2f\x31\x01")) return FileKind::exr;
     if (is_checkpoint(path)) return FileKind::checkpoint;
-    throw Error(ErrorCode::io, path + (bytes.empty() ? ": is empty"
-                                                     : ": is neither an OpenVDB file, nor an OpenEXR file, nor a "
-                                                       "checkpoint of nephos"));
+    throw Error(ErrorCode::io,
+                path + (bytes.empty() ? ": is empty"
+                                      : ": is neither an OpenVDB file, nor an OpenEXR file, nor a "
+                                        "checkpoint of nephos"));
 }
 
 Json pairs_json(const std::vector<std::pair<std::string, std::string>>& pairs) {
@@ -82,7 +83,10 @@ Json vdb_json(const VdbInfo& info) {
                          {"active_max", grid.active_box.max},
                          {"metadata", pairs_json(grid.metadata)}});
     }
-    return {{"kind", "vdb"}, {"file_version", info.file_version}, {"grids", grids}, {"metadata", pairs_json(info.metadata)}};
+    return {{"kind", "vdb"},
+            {"file_version", info.file_version},
+            {"grids", grids},
+            {"metadata", pairs_json(info.metadata)}};
 }
 
 std::string vdb_text(const VdbInfo& info, bool colours) {
@@ -91,7 +95,8 @@ std::string vdb_text(const VdbInfo& info, bool colours) {
     out += pairs_text(info.metadata, 2);
     for (const VdbGridInfo& grid : info.grids) {
         const VoxelBox& box = grid.active_box;
-        out += fmt::format("\n  {}  {}, {}\n", styled(grid.name.empty() ? "(no name)" : grid.name, Style::bold, colours),
+        out += fmt::format("\n  {}  {}, {}\n",
+                           styled(grid.name.empty() ? "(no name)" : grid.name, Style::bold, colours),
                            grid.type, grid.grid_class);
         std::vector<std::pair<std::string, std::string>> rows;
         const Vec3& size = grid.voxel_size;
@@ -100,8 +105,9 @@ std::string vdb_text(const VdbInfo& info, bool colours) {
                                             : fmt::format("{:g} x {:g} x {:g}", size.x, size.y, size.z));
         rows.emplace_back("active voxels", human_count(grid.active_voxels));
         if (!box.empty()) {
-            rows.emplace_back("active box", fmt::format("({}, {}, {}) to ({}, {}, {})", box.min[0], box.min[1], box.min[2],
-                                                        box.max[0], box.max[1], box.max[2]));
+            rows.emplace_back("active box",
+                              fmt::format("({}, {}, {}) to ({}, {}, {})", box.min[0], box.min[1], box.min[2],
+                                          box.max[0], box.max[1], box.max[2]));
         }
         out += pairs_text(rows, 4);
         if (grid.metadata != info.metadata) out += pairs_text(grid.metadata, 4);
@@ -131,7 +137,8 @@ Json exr_json(const ExrInfo& info) {
     Json parts = Json::array();
     for (const ExrPart& part : info.parts) {
         Json channels = Json::array();
-        for (const ExrChannel& channel : part.channels) channels.push_back({{"name", channel.name}, {"type", channel.type}});
+        for (const ExrChannel& channel : part.channels)
+            channels.push_back({{"name", channel.name}, {"type", channel.type}});
         parts.push_back({{"name", part.name},
                          {"width", part.width},
                          {"height", part.height},
@@ -144,9 +151,11 @@ Json exr_json(const ExrInfo& info) {
 }
 
 std::string exr_text(const ExrInfo& info, bool colours) {
-    std::string out = fmt::format("OpenEXR, {} part{}\n", info.parts.size(), info.parts.size() == 1 ? "" : "s");
+    std::string out =
+        fmt::format("OpenEXR, {} part{}\n", info.parts.size(), info.parts.size() == 1 ? "" : "s");
     for (const ExrPart& part : info.parts) {
-        out += fmt::format("\n  {}  {} x {}, {}{}\n", styled(part.name.empty() ? "(no name)" : part.name, Style::bold, colours),
+        out += fmt::format("\n  {}  {} x {}, {}{}\n",
+                           styled(part.name.empty() ? "(no name)" : part.name, Style::bold, colours),
                            part.width, part.height, part.compression, part.complete ? "" : ", INCOMPLETE");
         std::vector<std::pair<std::string, std::string>> rows;
         for (const ExrChannel& channel : part.channels) rows.emplace_back(channel.name, channel.type);
@@ -184,7 +193,8 @@ int info(const InfoArguments& a) {
             }
         }
         results.push_back(std::move(json));
-        if (!a.work.json) output.write(fmt::format("{}{}: {}", file == a.files.front() ? "" : "\n", file, text));
+        if (!a.work.json)
+            output.write(fmt::format("{}{}: {}", file == a.files.front() ? "" : "\n", file, text));
     }
     if (a.work.json) {
         const Json& all = a.files.size() == 1 ? results.front() : results;
@@ -198,7 +208,9 @@ int info(const InfoArguments& a) {
 void add_info_command(CLI::App& app, Action& action) {
     CLI::App* command = app.add_subcommand("info", "Show what is in OpenVDB, OpenEXR and checkpoint files");
     const auto a = std::make_shared<InfoArguments>();
-    command->add_option("FILE", a->files, "Files; their kind is known by their content")->required()->type_name("FILE");
+    command->add_option("FILE", a->files, "Files; their kind is known by their content")
+        ->required()
+        ->type_name("FILE");
     add_json(*command, a->work);
     command->footer(
         "Examples:\n"

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The `nephos` command: parses, calls one subcommand, and turns what went wrong into a message and an exit status.
+// The `nephos` command: parses, calls one subcommand, and turns what went wrong into a message and an exit
+// status.
 //
-//     0 done    1 a check failed    2 usage or scene    3 input or output    4 GPU    130 Ctrl-C    143 SIGTERM
+//     0 done    1 a check failed    2 usage or scene    3 input or output    4 GPU    130 Ctrl-C    143
+//     SIGTERM
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <new>
 #include <string>
 #include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "apps/arguments.h"
 #include "apps/commands.h"

@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+
 #include <nlohmann/json.hpp>
 
 #include "apps/version.h"
@@ -36,7 +37,8 @@ Json frames_json(const RunSettings& settings, const ManifestState& state, const 
         if (settings.render && (frames.png || frames.video)) {
             entry["png"] = relative(settings, folder.picture(frame.number, ".png"));
         }
-        if (settings.render && frames.exr) entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
+        if (settings.render && frames.exr)
+            entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
         list.push_back(std::move(entry));
     }
     return list;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// manifest.json: what was run, with which hashes, and every file of the run with its moment, so that another program
-// needs to guess nothing. All but "timing" is a function of the scene and the command line alone.
+// manifest.json: what was run, with which hashes, and every file of the run with its moment, so that another
+// program needs to guess nothing. All but "timing" is a function of the scene and the command line alone.
 
 #include <filesystem>
 #include <string>

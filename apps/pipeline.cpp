@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/pipeline.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+
+#include <fmt/format.h>
 
 #include "automaton/bytes.h"
 #include "automaton/error.h"
@@ -63,8 +63,9 @@ PipelineRange range_of_frames(const Scene& scene, int first, int last) {
     last = std::min(last, count);
     if (first < 1 || last < first) {
         throw Error(ErrorCode::usage,
-                    count == 0 ? fmt::format("the scene '{}' has no frames", scene.name)
-                               : fmt::format("no such frame: the scene '{}' has frames 1 to {}", scene.name, count));
+                    count == 0
+                        ? fmt::format("the scene '{}' has no frames", scene.name)
+                        : fmt::format("no such frame: the scene '{}' has frames 1 to {}", scene.name, count));
     }
     const double end_s = frame_time_s(scene.frames, last - 1);
     return {steps_up_to(moment_of(end_s, scene.automaton.time_step_s)), first, last};
@@ -93,9 +94,8 @@ Pipeline::Pipeline(const Scene& scene, const PipelineRange& range, std::string s
       range_(range),
       simulation_hash_(std::move(simulation_hash)),
       // The lattice is about to be replaced; an empty one is the cheapest to make.
-      automaton_(scene.automaton,
-                 Lattice{BitPlane(scene.automaton.extent), BitPlane(scene.automaton.extent),
-                         BitPlane(scene.automaton.extent)}) {
+      automaton_(scene.automaton, Lattice{BitPlane(scene.automaton.extent), BitPlane(scene.automaton.extent),
+                                          BitPlane(scene.automaton.extent)}) {
     if (checkpoint.simulation_hash != simulation_hash_) {
         throw Error(ErrorCode::usage, "the checkpoint belongs to another simulation");
     }
@@ -180,8 +180,8 @@ void Pipeline::report_frame(PipelineSink& sink) {
 void Pipeline::remember() {
     Past state;
     state.step = automaton_.steps();
-    state.statistics = cloud_statistics(automaton_.hum(), automaton_.act(), automaton_.cld(),
-                                        scene_.automaton.placement);
+    state.statistics =
+        cloud_statistics(automaton_.hum(), automaton_.act(), automaton_.cld(), scene_.automaton.placement);
     state.hash = automaton_.hash();
     state.cld = copy_of(automaton_.cld());
     if (scene_.density.write_state) {
@@ -250,7 +250,8 @@ void Pipeline::restore_history(const Checkpoint& checkpoint) {
     std::vector<std::byte> found(settings.size());
     reader.get_bytes(found);
     if (found != settings) {
-        throw Error(ErrorCode::usage, "the checkpoint belongs to a run with other frames or another smoothing window");
+        throw Error(ErrorCode::usage,
+                    "the checkpoint belongs to a run with other frames or another smoothing window");
     }
     next_step_ = reader.get<std::uint64_t>();
     next_frame_ = reader.get<std::int32_t>();
@@ -271,10 +272,12 @@ void Pipeline::restore_history(const Checkpoint& checkpoint) {
     const auto reach = std::uint64_t(scene_.density.smoothing.t0);
     const std::uint64_t lowest = lowest_needed();
     bool good = reader.rest().empty() && !history_.empty() && next_step_ <= range_.last_step + 1 &&
-                next_frame_ >= range_.first_frame && next_frame_ <= std::max(range_.last_frame, range_.first_frame - 1) + 1 &&
+                next_frame_ >= range_.first_frame &&
+                next_frame_ <= std::max(range_.last_frame, range_.first_frame - 1) + 1 &&
                 history_.back().step == automaton_.steps() && history_.back().hash == automaton_.hash() &&
                 (finished() || history_.front().step <= (lowest > reach ? lowest - reach : 0));
-    for (std::size_t n = 1; good && n < history_.size(); ++n) good = history_[n].step == history_[n - 1].step + 1;
+    for (std::size_t n = 1; good && n < history_.size(); ++n)
+        good = history_[n].step == history_[n - 1].step + 1;
     if (!good) throw Error(ErrorCode::io, "the checkpoint's history is damaged");
 }
 

@@ -6,13 +6,14 @@
 //     automaton step -> history of the last states -> density q at steps -> frames between steps
 //
 // q at step s needs the states s-t0 .. s+t0, and a frame between two steps needs q at both. The history keeps
-// exactly the states that something still needs; so the automaton runs up to t0 steps ahead of the results, also
-// beyond the scene's last step. A frame therefore never depends on where the run ends.
+// exactly the states that something still needs; so the automaton runs up to t0 steps ahead of the results,
+// also beyond the scene's last step. A frame therefore never depends on where the run ends.
 //
 //     Pipeline pipeline(scene, simulation_hash);
 //     while (!pipeline.finished()) pipeline.advance(sink);
 //
-// Between any two calls of advance() the pipeline can be saved; one that is restored goes on with the same results.
+// Between any two calls of advance() the pipeline can be saved; one that is restored goes on with the same
+// results.
 
 #include <cstdint>
 #include <deque>
@@ -39,10 +40,11 @@ struct StepResult {
 
 // One frame: density at a moment that need not be a step.
 struct FrameResult {
-    int number = 1;          // as in file names, counted from 1
+    int number = 1;  // as in file names, counted from 1
     double time_s = 0;
-    DensityGrid density;     // one voxel a cell (not refined)
-    std::uint64_t step = 0;  // the last step at or before time_s, whose state the three planes and the hash are
+    DensityGrid density;  // one voxel a cell (not refined)
+    std::uint64_t step =
+        0;  // the last step at or before time_s, whose state the three planes and the hash are
     StateHash hash;
     std::optional<BitPlaneView> hum, act, cld;  // only when the scene writes the state; valid during the call
 };
@@ -55,8 +57,8 @@ class PipelineSink {
     virtual void frame(const FrameResult& result) = 0;
 };
 
-// Which part of the scene is produced. Frames by their number, counted from 1; an empty range (last < first) means
-// no frame at all.
+// Which part of the scene is produced. Frames by their number, counted from 1; an empty range (last < first)
+// means no frame at all.
 struct PipelineRange {
     std::uint64_t last_step = 0;  // steps 0..last_step are reported
     int first_frame = 1, last_frame = 0;
@@ -68,8 +70,8 @@ struct PipelineRange {
 PipelineRange full_range(const Scene& scene);
 PipelineRange range_of_frames(const Scene& scene, int first, int last);
 
-// A moment in steps: `step` <= moment < step + 1, `fraction` the rest. A moment within 1e-9 of a step is that step:
-// products and quotients of decimal fractions seldom meet it exactly.
+// A moment in steps: `step` <= moment < step + 1, `fraction` the rest. A moment within 1e-9 of a step is that
+// step: products and quotients of decimal fractions seldom meet it exactly.
 struct Moment {
     std::uint64_t step = 0;
     double fraction = 0;
@@ -81,15 +83,15 @@ class Pipeline {
     // At step 0: from the scene's own initial state, or from `initial`. Throws as Automaton.
     Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
              std::optional<Lattice> initial = {});
-    // Where `checkpoint` was saved. Throws Error(usage) when it belongs to another simulation, another smoothing
-    // window or another range; Error(io) when its content is damaged.
+    // Where `checkpoint` was saved. Throws Error(usage) when it belongs to another simulation, another
+    // smoothing window or another range; Error(io) when its content is damaged.
     Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
              const Checkpoint& checkpoint);
 
     bool finished() const;
 
-    // Does the smallest piece of work that is due: reports one step or one frame, or lets the automaton take a step.
-    // Precondition: not finished().
+    // Does the smallest piece of work that is due: reports one step or one frame, or lets the automaton take
+    // a step. Precondition: not finished().
     void advance(PipelineSink& sink);
 
     Checkpoint save() const;

@@ -2,11 +2,11 @@
 
 // nephos render: a picture of any fog volume.
 
-#include <fmt/format.h>
-
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/arguments.h"
 #include "apps/commands.h"
@@ -68,7 +68,8 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
     add_value(command, "--view", "VIEW", "Where to look from: side, below or above (default: side)",
               [&](const std::string& text) {
                   if (text != "side" && text != "below" && text != "above") {
-                      throw Error(ErrorCode::usage, fmt::format("'{}' is not one of side, below and above", text));
+                      throw Error(ErrorCode::usage,
+                                  fmt::format("'{}' is not one of side, below and above", text));
                   }
                   a.view = text == "side" ? View::side : text == "below" ? View::below : View::above;
               })
@@ -80,13 +81,16 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
               [&](const std::string& text) { a.target_m = parse_point(text, -kFar_m, kFar_m); })
         ->group(group);
     real("--fov", "DEG", "Vertical field of view, 1 to 170 degrees (default: 50)", a.fov_deg, 1, 170);
-    real("--exposure", "EV", "Stops by which the PNG is brighter, -20 to 20 (default: 0)", a.exposure_ev, -20, 20);
+    real("--exposure", "EV", "Stops by which the PNG is brighter, -20 to 20 (default: 0)", a.exposure_ev, -20,
+         20);
     add_value(command, "--sun", "ELEV,AZIM",
-              "Where the sun stands: degrees above the horizon (-18 to 90), and clockwise from north (default: 40,135)",
+              "Where the sun stands: degrees above the horizon (-18 to 90), and clockwise from north "
+              "(default: 40,135)",
               [&](const std::string& text) {
                   const std::vector<double> sun = parse_reals(text, 2, -360, 360);
                   if (sun[0] < -18 || sun[0] > 90) {
-                      throw Error(ErrorCode::usage, fmt::format("'{}': the elevation is not from -18 to 90", text));
+                      throw Error(ErrorCode::usage,
+                                  fmt::format("'{}': the elevation is not from -18 to 90", text));
                   }
                   a.sun_deg = {sun[0], sun[1]};
               })
@@ -105,9 +109,11 @@ void add_cloud_options(CLI::App& command, RenderArguments& a) {
         })->group(group);
     };
     real("--extinction", "PER_M",
-         "Extinction per metre at density 1 (default: what the file says, else chosen so that the cloud is visible)",
+         "Extinction per metre at density 1 (default: what the file says, else chosen so that the cloud is "
+         "visible)",
          a.extinction_per_m, 0, 1e9);
-    add_value(command, "--up", "AXIS", "Axis of the file that points up: z or y (default: what the file says, else z)",
+    add_value(command, "--up", "AXIS",
+              "Axis of the file that points up: z or y (default: what the file says, else z)",
               [&](const std::string& text) {
                   if (text != "y" && text != "z") {
                       throw Error(ErrorCode::usage, fmt::format("'{}' is not one of y and z", text));
@@ -118,12 +124,15 @@ void add_cloud_options(CLI::App& command, RenderArguments& a) {
     add_value(command, "--scale", "M", "Metres of one unit of the file (default: 1)",
               [&](const std::string& text) { a.read.metres_per_unit = parse_real(text, 1e-9, 1e9); })
         ->group(group);
-    real("--albedo", "A", "Part of the light that is scattered and not absorbed, 0 to 1 (default: 1)", a.albedo, 0, 1);
+    real("--albedo", "A", "Part of the light that is scattered and not absorbed, 0 to 1 (default: 1)",
+         a.albedo, 0, 1);
     real("--g", "G", "Forward scattering of light, -0.99 to 0.99 (default: 0.5)", a.g, -0.99, 0.99);
 }
 
-// What the picture is drawn with: the scene's options, or defaults that fit the cloud, changed by the command line.
-RenderOptions picture_options(const RenderArguments& a, const std::optional<Scene>& scene, const DensityGrid& grid) {
+// What the picture is drawn with: the scene's options, or defaults that fit the cloud, changed by the command
+// line.
+RenderOptions picture_options(const RenderArguments& a, const std::optional<Scene>& scene,
+                              const DensityGrid& grid) {
     RenderOptions options;
     const WorldBox box = cloud_box(grid);
     if (scene) {
@@ -163,8 +172,10 @@ int render(const RenderArguments& a) {
         for (const std::string& note : loaded.notes) print_note(a.file + ": " + note);
     }
 
-    const double radius = scene ? scene->density.metaball_radius_cells : DensityOptions().metaball_radius_cells;
-    require_memory(grid.active_voxels() * 4 * sizeof(Metaball), fmt::format("{}: drawing its voxels", a.file));
+    const double radius =
+        scene ? scene->density.metaball_radius_cells : DensityOptions().metaball_radius_cells;
+    require_memory(grid.active_voxels() * 4 * sizeof(Metaball),
+                   fmt::format("{}: drawing its voxels", a.file));
     double extinction_per_m = 0;
     if (a.extinction_per_m) {
         extinction_per_m = *a.extinction_per_m;
@@ -175,9 +186,10 @@ int render(const RenderArguments& a) {
     } else {
         extinction_per_m = visible_extinction_per_m(grid);
         if (!a.work.quiet) {
-            print_note(fmt::format("{}: names no extinction; {:.4g} per metre at density 1 is taken, so that the "
-                                   "cloud is visible (--extinction changes it)",
-                                   a.file, extinction_per_m));
+            print_note(
+                fmt::format("{}: names no extinction; {:.4g} per metre at density 1 is taken, so that the "
+                            "cloud is visible (--extinction changes it)",
+                            a.file, extinction_per_m));
         }
     }
     const RenderOptions options = picture_options(a, scene, grid);
@@ -226,15 +238,20 @@ int render(const RenderArguments& a) {
 void add_render_command(CLI::App& app, Action& action) {
     CLI::App* command = app.add_subcommand("render", "Draw the fog volume of an OpenVDB file, ours or not");
     const auto a = std::make_shared<RenderArguments>();
-    command->add_option("FILE.vdb", a->file, "OpenVDB file with a float fog volume")->required()->type_name("FILE.vdb");
-    command->add_option("-o,--out", a->out, "Picture to write: .png (tone-mapped) or .exr (all layers); may be repeated")
+    command->add_option("FILE.vdb", a->file, "OpenVDB file with a float fog volume")
+        ->required()
+        ->type_name("FILE.vdb");
+    command
+        ->add_option("-o,--out", a->out,
+                     "Picture to write: .png (tone-mapped) or .exr (all layers); may be repeated")
         ->required()
         ->type_name("IMG")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     add_picture_options(*command, *a);
     add_cloud_options(*command, *a);
-    command->add_option("--device", a->device, "Vulkan device: a part of its name, or its number")->type_name("NAME");
+    command->add_option("--device", a->device, "Vulkan device: a part of its name, or its number")
+        ->type_name("NAME");
     add_threads(*command, a->work);
     add_json(*command, a->work);
     add_quiet(*command, a->work);

@@ -2,10 +2,10 @@
 
 // nephos run: a scene to density grids, pictures and statistics.
 
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <memory>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.h"
@@ -40,7 +40,8 @@ RunSettings settings_of(const RunArguments& a) {
     settings.scene_hash = scene_hash(scene);
     settings.range = a.frames ? range_of_frames(scene, a.frames->first, a.frames->last) : full_range(scene);
     settings.render = !a.no_render;
-    settings.folder = a.out.empty() ? std::filesystem::path("out") / scene.name : std::filesystem::path(a.out);
+    settings.folder =
+        a.out.empty() ? std::filesystem::path("out") / scene.name : std::filesystem::path(a.out);
     settings.resume = a.resume;
     settings.overwrite = a.overwrite;
     settings.checkpoint_every_s = a.checkpoint_every_s;
@@ -95,8 +96,8 @@ void print_files(Output& output, const RunReport& report) {
 
 void print_report(const RunReport& report, const RunSettings& settings) {
     Output output;
-    output.line(styled(fmt::format("{}: {} steps, {} frames in {}{}", settings.scene.name, report.steps_reported - 1,
-                                   report.frames, human_duration(report.wall_s),
+    output.line(styled(fmt::format("{}: {} steps, {} frames in {}{}", settings.scene.name,
+                                   report.steps_reported - 1, report.frames, human_duration(report.wall_s),
                                    report.device.empty() ? "" : ", drawn by " + report.device),
                        Style::bold, colours_on(stdout)));
     print_files(output, report);
@@ -109,18 +110,19 @@ void print_json(const RunReport& report, const RunSettings& settings) {
         for (const std::filesystem::path& file : entry.files) list.push_back(file.string());
         files[entry.kind] = list;
     }
-    const nlohmann::ordered_json json = {{"scene", settings.scene.name},
-                                         {"scene_hash", settings.scene_hash},
-                                         {"simulation_hash", settings.simulation_hash},
-                                         {"folder", settings.folder.string()},
-                                         {"complete", report.complete},
-                                         {"resumed_at_step", report.first_step},
-                                         {"steps", report.steps_reported == 0 ? 0 : report.steps_reported - 1},
-                                         {"frames", report.frames},
-                                         {"state_hash", report.state_hash},
-                                         {"wall_s", report.wall_s},
-                                         {"device", report.device},
-                                         {"files", files}};
+    const nlohmann::ordered_json json = {
+        {"scene", settings.scene.name},
+        {"scene_hash", settings.scene_hash},
+        {"simulation_hash", settings.simulation_hash},
+        {"folder", settings.folder.string()},
+        {"complete", report.complete},
+        {"resumed_at_step", report.first_step},
+        {"steps", report.steps_reported == 0 ? 0 : report.steps_reported - 1},
+        {"frames", report.frames},
+        {"state_hash", report.state_hash},
+        {"wall_s", report.wall_s},
+        {"device", report.device},
+        {"files", files}};
     Output().line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
@@ -134,9 +136,9 @@ int run(const RunArguments& a) {
         if (!bar) {
             bar = std::make_unique<ProgressBar>("step", progress.steps, progress.steps_in_all, !a.work.quiet);
         }
-        bar->update(progress.steps, progress.phase == "encoding"
-                                        ? "encoding the video"
-                                        : fmt::format("frame {}/{}", progress.frames, progress.frames_in_all));
+        bar->update(progress.steps, progress.phase == "encoding" ? "encoding the video"
+                                                                 : fmt::format("frame {}/{}", progress.frames,
+                                                                               progress.frames_in_all));
     };
     observer.stop = [] { return pending_signal() != 0; };
     defer_signals();
@@ -148,9 +150,9 @@ int run(const RunArguments& a) {
         print_report(report, settings);
     }
     if (report.complete) return 0;
-    print_note(fmt::format("stopped after {} of {} steps and {} frames; the same command with --resume goes on",
-                           report.steps_reported == 0 ? 0 : report.steps_reported - 1, settings.range.last_step,
-                           report.frames));
+    print_note(fmt::format(
+        "stopped after {} of {} steps and {} frames; the same command with --resume goes on",
+        report.steps_reported == 0 ? 0 : report.steps_reported - 1, settings.range.last_step, report.frames));
     return 128 + pending_signal();
 }
 
@@ -161,9 +163,11 @@ void add_run_command(CLI::App& app, Action& action) {
     const auto a = std::make_shared<RunArguments>();
     add_scene_arguments(*command, a->scene);
     command->add_option("-o,--out", a->out, "Folder to write to (default: out/NAME)")->type_name("DIR");
-    add_value(*command, "--frames", "A..B", "Write only these frames, counted from 1; A.., ..B and A alone work too",
+    add_value(*command, "--frames", "A..B",
+              "Write only these frames, counted from 1; A.., ..B and A alone work too",
               [a](const std::string& text) { a->frames = parse_frames(text); });
-    command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics; needs no GPU");
+    command->add_flag("--no-render", a->no_render,
+                      "No pictures, only density grids and statistics; needs no GPU");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
     command->add_flag("--resume", a->resume, "Go on where an interrupted run stopped");
     command->add_flag("--overwrite", a->overwrite, "Start anew although the folder holds an interrupted run");
@@ -175,7 +179,8 @@ void add_run_command(CLI::App& app, Action& action) {
     add_quiet(*command, a->work);
     command->footer(
         "Writes DIR/density/NAME_0001.vdb ..., DIR/frames/NAME_0001.png ..., DIR/statistics.csv,\n"
-        "DIR/manifest.json and DIR/checkpoint.nephos; files of an earlier run of the same name are replaced.\n"
+        "DIR/manifest.json and DIR/checkpoint.nephos; files of an earlier run of the same name are "
+        "replaced.\n"
         "The first Ctrl-C finishes the step and leaves a checkpoint, the second stops at once.\n"
         "\n"
         "Examples:\n"

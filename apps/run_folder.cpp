@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/run_folder.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <memory>
 #include <system_error>
+
+#include <fmt/format.h>
 
 #include "apps/manifest.h"
 #include "apps/statistics_file.h"
@@ -54,7 +54,8 @@ class Recorder : public PipelineSink {
         state_.frames.push_back({result.number, result.time_s, result.step, result.hash.hex()});
     }
 
-    // Takes over what an earlier run reported up to where `pipeline` goes on, and checks that it is all there.
+    // Takes over what an earlier run reported up to where `pipeline` goes on, and checks that it is all
+    // there.
     void take_over(const Pipeline& pipeline) {
         rows_ = read_statistics(folder_.statistics(), pipeline.next_step());
         state_.steps_reported = pipeline.next_step();
@@ -73,9 +74,10 @@ class Recorder : public PipelineSink {
         for (const RunFiles& files : frame_files()) {
             for (const std::filesystem::path& file : files.files) {
                 if (std::filesystem::exists(file)) continue;
-                throw Error(ErrorCode::io, file.string() +
-                                               ": is missing, although the checkpoint is past it: start anew with "
-                                               "--overwrite");
+                throw Error(ErrorCode::io,
+                            file.string() +
+                                ": is missing, although the checkpoint is past it: start anew with "
+                                "--overwrite");
             }
         }
     }
@@ -95,7 +97,8 @@ class Recorder : public PipelineSink {
 
     void encode_video() {
         std::vector<std::filesystem::path> pictures;
-        for (const FrameRecord& frame : state_.frames) pictures.push_back(folder_.picture(frame.number, ".png"));
+        for (const FrameRecord& frame : state_.frames)
+            pictures.push_back(folder_.picture(frame.number, ".png"));
         encode_mp4(folder_.video(), pictures, settings_.scene.frames.per_second);
     }
 
@@ -119,9 +122,9 @@ class Recorder : public PipelineSink {
     void write_density(const FrameResult& result) {
         const Scene& scene = settings_.scene;
         const DensityOptions& options = scene.density;
-        const DensityGrid written = options.refine > 1
-                                        ? resample(result.density, options.refine, options.metaball_radius_cells)
-                                        : result.density;
+        const DensityGrid written =
+            options.refine > 1 ? resample(result.density, options.refine, options.metaball_radius_cells)
+                               : result.density;
         VdbContent content;
         content.density = &written;
         content.half = options.half;
@@ -158,8 +161,10 @@ class Recorder : public PipelineSink {
         metadata.time_s = result.time_s;
         metadata.frames_per_second = scene.frames.per_second;
         metadata.extinction_per_m = scene.density.extinction_per_m;
-        if (scene.frames.exr) write_exr(folder_.picture(result.number, ".exr"), picture, scene.render, metadata);
-        if (wants_png(scene)) write_png(folder_.picture(result.number, ".png"), picture, scene.render, metadata);
+        if (scene.frames.exr)
+            write_exr(folder_.picture(result.number, ".exr"), picture, scene.render, metadata);
+        if (wants_png(scene))
+            write_png(folder_.picture(result.number, ".png"), picture, scene.render, metadata);
     }
 
     const RunSettings& settings_;
@@ -175,7 +180,8 @@ bool is_frame_of(const std::string& file, const std::string& name) {
     const std::string extension = dot == file.npos ? "" : file.substr(dot);
     if (extension != ".vdb" && extension != ".png" && extension != ".exr") return false;
     const std::string number = file.substr(name.size() + 1, dot - name.size() - 1);
-    return number.size() >= 4 && std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
+    return number.size() >= 4 &&
+           std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
 void remove_file(const std::filesystem::path& path) {
@@ -184,7 +190,8 @@ void remove_file(const std::filesystem::path& path) {
     if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
 }
 
-// An earlier run's files of the same name must not stay between those of the new one. Nothing else is touched.
+// An earlier run's files of the same name must not stay between those of the new one. Nothing else is
+// touched.
 void remove_earlier_run(const RunFolder& folder) {
     for (const char* part : {"density", "frames"}) {
         std::error_code error;
@@ -204,16 +211,18 @@ void remove_earlier_run(const RunFolder& folder) {
 // An interrupted run may hold hours of work: it is not thrown away without being asked.
 void refuse_to_lose(const RunFolder& folder) {
     std::error_code error;
-    if (!std::filesystem::exists(folder.checkpoint(), error) || !std::filesystem::exists(folder.manifest(), error)) {
+    if (!std::filesystem::exists(folder.checkpoint(), error) ||
+        !std::filesystem::exists(folder.manifest(), error)) {
         return;
     }
     const EarlierRun earlier = read_manifest(folder.manifest());
     if (earlier.complete) return;
-    throw Error(ErrorCode::usage,
-                fmt::format("{}: holds an interrupted run of '{}' ({} of {} steps): give --resume to go on, or "
-                            "--overwrite to start anew",
-                            folder.folder.string(), earlier.name, earlier.steps_reported,
-                            earlier.range.last_step + 1));
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("{}: holds an interrupted run of '{}' ({} of {} steps): give --resume to go on, or "
+                    "--overwrite to start anew",
+                    folder.folder.string(), earlier.name, earlier.steps_reported,
+                    earlier.range.last_step + 1));
 }
 
 std::string range_text(const EarlierRun& run) {
@@ -223,25 +232,27 @@ std::string range_text(const EarlierRun& run) {
 
 Pipeline resumed_pipeline(const RunSettings& settings, const RunFolder& folder) {
     if (!std::filesystem::exists(folder.checkpoint())) {
-        throw Error(ErrorCode::io,
-                    folder.checkpoint().string() + ": is not there, so there is nothing to resume: run without --resume");
+        throw Error(ErrorCode::io, folder.checkpoint().string() +
+                                       ": is not there, so there is nothing to resume: run without --resume");
     }
     const EarlierRun earlier = read_manifest(folder.manifest());
     if (earlier.simulation_hash != settings.simulation_hash || earlier.scene_hash != settings.scene_hash) {
         const bool same_clouds = earlier.simulation_hash == settings.simulation_hash;
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: was started with another scene (hash {}, now {}; {}). Resume with the scene, "
-                                "--seed and --set of the first call (manifest.json has the scene under "
-                                "\"scene_text\"), or start anew with --overwrite",
-                                folder.folder.string(), earlier.scene_hash, settings.scene_hash,
-                                same_clouds ? "the simulation is the same, density, frames or pictures differ"
-                                            : "the simulation itself differs"));
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: was started with another scene (hash {}, now {}; {}). Resume with the scene, "
+                        "--seed and --set of the first call (manifest.json has the scene under "
+                        "\"scene_text\"), or start anew with --overwrite",
+                        folder.folder.string(), earlier.scene_hash, settings.scene_hash,
+                        same_clouds ? "the simulation is the same, density, frames or pictures differ"
+                                    : "the simulation itself differs"));
     }
     const EarlierRun now{false, "", "", "", settings.render, settings.range, 0};
     if (earlier.range != settings.range || earlier.render != settings.render) {
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: was started for {}, now it is {}: resume with the same --frames and --no-render",
-                                folder.folder.string(), range_text(earlier), range_text(now)));
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: was started for {}, now it is {}: resume with the same --frames and --no-render",
+                        folder.folder.string(), range_text(earlier), range_text(now)));
     }
     const Checkpoint checkpoint = read_checkpoint(folder.checkpoint());
     try {
@@ -274,7 +285,9 @@ RunReport report_of(const Recorder& recorder, const RunSettings& settings, const
 
 }  // namespace
 
-std::filesystem::path RunFolder::density(int frame) const { return frame_path(folder / "density", name, frame); }
+std::filesystem::path RunFolder::density(int frame) const {
+    return frame_path(folder / "density", name, frame);
+}
 
 std::filesystem::path RunFolder::picture(int frame, std::string_view extension) const {
     return frame_path(folder / "frames", name, frame).replace_extension(extension);
@@ -285,8 +298,8 @@ std::filesystem::path RunFolder::video() const { return folder / "frames" / (nam
 RunReport run_scene(const RunSettings& given, const RunObserver& observer) {
     const Clock::time_point begin = Clock::now();
     RunSettings settings = given;
-    settings.render = given.render && wants_pictures(given.scene) &&
-                      given.range.last_frame >= given.range.first_frame;
+    settings.render =
+        given.render && wants_pictures(given.scene) && given.range.last_frame >= given.range.first_frame;
     const RunFolder folder{settings.folder, settings.scene.name};
     if (!settings.resume && !settings.overwrite) refuse_to_lose(folder);
 
@@ -305,7 +318,8 @@ RunReport run_scene(const RunSettings& given, const RunObserver& observer) {
     const auto stopped = [&] { return observer.stop && observer.stop(); };
     const auto report_progress = [&](std::string_view phase) {
         if (!observer.progress) return;
-        observer.progress({pipeline.steps_taken(), pipeline.steps_in_all(), int(recorder.state().frames.size()),
+        observer.progress({pipeline.steps_taken(), pipeline.steps_in_all(),
+                           int(recorder.state().frames.size()),
                            settings.range.last_frame - settings.range.first_frame + 1, phase});
     };
     Clock::time_point saved = Clock::now();
@@ -319,12 +333,14 @@ RunReport run_scene(const RunSettings& given, const RunObserver& observer) {
     }
     recorder.save(pipeline, false, seconds_since(begin));
     bool complete = pipeline.finished();
-    if (complete && settings.render && settings.scene.frames.video && !std::filesystem::exists(folder.video())) {
+    if (complete && settings.render && settings.scene.frames.video &&
+        !std::filesystem::exists(folder.video())) {
         report_progress("encoding");
         try {
             recorder.encode_video();
         } catch (const Error&) {
-            // Ctrl-C in a terminal reaches ffmpeg too; then it is the end that was asked for, and resuming encodes.
+            // Ctrl-C in a terminal reaches ffmpeg too; then it is the end that was asked for, and resuming
+            // encodes.
             if (!stopped()) throw;
             complete = false;
         }

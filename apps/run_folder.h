@@ -9,8 +9,8 @@
 //     DIR/manifest.json                what was run, and every file with its moment
 //     DIR/checkpoint.nephos            where to go on
 //
-// Every file appears complete or not at all. A run that was interrupted and resumed at any moment leaves the same
-// content as one that was not; only the part "timing" of the manifest differs.
+// Every file appears complete or not at all. A run that was interrupted and resumed at any moment leaves the
+// same content as one that was not; only the part "timing" of the manifest differs.
 
 #include <cstdint>
 #include <filesystem>
@@ -40,15 +40,15 @@ struct RunFolder {
 struct RunSettings {
     Scene scene;
     std::optional<Lattice> initial;  // the state at step 0, when it is not the scene's own
-    std::string scene_file;       // as the manifest names it
-    std::string scene_text;       // canonical
-    std::string scene_hash;       // of everything in the scene
-    std::string simulation_hash;  // of what decides the automaton's bits
+    std::string scene_file;          // as the manifest names it
+    std::string scene_text;          // canonical
+    std::string scene_hash;          // of everything in the scene
+    std::string simulation_hash;     // of what decides the automaton's bits
     PipelineRange range;
-    bool render = true;           // pictures too; needs a Vulkan device
+    bool render = true;  // pictures too; needs a Vulkan device
     std::filesystem::path folder;
-    bool resume = false;          // go on from the folder's checkpoint
-    bool overwrite = false;       // start anew although the folder holds an interrupted run
+    bool resume = false;             // go on from the folder's checkpoint
+    bool overwrite = false;          // start anew although the folder holds an interrupted run
     double checkpoint_every_s = 60;  // wall time between checkpoints; 0 = after every piece of work
 };
 
@@ -72,19 +72,20 @@ struct RunFiles {
 
 struct RunReport {
     bool complete = false;
-    std::uint64_t first_step = 0;     // 0, or where it was resumed
-    std::uint64_t steps_taken = 0;    // by the automaton, those ahead of the results included
-    std::uint64_t steps_reported = 0; // rows in statistics.csv
-    int frames = 0;                   // in the folder
-    std::string state_hash;           // at the last reported step
+    std::uint64_t first_step = 0;      // 0, or where it was resumed
+    std::uint64_t steps_taken = 0;     // by the automaton, those ahead of the results included
+    std::uint64_t steps_reported = 0;  // rows in statistics.csv
+    int frames = 0;                    // in the folder
+    std::string state_hash;            // at the last reported step
     double wall_s = 0;
-    std::string device;               // that drew; empty without pictures
+    std::string device;  // that drew; empty without pictures
     std::vector<RunFiles> files;
 };
 
 // Runs, or goes on. Throws Error(usage) when the settings contradict each other or the folder's checkpoint,
-// Error(io) naming a file that could not be written or read, Error(gpu) before anything is simulated when pictures are wanted and
-// there is no device. After any exception the folder can be resumed from its last checkpoint.
+// Error(io) naming a file that could not be written or read, Error(gpu) before anything is simulated when
+// pictures are wanted and there is no device. After any exception the folder can be resumed from its last
+// checkpoint.
 RunReport run_scene(const RunSettings& settings, const RunObserver& observer);
 
 }  // namespace nephos

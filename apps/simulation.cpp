@@ -12,8 +12,9 @@ namespace nephos {
 void require_memory(std::size_t bytes, const std::string& what) {
     const AvailableMemory available = available_memory();
     if (bytes <= available.bytes) return;
-    throw Error(ErrorCode::usage, fmt::format("{} takes about {}, but {} ({}) are all there is", what, bytes_text(bytes),
-                                              bytes_text(available.bytes), available.limit));
+    throw Error(ErrorCode::usage,
+                fmt::format("{} takes about {}, but {} ({}) are all there is", what, bytes_text(bytes),
+                            bytes_text(available.bytes), available.limit));
 }
 
 std::optional<Lattice> initial_state(const Scene& scene, const std::string& from) {
@@ -24,8 +25,9 @@ std::optional<Lattice> initial_state(const Scene& scene, const std::string& from
 
 Automaton start_automaton(const Scene& scene, const std::string& scene_file, const std::string& from) {
     const Extent& extent = scene.automaton.extent;
-    require_memory(Automaton::memory_bytes(scene.automaton),
-                   fmt::format("{}: a lattice of {} x {} x {} cells", scene_file, extent.x, extent.y, extent.z));
+    require_memory(
+        Automaton::memory_bytes(scene.automaton),
+        fmt::format("{}: a lattice of {} x {} x {} cells", scene_file, extent.x, extent.y, extent.z));
     if (std::optional<Lattice> initial = initial_state(scene, from)) {
         return Automaton(scene.automaton, std::move(*initial));
     }

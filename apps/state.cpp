@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// nephos state: the automaton's bits after some steps, as a VDB file that can be looked at, changed and started from.
-
-#include <fmt/format.h>
+// nephos state: the automaton's bits after some steps, as a VDB file that can be looked at, changed and
+// started from.
 
 #include <memory>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.h"
@@ -60,9 +61,9 @@ int state(const StateArguments& a) {
         cloud_statistics(automaton.hum(), automaton.act(), automaton.cld(), scene.automaton.placement);
     Output output;
     if (a.work.json) {
-        const nlohmann::ordered_json json = {{"file", a.out},          {"steps", steps},
-                                             {"hash", metadata.state_hash}, {"hum", statistics.hum},
-                                             {"act", statistics.act},  {"cld", statistics.cld}};
+        const nlohmann::ordered_json json = {
+            {"file", a.out},         {"steps", steps},        {"hash", metadata.state_hash},
+            {"hum", statistics.hum}, {"act", statistics.act}, {"cld", statistics.cld}};
         output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     } else {
         output.line(fmt::format("{} {}", steps, metadata.state_hash));
@@ -73,23 +74,27 @@ int state(const StateArguments& a) {
 }  // namespace
 
 void add_state_command(CLI::App& app, Action& action) {
-    CLI::App* command = app.add_subcommand("state", "Write the automaton's bits after some steps as a VDB file");
+    CLI::App* command =
+        app.add_subcommand("state", "Write the automaton's bits after some steps as a VDB file");
     const auto a = std::make_shared<StateArguments>();
     add_scene_arguments(*command, a->scene);
     command->add_option("-o,--out", a->out, "VDB file to write: the bool grids hum, act and cld")
         ->required()
         ->type_name("FILE.vdb");
-    add_value(*command, "-n,--steps", "N", "Steps to take (default: the scene's)", [a](const std::string& text) {
-        a->steps = parse_unsigned(text, 0, kMaxSteps);
-    });
-    command->add_option("--from", a->from, "VDB file with such grids to start from, instead of the scene's start")
+    add_value(*command, "-n,--steps", "N", "Steps to take (default: the scene's)",
+              [a](const std::string& text) { a->steps = parse_unsigned(text, 0, kMaxSteps); });
+    command
+        ->add_option("--from", a->from,
+                     "VDB file with such grids to start from, instead of the scene's start")
         ->type_name("FILE.vdb");
     add_threads(*command, a->work);
     add_json(*command, a->work);
     add_quiet(*command, a->work);
     command->footer(
-        "Prints `step hash` of the state that was written. Steps count from the start that was given, and so do wind\n"
-        "and randomness: a run that is to go on exactly where it stopped is what `nephos run --resume` is for.\n"
+        "Prints `step hash` of the state that was written. Steps count from the start that was given, and so "
+        "do wind\n"
+        "and randomness: a run that is to go on exactly where it stopped is what `nephos run --resume` is "
+        "for.\n"
         "\n"
         "Examples:\n"
         "  nephos state scenes/cumulus.toml --steps 100 --out state.vdb\n"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/statistics_file.h"
 
-#include <fmt/format.h>
-
 #include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+
+#include <fmt/format.h>
 
 #include "automaton/error.h"
 
@@ -19,8 +19,9 @@ std::string field(double value) { return std::isnan(value) ? std::string() : fmt
 
 std::string statistics_row(const StepResult& result) {
     const CloudStatistics& s = result.statistics;
-    return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", result.step, field(result.time_s), s.hum, s.act, s.cld,
-                       field(s.cover), field(s.base_m), field(s.top_m), field(s.mean_density), result.hash.hex());
+    return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", result.step, field(result.time_s), s.hum, s.act,
+                       s.cld, field(s.cover), field(s.base_m), field(s.top_m), field(s.mean_density),
+                       result.hash.hex());
 }
 
 std::string read_statistics(const std::filesystem::path& path, std::uint64_t steps) {
@@ -37,8 +38,8 @@ std::string read_statistics(const std::filesystem::path& path, std::uint64_t ste
     }
     if (!good) {
         throw Error(ErrorCode::io,
-                    fmt::format("{}: does not hold the steps 0 to {} that the checkpoint goes on from", path.string(),
-                                steps == 0 ? 0 : steps - 1));
+                    fmt::format("{}: does not hold the steps 0 to {} that the checkpoint goes on from",
+                                path.string(), steps == 0 ? 0 : steps - 1));
     }
     return text;
 }

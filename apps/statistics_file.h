@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// statistics.csv: one row a step, in the order of steps, without gaps. Numbers are written so that they read back
-// exactly; a field without a value (base and top of no cloud) is empty.
+// statistics.csv: one row a step, in the order of steps, without gaps. Numbers are written so that they read
+// back exactly; a field without a value (base and top of no cloud) is empty.
 
 #include <cstdint>
 #include <filesystem>

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/terminal.h"
 
-#include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include "automaton/error.h"
 
@@ -34,7 +34,8 @@ bool unicode_locale() {
         const char* value = std::getenv(name);
         if (value == nullptr || *value == '\0') continue;
         const std::string_view text(value);
-        return text.find("UTF-8") != text.npos || text.find("utf8") != text.npos || text.find("UTF8") != text.npos;
+        return text.find("UTF-8") != text.npos || text.find("utf8") != text.npos ||
+               text.find("UTF8") != text.npos;
     }
     return false;
 }
@@ -75,13 +76,26 @@ std::string styled(std::string_view text, Style style, bool colours) {
     if (!colours || style == Style::plain) return std::string(text);
     const char* code = "";
     switch (style) {
-        case Style::plain: break;
-        case Style::bold: code = "1"; break;
-        case Style::dim: code = "2"; break;
-        case Style::red: code = "1;31"; break;
-        case Style::yellow: code = "1;33"; break;
-        case Style::green: code = "32"; break;
-        case Style::cyan: code = "36"; break;
+        case Style::plain:
+            break;
+        case Style::bold:
+            code = "1";
+            break;
+        case Style::dim:
+            code = "2";
+            break;
+        case Style::red:
+            code = "1;31";
+            break;
+        case Style::yellow:
+            code = "1;33";
+            break;
+        case Style::green:
+            code = "32";
+            break;
+        case Style::cyan:
+            code = "36";
+            break;
     }
     return fmt::format("\033[{}m{}\033[0m", code, text);
 }
@@ -117,7 +131,8 @@ std::string human_duration(double seconds) {
     if (!(seconds < 3.2e7)) return "> 1 year";
     const auto whole = std::uint64_t(std::llround(std::max(0.0, seconds)));
     const std::uint64_t hours = whole / 3600, minutes = whole / 60 % 60, rest = whole % 60;
-    return hours > 0 ? fmt::format("{}:{:02}:{:02}", hours, minutes, rest) : fmt::format("{}:{:02}", minutes, rest);
+    return hours > 0 ? fmt::format("{}:{:02}:{:02}", hours, minutes, rest)
+                     : fmt::format("{}:{:02}", minutes, rest);
 }
 
 std::string human_count(std::uint64_t count) {
@@ -149,7 +164,8 @@ void ProgressBar::update(std::uint64_t done, std::string_view detail) {
     const double elapsed_s = std::chrono::duration<double>(now - begin_).count();
     // One column stays free: some terminals wrap when the last one is written.
     const int width = terminal_width(stderr, 80) - 1;
-    print_message(fmt::format("\r{}\033[K", text(unit_, start_, done, total_, elapsed_s, detail, width, unicode_)));
+    print_message(
+        fmt::format("\r{}\033[K", text(unit_, start_, done, total_, elapsed_s, detail, width, unicode_)));
 }
 
 void ProgressBar::clear() {
@@ -158,14 +174,16 @@ void ProgressBar::clear() {
     drawn_ = false;
 }
 
-std::string ProgressBar::text(std::string_view unit, std::uint64_t start, std::uint64_t done, std::uint64_t total,
-                              double elapsed_s, std::string_view detail, int width, bool unicode) {
+std::string ProgressBar::text(std::string_view unit, std::uint64_t start, std::uint64_t done,
+                              std::uint64_t total, double elapsed_s, std::string_view detail, int width,
+                              bool unicode) {
     const double fraction = total == 0 ? 1.0 : std::min(1.0, double(done) / double(total));
     std::string left = fmt::format("{} {}/{}", unit, human_count(done), human_count(total));
     std::string right = fmt::format("{:3.0f}%", std::floor(100 * fraction));
     if (done > start && elapsed_s > 0) {
         const double rate = double(done - start) / elapsed_s;
-        right += rate >= 1 ? fmt::format("  {:.1f} {}s/s", rate, unit) : fmt::format("  {:.1f} s/{}", 1 / rate, unit);
+        right += rate >= 1 ? fmt::format("  {:.1f} {}s/s", rate, unit)
+                           : fmt::format("  {:.1f} s/{}", 1 / rate, unit);
         if (done < total) right += fmt::format("  {} left", human_duration(double(total - done) / rate));
     }
     if (!detail.empty()) right += fmt::format("  {}", detail);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the command says: results on standard output, messages and the progress bar on standard error. Colours and
-// the bar appear only on a terminal; colours not when NO_COLOR is set or TERM is "dumb" (no-color.org).
+// What the command says: results on standard output, messages and the progress bar on standard error. Colours
+// and the bar appear only on a terminal; colours not when NO_COLOR is set or TERM is "dumb" (no-color.org).
 
 #include <chrono>
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace nephos {
 
-// Thrown by Output when the reader of standard output has gone (`nephos hash ... | head`): nothing more to say to
-// anyone, and no failure.
+// Thrown by Output when the reader of standard output has gone (`nephos hash ... | head`): nothing more to
+// say to anyone, and no failure.
 struct OutputClosed {};
 
 // Standard output, checked: a full disk or a closed pipe is not silent.
@@ -34,7 +34,8 @@ bool colours_on(std::FILE* stream);
 enum class Style { plain, bold, dim, red, yellow, green, cyan };
 std::string styled(std::string_view text, Style style, bool colours);
 
-// Messages on standard error, one line each or more: "error: ...", "warning: ...", "note: ..."; the label in colour.
+// Messages on standard error, one line each or more: "error: ...", "warning: ...", "note: ..."; the label in
+// colour.
 void print_error(std::string_view message);
 void print_warning(std::string_view message);
 void print_note(std::string_view message);
@@ -56,7 +57,8 @@ std::string human_count(std::uint64_t count);
 // Draws nothing unless standard error is a terminal. Not thread-safe.
 class ProgressBar {
   public:
-    // `unit` in the singular ("step"). `enabled` = false draws nothing in any case. The rate counts from `start`.
+    // `unit` in the singular ("step"). `enabled` = false draws nothing in any case. The rate counts from
+    // `start`.
     ProgressBar(std::string unit, std::uint64_t start, std::uint64_t total, bool enabled);
     ~ProgressBar();  // clears the line
     ProgressBar(const ProgressBar&) = delete;
@@ -68,8 +70,9 @@ class ProgressBar {
     void clear();
 
     // The line as it would be drawn, without colours, at most `width` columns.
-    static std::string text(std::string_view unit, std::uint64_t start, std::uint64_t done, std::uint64_t total,
-                            double elapsed_s, std::string_view detail, int width, bool unicode);
+    static std::string text(std::string_view unit, std::uint64_t start, std::uint64_t done,
+                            std::uint64_t total, double elapsed_s, std::string_view detail, int width,
+                            bool unicode);
 
   private:
     using Clock = std::chrono::steady_clock;

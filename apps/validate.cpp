@@ -2,9 +2,9 @@
 
 // nephos validate: every problem of a scene in one pass; or the scene with all its defaults spelled out.
 
-#include <fmt/format.h>
-
 #include <memory>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.h"
@@ -28,8 +28,9 @@ struct ValidateArguments {
 };
 
 Json problem_json(const Problem& problem) {
-    Json json = {{"file", problem.where.file}, {"line", problem.where.line},   {"column", problem.where.column},
-                 {"message", problem.message}, {"expected", problem.expected}, {"source_line", problem.source_line}};
+    Json json = {{"file", problem.where.file},     {"line", problem.where.line},
+                 {"column", problem.where.column}, {"message", problem.message},
+                 {"expected", problem.expected},   {"source_line", problem.source_line}};
     return json;
 }
 
@@ -47,9 +48,10 @@ Json scene_json(const std::string& file, const Scene& scene) {
 
 std::string summary(const std::string& file, const Scene& scene) {
     const Extent& cells = scene.automaton.extent;
-    return fmt::format("{}: valid: {} x {} x {} cells, {} steps, {} frames, up to {} of memory, scene hash {}", file,
-                       cells.x, cells.y, cells.z, scene.steps, frame_count(scene),
-                       human_bytes(memory_estimate_bytes(scene)), scene_hash(scene));
+    return fmt::format(
+        "{}: valid: {} x {} x {} cells, {} steps, {} frames, up to {} of memory, scene hash {}", file,
+        cells.x, cells.y, cells.z, scene.steps, frame_count(scene), human_bytes(memory_estimate_bytes(scene)),
+        scene_hash(scene));
 }
 
 int validate(const ValidateArguments& a) {

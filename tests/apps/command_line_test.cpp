@@ -2,10 +2,10 @@
 
 // The parts of the command that need no process of their own: values, progress, framing, completion.
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <numbers>
+
+#include <gtest/gtest.h>
 
 #include "apps/arguments.h"
 #include "apps/commands.h"
@@ -26,7 +26,8 @@ TEST(Values, NumbersAreReadWholeAndInRange) {
     for (const char* bad : {"", "11", "5x", " 5", "0x5", "5.0", "nan", "99999999999999999999"}) {
         EXPECT_THROW(parse_integer(bad, -10, 10), Error) << bad;
     }
-    for (const char* bad : {"", "nan", "inf", "1e999", "2", "1,5", "one"}) EXPECT_THROW(parse_real(bad, 0, 1), Error) << bad;
+    for (const char* bad : {"", "nan", "inf", "1e999", "2", "1,5", "one"})
+        EXPECT_THROW(parse_real(bad, 0, 1), Error) << bad;
     EXPECT_THROW(parse_unsigned("-1", 0, ~0ull), Error);
 }
 
@@ -43,7 +44,8 @@ TEST(Values, FramesSizesAndPoints) {
         EXPECT_THROW(parse_size(bad), Error) << bad;
     }
     EXPECT_EQ(parse_point("1,-2,3.5", -10, 10), (Vec3{1, -2, 3.5}));
-    for (const char* bad : {"", "1,2", "1,2,3,4", "1,2,x", "1,2,11"}) EXPECT_THROW(parse_point(bad, -10, 10), Error) << bad;
+    for (const char* bad : {"", "1,2", "1,2,3,4", "1,2,x", "1,2,11"})
+        EXPECT_THROW(parse_point(bad, -10, 10), Error) << bad;
 }
 
 TEST(Text, NumbersForPeople) {
@@ -59,11 +61,14 @@ TEST(Text, NumbersForPeople) {
 
 TEST(Progress, ShowsRateAndTimeLeft) {
     const std::string text = ProgressBar::text("step", 0, 50, 200, 10.0, "frame 2/8", 120, false);
-    EXPECT_EQ(text, "step 50/200  ##########------------------------------   25%  5.0 steps/s  0:30 left  frame 2/8");
+    EXPECT_EQ(
+        text,
+        "step 50/200  ##########------------------------------   25%  5.0 steps/s  0:30 left  frame 2/8");
     // After a restart at step 100 the rate counts what this process did.
     EXPECT_NE(ProgressBar::text("step", 100, 150, 200, 10.0, "", 120, false).find("5.0 steps/s  0:10 left"),
               std::string::npos);
-    EXPECT_NE(ProgressBar::text("step", 0, 2, 200, 10.0, "", 120, false).find("5.0 s/step"), std::string::npos);
+    EXPECT_NE(ProgressBar::text("step", 0, 2, 200, 10.0, "", 120, false).find("5.0 s/step"),
+              std::string::npos);
     for (int width = 0; width < 120; ++width) {
         EXPECT_LE(int(ProgressBar::text("step", 0, 50, 200, 10.0, "frame 2/8", width, false).size()), width);
     }
@@ -92,7 +97,8 @@ std::pair<double, double> projected(const Camera& camera, const Vec3& p) {
 }
 
 TEST(Framing, TheWholeBoxIsInThePicture) {
-    const WorldBox boxes[] = {{{-5000, 0, 1000}, {5000, 5000, 1800}}, {{0, 0, 0}, {1, 1, 1}}, {{-3, 10, 5}, {3, 12, 500}}};
+    const WorldBox boxes[] = {
+        {{-5000, 0, 1000}, {5000, 5000, 1800}}, {{0, 0, 0}, {1, 1, 1}}, {{-3, 10, 5}, {3, 12, 500}}};
     for (const WorldBox& box : boxes) {
         for (const View view : {View::side, View::above}) {
             for (const auto& [width, height] : {std::pair(1280, 720), std::pair(300, 900)}) {
@@ -102,7 +108,8 @@ TEST(Framing, TheWholeBoxIsInThePicture) {
                 frame(camera, box, view, ground_below(box) - 10);
                 double widest = 0;
                 for (int corner = 0; corner < 8; ++corner) {
-                    const Vec3 p{corner & 1 ? box.max_m.x : box.min_m.x, corner & 2 ? box.max_m.y : box.min_m.y,
+                    const Vec3 p{corner & 1 ? box.max_m.x : box.min_m.x,
+                                 corner & 2 ? box.max_m.y : box.min_m.y,
                                  corner & 4 ? box.max_m.z : box.min_m.z};
                     const auto [x, y] = projected(camera, p);
                     EXPECT_LE(std::abs(x), 1);
@@ -124,7 +131,8 @@ TEST(Framing, ExtinctionMakesAnyUnitVisible) {
         Placement placement;
         placement.cell_size_m = edge_m;
         const Extent extent{16, 16, 16};
-        const DensityGrid grid = DensityGrid::from_dense(std::vector<float>(extent.cells(), 0.5f), extent, placement);
+        const DensityGrid grid =
+            DensityGrid::from_dense(std::vector<float>(extent.cells(), 0.5f), extent, placement);
         // A way through: 16 voxels at density 0.5.
         EXPECT_NEAR(visible_extinction_per_m(grid) * 0.5 * 16 * edge_m, 12, 1e-3);
     }
@@ -163,7 +171,8 @@ TEST(Help, EveryPageIsCompleteAndFits) {
         EXPECT_FALSE(command->get_description().empty());
         EXPECT_NE(command->get_footer().find("Example"), std::string::npos) << command->get_name();
         for (const CLI::Option* option : command->get_options()) {
-            EXPECT_FALSE(option->get_description().empty()) << command->get_name() << " " << option->get_name();
+            EXPECT_FALSE(option->get_description().empty())
+                << command->get_name() << " " << option->get_name();
         }
         const std::string page = HelpPage().make_help(command, "", CLI::AppFormatMode::Normal);
         for (std::size_t begin = 0; begin < page.size();) {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The pipeline against a plain second way to the same frames, and a pipeline that was saved at every possible moment
-// against one that was not.
+// The pipeline against a plain second way to the same frames, and a pipeline that was saved at every possible
+// moment against one that was not.
 
 #include "apps/pipeline.h"
-
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <bit>
 #include <functional>
+
+#include <gtest/gtest.h>
 
 #include "automaton/error.h"
 #include "density/smoothing.h"
@@ -29,7 +29,8 @@ Scene small_scene() {
     scene.steps = 12;
     scene.density.smoothing = {SmoothingKernel::tent, 2, 1, 1, 1};
     scene.frames.per_second = 1;
-    scene.frames.time_scale = 7;  // a frame every 7 s: never the time step's 10 s, but every tenth frame on a step
+    scene.frames.time_scale =
+        7;  // a frame every 7 s: never the time step's 10 s, but every tenth frame on a step
     scene.frames.start_s = 0;
     return scene;
 }
@@ -39,9 +40,10 @@ class Listing : public PipelineSink {
   public:
     void step(const StepResult& r) override {
         const CloudStatistics& s = r.statistics;
-        events.push_back("step " + std::to_string(r.step) + " " + std::to_string(r.time_s) + " " + r.hash.hex() + " " +
-                         std::to_string(s.hum) + " " + std::to_string(s.act) + " " + std::to_string(s.cld) + " " +
-                         std::to_string(s.cover) + " " + std::to_string(s.base_m) + " " + std::to_string(s.top_m) + " " +
+        events.push_back("step " + std::to_string(r.step) + " " + std::to_string(r.time_s) + " " +
+                         r.hash.hex() + " " + std::to_string(s.hum) + " " + std::to_string(s.act) + " " +
+                         std::to_string(s.cld) + " " + std::to_string(s.cover) + " " +
+                         std::to_string(s.base_m) + " " + std::to_string(s.top_m) + " " +
                          std::to_string(std::bit_cast<std::uint64_t>(s.mean_density)));
         steps.push_back(r);
     }
@@ -58,7 +60,8 @@ class Listing : public PipelineSink {
             state = std::to_string(bits);
         }
         events.push_back("frame " + std::to_string(r.number) + " " + std::to_string(r.time_s) + " " +
-                         std::to_string(r.step) + " " + r.hash.hex() + " " + std::to_string(sum) + " " + state);
+                         std::to_string(r.step) + " " + r.hash.hex() + " " + std::to_string(sum) + " " +
+                         state);
         frames.push_back(dense);
         numbers.push_back(r.number);
     }
@@ -108,8 +111,10 @@ TEST(Pipeline, FramesAreTheSmoothedAndMixedStates) {
         }
         const auto q = [&](int step) {
             std::vector<TimedPlane> planes;
-            for (int t = std::max(-t0, -step); t <= t0; ++t) planes.push_back({clds[std::size_t(step + t)].view(), t});
-            return smooth(planes, scene.density.smoothing, scene.automaton.placement, scene.automaton.boundaries);
+            for (int t = std::max(-t0, -step); t <= t0; ++t)
+                planes.push_back({clds[std::size_t(step + t)].view(), t});
+            return smooth(planes, scene.density.smoothing, scene.automaton.placement,
+                          scene.automaton.boundaries);
         };
         ASSERT_EQ(int(got.frames.size()), frame_count(scene));
         ASSERT_EQ(got.frames.size(), 18u);  // 0, 7, ... 119 s of 120 s
@@ -120,7 +125,8 @@ TEST(Pipeline, FramesAreTheSmoothedAndMixedStates) {
             const DensityGrid expected = rest == 0 ? q(step) : mix(q(step), q(step + 1), rest / 10.0);
             const std::vector<float> want = expected.to_dense();
             for (std::size_t c = 0; c < want.size(); ++c) {
-                ASSERT_NEAR(got.frames[std::size_t(n)][c], want[c], 1e-6) << "t0 " << t0 << " frame " << n + 1;
+                ASSERT_NEAR(got.frames[std::size_t(n)][c], want[c], 1e-6)
+                    << "t0 " << t0 << " frame " << n + 1;
                 any = any || want[c] > 0;
             }
         }
@@ -219,9 +225,8 @@ TEST(Pipeline, RefusesForeignAndDamagedCheckpoints) {
     Listing dummy;
     for (int n = 0; n < 9; ++n) pipeline.advance(dummy);
     const Checkpoint good = pipeline.save();
-    const auto restart = [&](const Scene& s, const PipelineRange& r, const std::string& hash, const Checkpoint& c) {
-        return code_of([&] { Pipeline(s, r, hash, c); });
-    };
+    const auto restart = [&](const Scene& s, const PipelineRange& r, const std::string& hash,
+                             const Checkpoint& c) { return code_of([&] { Pipeline(s, r, hash, c); }); };
     EXPECT_EQ(restart(scene, range, std::string(32, '1'), good), ErrorCode::usage);
     EXPECT_EQ(restart(scene, range_of_frames(scene, 1, 3), std::string(32, '0'), good), ErrorCode::usage);
     Scene wider = scene;

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A run on disk without pictures: what is written, and that a run which was stopped anywhere and resumed leaves the
-// same folder as one that was not.
+// A run on disk without pictures: what is written, and that a run which was stopped anywhere and resumed
+// leaves the same folder as one that was not.
 
 #include "apps/run_folder.h"
 
-#include <gtest/gtest.h>
-#include <unistd.h>
-
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <sstream>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
 
 #include "apps/statistics_file.h"
 #include "automaton/error.h"
@@ -109,9 +109,11 @@ TEST_F(RunFolderTest, WritesEveryFileAndNamesItInTheManifest) {
 
     // The bounds and the state's hash are in each file.
     for (int frame = 1; frame <= 5; ++frame) {
-        const LoadedDensity loaded = load_density(s.folder / manifest["frames"][frame - 1]["density"].get<std::string>());
+        const LoadedDensity loaded =
+            load_density(s.folder / manifest["frames"][frame - 1]["density"].get<std::string>());
         EXPECT_EQ(loaded.density.extent(), s.scene.automaton.extent);
-        EXPECT_EQ(loaded.metadata->state_hash, manifest["frames"][frame - 1]["state_hash"].get<std::string>());
+        EXPECT_EQ(loaded.metadata->state_hash,
+                  manifest["frames"][frame - 1]["state_hash"].get<std::string>());
         EXPECT_EQ(loaded.metadata->time_s, 15.0 * (frame - 1));
     }
     // The last row: step 6 with the hash that the report names.
@@ -159,7 +161,8 @@ TEST_F(RunFolderTest, ResultsThatAreNewerThanTheCheckpointAreReplaced) {
     ASSERT_TRUE(run_scene(whole, {}).complete);
     RunSettings s = settings("cut");
     ASSERT_FALSE(run_scene(s, stop_after(8)).complete);
-    fs::copy_file(whole.folder / "statistics.csv", s.folder / "statistics.csv", fs::copy_options::overwrite_existing);
+    fs::copy_file(whole.folder / "statistics.csv", s.folder / "statistics.csv",
+                  fs::copy_options::overwrite_existing);
     fs::copy_file(whole.folder / "density/small_0005.vdb", s.folder / "density/small_0005.vdb");
     s.resume = true;
     ASSERT_TRUE(run_scene(s, {}).complete);
@@ -183,7 +186,8 @@ TEST_F(RunFolderTest, RefusesToResumeWhatDoesNotFit) {
     EXPECT_NE(error_of(s, ErrorCode::io).find("checkpoint.nephos"), std::string::npos);
     s.resume = false;
     ASSERT_FALSE(run_scene(s, stop_after(9)).complete);
-    EXPECT_NE(error_of(s, ErrorCode::usage).find("--resume"), std::string::npos) << "it would throw work away";
+    EXPECT_NE(error_of(s, ErrorCode::usage).find("--resume"), std::string::npos)
+        << "it would throw work away";
 
     s.resume = true;
     RunSettings other = s;

@@ -25,7 +25,8 @@ int main(int argc, char** argv) try {
     nephos::VdbContent content;
     content.density = &density;
     content.cells = options.placement;
-    nephos::write_vdb(argv[1], content, nephos::VdbMetadata{.time_s = automaton.time_s(), .seed = options.seed});
+    nephos::write_vdb(argv[1], content,
+                      nephos::VdbMetadata{.time_s = automaton.time_s(), .seed = options.seed});
     std::printf("%s %llu\n", automaton.hash().hex().c_str(),
                 static_cast<unsigned long long>(density.active_voxels()));
     return density.active_voxels() > 0 ? 0 : 1;
