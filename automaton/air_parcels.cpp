@@ -14,19 +14,22 @@ enum ParcelDraw : std::uint32_t { kX, kY, kZ, kAxisX, kAxisY, kAxisZ, kYaw, kBir
 
 double draw(const AutomatonOptions& options, const AirParcel& parcel, ParcelDraw what, Range range) {
     if (range.min == range.max) return range.min;  // also for infinite ones
-    const auto words = philox(options.seed, item_counter(Domain::field, std::uint32_t(parcel.scatter), parcel.index,
-                                                         parcel.generation, what / 4u));
+    const auto words = philox(options.seed, item_counter(Domain::field, std::uint32_t(parcel.scatter),
+                                                         parcel.index, parcel.generation, what / 4u));
     return range.min + (range.max - range.min) * unit_interval(words[what % 4u]);
 }
 
 // The parcel of a scatter, at the place and time that its ranges say.
-AirParcel draw_parcel(const AutomatonOptions& options, int scatter, std::uint32_t index, std::uint32_t generation) {
+AirParcel draw_parcel(const AutomatonOptions& options, int scatter, std::uint32_t index,
+                      std::uint32_t generation) {
     const EllipsoidScatter& s = options.field.scatters[std::size_t(scatter)];
-    AirParcel parcel{.ellipsoid = {}, .scatter = scatter, .index = index, .generation = generation, .carried = {}};
+    AirParcel parcel{
+        .ellipsoid = {}, .scatter = scatter, .index = index, .generation = generation, .carried = {}};
     Ellipsoid& e = parcel.ellipsoid;
     e.centre_m = {draw(options, parcel, kX, s.x_m), draw(options, parcel, kY, s.y_m),
                   draw(options, parcel, kZ, s.z_m)};
-    e.semi_axes_m = {draw(options, parcel, kAxisX, s.semi_axis_x_m), draw(options, parcel, kAxisY, s.semi_axis_y_m),
+    e.semi_axes_m = {draw(options, parcel, kAxisX, s.semi_axis_x_m),
+                     draw(options, parcel, kAxisY, s.semi_axis_y_m),
                      draw(options, parcel, kAxisZ, s.semi_axis_z_m)};
     e.yaw_deg = draw(options, parcel, kYaw, s.yaw_deg);
     e.centre = s.centre;
@@ -50,12 +53,13 @@ HalfSize half_size(const Ellipsoid& e) {
             std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos)};
 }
 
-// Sum of displacements along one axis. It never overflows: a periodic box repeats, and beyond an open one lies
-// nothing, so that there the sum may stop at 2^29 cells.
+// Sum of displacements along one axis. It never overflows: a periodic box repeats, and beyond an open one
+// lies nothing, so that there the sum may stop at 2^29 cells.
 std::int64_t carry(std::int64_t sum, std::int64_t step, Boundary boundary, int extent) {
     constexpr std::int64_t kFarAway = std::int64_t{1} << 61;
     sum += step;
-    return boundary == Boundary::periodic ? sum % (std::int64_t{extent} << 32) : std::clamp(sum, -kFarAway, kFarAway);
+    return boundary == Boundary::periodic ? sum % (std::int64_t{extent} << 32)
+                                          : std::clamp(sum, -kFarAway, kFarAway);
 }
 
 Vec3 present_centre(const AirParcel& parcel, double cell_size_m) {
@@ -78,17 +82,17 @@ bool has_left(const AutomatonOptions& options, const AirParcel& parcel, const Ve
     const Box box = box_of(options);
     const HalfSize half = half_size(parcel.ellipsoid);
     const Vec3 centre = present_centre(parcel, options.placement.cell_size_m);
-    const bool left_x = options.boundaries.x == Boundary::open &&
-                        ((wind.east_m_per_s > 0 && centre.x - half.x >= box.x1) ||
-                         (wind.east_m_per_s < 0 && centre.x + half.x <= box.x0));
-    const bool left_y = options.boundaries.y == Boundary::open &&
-                        ((wind.north_m_per_s > 0 && centre.y - half.y >= box.y1) ||
-                         (wind.north_m_per_s < 0 && centre.y + half.y <= box.y0));
+    const bool left_x =
+        options.boundaries.x == Boundary::open && ((wind.east_m_per_s > 0 && centre.x - half.x >= box.x1) ||
+                                                   (wind.east_m_per_s < 0 && centre.x + half.x <= box.x0));
+    const bool left_y =
+        options.boundaries.y == Boundary::open && ((wind.north_m_per_s > 0 && centre.y - half.y >= box.y1) ||
+                                                   (wind.north_m_per_s < 0 && centre.y + half.y <= box.y0));
     return left_x || left_y;
 }
 
-// Puts a parcel outside the upwind sides so that it just touches the box. Air enters a side in proportion to the
-// wind across it and to its length; that decides which of two upwind sides it is.
+// Puts a parcel outside the upwind sides so that it just touches the box. Air enters a side in proportion to
+// the wind across it and to its length; that decides which of two upwind sides it is.
 void place_upwind(const AutomatonOptions& options, AirParcel& parcel, const Velocity& wind) {
     const Box box = box_of(options);
     const double inflow_x =
@@ -117,10 +121,14 @@ SinCos sin_cos_deg(double degrees) {
     for (int n = 16; n >= 0; n -= 2) c = 1 - c * r2 / ((n + 1.0) * (n + 2.0));
     s *= r;
     switch (int(std::fmod(turns, 4) + 4) % 4) {
-        case 0: return {s, c};
-        case 1: return {c, -s};
-        case 2: return {-s, -c};
-        default: return {-c, s};
+        case 0:
+            return {s, c};
+        case 1:
+            return {c, -s};
+        case 2:
+            return {-s, -c};
+        default:
+            return {-c, s};
     }
 }
 
@@ -161,7 +169,8 @@ void AirParcels::advance(const AutomatonOptions& options, double time_s) {
         const Ellipsoid& e = parcel.ellipsoid;
         const Velocity wind = e.carried ? wind_at(options.wind, e.centre_m.z, time_s) : Velocity{};
         if (e.carried && time_s >= e.birth_s) {
-            const Displacement d = displacement_of_step(wind, options.time_step_s, options.placement.cell_size_m);
+            const Displacement d =
+                displacement_of_step(wind, options.time_step_s, options.placement.cell_size_m);
             parcel.carried.x = carry(parcel.carried.x, d.x, options.boundaries.x, options.extent.x);
             parcel.carried.y = carry(parcel.carried.y, d.y, options.boundaries.y, options.extent.y);
         }

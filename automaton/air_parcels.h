@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The ellipsoids of the probability field over time: those placed by hand and those drawn at random, carried by
-// the wind, fading in and out, and drawn anew when they left or died and the scene wants that.
+// The ellipsoids of the probability field over time: those placed by hand and those drawn at random, carried
+// by the wind, fading in and out, and drawn anew when they left or died and the scene wants that.
 
 #include <cstdint>
 #include <vector>
@@ -15,11 +15,11 @@ namespace nephos {
 
 // One ellipsoid and where it comes from.
 struct AirParcel {
-    Ellipsoid ellipsoid;             // as born
-    int scatter = -1;                // index in FieldOptions::scatters, -1 when placed by hand
-    std::uint32_t index = 0;         // number within the scatter
-    std::uint32_t generation = 0;    // how often it has been drawn anew
-    Displacement carried;            // by the wind since birth
+    Ellipsoid ellipsoid;           // as born
+    int scatter = -1;              // index in FieldOptions::scatters, -1 when placed by hand
+    std::uint32_t index = 0;       // number within the scatter
+    std::uint32_t generation = 0;  // how often it has been drawn anew
+    Displacement carried;          // by the wind since birth
     bool operator==(const AirParcel&) const = default;
 };
 
@@ -31,7 +31,8 @@ class AirParcels {
     // Those with weight > 0 at `time_s`, at their present centre, in the order of the options.
     std::vector<ActiveEllipsoid> active(const AutomatonOptions& options, double time_s) const;
 
-    // Carries every parcel over the step that starts at `time_s`, then replaces those that left or died by its end.
+    // Carries every parcel over the step that starts at `time_s`, then replaces those that left or died by
+    // its end.
     void advance(const AutomatonOptions& options, double time_s);
 
     void save(ByteWriter& out) const;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "automaton/atomic_file.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstring>
 #include <string>
 #include <system_error>
+
+#include <fcntl.h>
+#include <unistd.h>
 
 #include "automaton/error.h"
 
@@ -42,7 +42,8 @@ void flush_to_device(const std::filesystem::path& subject, const std::filesystem
     Descriptor descriptor(::open(subject.c_str(), flags | O_CLOEXEC));
     if (descriptor.get() < 0) fail(reported, "cannot open after writing", errno);
     // Some file systems cannot flush a folder and say EINVAL; there the rename itself is all there is.
-    if (::fsync(descriptor.get()) != 0 && errno != EINVAL) fail(reported, "cannot flush to the device", errno);
+    if (::fsync(descriptor.get()) != 0 && errno != EINVAL)
+        fail(reported, "cannot flush to the device", errno);
 }
 
 }  // namespace
@@ -56,7 +57,10 @@ void write_atomically(const std::filesystem::path& path,
 
     // Extension last, because some writers choose the format by it; the process number keeps two runs apart.
     std::string name = ".";
-    name.append(path.stem().string()).append(".part").append(std::to_string(::getpid())).append(path.extension());
+    name.append(path.stem().string())
+        .append(".part")
+        .append(std::to_string(::getpid()))
+        .append(path.extension());
     const std::filesystem::path temporary = folder / name;
     try {
         write(temporary);

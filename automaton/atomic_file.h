@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Files that are either complete or not there: written under a temporary name in the same folder, flushed to the
-// device, renamed, and the folder flushed. A full disk, a kill or a power cut leaves the old file or none.
+// Files that are either complete or not there: written under a temporary name in the same folder, flushed to
+// the device, renamed, and the folder flushed. A full disk, a kill or a power cut leaves the old file or
+// none.
 
 #include <filesystem>
 #include <functional>
@@ -12,8 +13,8 @@
 namespace nephos {
 
 // Calls `write` with the path of the temporary file, which `write` must create and close; then publishes it.
-// Missing parent folders are created. On any failure the temporary file is removed and Error(io) names `path` and
-// the reason; what `write` throws passes through.
+// Missing parent folders are created. On any failure the temporary file is removed and Error(io) names `path`
+// and the reason; what `write` throws passes through.
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write);
 

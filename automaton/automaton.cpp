@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "automaton/automaton.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <xxhash.h>
-
 #include <algorithm>
 #include <memory>
 #include <utility>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <xxhash.h>
 
 #include "automaton/advection.h"
 #include "automaton/air_parcels.h"
@@ -34,10 +34,10 @@ void check_extents(const AutomatonOptions& options, const Lattice& lattice) {
     for (const BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) {
         if (plane->extent() == options.extent) continue;
         const Extent& e = plane->extent();
-        throw Error(ErrorCode::usage, "the initial state has " + std::to_string(e.x) + " x " + std::to_string(e.y) +
-                                          " x " + std::to_string(e.z) + " cells, the scene " +
-                                          std::to_string(options.extent.x) + " x " + std::to_string(options.extent.y) +
-                                          " x " + std::to_string(options.extent.z));
+        throw Error(ErrorCode::usage,
+                    "the initial state has " + std::to_string(e.x) + " x " + std::to_string(e.y) + " x " +
+                        std::to_string(e.z) + " cells, the scene " + std::to_string(options.extent.x) +
+                        " x " + std::to_string(options.extent.y) + " x " + std::to_string(options.extent.z));
     }
 }
 
@@ -54,8 +54,7 @@ std::string StateHash::hex() const {
 }
 
 struct Automaton::Impl {
-    Impl(const AutomatonOptions& o, Lattice initial)
-        : options(o), lattice(std::move(initial)), parcels(o) {
+    Impl(const AutomatonOptions& o, Lattice initial) : options(o), lattice(std::move(initial)), parcels(o) {
         check_extents(options, lattice);
         act_next = BitPlane(options.extent);
         zero_row.assign(lattice.hum.words_per_row() + 16, 0);
@@ -84,8 +83,8 @@ struct Automaton::Impl {
     std::uint64_t steps = 0;
 };
 
-// One step of births on the empty lattice, from its own domain of randomness: a cell at a time, since it happens
-// once and each cell has its own counter.
+// One step of births on the empty lattice, from its own domain of randomness: a cell at a time, since it
+// happens once and each cell has its own counter.
 void Automaton::Impl::draw_initial_state() {
     const BlockField field = field_now();
     const Extent& extent = options.extent;
@@ -96,15 +95,17 @@ void Automaton::Impl::draw_initial_state() {
             field.collect(by, bz, row);
             for (int bx = 0; bx < blocks(extent.x); ++bx) {
                 field.plan_blocks(bx, by, bz, row, std::span(&plan, 1));
-                if (plan.draws[kHum].kind == DrawPlan::Kind::none && plan.draws[kAct].kind == DrawPlan::Kind::none) {
+                if (plan.draws[kHum].kind == DrawPlan::Kind::none &&
+                    plan.draws[kAct].kind == DrawPlan::Kind::none) {
                     continue;
                 }
                 for (int cell = 0; cell < kBlockCells; ++cell) {
                     const int dx = cell % 8, dy = cell / 8 % 8, dz = cell / 64;
                     const int i = bx * kBlockEdge + dx, j = by * kBlockEdge + dy, k = bz * kBlockEdge + dz;
                     if (i >= extent.x || j >= extent.y || k >= extent.z) continue;
-                    const auto words = philox(options.seed, block_counter(Domain::initial_state, Draw::counts, 0, bx,
-                                                                          by, bz, std::uint32_t(cell)));
+                    const auto words =
+                        philox(options.seed, block_counter(Domain::initial_state, Draw::counts, 0, bx, by, bz,
+                                                           std::uint32_t(cell)));
                     const auto happens = [&](int draw) {
                         const auto t = probability_threshold(probability_at(field, plan, draw, dx, dy, dz));
                         return t == kCertain || words[std::size_t(draw)] < t;
@@ -139,22 +140,24 @@ void Automaton::Impl::grow_and_draw() {
 
 void Automaton::Impl::advect() {
     if (options.wind.keyframes.empty()) return;
-    tbb::parallel_for(tbb::blocked_range<int>(0, options.extent.z), [&](const tbb::blocked_range<int>& layers) {
-        std::vector<std::uint64_t> scratch;
-        for (int k = layers.begin(); k != layers.end(); ++k) {
-            const double height = options.placement.origin_m.z + (k + 0.5) * options.placement.cell_size_m;
-            Displacement moved = displacement_of_step(wind_at(options.wind, height, time_s()), options.time_step_s,
-                                                      options.placement.cell_size_m);
-            Displacement& rest = fraction[std::size_t(k)];
-            moved.x += rest.x;
-            moved.y += rest.y;
-            rest = {moved.x & kFractionMask, moved.y & kFractionMask};
-            if (moved.whole_x() == 0 && moved.whole_y() == 0) continue;
-            for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) {
-                shift_layer(*plane, k, moved.whole_x(), moved.whole_y(), options.boundaries, scratch);
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, options.extent.z), [&](const tbb::blocked_range<int>& layers) {
+            std::vector<std::uint64_t> scratch;
+            for (int k = layers.begin(); k != layers.end(); ++k) {
+                const double height =
+                    options.placement.origin_m.z + (k + 0.5) * options.placement.cell_size_m;
+                Displacement moved = displacement_of_step(wind_at(options.wind, height, time_s()),
+                                                          options.time_step_s, options.placement.cell_size_m);
+                Displacement& rest = fraction[std::size_t(k)];
+                moved.x += rest.x;
+                moved.y += rest.y;
+                rest = {moved.x & kFractionMask, moved.y & kFractionMask};
+                if (moved.whole_x() == 0 && moved.whole_y() == 0) continue;
+                for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) {
+                    shift_layer(*plane, k, moved.whole_x(), moved.whole_y(), options.boundaries, scratch);
+                }
             }
-        }
-    });
+        });
 }
 
 Automaton::Automaton(const AutomatonOptions& options) {

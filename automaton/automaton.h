@@ -8,8 +8,8 @@
 //     automaton.step();
 //     automaton.cld().get(i, j, k);
 //
-// One object is one simulation; different objects may run in different threads. A step uses the threads of the
-// oneTBB arena that it is called in (tbb::global_control or tbb::task_arena limit them).
+// One object is one simulation; different objects may run in different threads. A step uses the threads of
+// the oneTBB arena that it is called in (tbb::global_control or tbb::task_arena limit them).
 
 #include <array>
 #include <cstdint>
@@ -33,8 +33,8 @@ struct StateHash {
 
 // An ellipsoid of the field as it stands now: where, and how strong.
 struct ActiveEllipsoid {
-    Ellipsoid ellipsoid;   // centre_m is the present centre
-    double weight = 1.0;   // fade weight, 0..1
+    Ellipsoid ellipsoid;  // centre_m is the present centre
+    double weight = 1.0;  // fade weight, 0..1
 };
 
 class Automaton {
@@ -50,16 +50,17 @@ class Automaton {
     void step();
 
     const AutomatonOptions& options() const;
-    std::uint64_t steps() const;   // steps taken so far
-    double time_s() const;         // steps() * time_step_s
+    std::uint64_t steps() const;  // steps taken so far
+    double time_s() const;        // steps() * time_step_s
     BitPlaneView hum() const;
     BitPlaneView act() const;
     BitPlaneView cld() const;
     StateHash hash() const;
     std::vector<ActiveEllipsoid> ellipsoids() const;  // those alive now
 
-    // Replaces the ellipsoids that were set this way before; they act in the next step and until set again, in
-    // addition to those of options.field. For callers that steer the field themselves. Not part of a checkpoint.
+    // Replaces the ellipsoids that were set this way before; they act in the next step and until set again,
+    // in addition to those of options.field. For callers that steer the field themselves. Not part of a
+    // checkpoint.
     void set_external_ellipsoids(std::vector<ActiveEllipsoid> ellipsoids);
 
     // The complete state as bytes, for checkpoint.h; `restore` throws Error(io) on bytes it did not write.

@@ -50,13 +50,15 @@ BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEl
             for (int y = -ny; y <= ny; ++y) {
                 for (int z = -nz; z <= nz; ++z) {
                     add(options, e,
-                        {double(x) * options.extent.x, double(y) * options.extent.y, double(z) * options.extent.z});
+                        {double(x) * options.extent.x, double(y) * options.extent.y,
+                         double(z) * options.extent.z});
                 }
             }
         }
     }
     for (std::uint32_t i = 0; i < ellipsoids_.size(); ++i) {
-        for (int bz = ellipsoids_[i].bz0; bz < ellipsoids_[i].bz1; ++bz) by_slab_[std::size_t(bz)].push_back(i);
+        for (int bz = ellipsoids_[i].bz0; bz < ellipsoids_[i].bz1; ++bz)
+            by_slab_[std::size_t(bz)].push_back(i);
     }
 
     const auto can_be_born = [](const std::array<float, 3>& p) { return p[kHum] > 0 || p[kAct] > 0; };
@@ -75,7 +77,8 @@ void BlockField::add(const AutomatonOptions& options, const ActiveEllipsoid& act
     const Vec3& origin = options.placement.origin_m;
     const SinCos turn = sin_cos_deg(e.yaw_deg);
     FieldEllipsoid f{};
-    // On a periodic axis the centre is first brought into the box; the images then lie one box to either side.
+    // On a periodic axis the centre is first brought into the box; the images then lie one box to either
+    // side.
     const auto place = [](double cells, Boundary boundary, int extent) {
         return boundary == Boundary::periodic ? cells - std::floor(cells / extent) * extent : cells;
     };
@@ -101,9 +104,11 @@ void BlockField::add(const AutomatonOptions& options, const ActiveEllipsoid& act
     const double reach_a = kHalf * (std::abs(f.xx) + std::abs(f.xy));
     const double reach_b = kHalf * (std::abs(f.yx) + std::abs(f.yy));
     const double reach_c = kHalf * f.zz;
-    f.block_reach = float(std::sqrt(reach_a * reach_a + reach_b * reach_b + reach_c * reach_c) * (1 + 1e-5) + 1e-6);
+    f.block_reach =
+        float(std::sqrt(reach_a * reach_a + reach_b * reach_b + reach_c * reach_c) * (1 + 1e-5) + 1e-6);
 
-    const auto centre = as_array(e.centre), rim = as_array(e.rim), background = as_array(options.field.background);
+    const auto centre = as_array(e.centre), rim = as_array(e.rim),
+               background = as_array(options.field.background);
     for (std::size_t d = 0; d < 3; ++d) {
         f.rim[d] = float(background[d] + active.weight * (rim[d] - background[d]));
         f.span[d] = float(active.weight * (centre[d] - rim[d]));
@@ -134,8 +139,12 @@ void BlockField::plan_blocks(int bx0, int by, int bz, std::span<const FieldEllip
             add_to_plan({.base_a = float(e->xx * dx + e->xy * dy),
                          .base_b = float(e->yx * dx + e->yy * dy),
                          .base_c = float(e->zz * dz),
-                         .xx = float(e->xx), .xy = float(e->xy), .yx = float(e->yx), .yy = float(e->yy),
-                         .zz = float(e->zz), .source = e},
+                         .xx = float(e->xx),
+                         .xy = float(e->xy),
+                         .yx = float(e->yx),
+                         .yy = float(e->yy),
+                         .zz = float(e->zz),
+                         .source = e},
                         plans[std::size_t(bx - bx0)]);
         }
     }
@@ -161,7 +170,8 @@ void BlockField::add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const 
         const float highest = std::max(e.rim[d] + e.span[d] * inner, e.rim[d] + e.span[d] * outer) * 1.00001f;
         const float bound = std::clamp(highest, 0.0f, 1.0f);
         DrawPlan& draw = plan.draws[d];
-        if (d == kExt) {  // the smallest wins: from the background down, everywhere only if the block lies inside
+        if (d ==
+            kExt) {  // the smallest wins: from the background down, everywhere only if the block lies inside
             if (draw.kind == DrawPlan::Kind::none) continue;
             draw.kind = DrawPlan::Kind::varying;
             if (farthest < 1) draw.p_max = std::min(draw.p_max, bound);

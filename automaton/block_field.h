@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The probability field of one step in the form that the kernels read: ellipsoids as matrices in cells, listed by
-// slab of 8 layers, with bounds that tell which blocks of 8x8x8 cells they touch and how large p can become there.
+// The probability field of one step in the form that the kernels read: ellipsoids as matrices in cells,
+// listed by slab of 8 layers, with bounds that tell which blocks of 8x8x8 cells they touch and how large p
+// can become there.
 //
-// Values at a cell are float32, in this order of operations (IEEE, no FMA), for every kernel and for the naive twin:
+// Values at a cell are float32, in this order of operations (IEEE, no FMA), for every kernel and for the
+// naive twin:
 //
-//     dx, dy, dz  = cell - corner of its block (0..7)          base = M * (corner + 0.5 - centre), made in double
-//     a = base_a + (dx * xx + dy * xy)     b = base_b + (dx * yx + dy * yy)     c = base_c + dz * zz
+//     dx, dy, dz  = cell - corner of its block (0..7)          base = M * (corner + 0.5 - centre), made in
+//     double a = base_a + (dx * xx + dy * xy)     b = base_b + (dx * yx + dy * yy)     c = base_c + dz * zz
 //     u2 = (a*a + b*b) + c*c               s = max(0, 1 - u2)                    p = rim + span * (s*s)
 
 #include <array>
@@ -30,9 +32,9 @@ enum : int { kHum = 0, kAct = 1, kExt = 2 };
 struct FieldEllipsoid {
     double centre_x, centre_y, centre_z;
     double xx, xy, yx, yy, zz;
-    float block_reach;                     // length of M * (half diagonal of a block's cell centres), rounded up
-    std::array<float, 3> rim, span;        // p at the rim and centre minus rim, fade weight applied
-    int bx0, bx1, by0, by1, bz0, bz1;      // blocks that it can touch, half-open
+    float block_reach;                 // length of M * (half diagonal of a block's cell centres), rounded up
+    std::array<float, 3> rim, span;    // p at the rim and centre minus rim, fade weight applied
+    int bx0, bx1, by0, by1, bz0, bz1;  // blocks that it can touch, half-open
 };
 
 // One ellipsoid seen from one block: what remains to be evaluated per cell.

@@ -20,10 +20,8 @@ static_assert(std::endian::native == std::endian::little, "checkpoints and bit p
 class ByteWriter {
   public:
     template <class T>
-        requires std::is_trivially_copyable_v<T>
-    void put(const T& value) {
-        put_bytes(std::as_bytes(std::span(&value, 1)));
-    }
+    requires std::is_trivially_copyable_v<T>
+    void put(const T& value) { put_bytes(std::as_bytes(std::span(&value, 1))); }
     void put_bytes(std::span<const std::byte> content) {
         if (content.empty()) return;
         const std::size_t at = bytes_.size();
@@ -43,8 +41,7 @@ class ByteReader {
     explicit ByteReader(std::span<const std::byte> bytes) : left_(bytes) {}
 
     template <class T>
-        requires std::is_trivially_copyable_v<T>
-    T get() {
+    requires std::is_trivially_copyable_v<T> T get() {
         T value;
         get_bytes(std::as_writable_bytes(std::span(&value, 1)));
         return value;

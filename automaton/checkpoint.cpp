@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "automaton/checkpoint.h"
 
-#include <xxhash.h>
-
 #include <array>
 #include <fstream>
+
+#include <xxhash.h>
 
 #include "automaton/atomic_file.h"
 #include "automaton/bytes.h"
@@ -23,8 +23,9 @@ XXH128_hash_t hash_of(std::span<const std::byte> bytes) { return XXH3_128bits(by
 std::vector<std::byte> read_all(const std::filesystem::path& path) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) {
-        throw Error(ErrorCode::io, path.string() + ": " +
-                                       (std::filesystem::exists(path, error) ? "is not a file" : "no such file"));
+        throw Error(
+            ErrorCode::io,
+            path.string() + ": " + (std::filesystem::exists(path, error) ? "is not a file" : "no such file"));
     }
     const auto size = std::filesystem::file_size(path, error);
     if (error) throw Error(ErrorCode::io, path.string() + ": " + error.message());
@@ -51,8 +52,8 @@ Checkpoint parse(std::span<const std::byte> bytes) {
     ByteReader in(bytes);
     if (in.get<std::array<char, 8>>() != kMagic) throw Error(ErrorCode::io, "is not a nephos checkpoint");
     if (const auto version = in.get<std::uint32_t>(); version != kFormatVersion) {
-        throw Error(ErrorCode::io, "has checkpoint format " + std::to_string(version) + "; this version reads " +
-                                       std::to_string(kFormatVersion));
+        throw Error(ErrorCode::io, "has checkpoint format " + std::to_string(version) +
+                                       "; this version reads " + std::to_string(kFormatVersion));
     }
     if (const auto version = in.get<std::uint32_t>(); version != kRandomStreamVersion) {
         throw Error(ErrorCode::io, "was written with random stream " + std::to_string(version) +

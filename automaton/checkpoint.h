@@ -21,7 +21,7 @@
 namespace nephos {
 
 struct Checkpoint {
-    std::string simulation_hash;       // of what decides the bits; 32 hexadecimal digits
+    std::string simulation_hash;  // of what decides the bits; 32 hexadecimal digits
     std::uint64_t steps = 0;
     StateHash state;
     std::vector<std::byte> automaton;  // Automaton::save()
@@ -31,8 +31,8 @@ struct Checkpoint {
 // Writes atomically; throws Error(io).
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
 
-// Reads and verifies: magic, versions, sizes against the file's, hash over the content. Throws Error(io) that says
-// what is wrong with the file.
+// Reads and verifies: magic, versions, sizes against the file's, hash over the content. Throws Error(io) that
+// says what is wrong with the file.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
 // Whether a file starts as a checkpoint does; false also when it cannot be read.

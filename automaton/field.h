@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The probability field: how likely vapour, activation and extinction are in each cell and step (D, control of
-// motion). A background plus ellipsoids, each a parcel of air that is humid inside and is carried by the wind.
+// The probability field: how likely vapour, activation and extinction are in each cell and step (D, control
+// of motion). A background plus ellipsoids, each a parcel of air that is humid inside and is carried by the
+// wind.
 //
 // Inside an ellipsoid, with u = the normalised distance from its centre (0 at the centre, 1 at the rim):
 //
 //     p(u) = rim + (centre - rim) * (1 - u^2)^2        smooth, and flat at the centre and at the rim
 //
-// Outside (u >= 1) an ellipsoid has no effect. A fade weight w in 0..1 (birth, death) mixes p with the background:
-// background + w * (p - background). Where ellipsoids overlap, the larger hum and act and the smaller ext win,
-// the background always taking part.
+// Outside (u >= 1) an ellipsoid has no effect. A fade weight w in 0..1 (birth, death) mixes p with the
+// background: background + w * (p - background). Where ellipsoids overlap, the larger hum and act and the
+// smaller ext win, the background always taking part.
 
 #include <cstdint>
 #include <limits>
@@ -32,16 +33,16 @@ inline constexpr double kForever = std::numeric_limits<double>::infinity();
 
 // One parcel of air.
 struct Ellipsoid {
-    Vec3 centre_m;                       // at its birth
-    Vec3 semi_axes_m{500, 500, 300};     // > 0, before the turn by yaw
-    double yaw_deg = 0;                  // turn about the vertical, counter-clockwise seen from above
+    Vec3 centre_m;                    // at its birth
+    Vec3 semi_axes_m{500, 500, 300};  // > 0, before the turn by yaw
+    double yaw_deg = 0;               // turn about the vertical, counter-clockwise seen from above
     Probabilities centre{0.1, 0.001, 0.1};
     Probabilities rim{0, 0, 0.1};
-    double birth_s = 0;                  // time at which it appears
-    double life_s = kForever;            // until it is gone, fades included
-    double fade_in_s = 0;                // linear in time
-    double fade_out_s = 0;               // linear; ends at birth_s + life_s
-    bool carried = true;                 // moves with the wind at its centre's height; otherwise fixed
+    double birth_s = 0;        // time at which it appears
+    double life_s = kForever;  // until it is gone, fades included
+    double fade_in_s = 0;      // linear in time
+    double fade_out_s = 0;     // linear; ends at birth_s + life_s
+    bool carried = true;       // moves with the wind at its centre's height; otherwise fixed
     bool operator==(const Ellipsoid&) const = default;
 };
 
@@ -53,17 +54,18 @@ struct Range {
 
 // Ellipsoids drawn at random from the scene's seed.
 struct EllipsoidScatter {
-    int count = 0;                                     // alive at any time when `replace`, else in total; 0..100000
-    Range x_m, y_m, z_m;                               // where centres are drawn (world)
-    Range semi_axis_x_m, semi_axis_y_m, semi_axis_z_m; // > 0
+    int count = 0;        // alive at any time when `replace`, else in total; 0..100000
+    Range x_m, y_m, z_m;  // where centres are drawn (world)
+    Range semi_axis_x_m, semi_axis_y_m, semi_axis_z_m;  // > 0
     Range yaw_deg;
     Probabilities centre{0.1, 0.001, 0.1};
     Probabilities rim{0, 0, 0.1};
-    Range birth_s;                                     // times of birth
+    Range birth_s;  // times of birth
     Range life_s{kForever, kForever};
     double fade_in_s = 0, fade_out_s = 0;
     bool carried = true;
-    bool replace = false;  // one that left the box or died is drawn anew: upwind when it left, anywhere when it died
+    bool replace =
+        false;  // one that left the box or died is drawn anew: upwind when it left, anywhere when it died
     bool operator==(const EllipsoidScatter&) const = default;
 };
 

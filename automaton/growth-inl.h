@@ -4,8 +4,9 @@
 //
 //     hum' = hum & !act      cld' = cld | act      act' = hum' & f_act
 //
-// which is D's rule, because !act & hum is hum'. f_act ors act at the six neighbours, at distance two along x and y,
-// and two cells below; a shift along x takes bits across words from loads that begin one word to either side.
+// which is D's rule, because !act & hum is hum'. f_act ors act at the six neighbours, at distance two along x
+// and y, and two cells below; a shift along x takes bits across words from loads that begin one word to
+// either side.
 
 #if defined(NEPHOS_GROWTH_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_GROWTH_INL_H_
@@ -14,9 +15,9 @@
 #define NEPHOS_GROWTH_INL_H_
 #endif
 
-#include <hwy/highway.h>
-
 #include <cstdint>
+
+#include <hwy/highway.h>
 
 #include "automaton/kernels.h"
 
@@ -43,7 +44,8 @@ HWY_INLINE const std::uint64_t* act_row(const StepPlanes& p, int j, int k) {
 }
 
 // Neighbours of a periodic row across its ends: at most the two cells at either end are concerned.
-inline void wrap_row(const std::uint64_t* act, const std::uint64_t* hum_next, std::uint64_t* act_next, int nx) {
+inline void wrap_row(const std::uint64_t* act, const std::uint64_t* hum_next, std::uint64_t* act_next,
+                     int nx) {
     const auto get = [act](int i) { return (act[i / 64] >> (i % 64)) & 1u; };
     const auto feed = [&](int i, std::uint64_t bit) {
         act_next[i / 64] |= (bit << (i % 64)) & hum_next[i / 64];
@@ -100,7 +102,8 @@ HWY_INLINE void grow_vector(D d, const ActRows& rows, std::size_t w, std::size_t
     }
 }
 
-// Rows y0..y1 of layers z0..z1. kStream writes act past the caches: for planes that are not read again this step.
+// Rows y0..y1 of layers z0..z1. kStream writes act past the caches: for planes that are not read again this
+// step.
 template <bool kStream>
 HWY_NOINLINE void grow(const StepPlanes& p, int z0, int z1, int y0, int y1) {
     const hn::ScalableTag<std::uint64_t> d;

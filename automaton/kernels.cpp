@@ -19,9 +19,11 @@ void step_part_target(const StepPlanes& planes, const StepRandom& random, int bz
     const int z0 = bz * kBlockEdge, z1 = std::min(z0 + kBlockEdge, planes.extent.z);
     const int y0 = by_begin * kBlockEdge, y1 = std::min(by_end * kBlockEdge, planes.extent.y);
     const bool quiet = !random.field->anything();
-    // Past the caches only where nothing is read again in this step, rows are whole vectors, and planes are large.
+    // Past the caches only where nothing is read again in this step, rows are whole vectors, and planes are
+    // large.
     constexpr std::size_t kLargePlane = std::size_t{1} << 18;  // words: 2 MiB
-    const std::size_t words = planes.words_per_row * std::size_t(planes.extent.y) * std::size_t(planes.extent.z);
+    const std::size_t words =
+        planes.words_per_row * std::size_t(planes.extent.y) * std::size_t(planes.extent.z);
     if (quiet && planes.words_per_row % kMaxLanes == 0 && words >= kLargePlane) {
         grow<true>(planes, z0, z1, y0, y1);
     } else {
@@ -45,7 +47,8 @@ float sparse_rate_bound(const BlockPlan& plan, unsigned draws) {
     float sum = 0;
     for (unsigned d = 0; d < 3; ++d) {
         // Rounding of the rates in the cells may exceed that of the bound by a few units in the last place.
-        if ((draws >> d & 1) != 0) sum += sparse_rate(std::min(plan.draws[d].p_max, kVaryingSparseLimit)) * 1.00001f;
+        if ((draws >> d & 1) != 0)
+            sum += sparse_rate(std::min(plan.draws[d].p_max, kVaryingSparseLimit)) * 1.00001f;
     }
     return sum;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The step of a part of the lattice: growth, then extinction and birth (D), for some rows of blocks of one slab of
-// 8 layers. Vectorised with Highway and dispatched at run time; every target gives the same bits.
+// The step of a part of the lattice: growth, then extinction and birth (D), for some rows of blocks of one
+// slab of 8 layers. Vectorised with Highway and dispatched at run time; every target gives the same bits.
 //
-// hum and cld are updated in place, cell by cell; act is read around each cell and therefore written to a second
-// plane. Different parts may run in different threads: each writes only its own rows.
+// hum and cld are updated in place, cell by cell; act is read around each cell and therefore written to a
+// second plane. Different parts may run in different threads: each writes only its own rows.
 
 #include <array>
 #include <cstdint>
@@ -21,8 +21,8 @@ struct StepPlanes {
     Extent extent;
     std::size_t words_per_row = 0;
     Boundaries boundaries;
-    const std::uint64_t* act = nullptr;       // at time t
-    std::uint64_t* act_next = nullptr;        // at time t + 1; every word of the part is written
+    const std::uint64_t* act = nullptr;  // at time t
+    std::uint64_t* act_next = nullptr;   // at time t + 1; every word of the part is written
     std::uint64_t* hum = nullptr;
     std::uint64_t* cld = nullptr;
     const std::uint64_t* zero_row = nullptr;  // words_per_row zeros with 64 bytes of zeros before and after
@@ -60,8 +60,8 @@ inline std::uint32_t probability_threshold(float p) {
     return p >= 1.0f ? kCertain : std::uint32_t(std::int32_t(p * 0x1p31f)) << 1;
 }
 
-// -ln(1 - p) in float32 for 0 <= p <= kVaryingSparseLimit, by the series of 2 artanh(p / (2 - p)); relative error
-// < 1e-6. Same operations in every kernel.
+// -ln(1 - p) in float32 for 0 <= p <= kVaryingSparseLimit, by the series of 2 artanh(p / (2 - p)); relative
+// error < 1e-6. Same operations in every kernel.
 inline float sparse_rate(float p) {
     const float z = p / (2.0f - p);
     const float z2 = z * z;

@@ -64,8 +64,8 @@ struct BitPlaneView {
     std::size_t word_count() const { return words_per_row * std::size_t(extent.y) * std::size_t(extent.z); }
 };
 
-// One bit plane that owns its memory: 64-byte aligned, with 64 bytes of zeros before and after it, so that kernels
-// may load a vector that begins or ends just outside. Not thread-safe for writing to the same row.
+// One bit plane that owns its memory: 64-byte aligned, with 64 bytes of zeros before and after it, so that
+// kernels may load a vector that begins or ends just outside. Not thread-safe for writing to the same row.
 class BitPlane {
   public:
     BitPlane() = default;
@@ -83,15 +83,17 @@ class BitPlane {
 
     bool get(int i, int j, int k) const { return view().get(i, j, k); }
     void set(int i, int j, int k, bool value);
-    void clear();                   // all bits 0
-    std::uint64_t count() const;    // number of cells that are 1
+    void clear();                 // all bits 0
+    std::uint64_t count() const;  // number of cells that are 1
     bool operator==(const BitPlane& other) const;
 
     // Bytes that a plane of this extent takes; to check sizes before anything is allocated.
     static std::size_t bytes(Extent extent);
 
   private:
-    struct alignas(64) Line { std::uint64_t words[8]; };
+    struct alignas(64) Line {
+        std::uint64_t words[8];
+    };
 
     std::uint64_t* data() { return lines_.empty() ? nullptr : lines_[1].words; }
     const std::uint64_t* data() const { return lines_.empty() ? nullptr : lines_[1].words; }
@@ -111,7 +113,7 @@ struct Lattice {
 
 // How cells lie in the world. The centre of cell (i, j, k) is origin_m + (i+0.5, j+0.5, k+0.5) * cell_size_m.
 struct Placement {
-    Vec3 origin_m;              // world position of the lower corner of cell (0, 0, 0); z = height above ground
+    Vec3 origin_m;  // world position of the lower corner of cell (0, 0, 0); z = height above ground
     double cell_size_m = 50.0;  // edge of a cubic cell, > 0
     bool operator==(const Placement&) const = default;
 };

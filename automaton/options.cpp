@@ -36,14 +36,16 @@ void check(const Probabilities& p, const std::string& name) {
 
 void check(const Range& r, const std::string& name) {
     require(r.min <= r.max, name + " = " + number(r.min) + ".." + number(r.max) + ": expected min <= max");
-    require(r.min == r.max || (std::isfinite(r.min) && std::isfinite(r.max)), name + ": expected finite numbers");
+    require(r.min == r.max || (std::isfinite(r.min) && std::isfinite(r.max)),
+            name + ": expected finite numbers");
 }
 
 void check_life(double birth_s, double life_s, double fade_in_s, double fade_out_s, const std::string& name) {
     require_finite(birth_s, name + ".birth_s");
     require(life_s > 0, name + ".life_s = " + number(life_s) + ": expected > 0 s");
     require(fade_in_s >= 0 && std::isfinite(fade_in_s), name + ".fade_in_s: expected a finite number >= 0 s");
-    require(fade_out_s >= 0 && std::isfinite(fade_out_s), name + ".fade_out_s: expected a finite number >= 0 s");
+    require(fade_out_s >= 0 && std::isfinite(fade_out_s),
+            name + ".fade_out_s: expected a finite number >= 0 s");
 }
 
 // The images of an ellipsoid that a periodic axis repeats are all visited, so they must stay few.
@@ -63,7 +65,8 @@ void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& nam
     const double shorter = std::min(o.extent.x, o.extent.y) * cell;
     check_semi_axis(e.semi_axes_m.x, shorter, periodic_xy, name + ".semi_axes_m.x");
     check_semi_axis(e.semi_axes_m.y, shorter, periodic_xy, name + ".semi_axes_m.y");
-    check_semi_axis(e.semi_axes_m.z, o.extent.z * cell, o.boundaries.z == Boundary::periodic, name + ".semi_axes_m.z");
+    check_semi_axis(e.semi_axes_m.z, o.extent.z * cell, o.boundaries.z == Boundary::periodic,
+                    name + ".semi_axes_m.z");
     require_finite(e.yaw_deg, name + ".yaw_deg");
     check(e.centre, name + ".centre");
     check(e.rim, name + ".rim");
@@ -72,7 +75,8 @@ void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& nam
 
 void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::string& name) {
     constexpr int kMaxCount = 100000;
-    require(s.count >= 0 && s.count <= kMaxCount, name + ".count = " + std::to_string(s.count) + ": expected 0..100000");
+    require(s.count >= 0 && s.count <= kMaxCount,
+            name + ".count = " + std::to_string(s.count) + ": expected 0..100000");
     check(s.x_m, name + ".x_m");
     check(s.y_m, name + ".y_m");
     check(s.z_m, name + ".z_m");
@@ -122,7 +126,8 @@ void check(const Wind& wind, const AutomatonOptions& o) {
 
 void check(const AutomatonOptions& o) {
     for (int n : {o.extent.x, o.extent.y, o.extent.z}) {
-        require(n >= 1 && n <= kMaxExtent, "lattice extent " + std::to_string(n) + ": expected 1..65536 cells");
+        require(n >= 1 && n <= kMaxExtent,
+                "lattice extent " + std::to_string(n) + ": expected 1..65536 cells");
     }
     require(o.placement.cell_size_m > 0 && std::isfinite(o.placement.cell_size_m),
             "cell_size_m = " + number(o.placement.cell_size_m) + ": expected a finite number > 0 m");

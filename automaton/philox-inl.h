@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Philox4x32-10 on vectors: one counter per 64-bit lane, its four words in four vectors whose upper lane halves are
-// never read. A round is then two widening multiplications, two shifts and four exclusive ors, without shuffles.
+// Philox4x32-10 on vectors: one counter per 64-bit lane, its four words in four vectors whose upper lane
+// halves are never read. A round is then two widening multiplications, two shifts and four exclusive ors,
+// without shuffles.
 
 #if defined(NEPHOS_PHILOX_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_PHILOX_INL_H_
@@ -10,11 +11,11 @@
 #define NEPHOS_PHILOX_INL_H_
 #endif
 
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
+
+#include <hwy/highway.h>
 
 #include "automaton/random.h"
 
@@ -50,16 +51,19 @@ struct PhiloxState {
 };
 
 // Words 0 and 2 of a counter in one 64-bit number.
-inline std::uint64_t pack_counter(std::uint32_t word0, std::uint32_t word2) { return word0 | std::uint64_t{word2} << 32; }
+inline std::uint64_t pack_counter(std::uint32_t word0, std::uint32_t word2) {
+    return word0 | std::uint64_t{word2} << 32;
+}
 
-// out[4*i .. 4*i+3] = Philox of the counter with packed[i]. Both arrays must reach up to the next multiple of the
-// vector's lanes.
+// out[4*i .. 4*i+3] = Philox of the counter with packed[i]. Both arrays must reach up to the next multiple of
+// the vector's lanes.
 HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* HWY_RESTRICT packed, int count,
                                 std::uint32_t* HWY_RESTRICT out) {
 #if HWY_TARGET == HWY_SCALAR  // one lane: no 32-bit halves to multiply
     const std::uint64_t seed = batch.keys.key0[0][0] | batch.keys.key1[0][0] << 32;
     for (int i = 0; i < count; ++i) {
-        const auto words = philox(seed, {std::uint32_t(packed[i]), batch.word1, std::uint32_t(packed[i] >> 32), batch.word3});
+        const auto words = philox(
+            seed, {std::uint32_t(packed[i]), batch.word1, std::uint32_t(packed[i] >> 32), batch.word3});
         std::copy(words.begin(), words.end(), out + 4 * i);
     }
 #else
@@ -70,8 +74,8 @@ HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* H
     const auto low = hn::Set(d, 0xFFFFFFFFu);
     const auto start = [&](const std::uint64_t* at) HWY_ATTR {
         const auto both = hn::LoadU(d, at);
-        return PhiloxState<decltype(d)>{both, hn::Set(d, std::uint64_t{batch.word1}), hn::ShiftRight<32>(both),
-                                        hn::Set(d, std::uint64_t{batch.word3})};
+        return PhiloxState<decltype(d)>{both, hn::Set(d, std::uint64_t{batch.word1}),
+                                        hn::ShiftRight<32>(both), hn::Set(d, std::uint64_t{batch.word3})};
     };
     const auto advance = [&](PhiloxState<decltype(d)>& x, std::size_t round) HWY_ATTR {
         const auto product0 = hn::MulEven(hn::BitCast(d32, x.w0), m0);

@@ -39,7 +39,8 @@ PoissonTable make_poisson_table(double rate) {
     }
     for (std::size_t byte = 0; byte < table.start.size(); ++byte) {
         const auto lowest = std::uint32_t(byte << 24);
-        table.start[byte] = std::uint16_t(std::ranges::upper_bound(table.thresholds, lowest) - table.thresholds.begin());
+        table.start[byte] =
+            std::uint16_t(std::ranges::upper_bound(table.thresholds, lowest) - table.thresholds.begin());
     }
     return table;
 }
@@ -56,7 +57,8 @@ PoissonLadder::PoissonLadder() {
 const PoissonTable& PoissonLadder::level(float rate) const {
     assert(rate >= 0 && rate <= 1);
     // Exponent and two bits of mantissa, rounded up, are the number of the level.
-    const int number = int((std::bit_cast<std::uint32_t>(rate) + 0x1FFFFFu) >> 21) - ((127 + kLowestOctave) << 2);
+    const int number =
+        int((std::bit_cast<std::uint32_t>(rate) + 0x1FFFFFu) >> 21) - ((127 + kLowestOctave) << 2);
     return tables_[std::size_t(std::max(number, 0))];
 }
 

@@ -3,9 +3,9 @@
 
 // Numbers of events for the sparse draw of a block (docs/adr/0002).
 //
-// Throwing N ~ Poisson(512 * rate) events uniformly, with replacement, on the 512 cells of a block gives every cell
-// independently a Poisson number of events of mean `rate`. Keeping an event with probability r / rate thins the cell to
-// mean r: it is hit with probability 1 - exp(-r), which is p for r = -ln(1 - p).
+// Throwing N ~ Poisson(512 * rate) events uniformly, with replacement, on the 512 cells of a block gives
+// every cell independently a Poisson number of events of mean `rate`. Keeping an event with probability r /
+// rate thins the cell to mean r: it is hit with probability 1 - exp(-r), which is p for r = -ln(1 - p).
 //
 // Rates come from a ladder, 4 an octave, so that the tables are made once.
 
@@ -31,7 +31,8 @@ struct PoissonTable {
     }
 };
 
-// Computed with additions, multiplications and divisions alone, hence the same on every machine. rate in 0..1.
+// Computed with additions, multiplications and divisions alone, hence the same on every machine. rate in
+// 0..1.
 PoissonTable make_poisson_table(double rate);
 
 // Tables in rising order of their rates, 2^-28 to 1. Immutable.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// All randomness of nephos: Philox4x32-10 (Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3") as a
-// pure function of a key and a counter. Nothing here has state, so the numbers do not depend on threads, vector
-// width or the order of work. A counter is never used for two purposes; its layout is (docs/adr/0002):
+// All randomness of nephos: Philox4x32-10 (Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3")
+// as a pure function of a key and a counter. Nothing here has state, so the numbers do not depend on threads,
+// vector width or the order of work. A counter is never used for two purposes; its layout is (docs/adr/0002):
 //
 //     word 0   bits  0-15 sub-index   16-23 draw   24-31 version of the stream
 //     word 1   step (lattice), generation (field), anything the domain defines
@@ -11,10 +11,10 @@
 //     word 3   bits  0-15 block z (lattice) or group   16-31 domain
 //     key      the 64-bit seed, low word first
 
-#include <Random123/philox.h>
-
 #include <array>
 #include <cstdint>
+
+#include <Random123/philox.h>
 
 namespace nephos {
 

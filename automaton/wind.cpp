@@ -17,11 +17,13 @@ Velocity mix(const Velocity& a, const Velocity& b, double fraction) {
 
 Velocity at_height(const std::vector<WindLevel>& levels, double height_m) {
     if (levels.empty()) return {};
-    const auto above = std::ranges::find_if(levels, [&](const WindLevel& l) { return l.height_m >= height_m; });
+    const auto above =
+        std::ranges::find_if(levels, [&](const WindLevel& l) { return l.height_m >= height_m; });
     if (above == levels.begin()) return levels.front().velocity;
     if (above == levels.end()) return levels.back().velocity;
     const WindLevel& below = *(above - 1);
-    return mix(below.velocity, above->velocity, (height_m - below.height_m) / (above->height_m - below.height_m));
+    return mix(below.velocity, above->velocity,
+               (height_m - below.height_m) / (above->height_m - below.height_m));
 }
 
 std::int64_t to_fixed(double cells) {

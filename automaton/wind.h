@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Wind: a horizontal velocity that depends on height and time, piecewise linear in both (D: advection; D names
-// vector fields as the improvement). Motion is accumulated as integers, so nothing drifts: after n steps of a
-// constant wind the displacement is floor(n * speed) cells exactly, whatever the speed.
+// Wind: a horizontal velocity that depends on height and time, piecewise linear in both (D: advection; D
+// names vector fields as the improvement). Motion is accumulated as integers, so nothing drifts: after n
+// steps of a constant wind the displacement is floor(n * speed) cells exactly, whatever the speed.
 
 #include <cstdint>
 #include <vector>
@@ -29,8 +29,8 @@ struct WindKeyframe {
     bool operator==(const WindKeyframe&) const = default;
 };
 
-// Between keyframes each profile is evaluated and mixed linearly; before the first and after the last constant.
-// No keyframe at all: calm air.
+// Between keyframes each profile is evaluated and mixed linearly; before the first and after the last
+// constant. No keyframe at all: calm air.
 struct Wind {
     std::vector<WindKeyframe> keyframes;
     bool operator==(const Wind&) const = default;
@@ -39,7 +39,8 @@ struct Wind {
 // Velocity at a height and time. Thread-safe; pure.
 Velocity wind_at(const Wind& wind, double height_m, double time_s);
 
-// A displacement in cells as a fixed-point number with 32 fractional bits: exact sums, floor for the whole part.
+// A displacement in cells as a fixed-point number with 32 fractional bits: exact sums, floor for the whole
+// part.
 struct Displacement {
     std::int64_t x = 0, y = 0;  // cells * 2^32
 

@@ -2,16 +2,17 @@
 
 // Going on from any step gives the bits of the uninterrupted run; a damaged file is refused with its reason.
 
-#include <gtest/gtest.h>
-#include <sys/resource.h>
+#include "automaton/checkpoint.h"
 
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
 #include "automaton/atomic_file.h"
 #include "automaton/automaton.h"
-#include "automaton/checkpoint.h"
 #include "automaton/error.h"
 
 namespace nephos {
@@ -38,10 +39,19 @@ AutomatonOptions stormy_options() {
     o.wind.keyframes = {{0, {{0, {13, -7}}, {900, {31, 4}}}}, {300, {{0, {-9, 22}}}}};
     o.boundaries.x = Boundary::periodic;
     o.field.background.ext = 0.05;
-    o.field.scatters = {{.count = 9, .x_m = {0, 3800}, .y_m = {0, 3000}, .z_m = {100, 800},
-                         .semi_axis_x_m = {200, 600}, .semi_axis_y_m = {200, 400}, .semi_axis_z_m = {100, 200},
-                         .yaw_deg = {0, 90}, .birth_s = {0, 100}, .life_s = {100, 500}, .fade_in_s = 50,
-                         .fade_out_s = 50, .replace = true}};
+    o.field.scatters = {{.count = 9,
+                         .x_m = {0, 3800},
+                         .y_m = {0, 3000},
+                         .z_m = {100, 800},
+                         .semi_axis_x_m = {200, 600},
+                         .semi_axis_y_m = {200, 400},
+                         .semi_axis_z_m = {100, 200},
+                         .yaw_deg = {0, 90},
+                         .birth_s = {0, 100},
+                         .life_s = {100, 500},
+                         .fade_in_s = 50,
+                         .fade_out_s = 50,
+                         .replace = true}};
     return o;
 }
 
@@ -141,7 +151,8 @@ TEST(AtomicFile, KeepsTheOldFileWhenTheDiskIsFull) {
 
     std::ifstream in(folder / "file");
     EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "old content");
-    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1) << "a temporary file was left behind";
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1)
+        << "a temporary file was left behind";
 }
 
 TEST(AtomicFile, MakesFoldersAndNamesWhatFails) {

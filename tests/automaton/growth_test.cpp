@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The conformance vector: tests/golden/growth.txt states the bits before and after each of six steps, and with them
-// the orientation of the neighbourhood (two cells below feed a cell, two cells above do not).
-
-#include <gtest/gtest.h>
+// The conformance vector: tests/golden/growth.txt states the bits before and after each of six steps, and
+// with them the orientation of the neighbourhood (two cells below feed a cell, two cells above do not).
 
 #include <fstream>
 #include <sstream>
+
+#include <gtest/gtest.h>
 
 #include "automaton/automaton.h"
 #include "tests/reference/reference_automaton.h"
@@ -51,7 +51,9 @@ std::vector<Case> read_cases() {
             Extent& e = c.options.extent;
             Probabilities& p = c.options.field.background;
             in >> word >> e.x >> e.y >> e.z >> word >> x >> y >> z >> word >> p.hum >> p.act >> p.ext;
-            const auto boundary = [](bool periodic) { return periodic ? Boundary::periodic : Boundary::open; };
+            const auto boundary = [](bool periodic) {
+                return periodic ? Boundary::periodic : Boundary::open;
+            };
             c.options.boundaries = {boundary(x), boundary(y), boundary(z)};
             cases.push_back(c);
         } else if (word == "step") {
@@ -78,7 +80,8 @@ TEST(Growth, FollowsTheConformanceVector) {
     }
 }
 
-// The sentence of the scene format in one check: from one active cell in vapour, k+2 becomes active and k-2 not.
+// The sentence of the scene format in one check: from one active cell in vapour, k+2 becomes active and k-2
+// not.
 TEST(Growth, GoesTwoCellsUpAndNotTwoDown) {
     AutomatonOptions options{.extent = {5, 5, 9}};
     options.field.background = {0, 0, 0};

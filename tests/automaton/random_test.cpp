@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The random stream: known answers of Philox, counters that are never used twice, and probabilities that are what
-// they claim to be, for the sparse and the dense draw.
+// The random stream: known answers of Philox, counters that are never used twice, and probabilities that are
+// what they claim to be, for the sparse and the dense draw.
 
-#include <gtest/gtest.h>
+#include "automaton/random.h"
 
 #include <cmath>
 #include <set>
+
+#include <gtest/gtest.h>
 
 #include "automaton/automaton.h"
 #include "automaton/block_field.h"
 #include "automaton/kernels.h"
 #include "automaton/poisson.h"
-#include "automaton/random.h"
 #include "tests/reference/reference_automaton.h"
 
 namespace nephos {
@@ -27,8 +28,8 @@ TEST(Philox, GivesTheKnownAnswers) {
               (PhiloxWords{0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}));
 }
 
-// Every counter that a few steps of a small lattice could use, every item of the field's domain, and the initial
-// state: all different. The largest sub-indices are those of a dense draw in which all 512 cells tie.
+// Every counter that a few steps of a small lattice could use, every item of the field's domain, and the
+// initial state: all different. The largest sub-indices are those of a dense draw in which all 512 cells tie.
 TEST(Counters, AreNeverUsedTwice) {
     std::set<PhiloxWords> seen;
     std::size_t made = 0;
@@ -110,8 +111,8 @@ TEST(SparseRate, IsMinusLogOfOneMinusP) {
     }
 }
 
-// Counts how often each draw hits over many steps from a state in which every hit shows, and compares with p in
-// units of the standard deviation; also pairs of neighbouring cells, which must be independent.
+// Counts how often each draw hits over many steps from a state in which every hit shows, and compares with p
+// in units of the standard deviation; also pairs of neighbouring cells, which must be independent.
 struct Frequency {
     double hits = 0, pairs = 0, cells = 0, pair_places = 0;
 };
@@ -163,8 +164,8 @@ TEST(Births, HaveTheBackgroundsProbability) {
     }
 }
 
-// Inside ellipsoids p differs from cell to cell. Cells are gathered by their p into classes, over many seeds, and
-// each class must be hit as often as its p says; the sum over classes is a chi-square.
+// Inside ellipsoids p differs from cell to cell. Cells are gathered by their p into classes, over many seeds,
+// and each class must be hit as often as its p says; the sum over classes is a chi-square.
 double chi_square_per_class(const AutomatonOptions& base, int draw, int seeds) {
     constexpr int kClasses = 12;
     std::vector<double> expected(kClasses), variance(kClasses), hits(kClasses);
@@ -188,7 +189,9 @@ double chi_square_per_class(const AutomatonOptions& base, int draw, int seeds) {
             }
         }
         automaton.step();
-        const BitPlaneView plane = draw == kHum ? automaton.hum() : draw == kAct ? automaton.act() : automaton.cld();
+        const BitPlaneView plane = draw == kHum   ? automaton.hum()
+                                   : draw == kAct ? automaton.act()
+                                                  : automaton.cld();
         std::size_t n = 0;
         for (int k = 0; k < o.extent.z; ++k) {
             for (int j = 0; j < o.extent.y; ++j) {
@@ -204,7 +207,8 @@ double chi_square_per_class(const AutomatonOptions& base, int draw, int seeds) {
     }
     double chi_square = 0;
     for (std::size_t c = 0; c < kClasses; ++c) {
-        if (variance[c] > 5) chi_square += (hits[c] - expected[c]) * (hits[c] - expected[c]) / variance[c] / kClasses;
+        if (variance[c] > 5)
+            chi_square += (hits[c] - expected[c]) * (hits[c] - expected[c]) / variance[c] / kClasses;
         if (expected[c] == 0) {
             EXPECT_EQ(hits[c], 0);
         }

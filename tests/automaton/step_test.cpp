@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Whole steps of the kernels against the naive twin, bit for bit, on random scenes of any size and boundary; and the
-// promise that threads and instruction sets do not change them.
-
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
+// Whole steps of the kernels against the naive twin, bit for bit, on random scenes of any size and boundary;
+// and the promise that threads and instruction sets do not change them.
 
 #include <cmath>
-#include <hwy/targets.h>
 #include <random>
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+#include <tbb/global_control.h>
 
 #include "automaton/automaton.h"
 #include "automaton/kernels.h"
@@ -23,7 +23,9 @@ class Dice {
     double real(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine_); }
     int integer(int low, int high) { return std::uniform_int_distribution<>(low, high)(engine_); }
     bool coin() { return integer(0, 1) == 1; }
-    double pick(std::initializer_list<double> values) { return *(values.begin() + integer(0, int(values.size()) - 1)); }
+    double pick(std::initializer_list<double> values) {
+        return *(values.begin() + integer(0, int(values.size()) - 1));
+    }
 
   private:
     std::mt19937 engine_;
@@ -49,7 +51,8 @@ AutomatonOptions any_options(Dice& dice) {
     const double cell = o.placement.cell_size_m;
     for (int i = dice.integer(0, 6); i > 0; --i) {
         Ellipsoid e;
-        e.centre_m = {origin.x + dice.real(-5, o.extent.x + 5) * cell, origin.y + dice.real(-5, o.extent.y + 5) * cell,
+        e.centre_m = {origin.x + dice.real(-5, o.extent.x + 5) * cell,
+                      origin.y + dice.real(-5, o.extent.y + 5) * cell,
                       origin.z + dice.real(-3, o.extent.z + 3) * cell};
         const auto axis = [&](int n) { return dice.real(0.5, std::min(30.0, 15.0 * n)) * cell; };
         const int n = std::min(o.extent.x, o.extent.y);
@@ -85,7 +88,8 @@ Lattice any_lattice(Dice& dice, Extent e) {
     return l;
 }
 
-// floor((n + 1) d) - floor(n d): what a layer moves in step n under a constant displacement of d cells / 2^32.
+// floor((n + 1) d) - floor(n d): what a layer moves in step n under a constant displacement of d cells /
+// 2^32.
 class LayerMotion {
   public:
     std::int64_t next(std::int64_t displacement) {
@@ -119,7 +123,8 @@ TEST(Step, EqualsTheNaiveTwinOnRandomScenes) {
                 reference::advect_layer(twin, o.boundaries, k, motion_x[std::size_t(k)].next(d.x),
                                         motion_y[std::size_t(k)].next(d.y));
             }
-            ASSERT_EQ(reference::to_cells(automaton.hum(), automaton.act(), automaton.cld()), twin) << "step " << step;
+            ASSERT_EQ(reference::to_cells(automaton.hum(), automaton.act(), automaton.cld()), twin)
+                << "step " << step;
         }
     }
 }

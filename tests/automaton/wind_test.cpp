@@ -2,10 +2,10 @@
 
 // Wind, advection and the carried parcels of air: closed forms and the naive twin.
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <random>
+
+#include <gtest/gtest.h>
 
 #include "automaton/advection.h"
 #include "automaton/air_parcels.h"
@@ -32,8 +32,8 @@ TEST(Wind, RefusesWhatNoLatticeCanHold) {
     EXPECT_EQ(displacement_of_step({-0.25, 3}, 1, 1).whole_x(), -1);
 }
 
-// After n steps a layer has moved floor(n * speed) cells: 0.3 cells a step for 1000 steps is 300 cells, or 299 where
-// 0.3 rounds down to a multiple of 2^-32, and never anything else.
+// After n steps a layer has moved floor(n * speed) cells: 0.3 cells a step for 1000 steps is 300 cells, or
+// 299 where 0.3 rounds down to a multiple of 2^-32, and never anything else.
 TEST(Advection, NeverDrifts) {
     AutomatonOptions o{.extent = {400, 3, 1}};
     o.placement.cell_size_m = 1;
@@ -52,7 +52,9 @@ TEST(Advection, NeverDrifts) {
 
 TEST(Advection, EqualsTheNaiveTwin) {
     std::mt19937 engine(3);
-    const auto integer = [&](int low, int high) { return std::uniform_int_distribution<>(low, high)(engine); };
+    const auto integer = [&](int low, int high) {
+        return std::uniform_int_distribution<>(low, high)(engine);
+    };
     for (int round = 0; round < 300; ++round) {
         const Extent e{integer(1, 200), integer(1, 12), 2};
         const Boundaries b{integer(0, 1) ? Boundary::open : Boundary::periodic,
@@ -79,8 +81,10 @@ TEST(Advection, EqualsTheNaiveTwin) {
 TEST(SinCos, AgreesWithTheLibrary) {
     for (double degrees = -725; degrees < 1000; degrees += 0.37) {
         const SinCos value = sin_cos_deg(degrees);
-        EXPECT_NEAR(value.sin, std::sin(degrees * std::acos(-1.0) / 180), 4e-15 * (1 + std::abs(degrees) / 90));
-        EXPECT_NEAR(value.cos, std::cos(degrees * std::acos(-1.0) / 180), 4e-15 * (1 + std::abs(degrees) / 90));
+        EXPECT_NEAR(value.sin, std::sin(degrees * std::acos(-1.0) / 180),
+                    4e-15 * (1 + std::abs(degrees) / 90));
+        EXPECT_NEAR(value.cos, std::cos(degrees * std::acos(-1.0) / 180),
+                    4e-15 * (1 + std::abs(degrees) / 90));
     }
     EXPECT_EQ(sin_cos_deg(90).cos, 0);
     EXPECT_EQ(sin_cos_deg(-180).cos, -1);
@@ -103,8 +107,13 @@ TEST(AirParcels, FadeInAndOut) {
 AutomatonOptions carried_options(Velocity wind) {
     AutomatonOptions o{.extent = {100, 80, 10}};  // 5000 x 4000 m
     o.wind.keyframes = {{0, {{0, wind}}}};
-    o.field.scatters = {{.count = 20, .x_m = {0, 5000}, .y_m = {0, 4000}, .z_m = {250, 250},
-                         .semi_axis_x_m = {300, 300}, .semi_axis_y_m = {300, 300}, .semi_axis_z_m = {200, 200},
+    o.field.scatters = {{.count = 20,
+                         .x_m = {0, 5000},
+                         .y_m = {0, 4000},
+                         .z_m = {250, 250},
+                         .semi_axis_x_m = {300, 300},
+                         .semi_axis_y_m = {300, 300},
+                         .semi_axis_z_m = {200, 200},
                          .replace = true}};
     return o;
 }
@@ -137,12 +146,16 @@ TEST(AirParcels, AreReplacedUpwind) {
             ASSERT_EQ(after.size(), 20u);
             for (std::size_t i = 0; i < after.size(); ++i) {
                 const Vec3 &from = before[i].ellipsoid.centre_m, &to = after[i].ellipsoid.centre_m;
-                const double moved = (to.x - from.x) * wind.east_m_per_s + (to.y - from.y) * wind.north_m_per_s;
+                const double moved =
+                    (to.x - from.x) * wind.east_m_per_s + (to.y - from.y) * wind.north_m_per_s;
                 if (moved >= 0) continue;  // carried on
-                const bool touches_west = std::abs(to.x + 300) < 1e-6, touches_east = std::abs(to.x - 5300) < 1e-6;
-                const bool touches_south = std::abs(to.y + 300) < 1e-6, touches_north = std::abs(to.y - 4300) < 1e-6;
-                EXPECT_TRUE((touches_west && wind.east_m_per_s > 0) || (touches_east && wind.east_m_per_s < 0) ||
-                            (touches_south && wind.north_m_per_s > 0) || (touches_north && wind.north_m_per_s < 0))
+                const bool touches_west = std::abs(to.x + 300) < 1e-6,
+                           touches_east = std::abs(to.x - 5300) < 1e-6;
+                const bool touches_south = std::abs(to.y + 300) < 1e-6,
+                           touches_north = std::abs(to.y - 4300) < 1e-6;
+                EXPECT_TRUE(
+                    (touches_west && wind.east_m_per_s > 0) || (touches_east && wind.east_m_per_s < 0) ||
+                    (touches_south && wind.north_m_per_s > 0) || (touches_north && wind.north_m_per_s < 0))
                     << degrees << " degrees: " << to.x << ", " << to.y;
                 EXPECT_EQ(after[i].weight, 1);
             }
@@ -166,16 +179,25 @@ TEST(Options, EachProblemIsNamed) {
     EXPECT_NE(reason([](auto& o) { o.extent.y = 0; }).find("1..65536"), std::string::npos);
     EXPECT_NE(reason([](auto& o) { o.placement.cell_size_m = 0; }).find("cell_size_m"), std::string::npos);
     EXPECT_NE(reason([](auto& o) { o.time_step_s = std::nan(""); }).find("time_step_s"), std::string::npos);
-    EXPECT_NE(reason([](auto& o) { o.field.background.ext = 1.5; }).find("field.background.ext"), std::string::npos);
+    EXPECT_NE(reason([](auto& o) { o.field.background.ext = 1.5; }).find("field.background.ext"),
+              std::string::npos);
     EXPECT_NE(reason([](auto& o) { o.field.scatters[0].semi_axis_y_m.min = -1; }).find("scatters[0]"),
               std::string::npos);
-    EXPECT_NE(reason([](auto& o) { o.field.scatters[0].x_m = {2, 1}; }).find("min <= max"), std::string::npos);
-    EXPECT_NE(reason([](auto& o) { o.wind.keyframes[0].levels.push_back({0, {}}); }).find("rising heights"),
+    EXPECT_NE(reason([](auto& o) {
+                  o.field.scatters[0].x_m = {2, 1};
+              }).find("min <= max"),
               std::string::npos);
-    EXPECT_NE(reason([](auto& o) { o.wind.keyframes.push_back({0, {{0, {}}}}); }).find("rising times"),
+    EXPECT_NE(reason([](auto& o) {
+                  o.wind.keyframes[0].levels.push_back({0, {}});
+              }).find("rising heights"),
               std::string::npos);
-    EXPECT_NE(reason([](auto& o) { o.wind.keyframes[0].levels[0].velocity.east_m_per_s = 1e30; }).find("2^30"),
+    EXPECT_NE(reason([](auto& o) {
+                  o.wind.keyframes.push_back({0, {{0, {}}}});
+              }).find("rising times"),
               std::string::npos);
+    EXPECT_NE(
+        reason([](auto& o) { o.wind.keyframes[0].levels[0].velocity.east_m_per_s = 1e30; }).find("2^30"),
+        std::string::npos);
 }
 
 }  // namespace

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/bench/automaton_bench.h"
 
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
-
-#include <cstdio>
-#include <cstring>
-#include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "automaton/automaton.h"
 #include "scenes/reader.h"
@@ -32,7 +32,8 @@ class PlaneCopy {
 
 BenchRow step_against_memcpy(std::string work, Automaton automaton, std::string target, std::string note) {
     PlaneCopy copy(automaton.options().extent);
-    const auto [ours, other] = interleave(9, [&] { automaton.step(); }, copy);
+    const auto [ours, other] = interleave(
+        9, [&] { automaton.step(); }, copy);
     return {std::move(work), ours, other, std::move(target), std::move(note)};
 }
 
@@ -51,7 +52,8 @@ BenchRow cumulus_against_numpy(const fs::path& source) {
     for (int round = 0; round < 3; ++round) {
         ours.push_back(time_ms([&] {
                            for (int i = 0; i < 200; ++i) automaton.step();
-                       }) / 200);
+                       }) /
+                       200);
         std::FILE* pipe = ::popen(command.c_str(), "r");
         if (pipe == nullptr) throw std::runtime_error("cannot run " + command);
         std::string output;
@@ -69,7 +71,8 @@ BenchRow two_threads_against_one() {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
         automaton.step();
     };
-    const auto [with_two, with_one] = interleave(9, [&] { step(two, 2); }, [&] { step(one, 1); });
+    const auto [with_two, with_one] = interleave(
+        9, [&] { step(two, 2); }, [&] { step(one, 1); });
     return {"step with ellipsoids, 512^3: 2 threads, against 1", with_two, with_one, ">= 1.8x faster", ""};
 }
 
@@ -103,7 +106,8 @@ class UncountedSteps {
         std::fputc('\n', to_);
         std::fflush(to_);
         double ms = 0;
-        if (std::fscanf(from_, "%lf", &ms) != 1) throw std::runtime_error("the step without determinism failed");
+        if (std::fscanf(from_, "%lf", &ms) != 1)
+            throw std::runtime_error("the step without determinism failed");
         return ms;
     }
 
@@ -122,8 +126,8 @@ BenchRow determinism_against_none(const fs::path& programs) {
         ours.push_back(a);
         other.push_back(b);
     }
-    return {"step with ellipsoids, 512^3, against the same with xorshift128+ and FMA", median(ours), median(other),
-            "<= 1.05x", "the price of counters, order and IEEE arithmetic"};
+    return {"step with ellipsoids, 512^3, against the same with xorshift128+ and FMA", median(ours),
+            median(other), "<= 1.05x", "the price of counters, order and IEEE arithmetic"};
 }
 
 }  // namespace
@@ -134,17 +138,17 @@ std::vector<BenchRow> automaton_rows(const fs::path& source, const fs::path& pro
     {
         const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
         rows.push_back(step_against_memcpy("step, p = 0, 512^3, against memcpy of the three planes",
-                                           Automaton(cube(kEdge, {0, 0, 0}), random_lattice(extent)), "<= 1.1x",
-                                           "random bits everywhere"));
+                                           Automaton(cube(kEdge, {0, 0, 0}), random_lattice(extent)),
+                                           "<= 1.1x", "random bits everywhere"));
         rows.push_back(step_against_memcpy("step, 200 ellipsoids, p <= 0.01, 512^3, against the same",
                                            grown(ellipsoid_cube(kEdge, 0.01), 40), "<= 3x",
                                            "state grown from the field over 40 steps"));
-        rows.push_back(step_against_memcpy("... the same from random bits", 
-                                           Automaton(ellipsoid_cube(kEdge, 0.01), random_lattice(extent)), "<= 3x",
-                                           "cloud in every block, so that each draws its extinction"));
+        rows.push_back(step_against_memcpy(
+            "... the same from random bits", Automaton(ellipsoid_cube(kEdge, 0.01), random_lattice(extent)),
+            "<= 3x", "cloud in every block, so that each draws its extinction"));
         rows.push_back(step_against_memcpy("step, p = 0.37, 0.41, 0.3 in every cell, 512^3, against the same",
-                                           Automaton(cube(kEdge, {0.37, 0.41, 0.3}), random_lattice(extent)), "<= 12x",
-                                           "dense draw: 384 MiB of Philox bytes a step"));
+                                           Automaton(cube(kEdge, {0.37, 0.41, 0.3}), random_lattice(extent)),
+                                           "<= 12x", "dense draw: 384 MiB of Philox bytes a step"));
         rows.push_back(cumulus_against_numpy(source));
         rows.push_back(determinism_against_none(programs));
     }

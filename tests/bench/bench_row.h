@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// One measurement of ./bench: two sides measured in the same run, in turn, and their medians. The machines that this
-// runs on are noisy and shared; the ratio of two things measured side by side is what can be trusted.
+// One measurement of ./bench: two sides measured in the same run, in turn, and their medians. The machines
+// that this runs on are noisy and shared; the ratio of two things measured side by side is what can be
+// trusted.
 
 #include <algorithm>
 #include <chrono>
@@ -13,11 +14,11 @@
 namespace nephos::bench {
 
 struct BenchRow {
-    std::string work;      // what is measured, and against what
-    double ours_ms = 0;    // median
-    double other_ms = 0;   // median of the other side
-    std::string target;    // as the project states it, for example "<= 1.1x"
-    std::string note;      // what a reader must know to judge the figure
+    std::string work;     // what is measured, and against what
+    double ours_ms = 0;   // median
+    double other_ms = 0;  // median of the other side
+    std::string target;   // as the project states it, for example "<= 1.1x"
+    std::string note;     // what a reader must know to judge the figure
 };
 
 inline double median(std::vector<double> values) {

@@ -9,7 +9,8 @@
 
 namespace nephos::bench {
 
-// On one thread; a few seconds. Throws std::runtime_error when the two sides of a row do not agree on the result.
+// On one thread; a few seconds. Throws std::runtime_error when the two sides of a row do not agree on the
+// result.
 std::vector<BenchRow> density_bench_rows();
 
 }  // namespace nephos::bench

@@ -2,13 +2,13 @@
 
 // ./bench: prints the tables of the README. Nothing here passes or fails: figures are for people to judge.
 
-#include <fmt/core.h>
-
 #include <cstring>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+
+#include <fmt/core.h>
 
 #include "automaton/kernels.h"
 #include "tests/bench/automaton_bench.h"
@@ -31,8 +31,8 @@ void print(const std::vector<nephos::bench::BenchRow>& rows) {
     for (const auto& row : rows) {
         const bool faster = row.target.find("faster") != std::string::npos;
         const double ratio = faster ? row.other_ms / row.ours_ms : row.ours_ms / row.other_ms;
-        fmt::print("| {} | {:.3g} | {:.3g} | {:.2f}x{} | {} | {} |\n", row.work, row.ours_ms, row.other_ms, ratio,
-                   faster ? " faster" : "", row.target, row.note);
+        fmt::print("| {} | {:.3g} | {:.3g} | {:.2f}x{} | {} | {} |\n", row.work, row.ours_ms, row.other_ms,
+                   ratio, faster ? " faster" : "", row.target, row.note);
         std::fflush(stdout);
     }
     fmt::print("\n");
@@ -51,8 +51,10 @@ int main(int argc, char** argv) {
         {"seeds", [] { return seeds_rows(); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {
-        fmt::print("Usage: ./bench [GROUP ...]\n\nPrints medians of nephos and of what it is compared with, measured in "
-                   "turn.\nGroups:");
+        fmt::print(
+            "Usage: ./bench [GROUP ...]\n\nPrints medians of nephos and of what it is compared with, "
+            "measured in "
+            "turn.\nGroups:");
         for (const auto& group : groups) fmt::print(" {}", group.first);
         fmt::print(". Without a name, all.\n");
         return 0;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/bench/memory_bench.h"
 
+#include <stdexcept>
+#include <string>
+
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <stdexcept>
-#include <string>
 
 #include "automaton/lattice.h"
 #include "density/vdb_file.h"
@@ -46,13 +46,14 @@ std::vector<BenchRow> memory_rows(const fs::path& source, const fs::path& comman
     const fs::path scene_file = source / "scenes/large.toml";
     const Scene scene = read_scene(scene_file);
     const fs::path folder = fs::temp_directory_path() / ("nephos_bench_" + std::to_string(::getpid()));
-    const double peak = peak_of({command, "run", scene_file, "--no-render", "--frames", "1..1", "--threads", "1", "--out",
-                                 folder});
+    const double peak = peak_of(
+        {command, "run", scene_file, "--no-render", "--frames", "1..1", "--threads", "1", "--out", folder});
     const DensityGrid density = read_density(frame_path(folder / "density", scene.name, 1));
     fs::remove_all(folder);
     const double bits = 3.0 * double(BitPlane::bytes(scene.automaton.extent)) / kMiB;
     const double leaves = double(density.memory_bytes()) / kMiB;
-    return {{"large.toml: peak memory (MiB, not ms), against 3x bit planes + leaf data", peak, 3 * bits + leaves, "<= 1x",
+    return {{"large.toml: peak memory (MiB, not ms), against 3x bit planes + leaf data", peak,
+             3 * bits + leaves, "<= 1x",
              "bit planes " + std::to_string(int(bits)) + " MiB, leaves " + std::to_string(int(leaves)) +
                  " MiB; the peak includes the program and its libraries"}};
 }

@@ -8,8 +8,8 @@
 
 namespace nephos::bench {
 
-// Peak memory of `nephos run large.toml --no-render` for its first frame, against three times its bit planes plus the
-// leaves of its density. The columns are MiB, not ms. `command` is the nephos program.
+// Peak memory of `nephos run large.toml --no-render` for its first frame, against three times its bit planes
+// plus the leaves of its density. The columns are MiB, not ms. `command` is the nephos program.
 std::vector<BenchRow> memory_rows(const std::filesystem::path& source, const std::filesystem::path& command);
 
 }  // namespace nephos::bench

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Steps a simulation with random numbers that do not depend on their place (see uncounted/): a line on standard
-// input is one step, its milliseconds come back on standard output. ./bench asks in turn with its own steps.
-
-#include <tbb/global_control.h>
+// Steps a simulation with random numbers that do not depend on their place (see uncounted/): a line on
+// standard input is one step, its milliseconds come back on standard output. ./bench asks in turn with its
+// own steps.
 
 #include <cstdio>
+
+#include <tbb/global_control.h>
 
 #include "tests/bench/bench_row.h"
 #include "tests/bench/bench_scenes.h"

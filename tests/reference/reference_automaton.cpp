@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/reference/reference_automaton.h"
 
-#include <Random123/philox.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
+
+#include <Random123/philox.h>
 
 #include "automaton/block_field.h"
 #include "automaton/kernels.h"
@@ -16,7 +16,8 @@ namespace nephos::reference {
 namespace {
 
 // Value of a cell that may lie outside: the boundary decides.
-std::uint8_t at(const std::vector<std::uint8_t>& plane, const Extent& e, const Boundaries& b, int i, int j, int k) {
+std::uint8_t at(const std::vector<std::uint8_t>& plane, const Extent& e, const Boundaries& b, int i, int j,
+                int k) {
     const auto fold = [](int& n, int size, Boundary boundary) {
         if (n >= 0 && n < size) return true;
         n = ((n % size) + size) % size;
@@ -48,7 +49,8 @@ struct BlockDraws {
     }
     float p(int draw, int cell) const {
         const float value = probability_at(field, plan, draw, cell % 8, cell / 8 % 8, cell / 64);
-        if (value > plan.draws[std::size_t(draw)].p_max) throw std::logic_error("a cell exceeds the bound of its block");
+        if (value > plan.draws[std::size_t(draw)].p_max)
+            throw std::logic_error("a cell exceeds the bound of its block");
         return value;
     }
 };
@@ -63,7 +65,8 @@ void sparse_events(const BlockDraws& b, unsigned draws, const PoissonLadder& lad
     for (std::uint32_t threshold : level.thresholds) count += threshold <= uniform ? 1 : 0;
     for (std::uint32_t e = 0; e < count; ++e) {
         const int cell = int(b.word(4, e / 2, e % 2 * 2) % 512);
-        const float v = float(std::int32_t(b.word(4, e / 2, e % 2 * 2 + 1) / 2)) * (float(level.rate) * 0x1p-31f);
+        const float v =
+            float(std::int32_t(b.word(4, e / 2, e % 2 * 2 + 1) / 2)) * (float(level.rate) * 0x1p-31f);
         float sum = 0;
         for (int draw = 0; draw < 3; ++draw) {
             if ((draws >> draw & 1) == 0) continue;
@@ -79,7 +82,8 @@ void sparse_events(const BlockDraws& b, unsigned draws, const PoissonLadder& lad
 void dense_events(const BlockDraws& b, int draw, Events& events) {
     for (std::uint32_t cell = 0; cell < 512; ++cell) {
         const std::uint32_t t = probability_threshold(b.p(draw, int(cell)));
-        const std::uint32_t byte = (b.word(std::uint32_t(draw) + 1, cell / 16, cell / 4 % 4) >> (cell % 4 * 8)) & 255u;
+        const std::uint32_t byte =
+            (b.word(std::uint32_t(draw) + 1, cell / 16, cell / 4 % 4) >> (cell % 4 * 8)) & 255u;
         const std::uint32_t more = b.word(std::uint32_t(draw) + 1, 32 + cell / 4, cell % 4) >> 8;
         events[std::size_t(draw)][cell] =
             byte < t >> 24 || (byte == t >> 24 && (t == kCertain || more < (t & 0xFFFFFFu)));
@@ -142,7 +146,9 @@ Cells grow(const Cells& now, const Boundaries& b) {
     for (int k = 0; k < e.z; ++k) {
         for (int j = 0; j < e.y; ++j) {
             for (int i = 0; i < e.x; ++i) {
-                const auto act = [&](int di, int dj, int dk) { return at(now.act, e, b, i + di, j + dj, k + dk); };
+                const auto act = [&](int di, int dj, int dk) {
+                    return at(now.act, e, b, i + di, j + dj, k + dk);
+                };
                 const std::uint8_t f_act = act(1, 0, 0) | act(-1, 0, 0) | act(0, 1, 0) | act(0, -1, 0) |
                                            act(0, 0, 1) | act(0, 0, -1) | act(2, 0, 0) | act(-2, 0, 0) |
                                            act(0, 2, 0) | act(0, -2, 0) | act(0, 0, -2);
@@ -204,9 +210,11 @@ void advect_layer(Cells& cells, const Boundaries& b, int k, std::int64_t dx, std
     }
 }
 
-double probability(const AutomatonOptions& o, const std::vector<ActiveEllipsoid>& ellipsoids, int draw, int i, int j,
-                   int k) {
-    const auto pick = [draw](const Probabilities& p) { return draw == 0 ? p.hum : draw == 1 ? p.act : p.ext; };
+double probability(const AutomatonOptions& o, const std::vector<ActiveEllipsoid>& ellipsoids, int draw, int i,
+                   int j, int k) {
+    const auto pick = [draw](const Probabilities& p) {
+        return draw == 0 ? p.hum : draw == 1 ? p.act : p.ext;
+    };
     const double cell = o.placement.cell_size_m;
     const double x = o.placement.origin_m.x + (i + 0.5) * cell, y = o.placement.origin_m.y + (j + 0.5) * cell,
                  z = o.placement.origin_m.z + (k + 0.5) * cell;
@@ -222,9 +230,10 @@ double probability(const AutomatonOptions& o, const std::vector<ActiveEllipsoid>
                     const double dx = x - e.centre_m.x - px * o.extent.x * cell;
                     const double dy = y - e.centre_m.y - py * o.extent.y * cell;
                     const double dz = z - e.centre_m.z - pz * o.extent.z * cell;
-                    const double u2 = std::pow((dx * std::cos(turn) + dy * std::sin(turn)) / e.semi_axes_m.x, 2) +
-                                      std::pow((dy * std::cos(turn) - dx * std::sin(turn)) / e.semi_axes_m.y, 2) +
-                                      std::pow(dz / e.semi_axes_m.z, 2);
+                    const double u2 =
+                        std::pow((dx * std::cos(turn) + dy * std::sin(turn)) / e.semi_axes_m.x, 2) +
+                        std::pow((dy * std::cos(turn) - dx * std::sin(turn)) / e.semi_axes_m.y, 2) +
+                        std::pow(dz / e.semi_axes_m.z, 2);
                     if (u2 >= 1) continue;
                     const double p = pick(e.rim) + (pick(e.centre) - pick(e.rim)) * (1 - u2) * (1 - u2);
                     const double faded = background + a.weight * (p - background);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The automaton one cell at a time, beside the formulas of D: the twin that the kernels are compared with. It shares
-// with them the options, the carried ellipsoids and the choice of level per block; rules, probabilities, random
-// words and advection are written out here again, without bit tricks.
+// The automaton one cell at a time, beside the formulas of D: the twin that the kernels are compared with. It
+// shares with them the options, the carried ellipsoids and the choice of level per block; rules,
+// probabilities, random words and advection are written out here again, without bit tricks.
 
 #include <cstdint>
 #include <vector>
@@ -35,7 +35,7 @@ void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uin
 void advect_layer(Cells& cells, const Boundaries& boundaries, int k, std::int64_t dx, std::int64_t dy);
 
 // p of one draw (0 hum, 1 act, 2 ext) at a cell in double precision, straight from the head of field.h.
-double probability(const AutomatonOptions& options, const std::vector<ActiveEllipsoid>& ellipsoids, int draw, int i,
-                   int j, int k);
+double probability(const AutomatonOptions& options, const std::vector<ActiveEllipsoid>& ellipsoids, int draw,
+                   int i, int j, int k);
 
 }  // namespace nephos::reference

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the sparse and the dense draw share: a segment of 64 blocks, the events that it gathers, and the
+// evaluation of the probability field on vectors of cells.
+
+#if defined(NEPHOS_SEGMENT_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_SEGMENT_INL_H_
+#undef NEPHOS_SEGMENT_INL_H_
+#else
+#define NEPHOS_SEGMENT_INL_H_
+#endif
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <hwy/highway.h>
+
+#include "automaton/kernels.h"
+#include "automaton/philox-inl.h"
+#include "automaton/random.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+inline constexpr int kMaxLanes = 8;  // of 64 bits, in the widest vector
+
+// Blocks are taken in segments of 64 along x: their events fill 64 rows of 64 bytes a draw, which stay in the
+// first-level cache, and everything below has a fixed size.
+inline constexpr int kSegmentBlocks = 64;
+inline constexpr int kSegmentWords = kSegmentBlocks * kBlockEdge / 64;
+inline constexpr int kMaxCounters = 512;  // queued before the sparse draws are run
+
+// The sparse draws of one block.
+struct SparseJob {
+    int block;       // in the segment
+    unsigned draws;  // a bit each
+    int events;
+    int first;        // its first counter in the queue; two events a counter
+    float rate_unit;  // rate of the level * 2^-31
+};
+
+// Memory of one thread.
+struct BirthScratch {
+    // Cells that have an event: bit i of byte `block` of row y + 8 z is the cell i of that block. 0 between
+    // segments.
+    std::uint64_t events[3][64][kSegmentWords] = {};
+    std::uint64_t counters[kMaxCounters + kMaxLanes];  // packed, see philox-inl.h
+    std::uint32_t
+        words[4 * (kMaxCounters + kMaxLanes) + 32];  // 32 more: the last vector of events reads beyond
+    std::uint32_t counts[4 * (kSegmentBlocks + kMaxLanes)];
+    std::uint64_t cloudy[kSegmentWords];  // a byte a block: not 0 when it holds any cld
+    SparseJob jobs[kSegmentBlocks];
+    int job_count = 0, counter_count = 0;
+    bool dirty[3] = {};  // draws with events in this segment
+    std::vector<const FieldEllipsoid*> row;
+    std::vector<BlockPlan> plans = std::vector<BlockPlan>(kSegmentBlocks);
+};
+
+// A segment of a row of blocks: where its 64 rows of cells lie, and its planes.
+struct Segment {
+    const StepPlanes& planes;
+    const StepRandom& random;
+    const PhiloxKeys& keys;
+    int by, bz;
+    int bx0 = 0, blocks = 0;                    // first block and number of blocks, <= 64
+    std::array<std::ptrdiff_t, 64> row_word{};  // first word of cell row y + 8 z; -1 outside
+
+    PhiloxBatch batch() const {
+        return {keys, random.step, std::uint32_t(bz) | std::uint32_t(Domain::lattice) << 16};
+    }
+    std::uint64_t counter(Draw draw, int block, std::uint32_t sub) const {
+        const std::uint32_t word2 = std::uint32_t(bx0 + block) | std::uint32_t(by) << 16;
+        return pack_counter(counter_word_0(std::uint32_t(draw), sub), word2);
+    }
+};
+
+inline Draw draw_of(int draw) { return Draw(std::uint32_t(draw) + std::uint32_t(Draw::hum)); }
+
+inline std::uint8_t* event_bytes(BirthScratch& s, int draw, int block) {
+    return reinterpret_cast<std::uint8_t*>(s.events[draw]) + block;
+}
+
+// Marks a cell (x + 8 y + 64 z in its block); `bytes` comes from event_bytes().
+HWY_INLINE void mark(std::uint8_t* bytes, std::uint32_t cell) {
+    std::uint8_t& byte = bytes[(cell >> 3) * kSegmentBlocks];
+    byte = std::uint8_t(byte | 1u << (cell & 7));
+}
+
+// The place of a vector of cells in one ellipsoid; the operations and their order are those of block_field.h.
+template <class V>
+struct InEllipsoid {
+    V u2;       // squared normalised distance
+    V falloff;  // (1 - u^2)^2
+};
+
+template <class DF, class V = hn::Vec<DF>>
+HWY_INLINE InEllipsoid<V> locate(DF d, const BlockEllipsoid& e, V dx, V dy, V dz) {
+    const V a =
+        hn::Add(hn::Set(d, e.base_a), hn::Add(hn::Mul(dx, hn::Set(d, e.xx)), hn::Mul(dy, hn::Set(d, e.xy))));
+    const V b =
+        hn::Add(hn::Set(d, e.base_b), hn::Add(hn::Mul(dx, hn::Set(d, e.yx)), hn::Mul(dy, hn::Set(d, e.yy))));
+    const V c = hn::Add(hn::Set(d, e.base_c), hn::Mul(dz, hn::Set(d, e.zz)));
+    const V u2 = hn::Add(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Mul(c, c));
+    const V s = hn::Max(hn::Sub(hn::Set(d, 1.0f), u2), hn::Zero(d));
+    return {u2, hn::Mul(s, s)};
+}
+
+// Takes an ellipsoid into p: the larger hum and act, the smaller ext.
+template <class DF, class V = hn::Vec<DF>>
+HWY_INLINE V combine(DF d, const BlockEllipsoid& e, std::size_t draw, const InEllipsoid<V>& at, V p) {
+    const V value =
+        hn::Add(hn::Set(d, e.source->rim[draw]), hn::Mul(hn::Set(d, e.source->span[draw]), at.falloff));
+    const V combined = draw == kExt ? hn::Min(p, value) : hn::Max(p, value);
+    return hn::IfThenElse(hn::Lt(at.u2, hn::Set(d, 1.0f)), combined, p);
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
