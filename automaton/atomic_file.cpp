@@ -2,6 +2,7 @@
 #include "automaton/atomic_file.h"
 
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 #include <string>
 #include <system_error>
@@ -46,20 +47,40 @@ void flush_to_device(const std::filesystem::path& subject, const std::filesystem
         fail(reported, "cannot flush to the device", errno);
 }
 
+// What a path stands for: a symbolic link keeps pointing to the file that is replaced. A rename would put a file in the
+// place of a device or a pipe, so those are refused.
+std::filesystem::path target_of(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto kind = std::filesystem::status(path, error).type();
+    if (kind == std::filesystem::file_type::directory) fail(path, "cannot be written", EISDIR);
+    if (kind != std::filesystem::file_type::regular && kind != std::filesystem::file_type::not_found &&
+        kind != std::filesystem::file_type::none) {
+        throw Error(ErrorCode::io, path.string() + ": is not a regular file");
+    }
+    if (!std::filesystem::is_symlink(path, error)) return path;
+    const std::filesystem::path target = std::filesystem::weakly_canonical(path, error);
+    if (error) fail(path, "cannot follow the link", error.value());
+    return target;
+}
+
 }  // namespace
 
-void write_atomically(const std::filesystem::path& path,
+void write_atomically(const std::filesystem::path& given,
                       const std::function<void(const std::filesystem::path& temporary)>& write) {
-    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
     std::error_code error;
+    const std::filesystem::path path = target_of(given);
+    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
     std::filesystem::create_directories(folder, error);
     if (error) fail(folder, "cannot create the folder", error.value());
 
-    // Extension last, because some writers choose the format by it; the process number keeps two runs apart.
+    // Extension last, because some writers choose the format by it. The process number keeps two runs apart, the
+    // address of this call's variable two threads.
     std::string name = ".";
     name.append(path.stem().string())
         .append(".part")
         .append(std::to_string(::getpid()))
+        .append("-")
+        .append(std::to_string(reinterpret_cast<std::uintptr_t>(&error) >> 4))
         .append(path.extension());
     const std::filesystem::path temporary = folder / name;
     try {

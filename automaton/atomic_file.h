@@ -13,7 +13,8 @@
 namespace nephos {
 
 // Calls `write` with the path of the temporary file, which `write` must create and close; then publishes it.
-// Missing parent folders are created. On any failure the temporary file is removed and Error(io) names `path`
+// Missing parent folders are created. A symbolic link keeps pointing to the new file; a device, a pipe or a folder in
+// the place of the file is refused. On any failure the temporary file is removed and Error(io) names `path`
 // and the reason; what `write` throws passes through.
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write);

@@ -209,6 +209,12 @@ std::vector<ActiveEllipsoid> Automaton::ellipsoids() const {
 }
 
 void Automaton::set_external_ellipsoids(std::vector<ActiveEllipsoid> ellipsoids) {
+    for (const ActiveEllipsoid& e : ellipsoids) {
+        nephos::check(e.ellipsoid, impl_->options, "external ellipsoid");
+        if (!(e.weight >= 0 && e.weight <= 1)) {
+            throw Error(ErrorCode::usage, "weight " + std::to_string(e.weight) + " of an external ellipsoid: expected 0..1");
+        }
+    }
     impl_->external = std::move(ellipsoids);
 }
 
@@ -233,18 +239,27 @@ void Automaton::restore(std::span<const std::byte> bytes) {
     if (in.get<Extent>() != impl_->options.extent) {
         throw Error(ErrorCode::io, "saved state has another extent than the scene");
     }
-    impl_->steps = in.get<std::uint64_t>();
-    for (Displacement& d : impl_->fraction) d = in.get<Displacement>();
-    impl_->parcels.restore(in);
+    // Into fresh values first: bytes that end early must leave this simulation as it is.
+    const auto steps = in.get<std::uint64_t>();
+    std::vector<Displacement> fraction(impl_->fraction.size());
+    for (Displacement& d : fraction) d = in.get<Displacement>();
+    AirParcels parcels = impl_->parcels;
+    parcels.restore(in);
+    if (in.rest().size() != 3 * impl_->lattice.hum.words().size_bytes()) {
+        throw Error(ErrorCode::io, "saved state has another size than the scene's");
+    }
     for (BitPlane* plane : {&impl_->lattice.hum, &impl_->lattice.act, &impl_->lattice.cld}) {
         in.get_bytes(std::as_writable_bytes(plane->words()));
     }
-    if (!in.rest().empty()) throw Error(ErrorCode::io, "saved state is longer than the scene's");
+    impl_->steps = steps;
+    impl_->fraction = std::move(fraction);
+    impl_->parcels = std::move(parcels);
 }
 
 std::size_t Automaton::memory_bytes(const AutomatonOptions& options) {
     const std::size_t layer = std::size_t((options.extent.x + 63) / 64) * std::size_t(options.extent.y) * 8;
-    return 4 * BitPlane::bytes(options.extent) + layer;
+    return 4 * BitPlane::bytes(options.extent) + layer +
+           std::size_t(ellipsoid_count(options)) * (sizeof(AirParcel) + sizeof(ActiveEllipsoid) + sizeof(FieldEllipsoid));
 }
 
 }  // namespace nephos

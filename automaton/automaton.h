@@ -24,7 +24,7 @@
 
 namespace nephos {
 
-// XXH3-128 of the three planes in canonical order (state_hash.h).
+// XXH3-128 of the extent and the three planes in memory order (docs/adr/0003).
 struct StateHash {
     std::uint64_t high = 0, low = 0;
     std::string hex() const;  // 32 lower-case digits
@@ -60,7 +60,7 @@ class Automaton {
 
     // Replaces the ellipsoids that were set this way before; they act in the next step and until set again,
     // in addition to those of options.field. For callers that steer the field themselves. Not part of a
-    // checkpoint.
+    // checkpoint. Throws Error(usage) on an ellipsoid that check() would refuse or a weight outside 0..1.
     void set_external_ellipsoids(std::vector<ActiveEllipsoid> ellipsoids);
 
     // The complete state as bytes, for checkpoint.h; `restore` throws Error(io) on bytes it did not write.

@@ -29,8 +29,9 @@ std::vector<std::byte> read_all(const std::filesystem::path& path) {
     }
     const auto size = std::filesystem::file_size(path, error);
     if (error) throw Error(ErrorCode::io, path.string() + ": " + error.message());
-    std::vector<std::byte> bytes(size);
     std::ifstream in(path, std::ios::binary);
+    if (!is_checkpoint(path)) throw Error(ErrorCode::io, path.string() + ": is not a nephos checkpoint");
+    std::vector<std::byte> bytes(size);
     if (!in.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(size))) {
         throw Error(ErrorCode::io, path.string() + ": cannot read");
     }

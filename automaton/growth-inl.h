@@ -17,6 +17,7 @@
 
 #include <cstdint>
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include "automaton/kernels.h"
@@ -136,6 +137,7 @@ HWY_NOINLINE void grow(const StepPlanes& p, int z0, int z1, int y0, int y1) {
             if (p.boundaries.x == Boundary::periodic) wrap_row(rows.centre, hum, act_next, p.extent.x);
         }
     }
+    if constexpr (kStream) hwy::FlushStream();  // others read act_next in the next step
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -56,23 +56,6 @@ void check_semi_axis(double semi_axis_m, double box_m, bool periodic, const std:
             name + " = " + number(semi_axis_m) + ": at most 16 times the length of a periodic axis");
 }
 
-void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& name) {
-    require_finite(e.centre_m.x, name + ".centre_m.x");
-    require_finite(e.centre_m.y, name + ".centre_m.y");
-    require_finite(e.centre_m.z, name + ".centre_m.z");
-    const double cell = o.placement.cell_size_m;
-    const bool periodic_xy = o.boundaries.x == Boundary::periodic || o.boundaries.y == Boundary::periodic;
-    const double shorter = std::min(o.extent.x, o.extent.y) * cell;
-    check_semi_axis(e.semi_axes_m.x, shorter, periodic_xy, name + ".semi_axes_m.x");
-    check_semi_axis(e.semi_axes_m.y, shorter, periodic_xy, name + ".semi_axes_m.y");
-    check_semi_axis(e.semi_axes_m.z, o.extent.z * cell, o.boundaries.z == Boundary::periodic,
-                    name + ".semi_axes_m.z");
-    require_finite(e.yaw_deg, name + ".yaw_deg");
-    check(e.centre, name + ".centre");
-    check(e.rim, name + ".rim");
-    check_life(e.birth_s, e.life_s, e.fade_in_s, e.fade_out_s, name);
-}
-
 void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::string& name) {
     constexpr int kMaxCount = 100000;
     require(s.count >= 0 && s.count <= kMaxCount,
@@ -88,7 +71,7 @@ void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::stri
     check(s.life_s, name + ".life_s");
     for (bool largest : {false, true}) {  // both ends of every range make a valid ellipsoid
         const auto end = [&](const Range& r) { return largest ? r.max : r.min; };
-        check(Ellipsoid{.centre_m = {end(s.x_m), end(s.y_m), end(s.z_m)},
+        nephos::check(Ellipsoid{.centre_m = {end(s.x_m), end(s.y_m), end(s.z_m)},
                         .semi_axes_m = {end(s.semi_axis_x_m), end(s.semi_axis_y_m), end(s.semi_axis_z_m)},
                         .yaw_deg = end(s.yaw_deg),
                         .centre = s.centre,
@@ -122,7 +105,44 @@ void check(const Wind& wind, const AutomatonOptions& o) {
     }
 }
 
+// Images of one ellipsoid around the periodic axes, itself included (BlockField visits as many).
+double images_of(const Vec3& semi_axes_m, const AutomatonOptions& o) {
+    const double cell = o.placement.cell_size_m;
+    const auto along = [](Boundary boundary, double half_size_cells, int extent) {
+        return boundary == Boundary::periodic ? 2 * std::ceil(half_size_cells / extent) + 1 : 1;
+    };
+    const double half_xy = std::max(semi_axes_m.x, semi_axes_m.y) / cell;
+    return along(o.boundaries.x, half_xy, o.extent.x) * along(o.boundaries.y, half_xy, o.extent.y) *
+           along(o.boundaries.z, semi_axes_m.z / cell, o.extent.z);
+}
+
 }  // namespace
+
+void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& name) {
+    require_finite(e.centre_m.x, name + ".centre_m.x");
+    require_finite(e.centre_m.y, name + ".centre_m.y");
+    require_finite(e.centre_m.z, name + ".centre_m.z");
+    const double cell = o.placement.cell_size_m;
+    const bool periodic_xy = o.boundaries.x == Boundary::periodic || o.boundaries.y == Boundary::periodic;
+    const double shorter = std::min(o.extent.x, o.extent.y) * cell;
+    check_semi_axis(e.semi_axes_m.x, shorter, periodic_xy, name + ".semi_axes_m.x");
+    check_semi_axis(e.semi_axes_m.y, shorter, periodic_xy, name + ".semi_axes_m.y");
+    check_semi_axis(e.semi_axes_m.z, o.extent.z * cell, o.boundaries.z == Boundary::periodic,
+                    name + ".semi_axes_m.z");
+    require_finite(e.yaw_deg, name + ".yaw_deg");
+    check(e.centre, name + ".centre");
+    check(e.rim, name + ".rim");
+    check_life(e.birth_s, e.life_s, e.fade_in_s, e.fade_out_s, name);
+}
+
+std::uint64_t ellipsoid_count(const AutomatonOptions& o) {
+    double count = 0;
+    for (const Ellipsoid& e : o.field.ellipsoids) count += images_of(e.semi_axes_m, o);
+    for (const EllipsoidScatter& s : o.field.scatters) {
+        count += s.count * images_of({s.semi_axis_x_m.max, s.semi_axis_y_m.max, s.semi_axis_z_m.max}, o);
+    }
+    return std::uint64_t(std::min(count, 1e18));
+}
 
 void check(const AutomatonOptions& o) {
     for (int n : {o.extent.x, o.extent.y, o.extent.z}) {
@@ -143,6 +163,12 @@ void check(const AutomatonOptions& o) {
     for (std::size_t i = 0; i < o.field.scatters.size(); ++i) {
         check(o.field.scatters[i], o, "field.scatters[" + std::to_string(i) + "]");
     }
+    require(o.field.scatters.size() <= kMaxScatters,
+            "field.scatters: " + std::to_string(o.field.scatters.size()) + " of them; at most 65536 are possible");
+    const std::uint64_t ellipsoids = ellipsoid_count(o);
+    require(ellipsoids <= kMaxEllipsoids, "the field has " + std::to_string(ellipsoids) +
+                                              " ellipsoids, images around periodic axes included; at most " +
+                                              std::to_string(kMaxEllipsoids) + " are possible");
     check(o.wind, o);
 }
 

@@ -3,7 +3,9 @@
 
 // Everything that decides the bits of a simulation; plain data, filled by a scene or by another program.
 
+#include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "automaton/field.h"
 #include "automaton/lattice.h"
@@ -28,6 +30,14 @@ struct AutomatonOptions {
     Wind wind;
     bool operator==(const AutomatonOptions&) const = default;
 };
+
+// Number of ellipsoids that a step visits: those of the options, and their images around periodic axes.
+std::uint64_t ellipsoid_count(const AutomatonOptions& options);
+inline constexpr std::uint64_t kMaxEllipsoids = 1'000'000;
+inline constexpr std::size_t kMaxScatters = 65536;
+
+// Throws Error(usage) when an ellipsoid of a simulation with these options is meaningless; `name` is for the message.
+void check(const Ellipsoid& ellipsoid, const AutomatonOptions& options, const std::string& name);
 
 // Every problem of `options` would make the simulation meaningless: throws Error(usage) naming the first one.
 void check(const AutomatonOptions& options);

@@ -3,7 +3,8 @@
 
 // Wind: a horizontal velocity that depends on height and time, piecewise linear in both (D: advection; D
 // names vector fields as the improvement). Motion is accumulated as integers, so nothing drifts: after n
-// steps of a constant wind the displacement is floor(n * speed) cells exactly, whatever the speed.
+// steps of a constant wind the displacement is floor(n * d) cells exactly, whatever the speed, with d the
+// displacement of one step rounded to 2^-32 cell.
 
 #include <cstdint>
 #include <vector>

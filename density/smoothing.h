@@ -11,7 +11,8 @@
 //
 //     q = min(1, float(sum) * r),   r = 1 / float(W) rounded towards 1 or above
 //
-// is 1 exactly where every cell of the window is cloud, and above 0 exactly where one is. Beyond an open
+// is 1 exactly where every cell of the window is cloud (and, for windows with W > 2^24, where all but a part in
+// 2^24 is), and above 0 exactly where one is. Beyond an open
 // boundary cells are 0, so density falls towards it; a periodic axis wraps.
 //
 // The result does not depend on the number of threads or the instruction set. Functions are thread-safe and

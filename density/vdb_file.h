@@ -8,34 +8,35 @@
 // voxel (i, j, k), so the transform is: world = (i, j, k) * voxel + origin + voxel / 2. All grids of a file
 // share it.
 //
-// | grid            | type  | class      | content |
-// |-----------------|-------|------------|----------------------------------------------------------------------|
-// | `density`       | float | fog volume | 0..1, float or half; the two extreme corners are active with value
-// 0 | | `hum act cld`   | bool  |            | active and true where the bit is 1; on request | | `vel` |
-// vec3s |            | wind in m/s (east, north, 0), in every 8x8x8 block that holds density; on request |
+// clang-format off
+//
+//     grid          type            content
+//     density       float, half     fog volume, 0..1; the two extreme corners are active with value 0
+//     hum act cld   bool            active and true where the bit is 1; on request
+//     vel           vec3s           wind in m/s (east, north, 0), in blocks of 8x8x8 that hold density; on request
 //
 // The two corner voxels of `density` make the active bounds, and with them OpenVDB's own `file_bbox_min` and
-// `file_bbox_max`, the same in every file of a sequence, clouds or none. Where density is refined, one cell
-// is refine^3 equal voxels in the bool grids.
+// `file_bbox_max`, the same in every file of a sequence, clouds or none. The other grids keep the bounds of what they
+// hold; nephos_bbox_min/max say the constant ones. Where density is refined, one cell is refine^3 equal voxels in the
+// bool grids.
 //
 // Metadata, in the file and in each grid:
 //
-// | name                          | type   | meaning                                                    |
-// |-------------------------------|--------|------------------------------------------------------------|
-// | nephos_units                  | string | "m"                                                        |
-// | nephos_up_axis                | string | "z"                                                        |
-// | nephos_extinction_per_m       | double | extinction coefficient where density is 1                  |
-// | nephos_time_s                 | double | simulated time of this frame                               |
-// | nephos_time_step_s            | double | simulated time of one automaton step                       |
-// | nephos_frames_per_second      | double | frames per simulated second (of the sequence)              |
-// | nephos_seed                   | string | decimal, 0..2^64-1                                         |
-// | nephos_scene_hash             | string | hash of the scene                                          |
-// | nephos_state_hash             | string | hash of the automaton's state at or before this frame      |
-// | nephos_version                | string | version of nephos that wrote the file                      |
-// | nephos_random_stream_version  | int32  | version of the random stream                               |
-// | nephos_refine                 | int32  | voxels per cell and axis                                   |
-// | nephos_bbox_min, nephos_bbox_max | vec3i | bounds of the voxels, both included; constant over a sequence
-// |
+//     nephos_units                      string   "m"
+//     nephos_up_axis                    string   "z"
+//     nephos_extinction_per_m           double   extinction coefficient where density is 1
+//     nephos_time_s                     double   simulated time of this frame
+//     nephos_time_step_s                double   simulated time of one automaton step
+//     nephos_frames_per_second          double   frames per simulated second (of the sequence)
+//     nephos_seed                       string   decimal, 0..2^64-1
+//     nephos_scene_hash                 string   hash of the scene
+//     nephos_state_hash                 string   hash of the automaton's state at or before this frame
+//     nephos_version                    string   version of nephos that wrote the file
+//     nephos_random_stream_version      int32    version of the random stream
+//     nephos_refine                     int32    voxels per cell and axis
+//     nephos_bbox_min, nephos_bbox_max  vec3i    bounds of the voxels, both included; constant over a sequence
+//
+// clang-format on
 
 #include <cstddef>
 #include <cstdint>
@@ -111,8 +112,8 @@ struct LoadedDensity {
 };
 
 // Reads any float or half fog volume (also double). Bounds are nephos_bbox where present, else the active
-// bounds, moved so that voxel (0, 0, 0) is the lowest corner. The transform must have cubic voxels and axes
-// along the world's (any order and direction). Everything untrusted happens in a child process with limits on
+// bounds, moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and direction, are permuted; what is
+// turned, sheared or not cubic is resampled, with a note. Everything untrusted happens in a child process with limits on
 // memory and time, which sends the voxels back; this process never parses the file. Throws Error(io) naming
 // the path and what was wrong with it; Error(usage) on bad options.
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});

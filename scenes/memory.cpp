@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
+constexpr double kCheckpointCopies = 3;
 constexpr double kPlannedCover = 0.5;     // share of voxels that are cloud
 constexpr double kBytesPerVoxel = 4.5;    // a float, and the masks and nodes of the tree above it
 constexpr double kGrids = 3;              // two steps and the frame between them
@@ -133,8 +134,13 @@ MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
     const double window =
         2.0 * scene.density.smoothing.t0 + 2;  // the steps around both neighbours of a frame
     MemoryEstimate estimate;
+    // With the state written, hum and act are remembered beside cld. A checkpoint holds the planes and that history
+    // as bytes: gathered in a growing buffer, and copied once into the file's content.
+    const double plane = double(BitPlane::bytes(extent));
+    const double history = window * (scene.density.write_state ? 3 : 1) * plane;
+    const double checkpoint = kCheckpointCopies * (3 * plane + history);
     estimate.automaton = Automaton::memory_bytes(scene.automaton);
-    estimate.density = saturated(window * double(BitPlane::bytes(extent)) + voxels * kGrids * kBytesPerVoxel);
+    estimate.density = saturated(history + checkpoint + voxels * kGrids * kBytesPerVoxel);
     if (!with_pictures) return estimate;
     const double pixels = double(scene.render.camera.width) * scene.render.camera.height;
     const double texels = double(scene.render.shadow_map_size) * scene.render.shadow_map_size;

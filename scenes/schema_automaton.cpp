@@ -281,7 +281,7 @@ const Section& time_section() {
                                  {key<&Scene::automaton, &AutomatonOptions::time_step_s>(
                                       "step_s", "s", above(0, 86'400),
                                       "Simulated time of one step: a larger one makes clouds change faster."),
-                                  key<&Scene::steps>("steps", "", between(0, 1e12), "Number of steps.")},
+                                  key<&Scene::steps>("steps", "", between(0, 1e9), "Number of steps.")},
                                  nullptr};
     return section;
 }

@@ -178,7 +178,12 @@ std::string to_toml(const Scene& scene) {
     return out;
 }
 
-std::string scene_hash(const Scene& scene) { return hash_of(to_toml(scene)); }
+std::string scene_hash(const Scene& scene) {
+    if (!scene.initial_state_file) return hash_of(to_toml(scene));
+    Scene named = scene;  // the folder that the state's file was found in does not make another scene
+    named.initial_state_file = scene.initial_state_file->filename();
+    return hash_of(to_toml(named));
+}
 
 std::string simulation_hash(const Scene& scene, std::string_view initial_state_hash) {
     Scene simulation;

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "automaton/atomic_file.h"
 #include "automaton/automaton.h"
@@ -118,7 +119,8 @@ TEST(Checkpoint, RefusesDamagedFiles) {
         changed[at] = char(changed[at] ^ 0x10);
         with(changed);
     }
-    EXPECT_NE(with("").find("ends early"), std::string::npos);
+    EXPECT_NE(with("").find("not a nephos checkpoint"), std::string::npos);
+    EXPECT_NE(with(good.substr(0, 20)).find("ends early"), std::string::npos);
     EXPECT_NE(with("not a checkpoint at all").find("not a nephos checkpoint"), std::string::npos);
     EXPECT_NE(with(good + "x").find("after its end"), std::string::npos);
     EXPECT_NE(reason_of(folder / "missing").find("no such file"), std::string::npos);
@@ -161,6 +163,30 @@ TEST(AtomicFile, MakesFoldersAndNamesWhatFails) {
     EXPECT_TRUE(fs::exists(folder / "a/b/c.txt"));
     EXPECT_THROW(write_atomically(folder / "a/b/c.txt/below-a-file", "content"), Error);
     EXPECT_THROW(write_atomically(folder / "a/b", "over a folder"), Error);
+}
+
+// A rename would put a file in the place of a pipe or of the link itself.
+TEST(AtomicFile, FollowsLinksAndRefusesWhatIsNoFile) {
+    const TemporaryFolder folder;
+    write_atomically(folder / "target", "old");
+    fs::create_symlink("target", folder / "link");
+    write_atomically(folder / "link", "new");
+    EXPECT_TRUE(fs::is_symlink(folder / "link"));
+    std::ifstream in(folder / "target");
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "new");
+    ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+    EXPECT_THROW(write_atomically(folder / "pipe", "content"), Error);
+    EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
+}
+
+TEST(Checkpoint, AFailedRestoreChangesNothing) {
+    Automaton automaton(stormy_options());
+    automaton.step();
+    const std::vector<std::byte> before = automaton.save();
+    for (std::size_t size : {before.size() - 1, before.size() / 2, std::size_t{40}}) {
+        EXPECT_THROW(automaton.restore(std::span(before).first(size)), Error);
+        EXPECT_EQ(automaton.save(), before);
+    }
 }
 
 }  // namespace

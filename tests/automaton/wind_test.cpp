@@ -163,6 +163,25 @@ TEST(AirParcels, AreReplacedUpwind) {
     }
 }
 
+TEST(Options, TheNumberOfEllipsoidsIsLimited) {
+    AutomatonOptions o = carried_options({1, 1});
+    EXPECT_EQ(ellipsoid_count(o), 20u);
+    o.boundaries = {Boundary::periodic, Boundary::periodic, Boundary::periodic};
+    EXPECT_EQ(ellipsoid_count(o), 20u * 27u);
+    o.field.scatters[0].count = 100000;
+    EXPECT_THROW(check(o), Error);
+}
+
+TEST(Automaton, RefusesMeaninglessExternalEllipsoids) {
+    Automaton automaton(carried_options({1, 1}));
+    Ellipsoid flat;
+    flat.semi_axes_m.z = 0;
+    EXPECT_THROW(automaton.set_external_ellipsoids({{flat, 1}}), Error);
+    EXPECT_THROW(automaton.set_external_ellipsoids({{Ellipsoid{}, 1.5}}), Error);
+    automaton.set_external_ellipsoids({{Ellipsoid{}, 0.5}});
+    automaton.step();
+}
+
 TEST(Options, EachProblemIsNamed) {
     const auto reason = [](auto change) -> std::string {
         AutomatonOptions o = carried_options({1, 1});

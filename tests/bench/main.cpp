@@ -31,8 +31,10 @@ void print(const std::vector<nephos::bench::BenchRow>& rows) {
     for (const auto& row : rows) {
         const bool faster = row.target.find("faster") != std::string::npos;
         const double ratio = faster ? row.other_ms / row.ours_ms : row.ours_ms / row.other_ms;
-        fmt::print("| {} | {:.3g} | {:.3g} | {:.2f}x{} | {} | {} |\n", row.work, row.ours_ms, row.other_ms,
-                   ratio, faster ? " faster" : "", row.target, row.note);
+        const bool compared = row.other_ms > 0;  // some rows have a target in ms and no other side
+        fmt::print("| {} | {:.3g} | {} | {} | {} | {} |\n", row.work, row.ours_ms,
+                   compared ? fmt::format("{:.3g}", row.other_ms) : "",
+                   compared ? fmt::format("{:.2f}x{}", ratio, faster ? " faster" : "") : "", row.target, row.note);
         std::fflush(stdout);
     }
     fmt::print("\n");

@@ -47,7 +47,7 @@ std::vector<BenchRow> memory_rows(const fs::path& source, const fs::path& comman
     const Scene scene = read_scene(scene_file);
     const fs::path folder = fs::temp_directory_path() / ("nephos_bench_" + std::to_string(::getpid()));
     const double peak = peak_of(
-        {command, "run", scene_file, "--no-render", "--frames", "1..1", "--threads", "1", "--out", folder});
+        {command, "run", scene_file, "--no-render", "--frames", "1..3", "--threads", "1", "--out", folder});
     const DensityGrid density = read_density(frame_path(folder / "density", scene.name, 1));
     fs::remove_all(folder);
     const double bits = 3.0 * double(BitPlane::bytes(scene.automaton.extent)) / kMiB;

@@ -8,7 +8,7 @@
 
 namespace nephos::bench {
 
-// Peak memory of `nephos run large.toml --no-render` for its first frame, against three times its bit planes
+// Peak memory of `nephos run large.toml --no-render` for its first three frames, against three times its bit planes
 // plus the leaves of its density. The columns are MiB, not ms. `command` is the nephos program.
 std::vector<BenchRow> memory_rows(const std::filesystem::path& source, const std::filesystem::path& command);
 
