@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include "automaton/bytes.h"
 #include "automaton/error.h"
@@ -38,7 +39,10 @@ void put_settings(ByteWriter& writer, const Scene& scene, const PipelineRange& r
     writer.put(std::uint8_t(scene.density.write_state));
 }
 
-void put_plane(ByteWriter& writer, const BitPlane& plane) { writer.put_bytes(std::as_bytes(plane.words())); }
+void append_plane(std::vector<std::byte>& bytes, const BitPlane& plane) {
+    const std::span<const std::byte> words = std::as_bytes(plane.words());
+    bytes.insert(bytes.end(), words.begin(), words.end());
+}
 
 BitPlane get_plane(ByteReader& reader, Extent extent) {
     BitPlane plane(extent);
@@ -219,7 +223,10 @@ DensityGrid Pipeline::density_at_step(std::uint64_t step) {
     return density;
 }
 
-Checkpoint Pipeline::save() const {
+Checkpoint Pipeline::save() {
+    densities_.clear();
+    // Hands the small blocks that the densities lay in back to the system; the planes below need large ones.
+    ::malloc_trim(0);
     ByteWriter writer;
     writer.put(kHistoryVersion);
     put_settings(writer, scene_, range_);
@@ -230,13 +237,18 @@ Checkpoint Pipeline::save() const {
         writer.put(state.step);
         writer.put(state.statistics);
         writer.put(state.hash);
-        put_plane(writer, state.cld);
-        if (scene_.density.write_state) {
-            put_plane(writer, state.hum);
-            put_plane(writer, state.act);
-        }
     }
-    return {simulation_hash_, automaton_.steps(), automaton_.hash(), automaton_.save(), writer.take()};
+    std::vector<std::byte> bytes = writer.take();
+    // The planes at their exact size: a growing vector would hold them twice.
+    const std::size_t planes = history_.size() * (scene_.density.write_state ? 3 : 1);
+    bytes.reserve(bytes.size() + planes * automaton_.cld().word_count() * sizeof(std::uint64_t));
+    for (const Past& state : history_) {
+        append_plane(bytes, state.cld);
+        if (!scene_.density.write_state) continue;
+        append_plane(bytes, state.hum);
+        append_plane(bytes, state.act);
+    }
+    return {simulation_hash_, automaton_.steps(), automaton_.hash(), automaton_.save(), std::move(bytes)};
 }
 
 void Pipeline::restore_history(const Checkpoint& checkpoint) {
@@ -261,12 +273,13 @@ void Pipeline::restore_history(const Checkpoint& checkpoint) {
         state.step = reader.get<std::uint64_t>();
         state.statistics = reader.get<CloudStatistics>();
         state.hash = reader.get<StateHash>();
-        state.cld = get_plane(reader, scene_.automaton.extent);
-        if (scene_.density.write_state) {
-            state.hum = get_plane(reader, scene_.automaton.extent);
-            state.act = get_plane(reader, scene_.automaton.extent);
-        }
         history_.push_back(std::move(state));
+    }
+    for (Past& state : history_) {
+        state.cld = get_plane(reader, scene_.automaton.extent);
+        if (!scene_.density.write_state) continue;
+        state.hum = get_plane(reader, scene_.automaton.extent);
+        state.act = get_plane(reader, scene_.automaton.extent);
     }
     // past() relies on these.
     const auto reach = std::uint64_t(scene_.density.smoothing.t0);

@@ -94,7 +94,8 @@ class Pipeline {
     // a step. Precondition: not finished().
     void advance(PipelineSink& sink);
 
-    Checkpoint save() const;
+    // Gives back the densities, to make room for the copy; they are computed again when they are needed.
+    Checkpoint save();
 
     std::uint64_t steps_taken() const { return automaton_.steps(); }
     std::uint64_t next_step() const { return next_step_; }  // the first that was not reported yet

@@ -83,7 +83,7 @@ class Recorder : public PipelineSink {
     }
 
     // Statistics and manifest first: what the checkpoint goes on from is then always there.
-    void save(const Pipeline& pipeline, bool complete, double wall_s) {
+    void save(Pipeline& pipeline, bool complete, double wall_s) {
         write_atomically(folder_.statistics(), rows_);
         write_checkpoint(folder_.checkpoint(), pipeline.save());
         write_manifest(complete, wall_s);
