@@ -159,7 +159,7 @@ const Section& light_section() {
              "g", "", between(-0.99, 0.99),
              "Asymmetry of the phase function: above 0 light goes forward, so the rims of clouds before the "
              "sun shine.",
-             "S, phase function"),
+             "Henyey and Greenstein 1941"),
          render_key<&RenderOptions::light, &CloudLight::multiple_scattering>(
              "multiple_scattering", "", between(0, 10),
              "Strength of the sunlight that arrives after many scatterings and reaches deep into a cloud; 0 "
