@@ -208,15 +208,21 @@ void remove_earlier_run(const RunFolder& folder) {
     }
 }
 
-// An interrupted run may hold hours of work: it is not thrown away without being asked.
+// An interrupted run may hold hours of work, and a manifest may be somebody else's: neither is thrown away
+// without being asked.
 void refuse_to_lose(const RunFolder& folder) {
     std::error_code error;
-    if (!std::filesystem::exists(folder.checkpoint(), error) ||
-        !std::filesystem::exists(folder.manifest(), error)) {
-        return;
+    if (!std::filesystem::exists(folder.manifest(), error)) return;
+    EarlierRun earlier;
+    try {
+        earlier = read_manifest(folder.manifest());
+    } catch (const Error& reason) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: nothing was written, because the folder holds a manifest.json that is "
+                                "not of a run ({}): choose another --out, or give --overwrite",
+                                folder.folder.string(), reason.what()));
     }
-    const EarlierRun earlier = read_manifest(folder.manifest());
-    if (earlier.complete) return;
+    if (earlier.complete || !std::filesystem::exists(folder.checkpoint(), error)) return;
     throw Error(
         ErrorCode::usage,
         fmt::format("{}: holds an interrupted run of '{}' ({} of {} steps): give --resume to go on, or "
