@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/manifest.h"
 
-#include <cerrno>
-#include <cstring>
 #include <fstream>
+#include <string_view>
 
 #include <nlohmann/json.hpp>
 
 #include "apps/version.h"
+#include "automaton/atomic_file.h"
+#include "automaton/descriptor.h"
 #include "automaton/error.h"
 #include "automaton/random.h"
 
@@ -25,23 +26,19 @@ std::string relative(const RunSettings& settings, const std::filesystem::path& p
     return path.lexically_relative(settings.folder).generic_string();
 }
 
-Json frames_json(const RunSettings& settings, const ManifestState& state, const RunFolder& folder) {
+Json frame_json(const RunSettings& settings, const FrameRecord& frame, const RunFolder& folder) {
     const FrameOptions& frames = settings.scene.frames;
-    Json list = Json::array();
-    for (const FrameRecord& frame : state.frames) {
-        Json entry = {{"number", frame.number},
-                      {"time_s", frame.time_s},
-                      {"step", frame.step},
-                      {"state_hash", frame.state_hash},
-                      {"density", relative(settings, folder.density(frame.number))}};
-        if (settings.render && (frames.png || frames.video)) {
-            entry["png"] = relative(settings, folder.picture(frame.number, ".png"));
-        }
-        if (settings.render && frames.exr)
-            entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
-        list.push_back(std::move(entry));
+    Json entry = {{"number", frame.number},
+                  {"time_s", frame.time_s},
+                  {"step", frame.step},
+                  {"state_hash", frame.state_hash.hex()},
+                  {"density", relative(settings, folder.density(frame.number))}};
+    if (settings.render && (frames.png || frames.video)) {
+        entry["png"] = relative(settings, folder.picture(frame.number, ".png"));
     }
-    return list;
+    if (settings.render && frames.exr)
+        entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
+    return entry;
 }
 
 Json bounds_json(const Scene& scene) {
@@ -59,9 +56,8 @@ Json bounds_json(const Scene& scene) {
             {"extinction_per_m", scene.density.extinction_per_m}};
 }
 
-}  // namespace
-
-std::string manifest_text(const RunSettings& settings, const ManifestState& state) {
+// All that stands before the list of frames.
+Json head_json(const RunSettings& settings, const ManifestState& state) {
     const Scene& scene = settings.scene;
     const RunFolder folder{settings.folder, scene.name};
     Json json;
@@ -89,17 +85,43 @@ std::string manifest_text(const RunSettings& settings, const ManifestState& stat
         json["files"]["video"] = relative(settings, folder.video());
     }
     json["frames_per_second"] = scene.frames.per_second;
-    json["frames"] = frames_json(settings, state, folder);
-    json["scene_text"] = settings.scene_text;
-    json["timing"] = {{"wall_s", state.wall_s}, {"device", state.device}};
-    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    json["time_scale"] = scene.frames.time_scale;
+    return json;
+}
+
+// The members of an object in lines of their own, without its braces.
+std::string members(const Json& object) {
+    const std::string text = object.dump(2, ' ', false, Json::error_handler_t::replace);
+    return text.substr(2, text.size() - 4);
+}
+
+}  // namespace
+
+void write_manifest(const RunSettings& settings, const ManifestState& state) {
+    const RunFolder folder{settings.folder, settings.scene.name};
+    write_pieces_atomically(folder.manifest(), [&](const AppendPiece& append) {
+        append("{\n" + members(head_json(settings, state)) + ",\n  \"frames\": [");
+        std::string_view separator = "\n";
+        for (const FrameRecord& frame : state.frames) {
+            append(separator);
+            append("    " +
+                   frame_json(settings, frame, folder).dump(-1, ' ', false, Json::error_handler_t::replace));
+            separator = ",\n";
+        }
+        const Json tail = {{"scene_text", settings.scene_text},
+                           {"timing", {{"wall_s", state.wall_s}, {"device", state.device}}}};
+        append("\n  ],\n" + members(tail) + "\n}\n");
+    });
 }
 
 EarlierRun read_manifest(const std::filesystem::path& path) {
+    require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
-    if (!stream) throw Error(ErrorCode::io, path.string() + ": cannot open: " + std::strerror(errno));
     try {
-        const Json json = Json::parse(stream);
+        // The frames are not needed here, and may be very many.
+        const Json json = Json::parse(stream, [](int depth, Json::parse_event_t event, const Json& parsed) {
+            return !(depth == 1 && event == Json::parse_event_t::key && parsed == "frames");
+        });
         if (json.at("format") != "nephos run" || json.at("format_version") != kFormatVersion) {
             throw Error(ErrorCode::io, path.string() + ": is not a manifest of this version of nephos");
         }

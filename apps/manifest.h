@@ -9,15 +9,17 @@
 #include <vector>
 
 #include "apps/run_folder.h"
+#include "automaton/automaton.h"
 
 namespace nephos {
 
-// A frame that is in the folder.
+// A frame that is in the folder. Small: a run keeps one for each frame, 40 bytes beside a grid of kilobytes
+// on disk.
 struct FrameRecord {
     int number = 1;
     double time_s = 0;
     std::uint64_t step = 0;
-    std::string state_hash;
+    StateHash state_hash;
 };
 
 // What a run tells its manifest.
@@ -30,7 +32,9 @@ struct ManifestState {
     std::string device;
 };
 
-std::string manifest_text(const RunSettings& settings, const ManifestState& state);
+// Writes atomically, frame by frame. As JSON cannot be appended to, every call writes the whole list anew:
+// some 200 bytes a frame, against seconds between two checkpoints. Throws Error(io).
+void write_manifest(const RunSettings& settings, const ManifestState& state);
 
 // What a later run must know about an earlier one.
 struct EarlierRun {

@@ -25,16 +25,29 @@ struct RunArguments {
     SceneArguments scene;
     std::string out;
     std::optional<FrameRange> frames;
-    bool no_render = false, video = false, resume = false, overwrite = false;
+    bool no_render = false, video = false, resume = false, overwrite = false, needs = false;
     double checkpoint_every_s = 60;
     WorkArguments work;
 };
 
+Scene scene_of(const RunArguments& a) {
+    Scene scene = load_scene(a.scene);
+    if (a.video) scene.frames.video = true;
+    return scene;
+}
+
+// For scripts that install what is missing (./run): the scene and --set decide as much as the options do.
+void print_needs(const RunArguments& a) {
+    const Scene scene = scene_of(a);
+    Output output;
+    if (!a.no_render && wants_pictures(scene)) output.line("vulkan");
+    if (!a.no_render && wants_video(scene)) output.line("ffmpeg");
+}
+
 RunSettings settings_of(const RunArguments& a) {
     RunSettings settings;
     Scene& scene = settings.scene;
-    scene = load_scene(a.scene);
-    if (a.video) scene.frames.video = true;
+    scene = scene_of(a);
     settings.scene_file = std::filesystem::path(a.scene.file).filename().string();
     settings.scene_text = to_toml(scene);
     settings.scene_hash = scene_hash(scene);
@@ -128,6 +141,10 @@ void print_json(const RunReport& report, const RunSettings& settings) {
 
 int run(const RunArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
+    if (a.needs) {
+        print_needs(a);
+        return 0;
+    }
     const ThreadLimit limit(a.work.threads);
     RunSettings settings = settings_of(a);
     std::unique_ptr<ProgressBar> bar;
@@ -170,10 +187,13 @@ void add_run_command(CLI::App& app, Action& action) {
                       "No pictures, only density grids and statistics; needs no GPU");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
     command->add_flag("--resume", a->resume, "Go on where an interrupted run stopped");
-    command->add_flag("--overwrite", a->overwrite, "Start anew although the folder holds an interrupted run");
+    command->add_flag("--overwrite", a->overwrite,
+                      "Start anew although the folder holds an interrupted run, or files that no run wrote");
     add_value(*command, "--checkpoint-every", "S",
               "Seconds between checkpoints (default: 60); Ctrl-C always leaves one",
               [a](const std::string& text) { a->checkpoint_every_s = parse_real(text, 0, 1e9); });
+    command->add_flag("--needs", a->needs,
+                      "Only print what the run needs of the system, a word a line: vulkan, ffmpeg");
     add_threads(*command, a->work);
     add_json(*command, a->work);
     add_quiet(*command, a->work);

@@ -8,10 +8,12 @@
 
 #include <fmt/format.h>
 
+#include "apps/folder_lock.h"
 #include "apps/manifest.h"
 #include "apps/statistics_file.h"
 #include "apps/version.h"
 #include "automaton/atomic_file.h"
+#include "automaton/checkpoint.h"
 #include "automaton/error.h"
 #include "automaton/random.h"
 #include "density/metaballs.h"
@@ -19,6 +21,7 @@
 #include "render/image_file.h"
 #include "render/renderer.h"
 #include "render/video.h"
+#include "scenes/writer.h"
 
 namespace nephos {
 namespace {
@@ -30,47 +33,49 @@ double seconds_since(Clock::time_point begin) {
 }
 
 bool wants_png(const Scene& scene) { return scene.frames.png || scene.frames.video; }
-bool wants_pictures(const Scene& scene) { return wants_png(scene) || scene.frames.exr; }
 
-// Turns results into files; keeps in memory what statistics.csv and the manifest are written from.
+// Turns results into files.
 class Recorder : public PipelineSink {
   public:
     explicit Recorder(const RunSettings& settings)
-        : settings_(settings), folder_{settings.folder, settings.scene.name}, rows_(kStatisticsHeader) {
+        : settings_(settings), folder_{settings.folder, settings.scene.name} {
         if (settings.render) renderer_ = std::make_unique<Renderer>();
         if (renderer_) state_.device = renderer_->device_name();
     }
 
     void step(const StepResult& result) override {
-        const std::string row = statistics_row(result);
-        rows_ += row;
-        state_.state_hash = hash_in_row(row);
+        statistics_->add(statistics_row(result));
+        state_.state_hash = result.hash.hex();
         state_.steps_reported = result.step + 1;
     }
 
     void frame(const FrameResult& result) override {
         write_density(result);
         if (renderer_) draw(result);
-        state_.frames.push_back({result.number, result.time_s, result.step, result.hash.hex()});
+        state_.frames.push_back({result.number, result.time_s, result.step, result.hash});
+    }
+
+    // The files of a run that begins. A folder that cannot be written to is found now.
+    void begin() {
+        write_manifest(false, 0);
+        statistics_ = StatisticsFile::create(folder_.statistics());
     }
 
     // Takes over what an earlier run reported up to where `pipeline` goes on, and checks that it is all
     // there.
     void take_over(const Pipeline& pipeline) {
-        rows_ = read_statistics(folder_.statistics(), pipeline.next_step());
+        int number = settings_.range.first_frame;
+        const auto record_frames_of = [&](std::uint64_t step, std::string_view, const StateHash& hash) {
+            state_.state_hash = hash.hex();
+            for (; number < pipeline.next_frame(); ++number) {
+                const double time_s = frame_time_s(settings_.scene.frames, number - 1);
+                if (moment_of(time_s, settings_.scene.automaton.time_step_s).step != step) return;
+                state_.frames.push_back({number, time_s, step, hash});
+            }
+        };
+        // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
+        statistics_ = StatisticsFile::resume(folder_.statistics(), pipeline.next_step(), record_frames_of);
         state_.steps_reported = pipeline.next_step();
-        std::vector<std::string_view> hashes;
-        for (std::size_t begin = kStatisticsHeader.size(); begin < rows_.size();) {
-            const std::size_t end = rows_.find('\n', begin);
-            hashes.push_back(hash_in_row(std::string_view(rows_).substr(begin, end - begin)));
-            begin = end + 1;
-        }
-        if (!hashes.empty()) state_.state_hash = hashes.back();
-        for (int number = settings_.range.first_frame; number < pipeline.next_frame(); ++number) {
-            const double time_s = frame_time_s(settings_.scene.frames, number - 1);
-            const std::uint64_t step = moment_of(time_s, settings_.scene.automaton.time_step_s).step;
-            state_.frames.push_back({number, time_s, step, std::string(hashes.at(std::size_t(step)))});
-        }
         for (const RunFiles& files : frame_files()) {
             for (const std::filesystem::path& file : files.files) {
                 if (std::filesystem::exists(file)) continue;
@@ -84,7 +89,7 @@ class Recorder : public PipelineSink {
 
     // Statistics and manifest first: what the checkpoint goes on from is then always there.
     void save(Pipeline& pipeline, bool complete, double wall_s) {
-        write_atomically(folder_.statistics(), rows_);
+        statistics_->save();
         write_checkpoint(folder_.checkpoint(), pipeline.save());
         write_manifest(complete, wall_s);
     }
@@ -92,10 +97,10 @@ class Recorder : public PipelineSink {
     void write_manifest(bool complete, double wall_s) {
         state_.complete = complete;
         state_.wall_s = wall_s;
-        write_atomically(folder_.manifest(), manifest_text(settings_, state_));
+        nephos::write_manifest(settings_, state_);
     }
 
-    void encode_video() {
+    void encode_video() const {
         std::vector<std::filesystem::path> pictures;
         for (const FrameRecord& frame : state_.frames)
             pictures.push_back(folder_.picture(frame.number, ".png"));
@@ -170,7 +175,7 @@ class Recorder : public PipelineSink {
     const RunSettings& settings_;
     RunFolder folder_;
     std::unique_ptr<Renderer> renderer_;
-    std::string rows_;
+    std::optional<StatisticsFile> statistics_;  // from begin() or take_over() on
     ManifestState state_;
 };
 
@@ -190,39 +195,95 @@ void remove_file(const std::filesystem::path& path) {
     if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
 }
 
+// Names of the files in a part of the folder ("." for itself); none when it is not there.
+std::vector<std::string> names_in(const RunFolder& folder, const char* part) {
+    std::vector<std::string> names;
+    std::error_code error;
+    for (std::filesystem::directory_iterator at(folder.folder / part, error), end; !error && at != end;
+         at.increment(error)) {
+        names.push_back(at->path().filename().string());
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+// What a run of this name writes and finds there already, the manifest last: as long as it is there, the rest
+// is known to be of a run.
+std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
+    std::vector<std::filesystem::path> files;
+    for (const char* part : {"density", "frames"}) {
+        for (const std::string& name : names_in(folder, part)) {
+            if (is_frame_of(name, folder.name)) files.push_back(folder.folder / part / name);
+        }
+    }
+    for (const std::filesystem::path& path :
+         {folder.checkpoint(), folder.statistics(), folder.video(), folder.manifest()}) {
+        std::error_code error;
+        if (std::filesystem::symlink_status(path, error).type() != std::filesystem::file_type::not_found) {
+            files.push_back(path);
+        }
+    }
+    return files;
+}
+
 // An earlier run's files of the same name must not stay between those of the new one. Nothing else is
 // touched.
 void remove_earlier_run(const RunFolder& folder) {
-    for (const char* part : {"density", "frames"}) {
-        std::error_code error;
-        std::vector<std::filesystem::path> old;
-        for (std::filesystem::directory_iterator at(folder.folder / part, error), end; !error && at != end;
-             at.increment(error)) {
-            if (is_frame_of(at->path().filename().string(), folder.name)) old.push_back(at->path());
-        }
-        for (const std::filesystem::path& path : old) remove_file(path);
-    }
-    for (const std::filesystem::path& path :
-         {folder.checkpoint(), folder.manifest(), folder.statistics(), folder.video()}) {
-        remove_file(path);
-    }
+    for (const std::filesystem::path& path : earlier_files(folder)) remove_file(path);
 }
 
-// An interrupted run may hold hours of work, and a manifest may be somebody else's: neither is thrown away
-// without being asked.
+// Temporary files of a run that was killed. Only for the holder of the folder's lock: to nobody else are they
+// leftovers.
+void remove_leftovers(const RunFolder& folder) {
+    const auto remove_if = [&](const char* part, const auto& is_ours) {
+        for (const std::string& name : names_in(folder, part)) {
+            const std::string published = published_name(name);
+            if (!published.empty() && is_ours(published)) remove_file(folder.folder / part / name);
+        }
+    };
+    remove_if(".", [&](const std::string& name) {
+        return name == folder.manifest().filename() || name == folder.checkpoint().filename();
+    });
+    const auto is_frame = [&](const std::string& name) {
+        return is_frame_of(name, folder.name) || name == folder.video().filename();
+    };
+    remove_if("density", is_frame);
+    remove_if("frames", is_frame);
+}
+
+[[noreturn]] void refuse(const RunFolder& folder, const std::string& reason) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: nothing was written, because {}: choose another --out, or give --overwrite",
+                            folder.folder.string(), reason));
+}
+
+// An interrupted run may hold hours of work, and a file that no run wrote is somebody else's: neither is
+// thrown away without being asked.
 void refuse_to_lose(const RunFolder& folder) {
-    std::error_code error;
-    if (!std::filesystem::exists(folder.manifest(), error)) return;
+    const std::vector<std::filesystem::path> files = earlier_files(folder);
+    if (files.empty()) return;
+    if (files.back() != folder.manifest()) {
+        refuse(folder, fmt::format("there is {}, but no manifest.json that says that it is of a run",
+                                   files.back().lexically_relative(folder.folder).string()));
+    }
     EarlierRun earlier;
     try {
         earlier = read_manifest(folder.manifest());
     } catch (const Error& reason) {
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: nothing was written, because the folder holds a manifest.json that is "
-                                "not of a run ({}): choose another --out, or give --overwrite",
-                                folder.folder.string(), reason.what()));
+        refuse(folder,
+               fmt::format("the folder holds a manifest.json that is not of a run ({})", reason.what()));
     }
-    if (earlier.complete || !std::filesystem::exists(folder.checkpoint(), error)) return;
+    const auto is_there = [&](const std::filesystem::path& file) {
+        return std::ranges::count(files, file) > 0;
+    };
+    if (is_there(folder.statistics()) && !is_statistics(folder.statistics())) {
+        refuse(folder, "the folder holds a statistics.csv that is not of a run");
+    }
+    if (!is_there(folder.checkpoint())) return;
+    if (!is_checkpoint(folder.checkpoint())) {
+        refuse(folder, "the folder holds a checkpoint.nephos that is not of a run");
+    }
+    if (earlier.complete) return;
     throw Error(
         ErrorCode::usage,
         fmt::format("{}: holds an interrupted run of '{}' ({} of {} steps): give --resume to go on, or "
@@ -236,22 +297,35 @@ std::string range_text(const EarlierRun& run) {
                        run.render ? "" : ", without pictures");
 }
 
-Pipeline resumed_pipeline(const RunSettings& settings, const RunFolder& folder) {
-    if (!std::filesystem::exists(folder.checkpoint())) {
-        throw Error(ErrorCode::io, folder.checkpoint().string() +
-                                       ": is not there, so there is nothing to resume: run without --resume");
+void require_checkpoint(const RunFolder& folder) {
+    if (std::filesystem::exists(folder.checkpoint())) return;
+    throw Error(ErrorCode::io, folder.checkpoint().string() +
+                                   ": is not there, so there is nothing to resume: run without --resume");
+}
+
+// What makes the scene another one than that of the earlier run.
+std::string difference(const EarlierRun& earlier, const RunSettings& settings) {
+    Scene other_video = settings.scene;
+    other_video.frames.video = !other_video.frames.video;
+    if (earlier.scene_hash == scene_hash(other_video)) {
+        return settings.scene.frames.video ? "only the video differs: the first call was without --video"
+                                           : "only the video differs: the first call was with --video";
     }
+    return earlier.simulation_hash == settings.simulation_hash
+               ? "the simulation is the same, density, frames or pictures differ"
+               : "the simulation itself differs";
+}
+
+Pipeline resumed_pipeline(const RunSettings& settings, const RunFolder& folder) {
     const EarlierRun earlier = read_manifest(folder.manifest());
     if (earlier.simulation_hash != settings.simulation_hash || earlier.scene_hash != settings.scene_hash) {
-        const bool same_clouds = earlier.simulation_hash == settings.simulation_hash;
         throw Error(
             ErrorCode::usage,
             fmt::format("{}: was started with another scene (hash {}, now {}; {}). Resume with the scene, "
-                        "--seed and --set of the first call (manifest.json has the scene under "
+                        "--seed, --set and --video of the first call (manifest.json has the scene under "
                         "\"scene_text\"), or start anew with --overwrite",
                         folder.folder.string(), earlier.scene_hash, settings.scene_hash,
-                        same_clouds ? "the simulation is the same, density, frames or pictures differ"
-                                    : "the simulation itself differs"));
+                        difference(earlier, settings)));
     }
     const EarlierRun now{false, "", "", "", settings.render, settings.range, 0};
     if (earlier.range != settings.range || earlier.render != settings.render) {
@@ -289,6 +363,48 @@ RunReport report_of(const Recorder& recorder, const RunSettings& settings, const
     return report;
 }
 
+bool stopped(const RunObserver& observer) { return observer.stop && observer.stop(); }
+
+void report_progress(const RunObserver& observer, const Pipeline& pipeline, const Recorder& recorder,
+                     const RunSettings& settings, std::string_view phase) {
+    if (!observer.progress) return;
+    observer.progress({pipeline.steps_taken(), pipeline.steps_in_all(), int(recorder.state().frames.size()),
+                       settings.range.last_frame - settings.range.first_frame + 1, phase});
+}
+
+// Up to the end or until it is stopped; leaves a checkpoint in both cases.
+void simulate(Pipeline& pipeline, Recorder& recorder, const RunSettings& settings,
+              const RunObserver& observer, Clock::time_point begin) {
+    Clock::time_point saved = Clock::now();
+    while (!pipeline.finished() && !stopped(observer)) {
+        pipeline.advance(recorder);
+        report_progress(observer, pipeline, recorder, settings, "simulating");
+        if (seconds_since(saved) < settings.checkpoint_every_s) continue;
+        recorder.save(pipeline, false, seconds_since(begin));
+        saved = Clock::now();
+    }
+    recorder.save(pipeline, false, seconds_since(begin));
+}
+
+// The video, when there is to be one and it is not there yet; false when it was stopped.
+bool encode(const Pipeline& pipeline, const Recorder& recorder, const RunSettings& settings,
+            const RunObserver& observer) {
+    if (!settings.render || !wants_video(settings.scene) ||
+        std::filesystem::exists(recorder.folder().video())) {
+        return true;
+    }
+    report_progress(observer, pipeline, recorder, settings, "encoding");
+    try {
+        recorder.encode_video();
+    } catch (const Error&) {
+        // Ctrl-C in a terminal reaches ffmpeg too; then it is the end that was asked for, and resuming
+        // encodes.
+        if (!stopped(observer)) throw;
+        return false;
+    }
+    return true;
+}
+
 }  // namespace
 
 std::filesystem::path RunFolder::density(int frame) const {
@@ -301,15 +417,22 @@ std::filesystem::path RunFolder::picture(int frame, std::string_view extension) 
 
 std::filesystem::path RunFolder::video() const { return folder / "frames" / (name + ".mp4"); }
 
+bool wants_pictures(const Scene& scene) { return wants_png(scene) || scene.frames.exr; }
+bool wants_video(const Scene& scene) { return scene.frames.video; }
+
 RunReport run_scene(const RunSettings& given, const RunObserver& observer) {
     const Clock::time_point begin = Clock::now();
     RunSettings settings = given;
     settings.render =
         given.render && wants_pictures(given.scene) && given.range.last_frame >= given.range.first_frame;
     const RunFolder folder{settings.folder, settings.scene.name};
-    if (!settings.resume && !settings.overwrite) refuse_to_lose(folder);
+    if (settings.render && wants_video(settings.scene)) require_ffmpeg();
+    if (settings.resume) require_checkpoint(folder);
+    Recorder recorder(settings);  // opens the device
 
-    Recorder recorder(settings);
+    const FolderLock lock(folder.folder);
+    if (!settings.resume && !settings.overwrite) refuse_to_lose(folder);
+    if (lock.held()) remove_leftovers(folder);
     Pipeline pipeline = settings.resume ? resumed_pipeline(settings, folder)
                                         : Pipeline(settings.scene, settings.range, settings.simulation_hash,
                                                    settings.initial);
@@ -318,39 +441,11 @@ RunReport run_scene(const RunSettings& given, const RunObserver& observer) {
         recorder.take_over(pipeline);
     } else {
         remove_earlier_run(folder);
-        recorder.write_manifest(false, 0);  // a folder that cannot be written to is found now
+        recorder.begin();
     }
 
-    const auto stopped = [&] { return observer.stop && observer.stop(); };
-    const auto report_progress = [&](std::string_view phase) {
-        if (!observer.progress) return;
-        observer.progress({pipeline.steps_taken(), pipeline.steps_in_all(),
-                           int(recorder.state().frames.size()),
-                           settings.range.last_frame - settings.range.first_frame + 1, phase});
-    };
-    Clock::time_point saved = Clock::now();
-    while (!pipeline.finished() && !stopped()) {
-        pipeline.advance(recorder);
-        report_progress("simulating");
-        if (seconds_since(saved) >= settings.checkpoint_every_s) {
-            recorder.save(pipeline, false, seconds_since(begin));
-            saved = Clock::now();
-        }
-    }
-    recorder.save(pipeline, false, seconds_since(begin));
-    bool complete = pipeline.finished();
-    if (complete && settings.render && settings.scene.frames.video &&
-        !std::filesystem::exists(folder.video())) {
-        report_progress("encoding");
-        try {
-            recorder.encode_video();
-        } catch (const Error&) {
-            // Ctrl-C in a terminal reaches ffmpeg too; then it is the end that was asked for, and resuming
-            // encodes.
-            if (!stopped()) throw;
-            complete = false;
-        }
-    }
+    simulate(pipeline, recorder, settings, observer, begin);
+    const bool complete = pipeline.finished() && encode(pipeline, recorder, settings, observer);
     if (complete) recorder.write_manifest(true, seconds_since(begin));
     RunReport report = report_of(recorder, settings, pipeline);
     report.first_step = first_step;

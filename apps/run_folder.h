@@ -9,8 +9,9 @@
 //     DIR/manifest.json                what was run, and every file with its moment
 //     DIR/checkpoint.nephos            where to go on
 //
-// Every file appears complete or not at all. A run that was interrupted and resumed at any moment leaves the
-// same content as one that was not; only the part "timing" of the manifest differs.
+// Every file appears complete or not at all, but for statistics.csv, to which each checkpoint appends whole
+// rows. A run that was interrupted and resumed at any moment leaves the same content as one that was not;
+// only the part "timing" of the manifest differs.
 
 #include <cstdint>
 #include <filesystem>
@@ -48,7 +49,7 @@ struct RunSettings {
     bool render = true;  // pictures too; needs a Vulkan device
     std::filesystem::path folder;
     bool resume = false;             // go on from the folder's checkpoint
-    bool overwrite = false;          // start anew although the folder holds an interrupted run
+    bool overwrite = false;          // start anew although the folder holds what would be lost
     double checkpoint_every_s = 60;  // wall time between checkpoints; 0 = after every piece of work
 };
 
@@ -82,10 +83,16 @@ struct RunReport {
     std::vector<RunFiles> files;
 };
 
+// What a run of this scene with pictures writes of them: any, which takes a Vulkan device; a video, which
+// takes the ffmpeg command.
+bool wants_pictures(const Scene& scene);
+bool wants_video(const Scene& scene);
+
 // Runs, or goes on. Throws Error(usage) when the settings contradict each other or the folder's checkpoint,
-// Error(io) naming a file that could not be written or read, Error(gpu) before anything is simulated when
-// pictures are wanted and there is no device. After any exception the folder can be resumed from its last
-// checkpoint.
+// or when files would be lost that are not of a complete run; Error(io) naming a file that could not be
+// written or read, or when another run is writing into the folder. Before anything is simulated: Error(gpu)
+// when pictures are wanted and there is no device, Error(io) when a video is wanted and there is no ffmpeg.
+// After any exception the folder can be resumed from its last checkpoint.
 RunReport run_scene(const RunSettings& settings, const RunObserver& observer);
 
 }  // namespace nephos

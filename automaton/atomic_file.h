@@ -8,19 +8,30 @@
 #include <filesystem>
 #include <functional>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace nephos {
 
 // Calls `write` with the path of the temporary file, which `write` must create and close; then publishes it.
-// Missing parent folders are created. A symbolic link keeps pointing to the new file; a device, a pipe or a folder in
-// the place of the file is refused. On any failure the temporary file is removed and Error(io) names `path`
-// and the reason; what `write` throws passes through.
+// Missing parent folders are created. A symbolic link keeps pointing to the new file; a device, a pipe or a
+// folder in the place of the file is refused. On any failure the temporary file is removed and Error(io)
+// names `path` and the reason; what `write` throws passes through.
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write);
 
 // The same for content that is in memory.
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
 void write_atomically(const std::filesystem::path& path, std::string_view content);
+
+// The same for content that comes in pieces and need never be in memory as a whole: `fill` hands them over in
+// order.
+using AppendPiece = std::function<void(std::string_view piece)>;
+void write_pieces_atomically(const std::filesystem::path& path,
+                             const std::function<void(const AppendPiece& append)>& fill);
+
+// The name that a file of this name, a temporary one of the functions above, was to get ("cloud.vdb" for
+// ".cloud.part123-456.vdb"); empty for any other name. A process that was killed leaves such files behind.
+std::string published_name(std::string_view temporary);
 
 }  // namespace nephos

@@ -18,6 +18,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "automaton/descriptor.h"
 #include "automaton/error.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -43,31 +44,10 @@ constexpr auto kStallTime = std::chrono::seconds(8);
 // Thrown inside run_sandboxed when the child seems to wait for a lock that nobody holds.
 struct Stalled {};
 
-class Descriptor {
-  public:
-    explicit Descriptor(int fd) : fd_(fd) {}
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    ~Descriptor() { close(); }
-    int get() const { return fd_; }
-    void close() {
-        if (fd_ >= 0) ::close(fd_);
-        fd_ = -1;
-    }
-
-  private:
-    int fd_;
-};
-
-void write_all(int fd, const void* data, std::size_t size) {
-    const char* at = static_cast<const char*>(data);
-    while (size > 0) {
-        const ssize_t written = ::write(fd, at, size);
-        if (written < 0 && errno == EINTR) continue;
-        if (written < 0) ::_exit(1);  // nobody listens any more
-        at += written;
-        size -= std::size_t(written);
-    }
+// In the child.
+void send_all(int fd, const void* data, std::size_t size) {
+    if (write_all(fd, {static_cast<const std::byte*>(data), size}) != 0)
+        ::_exit(1);  // nobody listens any more
 }
 
 // Addresses that this process uses now.
@@ -305,22 +285,22 @@ void SandboxWriter::text(std::string_view text) {
 void SandboxWriter::flush() {
     if (buffer_.empty()) return;
     const auto length = std::uint32_t(buffer_.size());
-    write_all(fd_, &length, sizeof length);
-    write_all(fd_, buffer_.data(), buffer_.size());
+    send_all(fd_, &length, sizeof length);
+    send_all(fd_, buffer_.data(), buffer_.size());
     buffer_.clear();
 }
 
 void SandboxWriter::finish() {
     flush();
-    write_all(fd_, &kEnd, sizeof kEnd);
+    send_all(fd_, &kEnd, sizeof kEnd);
 }
 
 void SandboxWriter::fail(std::string_view message) {
     message = message.substr(0, kMaxText);
     const auto length = std::uint32_t(message.size());
-    write_all(fd_, &kFailure, sizeof kFailure);
-    write_all(fd_, &length, sizeof length);
-    write_all(fd_, message.data(), message.size());
+    send_all(fd_, &kFailure, sizeof kFailure);
+    send_all(fd_, &length, sizeof length);
+    send_all(fd_, message.data(), message.size());
 }
 
 std::string SandboxReader::text() {

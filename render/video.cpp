@@ -2,11 +2,13 @@
 #include "render/video.h"
 
 #include <cerrno>
-#include <cmath>
+#include <charconv>
 #include <csignal>
-#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
 #include <fcntl.h>
@@ -17,6 +19,7 @@
 #include <unistd.h>
 
 #include "automaton/atomic_file.h"
+#include "automaton/descriptor.h"
 #include "automaton/error.h"
 #include "render/image_file.h"
 
@@ -25,26 +28,8 @@ extern char** environ;
 namespace nephos {
 namespace {
 
-class Descriptor {
-  public:
-    Descriptor() = default;
-    explicit Descriptor(int fd) : fd_(fd) {}
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    ~Descriptor() { close(); }
-    int get() const { return fd_; }
-    void reset(int fd) {
-        close();
-        fd_ = fd;
-    }
-    void close() {
-        if (fd_ >= 0) ::close(fd_);
-        fd_ = -1;
-    }
-
-  private:
-    int fd_ = -1;
-};
+constexpr const char* kNoFfmpeg =
+    "the ffmpeg command was not found: install the package ffmpeg to write videos";
 
 // The running command. Its input is a socket rather than a pipe: writing to a dead reader is then an error
 // code (MSG_NOSIGNAL) and not a SIGPIPE, whatever the program around us does with signals.
@@ -116,8 +101,7 @@ class Encoder {
         ::posix_spawnattr_destroy(&attributes);
         if (error == 0) return;
         child_ = -1;
-        if (error == ENOENT)
-            throw Error(ErrorCode::io, "ffmpeg was not found: install the package ffmpeg to write videos");
+        if (error == ENOENT) throw Error(ErrorCode::io, kNoFfmpeg);
         fail_system("cannot start ffmpeg", error);
     }
 
@@ -156,12 +140,13 @@ void check(const VideoOptions& options) {
 
 std::vector<std::string> command_line(const VideoOptions& options, const std::filesystem::path& output) {
     char rate[32];
-    std::snprintf(rate, sizeof rate, "%.6f", options.frames_per_second);
+    const auto end =
+        std::to_chars(rate, rate + sizeof rate, options.frames_per_second, std::chars_format::fixed, 6);
     // An absolute path can be mistaken neither for an option nor for a protocol.
     return {"ffmpeg", "-hide_banner", "-loglevel", "error", "-nostdin", "-y", "-f", "rawvideo",
             "-pixel_format", "rgb24", "-video_size",
-            std::to_string(options.width) + "x" + std::to_string(options.height), "-framerate", rate, "-i",
-            "pipe:0",
+            std::to_string(options.width) + "x" + std::to_string(options.height), "-framerate",
+            std::string(rate, end.ptr), "-i", "pipe:0",
             // yuv420p, the one layout every player takes, halves the chroma: sides must be even.
             "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p",
             "-c:v", "libx264", "-crf", std::to_string(options.quality), "-preset", "medium", "-colorspace",
@@ -171,6 +156,20 @@ std::vector<std::string> command_line(const VideoOptions& options, const std::fi
 }
 
 }  // namespace
+
+void require_ffmpeg() {
+    // As posix_spawnp() looks for it.
+    const char* variable = std::getenv("PATH");
+    std::string_view rest = variable != nullptr ? variable : "/bin:/usr/bin";
+    while (true) {
+        const std::string_view folder = rest.substr(0, rest.find(':'));
+        const std::filesystem::path command = std::filesystem::path(folder.empty() ? "." : folder) / "ffmpeg";
+        std::error_code error;
+        if (std::filesystem::is_regular_file(command, error) && ::access(command.c_str(), X_OK) == 0) return;
+        if (folder.size() == rest.size()) throw Error(ErrorCode::io, kNoFfmpeg);
+        rest.remove_prefix(folder.size() + 1);
+    }
+}
 
 void write_mp4(const std::filesystem::path& path, const VideoOptions& options,
                const std::function<bool(std::span<std::uint8_t> rgb)>& next_frame) {

@@ -17,6 +17,10 @@ struct VideoOptions {
     int quality = 18;               // constant rate factor of x264, 0 (lossless) .. 51
 };
 
+// Throws Error(io), saying what to install, when there is no ffmpeg command on the PATH: to be asked before
+// hours of work whose last step is a video.
+void require_ffmpeg();
+
 // Calls `next_frame` with the room for one frame (3 * width * height bytes, RGB, row 0 at the top) until it
 // returns false, and encodes what it filled in. The file appears at the end and complete, or not at all.
 // Throws Error(usage) on bad options or no frame, Error(io) when ffmpeg is missing or fails (with its

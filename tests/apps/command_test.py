@@ -531,6 +531,31 @@ class Signals(Case):
         self.assertEqual(process.returncode, 130)
         self.assertLess(time.monotonic() - begin, 1.0)
 
+    def test_two_runs_do_not_share_a_folder(self):
+        process = self.start("run", self.long, "--no-render", "--out", "stopped")
+        self.wait_for("stopped/density/long_0002.vdb")
+        for more in ([], ["--overwrite"]):
+            self.refused(3, "run", self.long, "--no-render", "--out", "stopped", *more, says="another run")
+        process.send_signal(signal.SIGKILL)
+        process.communicate(timeout=60)
+        # The lock ends with its owner, however that ends; so do the files that it was writing.
+        (self.folder / "stopped/density/.long_0003.part1-2.vdb").write_text("half")
+        self.call("run", self.long, "--no-render", "--out", "stopped", "--overwrite", "--set", "time.steps=20")
+        self.assertFalse([p for p in (self.folder / "stopped").rglob(".*")])
+
+    def test_a_signal_with_json(self):
+        output, errors = self.interrupt(signal.SIGTERM, self.long, "--no-render", "--out", "stopped", "--json")
+        report = json.loads(output)
+        self.assertFalse(report["complete"])
+        self.assertIn("--resume", errors)
+        rows = rows_of(self.folder / "stopped/statistics.csv")
+        self.assertEqual((len(rows) - 1, rows[-1]["hash"]), (report["steps"], report["state_hash"]))
+        self.assertEqual(len(report["files"]["density"]), report["frames"])
+        # The frames of the manifest are those of the folder.
+        manifest = json.loads((self.folder / "stopped/manifest.json").read_text())
+        self.assertFalse(manifest["complete"])
+        self.assertEqual([f["number"] for f in manifest["frames"]], list(range(1, report["frames"] + 1)))
+
     def test_commands_without_a_checkpoint_stop_at_once(self):
         process = self.start("hash", self.long, "--steps", "1000000000", "--json")
         time.sleep(0.3)
@@ -552,6 +577,15 @@ class Vulkan(Case):
             self.assertNotIn("unexpected", result.stderr)
         self.assertFalse((self.folder / "other").exists(), "nothing was done")
         self.assertFalse((self.folder / "x.png").exists())
+
+    def test_a_missing_ffmpeg_is_found_before_anything_is_computed(self):
+        video = self.write("video.toml", SCENE.replace("[frames]", "[frames]\nvideo = true"))
+        for arguments in ([self.scene, "--video"], [video], [self.scene, "--set", "frames.video=true"]):
+            # Not even a device is looked for.
+            self.refused(3, "run", *arguments, "--out", "out", says="install the package ffmpeg",
+                         env={**self.NONE, "PATH": str(self.folder)})
+            self.assertFalse((self.folder / "out").exists(), "nothing was done")
+        self.call("run", video, "--no-render", "--out", "out", env={**self.NONE, "PATH": str(self.folder)})
 
     def test_a_scene_without_pictures_needs_no_device(self):
         self.call("run", self.scene, "--set", "frames.png=false", env=self.NONE)
@@ -733,6 +767,44 @@ class SetUp(Case):
         self.assertTrue(calls[1].endswith("install --no-install-recommends cmake mesa-vulkan-drivers"), calls[1])
         self.assertTrue(all(call.startswith("noninteractive ") for call in calls))
         self.assertEqual(result.stdout, "")
+
+    def test_what_a_run_needs(self):
+        video = self.write("video.toml", SCENE.replace("[frames]", "[frames]\nvideo = true"))
+        for arguments, needs in (([self.scene], "vulkan\n"), ([video], "vulkan\nffmpeg\n"), ([video, "--no-render"], ""),
+                                 ([self.scene, "--video"], "vulkan\nffmpeg\n"),
+                                 ([self.scene, "--set", "frames.video=true"], "vulkan\nffmpeg\n"),
+                                 ([self.scene, "--set", "frames.png=false"], "")):
+            self.assertEqual(self.call("run", *arguments, "--needs").stdout, needs)
+        self.assertFalse((self.folder / "out").exists(), "nothing was done")
+
+    def test_run_installs_ffmpeg_for_whoever_asks_for_a_video(self):
+        # A tree that is built already, whose command tells what it was called with.
+        for name in ("run", "apps/setup.sh", "packages.txt"):
+            (self.folder / name).parent.mkdir(exist_ok=True)
+            shutil.copy(SOURCE / name, self.folder / name)
+        video = self.write("a scene.toml", SCENE.replace("[frames]", "[frames]\nvideo = true"))
+        self.write("CMakePresets.json", "")
+        self.write("build/release/CMakeCache.txt", f"CMAKE_HOME_DIRECTORY:INTERNAL={self.folder}\n")
+        self.write("build/release/build.ninja", "")
+        nephos = pathlib.Path(self.write("build/release/apps/nephos", f"""#!/bin/bash
+            case "$*" in *--needs*) exec '{NEPHOS}' "$@" ;; esac
+            printf '<%s>' "$@"
+        """))
+        nephos.chmod(0o755)
+        self.stand_in("ninja", "echo 'ninja: no work to do.'")
+        self.stand_in("dpkg-query", "sed -n 's/^[a-z]\\+ \\+\\([^ ]*\\).*/installed \\1/p' packages.txt | grep -v ffmpeg; exit 1")
+        self.stand_in("apt-get", f'echo "$*" >> "{self.folder}/apt.log"')
+        self.stand_in("id", "echo 0")
+        for arguments, installs in (([self.scene], False), ([self.scene, "--video"], True), ([video], True),
+                                    ([video, "--no-render"], False), ([self.scene, "--set", "frames.video=true"], True),
+                                    (["no.toml"], False)):
+            log = self.folder / "apt.log"
+            log.unlink(missing_ok=True)
+            result = subprocess.run(["./run", *arguments], cwd=self.folder, capture_output=True, text=True, timeout=60,
+                                    env={**self.environment, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
+            self.assertEqual(result.stdout, "".join(f"<{a}>" for a in ["run", *arguments]), result.stderr)
+            self.assertEqual("install --no-install-recommends ffmpeg" in (log.read_text() if log.exists() else ""),
+                             installs, arguments)
 
     def test_nothing_to_do_says_nothing(self):
         result, calls = self.install("build run test bench", missing=[])

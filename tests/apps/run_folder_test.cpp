@@ -5,14 +5,17 @@
 
 #include "apps/run_folder.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "apps/folder_lock.h"
 #include "apps/statistics_file.h"
 #include "automaton/error.h"
 #include "density/vdb_file.h"
@@ -117,9 +120,15 @@ TEST_F(RunFolderTest, WritesEveryFileAndNamesItInTheManifest) {
         EXPECT_EQ(loaded.metadata->time_s, 15.0 * (frame - 1));
     }
     // The last row: step 6 with the hash that the report names.
-    const std::string rows = read_statistics(s.folder / "statistics.csv", 7);
-    EXPECT_EQ(hash_in_row(rows), report.state_hash);
-    EXPECT_NE(rows.find("\n6,60,"), std::string::npos);
+    std::string last, last_hash;
+    const std::uint64_t bytes = read_statistics(
+        s.folder / "statistics.csv", 7, [&](std::uint64_t, std::string_view row, const StateHash& hash) {
+            last = row;
+            last_hash = hash.hex();
+        });
+    EXPECT_EQ(bytes, fs::file_size(s.folder / "statistics.csv")) << "nothing after the last step";
+    EXPECT_EQ(last_hash, report.state_hash);
+    EXPECT_TRUE(last.starts_with("6,60,")) << last;
 }
 
 TEST_F(RunFolderTest, StoppedAnywhereAndResumedIsTheSame) {
@@ -227,6 +236,111 @@ TEST_F(RunFolderTest, AnEarlierRunOfTheSameNameIsReplaced) {
     EXPECT_FALSE(fs::exists(s.folder / "density/small_0003.vdb"));
     EXPECT_TRUE(fs::exists(s.folder / "density/notes.txt"));
     EXPECT_TRUE(fs::exists(s.folder / "density/other_0001.vdb"));
+}
+
+// Every kind of file that a run would replace, when no run wrote it.
+TEST_F(RunFolderTest, WhatNoRunWroteIsNotReplacedUnasked) {
+    for (const char* name : {"statistics.csv", "checkpoint.nephos", "manifest.json", "density/small_0003.vdb",
+                             "frames/small_0001.png", "frames/small.mp4"}) {
+        SCOPED_TRACE(name);
+        RunSettings s = settings("out");
+        fs::remove_all(s.folder);
+        fs::create_directories((s.folder / name).parent_path());
+        std::ofstream(s.folder / name) << "mine";
+        const std::string message = error_of(s, ErrorCode::usage);
+        EXPECT_NE(message.find(name), std::string::npos) << message;
+        EXPECT_NE(message.find("--overwrite"), std::string::npos) << message;
+        EXPECT_EQ(content(s.folder / name), "mine");
+        s.overwrite = true;
+        EXPECT_TRUE(run_scene(s, {}).complete);
+    }
+}
+
+// A complete run may be replaced, but not what somebody else has put in the place of its files.
+TEST_F(RunFolderTest, AFileThatReplacedARunsOwnIsNotReplacedUnasked) {
+    for (const char* name : {"statistics.csv", "checkpoint.nephos"}) {
+        SCOPED_TRACE(name);
+        RunSettings s = settings(std::string("out of ") + name);
+        ASSERT_TRUE(run_scene(s, {}).complete);
+        ASSERT_TRUE(run_scene(s, {}).complete);
+        std::ofstream(s.folder / name) << "mine";
+        EXPECT_NE(error_of(s, ErrorCode::usage).find(name), std::string::npos);
+        EXPECT_EQ(content(s.folder / name), "mine");
+    }
+}
+
+TEST_F(RunFolderTest, TwoRunsCannotWriteIntoOneFolder) {
+    RunSettings s = settings("out");
+    {
+        const FolderLock other(s.folder);
+        ASSERT_TRUE(other.held());
+        EXPECT_NE(error_of(s, ErrorCode::io).find("another run"), std::string::npos);
+        EXPECT_TRUE(fs::is_empty(s.folder)) << "nothing was written";
+    }
+    EXPECT_TRUE(run_scene(s, {}).complete);
+    const FolderLock other(s.folder);
+    s.resume = true;
+    EXPECT_NE(error_of(s, ErrorCode::io).find("another run"), std::string::npos);
+}
+
+// What SIGKILL leaves: only what this run's files would be called goes, and only without another run at work.
+TEST_F(RunFolderTest, TemporaryFilesOfAKilledRunAreRemoved) {
+    RunSettings s = settings("out");
+    fs::create_directories(s.folder / "density");
+    fs::create_directories(s.folder / "frames");
+    const char* ours[] = {".manifest.part12-34.json", ".checkpoint.part12-34.nephos",
+                          "density/.small_0002.part12-34.vdb", "frames/.small_0002.part12-34.png",
+                          "frames/.small.part12-34.mp4"};
+    const char* others[] = {".notes.part12-34.txt", "manifest.part12-34.json", ".manifest.part12.json",
+                            "density/.other_0002.part12-34.vdb", "density/.small_0002.partial.vdb"};
+    for (const char* name : ours) std::ofstream(s.folder / name) << "part";
+    for (const char* name : others) std::ofstream(s.folder / name) << "mine";
+    {
+        const FolderLock other(s.folder);
+        error_of(s, ErrorCode::io);
+        for (const char* name : ours) EXPECT_TRUE(fs::exists(s.folder / name)) << name;
+    }
+    EXPECT_TRUE(run_scene(s, {}).complete);
+    for (const char* name : ours) EXPECT_FALSE(fs::exists(s.folder / name)) << name;
+    for (const char* name : others) EXPECT_TRUE(fs::exists(s.folder / name)) << name;
+}
+
+// Rows are appended at checkpoints and never written again; a part of a row is cut off.
+TEST_F(RunFolderTest, StatisticsAreAppended) {
+    RunSettings s = settings("out");
+    s.checkpoint_every_s = 0;
+    std::string before;
+    ino_t file = 0;
+    RunObserver observer;
+    observer.progress = [&](const RunProgress&) {
+        struct stat status {};
+        ASSERT_EQ(::stat((s.folder / "statistics.csv").c_str(), &status), 0);
+        EXPECT_TRUE(file == 0 || status.st_ino == file) << "the file was replaced";
+        file = status.st_ino;
+        const std::string now = content(s.folder / "statistics.csv");
+        EXPECT_TRUE(now.starts_with(before));
+        EXPECT_TRUE(now.ends_with('\n'));
+        before = now;
+    };
+    ASSERT_TRUE(run_scene(s, observer).complete);
+    EXPECT_EQ(std::count(before.begin(), before.end(), '\n'), 1 + 7);
+
+    RunSettings cut = settings("cut");
+    ASSERT_FALSE(run_scene(cut, stop_after(8)).complete);
+    std::ofstream(cut.folder / "statistics.csv", std::ios::app) << "3,30,12";
+    cut.resume = true;
+    ASSERT_TRUE(run_scene(cut, {}).complete);
+    expect_same_folders(s.folder, cut.folder);
+}
+
+TEST_F(RunFolderTest, AResumeThatDiffersInTheVideoSaysSo) {
+    RunSettings s = settings("out");
+    ASSERT_FALSE(run_scene(s, stop_after(9)).complete);
+    s.resume = true;
+    s.scene.frames.video = true;
+    s.scene_hash = scene_hash(s.scene);
+    const std::string message = error_of(s, ErrorCode::usage);
+    EXPECT_NE(message.find("the first call was without --video"), std::string::npos) << message;
 }
 
 TEST_F(RunFolderTest, AFolderThatCannotBeMadeIsFoundBeforeAnything) {
