@@ -7,25 +7,47 @@
 namespace nephos {
 namespace {
 
-// out |= in << shift over whole rows of words; bits shifted beyond the row are lost.
-void or_shifted_up(std::span<std::uint64_t> out, const std::uint64_t* in, std::int64_t shift) {
-    const std::size_t by_words = std::size_t(shift / 64);
-    const int bits = int(shift % 64);
-    for (std::size_t w = by_words; w < out.size(); ++w) {
-        out[w] |= in[w - by_words] << bits;
-        if (bits != 0 && w > by_words) out[w] |= in[w - by_words - 1] >> (64 - bits);
+// A row with what flows in from either side, so that a shift becomes a copy of bits from `start` on: zeros,
+// the row and zeros again, or, if periodic, the row twice.
+class RowWithSurroundings {
+  public:
+    RowWithSurroundings(std::int64_t nx, std::size_t words, bool periodic, std::int64_t dx)
+        : nx_(nx), words_(words), periodic_(periodic), bits_(3 * words + 1, 0) {
+        const std::int64_t all = std::int64_t(words) * 64;
+        start_ = std::size_t(periodic ? nx - dx : all - std::clamp(dx, -all, all));
     }
-}
 
-// out |= in >> shift.
-void or_shifted_down(std::span<std::uint64_t> out, const std::uint64_t* in, std::int64_t shift) {
-    const std::size_t by_words = std::size_t(shift / 64);
-    const int bits = int(shift % 64);
-    for (std::size_t w = 0; w + by_words < out.size(); ++w) {
-        out[w] |= in[w + by_words] >> bits;
-        if (bits != 0 && w + by_words + 1 < out.size()) out[w] |= in[w + by_words + 1] << (64 - bits);
+    void load(const std::uint64_t* row) {
+        if (!periodic_) {
+            std::copy_n(row, words_, bits_.data() + words_);
+            return;
+        }
+        const std::size_t end = std::size_t(nx_ / 64);
+        const int rest = int(nx_ % 64);
+        std::copy_n(row, words_, bits_.data());
+        if (rest == 0) {
+            std::copy_n(row, words_, bits_.data() + end);
+            return;
+        }
+        for (std::size_t w = 0; w < words_; ++w) {
+            bits_[end + w] |= row[w] << rest;
+            bits_[end + w + 1] = row[w] >> (64 - rest);
+        }
     }
-}
+
+    void store_shifted(std::span<std::uint64_t> out) const {
+        const std::uint64_t* in = bits_.data() + start_ / 64;
+        const int shift = int(start_ % 64);
+        for (std::size_t w = 0; w < out.size(); ++w) out[w] = in[w] >> shift | in[w + 1] << 1 << (63 - shift);
+    }
+
+  private:
+    std::int64_t nx_;
+    std::size_t words_;
+    bool periodic_;
+    std::size_t start_;
+    std::vector<std::uint64_t> bits_;
+};
 
 std::int64_t wrap(std::int64_t value, std::int64_t size) { return (value % size + size) % size; }
 
@@ -40,18 +62,20 @@ void shift_layer(BitPlane& plane, int k, std::int64_t dx, std::int64_t dy, const
     if (dx == 0 && dy == 0) return;
 
     const std::size_t words = plane.words_per_row();
-    std::uint64_t* layer = plane.row(0, k);
-    scratch.assign(layer, layer + words * std::size_t(ny));
+    const std::span layer(plane.row(0, k), words * std::size_t(ny));
+    if (std::ranges::all_of(layer, [](std::uint64_t word) { return word == 0; })) return;
+    scratch.assign(layer.begin(), layer.end());
     const std::uint64_t last_word = nx % 64 == 0 ? ~std::uint64_t{0} : (std::uint64_t{1} << (nx % 64)) - 1;
+    RowWithSurroundings row(nx, words, wraps_x, dx);
     for (std::int64_t j = 0; j < ny; ++j) {
-        const std::span<std::uint64_t> out(layer + std::size_t(j) * words, words);
-        std::ranges::fill(out, std::uint64_t{0});
+        const std::span out = layer.subspan(std::size_t(j) * words, words);
         const std::int64_t from = wraps_y ? wrap(j - dy, ny) : j - dy;
-        if (from < 0 || from >= ny) continue;
-        const std::uint64_t* in = scratch.data() + std::size_t(from) * words;
-        if (dx >= 0 && dx < nx) or_shifted_up(out, in, dx);
-        if (dx < 0 && -dx < nx) or_shifted_down(out, in, -dx);
-        if (wraps_x && dx > 0) or_shifted_down(out, in, nx - dx);
+        if (from < 0 || from >= ny) {
+            std::ranges::fill(out, std::uint64_t{0});
+            continue;
+        }
+        row.load(scratch.data() + std::size_t(from) * words);
+        row.store_shifted(out);
         out.back() &= last_word;
     }
 }

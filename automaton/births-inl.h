@@ -17,6 +17,7 @@
 
 #include <hwy/highway.h>
 
+#include "automaton/block_bits-inl.h"
 #include "automaton/dense-inl.h"
 #include "automaton/segment-inl.h"
 #include "automaton/sparse-inl.h"
@@ -50,6 +51,7 @@ inline void merge_events(const Segment& g, BirthScratch& s) {
     for (int draw = 0; draw < 3; ++draw) {
         if (!s.dirty[draw]) continue;
         s.dirty[draw] = false;
+        move_dense_events(draw, s);
         for (std::size_t row = 0; row < 64; ++row) {
             std::uint64_t* events = s.events[draw][row];
             if (g.row_word[row] >= 0) {
@@ -68,6 +70,7 @@ inline void merge_events(const Segment& g, BirthScratch& s) {
 
 inline void draw_segment(const Segment& g, BirthScratch& s) {
     const BlockField& field = *g.random.field;
+    s.known_cloud = 0;
     if (field.any_extinction()) find_cloudy(g, s.cloudy);
     std::uint64_t counters[kSegmentBlocks + kMaxLanes];
     for (int b = 0; b < kSegmentBlocks + kMaxLanes; ++b) counters[b] = g.counter(Draw::counts, b, 0);
@@ -90,6 +93,7 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
         if (sparse != 0) queue_sparse(g, b, sparse, s);
     }
     run_queue(g, s);
+    run_ties(g, s);
     merge_events(g, s);
 }
 

@@ -23,6 +23,31 @@ std::pair<int, int> block_range(double low, double high, int cells) {
     return {int(first) / kBlockEdge, blocks(int(last))};
 }
 
+// The rows of M (block_field.h).
+struct Turned {
+    double xx, xy, yx, yy, zz;
+};
+
+// Everything of an ellipsoid but its place.
+FieldEllipsoid field_ellipsoid(const AutomatonOptions& options, const ActiveEllipsoid& active,
+                               const Turned& m) {
+    FieldEllipsoid f{.xx = m.xx, .xy = m.xy, .yx = m.yx, .yy = m.yy, .zz = m.zz};
+    // The farthest cell centre of a block is 3.5 cells from the block's centre on each axis.
+    constexpr double kHalf = 3.5;
+    const double reach_a = kHalf * (std::abs(f.xx) + std::abs(f.xy));
+    const double reach_b = kHalf * (std::abs(f.yx) + std::abs(f.yy));
+    const double reach_c = kHalf * f.zz;
+    f.block_reach =
+        float(std::sqrt(reach_a * reach_a + reach_b * reach_b + reach_c * reach_c) * (1 + 1e-5) + 1e-6);
+    const auto centre = as_array(active.ellipsoid.centre), rim = as_array(active.ellipsoid.rim),
+               background = as_array(options.field.background);
+    for (std::size_t d = 0; d < 3; ++d) {
+        f.rim[d] = float(background[d] + active.weight * (rim[d] - background[d]));
+        f.span[d] = float(active.weight * (centre[d] - rim[d]));
+    }
+    return f;
+}
+
 }  // namespace
 
 BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> active) {
@@ -36,26 +61,7 @@ BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEl
     }
     by_slab_.resize(std::size_t(blocks(options.extent.z)));
 
-    const double cell = options.placement.cell_size_m;
-    const auto images = [](Boundary boundary, double half_size_cells, int extent) {
-        return boundary == Boundary::periodic ? int(std::ceil(half_size_cells / extent)) : 0;
-    };
-    for (const ActiveEllipsoid& e : active) {
-        const Vec3& half = e.ellipsoid.semi_axes_m;
-        const double half_xy = std::max(half.x, half.y) / cell;
-        const int nx = images(options.boundaries.x, half_xy, options.extent.x);
-        const int ny = images(options.boundaries.y, half_xy, options.extent.y);
-        const int nz = images(options.boundaries.z, half.z / cell, options.extent.z);
-        for (int x = -nx; x <= nx; ++x) {
-            for (int y = -ny; y <= ny; ++y) {
-                for (int z = -nz; z <= nz; ++z) {
-                    add(options, e,
-                        {double(x) * options.extent.x, double(y) * options.extent.y,
-                         double(z) * options.extent.z});
-                }
-            }
-        }
-    }
+    for (const ActiveEllipsoid& e : active) add_with_images(options, e);
     for (std::uint32_t i = 0; i < ellipsoids_.size(); ++i) {
         for (int bz = ellipsoids_[i].bz0; bz < ellipsoids_[i].bz1; ++bz)
             by_slab_[std::size_t(bz)].push_back(i);
@@ -71,49 +77,47 @@ BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEl
     anything_ = any_birth_ || any_extinction_;
 }
 
-void BlockField::add(const AutomatonOptions& options, const ActiveEllipsoid& active, Vec3 shift) {
-    const Ellipsoid& e = active.ellipsoid;
-    const double cell = options.placement.cell_size_m;
-    const Vec3& origin = options.placement.origin_m;
-    const SinCos turn = sin_cos_deg(e.yaw_deg);
-    FieldEllipsoid f{};
-    // On a periodic axis the centre is first brought into the box; the images then lie one box to either
-    // side.
+// On a periodic axis the centre is brought into the box; as many images of it as can reach the box lie to
+// either side.
+void BlockField::add_with_images(const AutomatonOptions& options, const ActiveEllipsoid& active) {
     const auto place = [](double cells, Boundary boundary, int extent) {
         return boundary == Boundary::periodic ? cells - std::floor(cells / extent) * extent : cells;
     };
-    f.centre_x = place((e.centre_m.x - origin.x) / cell, options.boundaries.x, options.extent.x) + shift.x;
-    f.centre_y = place((e.centre_m.y - origin.y) / cell, options.boundaries.y, options.extent.y) + shift.y;
-    f.centre_z = place((e.centre_m.z - origin.z) / cell, options.boundaries.z, options.extent.z) + shift.z;
+    const auto images = [](double half_size_cells, Boundary boundary, int extent) {
+        return boundary == Boundary::periodic ? int(std::ceil(half_size_cells / extent)) : 0;
+    };
+    const Ellipsoid& e = active.ellipsoid;
+    const double cell = options.placement.cell_size_m;
+    const Vec3& origin = options.placement.origin_m;
+    const Extent& extent = options.extent;
+    const Boundaries& sides = options.boundaries;
+    const double x = place((e.centre_m.x - origin.x) / cell, sides.x, extent.x);
+    const double y = place((e.centre_m.y - origin.y) / cell, sides.y, extent.y);
+    const double z = place((e.centre_m.z - origin.z) / cell, sides.z, extent.z);
     const double a = e.semi_axes_m.x / cell, b = e.semi_axes_m.y / cell, c = e.semi_axes_m.z / cell;
-    f.xx = turn.cos / a;
-    f.xy = turn.sin / a;
-    f.yx = -turn.sin / b;
-    f.yy = turn.cos / b;
-    f.zz = 1 / c;
-
+    const int nx = images(std::max(a, b), sides.x, extent.x), ny = images(std::max(a, b), sides.y, extent.y),
+              nz = images(c, sides.z, extent.z);
+    const SinCos turn = sin_cos_deg(e.yaw_deg);
     const double half_x = std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin);
     const double half_y = std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos);
-    std::tie(f.bx0, f.bx1) = block_range(f.centre_x - half_x, f.centre_x + half_x, options.extent.x);
-    std::tie(f.by0, f.by1) = block_range(f.centre_y - half_y, f.centre_y + half_y, options.extent.y);
-    std::tie(f.bz0, f.bz1) = block_range(f.centre_z - c, f.centre_z + c, options.extent.z);
-    if (f.bx0 == f.bx1 || f.by0 == f.by1 || f.bz0 == f.bz1) return;
 
-    // The farthest cell centre of a block is 3.5 cells from the block's centre on each axis.
-    constexpr double kHalf = 3.5;
-    const double reach_a = kHalf * (std::abs(f.xx) + std::abs(f.xy));
-    const double reach_b = kHalf * (std::abs(f.yx) + std::abs(f.yy));
-    const double reach_c = kHalf * f.zz;
-    f.block_reach =
-        float(std::sqrt(reach_a * reach_a + reach_b * reach_b + reach_c * reach_c) * (1 + 1e-5) + 1e-6);
-
-    const auto centre = as_array(e.centre), rim = as_array(e.rim),
-               background = as_array(options.field.background);
-    for (std::size_t d = 0; d < 3; ++d) {
-        f.rim[d] = float(background[d] + active.weight * (rim[d] - background[d]));
-        f.span[d] = float(active.weight * (centre[d] - rim[d]));
+    FieldEllipsoid f =
+        field_ellipsoid(options, active, {turn.cos / a, turn.sin / a, -turn.sin / b, turn.cos / b, 1 / c});
+    for (int image_z = -nz; image_z <= nz; ++image_z) {
+        f.centre_z = z + double(image_z) * extent.z;
+        std::tie(f.bz0, f.bz1) = block_range(f.centre_z - c, f.centre_z + c, extent.z);
+        if (f.bz0 == f.bz1) continue;
+        for (int image_y = -ny; image_y <= ny; ++image_y) {
+            f.centre_y = y + double(image_y) * extent.y;
+            std::tie(f.by0, f.by1) = block_range(f.centre_y - half_y, f.centre_y + half_y, extent.y);
+            if (f.by0 == f.by1) continue;
+            for (int image_x = -nx; image_x <= nx; ++image_x) {
+                f.centre_x = x + double(image_x) * extent.x;
+                std::tie(f.bx0, f.bx1) = block_range(f.centre_x - half_x, f.centre_x + half_x, extent.x);
+                if (f.bx0 != f.bx1) ellipsoids_.push_back(f);
+            }
+        }
     }
-    ellipsoids_.push_back(f);
 }
 
 void BlockField::collect(int by, int bz, std::vector<const FieldEllipsoid*>& out) const {
@@ -134,18 +138,18 @@ void BlockField::plan_blocks(int bx0, int by, int bz, std::span<const FieldEllip
     for (const FieldEllipsoid* e : row) {
         const double dy = by * kBlockEdge + 0.5 - e->centre_y;
         const double dz = bz * kBlockEdge + 0.5 - e->centre_z;
+        BlockEllipsoid seen{.base_c = float(e->zz * dz),
+                            .xx = float(e->xx),
+                            .xy = float(e->xy),
+                            .yx = float(e->yx),
+                            .yy = float(e->yy),
+                            .zz = float(e->zz),
+                            .source = e};
         for (int bx = std::max(bx0, e->bx0); bx < std::min(bx1, e->bx1); ++bx) {
             const double dx = bx * kBlockEdge + 0.5 - e->centre_x;
-            add_to_plan({.base_a = float(e->xx * dx + e->xy * dy),
-                         .base_b = float(e->yx * dx + e->yy * dy),
-                         .base_c = float(e->zz * dz),
-                         .xx = float(e->xx),
-                         .xy = float(e->xy),
-                         .yx = float(e->yx),
-                         .yy = float(e->yy),
-                         .zz = float(e->zz),
-                         .source = e},
-                        plans[std::size_t(bx - bx0)]);
+            seen.base_a = float(e->xx * dx + e->xy * dy);
+            seen.base_b = float(e->yx * dx + e->yy * dy);
+            add_to_plan(seen, plans[std::size_t(bx - bx0)]);
         }
     }
 }
@@ -157,7 +161,10 @@ void BlockField::add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const 
     const float a = seen.base_a + 3.5f * (seen.xx + seen.xy);
     const float b = seen.base_b + 3.5f * (seen.yx + seen.yy);
     const float c = seen.base_c + 3.5f * seen.zz;
-    const float distance = std::sqrt(a * a + b * b + c * c);
+    const float square = a * a + b * b + c * c;
+    const float outside = (1 + e.block_reach) * (1 + e.block_reach);
+    if (square > outside * 1.0001f) return;  // most of the box around an ellipsoid; spares the root
+    const float distance = std::sqrt(square);
     const float nearest = std::max(0.0f, distance - e.block_reach);
     const float farthest = distance + e.block_reach;
     if (nearest >= 1) return;

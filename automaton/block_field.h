@@ -77,7 +77,7 @@ class BlockField {
                      std::span<BlockPlan> plans) const;
 
   private:
-    void add(const AutomatonOptions& options, const ActiveEllipsoid& active, Vec3 shift_cells);
+    void add_with_images(const AutomatonOptions& options, const ActiveEllipsoid& active);
     void add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const;
 
     std::array<float, 3> background_{};

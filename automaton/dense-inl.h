@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The dense draw (docs/adr/0002): one random byte a cell against the top byte of its p; the 1 in 256 that tie
-// compare 24 bits more. Layers of a block that the draw cannot change are skipped.
+// compare 24 bits more, at the end of the segment. Layers of a block that the draw cannot change are skipped.
 
 #if defined(NEPHOS_DENSE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_DENSE_INL_H_
@@ -10,13 +10,17 @@
 #define NEPHOS_DENSE_INL_H_
 #endif
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <span>
+#include <vector>
 
 #include <hwy/highway.h>
 
+#include "automaton/block_bits-inl.h"
 #include "automaton/segment-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -25,37 +29,72 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 // Thresholds of the 64 cells of a layer of a block, x fastest, and their top bytes.
 struct LayerThresholds {
-    std::array<std::uint32_t, 64> full;
-    std::array<std::uint8_t, 64> top;
+    alignas(64) std::array<std::uint32_t, 64> full;
+    alignas(64) std::array<std::uint8_t, 64> top;
 };
 
-// Only rows with a bit in `wanted` are made.
-inline void make_thresholds(const Segment& g, const BlockPlan& plan, int draw, int layer,
-                            std::uint64_t wanted, LayerThresholds& out) {
+// a*a + b*b (block_field.h) of the 64 columns of a block, x fastest, for each of its ellipsoids.
+inline void locate_columns(const BlockPlan& plan, std::vector<float>& columns) {
     const hn::CappedTag<float, 8> d;
-    const std::size_t lanes = hn::Lanes(d);
-    const auto which = std::size_t(draw);
-    const auto background = hn::Set(d, g.random.field->background()[which]);
-    const auto dz = hn::Set(d, float(layer));
-    const hn::RebindToSigned<decltype(d)> di;
-    const hn::RebindToUnsigned<decltype(d)> du;
-    for (std::size_t row = 0; row < 8; ++row) {
-        if ((wanted >> (8 * row) & 0xFF) == 0) continue;
-        const auto dy = hn::Set(d, float(row));
-        for (std::size_t x = 0; x < 8; x += lanes) {
-            auto value = background;
-            for (const BlockEllipsoid& e : plan.ellipsoids) {
-                value = combine(d, e, which, locate(d, e, hn::Iota(d, float(x)), dy, dz), value);
+    columns.resize(64 * plan.ellipsoids.size());
+    float* out = columns.data();
+    for (const BlockEllipsoid& e : plan.ellipsoids) {
+        const auto base_a = hn::Set(d, e.base_a), base_b = hn::Set(d, e.base_b);
+        for (std::size_t y = 0; y < 8; ++y) {
+            const auto ya = hn::Set(d, float(y) * e.xy), yb = hn::Set(d, float(y) * e.yy);
+            for (std::size_t x = 0; x < 8; x += hn::Lanes(d), out += hn::Lanes(d)) {
+                const auto dx = hn::Iota(d, float(x));
+                const auto a = hn::Add(base_a, hn::Add(hn::Mul(dx, hn::Set(d, e.xx)), ya));
+                const auto b = hn::Add(base_b, hn::Add(hn::Mul(dx, hn::Set(d, e.yx)), yb));
+                hn::StoreU(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), d, out);
             }
-            // probability_threshold() of kernels.h
-            const auto scaled = hn::ConvertTo(di, hn::Mul(value, hn::Set(d, 0x1p31f)));
-            const auto threshold = hn::ShiftLeft<1>(hn::BitCast(du, scaled));
-            const auto certain = hn::RebindMask(du, hn::Ge(value, hn::Set(d, 1.0f)));
-            hn::StoreU(hn::IfThenElse(certain, hn::Set(du, kCertain), threshold), du,
-                       out.full.data() + row * 8 + x);
         }
     }
-    for (std::size_t c = 0; c < 64; ++c) out.top[c] = std::uint8_t(out.full[c] >> 24);
+}
+
+// The ellipsoids that reach into a layer. One whose rim does not exceed the background, where it ends,
+// changes nothing outside even if it is taken into account there.
+inline void find_in_layer(const Segment& g, const BlockPlan& plan, int draw, int layer, BirthScratch& s) {
+    const auto which = std::size_t(draw);
+    const float background = g.random.field->background()[which];
+    s.layer.clear();
+    for (std::size_t i = 0; i < plan.ellipsoids.size(); ++i) {
+        const BlockEllipsoid& e = plan.ellipsoids[i];
+        const float c = e.base_c + float(layer) * e.zz;
+        if (c * c >= 1) continue;
+        const float rim = e.source->rim[which];
+        const bool bounded = draw == kExt ? rim < background : rim > background;
+        s.layer.push_back({s.columns.data() + 64 * i, c * c, rim, e.source->span[which], bounded});
+    }
+}
+
+// Only vectors with a bit in `wanted` are made.
+inline void make_thresholds(const Segment& g, int draw, std::uint64_t wanted,
+                            const std::vector<LayerEllipsoid>& ellipsoids, LayerThresholds& out) {
+    const hn::CappedTag<float, 16> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    const hn::Rebind<std::uint8_t, decltype(d)> d8;
+    constexpr std::size_t kLanes = hn::MaxLanes(d);
+    const auto one = hn::Set(d, 1.0f);
+    for (std::size_t c = 0; c < 64; c += kLanes) {
+        if ((wanted >> c & ((std::uint64_t{1} << kLanes) - 1)) == 0) continue;
+        auto p = hn::Set(d, g.random.field->background()[std::size_t(draw)]);
+        for (const LayerEllipsoid& e : ellipsoids) {
+            const auto u2 = hn::Add(hn::LoadU(d, e.columns + c), hn::Set(d, e.c2));
+            const auto s = hn::Max(hn::Sub(one, u2), hn::Zero(d));
+            const auto value = hn::Add(hn::Set(d, e.rim), hn::Mul(hn::Set(d, e.span), hn::Mul(s, s)));
+            const auto combined = draw == kExt ? hn::Min(p, value) : hn::Max(p, value);
+            p = e.bounded ? hn::IfThenElse(hn::Lt(u2, one), combined, p) : combined;
+        }
+        // probability_threshold() of kernels.h
+        const auto scaled = hn::ConvertTo(di, hn::Mul(p, hn::Set(d, 0x1p31f)));
+        const auto certain = hn::RebindMask(du, hn::Ge(p, one));
+        const auto threshold =
+            hn::IfThenElse(certain, hn::Set(du, kCertain), hn::ShiftLeft<1>(hn::BitCast(du, scaled)));
+        hn::Store(threshold, du, out.full.data() + c);
+        hn::StoreU(hn::DemoteTo(d8, hn::BitCast(di, hn::ShiftRight<24>(threshold))), d8, out.top.data() + c);
+    }
 }
 
 // A bit for each of 64 cells: random byte below `top(cell)`, and equal to it.
@@ -87,94 +126,102 @@ HWY_INLINE LayerBits compare_bytes(const std::uint8_t* random, const Top& top) {
     return bits;
 }
 
-// Decides tied cells by 24 more bits each: word c % 4 of counter 32 + c / 4. `threshold(cell)` for cells of
-// the layer.
-template <class Threshold>
-HWY_INLINE void resolve_ties(const Segment& g, int block, int draw, int layer, const Threshold& threshold,
-                             LayerBits& bits) {
-    while (bits.tie != 0) {
-        int cells[kMaxLanes];
-        std::uint64_t counters[kMaxLanes] = {};
-        int count = 0;
-        for (; bits.tie != 0 && count < 4; bits.tie &= bits.tie - 1, ++count) {
-            cells[count] = std::countr_zero(bits.tie);
-            const int cell = layer * 64 + cells[count];
-            counters[count] = g.counter(draw_of(draw), block, 32 + std::uint32_t(cell) / 4);
-        }
-        std::uint32_t words[4 * kMaxLanes];
+// Decides the queued ties. Cell c takes word c % 4 of counter 32 + c / 4.
+inline void run_ties(const Segment& g, BirthScratch& s) {
+    constexpr int kBatch = 64;
+    HWY_ALIGN std::uint64_t counters[kBatch + kMaxLanes] = {};
+    HWY_ALIGN std::uint32_t words[4 * (kBatch + kMaxLanes)];
+    Tie ties[kBatch];
+    int count = 0;
+    const auto decide = [&]() HWY_ATTR {
         philox_counters(g.batch(), counters, count, words);
         for (int n = 0; n < count; ++n) {
-            const std::uint32_t t = threshold(std::size_t(cells[n]));
-            const bool event = t == kCertain || (words[4 * n + cells[n] % 4] >> 8) < (t & 0xFFFFFFu);
-            bits.less |= std::uint64_t{event} << cells[n];
+            const Tie& tie = ties[n];
+            const std::uint64_t event = words[4 * std::uint32_t(n) + tie.cell % 4] >> 8 < tie.below;
+            s.dense_events[tie.draw][tie.block][tie.cell / 64] |= event << (tie.cell % 64);
+        }
+        count = 0;
+    };
+    for (int i = 0; i < s.tie_count; ++i) {
+        const LayerTies& layer = s.ties[i];
+        for (std::uint64_t cells = layer.cells; cells != 0; cells &= cells - 1) {
+            const std::uint32_t cell = 64 * layer.layer + std::uint32_t(std::countr_zero(cells));
+            counters[count] = g.counter(draw_of(layer.draw), layer.block, 32 + cell / 4);
+            ties[count++] = {layer.block, layer.draw, cell, layer.below};
+            if (count == kBatch) decide();
         }
     }
+    decide();
+    s.tie_count = 0;
 }
 
-// Cells of a layer that are cld now: only these can be extinguished.
-inline std::uint64_t cloud_of_layer(const Segment& g, int block, int layer) {
-    std::uint64_t bits = 0;
-    for (int row = 0; row < 8; ++row) {
-        const std::ptrdiff_t at = g.row_word[std::size_t(8 * layer + row)];
-        if (at < 0) continue;
-        const std::uint64_t word = g.planes.cld[at + (g.bx0 + block) / 8];
-        bits |= (word >> (block % 8 * 8) & 0xFF) << (8 * row);
-    }
-    return bits;
+// What the 24 bits of a tied cell are compared with.
+inline std::uint32_t tie_threshold(std::uint32_t t) { return t == kCertain ? 0x1000000u : t & 0xFFFFFFu; }
+
+// Queues the tied cells of a layer that share a threshold. Without a branch: whether there are any is a
+// toss-up.
+HWY_INLINE void queue_ties(int block, int draw, int layer, std::uint64_t cells, std::uint32_t below,
+                           BirthScratch& s) {
+    s.ties[s.tie_count] = {cells, block, draw, std::uint32_t(layer), below};
+    s.tie_count += int{cells != 0};
 }
 
-// The dense draw of two layers, whose random bytes are 8 counters.
-inline void run_dense_layers(const Segment& g, int block, int draw, const BlockPlan& plan, int first_layer,
-                             const std::uint64_t* wanted, std::uint64_t* events) {
-    HWY_ALIGN std::uint64_t counters[8];
-    HWY_ALIGN std::uint32_t random[32];
-    const std::uint64_t first = g.counter(draw_of(draw), block, std::uint32_t(4 * first_layer));
-    for (std::uint64_t sub = 0; sub < 8; ++sub) counters[sub] = first + sub;
-    philox_counters(g.batch(), counters, 8, random);
-    const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
-    for (int layer = first_layer; layer < first_layer + 2; ++layer) {
-        if (wanted[layer] == 0) continue;
-        const auto* bytes = reinterpret_cast<const std::uint8_t*>(random) + 64 * (layer - first_layer);
-        LayerBits bits;
-        if (draw_plan.kind == DrawPlan::Kind::uniform) {
-            const std::uint32_t t = probability_threshold(draw_plan.p_max);
-            bits = compare_bytes(
-                bytes, [t](auto d, std::size_t) HWY_ATTR { return hn::Set(d, std::uint8_t(t >> 24)); });
-            bits.tie &= wanted[layer];
-            resolve_ties(
-                g, block, draw, layer, [t](std::size_t) { return t; }, bits);
-        } else {
-            HWY_ALIGN LayerThresholds t{};
-            make_thresholds(g, plan, draw, layer, wanted[layer], t);
-            bits = compare_bytes(
-                bytes, [&t](auto d, std::size_t c) HWY_ATTR { return hn::LoadU(d, t.top.data() + c); });
-            bits.tie &= wanted[layer];
-            resolve_ties(
-                g, block, draw, layer, [&t](std::size_t c) { return t.full[c]; }, bits);
-        }
-        events[layer] = bits.less & wanted[layer];
+// The random bytes of the layers in `layers` (a bit each): 4 counters a layer, 16 bytes a counter.
+inline void random_bytes(const Segment& g, int block, int draw, unsigned layers, std::uint32_t* out) {
+    HWY_ALIGN std::uint64_t counters[32 + kMaxLanes] = {};
+    const std::uint64_t first = g.counter(draw_of(draw), block, 0);
+    int count = 0;
+    for (; layers != 0; layers &= layers - 1) {
+        const auto sub = std::uint64_t(4 * std::countr_zero(layers));
+        for (std::uint64_t i = 0; i < 4; ++i) counters[count++] = first + sub + i;
     }
+    philox_counters(g.batch(), counters, count, out);
 }
 
 inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& plan, BirthScratch& s) {
     s.dirty[draw] = true;
-    std::array<std::uint64_t, 8> wanted, events{};  // a word a layer
-    wanted.fill(~std::uint64_t{0});
+    s.dense_words[draw] |= 1u << (block / 8);
+    CellBits& events = s.dense_events[draw][block];
+    CellBits wanted;
     if (draw == kExt) {
-        for (int layer = 0; layer < 8; ++layer) wanted[std::size_t(layer)] = cloud_of_layer(g, block, layer);
-    }
-    if (plan.draws[std::size_t(draw)].kind == DrawPlan::Kind::certain) {
-        events = wanted;
+        std::memcpy(wanted, cloud_of_block(g, block, s), sizeof wanted);
     } else {
-        for (int layer = 0; layer < 8; layer += 2) {
-            if ((wanted[std::size_t(layer)] | wanted[std::size_t(layer) + 1]) == 0) continue;
-            run_dense_layers(g, block, draw, plan, layer, wanted.data(), events.data());
-        }
+        std::fill_n(wanted, 8, ~std::uint64_t{0});
     }
-    std::uint8_t* out = event_bytes(s, draw, block);
-    const auto* rows = reinterpret_cast<const std::uint8_t*>(events.data());
-    for (std::size_t row = 0; row < 64; ++row)
-        out[row * kSegmentBlocks] = std::uint8_t(out[row * kSegmentBlocks] | rows[row]);
+    const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
+    if (draw_plan.kind == DrawPlan::Kind::certain) {
+        std::memcpy(events, wanted, sizeof wanted);
+        return;
+    }
+    unsigned layers = 0;
+    for (int layer = 0; layer < 8; ++layer) layers |= unsigned{wanted[layer] != 0} << layer;
+    HWY_ALIGN std::uint32_t random[4 * (32 + kMaxLanes)];
+    random_bytes(g, block, draw, layers, random);
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(random);
+    const bool uniform = draw_plan.kind == DrawPlan::Kind::uniform;
+    if (!uniform) locate_columns(plan, s.columns);
+    const std::uint32_t same = probability_threshold(draw_plan.p_max);
+    LayerThresholds t{};
+    for (; layers != 0; layers &= layers - 1, bytes += 64) {
+        const int layer = std::countr_zero(layers);
+        LayerBits bits;
+        if (s.tie_count + 64 > kMaxTies) run_ties(g, s);
+        if (uniform) {
+            bits = compare_bytes(
+                bytes, [same](auto d, std::size_t) HWY_ATTR { return hn::Set(d, std::uint8_t(same >> 24)); });
+            queue_ties(block, draw, layer, bits.tie & wanted[layer], tie_threshold(same), s);
+        } else {
+            find_in_layer(g, plan, draw, layer, s);
+            make_thresholds(g, draw, wanted[layer], s.layer, t);
+            bits = compare_bytes(
+                bytes, [&t](auto d, std::size_t c) HWY_ATTR { return hn::LoadU(d, t.top.data() + c); });
+            for (std::uint64_t cells = bits.tie & wanted[layer]; cells != 0; cells &= cells - 1) {
+                const std::uint32_t full = t.full[std::size_t(std::countr_zero(cells))];
+                queue_ties(block, draw, layer, cells & (~cells + 1), tie_threshold(full), s);
+            }
+        }
+        events[layer] = bits.less & wanted[layer];
+    }
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -81,10 +81,8 @@ HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* H
         const auto product0 = hn::MulEven(hn::BitCast(d32, x.w0), m0);
         const auto product1 = hn::MulEven(hn::BitCast(d32, x.w2), m1);
         // The key meets the older word first: the chain from round to round is multiply, shift, exclusive or.
-        const auto keyed0 = hn::Xor(x.w1, hn::Load(d, batch.keys.key0[round]));
-        const auto keyed1 = hn::Xor(x.w3, hn::Load(d, batch.keys.key1[round]));
-        x.w0 = hn::Xor(hn::ShiftRight<32>(product1), keyed0);
-        x.w2 = hn::Xor(hn::ShiftRight<32>(product0), keyed1);
+        x.w0 = hn::Xor3(hn::ShiftRight<32>(product1), x.w1, hn::Load(d, batch.keys.key0[round]));
+        x.w2 = hn::Xor3(hn::ShiftRight<32>(product0), x.w3, hn::Load(d, batch.keys.key1[round]));
         x.w1 = product1;
         x.w3 = product0;
     };
@@ -95,7 +93,24 @@ HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* H
     };
     const int lanes = int(hn::Lanes(d));
     int i = 0;
-    for (; i + lanes < count; i += 2 * lanes) {  // two at a time hide each other's latency
+    // Several vectors at a time hide each other's latency: as many as the registers hold.
+#if HWY_TARGET <= HWY_AVX3
+    for (; i + 3 * lanes < count; i += 4 * lanes) {
+        auto x = start(packed + i), y = start(packed + i + lanes), z = start(packed + i + 2 * lanes),
+             w = start(packed + i + 3 * lanes);
+        for (std::size_t round = 0; round < 10; ++round) {
+            advance(x, round);
+            advance(y, round);
+            advance(z, round);
+            advance(w, round);
+        }
+        finish(x, out + 4 * i);
+        finish(y, out + 4 * (i + lanes));
+        finish(z, out + 4 * (i + 2 * lanes));
+        finish(w, out + 4 * (i + 3 * lanes));
+    }
+#endif
+    for (; i + lanes < count; i += 2 * lanes) {
         auto x = start(packed + i), y = start(packed + i + lanes);
         for (std::size_t round = 0; round < 10; ++round) {
             advance(x, round);

@@ -26,11 +26,20 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 inline constexpr int kMaxLanes = 8;  // of 64 bits, in the widest vector
 
-// Blocks are taken in segments of 64 along x: their events fill 64 rows of 64 bytes a draw, which stay in the
-// first-level cache, and everything below has a fixed size.
+// Blocks are taken in segments of 64 along x: their events fill 4 KiB a draw, which stay in the first-level
+// cache, and everything below has a fixed size.
 inline constexpr int kSegmentBlocks = 64;
 inline constexpr int kSegmentWords = kSegmentBlocks * kBlockEdge / 64;
 inline constexpr int kMaxCounters = 512;  // queued before the sparse draws are run
+inline constexpr int kMaxTies = 512;      // queued before they are decided
+
+// An ellipsoid in one layer of a block, for one draw.
+struct LayerEllipsoid {
+    const float* columns;  // 64, see locate_columns()
+    float c2;              // c * c of block_field.h
+    float rim, span;
+    bool bounded;  // outside, where its value is the rim, it must be left out
+};
 
 // The sparse draws of one block.
 struct SparseJob {
@@ -41,11 +50,32 @@ struct SparseJob {
     float rate_unit;  // rate of the level * 2^-31
 };
 
+// A bit for each cell of a block: bit c % 64 of word c / 64 is the cell c = x + 8 y + 64 z.
+using CellBits = std::uint64_t[8];
+
+// Cells of a layer whose random byte equals the top byte of their threshold: 24 more bits decide.
+struct LayerTies {
+    std::uint64_t cells;
+    int block, draw;
+    std::uint32_t layer;
+    std::uint32_t below;  // an event if the 24 bits are less than this
+};
+
+// One of them.
+struct Tie {
+    int block, draw;
+    std::uint32_t cell;
+    std::uint32_t below;
+};
+
 // Memory of one thread.
 struct BirthScratch {
     // Cells that have an event: bit i of byte `block` of row y + 8 z is the cell i of that block. 0 between
     // segments.
     std::uint64_t events[3][64][kSegmentWords] = {};
+    alignas(64) CellBits
+        dense_events[3][kSegmentBlocks] = {};          // those of the dense draws; 0 between segments
+    alignas(64) CellBits cloud[kSegmentBlocks];        // cells that are cld, see cloud_of_block()
     std::uint64_t counters[kMaxCounters + kMaxLanes];  // packed, see philox-inl.h
     std::uint32_t
         words[4 * (kMaxCounters + kMaxLanes) + 32];  // 32 more: the last vector of events reads beyond
@@ -53,7 +83,13 @@ struct BirthScratch {
     std::uint64_t cloudy[kSegmentWords];  // a byte a block: not 0 when it holds any cld
     SparseJob jobs[kSegmentBlocks];
     int job_count = 0, counter_count = 0;
-    bool dirty[3] = {};  // draws with events in this segment
+    LayerTies ties[kMaxTies];
+    int tie_count = 0;
+    bool dirty[3] = {};            // draws with events in this segment
+    unsigned dense_words[3] = {};  // words of its rows, a bit each, that have events of the dense draw
+    unsigned known_cloud = 0;      // words of the segment's rows, a bit each, whose 8 blocks are in `cloud`
+    std::vector<float> columns;    // see locate_columns()
+    std::vector<LayerEllipsoid> layer;
     std::vector<const FieldEllipsoid*> row;
     std::vector<BlockPlan> plans = std::vector<BlockPlan>(kSegmentBlocks);
 };

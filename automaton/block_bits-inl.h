@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Between the two orders of bits: rows of the lattice, whose words hold 8 cells of each of 8 neighbouring
+// blocks, and blocks, whose 512 bits lie together (CellBits). A layer of 8 blocks is a square of 8x8 bytes
+// that is mirrored at its diagonal; the 8 layers are the lanes of vectors.
+
+#if defined(NEPHOS_BLOCK_BITS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_BLOCK_BITS_INL_H_
+#undef NEPHOS_BLOCK_BITS_INL_H_
+#else
+#define NEPHOS_BLOCK_BITS_INL_H_
+#endif
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include <hwy/highway.h>
+
+#include "automaton/segment-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Exchanges the bits of a above `kShift` with those of b below it, in every group of 2 * kShift bits.
+template <int kShift, class D, class V = hn::Vec<D>>
+HWY_INLINE void exchange(D d, std::uint64_t low_mask, V& a, V& b) {
+    const V t = hn::And(hn::Xor(hn::ShiftRight<kShift>(a), b), hn::Set(d, low_mask));
+    b = hn::Xor(b, t);
+    a = hn::Xor(a, hn::ShiftLeft<kShift>(t));
+}
+
+// Byte i of out[j][layer] = byte j of in[i][layer], for 8 layers.
+HWY_INLINE void mirror_bytes(const CellBits* HWY_RESTRICT in, CellBits* HWY_RESTRICT out) {
+    const hn::CappedTag<std::uint64_t, 8> d;
+    for (std::size_t layer = 0; layer < 8; layer += hn::Lanes(d)) {
+        hn::Vec<decltype(d)> v[8];
+        for (int i = 0; i < 8; ++i) v[i] = hn::LoadU(d, in[i] + layer);
+        for (int i : {0, 1, 2, 3}) exchange<32>(d, 0x00000000FFFFFFFFu, v[i], v[i + 4]);
+        for (int i : {0, 1, 4, 5}) exchange<16>(d, 0x0000FFFF0000FFFFu, v[i], v[i + 2]);
+        for (int i : {0, 2, 4, 6}) exchange<8>(d, 0x00FF00FF00FF00FFu, v[i], v[i + 1]);
+        for (int i = 0; i < 8; ++i) hn::StoreU(v[i], d, out[i] + layer);
+    }
+}
+
+// The cells of a block that are cld now: only these can be extinguished.
+inline const CellBits& cloud_of_block(const Segment& g, int block, BirthScratch& s) {
+    const int word = block / 8;
+    if ((s.known_cloud >> word & 1) == 0) {
+        s.known_cloud |= 1u << word;
+        alignas(64) CellBits rows[8];
+        for (std::size_t row = 0; row < 64; ++row) {
+            const std::ptrdiff_t at = g.row_word[row];
+            rows[row % 8][row / 8] = at < 0 ? 0 : g.planes.cld[at + g.bx0 / 8 + word];
+        }
+        mirror_bytes(rows, s.cloud + 8 * word);
+    }
+    return s.cloud[block];
+}
+
+// Moves the segment's events of one dense draw to the rows.
+inline void move_dense_events(int draw, BirthScratch& s) {
+    for (; s.dense_words[draw] != 0; s.dense_words[draw] &= s.dense_words[draw] - 1) {
+        const int word = std::countr_zero(s.dense_words[draw]);
+        CellBits* blocks = s.dense_events[draw] + 8 * word;
+        alignas(64) CellBits rows[8];
+        mirror_bytes(blocks, rows);
+        for (std::size_t row = 0; row < 64; ++row) s.events[draw][row][word] |= rows[row % 8][row / 8];
+        std::fill_n(&blocks[0][0], 64, std::uint64_t{0});
+    }
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
