@@ -83,6 +83,10 @@ Json key_json(const Key& key, const void* owner) {
             return array_json(number_json(key, "number"), 3);
         case KeyKind::range:
             return any_of(number_json(key, "number"), array_json(number_json(key, "number"), 2));
+        case KeyKind::counts:
+            return any_of(number_json(key, "integer"), array_json(number_json(key, "integer"), 2));
+        case KeyKind::texts:
+            return any_of({{"type", "string"}}, {{"type", "array"}, {"items", {{"type", "string"}}}});
         case KeyKind::boundaries:
             return any_of(word_json(key), array_json(word_json(key), 3));
         case KeyKind::table:
@@ -140,6 +144,10 @@ std::string type_text(const Key& key) {
             return "linear RGB";
         case KeyKind::range:
             return "[min, max] or number";
+        case KeyKind::counts:
+            return "[min, max] or integer";
+        case KeyKind::texts:
+            return "texts";
         case KeyKind::boundaries:
             return "3 words or 1";
         case KeyKind::table:

@@ -146,6 +146,7 @@ void finish_scene(const SectionReader& reader, void* owner) {
     check_wind_speed(reader, scene);
     check_periodic_sizes(reader, scene);
     check_frames(reader, scene);
+    finish_layers(reader, scene);
     const Placement& placement = scene.automaton.placement;
     for (EllipsoidScatter& scatter : scene.automaton.field.scatters) {
         replace_infinite(scatter.x_m, placement.origin_m.x, scene.automaton.extent.x * placement.cell_size_m);

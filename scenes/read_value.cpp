@@ -138,6 +138,49 @@ void read_range(const Reading& reading, const Node& node, Range& range) {
     range = {*min, *max};
 }
 
+void read_counts(const Reading& reading, const Node& node, CountRange& counts) {
+    if (node.kind != Node::Kind::array) {
+        if (const auto number = integer_of(reading, node)) counts = {int(*number), int(*number)};
+        return;
+    }
+    if (node.items.size() != 2) {
+        const std::size_t size = node.items.size();
+        reading.report(node.place,
+                       "has " + std::to_string(size) + (size == 1 ? " item" : " items") + ", not 2");
+        return;
+    }
+    const auto min = integer_of({reading.document, reading.key, indexed(reading.path, 0)}, node.items[0]);
+    const auto max = integer_of({reading.document, reading.key, indexed(reading.path, 1)}, node.items[1]);
+    if (!min || !max) return;
+    if (*min > *max) {
+        reading.report(node.place, "runs from " + std::to_string(*min) + " down to " + std::to_string(*max));
+        return;
+    }
+    counts = {int(*min), int(*max)};
+}
+
+void read_texts(const Reading& reading, const Node& node, std::vector<std::string>& texts) {
+    if (node.kind == Node::Kind::text) {
+        texts = {node.text};
+        return;
+    }
+    if (node.kind != Node::Kind::array) {
+        reading.report(node.place, "is " + node_text(node));
+        return;
+    }
+    texts.clear();
+    for (std::size_t n = 0; n < node.items.size(); ++n) {
+        const Node& item = node.items[n];
+        if (item.kind == Node::Kind::text) {
+            texts.push_back(item.text);
+        } else {
+            reading.document.report(item.place,
+                                    enclosed(indexed(reading.path, n), '`') + " is " + node_text(item),
+                                    "expected a text");
+        }
+    }
+}
+
 std::optional<int> word_of(const Reading& reading, const Node& node) {
     if (node.kind != Node::Kind::text) {
         reading.report(node.place, "is " + node_text(node));
@@ -240,7 +283,8 @@ void read_value(Document& document, const Key& key, const Node& node, const std:
             read_path(reading, node, as<std::optional<std::filesystem::path>>(value));
             break;
         case KeyKind::word:
-            if (const auto word = word_of(reading, node)) key.set_word(value, *word);
+            if (const auto word = word_of(reading, node); word && value != nullptr)
+                key.set_word(value, *word);
             break;
         case KeyKind::extent:
             if (const auto n = read_three(reading, node, integer_of)) {
@@ -257,6 +301,14 @@ void read_value(Document& document, const Key& key, const Node& node, const std:
         case KeyKind::range:
             read_range(reading, node, as<Range>(value));
             break;
+        case KeyKind::counts:
+            read_counts(reading, node, as<CountRange>(value));
+            break;
+        case KeyKind::texts: {
+            std::vector<std::string> ignored;
+            read_texts(reading, node, value != nullptr ? as<std::vector<std::string>>(value) : ignored);
+            break;
+        }
         case KeyKind::boundaries:
             read_boundaries(reading, node, as<Boundaries>(value));
             break;

@@ -2,16 +2,14 @@
 #include "scenes/reader.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <system_error>
 #include <tuple>
 
 #include "scenes/document.h"
+#include "scenes/model_files.h"
 #include "scenes/read_value.h"
 #include "scenes/schema.h"
 #include "scenes/text.h"
+#include "scenes/text_file.h"
 
 namespace nephos {
 namespace {
@@ -160,8 +158,15 @@ KeyForm describe(const std::vector<std::string>& path) {
     const Key* key = find_key(path);
     if (key == nullptr) return {};
     const bool takes_text = key->kind == KeyKind::text || key->kind == KeyKind::path ||
-                            key->kind == KeyKind::word || key->kind == KeyKind::boundaries;
+                            key->kind == KeyKind::word || key->kind == KeyKind::texts ||
+                            key->kind == KeyKind::boundaries;
     return {takes_text, expected_text(*key)};
+}
+
+bool sets_model_files(std::string_view option) {
+    constexpr std::string_view kKey = "models";
+    return option.starts_with(kKey) && option.size() > kKey.size() &&
+           std::string_view("=[ \t").find(option[kKey.size()]) != std::string_view::npos;
 }
 
 // Only letters that every file system takes.
@@ -211,29 +216,11 @@ void resolve_initial_state(Scene& scene, const Document& document, const std::fi
     throw SceneErrors(std::move(problems));
 }
 
-std::string read_text_file(const std::filesystem::path& path) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) {
-        throw Error(ErrorCode::io, path.string() + ": is a folder, expected a scene in TOML");
-    }
-    errno = 0;
-    std::ifstream file(path, std::ios::binary);
-    const auto failed = [&] {
-        const std::string reason = errno != 0 ? std::strerror(errno) : "unknown error";
-        return Error(ErrorCode::io, path.string() + ": cannot read the scene: " + reason);
-    };
-    if (!file) throw failed();
-    std::string text(kMaxSceneBytes + 1, '\0');
-    file.read(text.data(), std::streamsize(text.size()));
-    if (file.bad()) throw failed();
-    text.resize(std::size_t(file.gcount()));
-    return text;
-}
-
 }  // namespace
 
 Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides) {
-    return read_scene_text(read_text_file(path), path.string(), path.parent_path(), overrides);
+    return read_scene_text(read_text_file(path, kMaxSceneBytes), path.string(), path.parent_path(),
+                           overrides);
 }
 
 Scene read_scene_text(std::string_view text, const std::string& label, const std::filesystem::path& folder,
@@ -252,7 +239,14 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
         document.root = std::move(*root);
     }
     const bool readable = document.problems.empty();
-    for (const std::string& option : overrides) document.set(option, &describe);
+    // First what says which files models come from, so that the other options may change those models.
+    for (const std::string& option : overrides) {
+        if (sets_model_files(option)) document.set(option, &describe);
+    }
+    if (readable) take_models_from_files(document, folder);
+    for (const std::string& option : overrides) {
+        if (!sets_model_files(option)) document.set(option, &describe);
+    }
     if (!readable) throw_problems(std::move(document.problems));
 
     Scene scene;

@@ -8,10 +8,13 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "automaton/options.h"
 #include "density/options.h"
 #include "render/options.h"
+#include "scenes/layers.h"
+#include "seeds/model.h"
 
 namespace nephos {
 
@@ -35,6 +38,12 @@ struct Scene {
     std::uint64_t steps = 240;  // length of the simulation
     // A VDB file whose bool grids hum, act and cld are the state at step 0, instead of automaton.initial.
     std::optional<std::filesystem::path> initial_state_file;
+    // Clouds from base models (layers.h). With layers, `automaton` holds what they share: seed, time step,
+    // wind, how lattices start, and the lattice and background of layers that say nothing else.
+    std::vector<BaseModel> models;
+    std::vector<NamedSky> skies;
+    ClimateOptions climate;
+    std::vector<LayerOptions> layers;
     DensityOptions density;
     RenderOptions render;
     FrameOptions frames;

@@ -130,6 +130,10 @@ std::string expected_text(const Key& key) {
             return "[red, green, blue], each " + numbers_text(key, "a number");
         case KeyKind::range:
             return "[min, max] or one number for both, each " + numbers_text(key, "a number");
+        case KeyKind::counts:
+            return "[min, max] or one integer for both, each " + numbers_text(key, "an integer");
+        case KeyKind::texts:
+            return "a text or an array of texts";
         case KeyKind::boundaries:
             return "[x, y, z] or one word for all, each " + quoted_words(key);
         case KeyKind::table:
@@ -154,13 +158,20 @@ const Section& scene_section() {
             "seed", "", kAny,
             "Start of all randomness: the same seed gives the same clouds, bit for bit, on every machine.");
         seed.kind = KeyKind::seed;
+        Key climate = table<&Scene::climate>("climate", climate_section(), climate_section().effect);
+        climate.written = [](const void* scene) {
+            return !(static_cast<const Scene*>(scene)->climate == ClimateOptions{});
+        };
         return Section{
             "Scene",
             "",
-            {name, seed, group("lattice", lattice_section()), group("time", time_section()),
-             group("field", field_section()),
+            {name, seed, model_files_key(), group("lattice", lattice_section()),
+             group("time", time_section()), group("field", field_section()),
              tables<&Scene::automaton, &AutomatonOptions::wind, &Wind::keyframes>("wind", wind_section(), 0,
                                                                                   10'000),
+             tables<&Scene::models>("model", model_section(), 0, kMaxModels),
+             tables<&Scene::skies>("sky", sky_section(), 0, 10'000), std::move(climate),
+             tables<&Scene::layers>("layer", layer_section(), 0, int(kMaxLayers)),
              group("density", density_section()), group("frames", frames_section()),
              group("camera", camera_section()), group("sun", sun_section()), group("light", light_section()),
              group("air", air_section()), group("ground", ground_section())},

@@ -35,6 +35,8 @@ enum class KeyKind {
     vector,   // [x, y, z]                                               Vec3
     colour,   // [red, green, blue], linear                              Rgb
     range,    // [min, max], or one number for both                      Range
+    counts,   // the same in integers                                    CountRange
+    texts,    // texts, or one alone                                     std::vector<std::string>
     boundaries,  // [x, y, z] of Key::words, or one for all                 Boundaries
     table,       // a table, described by Key::section                      its owner
     tables,      // any number of tables, each described by Key::section    std::vector of owners
@@ -70,6 +72,7 @@ struct Key {
     void (*set_word)(void* value, int index) = nullptr;
     std::vector<std::string> together_with;  // keys that must be there with this one
     std::string replaced_by;  // a key that takes this one's place: only one of both may be there
+    bool (*written)(const void* owner) = nullptr;  // whether the canonical scene has it; null: always
 
     const Section* section = nullptr;         // table, tables
     int min_items = 0, max_items = 0;         // tables

@@ -33,22 +33,6 @@ constexpr double kFastest_m_per_s = 1000;
 
 const std::vector<std::string_view> kBoundaryWords{"open", "periodic"};
 
-const Section& probabilities_section() {
-    static const Section section{
-        "Probabilities",
-        "How likely vapour, activation and extinction are in a cell and step.",
-        {key<&Probabilities::hum>("hum", "per step", between(0, 1),
-                                  "Probability that a cell without vapour gets some.",
-                                  "D, extinction and birth"),
-         key<&Probabilities::act>("act", "per step", between(0, 1),
-                                  "Probability that a cell is activated, the start of a cloud.",
-                                  "D, extinction and birth"),
-         key<&Probabilities::ext>("ext", "per step", between(0, 1), "Probability that a cloud cell dies.",
-                                  "D, extinction and birth")},
-        nullptr};
-    return section;
-}
-
 void check_fades(const SectionReader& reader, double fades_s, double life_s) {
     if (fades_s <= life_s) return;
     const char* at = reader.find("fade_out_s") != nullptr ? "fade_out_s" : "fade_in_s";
@@ -210,6 +194,22 @@ void finish_wind(const SectionReader& reader, void* owner) {
 }
 
 }  // namespace
+
+const Section& probabilities_section() {
+    static const Section section{
+        "Probabilities",
+        "How likely vapour, activation and extinction are in a cell and step.",
+        {key<&Probabilities::hum>("hum", "per step", between(0, 1),
+                                  "Probability that a cell without vapour gets some.",
+                                  "D, extinction and birth"),
+         key<&Probabilities::act>("act", "per step", between(0, 1),
+                                  "Probability that a cell is activated, the start of a cloud.",
+                                  "D, extinction and birth"),
+         key<&Probabilities::ext>("ext", "per step", between(0, 1), "Probability that a cloud cell dies.",
+                                  "D, extinction and birth")},
+        nullptr};
+    return section;
+}
 
 const Section& wind_section() {
     static const Section section{

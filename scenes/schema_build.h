@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "scenes/schema.h"
+#include "seeds/model.h"
 
 namespace nephos::schema_build {
 
@@ -66,6 +67,10 @@ constexpr KeyKind kind_of() {
         return KeyKind::colour;
     else if constexpr (std::is_same_v<T, Range>)
         return KeyKind::range;
+    else if constexpr (std::is_same_v<T, CountRange>)
+        return KeyKind::counts;
+    else if constexpr (std::is_same_v<T, std::vector<std::string>>)
+        return KeyKind::texts;
     else if constexpr (std::is_same_v<T, Boundaries>)
         return KeyKind::boundaries;
     else
@@ -107,6 +112,25 @@ Key word(std::string name, std::vector<std::string_view> words, std::string effe
     made.value = &value_at<Members...>;
     made.word_index = [](const void* value) { return int(*static_cast<const Word*>(value)); };
     made.set_word = [](void* value, int index) { *static_cast<Word*>(value) = Word(index); };
+    return made;
+}
+
+// A genus by its abbreviation, or "none".
+template <auto... Members>
+Key genus_word(std::string name, std::string effect, std::string source = {}) {
+    static_assert(std::is_same_v<typename Chain<Members...>::value_type, std::optional<Genus>>);
+    Key made = plain_key(KeyKind::word, std::move(name), {}, {}, std::move(effect), std::move(source));
+    made.words.push_back("none");
+    for (const GenusFacts& facts : genera()) made.words.push_back(facts.abbreviation);
+    made.value = &value_at<Members...>;
+    made.word_index = [](const void* value) {
+        const auto& genus = *static_cast<const std::optional<Genus>*>(value);
+        return genus ? int(*genus) + 1 : 0;
+    };
+    made.set_word = [](void* value, int index) {
+        auto& genus = *static_cast<std::optional<Genus>*>(value);
+        genus = index == 0 ? std::nullopt : std::optional(Genus(index - 1));
+    };
     return made;
 }
 

@@ -21,8 +21,22 @@ const Section& ground_section();
 
 // Owner: WindKeyframe.
 const Section& wind_section();
+// Owner: Probabilities.
+const Section& probabilities_section();
+// Owner: BaseModel, NamedSky, ClimateOptions, LayerOptions.
+const Section& model_section();
+const Section& sky_section();
+const Section& climate_section();
+const Section& layer_section();
+
+// The key `models`: files that base models are taken from (model_files.h); it has no value of its own.
+Key model_files_key();
+inline constexpr int kMaxModels = 10'000;
 
 // Checks of values that lie in several sections, and the defaults that depend on them; owner: Scene.
 void finish_scene(const SectionReader& reader, void* owner);
+
+// The part of it that concerns models, skies, climate and layers.
+void finish_layers(const SectionReader& reader, Scene& scene);
 
 }  // namespace nephos

@@ -33,7 +33,7 @@ std::string seed_text(std::uint64_t seed) {
 }
 
 bool has_value(const Key& key, const void* owner) {
-    if (key.value == nullptr) return false;
+    if (key.value == nullptr || (key.written != nullptr && !key.written(owner))) return false;
     if (key.kind == KeyKind::tables) return key.size(value_of(key, owner)) > 0;
     return key.kind != KeyKind::path ||
            as<std::optional<std::filesystem::path>>(value_of(key, owner)).has_value();
@@ -160,6 +160,17 @@ std::string value_text(const Key& key, const void* value) {
             if (range.min == range.max) return toml_number(range.min);
             return array_text({toml_number(range.min), toml_number(range.max)});
         }
+        case KeyKind::counts: {
+            const auto& counts = as<CountRange>(value);
+            if (counts.min == counts.max) return std::to_string(counts.min);
+            return array_text({std::to_string(counts.min), std::to_string(counts.max)});
+        }
+        case KeyKind::texts: {
+            std::vector<std::string> items;
+            for (const std::string& text : as<std::vector<std::string>>(value))
+                items.push_back(toml_string(text));
+            return array_text(items);
+        }
         case KeyKind::boundaries: {
             const auto& boundaries = as<Boundaries>(value);
             return words({boundaries.x, boundaries.y, boundaries.z});
@@ -188,6 +199,10 @@ std::string scene_hash(const Scene& scene) {
 std::string simulation_hash(const Scene& scene, std::string_view initial_state_hash) {
     Scene simulation;
     simulation.automaton = scene.automaton;
+    simulation.models = scene.models;
+    simulation.skies = scene.skies;
+    simulation.climate = scene.climate;
+    simulation.layers = scene.layers;
     simulation.density = scene.density;
     simulation.steps = 0;
     if (scene.initial_state_file) simulation.initial_state_file = "state";

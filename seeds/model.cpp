@@ -44,18 +44,6 @@ void check_seed(const std::string& where, const Seed& seed) {
         check_root(where + ", root " + std::to_string(r), seed.roots[r]);
 }
 
-// Boxes of the largest cloud that the model can make; at most kMaxCount^2 a root, so it cannot overflow.
-std::int64_t largest_cloud(const BaseModel& model) {
-    std::int64_t boxes = 0;
-    for (const Seed& seed : model.seeds) {
-        ++boxes;
-        for (const Root& root : seed.roots) {
-            boxes += std::int64_t(root.reproductions.max) * std::max(root.seeds_start, root.seeds_end);
-        }
-    }
-    return boxes;
-}
-
 // The frame of a root and its opening: where children may go.
 struct Cone {
     Vec3 axis, side, up;  // orthonormal; side towards growing yaw, up towards growing pitch
@@ -127,6 +115,18 @@ void add_children(std::vector<SeedBox>& boxes, const CloudName& name, const Seed
 }
 
 }  // namespace
+
+// At most kMaxCount^2 a root, so it cannot overflow.
+std::int64_t largest_cloud(const BaseModel& model) {
+    std::int64_t boxes = 0;
+    for (const Seed& seed : model.seeds) {
+        ++boxes;
+        for (const Root& root : seed.roots) {
+            boxes += std::int64_t(root.reproductions.max) * std::max(root.seeds_start, root.seeds_end);
+        }
+    }
+    return boxes;
+}
 
 void check(const BaseModel& model) {
     const std::string where = "base model \"" + model.name + "\"";

@@ -80,6 +80,9 @@ struct BaseModel {
 // No cloud has more boxes than this; a model whose largest cloud could is refused.
 inline constexpr int kMaxBoxes = 1'000'000;
 
+// Boxes of the largest cloud that a model can make. Pure.
+std::int64_t largest_cloud(const BaseModel& model);
+
 // Throws Error(usage) with the model's name, the value and what was expected.
 void check(const BaseModel& model);
 

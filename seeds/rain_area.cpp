@@ -80,7 +80,7 @@ void check(const HumidColumn& column) {
 }
 
 std::vector<RainArea> placed_areas(std::span<const PlacedRain> rains, double time_s,
-                                   const Displacement& carried) {
+                                   const Displacement& carried, std::uint32_t layer) {
     std::vector<RainArea> areas;
     for (std::size_t i = 0; i < rains.size(); ++i) {
         const PlacedRain& rain = rains[i];
@@ -94,7 +94,7 @@ std::vector<RainArea> placed_areas(std::span<const PlacedRain> rains, double tim
         const Rotation turn = rotation_of_degrees(rain.yaw_deg);
         const double moved_x = rain.carried ? double(carried.x) * 0x1p-32 : 0;
         const double moved_y = rain.carried ? double(carried.y) * 0x1p-32 : 0;
-        areas.push_back({rain_id(RainSource::placed, 0, 0, std::uint32_t(i)), rain.x_m + moved_x,
+        areas.push_back({rain_id(RainSource::placed, layer, 0, std::uint32_t(i)), rain.x_m + moved_x,
                          rain.y_m + moved_y, rain.semi_a_m, rain.semi_b_m, turn.cos, turn.sin,
                          rain.intensity_mm_per_h * weight});
     }

@@ -63,9 +63,9 @@ void check(const PlacedRain& rain);
 void check(const AttachedRain& rain);
 
 // Those that rain at a time, in order; throws Error(usage) on bad ones. `carried`: how far the air has moved
-// since time 0 (SkySimulation::carried()).
+// since time 0 (SkySimulation::carried()). `layer` makes ids unique among several layers.
 std::vector<RainArea> placed_areas(std::span<const PlacedRain> rains, double time_s,
-                                   const Displacement& carried);
+                                   const Displacement& carried, std::uint32_t layer = 0);
 
 // Those below the clouds of a layer, rule by rule, oldest cloud first, without those of intensity 0.
 // Throws Error(usage) on bad rules and on more than kMaxRainRules of them.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "seeds/sky.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "seeds/checks.h"
@@ -35,6 +36,30 @@ void check_skies(const std::string& where, const SkyOptions& options) {
                             "\" have the same state " + text_of(sky.state) + "; only one sky may have it");
             }
         }
+    }
+}
+
+// A sky of enormous clouds would take hours and all memory: it is refused before the first cloud is made.
+void check_number_of_boxes(const std::string& where, const SkyOptions& options) {
+    std::vector<std::int64_t> generated(options.models.size(), 0);
+    for (const Sky& sky : options.skies) {
+        std::int64_t largest = 0;
+        for (const SkyModel& m : sky.models) {
+            generated[m.model] = std::max<std::int64_t>(generated[m.model], m.generated);
+            largest = std::max(largest, largest_cloud(options.models[m.model]));
+        }
+        if (sky.clouds * largest > kMaxSkyBoxes) {
+            usage_error(where + ", sky \"" + sky.name + "\": " + std::to_string(sky.clouds) +
+                        " clouds of up to " + std::to_string(largest) + " seeds each, at most " +
+                        std::to_string(kMaxSkyBoxes) + " seeds are possible");
+        }
+    }
+    std::int64_t boxes = 0;
+    for (std::size_t m = 0; m < generated.size(); ++m)
+        boxes += generated[m] * largest_cloud(options.models[m]);
+    if (boxes > kMaxShapeBoxes) {
+        usage_error(where + ": the clouds generated of its base models have up to " + std::to_string(boxes) +
+                    " seeds, at most " + std::to_string(kMaxShapeBoxes) + " are possible");
     }
 }
 
@@ -74,6 +99,7 @@ void check(const SkyOptions& options) {
     if (options.models.size() > 65536) usage_error(where + ": more than 65536 base models");
     for (const BaseModel& model : options.models) check(model);
     check_skies(where, options);
+    check_number_of_boxes(where, options);
     check_schedule(where, options.schedule);
 }
 

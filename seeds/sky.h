@@ -64,6 +64,11 @@ struct SkyOptions {
     bool operator==(const SkyOptions&) const = default;
 };
 
+// Most boxes of all the different clouds that the skies of a layer use, and of all the clouds of one sky:
+// what memory and a step's time grow with.
+inline constexpr std::int64_t kMaxShapeBoxes = 4'000'000;
+inline constexpr std::int64_t kMaxSkyBoxes = 1'000'000;
+
 // Throws Error(usage) naming the layer, the value and what was expected: no sky, two skies with one state, a
 // state outside 0..1, an unknown model index, clouds without models, a schedule that does not rise, bad
 // models. A cloud larger than the world is found when the clouds are made (SkySimulation).

@@ -98,6 +98,17 @@ Displacement SkySimulation::wind_step(const SkyCloud& cloud, double time_s) cons
     return d;
 }
 
+SkyCloud SkySimulation::ahead(const SkyCloud& cloud, double after_s) const {
+    const Displacement d = wind_step(cloud, time_s());
+    const double fraction = after_s / options_.time_step_s;
+    SkyCloud later = cloud;
+    later.place = {cloud.place.x + fixed(metres(d.x) * fraction),
+                   cloud.place.y + fixed(metres(d.y) * fraction)};
+    later.phase = cloud.dissolving ? receded(cloud.phase, after_s, options_.dissolution_s)
+                                   : advanced(cloud.phase, after_s, options_.formation_s);
+    return later;
+}
+
 void SkySimulation::step() {
     move_clouds();
     const std::size_t before = count();

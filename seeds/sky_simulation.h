@@ -74,6 +74,10 @@ class SkySimulation {
     Vec3 position_m(const SkyCloud& cloud) const;  // world position of the model's origin
     Sphere sphere(const SkyCloud& cloud) const;    // around the cloud, in the world
 
+    // The cloud as it is `after_s` later, 0..time_step_s: moved by the wind and formed or dissolved further
+    // as the next step does it, so that its motion is continuous from step to step.
+    SkyCloud ahead(const SkyCloud& cloud, double after_s) const;
+
     // How far the air at the middle of the base heights has moved since the start, metres * 2^32 (wraps
     // around).
     const Displacement& carried() const { return carried_; }

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scenes/layers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "automaton/error.h"
+#include "automaton/random.h"
+#include "scenes/scene.h"
+
+namespace nephos {
+namespace {
+
+// Index of the item of this name.
+template <typename Item>
+std::size_t index_of(const std::vector<Item>& items, const std::string& name, const char* what) {
+    const auto found = std::ranges::find(items, name, &Item::name);
+    if (found == items.end()) {
+        throw Error(ErrorCode::usage, std::string("there is no ") + what + " called \"" + name + "\"");
+    }
+    return std::size_t(found - items.begin());
+}
+
+Sky resolved(const Scene& scene, const NamedSky& named) {
+    Sky sky{named.name, named.state, named.clouds, {}};
+    for (const std::string& model : named.models) {
+        sky.models.push_back({index_of(scene.models, model, "base model"), named.generated});
+    }
+    return sky;
+}
+
+}  // namespace
+
+std::uint64_t layer_seed(std::uint64_t scene_seed, std::size_t layer) {
+    if (layer == 0) return scene_seed;
+    const PhiloxWords words = philox(scene_seed, item_counter(Domain::layers, 0, std::uint32_t(layer), 0, 0));
+    return words[0] | std::uint64_t(words[1]) << 32;
+}
+
+const Wind& layer_wind(const Scene& scene, std::size_t layer) {
+    const Wind& own = scene.layers[layer].wind;
+    return own.keyframes.empty() ? scene.automaton.wind : own;
+}
+
+SkyOptions sky_options(const Scene& scene, std::size_t layer) {
+    const LayerOptions& given = scene.layers[layer];
+    SkyOptions options;
+    options.name = given.name;
+    options.seed = scene.automaton.seed;
+    options.layer = std::uint32_t(layer);
+    const Vec3& origin = given.placement.origin_m;
+    options.world = {origin.x, origin.y, origin.x + given.extent.x * given.placement.cell_size_m,
+                     origin.y + given.extent.y * given.placement.cell_size_m};
+    options.base_height_m = given.base_height_m;
+    options.models = scene.models;
+    for (const std::string& sky : given.skies) {
+        options.skies.push_back(resolved(scene, scene.skies[index_of(scene.skies, sky, "sky")]));
+    }
+    if (!scene.climate.schedule.empty()) options.schedule = scene.climate.schedule;
+    if (!given.schedule.empty()) options.schedule = given.schedule;
+    options.wind = layer_wind(scene, layer);
+    options.time_step_s = scene.automaton.time_step_s;
+    options.formation_s = given.formation_s;
+    options.dissolution_s = given.dissolution_s;
+    options.formation_softness = given.formation_softness;
+    options.cross_edges_whole = given.cross_edges_whole;
+    return options;
+}
+
+AutomatonOptions automaton_options(const Scene& scene, std::size_t layer) {
+    const LayerOptions& given = scene.layers[layer];
+    AutomatonOptions options = scene.automaton;
+    options.extent = given.extent;
+    options.placement = given.placement;
+    options.boundaries = given.boundaries;
+    options.seed = layer_seed(scene.automaton.seed, layer);
+    options.field = {given.background, {}, {}};
+    options.wind = layer_wind(scene, layer);
+    return options;
+}
+
+std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer) {
+    std::vector<AttachedRain> rains;
+    for (const AttachedRainRule& rule : scene.layers[layer].rain.attached) {
+        AttachedRain& rain = rains.emplace_back();
+        if (!rule.model.empty()) rain.model = index_of(scene.models, rule.model, "base model");
+        rain.genus = rule.genus;
+        rain.state = rule.state;
+        rain.size_scale = rule.size_scale;
+        rain.intensity_mm_per_h = rule.intensity_mm_per_h;
+    }
+    return rains;
+}
+
+SkiesAtTime skies_at(const Scene& scene, double time_s) {
+    if (!(time_s >= 0) || !std::isfinite(time_s)) {
+        throw Error(ErrorCode::usage,
+                    "no sky at " + std::to_string(time_s) + " s, expected a time of 0 s or later");
+    }
+    const double step_s = scene.automaton.time_step_s;
+    // A product of decimal fractions seldom meets a step exactly.
+    const double steps = std::floor(time_s / step_s * (1 + 1e-12) + 1e-9);
+    SkiesAtTime result{{}, std::max(0.0, time_s - steps * step_s)};
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        SkySimulation& sky = result.skies.emplace_back(sky_options(scene, n));
+        while (double(sky.steps()) < steps) sky.step();
+    }
+    return result;
+}
+
+}  // namespace nephos

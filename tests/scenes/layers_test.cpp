@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// Models from other files, and what a scene's layers become in the options of the libraries.
+
+#include "scenes/layers.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "scenes/reader.h"
+#include "scenes/writer.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A folder of its own, gone afterwards.
+class ModelFiles : public testing::Test {
+  protected:
+    void SetUp() override {
+        folder_ = fs::temp_directory_path() / ("nephos-models-" + std::to_string(::getpid()));
+        fs::create_directories(folder_ / "genera");
+    }
+    void TearDown() override { fs::remove_all(folder_); }
+
+    void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / name) << text; }
+    Scene read(const std::vector<std::string>& overrides = {}) {
+        return read_scene(folder_ / "scene.toml", overrides);
+    }
+    std::string messages(const std::vector<std::string>& overrides = {}) {
+        try {
+            read(overrides);
+        } catch (const SceneErrors& errors) {
+            return format(errors.problems());
+        }
+        return "no error";
+    }
+
+    fs::path folder_;
+};
+
+const std::string kCu = "[[model]]\nname = \"Cu\"\ngenus = \"Cu\"\nseeds = [{ size_m = [30, 20, 10] }]\n";
+
+TEST_F(ModelFiles, StandBeforeTheScenesOwnModelsAndInItsHash) {
+    write("genera/Cu.toml", kCu + "[[sky]]\nname = \"ignored\"\nstate = 0\n");
+    write("scene.toml", "models = [\"genera/Cu.toml\"]\n[[model]]\nname = \"own\"\nseeds = [{}]\n");
+    const Scene scene = read();
+    ASSERT_EQ(scene.models.size(), 2u);
+    EXPECT_EQ(scene.models[0].name, "Cu");
+    EXPECT_EQ(scene.models[0].genus, Genus::Cu);
+    EXPECT_EQ(scene.models[0].seeds[0].size_m, (Vec3{30, 20, 10}));
+    EXPECT_EQ(scene.models[1].name, "own");
+    EXPECT_TRUE(scene.skies.empty());
+    // The canonical scene needs the file no longer.
+    EXPECT_EQ(read_scene_text(to_toml(scene), "again.toml"), scene);
+
+    const std::string before = scene_hash(scene), simulation = simulation_hash(scene);
+    write("genera/Cu.toml", kCu + "# a comment\n");
+    EXPECT_EQ(scene_hash(read()), before);
+    write("genera/Cu.toml", kCu + "light_distance_m = 50\n" + "[[model.seeds]]\n");
+    EXPECT_NE(messages(), "no error") << "seeds are given twice";
+    write("genera/Cu.toml",
+          "[[model]]\nname = \"Cu\"\ngenus = \"Cu\"\nseeds = [{ size_m = [30, 20, 11] }]\n");
+    EXPECT_NE(scene_hash(read()), before);
+    EXPECT_NE(simulation_hash(read()), simulation);
+}
+
+TEST_F(ModelFiles, CanBeSetAndChangedFromTheCommandLine) {
+    write("genera/Cu.toml", kCu);
+    write("scene.toml", "name = \"x\"\n");
+    const std::string path = (folder_ / "genera/Cu.toml").string();
+    EXPECT_EQ(read({"models=" + path}).models.size(), 1u);
+    // The order of the options does not matter: files come first.
+    const Scene scene = read({"model[0].light_distance_m=7", "models=[\"" + path + "\"]"});
+    EXPECT_EQ(scene.models.at(0).light_distance_m, 7);
+}
+
+TEST_F(ModelFiles, ProblemsNameTheirFileAndLine) {
+    write("genera/Cu.toml", kCu);
+    write("scene.toml", "models = [\"genera/Cuu.toml\"]\n");
+    EXPECT_NE(messages().find("did you mean \"genera/Cu.toml\"?"), std::string::npos) << messages();
+    write("scene.toml", "models = \"genera\"\n");
+    EXPECT_NE(messages().find("is a folder"), std::string::npos) << messages();
+    write("genera/Cu.toml", "name = \"none\"\n");
+    write("scene.toml", "models = \"genera/Cu.toml\"\n");
+    EXPECT_NE(messages().find("has no [[model]]"), std::string::npos) << messages();
+    write("genera/Cu.toml", "\n\n[[model]]\nname = \"a\"\nseeds = [{ size_m = [1, 2, -3] }]\n");
+    EXPECT_NE(messages().find("genera/Cu.toml:5:28: error: `model[0].seeds[0].size_m[2]` is -3"),
+              std::string::npos)
+        << messages();
+    write("genera/Cu.toml", "[[model]\n");
+    EXPECT_NE(messages().find("genera/Cu.toml:1:"), std::string::npos) << messages();
+}
+
+const char* const kTwoLayers = R"(
+seed = 77
+[lattice]
+cells = [32, 16, 8]
+cell_size_m = 100
+origin_m = [-1600, 0, 500]
+[field.background]
+ext = 0.2
+[[wind]]
+levels = [{ height_m = 0, east_m_per_s = 5 }]
+[climate]
+region = "polar"
+initial_state = 0.25
+final_state = 1
+duration_s = 600
+[[model]]
+name = "puff"
+seeds = [{}]
+[[sky]]
+name = "fair"
+state = 0
+clouds = 4
+models = "puff"
+generated = 3
+[[layer]]
+name = "low"
+skies = "fair"
+base_height_m = 600
+[[layer]]
+name = "middle"
+skies = "fair"
+genus = "Ac"
+lattice = { cells = [20, 20, 30], origin_m = [0, 0, 1000], boundaries = "periodic" }
+background = { hum = 0.01 }
+wind = [{ levels = [{ height_m = 0, north_m_per_s = 9 }] }]
+climate = { initial_state = 0.5 }
+coupling = { min_semi_axis_m = 3 }
+)";
+
+TEST(Layers, TakeWhatTheySayNotFromTheScene) {
+    const Scene scene = read_scene_text(kTwoLayers, "two.toml");
+    const AutomatonOptions low = automaton_options(scene, 0), middle = automaton_options(scene, 1);
+    EXPECT_EQ(low.extent, scene.automaton.extent);
+    EXPECT_EQ(low.placement, scene.automaton.placement);
+    EXPECT_EQ(low.wind, scene.automaton.wind);
+    EXPECT_EQ(low.seed, 77u) << "one layer has the bits of a scene without";
+    EXPECT_EQ(middle.extent, (Extent{20, 20, 30}));
+    EXPECT_EQ(middle.placement, (Placement{{0, 0, 1000}, 100}));
+    EXPECT_EQ(middle.boundaries, (Boundaries{Boundary::periodic, Boundary::periodic, Boundary::periodic}));
+    EXPECT_EQ(middle.field.background, (Probabilities{0.01, 0, 0.2}));
+    EXPECT_EQ(wind_at(middle.wind, 0, 0), (Velocity{0, 9}));
+    EXPECT_NE(middle.seed, low.seed);
+
+    const SkyOptions sky = sky_options(scene, 1);
+    EXPECT_EQ(sky.layer, 1u);
+    EXPECT_EQ(sky.seed, 77u);
+    EXPECT_EQ(sky.world, (WorldRectangle{0, 0, 2000, 2000}));
+    EXPECT_EQ(sky.base_height_m, (Range{2000, 4000}))
+        << "Ac in polar regions, cut to the lattice's 1000..4000 m";
+    EXPECT_EQ(sky.schedule, (std::vector<StatePoint>{{0, 0.5}}));
+    EXPECT_EQ(sky.wind, middle.wind);
+    EXPECT_EQ(sky.skies.at(0).models, (std::vector<SkyModel>{{0, 3}}));
+    EXPECT_EQ(sky_options(scene, 0).schedule, (std::vector<StatePoint>{{0, 0.25}, {600, 1}}));
+    EXPECT_EQ(scene.layers[0].coupling.min_semi_axis_m, 100) << "a cell";
+    EXPECT_EQ(scene.layers[1].coupling.min_semi_axis_m, 3);
+    EXPECT_EQ(scene.layers[1].rain.column.bottom_m, 1000);
+    EXPECT_EQ(scene.layers[1].rain.column.top_m, 4000);
+}
+
+TEST(Layers, HaveSeedsThatNeverRepeat) {
+    std::vector<std::uint64_t> seeds;
+    for (std::uint64_t scene : {0ull, 1ull, 77ull, ~0ull}) {
+        for (std::size_t layer = 0; layer < kMaxLayers; ++layer) seeds.push_back(layer_seed(scene, layer));
+    }
+    std::sort(seeds.begin(), seeds.end());
+    EXPECT_EQ(std::adjacent_find(seeds.begin(), seeds.end()), seeds.end());
+    EXPECT_EQ(layer_seed(77, 1), layer_seed(77, 1));
+}
+
+TEST(Layers, SkiesAtATimeAreThoseOfTheSteps) {
+    const Scene scene = read_scene_text(kTwoLayers, "two.toml");
+    const SkiesAtTime at = skies_at(scene, 127.5);
+    ASSERT_EQ(at.skies.size(), 2u);
+    EXPECT_EQ(at.since_step_s, 7.5);
+    SkySimulation stepped(sky_options(scene, 1));
+    for (int n = 0; n < 12; ++n) stepped.step();
+    EXPECT_EQ(at.skies[1].save(), stepped.save());
+    EXPECT_THROW(skies_at(scene, -1), Error);
+    EXPECT_THROW(skies_at(scene, std::numeric_limits<double>::infinity()), Error);
+}
+
+// Between two steps a cloud moves on a straight line that ends where the step puts it.
+TEST(Layers, CloudsMoveOnContinuouslyBetweenSteps) {
+    const Scene scene = read_scene_text(kTwoLayers, "two.toml");
+    SkySimulation sky(sky_options(scene, 0));
+    for (int n = 0; n < 5; ++n) sky.step();
+    const SkyCloud before = sky.clouds().front();
+    const SkyCloud half = sky.ahead(before, 5), whole = sky.ahead(before, 10);
+    sky.step();
+    const SkyCloud after = sky.clouds().front();
+    ASSERT_EQ(after.serial, before.serial);
+    EXPECT_EQ(whole, after);
+    EXPECT_NEAR(sky.position_m(half).x - sky.position_m(before).x, 25, 1e-6);
+    EXPECT_EQ(sky.ahead(before, 0), before);
+}
+
+}  // namespace
+}  // namespace nephos
