@@ -14,6 +14,7 @@
 #include "apps/commands.h"
 #include "apps/simulation.h"
 #include "apps/terminal.h"
+#include "automaton/descriptor.h"
 #include "automaton/error.h"
 #include "automaton/random.h"
 
@@ -30,6 +31,7 @@ struct HashArguments {
 
 // The lines of a file, to compare with; blank lines and comments (#) left out.
 std::vector<std::string> expected_lines(const std::string& path) {
+    if (is_named_pipe(path)) throw Error(ErrorCode::io, path + ": is a named pipe");
     std::ifstream stream(path);
     if (!stream) throw Error(ErrorCode::io, path + ": cannot open: " + std::strerror(errno));
     std::vector<std::string> lines;

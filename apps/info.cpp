@@ -3,9 +3,6 @@
 // nephos info: what a file says about itself, whatever its name is.
 
 #include <array>
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <memory>
 
@@ -16,7 +13,9 @@
 #include "apps/commands.h"
 #include "apps/terminal.h"
 #include "automaton/checkpoint.h"
+#include "automaton/descriptor.h"
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "density/vdb_file.h"
 #include "render/image_file.h"
 
@@ -34,10 +33,8 @@ enum class FileKind { vdb, checkpoint, exr };
 
 // By the first bytes: OpenVDB's magic number is " BDV" and four zeros, OpenEXR's 20000630.
 FileKind kind_of(const std::string& path) {
-    std::error_code error;
-    if (std::filesystem::is_directory(path, error)) throw Error(ErrorCode::io, path + ": is a folder");
+    require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
-    if (!stream) throw Error(ErrorCode::io, path + ": cannot open: " + std::strerror(errno));
     std::array<char, 8> head{};
     stream.read(head.data(), head.size());
     const std::string_view bytes(head.data(), std::size_t(stream.gcount()));
@@ -128,8 +125,8 @@ std::string checkpoint_text(const Checkpoint& checkpoint) {
     return "checkpoint of nephos\n" + pairs_text({{"steps", human_count(checkpoint.steps)},
                                                   {"state hash", checkpoint.state.hex()},
                                                   {"simulation hash", checkpoint.simulation_hash},
-                                                  {"state", human_bytes(checkpoint.automaton.size())},
-                                                  {"history", human_bytes(checkpoint.history.size())}},
+                                                  {"state", bytes_text(checkpoint.automaton.size())},
+                                                  {"history", bytes_text(checkpoint.history.size())}},
                                                  2);
 }
 
@@ -165,42 +162,56 @@ std::string exr_text(const ExrInfo& info, bool colours) {
     return out;
 }
 
+struct Description {
+    Json json;
+    std::string text;
+};
+
+Description describe(const std::string& file, bool colours) {
+    switch (kind_of(file)) {
+        case FileKind::vdb: {
+            const VdbInfo content = read_vdb_info(file);
+            return {vdb_json(content), vdb_text(content, colours)};
+        }
+        case FileKind::checkpoint: {
+            const Checkpoint content = read_checkpoint(file);
+            return {checkpoint_json(content), checkpoint_text(content)};
+        }
+        case FileKind::exr: {
+            const ExrInfo content = read_exr_info(file);
+            return {exr_json(content), exr_text(content, colours)};
+        }
+    }
+    throw Error(ErrorCode::io, file + ": is of no known kind");
+}
+
+// A file that cannot be read does not keep the others from being shown.
 int info(const InfoArguments& a) {
     Output output;
     const bool colours = colours_on(stdout);
     Json results = Json::array();
+    int status = 0;
+    std::string_view separator;
     for (const std::string& file : a.files) {
         Json json = {{"file", file}};
-        std::string text;
-        switch (kind_of(file)) {
-            case FileKind::vdb: {
-                const VdbInfo content = read_vdb_info(file);
-                json.update(vdb_json(content));
-                text = vdb_text(content, colours);
-                break;
-            }
-            case FileKind::checkpoint: {
-                const Checkpoint content = read_checkpoint(file);
-                json.update(checkpoint_json(content));
-                text = checkpoint_text(content);
-                break;
-            }
-            case FileKind::exr: {
-                const ExrInfo content = read_exr_info(file);
-                json.update(exr_json(content));
-                text = exr_text(content, colours);
-                break;
-            }
+        try {
+            const Description description = describe(file, colours);
+            json.update(description.json);
+            if (!a.work.json) output.write(fmt::format("{}{}: {}", separator, file, description.text));
+            separator = "\n";
+        } catch (const Error& error) {
+            output.flush();  // what was shown before stands before the message
+            print_error(error);
+            json["error"] = error.what();
+            status = int(error.code());
         }
         results.push_back(std::move(json));
-        if (!a.work.json)
-            output.write(fmt::format("{}{}: {}", file == a.files.front() ? "" : "\n", file, text));
     }
     if (a.work.json) {
         const Json& all = a.files.size() == 1 ? results.front() : results;
         output.line(all.dump(2, ' ', false, Json::error_handler_t::replace));
     }
-    return 0;
+    return status;
 }
 
 }  // namespace
@@ -213,6 +224,9 @@ void add_info_command(CLI::App& app, Action& action) {
         ->type_name("FILE");
     add_json(*command, a->work);
     command->footer(
+        "Exit status 0: all files are described; 3: at least one cannot be read (with --json its entry has "
+        "\"error\").\n"
+        "\n"
         "Examples:\n"
         "  nephos info out/cumulus/density/cumulus_0001.vdb\n"
         "  nephos info out/cumulus/checkpoint.nephos --json");

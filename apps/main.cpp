@@ -83,15 +83,7 @@ int report_usage(const CLI::App& app, const std::string& message) {
 }
 
 int report(const Error& error) {
-    const SourcePosition& where = error.where();
-    std::string place;
-    if (!where.file.empty()) {
-        place = where.file + ":";
-        if (where.line > 0) place += std::to_string(where.line) + ":";
-        if (where.line > 0 && where.column > 0) place += std::to_string(where.column) + ":";
-        place += " ";
-    }
-    print_error(place + error.what());
+    print_error(error);
     return int(error.code());
 }
 

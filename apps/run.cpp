@@ -15,6 +15,7 @@
 #include "apps/simulation.h"
 #include "apps/terminal.h"
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "scenes/memory.h"
 #include "scenes/writer.h"
 
@@ -96,7 +97,7 @@ void print_files(Output& output, const RunReport& report) {
     for (const RunFiles& files : report.files) {
         std::string name = files.files.front().string();
         if (files.files.size() > 1) name += " .. " + files.files.back().filename().string();
-        rows.push_back({name, human_bytes(total_bytes(files)), std::string(opened_by(files.kind))});
+        rows.push_back({name, bytes_text(total_bytes(files)), std::string(opened_by(files.kind))});
         width = std::max(width, name.size());
         size_width = std::max(size_width, rows.back().size.size());
     }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "density/vdb_file.h"
 #include "scenes/memory.h"
 

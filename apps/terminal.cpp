@@ -11,8 +11,6 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "automaton/error.h"
-
 namespace nephos {
 namespace {
 
@@ -73,11 +71,9 @@ bool colours_on(std::FILE* stream) {
 }
 
 std::string styled(std::string_view text, Style style, bool colours) {
-    if (!colours || style == Style::plain) return std::string(text);
+    if (!colours) return std::string(text);
     const char* code = "";
     switch (style) {
-        case Style::plain:
-            break;
         case Style::bold:
             code = "1";
             break;
@@ -86,12 +82,6 @@ std::string styled(std::string_view text, Style style, bool colours) {
             break;
         case Style::red:
             code = "1;31";
-            break;
-        case Style::yellow:
-            code = "1;33";
-            break;
-        case Style::green:
-            code = "32";
             break;
         case Style::cyan:
             code = "36";
@@ -105,25 +95,23 @@ void print_message(std::string_view text) {
     std::fflush(stderr);
 }
 void print_error(std::string_view message) { print_labelled("error:", Style::red, message); }
-void print_warning(std::string_view message) { print_labelled("warning:", Style::yellow, message); }
+void print_error(const Error& error) {
+    const SourcePosition& where = error.where();
+    std::string place;
+    if (!where.file.empty()) {
+        place = where.file + ":";
+        if (where.line > 0) place += std::to_string(where.line) + ":";
+        if (where.line > 0 && where.column > 0) place += std::to_string(where.column) + ":";
+        place += " ";
+    }
+    print_error(place + error.what());
+}
 void print_note(std::string_view message) { print_labelled("note:", Style::cyan, message); }
 
 int terminal_width(std::FILE* stream, int otherwise) {
     winsize size{};
     if (::ioctl(::fileno(stream), TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return otherwise;
     return size.ws_col;
-}
-
-std::string human_bytes(std::uint64_t bytes) {
-    if (bytes < 1024) return fmt::format("{} bytes", bytes);
-    double value = double(bytes);
-    const char* unit = "";
-    for (const char* next : {"KiB", "MiB", "GiB", "TiB", "PiB"}) {
-        if (value < 1024) break;
-        value /= 1024;
-        unit = next;
-    }
-    return value < 10 ? fmt::format("{:.1f} {}", value, unit) : fmt::format("{:.0f} {}", value, unit);
 }
 
 std::string human_duration(double seconds) {

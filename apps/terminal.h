@@ -10,6 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include "automaton/error.h"
+
 namespace nephos {
 
 // Thrown by Output when the reader of standard output has gone (`nephos hash ... | head`): nothing more to
@@ -31,13 +33,12 @@ class Output {
 bool colours_on(std::FILE* stream);
 
 // Text between escape sequences when colours are on: "\033[1;31m" ... "\033[0m".
-enum class Style { plain, bold, dim, red, yellow, green, cyan };
+enum class Style { bold, dim, red, cyan };
 std::string styled(std::string_view text, Style style, bool colours);
 
-// Messages on standard error, one line each or more: "error: ...", "warning: ...", "note: ..."; the label in
-// colour.
+// Messages on standard error, one line each or more: "error: ...", "note: ..."; the label in colour.
 void print_error(std::string_view message);
-void print_warning(std::string_view message);
+void print_error(const Error& error);  // with its place, when it has one
 void print_note(std::string_view message);
 // Text as it is on standard error; failures to write are ignored, there is nowhere left to say so.
 void print_message(std::string_view text);
@@ -45,8 +46,7 @@ void print_message(std::string_view text);
 // Columns of the terminal at `stream`, or `otherwise` when it is none.
 int terminal_width(std::FILE* stream, int otherwise);
 
-// Bytes as "3.4 MiB"; seconds as "0:07", "12:34" or "1:02:03"; a count as "1,234,567".
-std::string human_bytes(std::uint64_t bytes);
+// Seconds as "0:07", "12:34" or "1:02:03"; a count as "1,234,567".
 std::string human_duration(double seconds);
 std::string human_count(std::uint64_t count);
 

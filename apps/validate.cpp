@@ -11,6 +11,7 @@
 #include "apps/commands.h"
 #include "apps/terminal.h"
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "scenes/errors.h"
 #include "scenes/memory.h"
 #include "scenes/writer.h"
@@ -43,14 +44,15 @@ Json scene_json(const std::string& file, const Scene& scene) {
             {"steps", scene.steps},
             {"frames", frame_count(scene)},
             {"scene_hash", scene_hash(scene)},
-            {"memory_bytes", memory_estimate_bytes(scene)}};
+            {"memory_bytes", memory_estimate_bytes(scene)},
+            {"memory_bytes_without_pictures", memory_estimate_bytes(scene, false)}};
 }
 
 std::string summary(const std::string& file, const Scene& scene) {
     const Extent& cells = scene.automaton.extent;
     return fmt::format(
         "{}: valid: {} x {} x {} cells, {} steps, {} frames, up to {} of memory, scene hash {}", file,
-        cells.x, cells.y, cells.z, scene.steps, frame_count(scene), human_bytes(memory_estimate_bytes(scene)),
+        cells.x, cells.y, cells.z, scene.steps, frame_count(scene), bytes_text(memory_estimate_bytes(scene)),
         scene_hash(scene));
 }
 
@@ -58,6 +60,7 @@ int validate(const ValidateArguments& a) {
     Output output;
     Json results = Json::array();
     int status = 0;
+    bool unreadable = false;
     for (const std::string& file : a.files) {
         SceneArguments one = a.scene;
         one.file = file;
@@ -79,10 +82,14 @@ int validate(const ValidateArguments& a) {
             } else {
                 print_scene_errors(errors);
             }
+        } catch (const Error& error) {  // cannot be read
+            unreadable = true;
+            print_error(error);
+            results.push_back({{"file", file}, {"valid", false}, {"error", error.what()}});
         }
     }
     if (a.work.json && !a.print) output.line(results.dump(2, ' ', false, Json::error_handler_t::replace));
-    return status;
+    return unreadable ? int(ErrorCode::io) : status;
 }
 
 }  // namespace
@@ -95,7 +102,7 @@ void add_validate_command(CLI::App& app, Action& action) {
     command->add_flag("--print", a->print, "Print the scene with every key and default spelled out");
     add_json(*command, a->work);
     command->footer(
-        "Exit status 0: all scenes are valid; 2: at least one is not.\n"
+        "Exit status 0: all scenes are valid; 2: at least one is not; 3: at least one cannot be read.\n"
         "\n"
         "Examples:\n"
         "  nephos validate scenes/*.toml\n"

@@ -16,6 +16,7 @@
 #include "automaton/error.h"
 #include "automaton/kernels.h"
 #include "automaton/random.h"
+#include "automaton/text.h"
 
 namespace nephos {
 namespace {
@@ -212,7 +213,8 @@ void Automaton::set_external_ellipsoids(std::vector<ActiveEllipsoid> ellipsoids)
     for (const ActiveEllipsoid& e : ellipsoids) {
         nephos::check(e.ellipsoid, impl_->options, "external ellipsoid");
         if (!(e.weight >= 0 && e.weight <= 1)) {
-            throw Error(ErrorCode::usage, "weight " + std::to_string(e.weight) + " of an external ellipsoid: expected 0..1");
+            throw Error(ErrorCode::usage,
+                        "weight " + number_text(e.weight, 6) + " of an external ellipsoid: expected 0..1");
         }
     }
     impl_->external = std::move(ellipsoids);
@@ -259,7 +261,8 @@ void Automaton::restore(std::span<const std::byte> bytes) {
 std::size_t Automaton::memory_bytes(const AutomatonOptions& options) {
     const std::size_t layer = std::size_t((options.extent.x + 63) / 64) * std::size_t(options.extent.y) * 8;
     return 4 * BitPlane::bytes(options.extent) + layer +
-           std::size_t(ellipsoid_count(options)) * (sizeof(AirParcel) + sizeof(ActiveEllipsoid) + sizeof(FieldEllipsoid));
+           std::size_t(ellipsoid_count(options)) *
+               (sizeof(AirParcel) + sizeof(ActiveEllipsoid) + sizeof(FieldEllipsoid));
 }
 
 }  // namespace nephos

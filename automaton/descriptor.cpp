@@ -3,6 +3,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <system_error>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -30,6 +31,13 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
 }
 
 void require_regular_file(const std::filesystem::path& path) { open_regular_file(path, O_RDONLY); }
+
+bool is_named_pipe(const std::filesystem::path& path) {
+    std::error_code error;
+    if (!std::filesystem::is_fifo(path, error)) return false;
+    const std::filesystem::path name = std::filesystem::canonical(path, error);
+    return !error && std::filesystem::exists(name, error);
+}
 
 int write_all(int fd, std::span<const std::byte> content) {
     while (!content.empty()) {

@@ -53,6 +53,11 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags);
 // Throws Error(io) unless open_regular_file() can read it.
 void require_regular_file(const std::filesystem::path& path);
 
+// Whether a path is a pipe with a name in the file system. Nobody may ever write to it, and a program that
+// opens it to read waits for that. The pipe of a running command (/dev/stdin, what a shell puts for
+// `<(command)`) has no such name.
+bool is_named_pipe(const std::filesystem::path& path);
+
 // Writes everything, however many calls it takes. 0, or the error number of the call that failed.
 int write_all(int fd, std::span<const std::byte> content);
 

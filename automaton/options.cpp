@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <string>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 
 namespace nephos {
 namespace {
@@ -15,11 +15,7 @@ void require(bool good, const std::string& message) {
     if (!good) throw Error(ErrorCode::usage, message);
 }
 
-std::string number(double value) {
-    std::ostringstream text;
-    text << value;
-    return text.str();
-}
+std::string number(double value) { return number_text(value, 6); }
 
 void require_finite(double value, const std::string& name) {
     require(std::isfinite(value), name + " = " + number(value) + ": expected a finite number");
@@ -71,16 +67,17 @@ void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::stri
     check(s.life_s, name + ".life_s");
     for (bool largest : {false, true}) {  // both ends of every range make a valid ellipsoid
         const auto end = [&](const Range& r) { return largest ? r.max : r.min; };
-        nephos::check(Ellipsoid{.centre_m = {end(s.x_m), end(s.y_m), end(s.z_m)},
-                        .semi_axes_m = {end(s.semi_axis_x_m), end(s.semi_axis_y_m), end(s.semi_axis_z_m)},
-                        .yaw_deg = end(s.yaw_deg),
-                        .centre = s.centre,
-                        .rim = s.rim,
-                        .birth_s = end(s.birth_s),
-                        .life_s = end(s.life_s),
-                        .fade_in_s = s.fade_in_s,
-                        .fade_out_s = s.fade_out_s},
-              o, name);
+        nephos::check(
+            Ellipsoid{.centre_m = {end(s.x_m), end(s.y_m), end(s.z_m)},
+                      .semi_axes_m = {end(s.semi_axis_x_m), end(s.semi_axis_y_m), end(s.semi_axis_z_m)},
+                      .yaw_deg = end(s.yaw_deg),
+                      .centre = s.centre,
+                      .rim = s.rim,
+                      .birth_s = end(s.birth_s),
+                      .life_s = end(s.life_s),
+                      .fade_in_s = s.fade_in_s,
+                      .fade_out_s = s.fade_out_s},
+            o, name);
     }
 }
 
@@ -164,7 +161,8 @@ void check(const AutomatonOptions& o) {
         check(o.field.scatters[i], o, "field.scatters[" + std::to_string(i) + "]");
     }
     require(o.field.scatters.size() <= kMaxScatters,
-            "field.scatters: " + std::to_string(o.field.scatters.size()) + " of them; at most 65536 are possible");
+            "field.scatters: " + std::to_string(o.field.scatters.size()) +
+                " of them; at most 65536 are possible");
     const std::uint64_t ellipsoids = ellipsoid_count(o);
     require(ellipsoids <= kMaxEllipsoids, "the field has " + std::to_string(ellipsoids) +
                                               " ellipsoids, images around periodic axes included; at most " +

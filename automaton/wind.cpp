@@ -6,6 +6,7 @@
 #include <string>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 
 namespace nephos {
 namespace {
@@ -29,7 +30,7 @@ Velocity at_height(const std::vector<WindLevel>& levels, double height_m) {
 std::int64_t to_fixed(double cells) {
     constexpr double kMaxCells = 0x1p30;
     if (!(std::abs(cells) <= kMaxCells)) {
-        throw Error(ErrorCode::usage, "wind moves the air by " + std::to_string(cells) +
+        throw Error(ErrorCode::usage, "wind moves the air by " + number_text(cells, 6) +
                                           " cells in one step; at most 2^30 cells are possible");
     }
     return std::llround(cells * 0x1p32);

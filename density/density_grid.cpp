@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "density/openvdb_access.h"
 
 namespace nephos {
@@ -147,7 +148,7 @@ DensityGrid DensityGrid::from_dense(std::span<const float> values, Extent extent
     }
     const auto bad = std::ranges::find_if_not(values, [](float v) { return v >= 0 && std::isfinite(v); });
     if (bad != values.end()) {
-        throw Error(ErrorCode::usage, "density " + std::to_string(*bad) + " at position " +
+        throw Error(ErrorCode::usage, "density " + number_text(*bad, 6) + " at position " +
                                           std::to_string(bad - values.begin()) +
                                           ": must be finite and at least 0");
     }

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "density/openvdb_access.h"
 
 namespace nephos {
@@ -18,7 +19,7 @@ namespace {
 void check_radius(double radius_cells) {
     if (!(radius_cells >= kMinMetaballRadius && radius_cells <= kMaxMetaballRadius)) {
         throw Error(ErrorCode::usage,
-                    "metaball radius of " + std::to_string(radius_cells) + " voxels: must be 1..8");
+                    "metaball radius of " + number_text(radius_cells, 6) + " voxels: must be 1..8");
     }
 }
 

@@ -18,8 +18,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "automaton/available_memory.h"
 #include "automaton/descriptor.h"
 #include "automaton/error.h"
+#include "automaton/text.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define NEPHOS_SANITIZED 1  // shadow memory needs terabytes of addresses: no limit on them then
@@ -50,6 +52,11 @@ void send_all(int fd, const void* data, std::size_t size) {
         ::_exit(1);  // nobody listens any more
 }
 
+std::size_t sum_or_most(std::size_t a, std::size_t b) {
+    constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
+    return a > kMost - b ? kMost : a + b;
+}
+
 // Addresses that this process uses now.
 std::size_t address_space() {
     std::ifstream statm("/proc/self/statm");
@@ -76,7 +83,7 @@ void confine(std::size_t memory_bytes, double seconds) {
     }
     set_limit(RLIMIT_CORE, 0);
     set_limit(RLIMIT_CPU, rlim_t(seconds) + 1);
-    if (!NEPHOS_SANITIZED) set_limit(RLIMIT_AS, address_space() + memory_bytes);
+    if (!NEPHOS_SANITIZED) set_limit(RLIMIT_AS, rlim_t(sum_or_most(address_space(), memory_bytes)));
 }
 
 [[noreturn]] void run_child(int fd, const VdbReadLimits& limits, std::size_t memory_bytes,
@@ -323,14 +330,7 @@ std::string clamp_message(std::string_view text, std::size_t length) {
 
 std::size_t memory_limit(const VdbReadLimits& limits) {
     if (limits.memory_bytes > 0) return limits.memory_bytes;
-    std::ifstream meminfo("/proc/meminfo");
-    std::string name;
-    std::size_t kib = 0;
-    while (meminfo >> name >> kib) {
-        if (name == "MemAvailable:") return kib * 1024 / 2;
-        meminfo.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
-    }
-    return std::size_t(::sysconf(_SC_PHYS_PAGES)) * std::size_t(::sysconf(_SC_PAGESIZE)) / 4;
+    return available_memory().bytes / 2;
 }
 
 void run_sandboxed(const std::filesystem::path& subject, const VdbReadLimits& limits,
@@ -338,7 +338,7 @@ void run_sandboxed(const std::filesystem::path& subject, const VdbReadLimits& li
                    const std::function<void(SandboxReader&)>& parent) {
     if (!(limits.seconds > 0 && limits.seconds <= 1e6)) {
         throw Error(ErrorCode::usage,
-                    "time limit of " + std::to_string(limits.seconds) + " s: must be above 0");
+                    "time limit of " + number_text(limits.seconds, 6) + " s: must be above 0");
     }
     const std::size_t memory_bytes = memory_limit(limits);
     const auto deadline =

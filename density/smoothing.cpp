@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "density/openvdb_access.h"
 #include "density/smoothing_kernel.h"
 
@@ -215,7 +216,7 @@ void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& op
 DensityGrid mix(const DensityGrid& a, const DensityGrid& b, double fraction) {
     if (!(fraction >= 0 && fraction <= 1)) {
         throw Error(ErrorCode::usage,
-                    "fraction " + std::to_string(fraction) + " between two steps: must be 0..1");
+                    "fraction " + number_text(fraction, 6) + " between two steps: must be 0..1");
     }
     if (!(a.extent() == b.extent()) || !(a.placement() == b.placement())) {
         throw Error(ErrorCode::usage, "only grids of the same extent and placement can be mixed");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <locale>
 #include <sstream>
 #include <string>
 
@@ -69,6 +70,7 @@ const Typed* as(const Imf::Attribute& attribute) {
 template <class... Values>
 std::string joined(int digits, Values... values) {
     std::ostringstream text;
+    text.imbue(std::locale::classic());
     text.precision(digits);
     const char* separator = "";
     ((text << separator << values, separator = " "), ...);

@@ -5,7 +5,6 @@
 #include <cstring>
 #include <functional>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 
 #include "automaton/atomic_file.h"
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "render/image_file.h"
 #include "render/tone_map.h"
 
@@ -106,12 +106,7 @@ void point_rows(Exchange& exchange) {
         exchange.rows[y] = exchange.image.rgb.data() + y * row;
 }
 
-std::string number_text(double value) {
-    std::ostringstream text;
-    text.precision(17);
-    text << value;
-    return text.str();
-}
+std::string exact(double value) { return number_text(value, 17); }
 
 Texts text_of(const PictureMetadata& metadata, const RenderOptions& options) {
     Texts texts{{"Software", "nephos" + (metadata.version.empty() ? "" : " " + metadata.version)}};
@@ -122,9 +117,9 @@ Texts text_of(const PictureMetadata& metadata, const RenderOptions& options) {
     add("seed", std::to_string(metadata.seed));
     add("sceneHash", metadata.scene_hash);
     add("stateHash", metadata.state_hash);
-    add("time", number_text(metadata.time_s));
-    if (metadata.extinction_per_m > 0) add("extinctionPerMetre", number_text(metadata.extinction_per_m));
-    add("exposure", number_text(options.camera.exposure_ev));
+    add("time", exact(metadata.time_s));
+    if (metadata.extinction_per_m > 0) add("extinctionPerMetre", exact(metadata.extinction_per_m));
+    add("exposure", exact(options.camera.exposure_ev));
     return texts;
 }
 

@@ -2,32 +2,21 @@
 #include "render/renderer.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <new>
 
+#include "automaton/available_memory.h"
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "render/attenuation_texture.h"
 #include "render/light_pass.h"
+#include "render/renderer_test_access.h"
 #include "render/view_pass.h"
 
 namespace nephos {
 namespace {
 
 constexpr int kMaxSlabs = 256;
-
-// Memory that can be used without swapping; 0 when the system does not say.
-std::size_t available_memory_bytes() {
-    std::ifstream file("/proc/meminfo");
-    std::string key, unit;
-    std::size_t kilobytes = 0;
-    while (file >> key >> kilobytes) {
-        std::getline(file, unit);
-        if (key == "MemAvailable:") return kilobytes * 1024;
-    }
-    return 0;
-}
 
 // Bytes in main memory while a picture is drawn, on a device that shares it.
 std::size_t memory_needed(const MetaballCloud& cloud, const RenderOptions& options, int tile_size) {
@@ -42,14 +31,12 @@ std::size_t memory_needed(const MetaballCloud& cloud, const RenderOptions& optio
 
 void check_memory(const MetaballCloud& cloud, const RenderOptions& options, int tile_size) {
     const std::size_t needed = memory_needed(cloud, options, tile_size);
-    const std::size_t available = available_memory_bytes();
-    if (available == 0 || needed <= available) return;
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "a picture of %d x %d pixels needs %.1f GiB of memory, %.1f GiB are free",
-                  options.camera.width, options.camera.height, double(needed) / (1 << 30),
-                  double(available) / (1 << 30));
-    throw Error(ErrorCode::usage, text);
+    const AvailableMemory available = available_memory();
+    if (needed <= available.bytes) return;
+    throw Error(ErrorCode::usage, "a picture of " + std::to_string(options.camera.width) + " x " +
+                                      std::to_string(options.camera.height) + " pixels needs " +
+                                      bytes_text(needed) + " of memory, but the " + available.limit +
+                                      " leaves " + bytes_text(available.bytes));
 }
 
 GpuImage upload_attenuation(const GpuDevice& gpu) {
@@ -176,12 +163,13 @@ std::vector<std::string> Renderer::validation_messages() const {
 }
 
 // Two copies into the same buffer with no barrier between them.
-void Renderer::provoke_hazard_for_test() {
+void RendererTestAccess::provoke_hazard(Renderer& renderer) {
+    const GpuDevice& gpu = renderer.impl_->gpu;
     with_gpu_errors("provoking a hazard", [&] {
         using Usage = vk::BufferUsageFlagBits;
-        const GpuBuffer from = create_buffer(impl_->gpu, 64, Usage::eTransferSrc, HostAccess::write);
-        const GpuBuffer to = create_buffer(impl_->gpu, 64, Usage::eTransferDst, HostAccess::read);
-        submit_and_wait(impl_->gpu, [&](const vk::raii::CommandBuffer& commands) {
+        const GpuBuffer from = create_buffer(gpu, 64, Usage::eTransferSrc, HostAccess::write);
+        const GpuBuffer to = create_buffer(gpu, 64, Usage::eTransferDst, HostAccess::read);
+        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
             for (int i = 0; i < 2; ++i)
                 commands.copyBuffer(*from.buffer, *to.buffer, vk::BufferCopy(0, 0, 64));
         });

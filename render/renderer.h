@@ -69,11 +69,8 @@ class Renderer {
     // What the validation layer has said so far; empty without DeviceOptions::validation.
     std::vector<std::string> validation_messages() const;
 
-    // Test hook: submits a deliberate write-after-write hazard, which the synchronization validation must
-    // report.
-    void provoke_hazard_for_test();
-
   private:
+    friend struct RendererTestAccess;  // render/renderer_test_access.h
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "automaton/descriptor.h"
 #include "automaton/error.h"
 
 namespace nephos {
@@ -14,6 +15,9 @@ std::string read_text_file(const std::filesystem::path& path, std::size_t most_b
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
         throw Error(ErrorCode::io, path.string() + ": is a folder, expected a scene in TOML");
+    }
+    if (is_named_pipe(path)) {
+        throw Error(ErrorCode::io, path.string() + ": is a named pipe, expected a scene in TOML");
     }
     errno = 0;
     std::ifstream file(path, std::ios::binary);

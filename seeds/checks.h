@@ -4,21 +4,17 @@
 // Checks of user input in this module: one line a rule, every message with the value and what was expected.
 
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "automaton/error.h"
 #include "automaton/field.h"
+#include "automaton/text.h"
 
 namespace nephos {
 
 [[noreturn]] inline void usage_error(const std::string& message) { throw Error(ErrorCode::usage, message); }
 
-inline std::string text_of(double value) {
-    char buffer[32];
-    std::snprintf(buffer, sizeof buffer, "%g", value);
-    return buffer;
-}
+inline std::string text_of(double value) { return number_text(value, 6); }
 
 // Throws unless min <= value <= max; false for NaN too.
 inline void require_in(const std::string& what, double value, double min, double max) {

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "automaton/error.h"
-#include "render/renderer.h"
+#include "render/renderer_test_access.h"
 
 namespace nephos {
 namespace {
@@ -35,7 +35,7 @@ bool in_child(const std::function<bool()>& works) {
 TEST(Device, ValidationSeesASeededHazard) {
     Renderer renderer({{}, true, 2048});
     EXPECT_TRUE(renderer.validation_messages().empty());
-    renderer.provoke_hazard_for_test();
+    RendererTestAccess::provoke_hazard(renderer);
     const std::vector<std::string> messages = renderer.validation_messages();
     ASSERT_FALSE(messages.empty());
     EXPECT_NE(messages.front().find("SYNC-HAZARD-WRITE-AFTER-WRITE"), std::string::npos) << messages.front();

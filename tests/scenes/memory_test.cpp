@@ -13,6 +13,7 @@
 
 #include "automaton/automaton.h"
 #include "automaton/error.h"
+#include "automaton/text.h"
 
 namespace nephos {
 namespace {
@@ -108,9 +109,11 @@ TEST(MemoryEstimate, GrowsWithItsPartsAndNeverOverflows) {
     EXPECT_GT(plain.density, scene.automaton.extent.cells()) << "floats for a good part of the cells";
     EXPECT_GT(plain.pictures, 640u * 480u * 4u);
     EXPECT_EQ(memory_estimate(scene, false).pictures, 0u);
-    EXPECT_EQ(memory_estimate_bytes(scene), plain.automaton + plain.density + plain.pictures);
+    EXPECT_EQ(memory_estimate_bytes(scene), plain.program + plain.automaton + plain.density + plain.pictures);
+    scene.density.write_velocity = true;
+    EXPECT_GT(memory_estimate(scene).density, plain.density + 12 * scene.automaton.extent.cells());
     scene.density.refine = 4;
-    EXPECT_GT(memory_estimate(scene).density, 32 * plain.density);
+    EXPECT_GT(memory_estimate(scene).density, plain.density + 64 * 16 * scene.automaton.extent.cells());
     scene.automaton.extent = {kMaxExtent, kMaxExtent, kMaxExtent};
     scene.density.refine = 8;
     EXPECT_GT(memory_estimate_bytes(scene), std::size_t(1) << 60);
@@ -141,6 +144,8 @@ TEST(BytesText, PicksTheUnit) {
     EXPECT_EQ(bytes_text(0), "0 bytes");
     EXPECT_EQ(bytes_text(1023), "1023 bytes");
     EXPECT_EQ(bytes_text(1536), "1.5 KiB");
+    EXPECT_EQ(bytes_text(std::size_t(99) << 20), "99.0 MiB");
+    EXPECT_EQ(bytes_text(std::size_t(300) << 20), "300 MiB");
     EXPECT_EQ(bytes_text(std::size_t(5) << 40), "5.0 TiB");
     EXPECT_EQ(bytes_text(kMost), "16.0 EiB");
 }
