@@ -2,6 +2,7 @@
 
 // nephos render: a picture of any fog volume.
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 
@@ -157,46 +158,38 @@ RenderOptions picture_options(const RenderArguments& a, const std::optional<Scen
     return options;
 }
 
-int render(const RenderArguments& a) {
+void check_outputs(const RenderArguments& a) {
     for (const std::string& out : a.out) {
-        if (extension_of(out) != ".png" && extension_of(out) != ".exr") {
-            throw Error(ErrorCode::usage, fmt::format("--out '{}' does not end with .png or .exr", out));
-        }
+        if (extension_of(out) == ".png" || extension_of(out) == ".exr") continue;
+        throw Error(ErrorCode::usage, fmt::format("--out '{}' does not end with .png or .exr", out));
     }
-    const ThreadLimit limit(a.work.threads);
-    std::optional<Scene> scene;
-    if (!a.scene.file.empty()) scene = load_scene(a.scene);
-    const LoadedDensity loaded = load_density(a.file, a.read);
-    const DensityGrid& grid = loaded.density;
-    if (!a.work.quiet) {
-        for (const std::string& note : loaded.notes) print_note(a.file + ": " + note);
-    }
+}
 
-    const double radius =
+// In voxels of the file: a scene's radius is in cells of the lattice, and a refined grid has several voxels a
+// cell.
+double radius_in_voxels(const std::optional<Scene>& scene, const LoadedDensity& loaded) {
+    const double cells =
         scene ? scene->density.metaball_radius_cells : DensityOptions().metaball_radius_cells;
-    require_memory(grid.active_voxels() * 4 * sizeof(Metaball),
-                   fmt::format("{}: drawing its voxels", a.file));
-    double extinction_per_m = 0;
-    if (a.extinction_per_m) {
-        extinction_per_m = *a.extinction_per_m;
-    } else if (scene) {
-        extinction_per_m = scene->density.extinction_per_m;
-    } else if (loaded.metadata) {
-        extinction_per_m = loaded.metadata->extinction_per_m;
-    } else {
-        extinction_per_m = visible_extinction_per_m(grid);
-        if (!a.work.quiet) {
-            print_note(
-                fmt::format("{}: names no extinction; {:.4g} per metre at density 1 is taken, so that the "
-                            "cloud is visible (--extinction changes it)",
-                            a.file, extinction_per_m));
-        }
-    }
-    const RenderOptions options = picture_options(a, scene, grid);
-    Renderer renderer(DeviceOptions{.device = a.device});
-    const std::vector<Metaball> balls = metaballs(grid, radius);
-    const Picture picture = renderer.draw({balls, extinction_per_m, metaball_normalisation(radius)}, options);
+    return std::min(cells * loaded.refine, kMaxMetaballRadius);
+}
 
+double extinction_of(const RenderArguments& a, const std::optional<Scene>& scene,
+                     const LoadedDensity& loaded) {
+    if (a.extinction_per_m) return *a.extinction_per_m;
+    if (scene) return scene->density.extinction_per_m;
+    if (loaded.metadata) return loaded.metadata->extinction_per_m;
+    const double visible = visible_extinction_per_m(loaded.density);
+    if (!a.work.quiet) {
+        print_note(
+            fmt::format("{}: names no extinction; {:.4g} per metre at density 1 is taken, so that the "
+                        "cloud is visible (--extinction changes it)",
+                        a.file, visible));
+    }
+    return visible;
+}
+
+PictureMetadata picture_metadata(const RenderArguments& a, const LoadedDensity& loaded,
+                                 double extinction_per_m) {
     PictureMetadata metadata;
     metadata.scene = std::filesystem::path(a.file).filename().string();
     metadata.version = version();
@@ -206,7 +199,14 @@ int render(const RenderArguments& a) {
         metadata.scene_hash = loaded.metadata->scene_hash;
         metadata.state_hash = loaded.metadata->state_hash;
         metadata.time_s = loaded.metadata->time_s;
+        metadata.frames_per_second = loaded.metadata->frames_per_second;
+        metadata.time_scale = loaded.metadata->time_scale;
     }
+    return metadata;
+}
+
+void write_pictures(const RenderArguments& a, const Picture& picture, const RenderOptions& options,
+                    const PictureMetadata& metadata) {
     for (const std::string& out : a.out) {
         if (extension_of(out) == ".exr") {
             write_exr(out, picture, options, metadata);
@@ -214,18 +214,46 @@ int render(const RenderArguments& a) {
             write_png(out, picture, options, metadata);
         }
     }
+}
+
+nlohmann::ordered_json render_json(const RenderArguments& a, const RenderOptions& options) {
+    const Vec3 &eye = options.camera.position_m, &target = options.camera.target_m;
+    return {{"files", a.out},
+            {"width", options.camera.width},
+            {"height", options.camera.height},
+            {"camera_m", {eye.x, eye.y, eye.z}},
+            {"target_m", {target.x, target.y, target.z}}};
+}
+
+int render(const RenderArguments& a) {
+    check_outputs(a);
+    const ThreadLimit limit(a.work.threads);
+    std::optional<Scene> scene;
+    if (!a.scene.file.empty()) scene = load_scene(a.scene);
+    const LoadedDensity loaded = load_density(a.file, a.read);
+    const DensityGrid& grid = loaded.density;
+    if (!a.work.quiet) {
+        for (const std::string& note : loaded.notes) print_note(a.file + ": " + note);
+    }
+    require_memory(grid.active_voxels() * 4 * sizeof(Metaball),
+                   fmt::format("{}: drawing its voxels", a.file));
+
+    const double radius = radius_in_voxels(scene, loaded);
+    const double extinction_per_m = extinction_of(a, scene, loaded);
+    const RenderOptions options = picture_options(a, scene, grid);
+    Renderer renderer(DeviceOptions{.device = a.device});
+    const std::vector<Metaball> balls = metaballs(grid, radius);
+    const Picture picture = renderer.draw({balls, extinction_per_m, metaball_normalisation(radius)}, options);
+    write_pictures(a, picture, options, picture_metadata(a, loaded, extinction_per_m));
+
     Output output;
     if (a.work.json) {
-        const Vec3 &eye = options.camera.position_m, &target = options.camera.target_m;
-        const nlohmann::ordered_json json = {{"files", a.out},
-                                             {"grid", loaded.grid_name},
-                                             {"width", picture.width},
-                                             {"height", picture.height},
-                                             {"metaballs", balls.size()},
-                                             {"extinction_per_m", extinction_per_m},
-                                             {"camera_m", {eye.x, eye.y, eye.z}},
-                                             {"target_m", {target.x, target.y, target.z}},
-                                             {"device", renderer.device_name()}};
+        nlohmann::ordered_json json = render_json(a, options);
+        json["grid"] = loaded.grid_name;
+        json["metaballs"] = balls.size();
+        json["metaball_radius_voxels"] = radius;
+        json["extinction_per_m"] = extinction_per_m;
+        json["device"] = renderer.device_name();
         output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     } else {
         for (const std::string& out : a.out) output.line(out);

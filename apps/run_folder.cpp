@@ -10,6 +10,7 @@
 
 #include "apps/folder_lock.h"
 #include "apps/manifest.h"
+#include "apps/simulation.h"
 #include "apps/statistics_file.h"
 #include "apps/version.h"
 #include "automaton/atomic_file.h"
@@ -142,7 +143,8 @@ class Recorder : public PipelineSink {
         metadata.extinction_per_m = options.extinction_per_m;
         metadata.time_s = result.time_s;
         metadata.time_step_s = scene.automaton.time_step_s;
-        metadata.frames_per_second = scene.frames.per_second / scene.frames.time_scale;
+        metadata.frames_per_second = scene.frames.per_second;
+        metadata.time_scale = scene.frames.time_scale;
         metadata.seed = scene.automaton.seed;
         metadata.scene_hash = settings_.scene_hash;
         metadata.state_hash = result.hash.hex();
@@ -154,6 +156,8 @@ class Recorder : public PipelineSink {
     void draw(const FrameResult& result) {
         const Scene& scene = settings_.scene;
         const double radius = scene.density.metaball_radius_cells;
+        require_memory(result.density.active_voxels() * 4 * sizeof(Metaball),
+                       fmt::format("{}: drawing frame {}", scene.name, result.number));
         const std::vector<Metaball> balls = metaballs(result.density, radius);
         const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
         const Picture picture = renderer_->draw(cloud, scene.render);
@@ -165,6 +169,7 @@ class Recorder : public PipelineSink {
         metadata.version = version();
         metadata.time_s = result.time_s;
         metadata.frames_per_second = scene.frames.per_second;
+        metadata.time_scale = scene.frames.time_scale;
         metadata.extinction_per_m = scene.density.extinction_per_m;
         if (scene.frames.exr)
             write_exr(folder_.picture(result.number, ".exr"), picture, scene.render, metadata);

@@ -49,7 +49,8 @@ int state(const StateArguments& a) {
     metadata.extinction_per_m = scene.density.extinction_per_m;
     metadata.time_s = automaton.time_s();
     metadata.time_step_s = scene.automaton.time_step_s;
-    metadata.frames_per_second = scene.frames.per_second / scene.frames.time_scale;
+    metadata.frames_per_second = scene.frames.per_second;
+    metadata.time_scale = scene.frames.time_scale;
     metadata.seed = scene.automaton.seed;
     metadata.scene_hash = scene_hash(scene);
     metadata.state_hash = automaton.hash().hex();

@@ -27,7 +27,8 @@
 //     nephos_extinction_per_m           double   extinction coefficient where density is 1
 //     nephos_time_s                     double   simulated time of this frame
 //     nephos_time_step_s                double   simulated time of one automaton step
-//     nephos_frames_per_second          double   frames per simulated second (of the sequence)
+//     nephos_frames_per_second          double   frames per second of film
+//     nephos_time_scale                 double   simulated seconds per second of film
 //     nephos_seed                       string   decimal, 0..2^64-1
 //     nephos_scene_hash                 string   hash of the scene
 //     nephos_state_hash                 string   hash of the automaton's state at or before this frame
@@ -58,6 +59,7 @@ struct VdbMetadata {
     double time_s = 0;
     double time_step_s = 0;
     double frames_per_second = 0;
+    double time_scale = 1;
     std::uint64_t seed = 0;
     std::string scene_hash;
     std::string state_hash;
@@ -107,20 +109,23 @@ struct LoadedDensity {
     DensityGrid density;
     std::string grid_name;
     std::optional<VdbMetadata> metadata;  // when nephos wrote the file
+    int refine = 1;  // voxels per cell of the lattice and axis; 1 unless the file says more
     std::vector<std::string>
         notes;  // one sentence for each thing that was adapted (negative values set to 0 ...)
 };
 
 // Reads any float or half fog volume (also double). Bounds are nephos_bbox where present, else the active
-// bounds, moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and direction, are permuted; what is
-// turned, sheared or not cubic is resampled, with a note. Everything untrusted happens in a child process with limits on
-// memory and time, which sends the voxels back; this process never parses the file. Throws Error(io) naming
-// the path and what was wrong with it; Error(usage) on bad options.
+// bounds, moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and
+// direction, are permuted; what is turned, sheared or not cubic is resampled, with a note. Everything
+// untrusted happens in a child process with limits on memory and time, which sends the voxels back; this
+// process never parses the file. Throws Error(io) naming the path and what was wrong with it; Error(usage) on
+// bad options.
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 
 // Reads the bool (or mask) grids hum, act and cld as a state of this extent; the transform is ignored.
-// Throws Error(io) as above, and when one of them is missing or has a voxel outside the extent.
+// Throws Error(io) as above, and when one of them is missing, is of another extent by its nephos_bbox_max, or
+// (without one) has a voxel outside the extent.
 Lattice read_state(const std::filesystem::path& path, Extent extent, const VdbReadLimits& limits = {});
 
 // One grid as `nephos info` lists it.

@@ -13,6 +13,7 @@ openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int ref
     map.insertMeta(kMetaTime, openvdb::DoubleMetadata(metadata.time_s));
     map.insertMeta(kMetaTimeStep, openvdb::DoubleMetadata(metadata.time_step_s));
     map.insertMeta(kMetaFrameRate, openvdb::DoubleMetadata(metadata.frames_per_second));
+    map.insertMeta(kMetaTimeScale, openvdb::DoubleMetadata(metadata.time_scale));
     // A string, because OpenVDB's widest integer is signed.
     map.insertMeta(kMetaSeed, openvdb::StringMetadata(std::to_string(metadata.seed)));
     map.insertMeta(kMetaSceneHash, openvdb::StringMetadata(metadata.scene_hash));
@@ -34,6 +35,7 @@ std::optional<VdbMetadata> from_meta_map(const openvdb::MetaMap& map) {
     metadata.time_s = meta_value<double>(map, kMetaTime).value_or(0);
     metadata.time_step_s = meta_value<double>(map, kMetaTimeStep).value_or(0);
     metadata.frames_per_second = meta_value<double>(map, kMetaFrameRate).value_or(0);
+    metadata.time_scale = meta_value<double>(map, kMetaTimeScale).value_or(metadata.time_scale);
     metadata.scene_hash = meta_value<std::string>(map, kMetaSceneHash).value_or("");
     metadata.state_hash = meta_value<std::string>(map, kMetaStateHash).value_or("");
     metadata.random_stream_version = meta_value<int>(map, kMetaStreamVersion).value_or(0);

@@ -19,6 +19,7 @@ inline constexpr const char* kMetaExtinction = "nephos_extinction_per_m";
 inline constexpr const char* kMetaTime = "nephos_time_s";
 inline constexpr const char* kMetaTimeStep = "nephos_time_step_s";
 inline constexpr const char* kMetaFrameRate = "nephos_frames_per_second";
+inline constexpr const char* kMetaTimeScale = "nephos_time_scale";
 inline constexpr const char* kMetaSeed = "nephos_seed";
 inline constexpr const char* kMetaSceneHash = "nephos_scene_hash";
 inline constexpr const char* kMetaStateHash = "nephos_state_hash";

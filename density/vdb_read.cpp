@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "density/metaballs.h"
 #include "density/openvdb_access.h"
 #include "density/sandbox.h"
@@ -155,6 +156,13 @@ bool has_y_up(const openvdb::GridBase& header, const openvdb::MetaMap& file, UpA
     return stated == "y";
 }
 
+int refine_of(const openvdb::GridBase& header) {
+    const int refine = meta_value<int>(header, kMetaRefine).value_or(1);
+    if (refine < 1 || refine > kMaxRefine)
+        throw std::runtime_error("it is damaged: nephos_refine is out of range");
+    return refine;
+}
+
 void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& metadata) {
     writer.value(std::uint8_t(metadata.has_value()));
     if (!metadata) return;
@@ -162,6 +170,7 @@ void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& meta
     writer.value(metadata->time_s);
     writer.value(metadata->time_step_s);
     writer.value(metadata->frames_per_second);
+    writer.value(metadata->time_scale);
     writer.value(metadata->seed);
     writer.value(metadata->random_stream_version);
     for (const std::string* text :
@@ -177,6 +186,7 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
     metadata.time_s = reader.value<double>();
     metadata.time_step_s = reader.value<double>();
     metadata.frames_per_second = reader.value<double>();
+    metadata.time_scale = reader.value<double>();
     metadata.seed = reader.value<std::uint64_t>();
     metadata.random_stream_version = reader.value<int>();
     for (std::string* text : {&metadata.scene_hash, &metadata.state_hash, &metadata.nephos_version})
@@ -192,13 +202,14 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, SandboxWri
     check_stated_size(header, memory_bytes);
     const auto grid = as_float(archive.read(n));
     if (grid->background() != 0.0f) {
-        throw std::runtime_error("its background is " + std::to_string(grid->background()) +
+        throw std::runtime_error("its background is " + number_text(grid->background(), 6) +
                                  ", not 0: it is no fog volume");
     }
     if (grid->activeVoxelCount() > memory_bytes / sizeof(float)) throw std::bad_alloc();
     writer.text(archive.entries()[n].descriptor.gridName());
     auto metadata = from_meta_map(header);
     send_metadata(writer, metadata ? metadata : from_meta_map(archive.metadata()));
+    writer.value(refine_of(header));
 
     const auto coord = [&](const Coord& c) {
         for (int a = 0; a < 3; ++a) writer.value(std::int32_t(c[a]));
@@ -240,6 +251,7 @@ LoadedDensity receive_density(SandboxReader& reader) {
     LoadedDensity loaded;
     loaded.grid_name = clamp_message(reader.text(), kMaxMetadataText);
     loaded.metadata = receive_metadata(reader);
+    loaded.refine = std::clamp(reader.value<int>(), 1, kMaxRefine);
     const auto extent = reader.value<Extent>();
     const auto placement = reader.value<Placement>();
     if (extent.x < 1 || extent.y < 1 || extent.z < 1 || !(placement.cell_size_m > 0)) {
@@ -262,7 +274,7 @@ LoadedDensity receive_density(SandboxReader& reader) {
     loaded.density = builder.finish(extent, placement);
     if (result.resampled) {
         loaded.notes.push_back("its voxels are not cubes along the axes: resampled to voxels of " +
-                               std::to_string(placement.cell_size_m) + " m");
+                               number_text(placement.cell_size_m, 6) + " m");
     }
     if (result.negative > 0) {
         loaded.notes.push_back(std::to_string(result.negative) + " values below 0 were set to 0");
@@ -311,6 +323,19 @@ void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& na
 
 constexpr const char* kStateGrids[] = {"hum", "act", "cld"};
 
+// Without nephos's bounds nobody knows how large the state is: then only its voxels can lie outside.
+void check_state_extent(const openvdb::GridBase& header, int refine, const Extent& extent) {
+    const auto last = meta_value<openvdb::Vec3i>(header, kMetaBoxMax);
+    if (!last) return;
+    const auto cells = [&](int axis) { return (std::int64_t{(*last)[axis]} + 1) / refine; };
+    if (cells(0) == extent.x && cells(1) == extent.y && cells(2) == extent.z) return;
+    const auto text = [](std::int64_t x, std::int64_t y, std::int64_t z) {
+        return std::to_string(x) + " x " + std::to_string(y) + " x " + std::to_string(z);
+    };
+    throw std::runtime_error("it holds a state of " + text(cells(0), cells(1), cells(2)) +
+                             " cells, but the scene has " + text(extent.x, extent.y, extent.z));
+}
+
 void send_state(VdbArchive& archive, Extent extent, SandboxWriter& writer) {
     for (const char* name : kStateGrids) {
         const auto& entries = archive.entries();
@@ -320,9 +345,8 @@ void send_state(VdbArchive& archive, Extent extent, SandboxWriter& writer) {
             throw std::runtime_error(std::string("there is no grid `") + name +
                                      "`; a state needs hum, act and cld; it has " + names_of(archive));
         }
-        const int refine = meta_value<int>(*entry->header, kMetaRefine).value_or(1);
-        if (refine < 1 || refine > kMaxRefine)
-            throw std::runtime_error("it is damaged: nephos_refine is out of range");
+        const int refine = refine_of(*entry->header);
+        check_state_extent(*entry->header, refine, extent);
         writer.value(refine);
         const Coord last(extent.x * refine - 1, extent.y * refine - 1, extent.z * refine - 1);
         const auto grid = archive.read(std::size_t(entry - entries.begin()));
@@ -444,7 +468,7 @@ VdbInfo receive_info(SandboxReader& reader) {
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options) {
     if (!(options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit))) {
         throw Error(ErrorCode::usage,
-                    std::to_string(options.metres_per_unit) + " metres per unit: must be above 0");
+                    number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
     }
     LoadedDensity loaded;
     in_sandbox(

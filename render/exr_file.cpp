@@ -67,6 +67,7 @@ Imf::Header picture_header(const Picture& picture, const RenderOptions& options,
         Imf::addFramesPerSecond(
             header,
             Imf::Rational(int(std::lround(1000.0 * std::min(metadata.frames_per_second, 1e6))), 1000));
+        header.insert("timeScale", Imf::DoubleAttribute(metadata.time_scale));
     }
     header.insert("verticalFieldOfView", Imf::FloatAttribute(float(options.camera.vertical_fov_deg)));
     header.insert("exposure", Imf::FloatAttribute(float(options.camera.exposure_ev)));

@@ -52,7 +52,8 @@ struct PictureMetadata {
     std::string state_hash;        // hexadecimal; of the state that is drawn
     std::string version;           // of nephos
     double time_s = 0;             // simulated time
-    double frames_per_second = 0;  // 0 = a single picture
+    double frames_per_second = 0;  // of film; 0 = a single picture
+    double time_scale = 1;         // simulated seconds per second of film
     double extinction_per_m = 0;   // at density 1
 };
 

@@ -18,6 +18,7 @@ METADATA = {
     "nephos_time_s": 33.5,
     "nephos_time_step_s": 5.0,
     "nephos_frames_per_second": 24.0,
+    "nephos_time_scale": 150.0,
     "nephos_seed": "12345678901234567890",
     "nephos_scene_hash": "scene",
     "nephos_state_hash": "state",

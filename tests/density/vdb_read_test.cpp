@@ -82,7 +82,7 @@ DensityGrid write_own(const std::filesystem::path& path) {
     content.density = &grid;
     content.hum = content.act = content.cld = plane.view();
     content.cells = placement;
-    write_vdb(path, content, {0.03, 7, 2, 24, 99, "a", "b", "c", 3});
+    write_vdb(path, content, {0.03, 7, 2, 24, 120, 99, "a", "b", "c", 3});
     return grid;
 }
 
@@ -95,7 +95,7 @@ TEST(VdbRead, OwnFilesComeBackAsTheyWere) {
     EXPECT_EQ(loaded.density.placement(), grid.placement());
     EXPECT_EQ(loaded.grid_name, "density");
     ASSERT_TRUE(loaded.metadata);
-    EXPECT_EQ(*loaded.metadata, (VdbMetadata{0.03, 7, 2, 24, 99, "a", "b", "c", 3}));
+    EXPECT_EQ(*loaded.metadata, (VdbMetadata{0.03, 7, 2, 24, 120, 99, "a", "b", "c", 3}));
     EXPECT_TRUE(loaded.notes.empty());
     const Lattice state = read_state(folder / "own.vdb", grid.extent());
     EXPECT_EQ(state.cld, test::random_plane(grid.extent(), 0.1, 8));
@@ -470,11 +470,13 @@ TEST(VdbRead, InfoListsEveryGrid) {
     EXPECT_EQ(counted.grids[0].active_box.min[0], fog->evalActiveVoxelBoundingBox().min().x());
 }
 
-// The cloud data set of Walt Disney Animation Studios, where it lies beside the checkout.
+// The cloud data set of Walt Disney Animation Studios, where somebody has it.
 TEST(VdbRead, DisneyCloud) {
-    const std::filesystem::path path =
-        std::filesystem::path(NEPHOS_SOURCE_DIR) / "../shared/data/wdas_cloud_sixteenth.vdb";
-    if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there";
+    const char* const variable = std::getenv("NEPHOS_TEST_DATA");
+    const std::filesystem::path folder = variable != nullptr ? variable : NEPHOS_TEST_DATA;
+    const std::filesystem::path path = folder / "wdas_cloud_sixteenth.vdb";
+    if (!std::filesystem::exists(path))
+        GTEST_SKIP() << path << " is not there: set NEPHOS_TEST_DATA to its folder";
     const auto file = test::read_with_openvdb(path);
     const auto grid = file.get<FloatGrid>("density");
     ASSERT_TRUE(grid);

@@ -31,7 +31,7 @@ struct Scene {
     Lattice state{test::random_plane(extent, 0.5, 1), test::random_plane(extent, 0.02, 2), BitPlane(extent)};
     DensityGrid density;
     Wind wind;
-    VdbMetadata metadata{0.05, 120.5, 10, 25, 18446744073709551615u, "scene-hash", "state-hash", "0.1.0", 1};
+    VdbMetadata metadata{0.05, 120.5, 10, 25, 60, 18446744073709551615u, "scene-hash", "state-hash", "0.1.0", 1};
 
     Scene() {
         for (int k = 2; k < 19; ++k) {
@@ -72,6 +72,7 @@ void expect_shared_properties(const openvdb::GridBase& grid, const Scene& scene,
     EXPECT_EQ(grid.metaValue<double>("nephos_time_s"), 120.5);
     EXPECT_EQ(grid.metaValue<double>("nephos_time_step_s"), 10.0);
     EXPECT_EQ(grid.metaValue<double>("nephos_frames_per_second"), 25.0);
+    EXPECT_EQ(grid.metaValue<double>("nephos_time_scale"), 60.0);
     EXPECT_EQ(grid.metaValue<std::string>("nephos_seed"), "18446744073709551615");
     EXPECT_EQ(grid.metaValue<std::string>("nephos_scene_hash"), "scene-hash");
     EXPECT_EQ(grid.metaValue<std::string>("nephos_state_hash"), "state-hash");

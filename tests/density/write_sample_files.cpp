@@ -67,7 +67,7 @@ void write_samples(const std::filesystem::path& folder) {
     const DensityGrid coarse = smooth(timed, {SmoothingKernel::gaussian, 1, 1, 1, 0}, placement, {});
     Wind wind;
     wind.keyframes = {{0, {{0, {3, -1}}, {2000, {23, -1}}}}};
-    const VdbMetadata metadata{0.04, 33.5, 5, 24, 12345678901234567890u, "scene", "state", "0.1.0", 1};
+    const VdbMetadata metadata{0.04, 33.5, 5, 24, 150, 12345678901234567890u, "scene", "state", "0.1.0", 1};
     for (const auto& [name, half, refine] :
          {std::tuple{"float", false, 1}, {"half", true, 1}, {"refined", false, 2}}) {
         const DensityGrid density = refine == 1 ? coarse : resample(coarse, refine, 1.5);

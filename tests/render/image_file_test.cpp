@@ -48,6 +48,7 @@ PictureMetadata sample_metadata() {
     metadata.version = "0.1.0";
     metadata.time_s = 1234.5;
     metadata.frames_per_second = 25;
+    metadata.time_scale = 120;
     metadata.extinction_per_m = 0.02;
     return metadata;
 }
@@ -105,6 +106,7 @@ TEST(Exr, InfoListsLayersAndMetadata) {
     }
     EXPECT_EQ(value_of(part.attributes, "exposure"), "0.5");
     EXPECT_EQ(value_of(part.attributes, "framesPerSecond"), "25000/1000");
+    EXPECT_EQ(value_of(part.attributes, "timeScale"), "120");
     EXPECT_EQ(value_of(part.attributes, "verticalFieldOfView"), "50");
     EXPECT_NE(value_of(part.attributes, "worldToCamera"), "absent");
 }
