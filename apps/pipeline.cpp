@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -55,7 +56,8 @@ BitPlane get_plane(ByteReader& reader, Extent extent) {
 Moment moment_of(double time_s, double time_step_s) {
     const double steps = time_s / time_step_s;
     const double nearest = std::round(steps);
-    if (std::abs(steps - nearest) <= 1e-9 * std::max(1.0, nearest)) return {std::uint64_t(nearest), 0};
+    constexpr double kTolerance = 4 * std::numeric_limits<double>::epsilon();
+    if (std::abs(steps - nearest) <= kTolerance * nearest) return {std::uint64_t(nearest), 0};
     const double whole = std::floor(steps);
     return {std::uint64_t(whole), steps - whole};
 }

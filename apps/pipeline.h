@@ -9,7 +9,7 @@
 // exactly the states that something still needs; so the automaton runs up to t0 steps ahead of the results,
 // also beyond the scene's last step. A frame therefore never depends on where the run ends.
 //
-//     Pipeline pipeline(scene, simulation_hash);
+//     Pipeline pipeline(scene, full_range(scene), simulation_hash);
 //     while (!pipeline.finished()) pipeline.advance(sink);
 //
 // Between any two calls of advance() the pipeline can be saved; one that is restored goes on with the same
@@ -70,8 +70,10 @@ struct PipelineRange {
 PipelineRange full_range(const Scene& scene);
 PipelineRange range_of_frames(const Scene& scene, int first, int last);
 
-// A moment in steps: `step` <= moment < step + 1, `fraction` the rest. A moment within 1e-9 of a step is that
-// step: products and quotients of decimal fractions seldom meet it exactly.
+// A moment in steps: `step` <= moment < step + 1, `fraction` the rest. A quotient within four units in the
+// last place of a whole number is that number: products and quotients of decimal fractions (0.3 s by steps of
+// 0.1 s) seldom meet it exactly, and the seven roundings up to here (three factors and the step that are no
+// binary fractions, product, quotient and sum of frame_time_s(), and this quotient) are half a unit each.
 struct Moment {
     std::uint64_t step = 0;
     double fraction = 0;

@@ -7,9 +7,12 @@
 #include <xxhash.h>
 
 #include "automaton/atomic_file.h"
+#include "automaton/available_memory.h"
 #include "automaton/bytes.h"
+#include "automaton/descriptor.h"
 #include "automaton/error.h"
 #include "automaton/random.h"
+#include "automaton/text.h"
 
 namespace nephos {
 namespace {
@@ -17,41 +20,23 @@ namespace {
 constexpr std::array<char, 8> kMagic = {'N', 'E', 'P', 'H', 'O', 'S', 'C', 'P'};
 constexpr std::uint32_t kFormatVersion = 1;
 constexpr std::size_t kHashDigits = 32;
+constexpr const char* kStateName = "automaton's state";
+constexpr const char* kHistoryName = "history";
 
 XXH128_hash_t hash_of(std::span<const std::byte> bytes) { return XXH3_128bits(bytes.data(), bytes.size()); }
 
-std::vector<std::byte> read_all(const std::filesystem::path& path) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) {
-        throw Error(
-            ErrorCode::io,
-            path.string() + ": " + (std::filesystem::exists(path, error) ? "is not a file" : "no such file"));
-    }
-    const auto size = std::filesystem::file_size(path, error);
-    if (error) throw Error(ErrorCode::io, path.string() + ": " + error.message());
-    std::ifstream in(path, std::ios::binary);
-    if (!is_checkpoint(path)) throw Error(ErrorCode::io, path.string() + ": is not a nephos checkpoint");
-    std::vector<std::byte> bytes(size);
-    if (!in.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(size))) {
-        throw Error(ErrorCode::io, path.string() + ": cannot read");
-    }
-    return bytes;
+[[noreturn]] void ends_inside(const char* what, std::uint64_t size, std::uint64_t left) {
+    throw Error(ErrorCode::io, std::string("ends inside the ") + what + ": " + std::to_string(size) +
+                                   " bytes announced, " + std::to_string(left) + " left");
 }
 
-std::vector<std::byte> get_block(ByteReader& in, const char* what) {
-    const auto size = in.get<std::uint64_t>();
-    if (size > in.rest().size()) {
-        throw Error(ErrorCode::io, std::string("ends inside the ") + what + ": " + std::to_string(size) +
-                                       " bytes announced, " + std::to_string(in.rest().size()) + " left");
-    }
-    std::vector<std::byte> block(size);
-    in.get_bytes(block);
-    return block;
-}
+// Bytes before the first block (checkpoint.h), and after the last.
+constexpr std::uint64_t kHeadBytes = 8 + 4 + 4 + kHashDigits + 3 * 8;
+constexpr std::uint64_t kTailBytes = 2 * 8;
 
-Checkpoint parse(std::span<const std::byte> bytes) {
-    ByteReader in(bytes);
-    if (in.get<std::array<char, 8>>() != kMagic) throw Error(ErrorCode::io, "is not a nephos checkpoint");
+void check_head(ByteReader& in) {
+    if (in.rest().size() < kMagic.size() || in.get<std::array<char, 8>>() != kMagic)
+        throw Error(ErrorCode::io, "is not a nephos checkpoint");
     if (const auto version = in.get<std::uint32_t>(); version != kFormatVersion) {
         throw Error(ErrorCode::io, "has checkpoint format " + std::to_string(version) +
                                        "; this version reads " + std::to_string(kFormatVersion));
@@ -60,14 +45,74 @@ Checkpoint parse(std::span<const std::byte> bytes) {
         throw Error(ErrorCode::io, "was written with random stream " + std::to_string(version) +
                                        "; this version draws stream " + std::to_string(kRandomStreamVersion));
     }
+}
+
+// The head and the sizes that a file states, against its own size, before anything is allocated for them.
+void check_sizes(std::ifstream& in, std::uint64_t file_size) {
+    std::array<std::byte, kHeadBytes> head{};
+    in.read(reinterpret_cast<char*>(head.data()), head.size());
+    ByteReader reader(std::span<const std::byte>(head).first(std::size_t(in.gcount())));
+    check_head(reader);
+    if (std::uint64_t(in.gcount()) < kHeadBytes) throw Error(ErrorCode::io, "ends early: inside its head");
+    std::uint64_t at = kHeadBytes;
+    for (const char* what : {kStateName, kHistoryName}) {
+        std::uint64_t size = 0;
+        in.seekg(std::streamoff(at));
+        if (at > file_size || file_size - at < sizeof size ||
+            !in.read(reinterpret_cast<char*>(&size), sizeof size)) {
+            throw Error(ErrorCode::io, std::string("ends before the ") + what);
+        }
+        at += sizeof size;
+        if (size > file_size - at) ends_inside(what, size, file_size - at);
+        at += size;
+    }
+    if (file_size - at < kTailBytes) throw Error(ErrorCode::io, "ends before its hash");
+    if (file_size - at > kTailBytes) {
+        throw Error(ErrorCode::io,
+                    "has " + std::to_string(file_size - at - kTailBytes) + " bytes after its end");
+    }
+    if (const AvailableMemory memory = available_memory(); file_size > memory.bytes / 2) {
+        throw Error(ErrorCode::io, "takes " + bytes_text(2 * file_size) + " to read, but the " +
+                                       memory.limit + " leaves " + bytes_text(memory.bytes));
+    }
+}
+
+std::vector<std::byte> read_all(const std::filesystem::path& path) {
+    require_regular_file(path);
+    const std::uint64_t size = std::filesystem::file_size(path);
+    std::ifstream in(path, std::ios::binary);
+    try {
+        check_sizes(in, size);
+    } catch (const Error& error) {
+        throw Error(ErrorCode::io, path.string() + ": " + error.what());
+    }
+    std::vector<std::byte> bytes(size);
+    in.seekg(0);
+    if (!in.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(size))) {
+        throw Error(ErrorCode::io, path.string() + ": cannot read");
+    }
+    return bytes;
+}
+
+std::vector<std::byte> get_block(ByteReader& in, const char* what) {
+    const auto size = in.get<std::uint64_t>();
+    if (size > in.rest().size()) ends_inside(what, size, in.rest().size());
+    std::vector<std::byte> block(size);
+    in.get_bytes(block);
+    return block;
+}
+
+Checkpoint parse(std::span<const std::byte> bytes) {
+    ByteReader in(bytes);
+    check_head(in);
     Checkpoint checkpoint;
     checkpoint.simulation_hash.resize(kHashDigits);
     in.get_bytes(std::as_writable_bytes(std::span(checkpoint.simulation_hash)));
     checkpoint.state.high = in.get<std::uint64_t>();
     checkpoint.state.low = in.get<std::uint64_t>();
     checkpoint.steps = in.get<std::uint64_t>();
-    checkpoint.automaton = get_block(in, "automaton's state");
-    checkpoint.history = get_block(in, "history");
+    checkpoint.automaton = get_block(in, kStateName);
+    checkpoint.history = get_block(in, kHistoryName);
     const std::size_t hashed = bytes.size() - in.rest().size();
     const auto high = in.get<std::uint64_t>(), low = in.get<std::uint64_t>();
     const XXH128_hash_t actual = hash_of(bytes.first(hashed));
@@ -115,6 +160,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
 
 bool is_checkpoint(const std::filesystem::path& path) {
     std::array<char, 8> magic{};
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return false;  // a pipe could wait for ever
     std::ifstream in(path, std::ios::binary);
     return in.read(magic.data(), magic.size()) && magic == kMagic;
 }

@@ -7,8 +7,7 @@
 //
 //     bits of a row  --expand, sum over t'-->  integers of a row  --sum over i'-->  X row
 //     X rows         --sum over j'-->  Y plane, kept in a ring of 8 + 2 k0 planes
-//     Y planes       --sum over k'-->  S rows  --* r-->  floats: dense rows, or 8x8x8 blocks in OpenVDB's
-//     order
+//     Y planes       --sum over k'-->  S rows  --* r-->  floats: dense rows, or blocks in OpenVDB's order
 //
 // Integers are as narrow as the window's total weight allows: 8 bit (a box of up to 255 cells), 16, 32 bit,
 // else double, which is exact up to 2^53, more than any window can reach. Planes without a bit in reach of a
@@ -49,8 +48,8 @@ struct SmoothingTile {
 class BlockSink {
   public:
     virtual ~BlockSink() = default;
-    // Memory for the 512 values of the block at cell (x, y, z), in OpenVDB's order: (x & 7) << 6 | (y & 7) <<
-    // 3 | z & 7.
+    // Memory for the 512 values of the block at cell (x, y, z), in OpenVDB's order:
+    // (x & 7) << 6 | (y & 7) << 3 | z & 7.
     virtual float* begin_block(int x, int y, int z) = 0;
     // Ends the block begun last: bit n of the 512 is set where value n is above 0.
     virtual void end_block(const std::uint64_t (&mask)[8]) = 0;

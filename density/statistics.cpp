@@ -15,7 +15,7 @@ std::uint64_t count_plane(const BitPlaneView& plane) { return count_bits(plane.w
 }  // namespace
 
 CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& act, const BitPlaneView& cld,
-                                 const Placement& placement, const DensityGrid* density) {
+                                 const Placement& placement) {
     const Extent extent = cld.extent;
     if (!(hum.extent == extent) || !(act.extent == extent)) {
         throw Error(ErrorCode::usage, "the planes of a state differ in extent");
@@ -40,8 +40,7 @@ CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& ac
     const double nan = std::numeric_limits<double>::quiet_NaN();
     result.base_m = lowest < 0 ? nan : placement.origin_m.z + lowest * placement.cell_size_m;
     result.top_m = highest < 0 ? nan : placement.origin_m.z + (highest + 1) * placement.cell_size_m;
-    result.mean_density = density ? density->sum() / double(density->extent().cells())
-                                  : double(result.cld) / double(extent.cells());
+    result.mean_density = double(result.cld) / double(extent.cells());
     return result;
 }
 

@@ -7,24 +7,20 @@
 #include <cstdint>
 
 #include "automaton/lattice.h"
-#include "density/density_grid.h"
 
 namespace nephos {
 
 struct CloudStatistics {
     std::uint64_t hum = 0, act = 0, cld = 0;  // cells that are 1
-    double cover =
-        0;  // fraction of the columns with at least one cloud cell: cloud cover seen from above, 0..1
-    double base_m = 0;  // world z of the lower face of the lowest cloud cell; NaN without cloud
-    double top_m = 0;   // world z of the upper face of the highest cloud cell; NaN without cloud
-    double mean_density =
-        0;  // mean over all cells of the box: of the density grid where one is given, else of cld
+    double cover = 0;         // cloud cover seen from above, 0..1: fraction of the columns with a cloud cell
+    double base_m = 0;        // world z of the lower face of the lowest cloud cell; NaN without cloud
+    double top_m = 0;         // world z of the upper face of the highest cloud cell; NaN without cloud
+    double mean_density = 0;  // mean of cld over all cells of the box
 };
 
-// Statistics of one state. With `density` (of the same region, at any refinement) mean_density is the grid's.
-// Throws Error(usage) when the planes differ in extent. Thread-safe; does not depend on the number of
-// threads.
+// Statistics of one state. Throws Error(usage) when the planes differ in extent. Thread-safe; does not depend
+// on the number of threads.
 CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& act, const BitPlaneView& cld,
-                                 const Placement& placement, const DensityGrid* density = nullptr);
+                                 const Placement& placement);
 
 }  // namespace nephos

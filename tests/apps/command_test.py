@@ -257,6 +257,95 @@ class Files(Case):
                 self.refused(3, "render", path, "--out", "x.png", says=name)
                 self.refused(3, "hash", self.scene, "--from", path, says=name)
 
+    def test_pipes_and_links_in_the_folder_of_a_run(self):
+        for name in ("manifest.json", "statistics.csv", "checkpoint.nephos", "density/tiny_0001.vdb"):
+            shutil.rmtree(self.folder / "out", ignore_errors=True)
+            (self.folder / "out/density").mkdir(parents=True)
+            os.mkfifo(self.folder / "out" / name)
+            self.refused(2, "run", self.scene, "--no-render", "--out", "out", says=name)
+            self.assertTrue((self.folder / "out" / name).is_fifo())
+            self.call("run", self.scene, "--no-render", "--out", "out", "--overwrite")
+            self.assertTrue((self.folder / "out" / name).is_file())
+        for name in ("checkpoint.nephos", "manifest.json", "statistics.csv"):
+            shutil.rmtree(self.folder / "out", ignore_errors=True)
+            self.call("run", self.scene, "--no-render", "--out", "out")
+            (self.folder / "out" / name).unlink()
+            os.mkfifo(self.folder / "out" / name)
+            self.refused(3, "run", self.scene, "--no-render", "--out", "out", "--resume", says=name)
+        # The folder and its parts may be links, to elsewhere and to nothing.
+        elsewhere = self.folder / "elsewhere"
+        (elsewhere / "grids").mkdir(parents=True)
+        (self.folder / "link").symlink_to(elsewhere)
+        (elsewhere / "density").symlink_to("grids")
+        self.call("run", self.scene, "--no-render", "--out", "link")
+        self.assertEqual(len(list((elsewhere / "grids").iterdir())), 5)
+        (self.folder / "nowhere").symlink_to("not there")
+        self.refused(3, "run", self.scene, "--no-render", "--out", "nowhere", says="nowhere")
+        # A link in the place of a file is somebody's, whatever it points to.
+        (self.folder / "mine").write_text("mine")
+        (self.folder / "third").mkdir()
+        (self.folder / "third/statistics.csv").symlink_to("../mine")
+        self.refused(2, "run", self.scene, "--no-render", "--out", "third", says="statistics.csv")
+        self.call("run", self.scene, "--no-render", "--out", "third", "--overwrite")
+        self.assertEqual((self.folder / "mine").read_text(), "mine")
+
+    def test_a_foreign_manifest(self):
+        for text in ("", "{}", "[1, 2]", "mine", '{"format": "nephos run", "format_version": 999}'):
+            self.write("out/manifest.json", text)
+            self.refused(2, "run", self.scene, "--no-render", "--out", "out", says="manifest.json")
+            self.assertEqual((self.folder / "out/manifest.json").read_text(), text)
+        self.assertEqual(len(list((self.folder / "out").iterdir())), 1)
+        self.call("run", self.scene, "--no-render", "--out", "out", "--overwrite")
+
+    def test_named_pipes_are_refused_and_those_of_commands_read(self):
+        os.mkfifo(self.folder / "pipe")
+        for arguments in (["info"], ["validate"], ["run"], ["hash"], ["hash", self.scene, "--check"],
+                          ["hash", self.scene, "--from"]):
+            with self.subTest(arguments=arguments):
+                self.refused(3, *arguments, "pipe", says="pipe")
+        result = subprocess.run(["bash", "-c", f'"{NEPHOS}" validate <(cat "{self.scene}")'], capture_output=True, text=True,
+                                timeout=60, env=self.environment)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_one_unreadable_file_does_not_hide_the_others(self):
+        bad = self.write("bad.toml", Scenes.BAD)
+        result = self.call("validate", "no.toml", bad, self.scene, "--json", status=3)
+        entries = json.loads(result.stdout)
+        self.assertEqual([entry["valid"] for entry in entries], [False, False, True])
+        self.assertIn("no.toml", entries[0]["error"])
+        self.assertIn("error: ", result.stderr)
+        self.assertIn("tiny.toml: valid", self.call("validate", "no.toml", self.scene, status=3).stdout)
+
+        self.call("state", self.scene, "--out", "good.vdb")
+        self.write("empty", "")
+        result = self.call("info", "empty", "no.vdb", "good.vdb", "--json", status=3)
+        entries = json.loads(result.stdout)
+        self.assertEqual([entry.get("kind") for entry in entries], [None, None, "vdb"])
+        self.assertIn("is empty", entries[0]["error"])
+        result = self.call("info", "empty", "good.vdb", status=3)
+        self.assertTrue(result.stdout.startswith("good.vdb: OpenVDB"), result.stdout)
+        self.assertEqual(result.stderr.count("error: "), 1)
+        self.assertIn("no.vdb", json.loads(self.call("info", "no.vdb", "--json", status=3).stdout)["error"])
+
+    def test_a_checkpoint_that_lies_about_its_size(self):
+        head = b"NEPHOSCP" + struct.pack("<II", 1, 1) + b"a" * 32 + bytes(24)
+        for name, sizes in (("state", [1 << 62]), ("history", [8, 1 << 62]), ("sum", [(1 << 64) - 8])):
+            content = head
+            for size in sizes:
+                content += struct.pack("<Q", size) + bytes(8 if size == 8 else 0)
+            path = self.folder / name
+            path.write_bytes(content)
+            self.refused(3, "info", path, says="bytes announced")
+        # A sparse file of a terabyte costs nothing to make, and must cost nothing to refuse.
+        with open(self.folder / "huge", "wb") as file:
+            file.write(head + struct.pack("<Q", 100))
+            file.truncate(1 << 40)
+        self.refused(3, "info", "huge", says="bytes after its end")
+        with open(self.folder / "huge", "r+b") as file:
+            file.seek(len(head))
+            file.write(struct.pack("<Q", (1 << 40) - len(head) - 32))
+        self.refused(3, "info", "huge", says="to read, but")
+
     def test_an_output_that_is_in_the_way(self):
         self.write("file", "mine")
         self.refused(3, "run", self.scene, "--no-render", "--out", "file", says="file")
@@ -303,6 +392,107 @@ class Files(Case):
         self.assertIn("error:", result.stderr)
 
 
+class Disk(Case):
+    """A full disk at every kind of file: exit status 3, the file's name, nothing half, and the rest as it was."""
+
+    def limited(self, size):
+        return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    def no_parts(self):
+        parts = [p for p in self.folder.rglob("*") if ".part" in p.name]
+        self.assertEqual(parts, [])
+
+    def refused_at(self, size, says, *arguments):
+        result = self.refused(3, *arguments, says=says, preexec_fn=self.limited(size))
+        self.assertIn("File too large", result.stderr)
+        self.no_parts()
+
+    def test_manifest(self):
+        self.refused_at(100, "manifest.json", "run", self.scene, "--no-render", "--out", "out")
+        self.assertEqual([p.name for p in (self.folder / "out").iterdir()], [])
+
+    def test_vdb(self):
+        # Larger than manifest and table, smaller than a grid.
+        self.refused_at(5000, "tiny_0001.vdb", "run", self.scene, "--no-render", "--out", "out")
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        self.refused_at(5000, "x.vdb", "state", self.scene, "--out", "x.vdb")
+
+    def test_statistics(self):
+        # Grids of few voxels stay small, the table of many steps does not.
+        few = ["--set", "lattice.cells=[8,8,8]", "--set", "density.write_state=false", "--set", "frames.time_scale=100000",
+               "--set", "time.steps=300", "--no-render", "--out", "out"]
+        self.refused_at(15000, "statistics.csv", "run", self.scene, *few)
+        # Whole rows or none, and the run can start again.
+        text = (self.folder / "out/statistics.csv").read_text()
+        self.assertTrue(text.endswith("\n"))
+        self.call("run", self.scene, *few)
+        self.assertGreater((self.folder / "out/statistics.csv").stat().st_size, 15000)
+
+    def test_checkpoint(self):
+        # Planes without a cloud: grids stay small, planes as bits do not.
+        bare = ["--set", "field.background.act=0", "--set", "density.write_state=false", "--set", "lattice.cells=[256,256,32]",
+                "--no-render", "--out", "out"]
+        self.refused_at(100000, "checkpoint.nephos", "run", self.scene, *bare)
+        self.assertFalse((self.folder / "out/checkpoint.nephos").exists())
+        self.call("run", self.scene, *bare)
+
+    def test_pictures(self):
+        if shutil.which("vulkaninfo") is None and not list(pathlib.Path("/usr/share/vulkan/icd.d").glob("*")):
+            self.skipTest("no Vulkan device")
+        small = ["--set", "lattice.cells=[16,16,8]", "--set", "density.write_state=false", "--set", "camera.width=640",
+                 "--set", "camera.height=480"]
+        self.refused_at(20000, "tiny_0001.png", "run", self.scene, *small, "--out", "png")
+        self.refused_at(20000, "tiny_0001.exr", "run", self.scene, *small, "--out", "exr", "--set", "frames.png=false",
+                        "--set", "frames.exr=true")
+        self.call("run", self.scene, *small, "--no-render", "--out", "out")
+        for name in ("x.png", "x.exr"):
+            self.refused_at(20000, name, "render", "out/density/tiny_0005.vdb", "--out", name)
+            self.assertFalse((self.folder / name).exists())
+
+    def test_a_small_file_system(self):
+        """No limit on files but a disk that is really full, where this machine lets us mount one."""
+        disk = self.folder / "disk"
+        disk.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", disk], capture_output=True).returncode != 0:
+            self.skipTest("mounting is not allowed here")
+        self.addCleanup(subprocess.run, ["umount", disk], check=True)
+        many = ["--no-render", "--out", "disk/out", "--set", "time.steps=60"]
+        result = self.refused(3, "run", self.scene, *many, says="No space left on device")
+        self.assertIn("disk/out/", result.stderr)
+        self.no_parts()
+        for frame in (disk / "out/density").iterdir():
+            self.call("info", frame)
+
+
+class Memory(Case):
+    SKIES = {"overcast": (0.9, 0.6, 0), "fair": (0.1, 0.0005, 0.3)}
+    OUTPUTS = {"plain": "", "state": "write_state = true", "refined": "refine = 2",
+               "all": "write_state = true\nrefine = 2\nwrite_velocity = true\nhalf = true"}
+
+    def peak(self, *arguments):
+        """Bytes of main memory that a command took at its peak."""
+        out = os.open("/dev/null", os.O_WRONLY)
+        self.addCleanup(os.close, out)
+        child = os.posix_spawn(NEPHOS, [NEPHOS, *map(str, arguments)], self.environment,
+                               file_actions=[(os.POSIX_SPAWN_DUP2, out, 1)])
+        _, status, usage = os.wait4(child, 0)
+        self.assertEqual(status, 0)
+        return usage.ru_maxrss * 1024
+
+    @unittest.skipIf("asan" in NEPHOS or "tsan" in NEPHOS, "sanitizers take memory of their own")
+    def test_a_run_stays_below_its_estimate(self):
+        for sky, (hum, act, ext) in self.SKIES.items():
+            for output, keys in self.OUTPUTS.items():
+                scene = self.write(f"{sky} {output}.toml", f"[lattice]\ncells = [192, 200, 60]\n[time]\nsteps = 5\n"
+                                   f"[field.background]\nhum = {hum}\nact = {act}\next = {ext}\n[density]\n{keys}\n"
+                                   f"[frames]\nper_second = 1\ntime_scale = 13\n")
+                estimate = json.loads(self.call("validate", scene, "--json").stdout)[0]["memory_bytes_without_pictures"]
+                peak = self.peak("run", scene, "--no-render", "--out", self.folder / f"{sky} {output}")
+                with self.subTest(sky=sky, output=output):
+                    self.assertLess(peak, estimate)
+                    self.assertLess(estimate, 2 * peak, "so large that it would refuse what fits")
+
+
 class Results(Case):
     def test_hash_prints_a_line_for_each_step(self):
         lines = self.hashes(self.scene, "--steps", "5").splitlines()
@@ -335,8 +525,27 @@ class Results(Case):
         self.assertEqual(as_json["hash"], all_steps[6].split()[1])
         content, _ = voxels(self.folder / "state.vdb")
         self.assertEqual(sorted(content), ["act", "cld", "hum"])
-        # A state of another size is refused.
-        self.refused(3, "hash", self.scene, "--from", "state.vdb", "--set", "lattice.cells=[8,8,8]", says="state.vdb")
+        # A state of another size is refused, a smaller scene as well as a larger one.
+        for cells in ("[8,8,8]", "[32,24,13]"):
+            result = self.refused(3, "hash", self.scene, "--from", "state.vdb", "--set", f"lattice.cells={cells}",
+                                  says="state.vdb")
+            self.assertIn("32 x 24 x 12", result.stderr)
+
+    def test_a_run_starts_from_a_state(self):
+        self.call("state", self.scene, "--steps", "4", "--out", "state.vdb")
+        scene = self.write("from.toml", SCENE.replace("[time]", 'initial_state = "state.vdb"\n[time]'))
+        self.call("run", scene, "--no-render", "--out", "out")
+        expected = self.hashes(self.scene, "--from", "state.vdb").splitlines()
+        self.assertEqual([row["hash"] for row in rows_of(self.folder / "out/statistics.csv")],
+                         [line.split()[1] for line in expected])
+        self.assertEqual(expected[0].split()[1], self.hashes(self.scene, "--steps", "4").splitlines()[4].split()[1])
+        # Another state is another simulation.
+        manifest = json.loads((self.folder / "out/manifest.json").read_text())
+        self.call("state", self.scene, "--steps", "5", "--out", "state.vdb")
+        self.refused(2, "run", scene, "--no-render", "--out", "out", "--resume", says="the simulation itself differs")
+        self.call("run", scene, "--no-render", "--out", "out")
+        again = json.loads((self.folder / "out/manifest.json").read_text())
+        self.assertNotEqual(manifest["scene"]["simulation_hash"], again["scene"]["simulation_hash"])
 
     def test_run_writes_what_it_lists(self):
         result = self.call("run", self.scene, "--no-render")
@@ -353,6 +562,10 @@ class Results(Case):
         manifest = json.loads((out / "manifest.json").read_text())
         self.assertEqual(sorted(p.name for p in (out / "density").iterdir()),
                          [pathlib.Path(f["density"]).name for f in manifest["frames"]])
+        # The film rate is the same wherever it is named.
+        self.assertEqual((manifest["frames_per_second"], manifest["time_scale"]), (1, 15))
+        metadata = json.loads(self.call("info", "--json", out / "density/tiny_0001.vdb").stdout)["metadata"]
+        self.assertEqual((float(metadata["nephos_frames_per_second"]), float(metadata["nephos_time_scale"])), (1, 15))
 
     def test_all_json_parses(self):
         run = json.loads(self.call("run", self.scene, "--no-render", "--json").stdout)
@@ -602,6 +815,8 @@ class Pictures(Case):
         self.assertEqual(info["kind"], "exr")
         self.assertEqual((info["parts"][0]["width"], info["parts"][0]["height"]), (64, 48))
         self.assertTrue(all(part["complete"] for part in info["parts"]))
+        film = info["parts"][0]["attributes"]
+        self.assertEqual((film["framesPerSecond"], film["timeScale"]), ("1000/1000", "15"))
         png = (self.folder / result["files"]["png"][4]).read_bytes()
         self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(struct.unpack(">II", png[16:24]), (64, 48))
@@ -642,6 +857,17 @@ class Pictures(Case):
         self.call("render", "out/density/tiny_0005.vdb", "--scene", self.scene, "--out", "again.png")
         a, b = [png_pixels(self.folder / p) for p in ("out/frames/tiny_0005.png", "again.png")]
         self.assertEqual(a, b)
+
+    def test_refined_grids_are_drawn_with_metaballs_of_the_same_size(self):
+        """The radius is in cells: a refined file looks as the run's own picture, which is of the cells."""
+        changes = ["--set", "density.refine=2", "--set", "density.metaball_radius_cells=2.5", "--set", "lattice.cells=[48,32,24]"]
+        self.call("run", self.scene, *changes, "--out", "out")
+        result = self.call("render", "out/density/tiny_0005.vdb", "--scene", self.scene, *changes, "--out", "again.png",
+                           "--json")
+        self.assertEqual(json.loads(result.stdout)["metaball_radius_voxels"], 5)
+        a, b = [png_pixels(self.folder / p) for p in ("out/frames/tiny_0005.png", "again.png")]
+        differences = sorted(abs(x - y) for x, y in zip(a, b))
+        self.assertLess(sum(differences) / len(differences), 3)
 
     def test_foreign_volumes_are_drawn(self):
         import pyopenvdb

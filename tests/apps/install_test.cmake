@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs the build tree BUILD to a temporary prefix under WORK, builds the programs of tests/apps/consumer (SOURCE)
-# against it, and runs them. GENERATOR, COMPILER, PYTHON as in the build.
+# Installs the build tree BUILD of SOURCE_ROOT to a temporary prefix under WORK, builds the programs of
+# tests/apps/consumer (SOURCE) against it with GENERATOR, COMPILER and FLAGS, those of the build, and runs them.
 
 file(REMOVE_RECURSE "${WORK}")
 file(MAKE_DIRECTORY "${WORK}")

@@ -92,6 +92,24 @@ TEST(Moment, SplitsTimeIntoStepAndFraction) {
     EXPECT_EQ(moment_of(3 * 0.1, 0.1).fraction, 0);
     EXPECT_EQ(moment_of(0.7, 0.1).step, 7u);
     EXPECT_EQ(moment_of(0.7, 0.1).fraction, 0);
+    // After a long time a moment between two steps is still one.
+    EXPECT_EQ(moment_of(1e9 + 0.25, 1).step, 1000000000u);
+    EXPECT_EQ(moment_of(1e9 + 0.25, 1).fraction, 0.25);
+    EXPECT_EQ(moment_of(1e9 + 0.75, 1).fraction, 0.75);
+    // Film rates and steps that are no binary fractions: every frame of a step is that step.
+    for (const double rate : {24.0, 30.0, 29.97, 0.3}) {
+        for (const double step_s : {0.1, 0.7, 10.0, 1.0 / 3.0}) {
+            FrameOptions frames;
+            frames.per_second = rate;
+            frames.time_scale = rate * step_s;
+            frames.start_s = 3 * step_s;
+            for (int index = 0; index < 20000; index += 7) {
+                const Moment moment = moment_of(frame_time_s(frames, index), step_s);
+                ASSERT_EQ(moment.fraction, 0) << rate << " " << step_s << " " << index;
+                ASSERT_EQ(moment.step, std::uint64_t(index) + 3);
+            }
+        }
+    }
 }
 
 // The same frames from all states kept in memory: q by smooth() over the window, then mix().

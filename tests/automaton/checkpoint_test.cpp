@@ -123,8 +123,8 @@ TEST(Checkpoint, RefusesDamagedFiles) {
     EXPECT_NE(with(good.substr(0, 20)).find("ends early"), std::string::npos);
     EXPECT_NE(with("not a checkpoint at all").find("not a nephos checkpoint"), std::string::npos);
     EXPECT_NE(with(good + "x").find("after its end"), std::string::npos);
-    EXPECT_NE(reason_of(folder / "missing").find("no such file"), std::string::npos);
-    EXPECT_NE(reason_of(folder.path()).find("is not a file"), std::string::npos);
+    EXPECT_NE(reason_of(folder / "missing").find("No such file"), std::string::npos);
+    EXPECT_NE(reason_of(folder.path()).find("is a folder"), std::string::npos);
     EXPECT_FALSE(is_checkpoint(folder / "missing"));
     EXPECT_FALSE(is_checkpoint(folder.path()));
 }
