@@ -5,12 +5,10 @@
 //
 // Invariants of a wrapped tree:
 // - background 0, inactive values 0, nothing active outside 0 .. extent-1;
-// - a value is active exactly when it is above 0, but for the two extreme corners, voxel 0 and voxel
-// extent-1,
-//   which are always active: so the active bounds, which OpenVDB and its users take for the grid's bounds,
-//   are the extent's;
-// - tiles are exactly one leaf large (8x8x8), so that a tree is a set of blocks. A block of one value is a
-// tile.
+// - a value is active exactly when it is above 0. Two voxels are always active, 0 and extent-1: so the active
+//   bounds, which OpenVDB and its users take for the grid's bounds, are the extent's;
+// - tiles are exactly one leaf large (8x8x8), so that a tree is a set of blocks;
+// - a block of one value is a tile.
 
 #include <memory>
 #include <tuple>
