@@ -47,14 +47,15 @@ int hash(const HashArguments& a) {
     const Scene scene = load_scene(a.scene);
     std::vector<std::string> expected;
     if (!a.check.empty()) expected = expected_lines(a.check);
-    Automaton automaton = start_automaton(scene, a.scene.file, a.from);
+    std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);
 
     const std::uint64_t steps = a.steps.value_or(scene.steps);
     Output output;
     ProgressBar bar("step", 0, steps, !a.work.quiet && a.work.json);
     nlohmann::ordered_json hashes = nlohmann::ordered_json::array();
     for (std::uint64_t step = 0;; ++step) {
-        const std::string line = fmt::format("{} {}", step, automaton.hash().hex());
+        const std::string hash = combined_hash(layers).hex();
+        const std::string line = fmt::format("{} {}", step, hash);
         if (!a.check.empty() && (step >= expected.size() || expected[step] != line)) {
             output.flush();
             throw Error(ErrorCode::check,
@@ -62,13 +63,13 @@ int hash(const HashArguments& a) {
                                     step < expected.size() ? expected[step] : "(no line)", line));
         }
         if (a.work.json) {
-            hashes.push_back(automaton.hash().hex());
+            hashes.push_back(hash);
         } else if (a.check.empty()) {
             output.line(line);
         }
         bar.update(step);
         if (step == steps) break;
-        automaton.step();
+        for (LayerSimulation& layer : layers) layer.step();
     }
     bar.clear();
     if (!a.check.empty() && expected.size() != steps + 1) {
@@ -105,7 +106,8 @@ void add_hash_command(CLI::App& app, Action& action) {
     command->footer(
         "Prints a line `step hash` for each of the steps 0 to N. The hash is XXH3-128 of the planes hum, act "
         "and cld\n"
-        "and does not depend on threads, instruction set or compiler.\n"
+        "(with several layers, of their hashes) and does not depend on threads, instruction set or "
+        "compiler.\n"
         "\n"
         "Examples:\n"
         "  nephos hash scenes/cumulus.toml --steps 100 > golden.txt\n"

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/manifest.h"
 
+#include <array>
 #include <fstream>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "apps/version.h"
@@ -11,6 +13,8 @@
 #include "automaton/descriptor.h"
 #include "automaton/error.h"
 #include "automaton/random.h"
+#include "density/combine.h"
+#include "seeds/trigonometry.h"
 
 namespace nephos {
 namespace {
@@ -26,26 +30,45 @@ std::string relative(const RunSettings& settings, const std::filesystem::path& p
     return path.lexically_relative(settings.folder).generic_string();
 }
 
-Json frame_json(const RunSettings& settings, const FrameRecord& frame, const RunFolder& folder) {
+Json frame_json(const RunSettings& settings, const FrameRecord& frame, const ManifestState& state,
+                const RunFolder& folder) {
     const FrameOptions& frames = settings.scene.frames;
     Json entry = {{"number", frame.number},
                   {"time_s", frame.time_s},
                   {"step", frame.step},
-                  {"state_hash", frame.state_hash.hex()},
-                  {"density", relative(settings, folder.density(frame.number))}};
+                  {"state_hash", frame.state_hash.hex()}};
+    if (has_density(settings.scene)) entry["density"] = relative(settings, folder.density(frame.number));
     if (settings.render && (frames.png || frames.video)) {
         entry["png"] = relative(settings, folder.picture(frame.number, ".png"));
     }
     if (settings.render && frames.exr)
         entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
+    Json layers = Json::object();
+    for (const LayerOptions& layer : settings.scene.layers) {
+        if (layer.automaton)
+            layers[layer.name] = relative(settings, folder.density(frame.number, layer.name));
+    }
+    if (!layers.empty()) entry["layers"] = std::move(layers);
+    const auto rain = state.rain.find(frame.number);
+    if (rain != state.rain.end()) entry["rain"] = Json::parse(rain->second);
     return entry;
 }
 
-Json bounds_json(const Scene& scene) {
-    const AutomatonOptions& automaton = scene.automaton;
+Json area_json(const RainArea& area, const std::string& layer) {
+    constexpr std::array kSources{"placed", "attached", "found"};
+    return {{"id", fmt::format("{:016x}", area.id)},
+            {"layer", layer},
+            {"source", kSources.at(std::size_t(area.id >> 62))},
+            {"centre_m", {area.x_m, area.y_m}},
+            {"semi_axes_m", {area.semi_a_m, area.semi_b_m}},
+            {"yaw_deg", degrees_of_vector(area.axis_x, area.axis_y)},
+            {"intensity_mm_per_h", area.intensity_mm_per_h}};
+}
+
+Json bounds_json(const Scene& scene, const GridBox& box) {
     const int refine = scene.density.refine;
-    const Placement& at = automaton.placement;
-    const Extent& cells = automaton.extent;
+    const Placement& at = box.placement;
+    const Extent& cells = box.extent;
     return {{"voxels", {cells.x * refine, cells.y * refine, cells.z * refine}},
             {"voxel_size_m", at.cell_size_m / refine},
             {"min_m", vector_json(at.origin_m)},
@@ -54,6 +77,28 @@ Json bounds_json(const Scene& scene) {
               at.origin_m.z + cells.z * at.cell_size_m}},
             {"up_axis", "z"},
             {"extinction_per_m", scene.density.extinction_per_m}};
+}
+
+// The box of all layers together.
+GridBox whole_box(const Scene& scene) {
+    std::vector<GridBox> boxes;
+    for (const LayerOptions& layer : scene.layers) {
+        if (layer.automaton) boxes.push_back({layer.extent, layer.placement});
+    }
+    if (boxes.empty()) boxes.push_back({scene.automaton.extent, scene.automaton.placement});
+    return common_box(boxes);
+}
+
+Json layers_json(const RunSettings& settings, const RunFolder& folder) {
+    Json layers = Json::array();
+    for (const LayerOptions& layer : settings.scene.layers) {
+        layers.push_back({{"name", layer.name},
+                          {"automaton", layer.automaton},
+                          {"opacity", layer.opacity},
+                          {"bounds", bounds_json(settings.scene, {layer.extent, layer.placement})},
+                          {"statistics", relative(settings, folder.statistics(layer.name))}});
+    }
+    return layers;
 }
 
 // All that stands before the list of frames.
@@ -78,7 +123,8 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
     json["steps"] = {{"reported", state.steps_reported},
                      {"time_step_s", scene.automaton.time_step_s},
                      {"state_hash", state.state_hash}};
-    json["bounds"] = bounds_json(scene);
+    json["bounds"] = bounds_json(scene, whole_box(scene));
+    if (!scene.layers.empty()) json["layers"] = layers_json(settings, folder);
     json["files"] = {{"statistics", relative(settings, folder.statistics())},
                      {"checkpoint", relative(settings, folder.checkpoint())}};
     if (state.complete && settings.render && scene.frames.video) {
@@ -104,14 +150,37 @@ void write_manifest(const RunSettings& settings, const ManifestState& state) {
         std::string_view separator = "\n";
         for (const FrameRecord& frame : state.frames) {
             append(separator);
-            append("    " +
-                   frame_json(settings, frame, folder).dump(-1, ' ', false, Json::error_handler_t::replace));
+            append("    " + frame_json(settings, frame, state, folder)
+                                .dump(-1, ' ', false, Json::error_handler_t::replace));
             separator = ",\n";
         }
         const Json tail = {{"scene_text", settings.scene_text},
                            {"timing", {{"wall_s", state.wall_s}, {"device", state.device}}}};
         append("\n  ],\n" + members(tail) + "\n}\n");
     });
+}
+
+std::string rain_text(const FrameResult& frame) {
+    Json areas = Json::array();
+    for (const LayerFrame& layer : frame.layers) {
+        for (const RainArea& area : layer.rain) areas.push_back(area_json(area, layer.name));
+    }
+    return areas.empty() ? std::string() : areas.dump();
+}
+
+std::map<int, std::string> read_rain(const std::filesystem::path& path) {
+    require_regular_file(path);
+    std::ifstream stream(path, std::ios::binary);
+    try {
+        std::map<int, std::string> rain;
+        const Json json = Json::parse(stream);
+        for (const Json& frame : json.at("frames")) {
+            if (frame.contains("rain")) rain[frame.at("number").get<int>()] = frame.at("rain").dump();
+        }
+        return rain;
+    } catch (const nlohmann::json::exception&) {
+        throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
+    }
 }
 
 EarlierRun read_manifest(const std::filesystem::path& path) {

@@ -5,6 +5,7 @@
 // program needs to guess nothing. All but "timing" is a function of the scene and the command line alone.
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,8 @@ struct ManifestState {
     std::uint64_t steps_reported = 0;
     std::string state_hash;  // at the last reported step
     std::vector<FrameRecord> frames;
+    std::map<int, std::string>
+        rain;  // frame: its rain areas as JSON, by rain_text(); frames without rain left out
     double wall_s = 0;
     std::string device;
 };
@@ -35,6 +38,13 @@ struct ManifestState {
 // Writes atomically, frame by frame. As JSON cannot be appended to, every call writes the whole list anew:
 // some 200 bytes a frame, against seconds between two checkpoints. Throws Error(io).
 void write_manifest(const RunSettings& settings, const ManifestState& state);
+
+// The rain areas of a frame as the manifest lists them; empty without any.
+std::string rain_text(const FrameResult& frame);
+
+// Those that the manifest of an earlier run lists, for ManifestState::rain. Throws Error(io) as
+// read_manifest().
+std::map<int, std::string> read_rain(const std::filesystem::path& path);
 
 // What a later run must know about an earlier one.
 struct EarlierRun {

@@ -3,7 +3,7 @@
 
 // From a scene to its frames, without files, devices or a command line:
 //
-//     automaton step -> history of the last states -> density q at steps -> frames between steps
+//     step of every layer -> history of the last states -> density q at steps -> frames between steps
 //
 // q at step s needs the states s-t0 .. s+t0, and a frame between two steps needs q at both. The history keeps
 // exactly the states that something still needs; so the automaton runs up to t0 steps ahead of the results,
@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/layer_simulation.h"
 #include "automaton/automaton.h"
 #include "automaton/checkpoint.h"
 #include "density/density_grid.h"
@@ -30,23 +31,54 @@
 
 namespace nephos {
 
+// One layer after a step; a row of its own file of statistics.
+struct LayerStep {
+    std::string name;
+    double state = 0;        // of the atmosphere, 0..1
+    std::size_t clouds = 0;  // in the sky, those that form or dissolve included
+    std::size_t rain_areas = 0;
+    double rain_mm_per_h = 0;    // the strongest of them
+    CloudStatistics statistics;  // all 0 without automaton
+    StateHash hash;
+};
+
 // One row of statistics.csv: the state after `step` steps.
 struct StepResult {
     std::uint64_t step = 0;
     double time_s = 0;
-    CloudStatistics statistics;  // mean_density is that of q at this step
+    // mean_density is that of q at this step. Of several layers: sums of cells, the cover of layers that
+    // overlap at random (1 - product of 1 - cover), lowest base, highest top, mean density of all their boxes
+    // together.
+    CloudStatistics statistics;
     StateHash hash;
+    std::vector<LayerStep> layers;  // none in a scene without layers
+};
+
+// One layer in a frame.
+struct LayerFrame {
+    std::string name;
+    DensityGrid density;  // one voxel a cell; without automaton there are no voxels
+    StateHash hash;
+    std::optional<BitPlaneView> hum, act, cld;  // as in FrameResult
+    // Clouds at the frame's time; their shapes and models are those of `sky`, which itself stands at a later
+    // step.
+    const SkySimulation* sky = nullptr;  // never null, valid during the call
+    std::vector<SkyCloud> clouds;
+    bool direct = false;         // to be drawn as billboards: the layer has no automaton
+    std::vector<RainArea> rain;  // at the frame's time
 };
 
 // One frame: density at a moment that need not be a step.
 struct FrameResult {
     int number = 1;  // as in file names, counted from 1
     double time_s = 0;
-    DensityGrid density;  // one voxel a cell (not refined)
+    DensityGrid density;  // one voxel a cell (not refined); of layers, all together (density/combine.h)
     std::uint64_t step =
         0;  // the last step at or before time_s, whose state the three planes and the hash are
     StateHash hash;
-    std::optional<BitPlaneView> hum, act, cld;  // only when the scene writes the state; valid during the call
+    // Only when the scene writes the state; valid during the call. A scene with layers has them in these.
+    std::optional<BitPlaneView> hum, act, cld;
+    std::vector<LayerFrame> layers;  // none in a scene without layers
 };
 
 // Receives results in the order of time; a step comes before the frames at or after it.
@@ -99,39 +131,57 @@ class Pipeline {
     // Gives back the densities, to make room for the copy; they are computed again when they are needed.
     Checkpoint save();
 
-    std::uint64_t steps_taken() const { return automaton_.steps(); }
+    std::uint64_t steps_taken() const { return layers_.front().steps(); }
     std::uint64_t next_step() const { return next_step_; }  // the first that was not reported yet
     int next_frame() const { return next_frame_; }          // the first that was not reported yet
     // Steps that the automaton takes in all, those ahead included.
     std::uint64_t steps_in_all() const;
 
   private:
-    // A past state, as much of it as is still needed.
-    struct Past {
-        std::uint64_t step = 0;
+    // A past state of a layer, as much of it as is still needed.
+    struct PastLayer {
         CloudStatistics statistics;
         StateHash hash;
+        double state = 0;
         BitPlane cld;
         BitPlane hum, act;  // empty unless the scene writes the state
+        std::vector<SkyCloud> clouds;
+        std::vector<RainArea> rain;
+    };
+    struct Past {
+        std::uint64_t step = 0;
+        StateHash hash;
+        std::vector<PastLayer> layers;
+    };
+    // q of all layers at a step; empty grids where there is no automaton.
+    struct Densities {
+        std::uint64_t step = 0;
+        std::vector<DensityGrid> layers;
     };
 
+    void step();
     void remember();
+    PastLayer past_of(const LayerSimulation& layer) const;
     void forget();
     bool density_is_due(std::uint64_t step) const;
-    DensityGrid density_at_step(std::uint64_t step);
+    const std::vector<DensityGrid>& densities_at_step(std::uint64_t step);
+    DensityGrid density_of(std::size_t layer, std::uint64_t step) const;
+    DensityGrid density_at(std::size_t layer, const Moment& moment);
     const Past& past(std::uint64_t step) const;
     void report_step(PipelineSink& sink);
     void report_frame(PipelineSink& sink);
+    LayerFrame layer_frame(std::size_t layer, const Moment& moment);
     Moment moment_of_frame(int number) const;
     std::uint64_t lowest_needed() const;
+    void restore_layers(const Checkpoint& checkpoint);
     void restore_history(const Checkpoint& checkpoint);
 
     Scene scene_;
     PipelineRange range_;
     std::string simulation_hash_;
-    Automaton automaton_;
-    std::deque<Past> history_;  // consecutive steps, the newest last; never empty
-    std::vector<std::pair<std::uint64_t, DensityGrid>> densities_;  // q at steps that are still needed
+    std::vector<LayerSimulation> layers_;  // never empty; the one of a scene without layers has no sky
+    std::deque<Past> history_;             // consecutive steps, the newest last; never empty
+    std::vector<Densities> densities_;     // q at steps that are still needed
     std::uint64_t next_step_ = 0;
     int next_frame_ = 1;
 };

@@ -17,6 +17,7 @@
 #include "automaton/checkpoint.h"
 #include "automaton/error.h"
 #include "automaton/random.h"
+#include "density/combine.h"
 #include "density/metaballs.h"
 #include "density/vdb_file.h"
 #include "render/image_file.h"
@@ -33,6 +34,12 @@ double seconds_since(Clock::time_point begin) {
     return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
+void make_folder(const std::filesystem::path& folder) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) throw Error(ErrorCode::io, folder.string() + ": cannot make the folder: " + error.message());
+}
+
 bool wants_png(const Scene& scene) { return scene.frames.png || scene.frames.video; }
 
 // Turns results into files.
@@ -46,6 +53,9 @@ class Recorder : public PipelineSink {
 
     void step(const StepResult& result) override {
         statistics_->add(statistics_row(result));
+        for (std::size_t n = 0; n < result.layers.size(); ++n) {
+            layer_statistics_[n].add(statistics_row(result, result.layers[n]));
+        }
         state_.state_hash = result.hash.hex();
         state_.steps_reported = result.step + 1;
     }
@@ -54,12 +64,18 @@ class Recorder : public PipelineSink {
         write_density(result);
         if (renderer_) draw(result);
         state_.frames.push_back({result.number, result.time_s, result.step, result.hash});
+        if (std::string rain = rain_text(result); !rain.empty()) state_.rain[result.number] = std::move(rain);
     }
 
     // The files of a run that begins. A folder that cannot be written to is found now.
     void begin() {
         write_manifest(false, 0);
         statistics_ = StatisticsFile::create(folder_.statistics());
+        if (!settings_.scene.layers.empty()) make_folder(folder_.folder / "statistics");
+        for (const LayerOptions& layer : settings_.scene.layers) {
+            layer_statistics_.push_back(
+                StatisticsFile::create(folder_.statistics(layer.name), kLayerStatisticsHeader));
+        }
     }
 
     // Takes over what an earlier run reported up to where `pipeline` goes on, and checks that it is all
@@ -76,6 +92,12 @@ class Recorder : public PipelineSink {
         };
         // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
         statistics_ = StatisticsFile::resume(folder_.statistics(), pipeline.next_step(), record_frames_of);
+        for (const LayerOptions& layer : settings_.scene.layers) {
+            layer_statistics_.push_back(StatisticsFile::resume(
+                folder_.statistics(layer.name), pipeline.next_step(), {}, kLayerStatisticsHeader));
+        }
+        if (!settings_.scene.layers.empty()) state_.rain = read_rain(folder_.manifest());
+        std::erase_if(state_.rain, [&](const auto& rain) { return rain.first >= pipeline.next_frame(); });
         state_.steps_reported = pipeline.next_step();
         for (const RunFiles& files : frame_files()) {
             for (const std::filesystem::path& file : files.files) {
@@ -88,9 +110,12 @@ class Recorder : public PipelineSink {
         }
     }
 
-    // Statistics and manifest first: what the checkpoint goes on from is then always there.
+    // Statistics first: what the checkpoint goes on from is then always there. So is the manifest's rain,
+    // which no other file has.
     void save(Pipeline& pipeline, bool complete, double wall_s) {
         statistics_->save();
+        for (StatisticsFile& file : layer_statistics_) file.save();
+        if (!state_.rain.empty()) write_manifest(false, wall_s);
         write_checkpoint(folder_.checkpoint(), pipeline.save());
         write_manifest(complete, wall_s);
     }
@@ -111,7 +136,10 @@ class Recorder : public PipelineSink {
     std::vector<RunFiles> frame_files() const {
         RunFiles density{"density", {}}, png{"png", {}}, exr{"exr", {}};
         for (const FrameRecord& frame : state_.frames) {
-            density.files.push_back(folder_.density(frame.number));
+            if (has_density(settings_.scene)) density.files.push_back(folder_.density(frame.number));
+            for (const LayerOptions& layer : settings_.scene.layers) {
+                if (layer.automaton) density.files.push_back(folder_.density(frame.number, layer.name));
+            }
             if (!settings_.render) continue;
             if (wants_png(settings_.scene)) png.files.push_back(folder_.picture(frame.number, ".png"));
             if (settings_.scene.frames.exr) exr.files.push_back(folder_.picture(frame.number, ".exr"));
@@ -125,40 +153,94 @@ class Recorder : public PipelineSink {
     const RunFolder& folder() const { return folder_; }
 
   private:
-    void write_density(const FrameResult& result) {
+    DensityGrid refined(const DensityGrid& density) const {
+        const DensityOptions& options = settings_.scene.density;
+        return options.refine > 1 ? resample(density, options.refine, options.metaball_radius_cells)
+                                  : density;
+    }
+
+    VdbMetadata metadata_of(const FrameResult& result, const StateHash& hash) const {
         const Scene& scene = settings_.scene;
-        const DensityOptions& options = scene.density;
-        const DensityGrid written =
-            options.refine > 1 ? resample(result.density, options.refine, options.metaball_radius_cells)
-                               : result.density;
-        VdbContent content;
-        content.density = &written;
-        content.half = options.half;
-        content.hum = result.hum;
-        content.act = result.act;
-        content.cld = result.cld;
-        content.cells = scene.automaton.placement;
-        if (options.write_velocity) content.wind = &scene.automaton.wind;
         VdbMetadata metadata;
-        metadata.extinction_per_m = options.extinction_per_m;
+        metadata.extinction_per_m = scene.density.extinction_per_m;
         metadata.time_s = result.time_s;
         metadata.time_step_s = scene.automaton.time_step_s;
         metadata.frames_per_second = scene.frames.per_second;
         metadata.time_scale = scene.frames.time_scale;
         metadata.seed = scene.automaton.seed;
         metadata.scene_hash = settings_.scene_hash;
-        metadata.state_hash = result.hash.hex();
+        metadata.state_hash = hash.hex();
         metadata.nephos_version = version();
         metadata.random_stream_version = int(kRandomStreamVersion);
-        write_vdb(folder_.density(result.number), content, metadata);
+        return metadata;
+    }
+
+    void write_density(const FrameResult& result) {
+        if (!settings_.scene.layers.empty()) {
+            write_layers(result);
+            return;
+        }
+        const Scene& scene = settings_.scene;
+        const DensityGrid written = refined(result.density);
+        VdbContent content;
+        content.density = &written;
+        content.half = scene.density.half;
+        content.hum = result.hum;
+        content.act = result.act;
+        content.cld = result.cld;
+        content.cells = scene.automaton.placement;
+        if (scene.density.write_velocity) content.wind = &scene.automaton.wind;
+        write_vdb(folder_.density(result.number), content, metadata_of(result, result.hash));
+    }
+
+    // A file for each layer, with its own voxels, bits and wind, and one of their densities together.
+    void write_layers(const FrameResult& result) {
+        const Scene& scene = settings_.scene;
+        std::vector<DensityGrid> grids;
+        for (std::size_t n = 0; n < result.layers.size(); ++n) {
+            const LayerFrame& layer = result.layers[n];
+            if (layer.direct) continue;
+            grids.push_back(refined(layer.density));
+            VdbContent content;
+            content.density = &grids.back();
+            content.half = scene.density.half;
+            content.hum = layer.hum;
+            content.act = layer.act;
+            content.cld = layer.cld;
+            content.cells = scene.layers[n].placement;
+            if (scene.density.write_velocity) content.wind = &layer_wind(scene, n);
+            write_vdb(folder_.density(result.number, layer.name), content, metadata_of(result, layer.hash));
+        }
+        if (grids.empty()) return;
+        const DensityGrid whole = scene.density.refine > 1 ? combine(grids) : result.density;
+        VdbContent content;
+        content.density = &whole;
+        content.half = scene.density.half;
+        content.cells = whole.placement();
+        write_vdb(folder_.density(result.number), content, metadata_of(result, result.hash));
+    }
+
+    // The metaballs of every lattice, each with the size of its own cells.
+    std::vector<Metaball> metaballs_of(const FrameResult& result) const {
+        const double radius = settings_.scene.density.metaball_radius_cells;
+        std::uint64_t count = result.layers.empty() ? result.density.active_voxels() : 0;
+        for (const LayerFrame& layer : result.layers) count += layer.density.active_voxels();
+        require_memory(count * 4 * sizeof(Metaball),
+                       fmt::format("{}: drawing frame {}", settings_.scene.name, result.number));
+        if (result.layers.empty()) return metaballs(result.density, radius);
+        std::vector<Metaball> balls;
+        for (const LayerFrame& layer : result.layers) {
+            if (layer.direct) continue;
+            const std::vector<Metaball> more = metaballs(layer.density, radius);
+            balls.insert(balls.end(), more.begin(), more.end());
+        }
+        return balls;
     }
 
     void draw(const FrameResult& result) {
         const Scene& scene = settings_.scene;
         const double radius = scene.density.metaball_radius_cells;
-        require_memory(result.density.active_voxels() * 4 * sizeof(Metaball),
-                       fmt::format("{}: drawing frame {}", scene.name, result.number));
-        const std::vector<Metaball> balls = metaballs(result.density, radius);
+        const std::vector<Metaball> balls = metaballs_of(result);
         const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
         const Picture picture = renderer_->draw(cloud, scene.render);
         PictureMetadata metadata;
@@ -181,6 +263,7 @@ class Recorder : public PipelineSink {
     RunFolder folder_;
     std::unique_ptr<Renderer> renderer_;
     std::optional<StatisticsFile> statistics_;  // from begin() or take_over() on
+    std::vector<StatisticsFile> layer_statistics_;
     ManifestState state_;
 };
 
@@ -201,7 +284,7 @@ void remove_file(const std::filesystem::path& path) {
 }
 
 // Names of the files in a part of the folder ("." for itself); none when it is not there.
-std::vector<std::string> names_in(const RunFolder& folder, const char* part) {
+std::vector<std::string> names_in(const RunFolder& folder, const std::string& part) {
     std::vector<std::string> names;
     std::error_code error;
     for (std::filesystem::directory_iterator at(folder.folder / part, error), end; !error && at != end;
@@ -212,14 +295,29 @@ std::vector<std::string> names_in(const RunFolder& folder, const char* part) {
     return names;
 }
 
+// Parts of the folder that hold frames: a folder of its own for the densities of each layer.
+std::vector<std::string> frame_parts(const RunFolder& folder) {
+    std::vector<std::string> parts{"density", "frames"};
+    for (const std::string& name : names_in(folder, "density")) {
+        std::error_code error;
+        const auto type = std::filesystem::symlink_status(folder.folder / "density" / name, error).type();
+        if (type == std::filesystem::file_type::directory) parts.push_back("density/" + name);
+    }
+    return parts;
+}
+
 // What a run of this name writes and finds there already, the manifest last: as long as it is there, the rest
 // is known to be of a run.
 std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     std::vector<std::filesystem::path> files;
-    for (const char* part : {"density", "frames"}) {
+    for (const std::string& part : frame_parts(folder)) {
         for (const std::string& name : names_in(folder, part)) {
             if (is_frame_of(name, folder.name)) files.push_back(folder.folder / part / name);
         }
+    }
+    for (const std::string& name : names_in(folder, "statistics")) {
+        const std::filesystem::path path = folder.folder / "statistics" / name;
+        if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
     }
     for (const std::filesystem::path& path :
          {folder.checkpoint(), folder.statistics(), folder.video(), folder.manifest()}) {
@@ -240,7 +338,7 @@ void remove_earlier_run(const RunFolder& folder) {
 // Temporary files of a run that was killed. Only for the holder of the folder's lock: to nobody else are they
 // leftovers.
 void remove_leftovers(const RunFolder& folder) {
-    const auto remove_if = [&](const char* part, const auto& is_ours) {
+    const auto remove_if = [&](const std::string& part, const auto& is_ours) {
         for (const std::string& name : names_in(folder, part)) {
             const std::string published = published_name(name);
             if (!published.empty() && is_ours(published)) remove_file(folder.folder / part / name);
@@ -252,8 +350,7 @@ void remove_leftovers(const RunFolder& folder) {
     const auto is_frame = [&](const std::string& name) {
         return is_frame_of(name, folder.name) || name == folder.video().filename();
     };
-    remove_if("density", is_frame);
-    remove_if("frames", is_frame);
+    for (const std::string& part : frame_parts(folder)) remove_if(part, is_frame);
 }
 
 [[noreturn]] void refuse(const RunFolder& folder, const std::string& reason) {
@@ -362,7 +459,11 @@ RunReport report_of(const Recorder& recorder, const RunSettings& settings, const
     if (state.complete && settings.render && settings.scene.frames.video) {
         report.files.push_back({"video", {folder.video()}});
     }
-    report.files.push_back({"statistics", {folder.statistics()}});
+    RunFiles statistics{"statistics", {folder.statistics()}};
+    for (const LayerOptions& layer : settings.scene.layers) {
+        statistics.files.push_back(folder.statistics(layer.name));
+    }
+    report.files.push_back(std::move(statistics));
     report.files.push_back({"manifest", {folder.manifest()}});
     report.files.push_back({"checkpoint", {folder.checkpoint()}});
     return report;
@@ -414,6 +515,10 @@ bool encode(const Pipeline& pipeline, const Recorder& recorder, const RunSetting
 
 std::filesystem::path RunFolder::density(int frame) const {
     return frame_path(folder / "density", name, frame);
+}
+
+std::filesystem::path RunFolder::density(int frame, const std::string& layer) const {
+    return frame_path(folder / "density" / layer, name, frame);
 }
 
 std::filesystem::path RunFolder::picture(int frame, std::string_view extension) const {

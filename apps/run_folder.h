@@ -3,9 +3,11 @@
 
 // A run on disk: which files the folder of a run has, and the run itself, which fills it.
 //
-//     DIR/density/NAME_0001.vdb ...    a density grid a frame
+//     DIR/density/NAME_0001.vdb ...    a density grid a frame; of layers, all together
+//     DIR/density/LAYER/NAME_0001.vdb  a density grid a frame of each layer, with its own voxels
 //     DIR/frames/NAME_0001.png ...     a picture a frame, and/or NAME_0001.exr; NAME.mp4 of them all
 //     DIR/statistics.csv               a row a step
+//     DIR/statistics/LAYER.csv         a row a step of each layer
 //     DIR/manifest.json                what was run, and every file with its moment
 //     DIR/checkpoint.nephos            where to go on
 //
@@ -30,10 +32,14 @@ struct RunFolder {
     std::filesystem::path folder;
     std::string name;
 
-    std::filesystem::path density(int frame) const;                              // frames count from 1
+    std::filesystem::path density(int frame) const;  // frames count from 1
+    std::filesystem::path density(int frame, const std::string& layer) const;
     std::filesystem::path picture(int frame, std::string_view extension) const;  // ".png" or ".exr"
     std::filesystem::path video() const;
     std::filesystem::path statistics() const { return folder / "statistics.csv"; }
+    std::filesystem::path statistics(const std::string& layer) const {
+        return folder / "statistics" / (layer + ".csv");
+    }
     std::filesystem::path manifest() const { return folder / "manifest.json"; }
     std::filesystem::path checkpoint() const { return folder / "checkpoint.nephos"; }
 };

@@ -24,15 +24,22 @@ std::optional<Lattice> initial_state(const Scene& scene, const std::string& from
     return {};
 }
 
-Automaton start_automaton(const Scene& scene, const std::string& scene_file, const std::string& from) {
-    const Extent& extent = scene.automaton.extent;
-    require_memory(
-        Automaton::memory_bytes(scene.automaton),
-        fmt::format("{}: a lattice of {} x {} x {} cells", scene_file, extent.x, extent.y, extent.z));
-    if (std::optional<Lattice> initial = initial_state(scene, from)) {
-        return Automaton(scene.automaton, std::move(*initial));
+std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string& scene_file,
+                                          const std::string& from) {
+    if (!from.empty() && !scene.layers.empty()) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: has layers, but --from gives the state of one lattice", scene_file));
     }
-    return Automaton(scene.automaton);
+    std::size_t bytes = 0;
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        bytes += Automaton::memory_bytes(automaton_options(scene, n));
+    }
+    const Extent& extent = scene.automaton.extent;
+    require_memory(bytes, scene.layers.empty()
+                              ? fmt::format("{}: a lattice of {} x {} x {} cells", scene_file, extent.x,
+                                            extent.y, extent.z)
+                              : fmt::format("{}: {} layers", scene_file, scene.layers.size()));
+    return make_layers(scene, initial_state(scene, from));
 }
 
 }  // namespace nephos

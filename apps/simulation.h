@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "apps/layer_simulation.h"
 #include "automaton/automaton.h"
 #include "scenes/scene.h"
 
@@ -23,7 +25,9 @@ void require_memory(std::size_t bytes, const std::string& what);
 // nothing (the scene's own start). Throws as read_state().
 std::optional<Lattice> initial_state(const Scene& scene, const std::string& from = {});
 
-// The automaton at step 0, after a check of memory. `scene_file` names the scene in errors.
-Automaton start_automaton(const Scene& scene, const std::string& scene_file, const std::string& from);
+// Every layer at step 0, after a check of memory. `scene_file` names the scene in errors. Throws Error(usage)
+// when a scene with layers is to start from a file.
+std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string& scene_file,
+                                          const std::string& from);
 
 }  // namespace nephos

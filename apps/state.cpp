@@ -13,9 +13,11 @@
 #include "apps/simulation.h"
 #include "apps/terminal.h"
 #include "apps/version.h"
+#include "automaton/error.h"
 #include "automaton/random.h"
 #include "density/statistics.h"
 #include "density/vdb_file.h"
+#include "scenes/errors.h"
 #include "scenes/writer.h"
 
 namespace nephos {
@@ -24,19 +26,39 @@ namespace {
 struct StateArguments {
     SceneArguments scene;
     std::optional<std::uint64_t> steps;
-    std::string from, out;
+    std::string from, out, layer;
     WorkArguments work;
 };
+
+// The layer whose bits are wanted: the one of the name, or the only one.
+std::size_t chosen_layer(const StateArguments& a, const std::vector<LayerSimulation>& layers) {
+    std::vector<std::string_view> names;
+    for (std::size_t n = 0; n < layers.size(); ++n) {
+        if (layers[n].automaton() == nullptr) continue;
+        if (layers[n].name() == a.layer || (a.layer.empty() && layers.size() == 1)) return n;
+        names.push_back(layers[n].name());
+    }
+    const std::string_view meant = closest_word(a.layer, names);
+    throw Error(ErrorCode::usage,
+                a.layer.empty() ? fmt::format("{}: has several layers: give --layer, one of {}", a.scene.file,
+                                              fmt::join(names, ", "))
+                : meant.empty()
+                    ? fmt::format("{}: has no layer '{}' with an automaton (those that have one: {})",
+                                  a.scene.file, a.layer, fmt::join(names, ", "))
+                    : fmt::format("{}: has no layer '{}' with an automaton, did you mean '{}'?", a.scene.file,
+                                  a.layer, meant));
+}
 
 int state(const StateArguments& a) {
     const ThreadLimit limit(a.work.threads);
     const Scene scene = load_scene(a.scene);
-    Automaton automaton = start_automaton(scene, a.scene.file, a.from);
+    std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);
+    const Automaton& automaton = *layers[chosen_layer(a, layers)].automaton();
     const std::uint64_t steps = a.steps.value_or(scene.steps);
     {
         ProgressBar bar("step", 0, steps, !a.work.quiet);
         for (std::uint64_t step = 0; step < steps; ++step) {
-            automaton.step();
+            for (LayerSimulation& layer : layers) layer.step();
             bar.update(step + 1);
         }
     }
@@ -44,7 +66,7 @@ int state(const StateArguments& a) {
     content.hum = automaton.hum();
     content.act = automaton.act();
     content.cld = automaton.cld();
-    content.cells = scene.automaton.placement;
+    content.cells = automaton.options().placement;
     VdbMetadata metadata;
     metadata.extinction_per_m = scene.density.extinction_per_m;
     metadata.time_s = automaton.time_s();
@@ -59,7 +81,7 @@ int state(const StateArguments& a) {
     write_vdb(a.out, content, metadata);
 
     const CloudStatistics statistics =
-        cloud_statistics(automaton.hum(), automaton.act(), automaton.cld(), scene.automaton.placement);
+        cloud_statistics(automaton.hum(), automaton.act(), automaton.cld(), automaton.options().placement);
     Output output;
     if (a.work.json) {
         const nlohmann::ordered_json json = {
@@ -88,6 +110,8 @@ void add_state_command(CLI::App& app, Action& action) {
         ->add_option("--from", a->from,
                      "VDB file with such grids to start from, instead of the scene's start")
         ->type_name("FILE.vdb");
+    command->add_option("--layer", a->layer, "Layer whose bits are written, in a scene with several")
+        ->type_name("NAME");
     add_threads(*command, a->work);
     add_json(*command, a->work);
     add_quiet(*command, a->work);

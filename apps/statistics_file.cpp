@@ -20,6 +20,12 @@ constexpr std::size_t kGatheredBytes = std::size_t(1) << 20;
 
 std::string field(double value) { return std::isnan(value) ? std::string() : fmt::format("{}", value); }
 
+// What the two kinds of rows end with.
+std::string fields(const CloudStatistics& s, const StateHash& hash) {
+    return fmt::format("{},{},{},{},{},{},{},{}", s.hum, s.act, s.cld, field(s.cover), field(s.base_m),
+                       field(s.top_m), field(s.mean_density), hash.hex());
+}
+
 // The hash at the end of a row.
 std::optional<StateHash> hash_in(std::string_view row) {
     const std::string_view digits = row.substr(row.rfind(',') + 1);
@@ -40,21 +46,25 @@ std::optional<StateHash> hash_in(std::string_view row) {
 }  // namespace
 
 std::string statistics_row(const StepResult& result) {
-    const CloudStatistics& s = result.statistics;
-    return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", result.step, field(result.time_s), s.hum, s.act,
-                       s.cld, field(s.cover), field(s.base_m), field(s.top_m), field(s.mean_density),
-                       result.hash.hex());
+    return fmt::format("{},{},{}\n", result.step, field(result.time_s),
+                       fields(result.statistics, result.hash));
+}
+
+std::string statistics_row(const StepResult& result, const LayerStep& layer) {
+    return fmt::format("{},{},{},{},{},{},{}\n", result.step, field(result.time_s), field(layer.state),
+                       layer.clouds, layer.rain_areas, field(layer.rain_mm_per_h),
+                       fields(layer.statistics, layer.hash));
 }
 
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
-                              const StatisticsVisitor& visit) {
+                              const StatisticsVisitor& visit, std::string_view header) {
     require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
     std::string line;
     // A last line without its newline is one that was being written.
     const auto next_line = [&] { return std::getline(stream, line) && !stream.eof(); };
-    bool good = next_line() && line + '\n' == kStatisticsHeader;
-    std::uint64_t bytes = kStatisticsHeader.size();
+    bool good = next_line() && line + '\n' == header;
+    std::uint64_t bytes = header.size();
     for (std::uint64_t step = 0; good && step < steps; ++step) {
         good = next_line() && line.starts_with(fmt::format("{},", step));
         const std::optional<StateHash> hash = good ? hash_in(line) : std::nullopt;
@@ -70,9 +80,9 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
     return bytes;
 }
 
-bool is_statistics(const std::filesystem::path& path) {
+bool is_statistics(const std::filesystem::path& path, std::string_view header) {
     try {
-        return read_statistics(path, 0, {}) > 0;
+        return read_statistics(path, 0, {}, header) > 0;
     } catch (const Error&) {
         return false;
     }
@@ -81,16 +91,16 @@ bool is_statistics(const std::filesystem::path& path) {
 StatisticsFile::StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size)
     : path_(std::move(path)), file_(std::move(file)), size_(size) {}
 
-StatisticsFile StatisticsFile::create(const std::filesystem::path& path) {
+StatisticsFile StatisticsFile::create(const std::filesystem::path& path, std::string_view header) {
     StatisticsFile file(path, open_regular_file(path, O_WRONLY | O_APPEND | O_CREAT | O_TRUNC), 0);
-    file.gathered_ = kStatisticsHeader;
+    file.gathered_ = header;
     file.write_out();
     return file;
 }
 
 StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::uint64_t steps,
-                                      const StatisticsVisitor& visit) {
-    const std::uint64_t size = read_statistics(path, steps, visit);
+                                      const StatisticsVisitor& visit, std::string_view header) {
+    const std::uint64_t size = read_statistics(path, steps, visit, header);
     Descriptor file = open_regular_file(path, O_WRONLY | O_APPEND);
     if (::ftruncate(file.get(), off_t(size)) != 0) fail(path, errno);
     return StatisticsFile(path, std::move(file), size);

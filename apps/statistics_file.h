@@ -18,9 +18,14 @@ namespace nephos {
 
 inline constexpr std::string_view kStatisticsHeader =
     "step,time_s,hum,act,cld,cloud_cover,base_m,top_m,mean_density,hash\n";
+// Of the file that each layer has in a scene with layers.
+inline constexpr std::string_view kLayerStatisticsHeader =
+    "step,time_s,state,clouds,rain_areas,rain_mm_per_h,hum,act,cld,cloud_cover,base_m,top_m,mean_density,"
+    "hash\n";
 
 // A row with its newline.
 std::string statistics_row(const StepResult& result);
+std::string statistics_row(const StepResult& result, const LayerStep& layer);
 
 // Receives a row without its newline, and the hash in it.
 using StatisticsVisitor =
@@ -30,20 +35,21 @@ using StatisticsVisitor =
 // gives back where the next row begins, in bytes. Throws Error(io) when the file does not begin with exactly
 // these rows.
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
-                              const StatisticsVisitor& visit);
+                              const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
 
-// Whether a file begins with the header above; false also when it cannot be read.
-bool is_statistics(const std::filesystem::path& path);
+// Whether a file begins with the header; false also when it cannot be read.
+bool is_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
 
 // The file while a run appends to it. It holds whole rows at any moment, except while rows are being written:
 // then a power cut may leave a part of them, which resume() takes away.
 class StatisticsFile {
   public:
     // A file with the header alone, in the place of any other. Throws Error(io).
-    static StatisticsFile create(const std::filesystem::path& path);
+    static StatisticsFile create(const std::filesystem::path& path,
+                                 std::string_view header = kStatisticsHeader);
     // The file as read_statistics() has checked it, later rows cut off. Throws Error(io).
     static StatisticsFile resume(const std::filesystem::path& path, std::uint64_t steps,
-                                 const StatisticsVisitor& visit);
+                                 const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
 
     // Keeps a row for the next save(), or writes out what has gathered. Throws Error(io).
     void add(std::string_view row);

@@ -37,10 +37,17 @@ Json problem_json(const Problem& problem) {
 
 Json scene_json(const std::string& file, const Scene& scene) {
     const Extent& cells = scene.automaton.extent;
+    Json layers = Json::array();
+    for (const LayerOptions& layer : scene.layers) {
+        layers.push_back({{"name", layer.name},
+                          {"automaton", layer.automaton},
+                          {"cells", {layer.extent.x, layer.extent.y, layer.extent.z}}});
+    }
     return {{"file", file},
             {"valid", true},
             {"name", scene.name},
             {"cells", {cells.x, cells.y, cells.z}},
+            {"layers", layers},
             {"steps", scene.steps},
             {"frames", frame_count(scene)},
             {"scene_hash", scene_hash(scene)},
@@ -48,12 +55,20 @@ Json scene_json(const std::string& file, const Scene& scene) {
             {"memory_bytes_without_pictures", memory_estimate_bytes(scene, false)}};
 }
 
+std::string cells_text(const Extent& cells) {
+    return fmt::format("{} x {} x {} cells", cells.x, cells.y, cells.z);
+}
+
 std::string summary(const std::string& file, const Scene& scene) {
-    const Extent& cells = scene.automaton.extent;
-    return fmt::format(
-        "{}: valid: {} x {} x {} cells, {} steps, {} frames, up to {} of memory, scene hash {}", file,
-        cells.x, cells.y, cells.z, scene.steps, frame_count(scene), bytes_text(memory_estimate_bytes(scene)),
-        scene_hash(scene));
+    std::vector<std::string> lattices;
+    for (const LayerOptions& layer : scene.layers) {
+        lattices.push_back(fmt::format("{} ({})", layer.name,
+                                       layer.automaton ? cells_text(layer.extent) : "drawn directly"));
+    }
+    if (lattices.empty()) lattices.push_back(cells_text(scene.automaton.extent));
+    return fmt::format("{}: valid: {}, {} steps, {} frames, up to {} of memory, scene hash {}", file,
+                       fmt::join(lattices, ", "), scene.steps, frame_count(scene),
+                       bytes_text(memory_estimate_bytes(scene)), scene_hash(scene));
 }
 
 int validate(const ValidateArguments& a) {

@@ -51,6 +51,8 @@ class ByteReader {
         if (!out.empty()) std::memcpy(out.data(), left_.data(), out.size());
         left_ = left_.subspan(out.size());
     }
+    // Leaves out bytes that were read from rest(); at most rest().size().
+    void skip(std::size_t bytes) { left_ = left_.subspan(bytes); }
     std::span<const std::byte> rest() const { return left_; }
 
   private:

@@ -158,6 +158,11 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     }
 }
 
+StateHash hash_of_bytes(std::span<const std::byte> bytes) {
+    const XXH128_hash_t hash = hash_of(bytes);
+    return {hash.high64, hash.low64};
+}
+
 bool is_checkpoint(const std::filesystem::path& path) {
     std::array<char, 8> magic{};
     std::error_code error;

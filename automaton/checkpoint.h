@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,9 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
 // Reads and verifies: magic, versions, sizes against the file's, hash over the content. Throws Error(io) that
 // says what is wrong with the file.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
+
+// XXH3-128 of bytes, as a state hash. Pure.
+StateHash hash_of_bytes(std::span<const std::byte> bytes);
 
 // Whether a file starts as a checkpoint does; false also when it cannot be read.
 bool is_checkpoint(const std::filesystem::path& path);

@@ -37,6 +37,12 @@ std::uint64_t layer_seed(std::uint64_t scene_seed, std::size_t layer) {
     return words[0] | std::uint64_t(words[1]) << 32;
 }
 
+std::size_t lattice_count(const Scene& scene) { return scene.layers.empty() ? 1 : scene.layers.size(); }
+
+bool has_density(const Scene& scene) {
+    return scene.layers.empty() || std::ranges::any_of(scene.layers, &LayerOptions::automaton);
+}
+
 const Wind& layer_wind(const Scene& scene, std::size_t layer) {
     const Wind& own = scene.layers[layer].wind;
     return own.keyframes.empty() ? scene.automaton.wind : own;
@@ -68,6 +74,7 @@ SkyOptions sky_options(const Scene& scene, std::size_t layer) {
 }
 
 AutomatonOptions automaton_options(const Scene& scene, std::size_t layer) {
+    if (scene.layers.empty()) return scene.automaton;
     const LayerOptions& given = scene.layers[layer];
     AutomatonOptions options = scene.automaton;
     options.extent = given.extent;

@@ -96,6 +96,12 @@ inline constexpr std::size_t kMaxLayers = 64;
 // layer has the bits of one without, and 64 bits of Philox for the others. A pure function.
 std::uint64_t layer_seed(std::uint64_t scene_seed, std::size_t layer);
 
+// Lattices that the scene is simulated on: its layers, or the one of a scene without layers.
+std::size_t lattice_count(const Scene& scene);
+
+// Whether any of them has an automaton, and frames a density.
+bool has_density(const Scene& scene);
+
 // What the libraries need to simulate layer `layer` < scene.layers.size(). Pure; throw Error(usage) when the
 // scene was not made by the reader and a name in it is unknown.
 SkyOptions sky_options(const Scene& scene, std::size_t layer);
@@ -106,9 +112,9 @@ std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer);
 const Wind& layer_wind(const Scene& scene, std::size_t layer);
 
 // Every layer's sky, the first layer's first, as it stands at a time: at its last step, with `since_step_s`
-// the rest. SkySimulation::ahead(cloud, since_step_s) moves a cloud on to the moment itself. All steps from 0
-// are taken again, microseconds each. For pictures of clouds without an automaton; a run has them in its
-// frames (apps/pipeline.h).
+// the rest. SkySimulation::ahead(cloud, time_s(), since_step_s) moves a cloud on to the moment itself. All
+// steps from 0 are taken again, microseconds each. For pictures of clouds without an automaton; a run has
+// them in its frames (apps/pipeline.h).
 struct SkiesAtTime {
     std::vector<SkySimulation> skies;
     double since_step_s = 0;

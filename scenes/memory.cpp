@@ -56,23 +56,60 @@ double grid_bytes(const Extent& cells, const DensityOptions& density) {
 
 std::size_t MemoryEstimate::total() const { return sum(sum(program, automaton), sum(density, pictures)); }
 
-MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
-    const Extent& extent = scene.automaton.extent;
+namespace {
+
+// Voxels of a lattice whose blocks all hold something, in voxels of `voxel_m`.
+double voxels_of_size(const AutomatonOptions& lattice, double voxel_m) {
+    const double per_cell = lattice.placement.cell_size_m / voxel_m;
+    return voxels_in_blocks(lattice.extent, 1) * per_cell * per_cell * per_cell;
+}
+
+MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& lattice) {
     const double window =
         2.0 * scene.density.smoothing.t0 + 2;  // the steps around both neighbours of a frame
-    MemoryEstimate estimate;
     // With the state written, hum and act are remembered beside cld. A checkpoint holds the planes and that
     // history as bytes: gathered in a growing buffer, and copied once into the file's content.
-    const double plane = double(BitPlane::bytes(extent));
+    const double plane = double(BitPlane::bytes(lattice.extent));
     const double history = window * (scene.density.write_state ? 3 : 1) * plane;
     const double checkpoint = kCheckpointCopies * (3 * plane + history);
-    estimate.automaton = Automaton::memory_bytes(scene.automaton);
+    MemoryEstimate estimate;
+    estimate.automaton = Automaton::memory_bytes(lattice);
+    estimate.density = saturated(history + checkpoint + grid_bytes(lattice.extent, scene.density));
+    return estimate;
+}
+
+// The grid of all layers together, which has the smallest voxels of all.
+double combined_bytes(const Scene& scene) {
+    if (scene.layers.size() < 2) return 0;
+    double finest_m = std::numeric_limits<double>::infinity(), voxels = 0;
+    for (const LayerOptions& layer : scene.layers) {
+        if (layer.automaton) finest_m = std::min(finest_m, layer.placement.cell_size_m / scene.density.refine);
+    }
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        if (scene.layers[n].automaton) voxels += voxels_of_size(automaton_options(scene, n), finest_m);
+    }
+    return voxels * kBytesPerVoxel;
+}
+
+}  // namespace
+
+MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
+    MemoryEstimate estimate;
     estimate.program = kProgram;
-    estimate.density = saturated(history + checkpoint + grid_bytes(extent, scene.density));
+    double cells = 0;
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        if (!scene.layers.empty() && !scene.layers[n].automaton) continue;
+        const AutomatonOptions options = automaton_options(scene, n);
+        const MemoryEstimate lattice = lattice_estimate(scene, options);
+        estimate.automaton = sum(estimate.automaton, lattice.automaton);
+        estimate.density = sum(estimate.density, lattice.density);
+        cells += double(options.extent.x) * options.extent.y * options.extent.z;
+    }
+    estimate.density = sum(estimate.density, saturated(combined_bytes(scene)));
     if (!with_pictures) return estimate;
     const double pixels = double(scene.render.camera.width) * scene.render.camera.height;
     const double texels = double(scene.render.shadow_map_size) * scene.render.shadow_map_size;
-    const double metaballs = double(extent.x) * extent.y * extent.z * kPlannedCover;
+    const double metaballs = cells * kPlannedCover;
     estimate.pictures =
         saturated(metaballs * kBytesPerMetaball + pixels * kBytesPerPixel + texels * kBytesPerShadowTexel);
     return estimate;
@@ -91,7 +128,8 @@ void check_memory(const Scene& scene, const AvailableMemory& available, bool wit
                 "the scene needs about " + bytes_text(estimate.total()) + " of memory (automaton " +
                     bytes_text(estimate.automaton) + ", density " + bytes_text(estimate.density) +
                     ", pictures " + bytes_text(estimate.pictures) + ") for " + text(extent.x) + " x " +
-                    text(extent.y) + " x " + text(extent.z) + " cells, but the " + available.limit +
+                    text(extent.y) + " x " + text(extent.z) + " cells" +
+                    (scene.layers.empty() ? "" : " and the lattices of its layers") + ", but the " + available.limit +
                     " leaves " + bytes_text(available.bytes) + ": expected " + advice(estimate));
 }
 

@@ -4,10 +4,11 @@
 // How clouds drive the automaton: every seed box becomes an ellipsoid of the probability field, and every
 // rain area a humid column (rain_area.h). One list a step for Automaton::set_external_ellipsoids:
 //
-//     sky.step();
 //     auto ellipsoids = ellipsoids_of(sky, coupling);
 //     append_columns(ellipsoids, areas, column);
 //     automaton.set_external_ellipsoids(std::move(ellipsoids));
+//     automaton.step();
+//     sky.step();             // both are carried by the same wind over the same way
 //
 // The automaton then grows vapour and cloud where the boxes are, mixes those of neighbours, and lets go of
 // them when the boxes dissolve: one type of cloud changes into another, and the wind's profile shears them

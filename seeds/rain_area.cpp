@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "seeds/checks.h"
 #include "seeds/trigonometry.h"
@@ -125,6 +126,53 @@ std::vector<RainArea> attached_areas(std::span<const AttachedRain> rains, const 
                  (shape.high_m.x - shape.low_m.x) / 2 * rain.size_scale,
                  (shape.high_m.y - shape.low_m.y) / 2 * rain.size_scale, 1, 0, intensity});
         }
+    }
+    return areas;
+}
+
+namespace {
+
+// Both describe one area; the axis turns the short way (an axis has no direction).
+RainArea between(const RainArea& a, const RainArea& b, double fraction) {
+    const auto lerp = [&](double from, double to) { return from + (to - from) * fraction; };
+    const double dx = b.x_m - a.x_m, dy = b.y_m - a.y_m, reach = a.semi_a_m + b.semi_a_m;
+    if (dx * dx + dy * dy > reach * reach) return a;
+    RainArea area = a;
+    area.x_m = lerp(a.x_m, b.x_m);
+    area.y_m = lerp(a.y_m, b.y_m);
+    area.semi_a_m = lerp(a.semi_a_m, b.semi_a_m);
+    area.semi_b_m = lerp(a.semi_b_m, b.semi_b_m);
+    area.intensity_mm_per_h = lerp(a.intensity_mm_per_h, b.intensity_mm_per_h);
+    const double sign = a.axis_x * b.axis_x + a.axis_y * b.axis_y < 0 ? -1 : 1;
+    const double x = lerp(a.axis_x, sign * b.axis_x), y = lerp(a.axis_y, sign * b.axis_y);
+    const double length =
+        std::sqrt(x * x + y * y);  // at least sqrt(1/2): the axes differ by at most 90 degrees
+    area.axis_x = x / length;
+    area.axis_y = y / length;
+    return area;
+}
+
+}  // namespace
+
+std::vector<RainArea> mix(std::span<const RainArea> from, std::span<const RainArea> to, double fraction) {
+    std::vector<RainArea> areas;
+    const auto add = [&](RainArea area, double weight) {
+        area.intensity_mm_per_h *= weight;
+        if (area.intensity_mm_per_h > 0) areas.push_back(area);
+    };
+    std::map<std::uint64_t, const RainArea*> later;
+    for (const RainArea& b : to) later.emplace(b.id, &b);
+    for (const RainArea& a : from) {
+        const auto b = later.find(a.id);
+        if (b == later.end()) {
+            add(a, 1 - fraction);
+            continue;
+        }
+        add(between(a, *b->second, fraction), 1);
+        later.erase(b);
+    }
+    for (const RainArea& b : to) {
+        if (later.contains(b.id)) add(b, fraction);
     }
     return areas;
 }

@@ -71,6 +71,11 @@ std::vector<RainArea> placed_areas(std::span<const PlacedRain> rains, double tim
 // Throws Error(usage) on bad rules and on more than kMaxRainRules of them.
 std::vector<RainArea> attached_areas(std::span<const AttachedRain> rains, const SkySimulation& sky);
 
+// The areas at `fraction` of the way from those of one moment to those of a later one, matched by their ids:
+// centre, axes and intensity change linearly; what is only in one list fades in or out where it is. Areas
+// that are not where they could have moved (they went through a periodic side) stand as in the first list.
+std::vector<RainArea> mix(std::span<const RainArea> from, std::span<const RainArea> to, double fraction);
+
 // The humid column above an area.
 struct HumidColumn {
     double bottom_m = 0, top_m = 3000;   // world z, bottom < top

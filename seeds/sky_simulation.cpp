@@ -98,8 +98,8 @@ Displacement SkySimulation::wind_step(const SkyCloud& cloud, double time_s) cons
     return d;
 }
 
-SkyCloud SkySimulation::ahead(const SkyCloud& cloud, double after_s) const {
-    const Displacement d = wind_step(cloud, time_s());
+SkyCloud SkySimulation::ahead(const SkyCloud& cloud, double at_s, double after_s) const {
+    const Displacement d = wind_step(cloud, at_s);
     const double fraction = after_s / options_.time_step_s;
     SkyCloud later = cloud;
     later.place = {cloud.place.x + fixed(metres(d.x) * fraction),

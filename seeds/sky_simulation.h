@@ -14,8 +14,8 @@
 // left one enters upwind (where its shape just reaches the edge, at a random place of the way of one step, so
 // that fast wind leaves no gaps; the two upwind sides share them as the air that crosses them), further ones
 // form inside, and superfluous ones, drawn among all, dissolve inside. In calm air new clouds form inside.
-// Wind that crosses the world in one step replaces every cloud in every step. A sky without base models lets
-// no cloud enter: the other bracketing sky then has all of them.
+// Wind that crosses the world in one step leaves none for longer than two steps. A sky without base models
+// lets no cloud enter: the other bracketing sky then has all of them.
 //
 // Positions are fixed-point sums of whole displacements (automaton/wind.h): nothing drifts, and the state can
 // be saved and restored exactly. One object is one simulation; no function is safe to call while another
@@ -74,9 +74,9 @@ class SkySimulation {
     Vec3 position_m(const SkyCloud& cloud) const;  // world position of the model's origin
     Sphere sphere(const SkyCloud& cloud) const;    // around the cloud, in the world
 
-    // The cloud as it is `after_s` later, 0..time_step_s: moved by the wind and formed or dissolved further
-    // as the next step does it, so that its motion is continuous from step to step.
-    SkyCloud ahead(const SkyCloud& cloud, double after_s) const;
+    // A cloud that stood at time `at_s`, `after_s` later, 0..time_step_s: moved by the wind and formed or
+    // dissolved further as the step from there does it, so that its motion is continuous from step to step.
+    SkyCloud ahead(const SkyCloud& cloud, double at_s, double after_s) const;
 
     // How far the air at the middle of the base heights has moved since the start, metres * 2^32 (wraps
     // around).

@@ -194,13 +194,13 @@ TEST(Layers, CloudsMoveOnContinuouslyBetweenSteps) {
     SkySimulation sky(sky_options(scene, 0));
     for (int n = 0; n < 5; ++n) sky.step();
     const SkyCloud before = sky.clouds().front();
-    const SkyCloud half = sky.ahead(before, 5), whole = sky.ahead(before, 10);
+    const SkyCloud half = sky.ahead(before, 50, 5), whole = sky.ahead(before, 50, 10);
     sky.step();
     const SkyCloud after = sky.clouds().front();
     ASSERT_EQ(after.serial, before.serial);
     EXPECT_EQ(whole, after);
     EXPECT_NEAR(sky.position_m(half).x - sky.position_m(before).x, 25, 1e-6);
-    EXPECT_EQ(sky.ahead(before, 0), before);
+    EXPECT_EQ(sky.ahead(before, 50, 0), before);
 }
 
 }  // namespace

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/layer_simulation.h"
+
+#include <utility>
+
+#include "automaton/bytes.h"
+#include "automaton/checkpoint.h"
+#include "automaton/error.h"
+#include "seeds/coupling.h"
+
+namespace nephos {
+namespace {
+
+// A part of the saved state, with its length before it; nothing but the length when there is no such part.
+template <typename Part>
+void put_part(ByteWriter& writer, const std::optional<Part>& part) {
+    const std::vector<std::byte> bytes = part ? part->save() : std::vector<std::byte>();
+    writer.put(std::uint64_t(bytes.size()));
+    writer.put_bytes(bytes);
+}
+
+template <typename Part>
+void restore_part(ByteReader& reader, std::optional<Part>& part) {
+    const auto size = reader.get<std::uint64_t>();
+    if (size > reader.rest().size() || (size > 0) != part.has_value()) {
+        throw Error(ErrorCode::io, "the saved state is not of this layer");
+    }
+    const std::span<const std::byte> bytes = reader.rest().first(std::size_t(size));
+    if (part) part->restore(bytes);
+    reader.skip(bytes.size());
+}
+
+double metres(std::int64_t after, std::int64_t before) {
+    // Unsigned: the sum of a very long simulation wraps around.
+    return double(std::int64_t(std::uint64_t(after) - std::uint64_t(before))) * 0x1p-32;
+}
+
+}  // namespace
+
+LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::optional<Lattice> initial)
+    : number_(std::uint32_t(layer)), time_step_s_(scene.automaton.time_step_s) {
+    if (!scene.layers.empty()) {
+        options_ = scene.layers[layer];
+        attached_ = attached_rain(scene, layer);
+        sky_.emplace(sky_options(scene, layer));
+    }
+    if (!options_.automaton) return;
+    const AutomatonOptions lattice = automaton_options(scene, layer);
+    if (initial) {
+        automaton_.emplace(lattice, std::move(*initial));
+    } else {
+        automaton_.emplace(lattice);
+    }
+    if (options_.rain.find) {
+        finder_.emplace(options_.rain.finder, lattice.extent, lattice.placement, lattice.boundaries, number_);
+    }
+}
+
+std::uint64_t LayerSimulation::steps() const { return automaton_ ? automaton_->steps() : sky_->steps(); }
+
+void LayerSimulation::step() {
+    if (sky_ && automaton_) {
+        std::vector<ActiveEllipsoid> ellipsoids = ellipsoids_of(*sky_, options_.coupling);
+        append_columns(ellipsoids, rain(), options_.rain.column);
+        automaton_->set_external_ellipsoids(std::move(ellipsoids));
+    }
+    if (automaton_) automaton_->step();
+    if (!sky_) return;
+    const Displacement before = sky_->carried();
+    sky_->step();
+    if (!finder_) return;
+    const Displacement& after = sky_->carried();
+    finder_->update(automaton_->cld(), time_step_s_, metres(after.x, before.x), metres(after.y, before.y));
+}
+
+std::vector<RainArea> LayerSimulation::rain() const {
+    if (!sky_) return {};
+    std::vector<RainArea> areas =
+        placed_areas(options_.rain.placed, sky_->time_s(), sky_->carried(), number_);
+    const auto add = [&](const std::vector<RainArea>& more) {
+        areas.insert(areas.end(), more.begin(), more.end());
+    };
+    add(attached_areas(attached_, *sky_));
+    if (finder_) add(finder_->areas());
+    return areas;
+}
+
+StateHash LayerSimulation::hash() const {
+    return automaton_ ? automaton_->hash() : hash_of_bytes(sky_->save());
+}
+
+std::vector<std::byte> LayerSimulation::save() const {
+    if (!sky_) return automaton_->save();
+    ByteWriter writer;
+    put_part(writer, automaton_);
+    put_part(writer, sky_);
+    put_part(writer, finder_);
+    return writer.take();
+}
+
+void LayerSimulation::restore(std::span<const std::byte> bytes) {
+    if (!sky_) {
+        automaton_->restore(bytes);
+        return;
+    }
+    ByteReader reader(bytes);
+    restore_part(reader, automaton_);
+    restore_part(reader, sky_);
+    restore_part(reader, finder_);
+    if (!reader.rest().empty() || (automaton_ && automaton_->steps() != sky_->steps())) {
+        throw Error(ErrorCode::io, "the saved state is not of this layer");
+    }
+}
+
+std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial) {
+    std::vector<LayerSimulation> layers;
+    layers.reserve(lattice_count(scene));
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        layers.emplace_back(scene, n, scene.layers.empty() ? std::move(initial) : std::nullopt);
+    }
+    return layers;
+}
+
+StateHash combined_hash(std::span<const StateHash> hashes) {
+    return hashes.size() == 1 ? hashes.front() : hash_of_bytes(std::as_bytes(hashes));
+}
+
+StateHash combined_hash(std::span<const LayerSimulation> layers) {
+    std::vector<StateHash> hashes;
+    for (const LayerSimulation& layer : layers) hashes.push_back(layer.hash());
+    return combined_hash(hashes);
+}
+
+}  // namespace nephos
