@@ -2,13 +2,12 @@
 #include "render/cloud_preparation.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 
 #include "automaton/error.h"
+#include "render/keyed_order.h"
 #include "render/vector_math.h"
 
 namespace nephos {
@@ -29,22 +28,6 @@ void check(const Metaball& ball, std::size_t index) {
                                           std::to_string(ball.density));
 }
 
-// Sorts by a key that is not negative, then by index: as one integer, because the bits of floats >= 0 rise
-// with them.
-class KeyedOrder {
-  public:
-    explicit KeyedOrder(std::size_t count) { entries_.reserve(count); }
-    void add(float key, std::uint32_t index) {
-        entries_.push_back(std::uint64_t(std::bit_cast<std::uint32_t>(key)) << 32 | index);
-    }
-    void sort() { std::sort(entries_.begin(), entries_.end()); }
-    std::size_t size() const { return entries_.size(); }
-    std::uint32_t operator[](std::size_t i) const { return std::uint32_t(entries_[i]); }
-
-  private:
-    std::vector<std::uint64_t> entries_;
-};
-
 struct Interval {
     double min = std::numeric_limits<double>::infinity(), max = -min;
     void add(double low, double high) {
@@ -53,28 +36,6 @@ struct Interval {
     }
     double size() const { return max - min; }
     double middle() const { return 0.5 * (min + max); }
-};
-
-// Outside of one of the four planes through the eye and the sides of the picture, or behind the eye.
-class Frustum {
-  public:
-    explicit Frustum(const CameraFrame& camera) : camera_(camera) {
-        const Vec3 sides[4] = {camera.half_width * camera.forward + camera.right,
-                               camera.half_width * camera.forward - camera.right,
-                               camera.half_height * camera.forward + camera.up,
-                               camera.half_height * camera.forward - camera.up};
-        for (int i = 0; i < 4; ++i) inward_[i] = normalised(sides[i]);
-    }
-    bool may_see(const Vec3& offset, double radius) const {
-        if (dot(offset, camera_.forward) < -radius) return false;
-        for (const Vec3& inward : inward_)
-            if (dot(offset, inward) < -radius) return false;
-        return true;
-    }
-
-  private:
-    CameraFrame camera_;
-    Vec3 inward_[4];
 };
 
 }  // namespace
@@ -104,13 +65,6 @@ PreparedCloud prepare(const MetaballCloud& cloud) {
         prepared.top_m = height.max;
     }
     return prepared;
-}
-
-Vec3 direction_to_sun(const Sun& sun) {
-    constexpr double kRadians = std::numbers::pi / 180.0;
-    const double elevation = sun.elevation_deg * kRadians, azimuth = sun.azimuth_deg * kRadians;
-    return {std::sin(azimuth) * std::cos(elevation), std::cos(azimuth) * std::cos(elevation),
-            std::sin(elevation)};
 }
 
 ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size) {
@@ -187,47 +141,6 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
         const auto first = order.balls.begin();
         slab.dense =
             std::uint32_t(std::stable_partition(first + slab.begin, first + slab.end, is_thin) - first);
-    }
-    return order;
-}
-
-EyeOrder order_from_eye(const PreparedCloud& cloud, std::span<const float> light, const CameraFrame& camera,
-                        double pixels_per_unit, const Ground& ground) {
-    const Frustum frustum(camera);
-    const bool above_ground = camera.position_m.z > ground.height_m;
-    KeyedOrder by_distance(cloud.visible.size());
-    for (std::size_t i = 0; i < cloud.visible.size(); ++i) {
-        const Metaball& ball = cloud.metaballs[cloud.visible[i]];
-        if (above_ground && ball.z + ball.radius < ground.height_m) continue;
-        const Vec3 offset = centre_of(ball) - camera.position_m;
-        const double distance = length(offset);
-        // Billboards reach up to 1.35 radii (view_splat.vert), and never less than part of a pixel.
-        const double least = double(shader::kMinRadiusPixels) * distance / pixels_per_unit;
-        if (!frustum.may_see(offset, 1.5 * std::max(double(ball.radius), least))) continue;
-        by_distance.add(float(distance), std::uint32_t(i));
-    }
-    by_distance.sort();
-
-    const double height_scale = cloud.top_m > cloud.base_m ? 1.0 / (cloud.top_m - cloud.base_m) : 0.0;
-    EyeOrder order;
-    order.balls.reserve(by_distance.size());
-    for (std::size_t i = by_distance.size(); i-- > 0;) {
-        const std::uint32_t source = by_distance[i];
-        const Metaball& ball = cloud.metaballs[cloud.visible[source]];
-        const Vec3 offset = centre_of(ball) - camera.position_m;
-        shader::uint flags = 0;
-        if (length(offset) < double(shader::kNearDistance) * ball.radius)
-            flags |= shader::kAround | shader::kIntegrate;
-        if (above_ground && ball.z - ball.radius < ground.height_m) flags |= shader::kIntegrate;
-        if (cloud.depth_scale[source] > shader::kMaxDepthScale) flags |= shader::kIntegrate;
-        const bool integrate = flags != 0;
-        const std::uint32_t index = std::uint32_t(order.balls.size());
-        if (order.runs.empty() || order.runs.back().integrate != integrate)
-            order.runs.push_back({index, index, integrate});
-        ++order.runs.back().end;
-        order.balls.push_back({float(offset.x), float(offset.y), float(offset.z), ball.radius,
-                               cloud.depth_scale[source], light[source],
-                               float((ball.z - cloud.base_m) * height_scale), flags});
     }
     return order;
 }

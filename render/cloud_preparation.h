@@ -1,21 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What happens to a cloud before the device sees it: checks, optical depth scales, bounds, the frame of the
-// shadow map, and the two orders (from the sun, and from far to near of the eye). No Vulkan here. Private to
-// the module.
+// What happens to a cloud of metaballs before the device sees it: checks, optical depth scales, bounds, the
+// frame of the shadow map, and the order from the sun (that from the eye: eye_order.h). No Vulkan here.
+// Private to the module.
 //
-// Every order is total: equal distances are ordered by index, so a picture never depends on how a sort is
-// done.
+// The order is total: equal distances are ordered by index, so a picture never depends on how a sort is done.
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "render/camera.h"
 #include "render/picture.h"
-#include "render/renderer.h"
 #include "render/shaders/shared.h"
+#include "render/splats.h"
 
 namespace nephos {
 
@@ -29,9 +27,6 @@ struct PreparedCloud {
 
 // Throws Error(usage) when a metaball is not finite, has no radius, or there are more than 2^31 of them.
 PreparedCloud prepare(const MetaballCloud& cloud);
-
-// Direction from the world to the sun; unit.
-Vec3 direction_to_sun(const Sun& sun);
 
 // The smallest frame along the sun's rays around all visible metaballs, with a margin of two texels.
 ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size);
@@ -49,21 +44,5 @@ struct SunOrder {
 
 // Slabs of equal thickness: half the mean radius, but at most `max_slabs` of them.
 SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, int max_slabs);
-
-// Consecutive metaballs in the order from the eye that one pipeline draws.
-struct Run {
-    std::uint32_t begin = 0, end = 0;
-    bool integrate = false;  // all of them have shader::kIntegrate, or none has
-};
-
-struct EyeOrder {
-    std::vector<shader::ViewBall> balls;  // farthest first
-    std::vector<Run> runs;                // none is empty; together they are all of balls
-};
-
-// Metaballs that the camera can see, far ones first. `light` has one entry for each of cloud.visible;
-// `pixels_per_unit` is the size in pixels of a unit at distance 1.
-EyeOrder order_from_eye(const PreparedCloud& cloud, std::span<const float> light, const CameraFrame& camera,
-                        double pixels_per_unit, const Ground& ground);
 
 }  // namespace nephos

@@ -34,7 +34,7 @@ double pixels_per_unit(const Camera& camera, const CameraFrame& frame) {
 }
 
 shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
-                         const Tile& tile) {
+                         const Flash* flash, const Tile& tile) {
     const Vec3 to_sun = direction_to_sun(options.sun);
     const Daylight day = daylight(options.sun.elevation_deg);
     const CloudLight& light = options.light;
@@ -57,7 +57,8 @@ shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera
     // absorbed. A cloud is no slab and loses light through its sides as well: twice the decay shows its
     // relief.
     frame.ambient_base = to_vec4(light.ambient_base, day.sky, 1.5 * (1.0 - light.g));
-    frame.air_extinction = to_vec4(options.air.extinction_per_m, 1.0, 0);
+    frame.air_extinction =
+        to_vec4(options.air.extinction_per_m, 1.0, light.lighting == Lighting::cfa ? 1.0 : 0.0);
     frame.horizon = to_vec4(options.air.horizon, day.sky, 0);
     frame.zenith = to_vec4(options.air.zenith, day.sky, 0);
 
@@ -74,6 +75,13 @@ shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera
     frame.ground_sun = to_vec4(sunlit, 1.0, has_ground ? 1.0 : 0.0);
     frame.shadow_u = shadow_row(shadow.u_axis_m, shadow, eye);
     frame.shadow_v = shadow_row(shadow.v_axis_m, shadow, eye);
+    if (flash != nullptr) {
+        Rgb lit{};
+        for (std::size_t c = 0; c < 3; ++c) lit[c] = options.ground.albedo[c] * flash->colour[c];
+        frame.flash = to_vec4(flash->position_m - eye, flash->intensity);
+        frame.flash_colour = to_vec4(flash->colour, 1.0, 0);
+        frame.ground_flash = to_vec4(lit, flash->intensity, 0);
+    }
     return frame;
 }
 

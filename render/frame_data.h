@@ -25,8 +25,9 @@ struct Daylight {
 };
 Daylight daylight(double sun_elevation_deg);
 
+// `flash` is null in the dark.
 shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
-                         const Tile& tile);
+                         const Flash* flash, const Tile& tile);
 
 // Size in pixels of a unit at distance 1.
 double pixels_per_unit(const Camera& camera, const CameraFrame& frame);

@@ -15,6 +15,8 @@ namespace spirv {
 #include "light_sample_comp.h"
 #include "light_splat_frag.h"
 #include "light_splat_vert.h"
+#include "puff_frag.h"
+#include "puff_vert.h"
 #include "view_splat_frag.h"
 #include "view_splat_vert.h"
 }  // namespace spirv
@@ -43,8 +45,9 @@ vk::PipelineColorBlendAttachmentState blend_state(Blend blend) {
 
 const ShaderSet& shaders() {
     static constexpr ShaderSet kShaders{
-        spirv::light_splat_vert, spirv::light_splat_frag, spirv::light_sample_comp, spirv::background_vert,
-        spirv::background_frag,  spirv::view_splat_vert,  spirv::view_splat_frag};
+        spirv::light_splat_vert, spirv::light_splat_frag, spirv::light_sample_comp,
+        spirv::background_vert,  spirv::background_frag,  spirv::view_splat_vert,
+        spirv::view_splat_frag,  spirv::puff_vert,        spirv::puff_frag};
     return kShaders;
 }
 
@@ -146,6 +149,7 @@ vk::raii::Sampler create_sampler(const GpuDevice& gpu, vk::SamplerAddressMode be
     info.setMagFilter(vk::Filter::eLinear).setMinFilter(vk::Filter::eLinear);
     info.setAddressModeU(beyond).setAddressModeV(beyond).setAddressModeW(beyond);
     info.setBorderColor(vk::BorderColor::eFloatOpaqueWhite);
+    info.setMipmapMode(vk::SamplerMipmapMode::eNearest).setMaxLod(VK_LOD_CLAMP_NONE);
     return {gpu.device, info};
 }
 

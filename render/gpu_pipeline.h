@@ -3,9 +3,11 @@
 
 // Pipelines, and the one descriptor layout that they share:
 //
-//     0  uniform  Frame              3  attenuation textures (array)
-//     1  storage  metaballs          4  shadow map, or the light buffer that becomes it
-//     2  storage  light
+//     0  uniform  Frame                      3  attenuation textures, or puff textures (array)
+//     1  storage  metaballs, or billboards   4  shadow map, or the light buffer that becomes it
+//     2  storage  light, or clouds
+//
+// Both images of a set must be bound before a draw, used or not: lavapipe looks at them.
 //
 // Private to the module.
 
@@ -20,6 +22,7 @@ using ShaderCode = std::span<const std::uint32_t>;
 struct ShaderSet {
     ShaderCode light_splat_vert, light_splat_frag, light_sample_comp;
     ShaderCode background_vert, background_frag, view_splat_vert, view_splat_frag;
+    ShaderCode puff_vert, puff_frag;
 };
 const ShaderSet& shaders();
 
@@ -57,7 +60,7 @@ void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t b
 void bind_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, const GpuImage& image,
                 const vk::raii::Sampler& sampler);
 
-// Filters linearly; beyond the edge there is the edge's texel, or white.
+// Filters linearly within the nearest level; beyond the edge there is the edge's texel, or white.
 vk::raii::Sampler create_sampler(const GpuDevice& gpu, vk::SamplerAddressMode beyond);
 
 // Draws into attachments: begins and ends rendering over `area` and sets viewport and scissor to it.

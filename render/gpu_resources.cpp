@@ -22,7 +22,7 @@ std::uint32_t memory_type(const GpuDevice& gpu, std::uint32_t allowed,
 }
 
 vk::ImageSubresourceRange all_of(const GpuImage& image) {
-    return {vk::ImageAspectFlagBits::eColor, 0, 1, 0, image.layers};
+    return {vk::ImageAspectFlagBits::eColor, 0, image.levels, 0, image.layers};
 }
 
 }  // namespace
@@ -45,15 +45,16 @@ GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsage
 }
 
 GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t height, std::uint32_t layers,
-                      vk::Format format, vk::ImageUsageFlags usage) {
+                      vk::Format format, vk::ImageUsageFlags usage, std::uint32_t levels) {
     GpuImage image;
     image.format = format;
     image.width = width;
     image.height = height;
     image.layers = layers;
+    image.levels = levels;
     image.image = vk::raii::Image(
         gpu.device,
-        vk::ImageCreateInfo({}, vk::ImageType::e2D, format, vk::Extent3D(width, height, 1), 1, layers,
+        vk::ImageCreateInfo({}, vk::ImageType::e2D, format, vk::Extent3D(width, height, 1), levels, layers,
                             vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal, usage));
     const vk::MemoryRequirements needs = image.image.getMemoryRequirements();
     const std::uint32_t type = memory_type(gpu, needs.memoryTypeBits, {Memory::eDeviceLocal, MemoryFlags{}});

@@ -29,11 +29,11 @@ struct GpuImage {
     vk::raii::Image image{nullptr};
     vk::raii::ImageView view{nullptr};
     vk::Format format = vk::Format::eUndefined;
-    std::uint32_t width = 0, height = 0, layers = 1;
+    std::uint32_t width = 0, height = 0, layers = 1, levels = 1;
 };
 
 GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t height, std::uint32_t layers,
-                      vk::Format format, vk::ImageUsageFlags usage);
+                      vk::Format format, vk::ImageUsageFlags usage, std::uint32_t levels = 1);
 
 // One side of a dependency.
 struct Access {

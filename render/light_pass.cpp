@@ -46,14 +46,29 @@ void LightPass::resize_map(const GpuDevice& gpu, int shadow_size) {
     const std::uint32_t size = std::uint32_t(shadow_size);
     if (map_.width != size) {
         using Usage = vk::ImageUsageFlagBits;
-        map_ = create_image(gpu, size, size, 1, kFormat,
-                            Usage::eColorAttachment | Usage::eSampled | Usage::eTransferSrc);
+        map_ = create_image(
+            gpu, size, size, 1, kFormat,
+            Usage::eColorAttachment | Usage::eSampled | Usage::eTransferSrc | Usage::eTransferDst);
         bind_image(gpu, bindings_, 4, map_, *sampler_);
     }
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_image(commands, map_, access::draw);
         const std::array<const GpuImage*, 1> attachments{&map_};
         draw_into(commands, attachments, {size, size}, vk::AttachmentLoadOp::eClear, [] {});
+    });
+}
+
+void LightPass::use(const GpuDevice& gpu, std::span<const float> shadow, int shadow_size) {
+    resize_map(gpu, shadow_size);
+    const GpuBuffer staging =
+        create_buffer(gpu, shadow.size_bytes(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    std::memcpy(staging.mapped, shadow.data(), shadow.size_bytes());
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        image_barrier(commands, map_, access::draw, access::copy_to);
+        const vk::BufferImageCopy region(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, 0, 0},
+                                         {map_.width, map_.height, 1});
+        commands.copyBufferToImage(*staging.buffer, *map_.image, vk::ImageLayout::eGeneral, region);
+        image_barrier(commands, map_, access::copy_to, access::sample_in_fragment);
     });
 }
 

@@ -27,6 +27,9 @@ class LightPass {
     std::vector<float> run(const GpuDevice& gpu, const SunOrder& order, const ShadowFrame& frame,
                            int shadow_size);
 
+    // Takes a shadow map that was made elsewhere, shadow_size^2 texels.
+    void use(const GpuDevice& gpu, std::span<const float> shadow, int shadow_size);
+
     const GpuImage& shadow_map() const { return map_; }
     // The shadow map in main memory; row 0 has the smallest v.
     std::vector<float> read_shadow_map(const GpuDevice& gpu) const;

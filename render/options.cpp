@@ -2,6 +2,7 @@
 #include "render/options.h"
 
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "automaton/error.h"
@@ -49,6 +50,8 @@ void check(const RenderOptions& options) {
     require(within(light.multiple_scattering, 0, 10), "light.multiple_scattering", "0..10");
     check_colour(light.ambient_top, "light.ambient_top");
     check_colour(light.ambient_base, "light.ambient_base");
+    require(light.light_distance_m > 0, "light.light_distance_m", "metres above 0");
+    require(light.cfa_clouds_per_frame >= 0, "light.cfa_clouds_per_frame", "0 or more clouds");
     require(colour_within(options.air.extinction_per_m, 1), "air.extinction_per_m",
             "three numbers from 0 to 1 per metre");
     check_colour(options.air.horizon, "air.horizon");
@@ -56,6 +59,33 @@ void check(const RenderOptions& options) {
     require(std::isfinite(options.ground.height_m), "ground.height_m", "finite metres");
     require(colour_within(options.ground.albedo, 1), "ground.albedo", "three numbers from 0 to 1");
     require(within(options.shadow_map_size, 16, 8192), "shadow_map_size", "16..8192 texels");
+    for (const LightningFlash& flash : options.lightning) {
+        require(finite(flash.position_m), "lightning.position_m", "finite metres");
+        require(flash.time_s >= 0 && std::isfinite(flash.time_s), "lightning.time_s", "0 or more seconds");
+        require(flash.duration_s > 0 && std::isfinite(flash.duration_s), "lightning.duration_s",
+                "seconds above 0");
+        require(colour_within(flash.colour, 1), "lightning.colour", "three numbers from 0 to 1");
+        require(within(flash.intensity, 0, 1e6), "lightning.intensity", "0..1e6");
+    }
+}
+
+Vec3 direction_to_sun(const Sun& sun) {
+    constexpr double kRadians = std::numbers::pi / 180.0;
+    const double elevation = sun.elevation_deg * kRadians, azimuth = sun.azimuth_deg * kRadians;
+    return {std::sin(azimuth) * std::cos(elevation), std::cos(azimuth) * std::cos(elevation),
+            std::sin(elevation)};
+}
+
+std::optional<Flash> flash_at(std::span<const LightningFlash> lightning, double time_s) {
+    std::optional<Flash> brightest;
+    for (const LightningFlash& flash : lightning) {
+        const double left = 1 - (time_s - flash.time_s) / flash.duration_s;
+        if (!(left > 0 && left <= 1)) continue;
+        const double intensity = flash.intensity * left * left;
+        if (intensity > (brightest ? brightest->intensity : 0))
+            brightest = Flash{flash.position_m, flash.colour, intensity};
+    }
+    return brightest;
 }
 
 }  // namespace nephos

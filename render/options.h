@@ -6,7 +6,10 @@
 // faces a sun of colour 1.
 
 #include <array>
+#include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "automaton/lattice.h"
 
@@ -31,6 +34,15 @@ struct Sun {
     bool operator==(const Sun&) const = default;
 };
 
+// Direction from the world to the sun; unit.
+Vec3 direction_to_sun(const Sun& sun);
+
+// How the light of the sun finds its way into voxel clouds.
+enum class Lighting {
+    light_pass,  // D, step 1: metaballs drawn from the sun, each behind the attenuation of those before it
+    cfa,         // T's light absorption factor over blocks of voxels (voxel_absorption.h)
+};
+
 // How a cloud scatters light (D: the colour of a metaball). With the defaults a thick cloud top in the sun
 // has a radiance of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
@@ -43,6 +55,16 @@ struct CloudLight {
     double multiple_scattering = 1.0;
     Rgb ambient_top{0.19, 0.24, 0.33};   // light from the sky that a cloud's top scatters, >= 0
     Rgb ambient_base{0.11, 0.14, 0.19};  // ... and its base; between them by height
+    Lighting lighting =
+        Lighting::light_pass;  // of voxel clouds; clouds drawn as billboards always have the CFA
+    // T: the way in a voxel cloud of density 1 after which a light is absorbed, by the CFA; > 0, may be infinite.
+    // Larger: light reaches deeper. 2 / extinction_per_m lets in as much light in all as the light pass (the area
+    // below 1 - x / distance is that below exp(-extinction x)). Clouds drawn as billboards have that of their model.
+    double light_distance_m = 100.0;
+    // Clouds drawn as billboards whose absorption is computed anew in one frame because the light moved (T:
+    // 1);
+    // >= 0, 0: all of them. Clouds that are new are always computed.
+    int cfa_clouds_per_frame = 0;
     bool operator==(const CloudLight&) const = default;
 };
 
@@ -61,6 +83,39 @@ struct Ground {
     bool operator==(const Ground&) const = default;
 };
 
+// A flash of lightning: it lights clouds and ground from its place. At its begin it is brightest and then
+// fades as (1 - t / duration)^2; of several that burn at one moment the brightest lights the picture.
+struct LightningFlash {
+    Vec3 position_m{0, 0, 1000};
+    double time_s = 0;           // simulated time at which it begins, >= 0
+    double duration_s = 1;       // > 0
+    Rgb colour{0.75, 0.8, 1.0};  // 0..1
+    // Irradiance at a distance of 1 km in units of that of a sun of colour 1; falls off with the square of
+    // the distance (from 100 m on). >= 0
+    double intensity = 1;
+    bool operator==(const LightningFlash&) const = default;
+};
+
+// The lightning of one moment.
+struct Flash {
+    Vec3 position_m;
+    Rgb colour{};          // as above
+    double intensity = 0;  // as above, now; > 0
+};
+
+// The brightest flash that burns at a time, the first of equals; none when it is dark.
+std::optional<Flash> flash_at(std::span<const LightningFlash> lightning, double time_s);
+
+// What is drawn over the picture of T's clouds (T, figure 28).
+struct DebugView {
+    bool boxes = false;  // edges of the seed boxes, blue
+    bool axes = false;   // axes through the clouds' centres: x red, y green, z blue
+    bool roots = false;  // an arrow for each root of each seed of the base model, yellow
+    bool rays = false;   // from the boxes' centres to the light, red where they are inside of boxes
+    bool any() const { return boxes || axes || roots || rays; }
+    bool operator==(const DebugView&) const = default;
+};
+
 struct RenderOptions {
     Camera camera;
     Sun sun;
@@ -68,6 +123,8 @@ struct RenderOptions {
     Air air;
     Ground ground;
     int shadow_map_size = 1024;  // texels on a side, 16..8192
+    std::vector<LightningFlash> lightning;
+    DebugView debug_view;
     bool operator==(const RenderOptions&) const = default;
 };
 

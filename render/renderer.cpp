@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
+#include <optional>
 
 #include "automaton/available_memory.h"
 #include "automaton/error.h"
@@ -12,25 +13,28 @@
 #include "render/light_pass.h"
 #include "render/renderer_test_access.h"
 #include "render/view_pass.h"
+#include "render/voxel_absorption.h"
 
 namespace nephos {
 namespace {
 
 constexpr int kMaxSlabs = 256;
 
+std::size_t square(std::size_t side) { return side * side; }
+
 // Bytes in main memory while a picture is drawn, on a device that shares it.
-std::size_t memory_needed(const MetaballCloud& cloud, const RenderOptions& options, int tile_size) {
-    const auto square = [](std::size_t side) { return side * side; };
+std::size_t memory_needed(const Splats& splats, const RenderOptions& options, int tile_size) {
     const std::size_t pixels = std::size_t(options.camera.width) * std::size_t(options.camera.height);
     const std::size_t tile = std::min(pixels, square(std::size_t(tile_size)));
     // Orders, sort keys and light of a metaball.
-    constexpr std::size_t kPerMetaball = 32 + 8 + 4 * 5;
+    constexpr std::size_t kPerMetaball = 32 + 16 + 4 * 5, kPerBillboard = 2 * 32 + 16;
     return 20 * pixels + 40 * tile + 12 * square(std::size_t(options.shadow_map_size)) +
-           kPerMetaball * cloud.metaballs.size() + (std::size_t(96) << 20);
+           kPerMetaball * splats.metaballs.metaballs.size() + kPerBillboard * splats.billboards.size() +
+           (std::size_t(96) << 20);
 }
 
-void check_memory(const MetaballCloud& cloud, const RenderOptions& options, int tile_size) {
-    const std::size_t needed = memory_needed(cloud, options, tile_size);
+void check_memory(const Splats& splats, const RenderOptions& options, int tile_size) {
+    const std::size_t needed = memory_needed(splats, options, tile_size);
     const AvailableMemory available = available_memory();
     if (needed <= available.bytes) return;
     throw Error(ErrorCode::usage, "a picture of " + std::to_string(options.camera.width) + " x " +
@@ -75,7 +79,12 @@ Picture allocate_picture(const RenderOptions& options) {
 struct Renderer::Impl {
     explicit Impl(const DeviceOptions& device_options);
 
-    Picture draw(const MetaballCloud& cloud, const RenderOptions& options);
+    Picture draw(const Splats& splats, const RenderOptions& options);
+    // The sunlight that arrives at each visible metaball, and the shadow map into picture and light pass.
+    std::vector<float> pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
+                                     Picture& picture);
+    std::vector<float> absorb_sunlight(const PreparedCloud& cloud, const DensityBlocks& blocks,
+                                       const RenderOptions& options, Picture& picture);
 
     int tile_size;
     GpuDevice gpu;
@@ -99,32 +108,58 @@ Renderer::Impl::Impl(const DeviceOptions& device_options)
                                                  gpu.properties.limits.maxFramebufferWidth)));
 }
 
-Picture Renderer::Impl::draw(const MetaballCloud& cloud, const RenderOptions& options) {
+// D, step 1.
+std::vector<float> Renderer::Impl::pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
+                                                 Picture& picture) {
+    const SunOrder order = order_from_sun(cloud, picture.shadow_frame, kMaxSlabs);
+    const std::vector<float> ordered =
+        light_pass.run(gpu, order, picture.shadow_frame, options.shadow_map_size);
+    std::vector<float> light(ordered.size());
+    for (std::size_t i = 0; i < ordered.size(); ++i) light[order.balls[i].source] = ordered[i];
+    picture.shadow = cloud.visible.empty()
+                         ? std::vector<float>(square(std::size_t(picture.shadow_size)), 1.0f)
+                         : light_pass.read_shadow_map(gpu);
+    return light;
+}
+
+// T's absorption factor in its place.
+std::vector<float> Renderer::Impl::absorb_sunlight(const PreparedCloud& cloud, const DensityBlocks& blocks,
+                                                   const RenderOptions& options, Picture& picture) {
+    const double distance = options.light.light_distance_m;
+    picture.shadow = shadow_by_absorption(blocks, picture.shadow_frame, picture.shadow_size, distance);
+    light_pass.use(gpu, picture.shadow, picture.shadow_size);
+    return light_by_absorption(cloud, blocks, direction_to_sun(options.sun), distance);
+}
+
+Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options) {
+    const MetaballCloud& cloud = splats.metaballs;
+    const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     const PreparedCloud prepared = prepare(cloud);
     const CameraFrame camera = camera_frame(options.camera);
     Picture picture = allocate_picture(options);
 
     picture.shadow_frame = shadow_frame(prepared, direction_to_sun(options.sun), options.shadow_map_size);
-    std::vector<float> light(prepared.visible.size());
-    {
-        const SunOrder order = order_from_sun(prepared, picture.shadow_frame, kMaxSlabs);
-        const std::vector<float> ordered =
-            light_pass.run(gpu, order, picture.shadow_frame, options.shadow_map_size);
-        for (std::size_t i = 0; i < ordered.size(); ++i) light[order.balls[i].source] = ordered[i];
-    }
-    picture.shadow = light_pass.read_shadow_map(gpu);
+    std::optional<DensityBlocks> blocks;
+    if (!prepared.visible.empty() && (flash != nullptr || options.light.lighting == Lighting::cfa))
+        blocks.emplace(prepared, cloud.extinction_per_m);
+    const std::vector<float> light = options.light.lighting == Lighting::cfa && blocks
+                                         ? absorb_sunlight(prepared, *blocks, options, picture)
+                                         : pass_sunlight(prepared, options, picture);
+    std::vector<float> lightning;
+    if (flash != nullptr && blocks)
+        lightning = flash_by_absorption(prepared, *blocks, flash->position_m, options.light.light_distance_m);
     picture.light.assign(cloud.metaballs.size(), 1.0f);
     for (std::size_t i = 0; i < light.size(); ++i) picture.light[prepared.visible[i]] = light[i];
 
-    const EyeOrder order =
-        order_from_eye(prepared, light, camera, pixels_per_unit(options.camera, camera), options.ground);
+    const EyeOrder order = order_from_eye(prepared, {light, lightning}, splats, camera,
+                                          pixels_per_unit(options.camera, camera), options.ground);
     view_pass.use_shadow_map(gpu, light_pass.shadow_map(), white_beyond);
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {
             const Tile tile{x, y, std::min(tile_size, picture.width - x),
                             std::min(tile_size, picture.height - y)};
-            view_pass.draw_tile(gpu, frame_data(options, camera, picture.shadow_frame, tile), tile, order,
-                                picture);
+            view_pass.draw_tile(gpu, frame_data(options, camera, picture.shadow_frame, flash, tile), tile,
+                                order, picture);
         }
     }
     return picture;
@@ -141,13 +176,19 @@ Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 Picture Renderer::draw(const MetaballCloud& cloud, const RenderOptions& options) {
+    Splats splats;
+    splats.metaballs = cloud;
+    return draw_splats(splats, options);
+}
+
+Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options) {
     check(options);
     const std::uint32_t limit = impl_->gpu.properties.limits.maxImageDimension2D;
     if (std::uint32_t(options.shadow_map_size) > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
-    check_memory(cloud, options, impl_->tile_size);
+    check_memory(splats, options, impl_->tile_size);
     try {
-        return with_gpu_errors("drawing", [&] { return impl_->draw(cloud, options); });
+        return with_gpu_errors("drawing", [&] { return impl_->draw(splats, options); });
     } catch (const std::bad_alloc&) {
         throw Error(ErrorCode::usage, "not enough memory for a picture of this size");
     }

@@ -1,24 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The renderer of D: clouds as metaballs, each drawn as a billboard with a precomputed attenuation texture.
+// The renderer of D: clouds as metaballs, each drawn as a billboard with a precomputed attenuation texture;
+// and of T: clouds as textured billboards, lit by their absorption factors (splats.h).
 //
 //     step 0   64 attenuation textures as one array (attenuation_texture.h), once per Renderer
-//     step 1   from the sun: the light that reaches every metaball, and the shadow map
-//     step 2   from the eye: sky and ground, which wears the shadow map, then the billboards back to front:
+//     step 1   from the sun: the light that reaches every metaball, and the shadow map; or T's absorption
+//     factor
+//              over blocks of voxels instead (voxel_absorption.h)
+//     step 2   from the eye: sky and ground, which wears the shadow map, then all splats back to front:
 //              buffer = buffer * attenuation + colour
+//
+// Clouds drawn as billboards cast no shadow on the ground or on other clouds.
 //
 // Offscreen Vulkan 1.3; runs on a software device (lavapipe) as well as on a graphics card. The picture is a
 // function of cloud and options alone: two calls give the same bits on the same device and driver.
 
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "density/metaballs.h"
 #include "render/options.h"
 #include "render/picture.h"
+#include "render/splats.h"
 
 namespace nephos {
 
@@ -33,15 +37,6 @@ struct DeviceOptions {
     // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
     // the picture; memory on the device is about 24 bytes * tile_size^2.
     int tile_size = 2048;
-};
-
-// A cloud made of metaballs. Along a ray, extinction (per metre) is
-//     extinction_per_m * normalisation * sum_i density_i f(|x - x_i| / radius_i),
-//     f(a) = 1 - 22/9 a^2 + 17/9 a^4 - 4/9 a^6 for a < 1, else 0 (Wyvill)
-struct MetaballCloud {
-    std::span<const Metaball> metaballs;  // metres; metaballs of density <= 0 draw nothing
-    double extinction_per_m = 0.02;       // at density 1; >= 0
-    double normalisation = 1.0;           // such that a saturated lattice has density 1; >= 0
 };
 
 class Renderer {
@@ -60,8 +55,10 @@ class Renderer {
     //
     // Many may be drawn with one Renderer, one at a time: not thread-safe, but different
     // Renderers may work in different threads. Throws Error(usage) on bad options, on metaballs that are not
-    // finite or have no radius, and when the picture does not fit into memory; Error(gpu) when the device
-    // fails, after which this Renderer cannot be used any more.
+    // finite or have no radius, on billboards that are not as splats.h wants them, and when the picture does
+    // not fit into memory; Error(gpu) when the device fails, after which this Renderer cannot be used any
+    // more.
+    Picture draw_splats(const Splats& splats, const RenderOptions& options);
     Picture draw(const MetaballCloud& cloud, const RenderOptions& options);
 
     std::string device_name() const;

@@ -9,7 +9,7 @@
 namespace nephos {
 namespace {
 
-constexpr std::size_t kBatch = std::size_t(1) << 20;  // metaballs on the device at once: 32 MiB
+constexpr std::uint32_t kBatch = 1u << 20;  // metaballs, and billboards, on the device at once: 32 MiB each
 constexpr std::array kFormats{vk::Format::eR32G32B32A32Sfloat, vk::Format::eR32Sfloat};
 constexpr float kLeastOpacity = 1.0f / 1024.0f;  // thinner clouds have no depth (picture.h)
 
@@ -28,7 +28,8 @@ ViewPass::ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const Gpu
       frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
       balls_(create_buffer(gpu, kBatch * sizeof(shader::ViewBall), vk::BufferUsageFlagBits::eStorageBuffer,
-                           HostAccess::write)) {
+                           HostAccess::write)),
+      puffs_(gpu, layout, kFormats, frame_) {
     bind_buffer(gpu, bindings_, 0, frame_);
     bind_buffer(gpu, bindings_, 1, balls_);
     bind_image(gpu, bindings_, 3, attenuation, sampler);
@@ -73,27 +74,57 @@ void ViewPass::draw_background(const GpuDevice& gpu, vk::Extent2D area) const {
     });
 }
 
-void ViewPass::draw_balls(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order) const {
-    const std::array<const GpuImage*, 2> targets{&radiance_, &depth_};
-    auto run = order.runs.begin();
-    for (std::size_t begin = 0; begin < order.balls.size(); begin += kBatch) {
-        const std::size_t end = std::min(order.balls.size(), begin + kBatch);
-        std::memcpy(balls_.mapped, order.balls.data() + begin, (end - begin) * sizeof(shader::ViewBall));
-        const auto draws = [&](const vk::raii::CommandBuffer& commands) {
-            for (; run != order.runs.end() && run->begin < end; ++run) {
-                const std::size_t from = std::max<std::size_t>(run->begin, begin),
-                                  to = std::min<std::size_t>(run->end, end);
-                bind(commands, run->integrate ? integrated_splat_ : splat_);
-                commands.draw(6 * std::uint32_t(to - from), 1, 6 * std::uint32_t(from - begin), 0);
-                if (run->end > end) break;  // the rest of this run is in the next batch
+// Cuts the runs into batches that fit into the buffers.
+void ViewPass::draw_splats(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order) {
+    if (!order.runs.empty()) puffs_.use_clouds(gpu, order.clouds);
+    std::vector<Run> batch;
+    std::uint32_t balls = 0, puffs = 0;
+    for (Run run : order.runs) {
+        std::uint32_t& used = run.kind == SplatKind::billboard ? puffs : balls;
+        while (run.begin < run.end) {
+            if (used == kBatch) {
+                draw_batch(gpu, area, order, batch);
+                batch.clear();
+                balls = puffs = 0;
             }
-        };
-        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-            image_barrier(commands, radiance_, access::draw, access::draw);
-            image_barrier(commands, depth_, access::draw, access::draw);
-            draw_into(commands, targets, area, vk::AttachmentLoadOp::eLoad, [&] { draws(commands); });
-        });
+            const std::uint32_t end = std::min(run.end, run.begin + (kBatch - used));
+            batch.push_back({run.begin, end, run.kind});
+            used += end - run.begin;
+            run.begin = end;
+        }
     }
+    if (!batch.empty()) draw_batch(gpu, area, order, batch);
+}
+
+void ViewPass::draw_batch(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order,
+                          std::span<const Run> runs) {
+    Run balls, puffs;  // the consecutive ones of this batch
+    for (const Run& run : runs) {
+        Run& all = run.kind == SplatKind::billboard ? puffs : balls;
+        if (all.begin == all.end) all.begin = run.begin;
+        all.end = run.end;
+    }
+    if (balls.begin < balls.end) {
+        const std::size_t bytes = (balls.end - balls.begin) * sizeof(shader::ViewBall);
+        std::memcpy(balls_.mapped, order.balls.data() + balls.begin, bytes);
+    }
+    puffs_.use_puffs(gpu, std::span(order.puffs).subspan(puffs.begin, puffs.end - puffs.begin));
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        image_barrier(commands, radiance_, access::draw, access::draw);
+        image_barrier(commands, depth_, access::draw, access::draw);
+        const std::array<const GpuImage*, 2> targets{&radiance_, &depth_};
+        draw_into(commands, targets, area, vk::AttachmentLoadOp::eLoad, [&] {
+            for (const Run& run : runs) {
+                const std::uint32_t count = run.end - run.begin;
+                if (run.kind == SplatKind::billboard) {
+                    puffs_.draw(commands, run.begin - puffs.begin, count);
+                } else {
+                    bind(commands, run.kind == SplatKind::metaball ? splat_ : integrated_splat_);
+                    commands.draw(6 * count, 1, 6 * (run.begin - balls.begin), 0);
+                }
+            }
+        });
+    });
 }
 
 void ViewPass::read_back(const GpuDevice& gpu, vk::Extent2D area) const {
@@ -116,7 +147,7 @@ void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const
     std::memcpy(frame_.mapped, &frame, sizeof frame);
     const vk::Extent2D area{std::uint32_t(tile.width), std::uint32_t(tile.height)};
     draw_background(gpu, area);
-    draw_balls(gpu, area, order);
+    draw_splats(gpu, area, order);
     read_back(gpu, area);
     store(tile, picture);
 }

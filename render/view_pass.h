@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Step 2 of D, tile by tile: background, then billboards back to front. Two attachments in 32-bit floats:
-// radiance with the clouds' transmittance in alpha, and the distance weighted by what the eye sees of each
-// metaball, which the same blending accumulates. Private to the module.
+// Step 2 of D, tile by tile: background, then metaballs and billboards back to front. Two attachments in
+// 32-bit floats: radiance with the clouds' transmittance in alpha, and the distance weighted by what the eye
+// sees of each metaball, which the same blending accumulates. Private to the module.
 
-#include "render/cloud_preparation.h"
+#include "render/eye_order.h"
 #include "render/frame_data.h"
 #include "render/gpu_pipeline.h"
+#include "render/picture.h"
+#include "render/puff_pass.h"
 
 namespace nephos {
 
@@ -27,7 +29,9 @@ class ViewPass {
     void resize_targets(const GpuDevice& gpu, const Tile& tile);
     void bind(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& pipeline) const;
     void draw_background(const GpuDevice& gpu, vk::Extent2D area) const;
-    void draw_balls(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order) const;
+    void draw_splats(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order);
+    void draw_batch(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order,
+                    std::span<const Run> runs);
     void read_back(const GpuDevice& gpu, vk::Extent2D area) const;
     void store(const Tile& tile, Picture& picture) const;
 
@@ -36,6 +40,7 @@ class ViewPass {
     Bindings bindings_;
     GpuBuffer frame_, balls_, radiance_pixels_, depth_pixels_;
     GpuImage radiance_, depth_;
+    PuffPass puffs_;
 };
 
 }  // namespace nephos

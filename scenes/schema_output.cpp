@@ -168,7 +168,62 @@ const Section& light_section() {
          render_key<&RenderOptions::light, &CloudLight::ambient_top>(
              "ambient_top", "", kLight, "Light of the sky that the top of a cloud scatters, linear colour."),
          render_key<&RenderOptions::light, &CloudLight::ambient_base>(
-             "ambient_base", "", kLight, "The same at its base; between them by height.")},
+             "ambient_base", "", kLight, "The same at its base; between them by height."),
+         word<&Scene::render, &RenderOptions::light, &CloudLight::lighting>(
+             "lighting", {"light_pass", "cfa"},
+             "How sunlight finds its way into clouds of the automaton: drawn from the sun, or absorbed in "
+             "proportion to the way through them (light absorption factor).",
+             "D, step 1; T, CFA"),
+         render_key<&RenderOptions::light, &CloudLight::light_distance_m>(
+             "light_distance_m", "m", or_infinite(above(0, 0)),
+             "Way of light in a cloud of density 1 after which it is absorbed, for `cfa` and for lightning; "
+             "clouds "
+             "drawn as billboards have that of their base model.",
+             "T, CFA"),
+         render_key<&RenderOptions::light, &CloudLight::cfa_clouds_per_frame>(
+             "cfa_clouds_per_frame", "", between(0, 1e6),
+             "Clouds drawn as billboards whose absorption is computed anew in a frame because the sun moved; "
+             "0: "
+             "all.",
+             "T, CFA")},
+        nullptr};
+    return section;
+}
+
+const Section& lightning_section() {
+    constexpr Limits kWorld = between(-kFarthest_m, kFarthest_m);
+    static const Section section{
+        "Lightning",
+        "Flashes that light clouds and ground from their place. A flash is brightest when it begins and "
+        "fades as (1 - "
+        "t / `duration_s`)^2; of several at one moment the brightest lights the picture.",
+        {required(key<&LightningFlash::position_m>("position_m", "m", kWorld, "Its place.")),
+         key<&LightningFlash::time_s>("time_s", "s", between(0, 1e15), "Simulated time at which it begins."),
+         key<&LightningFlash::duration_s>("duration_s", "s", above(0, 1e9), "How long it lasts."),
+         key<&LightningFlash::colour>("colour", "", between(0, 1), "Its linear colour."),
+         key<&LightningFlash::intensity>("intensity", "", between(0, 1e6),
+                                         "Light that arrives at a distance of 1 km, as a multiple of that of "
+                                         "a sun of colour 1; falls off with "
+                                         "the square of the distance.")},
+        nullptr};
+    return section;
+}
+
+const Section& debug_view_section() {
+    static const Section section{
+        "Debug view",
+        "What clouds made of base models consist of, drawn over the picture.",
+        {render_key<&RenderOptions::debug_view, &DebugView::boxes>(
+             "boxes", "", kAny, "Edges of the seed boxes, blue.", "T, figure 28"),
+         render_key<&RenderOptions::debug_view, &DebugView::axes>(
+             "axes", "", kAny, "Axes through the centres of clouds: east red, north green, up blue.",
+             "T, figure 28"),
+         render_key<&RenderOptions::debug_view, &DebugView::roots>(
+             "roots", "", kAny, "An arrow for each root of the base model, yellow.", "T, figure 28"),
+         render_key<&RenderOptions::debug_view, &DebugView::rays>(
+             "rays", "", kAny,
+             "Rays from the boxes to the sun, white, and red inside of boxes, where light is absorbed.",
+             "T, figure 28")},
         nullptr};
     return section;
 }

@@ -16,6 +16,8 @@ const Section& frames_section();
 const Section& camera_section();
 const Section& sun_section();
 const Section& light_section();
+const Section& lightning_section();
+const Section& debug_view_section();
 const Section& air_section();
 const Section& ground_section();
 

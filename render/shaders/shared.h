@@ -33,6 +33,7 @@ NEPHOS_CONST float kPi = 3.14159265358979f;
 NEPHOS_CONST uint kComputeGroup = 64u;  // invocations in a work group
 NEPHOS_CONST uint kIntegrate = 1u;      // flag: evaluate the integral along the ray, do not use the textures
 NEPHOS_CONST uint kAround = 2u;         // flag: around or close to the eye, covers the whole picture
+NEPHOS_CONST float kMinPuffPixels = 1.0f;   // smaller billboards of T are widened to this half size
 
 // A metaball as the eye sees it; 32 bytes.
 struct ViewBall {
@@ -41,7 +42,25 @@ struct ViewBall {
     float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * column()
     float light;        // transmittance towards the sun
     float height;       // in the cloud: 0 base, 1 top
-    uint flags;
+    uint flags;    // lower half; upper half: share of the lightning that arrives, 0..65535
+};
+
+// One of T's billboards as the eye sees it; 32 bytes.
+struct Puff {
+    float x, y, z;      // centre relative to the eye
+    uint half_size;     // half width, half height in metres as two 16-bit floats
+    uint texture_bits;  // layer | turn << 8 | level << 12
+    uint absorbed;      // of the sun, of the lightning: two times 0..65535 for 0..1
+    float opacity;
+    uint cloud;
+};
+
+// What the billboards of a cloud share; 32 bytes.
+struct PuffCloud {
+    float x, y, z;         // centre relative to the eye
+    float base;            // height relative to the eye
+    float inverse_height;  // of the cloud
+    uint pad0, pad1, pad2;
 };
 
 // A metaball as the sun sees it; 32 bytes.
@@ -75,14 +94,22 @@ struct Frame {
     vec4 sunlight;        // rgb: colour of the direct sun; w: strength of multiple scattering
     vec4 ambient_top;     // rgb; w: albedo of the cloud
     vec4 ambient_base;    // rgb; w: decay of diffuse light per optical depth
-    vec4 air_extinction;  // rgb: per metre
+    vec4 air_extinction;  // rgb: per metre; w: 1 = light of metaballs is T's (1 - absorbed), 0 = a transmittance
     vec4 horizon;         // rgb: sky at the horizon, and light of the air itself
     vec4 zenith;          // rgb
     vec4 ground;  // rgb: radiance of the ground under open sky without the sun; w: height above the eye (< 0)
     vec4 ground_sun;  // rgb: what the unshaded sun adds; w: 1 = there is a ground
     vec4 shadow_u;    // shadow map coordinate 0..1 of a point p: dot(xyz, p) + w
     vec4 shadow_v;
+    vec4 flash;         // xyz: lightning relative to the eye; w: irradiance at 1 km, 0 = none
+    vec4 flash_colour;  // rgb
+    vec4 ground_flash;  // rgb: what it adds to ground 1 km below it
 };
+
+// Irradiance of lightning relative to that at 1 km.
+NEPHOS_FUNCTION float flash_falloff(float squared_distance_m) {
+    return 1.0e6f / (squared_distance_m > 1.0e4f ? squared_distance_m : 1.0e4f);
+}
 
 // The field of a metaball with u = 1 - a^2 is f = u^2 (5 + 4 u) / 9. Along a line at distance b from the
 // centre, with w = 1 - b^2 (square of half the chord) and s from -sqrt(w) to sqrt(w), u = w - s^2 and
@@ -114,7 +141,10 @@ static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&
               offsetof(ViewBall, flags) == 28);
 static_assert(sizeof(LightBall) == 32 && offsetof(LightBall, fraction) == 16);
 static_assert(sizeof(LightStep) == 32 && offsetof(LightStep, first) == 16 && offsetof(LightStep, end) == 24);
-static_assert(sizeof(Frame) == 16 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240);
+static_assert(sizeof(Puff) == 32 && offsetof(Puff, half_size) == 12 && offsetof(Puff, cloud) == 28);
+static_assert(sizeof(PuffCloud) == 32 && offsetof(PuffCloud, inverse_height) == 16);
+static_assert(sizeof(Frame) == 19 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
+              offsetof(Frame, flash_colour) == 272);
 
 }  // namespace nephos::shader
 #endif

@@ -30,11 +30,18 @@ void perpendicular(vec3 n, out vec3 u, out vec3 v) {
 // far slower than the direct beam, and comes from all sides.
 void scattered_light(ViewBall ball, float distance) {
     float optical_depth = -log(max(ball.light, 1.0e-30));
-    float multiple = frame.sunlight.w / (1.0 + frame.ambient_base.w * optical_depth);
+    bool absorbs = frame.air_extinction.w > 0.0;  // T: light falls off in proportion to the way, to nothing
+    float multiple = frame.sunlight.w * (absorbs ? ball.light : 1.0 / (1.0 + frame.ambient_base.w * optical_depth));
     vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, ball.height);
     vec3 beta = exp(-frame.air_extinction.rgb * distance);
     float albedo = frame.ambient_top.w;
-    diffuse = mix(frame.horizon.rgb, albedo * (frame.sunlight.rgb * multiple + ambient), beta);
+    vec3 light = frame.sunlight.rgb * multiple + ambient;
+    if (frame.flash.w > 0.0) {
+        vec3 way = frame.flash.xyz - vec3(ball.x, ball.y, ball.z);
+        float arrives = float(ball.flags >> 16) / 65535.0;
+        light += frame.flash.w * flash_falloff(dot(way, way)) * arrives * frame.flash_colour.rgb;
+    }
+    diffuse = mix(frame.horizon.rgb, albedo * light, beta);
     // A white surface facing the sun has radiance 1 here, 1 / pi of its irradiance: hence pi times the phase function.
     direct = beta * albedo * kPi * ball.light * frame.sunlight.rgb;
 }

@@ -66,9 +66,11 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"light"}), member_count<CloudLight>());
     EXPECT_EQ(keys_at({"air"}), member_count<Air>());
     EXPECT_EQ(keys_at({"ground"}), member_count<Ground>());
+    EXPECT_EQ(keys_at({"lightning"}), member_count<LightningFlash>());
+    EXPECT_EQ(keys_at({"debug_view"}), member_count<DebugView>());
     // [sun] also holds the size of the shadow map, the one plain member of RenderOptions.
     EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 1);
-    EXPECT_EQ(member_count<RenderOptions>(), 6u);
+    EXPECT_EQ(member_count<RenderOptions>(), 8u);
     EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/sky_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "render/camera.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kFarthest_m = 1e7;
+constexpr double kLeastFlash = 1.0 / 512;  // relative to the sun; less does not show
+
+Vec3 sum(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+
+double squared_distance(const Vec3& a, const Vec3& b) {
+    const double x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
+    return x * x + y * y + z * z;
+}
+
+}  // namespace
+
+Light light_of(const Sun& sun) { return {direction_to_sun(sun), true}; }
+Light light_of(const Flash& flash) { return {flash.position_m, false}; }
+
+Frustum frustum_of(const Camera& camera) {
+    const CameraFrame frame = camera_frame(camera);
+    FrustumView view;
+    view.eye_m = camera.position_m;
+    view.forward = frame.forward;
+    view.up = frame.up;
+    view.fov_y_deg = camera.vertical_fov_deg;
+    view.aspect = double(camera.width) / camera.height;
+    view.far_m = kFarthest_m;
+    return frustum_of(view);
+}
+
+const SkyBillboards::Strewn& SkyBillboards::strewn(const SkySimulation& sky, const SkyCloud& cloud) {
+    strewn_.resize(sky.shapes().size());
+    std::optional<Strewn>& result = strewn_[cloud.shape];
+    if (result) return *result;
+    const CloudShape& shape = sky.shapes()[cloud.shape];
+    result.emplace();
+    result->billboards = strew_billboards(sky.model(cloud), shape.cloud, sky.options().seed,
+                                          std::uint32_t(shape.model), shape.number);
+    result->low_m = shape.cloud.low_m.z;
+    result->high_m = std::max(shape.cloud.high_m.z, result->low_m + 1e-3);
+    for (const Billboard& billboard : result->billboards) {
+        result->reach_m = std::max(result->reach_m, 0.5 * std::hypot(billboard.width_m, billboard.height_m));
+        result->low_m = std::min(result->low_m, billboard.centre_m.z - 0.5 * billboard.height_m);
+        result->high_m = std::max(result->high_m, billboard.centre_m.z + 0.5 * billboard.height_m);
+    }
+    return *result;
+}
+
+void SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                                 const RenderOptions& options) {
+    std::vector<LitCloud> lit;
+    std::size_t unlit = 0;
+    for (const SkyCloud& cloud : clouds) {
+        lit.push_back({cloud.serial, &sky.shape(cloud), sky.position_m(cloud)});
+        if (sun_.absorbed(cloud.serial).empty()) ++unlit;
+    }
+    const int bound = options.light.cfa_clouds_per_frame;
+    sun_.update(lit, light_of(options.sun),
+                bound == 0 ? std::numeric_limits<std::size_t>::max() : unlit + std::size_t(bound));
+}
+
+void SkyBillboards::light_by_flash(const SkySimulation& sky, const Flash& flash,
+                                   const std::vector<const SkyCloud*>& seen) {
+    std::vector<LitCloud> lit;
+    for (const SkyCloud* cloud : seen) {
+        const Sphere sphere = sky.sphere(*cloud);
+        const double nearest = std::max(std::sqrt(squared_distance(sphere.centre_m, flash.position_m)) -
+                                            sphere.radius_m - strewn(sky, *cloud).reach_m,
+                                        1.0);
+        if (flash.intensity * 1e6 / (nearest * nearest) < kLeastFlash) continue;
+        lit.push_back({cloud->serial, &sky.shape(*cloud), sky.position_m(*cloud)});
+    }
+    flash_.update(lit, light_of(flash));
+}
+
+void SkyBillboards::list(const SkySimulation& sky, const SkyCloud& cloud, bool flash, DrawnClouds& out) {
+    const Cloud& shape = sky.shape(cloud);
+    const Strewn& what = strewn(sky, cloud);
+    const Vec3 place = sky.position_m(cloud);
+    const std::span<const double> sun = sun_.absorbed(cloud.serial);
+    // A cloud that the lightning does not reach is as dark in it as one that absorbs it all.
+    const std::span<const double> lightning =
+        flash ? flash_.absorbed(cloud.serial) : std::span<const double>{};
+    const auto index = std::uint32_t(out.clouds.size());
+    out.clouds.push_back({sum(shape.centre_m, place), what.low_m + place.z, what.high_m + place.z});
+    for (const Billboard& billboard : what.billboards) {
+        const double weight =
+            phase_weight(shape.boxes[billboard.box].distance, cloud.phase, sky.options().formation_softness);
+        if (weight <= 0) continue;
+        CloudBillboard& drawn = out.billboards.emplace_back();
+        drawn.centre_m = sum(billboard.centre_m, place);
+        drawn.width_m = float(billboard.width_m);
+        drawn.height_m = float(billboard.height_m);
+        drawn.sun_absorbed = float(sun[billboard.box]);
+        drawn.flash_absorbed = lightning.empty() ? 1.0f : float(lightning[billboard.box]);
+        drawn.opacity = float(weight);
+        drawn.texture = PuffTexture(int(billboard.texture));
+        drawn.variant = billboard.variant;
+        drawn.cloud = index;
+    }
+}
+
+void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                           const RenderOptions& options, const std::optional<Flash>& flash, DrawnClouds& out,
+                           bool cull) {
+    light_by_sun(sky, clouds, options);
+    const Frustum frustum = frustum_of(options.camera);
+    std::vector<const SkyCloud*> seen;
+    for (const SkyCloud& cloud : clouds) {
+        Sphere sphere = sky.sphere(cloud);
+        sphere.radius_m += strewn(sky, cloud).reach_m;
+        if (!cull || may_see(frustum, sphere)) seen.push_back(&cloud);
+    }
+    if (flash) light_by_flash(sky, *flash, seen);
+    for (const SkyCloud* cloud : seen) list(sky, *cloud, flash.has_value(), out);
+}
+
+}  // namespace nephos

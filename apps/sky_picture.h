@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// T's clouds drawn directly: from a layer's simulation to what the renderer draws. The boxes' billboards are
+// strewn once for each shape; each cloud that the camera can see lists them at its place, thinned where it
+// forms or dissolves, and lit by the absorption factors that seeds/light_absorption.h keeps up to date.
+//
+//     SkyBillboards billboards;                    // one for each layer, for as long as the layer lives
+//     DrawnClouds drawn;                           // one for each picture
+//     billboards.append(sky, sky.clouds(), options, flash, drawn);
+//     renderer.draw_splats({drawn.clouds, drawn.billboards, metaballs, flash}, options);
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render/options.h"
+#include "render/splats.h"
+#include "seeds/billboards.h"
+#include "seeds/light_absorption.h"
+#include "seeds/sky_simulation.h"
+
+namespace nephos {
+
+// Clouds of all layers of a picture; what Splats points to.
+struct DrawnClouds {
+    std::vector<BillboardCloud> clouds;
+    std::vector<CloudBillboard> billboards;
+};
+
+class SkyBillboards {
+  public:
+    // Lists what the camera can see of `clouds`, which have shapes of `sky`. Light first: the sun's
+    // absorption of all clouds of the layer, of which at most options.light.cfa_clouds_per_frame are computed
+    // anew (0: all; clouds never lit before always are), and the lightning's of those that it reaches. So
+    // with a bound a picture depends on those drawn before it. `cull` false lists also what the camera cannot
+    // see: the picture is the same.
+    void append(const SkySimulation& sky, std::span<const SkyCloud> clouds, const RenderOptions& options,
+                const std::optional<Flash>& flash, DrawnClouds& out, bool cull = true);
+
+    // Absorbed sunlight of a cloud's boxes as it was used last; empty before the first append().
+    std::span<const double> sun_absorbed(const SkyCloud& cloud) const { return sun_.absorbed(cloud.serial); }
+
+  private:
+    // What does not change with a cloud's place.
+    struct Strewn {
+        std::vector<Billboard> billboards;
+        double reach_m = 0;            // how far billboards reach beyond their boxes, at most
+        double low_m = 0, high_m = 1;  // of all billboards, model space
+    };
+    const Strewn& strewn(const SkySimulation& sky, const SkyCloud& cloud);
+    void light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                      const RenderOptions& options);
+    void light_by_flash(const SkySimulation& sky, const Flash& flash,
+                        const std::vector<const SkyCloud*>& seen);
+    void list(const SkySimulation& sky, const SkyCloud& cloud, bool flash, DrawnClouds& out);
+
+    std::vector<std::optional<Strewn>> strewn_;  // one for each of SkySimulation::shapes()
+    LightAbsorption sun_, flash_;
+};
+
+// The light of the sun, or of a flash, as the absorption factor takes it.
+Light light_of(const Sun& sun);
+Light light_of(const Flash& flash);
+
+// What the camera of a picture sees.
+Frustum frustum_of(const Camera& camera);
+
+}  // namespace nephos

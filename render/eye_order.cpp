@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/eye_order.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "automaton/error.h"
+#include "render/keyed_order.h"
+#include "render/puff_textures.h"
+#include "render/vector_math.h"
+
+namespace nephos {
+namespace {
+
+constexpr float kLargestBillboard_m = 60000;  // half of it is a 16-bit float
+
+[[noreturn]] void fail(const std::string& what, std::size_t index, const char* expected) {
+    throw Error(ErrorCode::usage, what + " " + std::to_string(index) + ": expected " + expected);
+}
+
+bool finite(const Vec3& v) { return std::isfinite(v.x + v.y + v.z); }
+bool within(float value, float min, float max) { return value >= min && value <= max; }
+
+void check(const CloudBillboard& billboard, std::size_t index, std::size_t clouds) {
+    const auto require = [&](bool good, const char* expected) {
+        if (!good) fail("billboard", index, expected);
+    };
+    require(finite(billboard.centre_m), "a finite centre");
+    require(billboard.width_m > 0 && billboard.height_m > 0 && billboard.width_m <= kLargestBillboard_m &&
+                billboard.height_m <= kLargestBillboard_m,
+            "sizes above 0 and at most 60000 m");
+    require(within(billboard.sun_absorbed, 0, 1) && within(billboard.flash_absorbed, 0, 1),
+            "absorbed light from 0 to 1");
+    require(within(billboard.opacity, 0, 1), "an opacity from 0 to 1");
+    require(std::size_t(billboard.texture) < kPuffKinds, "a texture of PuffTexture");
+    require(billboard.cloud < clouds, "the index of a cloud");
+}
+
+// Nearest 16-bit float of a number in 0..65504; what is too small for its normal numbers becomes 0.
+std::uint32_t half_bits(float value) {
+    const std::uint32_t bits =
+        std::bit_cast<std::uint32_t>(value) + 0x1000u;  // rounds to 10 bits of fraction
+    const std::int32_t exponent = std::int32_t(bits >> 23) - 112;
+    return exponent <= 0 ? 0 : std::uint32_t(exponent) << 10 | (bits >> 13 & 1023u);
+}
+
+std::uint32_t unorm16(float value) { return std::uint32_t(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f); }
+
+shader::PuffCloud puff_cloud(const BillboardCloud& cloud, std::size_t index, const Vec3& eye) {
+    if (!finite(cloud.centre_m) || !(cloud.base_m < cloud.top_m) ||
+        !std::isfinite(cloud.top_m - cloud.base_m))
+        fail("cloud of billboards", index, "a finite centre and a base below its top");
+    const Vec3 offset = cloud.centre_m - eye;
+    return {float(offset.x),
+            float(offset.y),
+            float(offset.z),
+            float(cloud.base_m - eye.z),
+            float(1 / (cloud.top_m - cloud.base_m)),
+            0,
+            0,
+            0};
+}
+
+// Collects what the camera sees and puts it in order.
+class Collector {
+  public:
+    Collector(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
+              double pixels_per_unit, const Ground& ground)
+        : cloud_(cloud),
+          splats_(splats),
+          camera_(camera),
+          eye_(camera.position_m),
+          pyramid_(camera),
+          pixels_per_unit_(pixels_per_unit),
+          ground_m_(ground.height_m),
+          above_ground_(camera.position_m.z > ground.height_m),
+          by_distance_(cloud.visible.size() + splats.billboards.size()) {}
+
+    void add_metaballs() {
+        for (std::size_t i = 0; i < cloud_.visible.size(); ++i) {
+            const Metaball& ball = cloud_.metaballs[cloud_.visible[i]];
+            if (above_ground_ && ball.z + ball.radius < ground_m_) continue;
+            // Metaballs reach up to 1.35 radii (view_splat.vert), and never less than part of a pixel.
+            add({ball.x, ball.y, ball.z}, ball.radius, 1.5, double(shader::kMinRadiusPixels),
+                std::uint32_t(i));
+        }
+    }
+
+    void add_billboards() {
+        const auto first = std::uint32_t(cloud_.visible.size());
+        for (std::size_t i = 0; i < splats_.billboards.size(); ++i) {
+            const CloudBillboard& billboard = splats_.billboards[i];
+            check(billboard, i, splats_.clouds.size());
+            if (above_ground_ && billboard.centre_m.z < ground_m_) continue;
+            if (!(drawn(billboard).opacity > 0)) continue;
+            add(billboard.centre_m, 0.5 * std::max(billboard.width_m, billboard.height_m), 1.4143,
+                double(shader::kMinPuffPixels), first + std::uint32_t(i));
+        }
+    }
+
+    EyeOrder order(const MetaballLight& light) {
+        by_distance_.sort();
+        EyeOrder order;
+        for (std::size_t i = by_distance_.size(); i-- > 0;) {
+            const std::uint32_t source = by_distance_[i];
+            if (source < cloud_.visible.size())
+                append_metaball(order, source, light);
+            else
+                append_billboard(order, splats_.billboards[source - cloud_.visible.size()]);
+        }
+        for (std::size_t i = 0; i < splats_.clouds.size(); ++i)
+            order.clouds.push_back(puff_cloud(splats_.clouds[i], i, eye_));
+        return order;
+    }
+
+  private:
+    // `reach` times the radius is what the splat covers; no radius is less than `least_pixels`.
+    void add(const Vec3& centre, double radius, double reach, double least_pixels, std::uint32_t index) {
+        const Vec3 offset = centre - eye_;
+        const double distance = std::sqrt(dot(offset, offset));
+        const double least = least_pixels * distance / pixels_per_unit_;
+        if (pyramid_.may_see(offset, reach * std::max(radius, least)))
+            by_distance_.add(float(distance), index);
+    }
+
+    // A billboard as it is drawn.
+    struct Drawn {
+        double depth_m = 0;                          // distance from the eye's plane
+        double half_width_m = 0, half_height_m = 0;  // at least part of a pixel
+        double opacity = 0;
+    };
+
+    Drawn drawn(const CloudBillboard& billboard) const {
+        Drawn result;
+        result.depth_m = dot(billboard.centre_m - eye_, camera_.forward);
+        if (!(result.depth_m > 0)) return result;
+        const double least = double(shader::kMinPuffPixels) * result.depth_m / pixels_per_unit_;
+        const double half_width = 0.5 * billboard.width_m, half_height = 0.5 * billboard.height_m;
+        result.half_width_m = std::max(half_width, least);
+        result.half_height_m = std::max(half_height, least);
+        // One that the eye flies through fades before it is cut.
+        const double fade = std::clamp(
+            2 * result.depth_m / std::max(result.half_width_m, result.half_height_m) - 1, 0.0, 1.0);
+        result.opacity = billboard.opacity * fade * half_width * half_height /
+                         (result.half_width_m * result.half_height_m);
+        return result;
+    }
+
+    // The level with about a texel a pixel.
+    int level_of(const Drawn& drawn) const {
+        const double pixels =
+            2 * std::max(drawn.half_width_m, drawn.half_height_m) * pixels_per_unit_ / drawn.depth_m;
+        const double texels_per_pixel = kPuffTexels / pixels;
+        int level = 0;
+        while (level + 1 < kPuffLevels && texels_per_pixel > double(1 << level) * 1.4142) ++level;
+        return level;
+    }
+
+    static std::uint32_t extend(EyeOrder& order, SplatKind kind) {
+        const std::size_t index = kind == SplatKind::billboard ? order.puffs.size() : order.balls.size();
+        if (order.runs.empty() || order.runs.back().kind != kind)
+            order.runs.push_back({std::uint32_t(index), std::uint32_t(index), kind});
+        return ++order.runs.back().end;
+    }
+
+    void append_metaball(EyeOrder& order, std::uint32_t source, const MetaballLight& light) const {
+        const Metaball& ball = cloud_.metaballs[cloud_.visible[source]];
+        const Vec3 offset = Vec3{ball.x, ball.y, ball.z} - eye_;
+        shader::uint flags = 0;
+        if (length(offset) < double(shader::kNearDistance) * ball.radius)
+            flags |= shader::kAround | shader::kIntegrate;
+        if (above_ground_ && ball.z - ball.radius < ground_m_) flags |= shader::kIntegrate;
+        if (cloud_.depth_scale[source] > shader::kMaxDepthScale) flags |= shader::kIntegrate;
+        extend(order, flags != 0 ? SplatKind::integrated_metaball : SplatKind::metaball);
+        if (!light.flash.empty()) flags |= unorm16(light.flash[source]) << 16;
+        const double scale = cloud_.top_m > cloud_.base_m ? 1.0 / (cloud_.top_m - cloud_.base_m) : 0.0;
+        order.balls.push_back({float(offset.x), float(offset.y), float(offset.z), ball.radius,
+                               cloud_.depth_scale[source], light.sun[source],
+                               float((ball.z - cloud_.base_m) * scale), flags});
+    }
+
+    void append_billboard(EyeOrder& order, const CloudBillboard& billboard) const {
+        extend(order, SplatKind::billboard);
+        const Vec3 offset = billboard.centre_m - eye_;
+        const Drawn what = drawn(billboard);
+        const PuffPicture picture = puff_picture(billboard.texture, billboard.variant);
+        order.puffs.push_back(
+            {float(offset.x), float(offset.y), float(offset.z),
+             half_bits(float(what.half_width_m)) | half_bits(float(what.half_height_m)) << 16,
+             std::uint32_t(picture.layer) | std::uint32_t(picture.turn) << 8 |
+                 std::uint32_t(level_of(what)) << 12,
+             unorm16(billboard.sun_absorbed) | unorm16(billboard.flash_absorbed) << 16, float(what.opacity),
+             billboard.cloud});
+    }
+
+    const PreparedCloud& cloud_;
+    const Splats& splats_;
+    const CameraFrame& camera_;
+    Vec3 eye_;
+    ViewPyramid pyramid_;
+    double pixels_per_unit_, ground_m_;
+    bool above_ground_;
+    KeyedOrder by_distance_;  // indices: metaballs first, then billboards
+};
+
+}  // namespace
+
+ViewPyramid::ViewPyramid(const CameraFrame& camera)
+    : inward_{camera.forward, normalised(camera.half_width * camera.forward + camera.right),
+              normalised(camera.half_width * camera.forward - camera.right),
+              normalised(camera.half_height * camera.forward + camera.up),
+              normalised(camera.half_height * camera.forward - camera.up)} {}
+
+bool ViewPyramid::may_see(const Vec3& offset, double radius) const {
+    for (const Vec3& inward : inward_)
+        if (dot(offset, inward) < -radius) return false;
+    return true;
+}
+
+EyeOrder order_from_eye(const PreparedCloud& cloud, const MetaballLight& light, const Splats& splats,
+                        const CameraFrame& camera, double pixels_per_unit, const Ground& ground) {
+    if (splats.billboards.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
+        throw Error(ErrorCode::usage, "more than 2^31 billboards");
+    Collector collector(cloud, splats, camera, pixels_per_unit, ground);
+    collector.add_metaballs();
+    collector.add_billboards();
+    return collector.order(light);
+}
+
+}  // namespace nephos

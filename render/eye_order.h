@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// All splats of a picture, metaballs and billboards, in one order from far to near of the eye: what a view
+// pass draws, whatever way it draws. No Vulkan here. Private to the module.
+//
+// The order is total: equal distances are ordered by index, billboards before metaballs, so a picture never
+// depends on how a sort is done.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/camera.h"
+#include "render/cloud_preparation.h"
+#include "render/shaders/shared.h"
+#include "render/splats.h"
+
+namespace nephos {
+
+enum class SplatKind {
+    metaball,             // shader::ViewBall, from the textures
+    integrated_metaball,  // shader::ViewBall with shader::kIntegrate
+    billboard,            // shader::Puff
+};
+
+// Consecutive splats in the order from the eye that one pipeline draws: of EyeOrder::balls or
+// EyeOrder::puffs.
+struct Run {
+    std::uint32_t begin = 0, end = 0;
+    SplatKind kind = SplatKind::metaball;
+};
+
+struct EyeOrder {
+    std::vector<shader::ViewBall> balls;  // farthest first
+    std::vector<shader::Puff> puffs;      // farthest first
+    std::vector<Run> runs;  // none is empty; together they are all of balls and puffs, farthest first
+    std::vector<shader::PuffCloud> clouds;  // one for each of Splats::clouds
+};
+
+// The light of each of cloud.visible.
+struct MetaballLight {
+    std::span<const float> sun;    // as the view pass takes it
+    std::span<const float> flash;  // share of the lightning that arrives, 0..1; empty without
+};
+
+// The splats that the camera can see. `pixels_per_unit` is the size in pixels of a unit at distance 1.
+// Throws Error(usage) naming the first billboard or cloud that is not as splats.h wants it.
+EyeOrder order_from_eye(const PreparedCloud& cloud, const MetaballLight& light, const Splats& splats,
+                        const CameraFrame& camera, double pixels_per_unit, const Ground& ground);
+
+// What the camera sees: inside of the four planes through the eye and the sides of the picture, not behind
+// the eye.
+class ViewPyramid {
+  public:
+    explicit ViewPyramid(const CameraFrame& camera);
+    // False only if nothing of the sphere is inside. `offset`: of its centre from the eye.
+    bool may_see(const Vec3& offset, double radius) const;
+
+  private:
+    Vec3 inward_[5];
+};
+
+}  // namespace nephos

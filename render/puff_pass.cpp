@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/puff_pass.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "render/puff_textures.h"
+
+namespace nephos {
+namespace {
+
+GpuImage upload_puffs(const GpuDevice& gpu) {
+    const std::vector<PuffLevel>& levels = puff_textures();
+    constexpr std::uint32_t kLayers = kPuffKinds * kPuffVariants;
+    GpuImage image = create_image(gpu, kPuffTexels, kPuffTexels, kLayers, vk::Format::eR8G8Unorm,
+                                  vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst,
+                                  std::uint32_t(levels.size()));
+    std::size_t bytes = 0;
+    std::vector<vk::BufferImageCopy> regions;
+    for (const PuffLevel& level : levels) {
+        const auto side = std::uint32_t(level.side);
+        regions.push_back({bytes,
+                           0,
+                           0,
+                           {vk::ImageAspectFlagBits::eColor, std::uint32_t(regions.size()), 0, kLayers},
+                           {0, 0, 0},
+                           {side, side, 1}});
+        bytes += level.texels.size();
+    }
+    const GpuBuffer staging =
+        create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    std::size_t to = 0;
+    for (const PuffLevel& level : levels) {
+        std::memcpy(staging.mapped + to, level.texels.data(), level.texels.size());
+        to += level.texels.size();
+    }
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        begin_image(commands, image, access::copy_to);
+        commands.copyBufferToImage(*staging.buffer, *image.image, vk::ImageLayout::eGeneral, regions);
+        image_barrier(commands, image, access::copy_to, access::sample_in_fragment);
+    });
+    return image;
+}
+
+// Copies into a storage buffer, which is made anew and bound when it is too small.
+template <class T>
+void fill(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
+          std::span<const T> content) {
+    if (buffer.bytes < content.size_bytes()) {
+        const std::size_t bytes = std::max(content.size_bytes(), 2 * buffer.bytes);
+        buffer = {};  // the old one goes before the new one comes
+        buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::write);
+        bind_buffer(gpu, bindings, binding, buffer);
+    }
+    if (!content.empty()) std::memcpy(buffer.mapped, content.data(), content.size_bytes());
+}
+
+}  // namespace
+
+PuffPass::PuffPass(const GpuDevice& gpu, const PipelineLayout& layout,
+                   std::span<const vk::Format> attachments, const GpuBuffer& frame)
+    : layout_(&layout),
+      pipeline_(create_graphics_pipeline(gpu, layout, shaders().puff_vert, shaders().puff_frag, attachments,
+                                         Blend::over)),
+      sampler_(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
+      bindings_(create_bindings(gpu, layout)) {
+    bind_buffer(gpu, bindings_, 0, frame);
+}
+
+void PuffPass::use_clouds(const GpuDevice& gpu, std::span<const shader::PuffCloud> clouds) {
+    fill(gpu, bindings_, 2, clouds_, clouds);
+}
+
+void PuffPass::use_puffs(const GpuDevice& gpu, std::span<const shader::Puff> puffs) {
+    if (!puffs.empty() && textures_.width == 0) {
+        textures_ = upload_puffs(gpu);
+        for (const std::uint32_t binding : {3u, 4u}) bind_image(gpu, bindings_, binding, textures_, sampler_);
+    }
+    fill(gpu, bindings_, 1, puffs_, puffs);
+}
+
+void PuffPass::draw(const vk::raii::CommandBuffer& commands, std::uint32_t first, std::uint32_t count) const {
+    commands.bindPipeline(vk::PipelineBindPoint::eGraphics, *pipeline_);
+    commands.bindDescriptorSets(vk::PipelineBindPoint::eGraphics, *layout_->layout, 0, bindings_.set, {});
+    commands.draw(6 * count, 1, 6 * first, 0);
+}
+
+}  // namespace nephos

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// T's billboards on the device: their textures, buffers and pipeline. The view pass draws them between its
+// metaballs. Private to the module.
+
+#include <span>
+
+#include "render/gpu_pipeline.h"
+#include "render/shaders/shared.h"
+
+namespace nephos {
+
+class PuffPass {
+  public:
+    // `attachments` are those of the view pass, `frame` its buffer of shader::Frame.
+    PuffPass(const GpuDevice& gpu, const PipelineLayout& layout, std::span<const vk::Format> attachments,
+             const GpuBuffer& frame);
+
+    // What following draws refer to. The textures are made when the first billboard is.
+    void use_clouds(const GpuDevice& gpu, std::span<const shader::PuffCloud> clouds);
+    void use_puffs(const GpuDevice& gpu, std::span<const shader::Puff> puffs);
+
+    // Draws some of the puffs in use; inside of a rendering into the attachments.
+    void draw(const vk::raii::CommandBuffer& commands, std::uint32_t first, std::uint32_t count) const;
+
+  private:
+    const PipelineLayout* layout_;
+    vk::raii::Pipeline pipeline_;
+    vk::raii::Sampler sampler_;
+    Bindings bindings_;
+    GpuBuffer puffs_, clouds_;
+    GpuImage textures_;
+};
+
+}  // namespace nephos
