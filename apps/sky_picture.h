@@ -5,16 +5,16 @@
 // strewn once for each shape; each cloud that the camera can see lists them at its place, thinned where it
 // forms or dissolves, and lit by the absorption factors that seeds/light_absorption.h keeps up to date.
 //
-//     SkyBillboards billboards;                    // one for each layer, for as long as the layer lives
-//     DrawnClouds drawn;                           // one for each picture
-//     billboards.append(sky, sky.clouds(), options, flash, drawn);
-//     renderer.draw_splats({drawn.clouds, drawn.billboards, metaballs, flash}, options);
+//     SkyPainter painter;  // for as long as the layers live
+//     const SkyLayer layer{&sky, sky.clouds()};
+//     const Picture picture = painter.draw(renderer, {}, {&layer, 1}, options, sky.time_s());
 
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "render/options.h"
+#include "render/renderer.h"
 #include "render/splats.h"
 #include "seeds/billboards.h"
 #include "seeds/light_absorption.h"
@@ -57,6 +57,27 @@ class SkyBillboards {
 
     std::vector<std::optional<Strewn>> strewn_;  // one for each of SkySimulation::shapes()
     LightAbsorption sun_, flash_;
+};
+
+// One layer of the sky in a picture.
+struct SkyLayer {
+    const SkySimulation* sky = nullptr;  // not null; has the shapes of `clouds`
+    std::span<const SkyCloud> clouds;
+    bool direct = true;  // draw them; false: only the debug view shows them
+};
+
+// Draws pictures of skies, one after the other: keeps what they have in common. Not thread-safe.
+class SkyPainter {
+  public:
+    // Voxel clouds, the billboards of layers, the lightning of options.lightning that burns at `time_s`, and
+    // the debug view over it. Every call has the same layers in the same order. Throws as
+    // Renderer::draw_splats().
+    Picture draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
+                 const RenderOptions& options, double time_s);
+
+  private:
+    std::vector<SkyBillboards> layers_;
+    DrawnClouds drawn_;
 };
 
 // The light of the sun, or of a flash, as the absorption factor takes it.

@@ -14,6 +14,7 @@
 #include "tests/bench/automaton_bench.h"
 #include "tests/bench/density_bench.h"
 #include "tests/bench/memory_bench.h"
+#include "tests/bench/render_bench.h"
 #include "tests/bench/seeds_bench.h"
 
 namespace {
@@ -51,6 +52,7 @@ int main(int argc, char** argv) {
         {"density", [] { return density_bench_rows(); }},
         {"memory", [&] { return memory_rows(source, programs / "../../apps/nephos"); }},
         {"seeds", [] { return seeds_rows(); }},
+        {"render", [] { return render_rows(); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {
         fmt::print(

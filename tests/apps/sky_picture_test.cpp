@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a sky to its picture: what is listed and how it is lit, what is left out, and the debug view.
+
+#include "apps/sky_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include "apps/debug_view.h"
+#include "automaton/error.h"
+
+namespace nephos {
+namespace {
+
+BaseModel tower() {
+    BaseModel model;
+    model.name = "tower";
+    model.light_distance_m = 400;
+    Seed seed;
+    seed.size_m = {200, 200, 100};
+    seed.position_m = {0, 0, 100};
+    seed.billboards = {3, 5};
+    seed.billboard_width_m = {200, 300};
+    seed.billboard_height_m = {150, 250};
+    seed.texture = BillboardTexture::dense;
+    seed.roots = {
+        {.pitch_deg = 60, .yaw_deg = 30, .seeds_start = 2, .seeds_end = 4, .reproductions = {2, 4}}};
+    model.seeds = {seed};
+    return model;
+}
+
+SkyOptions sky_of(int clouds) {
+    SkyOptions options;
+    options.world = {-5000, -5000, 5000, 5000};
+    options.models = {tower()};
+    options.skies = {{"only", 0, clouds, {{0, 6}}}};
+    options.wind = {{{0, {{0, {10, 4}}}}}};
+    options.formation_s = 60;
+    options.dissolution_s = 60;
+    return options;
+}
+
+RenderOptions from_the_edge() {
+    RenderOptions options;
+    options.camera.position_m = {0, -6000, 300};
+    options.camera.target_m = {0, 0, 1200};
+    options.camera.width = 160;
+    options.camera.height = 120;
+    options.shadow_map_size = 32;
+    return options;
+}
+
+DrawnClouds listed(SkyBillboards& billboards, const SkySimulation& sky, const RenderOptions& options,
+                   const std::optional<Flash>& flash = {}, bool cull = true) {
+    DrawnClouds drawn;
+    billboards.append(sky, sky.clouds(), options, flash, drawn, cull);
+    return drawn;
+}
+
+// Each billboard stands where its box has it, moved with the cloud, and has the absorption that
+// light_absorption.h computes for the box.
+TEST(SkyBillboards, StandInTheirBoxesAndAbsorbWhatTheirBoxesDo) {
+    SkySimulation sky(sky_of(12));
+    for (int step = 0; step < 7; ++step) sky.step();
+    SkyBillboards billboards;
+    RenderOptions options = from_the_edge();
+    const Flash flash{{100, 200, 600}, {1, 1, 1}, 3};
+    const DrawnClouds drawn = listed(billboards, sky, options, flash, false);
+    ASSERT_EQ(drawn.clouds.size(), sky.clouds().size());
+    std::size_t at = 0;
+    for (std::size_t c = 0; c < sky.clouds().size(); ++c) {
+        const SkyCloud& cloud = sky.clouds()[c];
+        const Cloud& shape = sky.shape(cloud);
+        const Vec3 place = sky.position_m(cloud);
+        EXPECT_DOUBLE_EQ(drawn.clouds[c].centre_m.x, shape.centre_m.x + place.x);
+        EXPECT_LT(drawn.clouds[c].base_m, drawn.clouds[c].top_m);
+        const std::vector<double> sun = absorbed_light(shape, place, light_of(options.sun));
+        const std::vector<double> lightning = absorbed_light(shape, place, light_of(flash));
+        for (std::size_t b = 0; b < shape.boxes.size(); ++b) {
+            const SeedBox& box = shape.boxes[b];
+            const double weight = phase_weight(box.distance, cloud.phase, sky.options().formation_softness);
+            if (weight <= 0) continue;
+            for (int i = 0; i < box.billboards; ++i, ++at) {
+                ASSERT_LT(at, drawn.billboards.size());
+                const CloudBillboard& billboard = drawn.billboards[at];
+                EXPECT_EQ(billboard.cloud, c);
+                EXPECT_LE(std::abs(billboard.centre_m.x - place.x - box.centre_m.x),
+                          0.5 * box.size_m.x + 1e-6);
+                EXPECT_LE(std::abs(billboard.centre_m.z - place.z - box.centre_m.z),
+                          0.5 * box.size_m.z + 1e-6);
+                EXPECT_EQ(billboard.sun_absorbed, float(sun[b]));
+                EXPECT_EQ(billboard.flash_absorbed, float(lightning[b]));
+                EXPECT_EQ(billboard.opacity, float(weight));
+                EXPECT_EQ(billboard.texture, PuffTexture::dense);
+            }
+        }
+    }
+    EXPECT_EQ(at, drawn.billboards.size());
+}
+
+// What the frustum leaves out cannot be seen: the same picture without, bit for bit, from inside of the sky.
+TEST(SkyBillboards, CullingChangesNoBitOfAPicture) {
+    SkySimulation sky(sky_of(150));
+    Renderer renderer{DeviceOptions{{}, true, 2048}};
+    for (const Vec3 target : {Vec3{0, 0, 1200}, Vec3{500, -300, 900}, Vec3{-4000, 1000, 4000}}) {
+        RenderOptions options = from_the_edge();
+        options.camera.position_m = {300, -1200, 700};
+        options.camera.target_m = target;
+        SkyBillboards culled, all;
+        const DrawnClouds some = listed(culled, sky, options), every = listed(all, sky, options, {}, false);
+        EXPECT_LT(some.clouds.size(), every.clouds.size());
+        EXPECT_GT(some.clouds.size(), 0u);
+        const Picture a = renderer.draw_splats({some.clouds, some.billboards, {}, {}}, options);
+        const Picture b = renderer.draw_splats({every.clouds, every.billboards, {}, {}}, options);
+        EXPECT_EQ(a.beauty, b.beauty);
+        EXPECT_EQ(a.transmittance, b.transmittance);
+    }
+    EXPECT_TRUE(renderer.validation_messages().empty());
+}
+
+// With a bound, a moved sun changes that many clouds a frame, and all of them in the end; new clouds are lit
+// at once.
+TEST(SkyBillboards, ABoundedNumberOfCloudsIsLitAnewInAFrame) {
+    const SkySimulation sky(sky_of(10));
+    RenderOptions options = from_the_edge();
+    options.light.cfa_clouds_per_frame = 4;
+    SkyBillboards billboards;
+    const auto absorption = [&] {
+        std::vector<float> result;
+        for (const CloudBillboard& billboard : listed(billboards, sky, options, {}, false).billboards)
+            result.push_back(billboard.sun_absorbed);
+        return result;
+    };
+    const auto changed_clouds = [&](const std::vector<double>& before) {
+        int changed = 0;
+        for (std::size_t c = 0; c < sky.clouds().size(); ++c)
+            changed += billboards.sun_absorbed(sky.clouds()[c])[0] != before[c];
+        return changed;
+    };
+    absorption();
+    std::vector<double> first;
+    for (const SkyCloud& cloud : sky.clouds()) {
+        ASSERT_FALSE(billboards.sun_absorbed(cloud).empty());
+        first.push_back(billboards.sun_absorbed(cloud)[0]);
+    }
+    options.sun = {-5, 300, {1, 0.6, 0.4}};  // below the horizon
+    for (const int expected : {4, 8, 10, 10}) {
+        absorption();
+        EXPECT_EQ(changed_clouds(first), expected);
+    }
+    SkyBillboards fresh;
+    options.light.cfa_clouds_per_frame = 0;
+    const std::vector<float> settled = absorption();
+    std::vector<float> direct;
+    for (const CloudBillboard& billboard : listed(fresh, sky, options, {}, false).billboards)
+        direct.push_back(billboard.sun_absorbed);
+    EXPECT_EQ(settled, direct);
+}
+
+// The same sky gives the same picture, whatever was drawn before; lightning at its time only.
+TEST(SkyPainter, DrawsTheSameTwiceAndLightningInItsTime) {
+    const SkySimulation sky(sky_of(60));
+    const SkyLayer layer{&sky, sky.clouds()};
+    RenderOptions options = from_the_edge();
+    options.sun.elevation_deg = -10;
+    options.lightning = {{{0, 0, 800}, 5, 0.5, {0.7, 0.8, 1}, 10}};
+    Renderer renderer{DeviceOptions{{}, true, 2048}};
+    SkyPainter painter, other;
+    const auto mean = [](const Picture& picture) {
+        double sum = 0;
+        for (const float value : picture.beauty) sum += double(value);
+        return sum / double(picture.beauty.size());
+    };
+    const Picture dark = painter.draw(renderer, {}, {&layer, 1}, options, 4.9);
+    const Picture bright = painter.draw(renderer, {}, {&layer, 1}, options, 5);
+    EXPECT_GT(mean(bright), 2 * mean(dark));
+    EXPECT_EQ(painter.draw(renderer, {}, {&layer, 1}, options, 5.6).beauty, dark.beauty);
+    EXPECT_EQ(other.draw(renderer, {}, {&layer, 1}, options, 5).beauty, bright.beauty);
+    EXPECT_TRUE(renderer.validation_messages().empty());
+}
+
+// Twelve edges a box, an axis for each direction, four strokes a root and more; the red parts of the rays are
+// as long as what the absorption counts where boxes do not overlap.
+TEST(DebugView, ShowsBoxesAxesRootsAndRays) {
+    SkyOptions sky_options = sky_of(1);
+    Seed far = sky_options.models[0].seeds[0];
+    sky_options.models[0].seeds[0].roots.clear();
+    far.roots.clear();
+    far.position_m.z += 300;
+    sky_options.models[0].seeds.push_back(far);
+    sky_options.models[0].seeds[0].roots = {{.seeds_start = 0, .seeds_end = 0, .reproductions = {0, 0}}};
+    const SkySimulation sky(sky_options);
+    RenderOptions options = from_the_edge();
+    options.sun.elevation_deg = 90;
+    const auto lines = [&](DebugView view) {
+        options.debug_view = view;
+        return debug_lines(sky, sky.clouds(), options, light_of(options.sun));
+    };
+    EXPECT_TRUE(lines({}).empty());
+    EXPECT_EQ(lines({.boxes = true}).size(), 24u);
+    EXPECT_EQ(lines({.axes = true}).size(), 3u);
+    EXPECT_EQ(lines({.roots = true}).size(), 5u);
+    double red = 0;
+    for (const WorldLine& line : lines({.rays = true}))
+        if (line.colour[0] > 0.5 && line.colour[1] < 0.5) red += line.to_m.z - line.from_m.z;
+    // Half of its own box each, and for the lower box the whole upper one.
+    EXPECT_NEAR(red, 50 + 50 + 100, 1e-6);
+    double absorbed = 0;
+    for (const double share : absorbed_light(sky.shape(sky.clouds()[0]), {}, light_of(options.sun)))
+        absorbed += 400 * share;
+    EXPECT_NEAR(red, absorbed, 1e-6);
+}
+
+}  // namespace
+}  // namespace nephos

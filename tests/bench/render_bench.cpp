@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/bench/render_bench.h"
+
+#include <fmt/core.h>
+
+#include "apps/sky_picture.h"
+
+namespace nephos::bench {
+namespace {
+
+// T's Cloud 2, that of the rain clouds, with T's numbers: 9 boxes of 10 m, one root with 2 to 3 children in
+// each of 2 to 4 reproductions, 4 to 5 billboards a box of 30 to 50 m, light distance 100 m.
+BaseModel rain_cloud() {
+    BaseModel model{.name = "cloud 2", .genus = Genus::Ns, .seeds = {}, .light_distance_m = 100};
+    for (int i = 0; i < 9; ++i) {
+        Seed seed;
+        seed.size_m = {10, 10, 10};
+        seed.position_m = {10.0 * (i % 3 - 1), 10.0 * (i / 3 - 1), i == 4 ? 12.0 : 5.0};
+        seed.billboards = {4, 5};
+        seed.billboard_width_m = {30, 50};
+        seed.billboard_height_m = {30, 50};
+        seed.texture = BillboardTexture::dense;
+        if (i == 4)
+            seed.roots = {{.pitch_deg = 45,
+                           .open_pitch_deg = 90,
+                           .open_yaw_deg = 179,
+                           .seeds_start = 2,
+                           .seeds_end = 3,
+                           .reproductions = {2, 4}}};
+        model.seeds.push_back(seed);
+    }
+    return model;
+}
+
+}  // namespace
+
+std::vector<BenchRow> render_rows() {
+    SkyOptions options;
+    options.world = {-2000, -2000, 2000, 2000};
+    options.base_height_m = {400, 400};
+    options.models = {rain_cloud()};
+    options.skies = {{"rain", 1, 1000, {{0, 10}}}};
+    const SkySimulation sky(options);
+    const SkyLayer layer{&sky, sky.clouds()};
+    RenderOptions picture;
+    picture.camera.position_m = {0, -3500, 100};  // the whole world is in view
+    picture.camera.target_m = {0, 0, 350};
+    picture.camera.vertical_fov_deg = 50;
+    Renderer renderer;
+    SkyPainter painter;
+    SkyBillboards counter;
+    DrawnClouds drawn;
+    counter.append(sky, sky.clouds(), picture, {}, drawn);
+    const auto [ms, empty_ms] = interleave(
+        9,
+        [&] {
+            painter.draw(renderer, {}, {&layer, 1}, picture, 0);
+        },
+        [&] { painter.draw(renderer, {}, {}, picture, 0); });
+    return {{fmt::format("T's {} clouds drawn directly, 640x480, {}", drawn.clouds.size(),
+                         renderer.device_name()),
+             ms, 0, "<= 100 ms",
+             fmt::format("{:.1f} frames/s, {} billboards; sky and ground alone {:.1f} ms", 1000 / ms,
+                         drawn.billboards.size(), empty_ms)}};
+}
+
+}  // namespace nephos::bench
