@@ -11,6 +11,7 @@
 #include "apps/folder_lock.h"
 #include "apps/manifest.h"
 #include "apps/simulation.h"
+#include "apps/sky_picture.h"
 #include "apps/statistics_file.h"
 #include "apps/version.h"
 #include "automaton/atomic_file.h"
@@ -242,7 +243,10 @@ class Recorder : public PipelineSink {
         const double radius = scene.density.metaball_radius_cells;
         const std::vector<Metaball> balls = metaballs_of(result);
         const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
-        const Picture picture = renderer_->draw(cloud, scene.render);
+        std::vector<SkyLayer> layers;
+        for (const LayerFrame& layer : result.layers)
+            layers.push_back({layer.sky, layer.clouds, layer.direct});
+        const Picture picture = painter_.draw(*renderer_, cloud, layers, scene.render, result.time_s);
         PictureMetadata metadata;
         metadata.scene = scene.name;
         metadata.seed = scene.automaton.seed;
@@ -262,6 +266,7 @@ class Recorder : public PipelineSink {
     const RunSettings& settings_;
     RunFolder folder_;
     std::unique_ptr<Renderer> renderer_;
+    SkyPainter painter_;
     std::optional<StatisticsFile> statistics_;  // from begin() or take_over() on
     std::vector<StatisticsFile> layer_statistics_;
     ManifestState state_;

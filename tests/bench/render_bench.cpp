@@ -43,7 +43,7 @@ std::vector<BenchRow> render_rows() {
     const SkySimulation sky(options);
     const SkyLayer layer{&sky, sky.clouds()};
     RenderOptions picture;
-    picture.camera.position_m = {0, -3500, 100};  // the whole world is in view
+    picture.camera.position_m = {0, -4600, 100};  // the whole world is in view
     picture.camera.target_m = {0, 0, 350};
     picture.camera.vertical_fov_deg = 50;
     Renderer renderer;
