@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "apps/debug_view.h"
+#include "apps/simulation.h"
 #include "render/camera.h"
 
 namespace nephos {
@@ -122,6 +124,12 @@ void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> c
         if (!cull || may_see(frustum, sphere)) seen.push_back(&cloud);
     }
     if (flash) light_by_flash(sky, *flash, seen);
+    std::size_t billboards = out.billboards.size();
+    for (const SkyCloud* cloud : seen) billboards += strewn(sky, *cloud).billboards.size();
+    // With what the renderer makes of one: its order and its form on the device.
+    require_memory(billboards * (sizeof(CloudBillboard) + 128),
+                   "the billboards of " + std::to_string(seen.size()) + " clouds");
+    out.billboards.reserve(billboards);
     for (const SkyCloud* cloud : seen) list(sky, *cloud, flash.has_value(), out);
 }
 

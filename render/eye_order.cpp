@@ -104,6 +104,9 @@ class Collector {
     EyeOrder order(const MetaballLight& light) {
         by_distance_.sort();
         EyeOrder order;
+        const std::size_t balls = by_distance_.count_below(std::uint32_t(cloud_.visible.size()));
+        order.balls.reserve(balls);
+        order.puffs.reserve(by_distance_.size() - balls);
         for (std::size_t i = by_distance_.size(); i-- > 0;) {
             const std::uint32_t source = by_distance_[i];
             if (source < cloud_.visible.size())

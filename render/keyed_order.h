@@ -32,6 +32,11 @@ class KeyedOrder {
         }
     }
     std::size_t size() const { return entries_.size(); }
+    // Number of indices below a limit.
+    std::size_t count_below(std::uint32_t limit) const {
+        return std::size_t(std::count_if(entries_.begin(), entries_.end(),
+                                         [&](std::uint64_t entry) { return std::uint32_t(entry) < limit; }));
+    }
     std::uint32_t operator[](std::size_t i) const { return std::uint32_t(entries_[i]); }
 
   private:

@@ -112,8 +112,9 @@ Renderer::Impl::Impl(const DeviceOptions& device_options)
 std::vector<float> Renderer::Impl::pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
                                                  Picture& picture) {
     const SunOrder order = order_from_sun(cloud, picture.shadow_frame, kMaxSlabs);
-    const std::vector<float> ordered =
-        light_pass.run(gpu, order, picture.shadow_frame, options.shadow_map_size);
+    // Without clouds the map is white, and the smallest will do.
+    const int size = cloud.visible.empty() ? 16 : options.shadow_map_size;
+    const std::vector<float> ordered = light_pass.run(gpu, order, picture.shadow_frame, size);
     std::vector<float> light(ordered.size());
     for (std::size_t i = 0; i < ordered.size(); ++i) light[order.balls[i].source] = ordered[i];
     picture.shadow = cloud.visible.empty()

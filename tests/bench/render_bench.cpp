@@ -39,7 +39,7 @@ std::vector<BenchRow> render_rows() {
     options.world = {-2000, -2000, 2000, 2000};
     options.base_height_m = {400, 400};
     options.models = {rain_cloud()};
-    options.skies = {{"rain", 1, 1000, {{0, 10}}}};
+    options.skies = {{"rain", 1, 1100, {{0, 10}}}};
     const SkySimulation sky(options);
     const SkyLayer layer{&sky, sky.clouds()};
     RenderOptions picture;
