@@ -246,7 +246,8 @@ class Recorder : public PipelineSink {
         std::vector<SkyLayer> layers;
         for (const LayerFrame& layer : result.layers)
             layers.push_back({layer.sky, layer.clouds, layer.direct});
-        const Picture picture = painter_.draw(*renderer_, cloud, layers, scene.render, result.time_s);
+        const Picture picture =
+            painter_.draw(*renderer_, cloud, layers, scene.render, result.time_s, scene.frames.exr);
         PictureMetadata metadata;
         metadata.scene = scene.name;
         metadata.seed = scene.automaton.seed;

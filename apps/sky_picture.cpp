@@ -134,14 +134,14 @@ void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> c
 }
 
 Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
-                         const RenderOptions& options, double time_s) {
+                         const RenderOptions& options, double time_s, bool depth) {
     layers_.resize(layers.size());
     drawn_.clouds.clear();
     drawn_.billboards.clear();
     const std::optional<Flash> flash = flash_at(options.lightning, time_s);
     for (std::size_t i = 0; i < layers.size(); ++i)
         if (layers[i].direct) layers_[i].append(*layers[i].sky, layers[i].clouds, options, flash, drawn_);
-    Picture picture = renderer.draw_splats({drawn_.clouds, drawn_.billboards, voxels, flash}, options);
+    Picture picture = renderer.draw_splats({drawn_.clouds, drawn_.billboards, voxels, flash, depth}, options);
     for (const SkyLayer& layer : layers) {
         const std::vector<WorldLine> lines =
             debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun));

@@ -73,7 +73,7 @@ class SkyPainter {
     // the debug view over it. Every call has the same layers in the same order. Throws as
     // Renderer::draw_splats().
     Picture draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
-                 const RenderOptions& options, double time_s);
+                 const RenderOptions& options, double time_s, bool depth = true);
 
   private:
     std::vector<SkyBillboards> layers_;

@@ -104,6 +104,7 @@ class Collector {
     EyeOrder order(const MetaballLight& light) {
         by_distance_.sort();
         EyeOrder order;
+        order.depth = splats_.depth;
         const std::size_t balls = by_distance_.count_below(std::uint32_t(cloud_.visible.size()));
         order.balls.reserve(balls);
         order.puffs.reserve(by_distance_.size() - balls);

@@ -36,6 +36,7 @@ struct EyeOrder {
     std::vector<shader::Puff> puffs;      // farthest first
     std::vector<Run> runs;  // none is empty; together they are all of balls and puffs, farthest first
     std::vector<shader::PuffCloud> clouds;  // one for each of Splats::clouds
+    bool depth = true;                      // as Splats::depth
 };
 
 // The light of each of cloud.visible.

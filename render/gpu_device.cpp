@@ -95,6 +95,7 @@ std::string missing_abilities(const vk::raii::PhysicalDevice& physical) {
         physical.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan13Features>();
     const auto& v13 = features.get<vk::PhysicalDeviceVulkan13Features>();
     if (!v13.dynamicRendering || !v13.synchronization2) return "dynamic rendering and synchronization2";
+    if (!features.get<vk::PhysicalDeviceFeatures2>().features.independentBlend) return "independent blending";
     using Feature = vk::FormatFeatureFlagBits;
     const auto lacks = [&](vk::Format format, vk::FormatFeatureFlags needed) {
         return (physical.getFormatProperties(format).optimalTilingFeatures & needed) != needed;
@@ -178,8 +179,10 @@ vk::raii::Device create_device(const vk::raii::PhysicalDevice& physical, std::ui
     features.dynamicRendering = true;
     features.synchronization2 = true;
     features.maintenance4 = true;  // core, always there in 1.3; compute shaders name their group size its way
+    vk::PhysicalDeviceFeatures core;
+    core.independentBlend = true;  // pictures without depth leave the second attachment alone
     vk::DeviceCreateInfo info({}, queue);
-    info.pNext = &features;
+    info.setPEnabledFeatures(&core).pNext = &features;
     return {physical, info};
 }
 

@@ -72,8 +72,8 @@ PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
 
 vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                             ShaderCode vertex, ShaderCode fragment,
-                                            std::span<const vk::Format> attachments, Blend blend,
-                                            bool exact) {
+                                            std::span<const vk::Format> attachments, Blend blend, bool exact,
+                                            std::size_t written) {
     const vk::raii::ShaderModule vertex_module = create_module(gpu, vertex);
     const vk::raii::ShaderModule fragment_module = create_module(gpu, fragment);
     const vk::Bool32 exact_value = exact ? VK_TRUE : VK_FALSE;
@@ -89,7 +89,8 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
     vk::PipelineRasterizationStateCreateInfo raster;
     raster.lineWidth = 1.0f;
     const vk::PipelineMultisampleStateCreateInfo single_sample({}, vk::SampleCountFlagBits::e1);
-    const std::vector<vk::PipelineColorBlendAttachmentState> states(attachments.size(), blend_state(blend));
+    std::vector<vk::PipelineColorBlendAttachmentState> states(attachments.size(), blend_state(blend));
+    for (std::size_t i = written; i < states.size(); ++i) states[i].colorWriteMask = {};
     vk::PipelineColorBlendStateCreateInfo blending;
     blending.setAttachments(states);
     const std::array dynamic_states{vk::DynamicState::eViewport, vk::DynamicState::eScissor};

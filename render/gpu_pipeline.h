@@ -11,6 +11,7 @@
 //
 // Private to the module.
 
+#include <cstdint>
 #include <span>
 
 #include "render/gpu_resources.h"
@@ -39,11 +40,11 @@ enum class Blend {
 };
 
 // Draws triangles; viewport and scissor are dynamic. `exact` becomes specialization constant 0 of the
-// fragment shader.
+// fragment shader. Attachments from `written` on stay as they are.
 vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                             ShaderCode vertex, ShaderCode fragment,
                                             std::span<const vk::Format> attachments, Blend blend,
-                                            bool exact = false);
+                                            bool exact = false, std::size_t written = SIZE_MAX);
 
 vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                            ShaderCode code);

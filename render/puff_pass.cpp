@@ -62,6 +62,8 @@ PuffPass::PuffPass(const GpuDevice& gpu, const PipelineLayout& layout,
     : layout_(&layout),
       pipeline_(create_graphics_pipeline(gpu, layout, shaders().puff_vert, shaders().puff_frag, attachments,
                                          Blend::over)),
+      without_depth_(create_graphics_pipeline(gpu, layout, shaders().puff_vert, shaders().puff_frag,
+                                              attachments, Blend::over, false, 1)),
       sampler_(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
       bindings_(create_bindings(gpu, layout)) {
     bind_buffer(gpu, bindings_, 0, frame);
@@ -79,8 +81,9 @@ void PuffPass::use_puffs(const GpuDevice& gpu, std::span<const shader::Puff> puf
     fill(gpu, bindings_, 1, puffs_, puffs);
 }
 
-void PuffPass::draw(const vk::raii::CommandBuffer& commands, std::uint32_t first, std::uint32_t count) const {
-    commands.bindPipeline(vk::PipelineBindPoint::eGraphics, *pipeline_);
+void PuffPass::draw(const vk::raii::CommandBuffer& commands, std::uint32_t first, std::uint32_t count,
+                    bool depth) const {
+    commands.bindPipeline(vk::PipelineBindPoint::eGraphics, depth ? *pipeline_ : *without_depth_);
     commands.bindDescriptorSets(vk::PipelineBindPoint::eGraphics, *layout_->layout, 0, bindings_.set, {});
     commands.draw(6 * count, 1, 6 * first, 0);
 }

@@ -21,12 +21,14 @@ class PuffPass {
     void use_clouds(const GpuDevice& gpu, std::span<const shader::PuffCloud> clouds);
     void use_puffs(const GpuDevice& gpu, std::span<const shader::Puff> puffs);
 
-    // Draws some of the puffs in use; inside of a rendering into the attachments.
-    void draw(const vk::raii::CommandBuffer& commands, std::uint32_t first, std::uint32_t count) const;
+    // Draws some of the puffs in use; inside of a rendering into the attachments. Without `depth` only the
+    // first attachment is drawn to.
+    void draw(const vk::raii::CommandBuffer& commands, std::uint32_t first, std::uint32_t count,
+              bool depth) const;
 
   private:
     const PipelineLayout* layout_;
-    vk::raii::Pipeline pipeline_;
+    vk::raii::Pipeline pipeline_, without_depth_;
     vk::raii::Sampler sampler_;
     Bindings bindings_;
     GpuBuffer puffs_, clouds_;

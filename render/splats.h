@@ -61,6 +61,8 @@ struct Splats {
     std::span<const CloudBillboard> billboards;
     MetaballCloud metaballs;
     std::optional<Flash> flash;
+    // False: nobody asks for Picture::depth_m, which is infinity then; billboards are drawn a sixth faster.
+    bool depth = true;
 };
 
 }  // namespace nephos

@@ -117,7 +117,7 @@ void ViewPass::draw_batch(const GpuDevice& gpu, vk::Extent2D area, const EyeOrde
             for (const Run& run : runs) {
                 const std::uint32_t count = run.end - run.begin;
                 if (run.kind == SplatKind::billboard) {
-                    puffs_.draw(commands, run.begin - puffs.begin, count);
+                    puffs_.draw(commands, run.begin - puffs.begin, count, order.depth);
                 } else {
                     bind(commands, run.kind == SplatKind::metaball ? splat_ : integrated_splat_);
                     commands.draw(6 * count, 1, 6 * (run.begin - balls.begin), 0);
@@ -149,10 +149,10 @@ void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const
     draw_background(gpu, area);
     draw_splats(gpu, area, order);
     read_back(gpu, area);
-    store(tile, picture);
+    store(tile, order.depth, picture);
 }
 
-void ViewPass::store(const Tile& tile, Picture& picture) const {
+void ViewPass::store(const Tile& tile, bool with_depth, Picture& picture) const {
     const auto* radiance = reinterpret_cast<const float*>(radiance_pixels_.mapped);
     const auto* depth = reinterpret_cast<const float*>(depth_pixels_.mapped);
     for (int y = 0; y < tile.height; ++y) {
@@ -162,8 +162,9 @@ void ViewPass::store(const Tile& tile, Picture& picture) const {
             const float transmittance = radiance[3];
             picture.transmittance[to] = transmittance;
             const float opacity = 1.0f - transmittance;
-            picture.depth_m[to] =
-                opacity >= kLeastOpacity ? *depth / opacity : std::numeric_limits<float>::infinity();
+            picture.depth_m[to] = with_depth && opacity >= kLeastOpacity
+                                      ? *depth / opacity
+                                      : std::numeric_limits<float>::infinity();
         }
     }
 }

@@ -33,7 +33,7 @@ class ViewPass {
     void draw_batch(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order,
                     std::span<const Run> runs);
     void read_back(const GpuDevice& gpu, vk::Extent2D area) const;
-    void store(const Tile& tile, Picture& picture) const;
+    void store(const Tile& tile, bool with_depth, Picture& picture) const;
 
     const PipelineLayout* layout_;
     vk::raii::Pipeline background_, splat_, integrated_splat_;

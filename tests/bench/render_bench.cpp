@@ -56,7 +56,7 @@ std::vector<BenchRow> render_rows() {
         [&] {
             painter.draw(renderer, {}, {&layer, 1}, picture, 0);
         },
-        [&] { painter.draw(renderer, {}, {}, picture, 0); });
+        [&] { painter.draw(renderer, {}, {}, picture, 0, false); });
     return {{fmt::format("T's {} clouds drawn directly, 640x480, {}", drawn.clouds.size(),
                          renderer.device_name()),
              ms, 0, "<= 100 ms",

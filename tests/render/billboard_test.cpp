@@ -250,6 +250,20 @@ TEST_F(BillboardTest, BillboardsAndMetaballsHideEachOtherByDistance) {
     EXPECT_NEAR(depth(500), 3000, 1);    // and behind it
 }
 
+// Whoever does not ask for depth gets the same picture without it.
+TEST_F(BillboardTest, DepthIsLeftOutOnRequest) {
+    const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
+    const std::vector<CloudBillboard> billboards = random_billboards(6, 100, 2);
+    Splats splats = scene_of(kClouds, billboards);
+    const Picture with = renderer_.draw_splats(splats, options);
+    splats.depth = false;
+    const Picture without = renderer_.draw_splats(splats, options);
+    EXPECT_EQ(with.beauty, without.beauty);
+    EXPECT_EQ(with.transmittance, without.transmittance);
+    EXPECT_LT(*std::ranges::min_element(with.depth_m), 4000);
+    EXPECT_EQ(*std::ranges::min_element(without.depth_m), std::numeric_limits<float>::infinity());
+}
+
 // Billboards far outside of the picture, behind the eye or without opacity change no bit.
 TEST_F(BillboardTest, WhatCannotBeSeenChangesNothing) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
