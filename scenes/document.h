@@ -71,6 +71,7 @@ class Document {
   public:
     Node root;
     std::vector<Problem> problems;
+    bool models_missing = false;  // a file that base models were to come from could not be read
 
     // Adds a text that places may refer to and returns its number.
     int add_origin(std::string label, std::string text, bool is_file);

@@ -73,7 +73,7 @@ bool check_known(const SectionReader& reader, const Node& node, const std::strin
 }
 
 void check_sky(const SectionReader& reader, const Scene& scene, const NamedSky& sky) {
-    for (std::size_t m = 0; m < sky.models.size(); ++m) {
+    for (std::size_t m = 0; m < sky.models.size() && !reader.document.models_missing; ++m) {
         check_known(reader, text_item(reader, "models", m), sky.models[m], "models", scene.models,
                     "base model");
     }
@@ -181,7 +181,7 @@ void check_rain(const SectionReader& reader, const Scene& scene, const LayerOpti
     const SectionReader rain = below(reader, "rain");
     for (std::size_t r = 0; r < layer.rain.attached.size(); ++r) {
         const AttachedRainRule& rule = layer.rain.attached[r];
-        if (rule.model.empty()) continue;
+        if (rule.model.empty() || reader.document.models_missing) continue;
         const SectionReader item{
             reader.document, rain.find("attached")->value.items[r], indexed(rain.path + ".attached", r), {}};
         check_known(item, item.find("model")->value, rule.model, "model", scene.models, "base model");

@@ -69,12 +69,14 @@ void take_models_from_files(Document& document, const fs::path& folder) {
     const bool many = files->value.kind == Node::Kind::array;
     if (many) names = files->value.items;
     std::vector<Node> models;
+    const std::size_t problems = document.problems.size();
     for (std::size_t n = 0; n < names.size() && models.size() <= std::size_t(kMaxModels); ++n) {
         if (names[n].kind != Node::Kind::text) continue;  // reported when the scene is read
         std::vector<Node> more =
             models_in_file(document, names[n], many ? indexed("models", n) : "models", folder);
         std::move(more.begin(), more.end(), std::back_inserter(models));
     }
+    document.models_missing = document.problems.size() > problems;
     if (models.empty()) return;
     Entry* own = document.root.find("model");
     if (own == nullptr) {

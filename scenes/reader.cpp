@@ -188,11 +188,12 @@ void resolve_initial_state(Scene& scene, const Document& document, const std::fi
     if (from_file) scene.initial_state_file = (folder / *scene.initial_state_file).lexically_normal();
 }
 
-[[noreturn]] void throw_problems(std::vector<Problem> problems) {
-    const auto order = [](const Problem& problem) {
-        const bool option = problem.where.line == 0;
-        return std::make_tuple(option, option ? problem.where.file : std::string(), problem.where.line,
-                               problem.where.column);
+// First those of the scene's own file, then those of other files, then those of options.
+[[noreturn]] void throw_problems(std::vector<Problem> problems, const std::string& scene_file) {
+    const auto order = [&](const Problem& problem) {
+        return std::make_tuple(problem.where.line == 0,
+                               problem.where.file == scene_file ? std::string() : problem.where.file,
+                               problem.where.line, problem.where.column);
     };
     std::stable_sort(problems.begin(), problems.end(),
                      [&](const Problem& a, const Problem& b) { return order(a) < order(b); });
@@ -247,11 +248,11 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
     for (const std::string& option : overrides) {
         if (!sets_model_files(option)) document.set(option, &describe);
     }
-    if (!readable) throw_problems(std::move(document.problems));
+    if (!readable) throw_problems(std::move(document.problems), label);
 
     Scene scene;
     SceneReader(document).read_section(scene_section(), document.root, {}, &scene);
-    if (!document.problems.empty()) throw_problems(std::move(document.problems));
+    if (!document.problems.empty()) throw_problems(std::move(document.problems), label);
     if (document.root.find("name") == nullptr) scene.name = name_from(label);
     resolve_initial_state(scene, document, folder);
     try {

@@ -81,7 +81,8 @@ struct HumidColumn {
     double bottom_m = 0, top_m = 3000;   // world z, bottom < top
     double strength = 1;                 // weight at full intensity and above, 0..1
     double full_intensity_mm_per_h = 5;  // > 0; less rain, proportionately less weight
-    Probabilities centre{0.1, 0.001, 0.02};
+    // No activation: rain keeps clouds alive and lets them spread, but starts none.
+    Probabilities centre{0.01, 0, 0.05};
     Probabilities rim{0, 0, 0.1};
     bool operator==(const HumidColumn&) const = default;
 };

@@ -4,6 +4,7 @@
 
 #include "seeds/climate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -327,6 +328,30 @@ TEST(Climate, ALayerWithoutAutomatonIsASkyAlone) {
         EXPECT_EQ(at.skies[0].ahead(at.skies[0].clouds()[n], 10, at.since_step_s), low.clouds[n]);
     }
     EXPECT_NE(make_layers(scene)[0].hash(), sink.frames[0].hash);
+}
+
+// Every shipped scene with layers is stepped: all its skies live, and what has an automaton grows cloud.
+TEST(Climate, EveryShippedSceneCanBeStepped) {
+    std::size_t scenes = 0;
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(NEPHOS_SOURCE_DIR) / "scenes")) {
+        if (entry.path().extension() != ".toml") continue;
+        const Scene scene = read_scene(entry.path());
+        if (scene.layers.empty()) continue;
+        SCOPED_TRACE(entry.path().string());
+        std::vector<LayerSimulation> layers = make_layers(scene);
+        for (int n = 0; n < 12; ++n) step_all(layers);
+        for (const LayerSimulation& layer : layers) {
+            EXPECT_FALSE(layer.sky()->clouds().empty()) << layer.name();
+            if (layer.automaton()) {
+                const BitPlaneView cld = layer.automaton()->cld();
+                EXPECT_TRUE(std::any_of(cld.words, cld.words + cld.word_count(), [](auto w) {
+                    return w != 0;
+                })) << layer.name();
+            }
+        }
+        ++scenes;
+    }
+    EXPECT_GE(scenes, 18u);
 }
 
 std::string content(const fs::path& path) {

@@ -33,7 +33,7 @@ def main():
     # A TOML date is none of JSON's types.
     validator = jsonschema.Draft4Validator(schema)
 
-    shipped = sorted((ROOT / "scenes").glob("*.toml"))
+    shipped = sorted((ROOT / "scenes").rglob("*.toml"))
     if len(shipped) < 4:
         failures.append("the shipped scenes are missing")
     for path in shipped:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,7 @@ const fs::path kFolder = fs::path(NEPHOS_SOURCE_DIR) / "scenes";
 
 std::vector<fs::path> shipped_scenes() {
     std::vector<fs::path> paths;
-    for (const auto& entry : fs::directory_iterator(kFolder)) {
+    for (const auto& entry : fs::recursive_directory_iterator(kFolder)) {
         if (entry.path().extension() == ".toml") paths.push_back(entry.path());
     }
     std::sort(paths.begin(), paths.end());
@@ -31,7 +32,7 @@ std::vector<fs::path> shipped_scenes() {
 
 TEST(ShippedScenes, LoadAndKeepTheirMeaning) {
     const std::vector<fs::path> paths = shipped_scenes();
-    ASSERT_GE(paths.size(), 4u);
+    ASSERT_GE(paths.size(), 22u);
     for (const fs::path& path : paths) {
         SCOPED_TRACE(path.filename().string());
         const Scene scene = read_scene(path);
@@ -40,7 +41,9 @@ TEST(ShippedScenes, LoadAndKeepTheirMeaning) {
         const std::string text = to_toml(scene);
         EXPECT_EQ(read_scene_text(text, "again.toml"), scene) << text;
         EXPECT_GT(frame_count(scene), 0);
-        EXPECT_FALSE(scene.automaton.field.ellipsoids.empty() && scene.automaton.field.scatters.empty());
+        EXPECT_FALSE(scene.automaton.field.ellipsoids.empty() && scene.automaton.field.scatters.empty() &&
+                     scene.layers.empty());
+        if (path.stem().string().starts_with("cloud-")) continue;  // one cloud, to look at
         EXPECT_FALSE(scene.automaton.wind.keyframes.empty());
         // Small enough for the machines that the project is for.
         EXPECT_LT(memory_estimate_bytes(scene), std::size_t(6) << 30);
@@ -52,7 +55,8 @@ TEST(ShippedScenes, BeginWithTheirSchema) {
         std::ifstream file(path);
         std::string line;
         std::getline(file, line);
-        EXPECT_EQ(line, "#:schema ./nephos.schema.json") << path;
+        const bool top = path.parent_path() == kFolder;
+        EXPECT_EQ(line, top ? "#:schema ./nephos.schema.json" : "#:schema ../nephos.schema.json") << path;
     }
 }
 
@@ -69,6 +73,81 @@ TEST(ShippedScenes, HaveTheNumbersOfTheirSource) {
     EXPECT_GE(by_hand.automaton.field.ellipsoids.size(), 3u);
     EXPECT_EQ(read_scene(kFolder / "stratus.toml").automaton.extent, (Extent{256, 256, 20}));
     EXPECT_EQ(read_scene(kFolder / "large.toml").automaton.extent, (Extent{1024, 1024, 64}));
+}
+
+// The ten genera and the two ragged forms, each under its WMO abbreviation, at the heights of the temperate
+// belt.
+TEST(ShippedScenes, HaveEveryGenus) {
+    for (const GenusFacts& facts : genera()) {
+        SCOPED_TRACE(std::string(facts.abbreviation));
+        std::string file(facts.abbreviation);
+        std::replace(file.begin(), file.end(), ' ', '-');
+        const Scene scene = read_scene(kFolder / "genera" / (file + ".toml"));
+        ASSERT_EQ(scene.models.size(), 1u);
+        EXPECT_EQ(scene.models[0].name, facts.abbreviation);
+        EXPECT_EQ(scene.models[0].genus, facts.genus);
+        ASSERT_EQ(scene.layers.size(), 1u);
+        const Range base = scene.layers[0].base_height_m;
+        EXPECT_GE(base.min, facts.base_temperate_m.min);
+        EXPECT_LE(base.max, facts.base_temperate_m.max);
+    }
+}
+
+// T's table of models and of skies.
+TEST(ShippedScenes, HaveTheNumbersOfTorchelsen) {
+    struct Row {
+        std::size_t seeds;
+        double box_m;
+        std::size_t roots;
+        CountRange reproductions;
+        int start, end;
+        CountRange billboards;
+        Range size_m;
+        double light_distance_m;
+    };
+    const double infinite = std::numeric_limits<double>::infinity();
+    const Row rows[] = {{6, 20, 1, {1, 2}, 2, 3, {2, 4}, {20, 50}, infinite},
+                        {9, 10, 1, {2, 4}, 2, 3, {4, 5}, {30, 50}, 100},
+                        {9, 10, 2, {2, 3}, 2, 4, {2, 4}, {30, 50}, 100},
+                        {8, 10, 2, {2, 3}, 2, 3, {3, 4}, {30, 50}, 100}};
+    for (int n = 1; n <= 4; ++n) {
+        SCOPED_TRACE(n);
+        const Row& row = rows[n - 1];
+        const Scene scene = read_scene(kFolder / "torchelsen" / ("cloud-" + std::to_string(n) + ".toml"));
+        ASSERT_EQ(scene.models.size(), 1u);
+        const BaseModel& model = scene.models[0];
+        EXPECT_EQ(model.name, "Cloud " + std::to_string(n));
+        EXPECT_EQ(model.light_distance_m, row.light_distance_m);
+        ASSERT_EQ(model.seeds.size(), row.seeds);
+        std::size_t roots = 0;
+        for (const Seed& seed : model.seeds) {
+            EXPECT_EQ(seed.size_m, (Vec3{row.box_m, row.box_m, row.box_m}));
+            EXPECT_EQ(seed.billboards, row.billboards);
+            EXPECT_EQ(seed.billboard_width_m, row.size_m);
+            EXPECT_EQ(seed.billboard_height_m, row.size_m);
+            for (const Root& root : seed.roots) {
+                ++roots;
+                EXPECT_EQ(root.reproductions, row.reproductions);
+                EXPECT_EQ(root.seeds_start, row.start);
+                EXPECT_EQ(root.seeds_end, row.end);
+            }
+        }
+        EXPECT_EQ(roots, row.roots);
+    }
+    const Scene skies = read_scene(kFolder / "torchelsen" / "skies.toml");
+    const std::vector<std::vector<int>> clouds{{50, 100}, {100, 200, 400}};
+    const std::vector<std::vector<std::size_t>> models{{1, 1}, {3, 3, 2}};
+    ASSERT_EQ(skies.layers.size(), 2u);
+    for (std::size_t layer = 0; layer < 2; ++layer) {
+        const SkyOptions options = sky_options(skies, layer);
+        ASSERT_EQ(options.skies.size(), clouds[layer].size());
+        for (std::size_t s = 0; s < options.skies.size(); ++s) {
+            EXPECT_EQ(options.skies[s].state, 0.5 * double(s));
+            EXPECT_EQ(options.skies[s].clouds, clouds[layer][s]);
+            EXPECT_EQ(options.skies[s].models.size(), models[layer][s]);
+            for (const SkyModel& model : options.skies[s].models) EXPECT_EQ(model.generated, 10);
+        }
+    }
 }
 
 }  // namespace
