@@ -6,6 +6,8 @@
 #include <limits>
 #include <string>
 
+#include <Imath/half.h>
+
 #include "automaton/error.h"
 #include "render/keyed_order.h"
 #include "render/vector_math.h"
@@ -26,6 +28,11 @@ void check(const Metaball& ball, std::size_t index) {
                                           ": expected finite numbers and a radius above 0, got radius " +
                                           std::to_string(ball.radius) + ", density " +
                                           std::to_string(ball.density));
+}
+
+// Two half floats, the first in the low bits.
+shader::uint pack_halves(double low, double high) {
+    return shader::uint(Imath::half(float(low)).bits()) | shader::uint(Imath::half(float(high)).bits()) << 16;
 }
 
 struct Interval {
@@ -97,50 +104,42 @@ ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int sha
     return frame;
 }
 
-SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, int max_slabs) {
+SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, int shadow_size) {
     SunOrder order;
     const std::size_t count = cloud.visible.size();
-    if (count == 0) return order;
     const Vec3 middle = frame.origin_m + 0.5 * frame.u_axis_m + 0.5 * frame.v_axis_m;
-    const Vec3 u = normalised(frame.u_axis_m), v = normalised(frame.v_axis_m);
-
     KeyedOrder by_distance(count);
     std::vector<float> distance(count);
-    Interval range;
-    double radii = 0;
     for (std::size_t i = 0; i < count; ++i) {
         const Metaball& ball = cloud.metaballs[cloud.visible[i]];
         distance[i] = float(std::max(0.0, dot(frame.direction, centre_of(ball) - middle)));
         by_distance.add(distance[i], std::uint32_t(i));
-        range.add(distance[i], distance[i]);
-        radii += ball.radius;
     }
     by_distance.sort();
 
-    const double wanted = std::floor(range.size() / (0.5 * radii / double(count))) + 1.0;
-    const double slabs = std::min(wanted, double(max_slabs));
-    const double per_metre = range.size() > 0 ? slabs / range.size() : 0.0;
-    order.balls.reserve(count);
-    double current = -1;
+    const double width = length(frame.u_axis_m), height = length(frame.v_axis_m);
+    const Vec3 u = (shadow_size / (width * width)) * frame.u_axis_m,
+               v = (shadow_size / (height * height)) * frame.v_axis_m;  // from metres to texels
+    const double texel_u = width / shadow_size, texel_v = height / shadow_size;
+    order.splats.resize(count);
+    order.places.resize(count);
+    order.source.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t source = by_distance[i];
         const Metaball& ball = cloud.metaballs[cloud.visible[source]];
-        const Vec3 offset = centre_of(ball) - middle;
-        const double position = (double(distance[source]) - range.min) * per_metre;
-        const double slab = std::min(std::floor(position), slabs - 1.0);
-        if (slab != current) order.slabs.push_back({std::uint32_t(i), 0, std::uint32_t(i)});
-        current = slab;
-        ++order.slabs.back().end;
-        order.balls.push_back({float(dot(u, offset)), float(dot(v, offset)), ball.radius,
-                               cloud.depth_scale[source], float(position - slab), source, 0, 0});
-    }
-    const auto is_thin = [](const shader::LightBall& ball) {
-        return ball.depth_scale <= shader::kMaxDepthScale;
-    };
-    for (Slab& slab : order.slabs) {
-        const auto first = order.balls.begin();
-        slab.dense =
-            std::uint32_t(std::stable_partition(first + slab.begin, first + slab.end, is_thin) - first);
+        const Vec3 offset = centre_of(ball) - frame.origin_m;
+        // What is smaller than a texel is widened and thinned out: its optical depth times area stays.
+        const double radius = ball.radius, least = double(shader::kMinRadiusPixels);
+        const double radius_u = std::max(radius / texel_u, least),
+                     radius_v = std::max(radius / texel_v, least);
+        const double thinning = radius / (radius_u * texel_u) * (radius / (radius_v * texel_v));
+        order.source[i] = source;
+        order.splats[i] = {.x = float(dot(u, offset)),
+                           .y = float(dot(v, offset)),
+                           .radii = pack_halves(radius_u, radius_v),
+                           .depth_scale = float(cloud.depth_scale[source] * thinning)};
+        order.places[i] = {.z = distance[source], .per_radius = float(1.0 / radius)};
+        order.largest_radius = std::max(order.largest_radius, ball.radius);
     }
     return order;
 }

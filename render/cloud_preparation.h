@@ -31,18 +31,14 @@ PreparedCloud prepare(const MetaballCloud& cloud);
 // The smallest frame along the sun's rays around all visible metaballs, with a margin of two texels.
 ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size);
 
-// Consecutive metaballs in the order from the sun. Within a slab order does not matter (light is read before
-// and behind it); those too dense for the textures come last.
-struct Slab {
-    std::uint32_t begin = 0, dense = 0, end = 0;  // begin <= dense <= end; [dense, end) are too dense
-};
-
+// Metaballs as the shadow map sees them, nearest to the sun first.
 struct SunOrder {
-    std::vector<shader::LightBall> balls;  // nearest to the sun first, slab by slab
-    std::vector<Slab> slabs;               // none is empty; together they are all of balls
+    std::vector<shader::LightSplat> splats;
+    std::vector<shader::LightPlace> places;  // of the same metaballs
+    std::vector<std::uint32_t> source;       // index into cloud.visible
+    float largest_radius = 0;                // metres
 };
 
-// Slabs of equal thickness: half the mean radius, but at most `max_slabs` of them.
-SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, int max_slabs);
+SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, int shadow_size);
 
 }  // namespace nephos

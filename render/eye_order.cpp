@@ -170,6 +170,15 @@ class Collector {
         return ++order.runs.back().end;
     }
 
+    // Whether the tiles can draw it as an ellipse with a polynomial. Beside or behind the eye the outline is
+    // no ellipse; halves, which hold the radius in pixels, end at 65504.
+    bool is_fitted(const Vec3& offset, double ball_radius, float depth_scale) const {
+        const double least = double(shader::kMinRadiusPixels) * length(offset) / pixels_per_unit_;
+        const double radius = std::max(ball_radius, least), depth = dot(offset, camera_.forward);
+        return depth_scale <= shader::kMaxFittedDepth && depth >= 1.01 * radius &&
+               radius * pixels_per_unit_ <= 60000.0 * depth;
+    }
+
     void append_metaball(EyeOrder& order, std::uint32_t source, const MetaballLight& light) const {
         const Metaball& ball = cloud_.metaballs[cloud_.visible[source]];
         const Vec3 offset = Vec3{ball.x, ball.y, ball.z} - eye_;
@@ -179,6 +188,10 @@ class Collector {
         if (above_ground_ && ball.z - ball.radius < ground_m_) flags |= shader::kIntegrate;
         if (cloud_.depth_scale[source] > shader::kMaxDepthScale) flags |= shader::kIntegrate;
         extend(order, flags != 0 ? SplatKind::integrated_metaball : SplatKind::metaball);
+        if (flags != 0 || !is_fitted(offset, ball.radius, cloud_.depth_scale[source])) {
+            flags |= shader::kNotFitted;
+            order.all_fitted = false;
+        }
         if (!light.flash.empty()) flags |= unorm16(light.flash[source]) << 16;
         const double scale = cloud_.top_m > cloud_.base_m ? 1.0 / (cloud_.top_m - cloud_.base_m) : 0.0;
         order.balls.push_back({float(offset.x), float(offset.y), float(offset.z), ball.radius,

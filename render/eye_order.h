@@ -37,6 +37,7 @@ struct EyeOrder {
     std::vector<Run> runs;  // none is empty; together they are all of balls and puffs, farthest first
     std::vector<shader::PuffCloud> clouds;  // one for each of Splats::clouds
     bool depth = true;                      // as Splats::depth
+    bool all_fitted = true;                 // no ball has shader::kNotFitted
 };
 
 // The light of each of cloud.visible.

@@ -104,6 +104,15 @@ std::string missing_abilities(const vk::raii::PhysicalDevice& physical) {
         return "blending of 32-bit colours";
     if (lacks(vk::Format::eR32Sfloat, Feature::eColorAttachmentBlend | Feature::eSampledImageFilterLinear))
         return "blending and filtering of 32-bit floats";
+    if (lacks(vk::Format::eR32Sfloat, Feature::eStorageImage)) return "storage images of 32-bit floats";
+    using Subgroup = vk::SubgroupFeatureFlagBits;
+    const auto properties =
+        physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceVulkan11Properties>();
+    const auto& v11 = properties.get<vk::PhysicalDeviceVulkan11Properties>();
+    const vk::SubgroupFeatureFlags needed = Subgroup::eBasic | Subgroup::eVote | Subgroup::eBallot;
+    if ((v11.subgroupSupportedOperations & needed) != needed ||
+        !(v11.subgroupSupportedStages & vk::ShaderStageFlagBits::eCompute))
+        return "votes and ballots of subgroups in compute shaders";
     return {};
 }
 
@@ -178,12 +187,27 @@ vk::raii::Device create_device(const vk::raii::PhysicalDevice& physical, std::ui
     vk::PhysicalDeviceVulkan13Features features;
     features.dynamicRendering = true;
     features.synchronization2 = true;
+    features.subgroupSizeControl = true;
     features.maintenance4 = true;  // core, always there in 1.3; compute shaders name their group size its way
     vk::PhysicalDeviceFeatures core;
     core.independentBlend = true;  // pictures without depth leave the second attachment alone
     vk::DeviceCreateInfo info({}, queue);
     info.setPEnabledFeatures(&core).pNext = &features;
     return {physical, info};
+}
+
+void choose_tile_lanes(GpuDevice& gpu) {
+    const auto chain =
+        gpu.physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceVulkan11Properties,
+                                    vk::PhysicalDeviceVulkan13Properties>();
+    const auto& subgroup = chain.get<vk::PhysicalDeviceVulkan11Properties>();
+    const auto& sizes = chain.get<vk::PhysicalDeviceVulkan13Properties>();
+    const bool varies = sizes.minSubgroupSize != sizes.maxSubgroupSize;
+    const bool can_ask = bool(sizes.requiredSubgroupSizeStages & vk::ShaderStageFlagBits::eCompute);
+    const std::uint32_t size = subgroup.subgroupSize;
+    gpu.tiles_are_subgroups = size >= 8 && size <= 128 && (!varies || can_ask);
+    gpu.subgroup_size_varies = varies;
+    gpu.tile_lanes = gpu.tiles_are_subgroups ? size : 8;
 }
 
 }  // namespace
@@ -203,6 +227,7 @@ GpuDevice open_device(const DeviceOptions& options) {
         gpu.properties = gpu.physical.getProperties();
         gpu.memory = gpu.physical.getMemoryProperties();
         gpu.queue_family = find_queue_family(gpu.physical).value();
+        choose_tile_lanes(gpu);
         gpu.device = create_device(gpu.physical, gpu.queue_family);
         gpu.queue = vk::raii::Queue(gpu.device, gpu.queue_family, 0);
         gpu.pool = vk::raii::CommandPool(

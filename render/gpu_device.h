@@ -37,6 +37,11 @@ struct GpuDevice {
     vk::PhysicalDeviceMemoryProperties memory;
     vk::raii::Device device{nullptr};
     std::uint32_t queue_family = 0;
+    // Invocations that draw a tile (shaders/tiles.glsl): one whole subgroup where the device has ones of 8 to
+    // 128.
+    std::uint32_t tile_lanes = 8;
+    bool tiles_are_subgroups = false;
+    bool subgroup_size_varies = false;  // and must be asked for
     vk::raii::Queue queue{nullptr};
     vk::raii::CommandPool pool{nullptr};
 };

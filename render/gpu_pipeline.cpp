@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/gpu_pipeline.h"
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -12,13 +13,15 @@ namespace {
 namespace spirv {
 #include "background_frag.h"
 #include "background_vert.h"
-#include "light_sample_comp.h"
-#include "light_splat_frag.h"
-#include "light_splat_vert.h"
+#include "light_centres_comp.h"
+#include "light_map_comp.h"
 #include "puff_frag.h"
 #include "puff_vert.h"
+#include "view_finish_comp.h"
+#include "view_project_comp.h"
 #include "view_splat_frag.h"
 #include "view_splat_vert.h"
+#include "view_tiles_comp.h"
 }  // namespace spirv
 
 vk::raii::ShaderModule create_module(const GpuDevice& gpu, ShaderCode code) {
@@ -31,10 +34,7 @@ vk::PipelineColorBlendAttachmentState blend_state(Blend blend) {
     state.colorWriteMask = vk::ColorComponentFlagBits::eR | vk::ColorComponentFlagBits::eG |
                            vk::ColorComponentFlagBits::eB | vk::ColorComponentFlagBits::eA;
     state.blendEnable = blend != Blend::none;
-    if (blend == Blend::multiply) {
-        state.setSrcColorBlendFactor(Factor::eZero).setDstColorBlendFactor(Factor::eSrcColor);
-        state.setSrcAlphaBlendFactor(Factor::eZero).setDstAlphaBlendFactor(Factor::eSrcAlpha);
-    } else if (blend == Blend::over) {
+    if (blend == Blend::over) {
         state.setSrcColorBlendFactor(Factor::eOne).setDstColorBlendFactor(Factor::eSrcAlpha);
         state.setSrcAlphaBlendFactor(Factor::eZero).setDstAlphaBlendFactor(Factor::eSrcAlpha);
     }
@@ -45,9 +45,9 @@ vk::PipelineColorBlendAttachmentState blend_state(Blend blend) {
 
 const ShaderSet& shaders() {
     static constexpr ShaderSet kShaders{
-        spirv::light_splat_vert, spirv::light_splat_frag, spirv::light_sample_comp,
-        spirv::background_vert,  spirv::background_frag,  spirv::view_splat_vert,
-        spirv::view_splat_frag,  spirv::puff_vert,        spirv::puff_frag};
+        spirv::light_map_comp,   spirv::light_centres_comp, spirv::view_project_comp, spirv::view_tiles_comp,
+        spirv::view_finish_comp, spirv::background_vert,    spirv::background_frag,   spirv::view_splat_vert,
+        spirv::view_splat_frag,  spirv::puff_vert,          spirv::puff_frag};
     return kShaders;
 }
 
@@ -61,10 +61,16 @@ PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
         vk::DescriptorSetLayoutBinding(2, Type::eStorageBuffer, 1, all),
         vk::DescriptorSetLayoutBinding(3, Type::eCombinedImageSampler, 1, all),
         vk::DescriptorSetLayoutBinding(4, Type::eCombinedImageSampler, 1, all),
+        vk::DescriptorSetLayoutBinding(5, Type::eStorageBuffer, 1, Stage::eCompute),
+        vk::DescriptorSetLayoutBinding(6, Type::eStorageBuffer, 1, Stage::eCompute),
+        vk::DescriptorSetLayoutBinding(7, Type::eStorageBuffer, 1, Stage::eCompute),
+        vk::DescriptorSetLayoutBinding(8, Type::eStorageBuffer, 1, Stage::eCompute),
+        vk::DescriptorSetLayoutBinding(9, Type::eStorageBuffer, 1, Stage::eCompute),
+        vk::DescriptorSetLayoutBinding(10, Type::eStorageImage, 1, Stage::eCompute),
     };
     PipelineLayout result;
     result.set = vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
-    const vk::PushConstantRange constants(all, 0, sizeof(shader::LightStep));
+    const vk::PushConstantRange constants(Stage::eCompute, 0, sizeof(shader::TileStep));
     result.layout =
         vk::raii::PipelineLayout(gpu.device, vk::PipelineLayoutCreateInfo({}, *result.set, constants));
     return result;
@@ -114,10 +120,50 @@ vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineL
     return {gpu.device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *layout.layout)};
 }
 
+vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
+                                        std::array<bool, 2> switches) {
+    const vk::raii::ShaderModule module = create_module(gpu, code);
+    // Lanes, rows of a lane, whether lanes hand splats round, and the switches.
+    const std::uint32_t lanes = gpu.tile_lanes;
+    const std::array<std::uint32_t, 5> values{lanes, shader::kTileWidth * shader::kTileHeight / lanes,
+                                              std::uint32_t(gpu.tiles_are_subgroups),
+                                              std::uint32_t(switches[0]), std::uint32_t(switches[1])};
+    std::array<vk::SpecializationMapEntry, values.size()> entries;
+    for (std::uint32_t i = 0; i < entries.size(); ++i) entries[i] = vk::SpecializationMapEntry(i, 4 * i, 4);
+    const vk::SpecializationInfo constants(entries.size(), entries.data(), sizeof values, values.data());
+    vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo subgroup(lanes);
+    vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main",
+                                            &constants);
+    if (gpu.tiles_are_subgroups && gpu.subgroup_size_varies) stage.pNext = &subgroup;
+    return {gpu.device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *layout.layout)};
+}
+
+void begin_compute(const vk::raii::CommandBuffer& commands, const PipelineLayout& layout,
+                   const Bindings& bindings, const vk::raii::Pipeline& pipeline,
+                   const shader::TileStep& step) {
+    constexpr auto kPoint = vk::PipelineBindPoint::eCompute;
+    commands.bindPipeline(kPoint, *pipeline);
+    commands.bindDescriptorSets(kPoint, *layout.layout, 0, bindings.set, {});
+    commands.pushConstants<shader::TileStep>(*layout.layout, vk::ShaderStageFlagBits::eCompute, 0, step);
+}
+
+void dispatch_groups(const vk::raii::CommandBuffer& commands, std::size_t groups) {
+    constexpr std::size_t kRow = 32768;
+    if (groups == 0) return;
+    commands.dispatch(std::uint32_t(std::min(groups, kRow)), std::uint32_t((groups + kRow - 1) / kRow), 1);
+}
+
+void compute_barrier(const vk::raii::CommandBuffer& commands) {
+    const vk::MemoryBarrier2 change(access::compute.stages, access::compute.kinds, access::compute.stages,
+                                    access::compute.kinds);
+    commands.pipelineBarrier2(vk::DependencyInfo().setMemoryBarriers(change));
+}
+
 Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
     const std::array sizes{vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, 1),
-                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, 2),
-                           vk::DescriptorPoolSize(vk::DescriptorType::eCombinedImageSampler, 2)};
+                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, 7),
+                           vk::DescriptorPoolSize(vk::DescriptorType::eCombinedImageSampler, 2),
+                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageImage, 1)};
     Bindings bindings;
     bindings.pool = vk::raii::DescriptorPool(gpu.device, vk::DescriptorPoolCreateInfo({}, 1, sizes));
     // Allocated without RAII: the set goes with its pool.
@@ -143,6 +189,27 @@ void bind_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t bi
     gpu.device.updateDescriptorSets(
         vk::WriteDescriptorSet(bindings.set, binding, 0, vk::DescriptorType::eCombinedImageSampler, info),
         {});
+}
+
+void reserve(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
+             std::size_t bytes, HostAccess access) {
+    if (buffer.bytes >= std::max<std::size_t>(bytes, 1)) return;
+    buffer = {};  // the old one goes before the new one comes
+    buffer = create_buffer(gpu, bytes + bytes / 4 + 256, vk::BufferUsageFlagBits::eStorageBuffer, access);
+    bind_buffer(gpu, bindings, binding, buffer);
+}
+
+void upload(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
+            std::span<const std::byte> bytes) {
+    reserve(gpu, bindings, binding, buffer, bytes.size(), HostAccess::write);
+    std::ranges::copy(bytes, buffer.mapped);
+}
+
+void bind_storage_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
+                        const GpuImage& image) {
+    const vk::DescriptorImageInfo info({}, *image.view, vk::ImageLayout::eGeneral);
+    gpu.device.updateDescriptorSets(
+        vk::WriteDescriptorSet(bindings.set, binding, 0, vk::DescriptorType::eStorageImage, info), {});
 }
 
 vk::raii::Sampler create_sampler(const GpuDevice& gpu, vk::SamplerAddressMode beyond) {

@@ -3,25 +3,30 @@
 
 // Pipelines, and the one descriptor layout that they share:
 //
-//     0  uniform  Frame                      3  attenuation textures, or puff textures (array)
-//     1  storage  metaballs, or billboards   4  shadow map, or the light buffer that becomes it
-//     2  storage  light, or clouds
+//     0  uniform  Frame                                  5  storage  ranges of the tiles' lists
+//     1  storage  metaballs, billboards, or places       6  storage  lists of splats
+//     2  storage  splats, or clouds                      7  storage  more of the splats, or items of work
+//     3  attenuation textures, or puff textures (array)  8  storage  radiance, or optical depth
+//     4  shadow map, to be sampled                       9  storage  distance, or places along the light
+//                                                       10  shadow map, to be written
 //
-// Both images of a set must be bound before a draw, used or not: lavapipe looks at them.
+// Both samplers of a set must be bound before a draw, used or not: lavapipe looks at them.
 //
 // Private to the module.
 
+#include <array>
 #include <cstdint>
 #include <span>
 
 #include "render/gpu_resources.h"
+#include "render/shaders/shared.h"
 
 namespace nephos {
 
 // SPIR-V words, embedded at build time from render/shaders.
 using ShaderCode = std::span<const std::uint32_t>;
 struct ShaderSet {
-    ShaderCode light_splat_vert, light_splat_frag, light_sample_comp;
+    ShaderCode light_map_comp, light_centres_comp, view_project_comp, view_tiles_comp, view_finish_comp;
     ShaderCode background_vert, background_frag, view_splat_vert, view_splat_frag;
     ShaderCode puff_vert, puff_frag;
 };
@@ -34,9 +39,8 @@ struct PipelineLayout {
 PipelineLayout create_pipeline_layout(const GpuDevice& gpu);
 
 enum class Blend {
-    none,      // dst = src
-    multiply,  // dst = dst * src
-    over,      // dst = src + dst * alpha of src; alpha of dst = alpha of both multiplied
+    none,  // dst = src
+    over,  // dst = src + dst * alpha of src; alpha of dst = alpha of both multiplied
 };
 
 // Draws triangles; viewport and scissor are dynamic. `exact` becomes specialization constant 0 of the
@@ -49,6 +53,11 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
 vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                            ShaderCode code);
 
+// One whose work groups are tiles (shaders/tiles.glsl): one subgroup each, where the device has subgroups
+// that fit. `variant` becomes specialization constant 3.
+vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
+                                        std::array<bool, 2> switches = {});
+
 // A pool with room for one set of the layout above, and the set.
 struct Bindings {
     vk::raii::DescriptorPool pool{nullptr};
@@ -60,6 +69,28 @@ void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t b
                  const GpuBuffer& buffer);
 void bind_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, const GpuImage& image,
                 const vk::raii::Sampler& sampler);
+
+// Makes a storage buffer at least so large, and binds it; its content is lost when it grows.
+void reserve(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
+             std::size_t bytes, HostAccess access);
+// The same, and copies `bytes` into it.
+void upload(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
+            std::span<const std::byte> bytes);
+
+// Binds a compute pipeline with its descriptors and push constants.
+void begin_compute(const vk::raii::CommandBuffer& commands, const PipelineLayout& layout,
+                   const Bindings& bindings, const vk::raii::Pipeline& pipeline,
+                   const shader::TileStep& step);
+
+// Work groups that run `groups` times; a shader reads their number with work_group() of tiles.glsl.
+void dispatch_groups(const vk::raii::CommandBuffer& commands, std::size_t groups);
+
+// Everything that was written by compute shaders before is seen by those after.
+void compute_barrier(const vk::raii::CommandBuffer& commands);
+
+// For imageStore; the image is in the layout GENERAL.
+void bind_storage_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
+                        const GpuImage& image);
 
 // Filters linearly within the nearest level; beyond the edge there is the edge's texel, or white.
 vk::raii::Sampler create_sampler(const GpuDevice& gpu, vk::SamplerAddressMode beyond);

@@ -37,7 +37,7 @@ GpuImage upload_puffs(const GpuDevice& gpu) {
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_image(commands, image, access::copy_to);
         commands.copyBufferToImage(*staging.buffer, *image.image, vk::ImageLayout::eGeneral, regions);
-        image_barrier(commands, image, access::copy_to, access::sample_in_fragment);
+        image_barrier(commands, image, access::copy_to, access::sample);
     });
     return image;
 }

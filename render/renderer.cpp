@@ -10,15 +10,14 @@
 #include "automaton/error.h"
 #include "automaton/text.h"
 #include "render/attenuation_texture.h"
-#include "render/light_pass.h"
+#include "render/light_tiles.h"
 #include "render/renderer_test_access.h"
 #include "render/view_pass.h"
+#include "render/view_tiles.h"
 #include "render/voxel_absorption.h"
 
 namespace nephos {
 namespace {
-
-constexpr int kMaxSlabs = 256;
 
 std::size_t square(std::size_t side) { return side * side; }
 
@@ -58,7 +57,7 @@ GpuImage upload_attenuation(const GpuDevice& gpu) {
                                          {vk::ImageAspectFlagBits::eColor, 0, 0, shader::kAttenuationLevels},
                                          {0, 0, 0}, {kSide, kSide, 1});
         commands.copyBufferToImage(*staging.buffer, *image.image, vk::ImageLayout::eGeneral, region);
-        image_barrier(commands, image, access::copy_to, access::sample_in_fragment);
+        image_barrier(commands, image, access::copy_to, access::sample);
     });
     return image;
 }
@@ -80,7 +79,7 @@ struct Renderer::Impl {
     explicit Impl(const DeviceOptions& device_options);
 
     Picture draw(const Splats& splats, const RenderOptions& options);
-    // The sunlight that arrives at each visible metaball, and the shadow map into picture and light pass.
+    // The sunlight that arrives at each visible metaball, and the shadow map into picture and light tiles.
     std::vector<float> pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
                                      Picture& picture);
     std::vector<float> absorb_sunlight(const PreparedCloud& cloud, const DensityBlocks& blocks,
@@ -91,8 +90,10 @@ struct Renderer::Impl {
     PipelineLayout layout;
     vk::raii::Sampler clamped, white_beyond;
     GpuImage attenuation;
-    LightPass light_pass;
-    ViewPass view_pass;
+    LightTiles light_tiles;
+    ViewTiles view_tiles;
+    Splatting splatting;
+    std::optional<ViewPass> view_pass;  // made when it is needed
 };
 
 Renderer::Impl::Impl(const DeviceOptions& device_options)
@@ -102,8 +103,9 @@ Renderer::Impl::Impl(const DeviceOptions& device_options)
       clamped(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
       white_beyond(create_sampler(gpu, vk::SamplerAddressMode::eClampToBorder)),
       attenuation(upload_attenuation(gpu)),
-      light_pass(gpu, layout, attenuation, clamped),
-      view_pass(gpu, layout, attenuation, clamped) {
+      light_tiles(gpu, layout, attenuation, clamped),
+      view_tiles(gpu, layout, attenuation, clamped),
+      splatting(device_options.splatting) {
     tile_size = std::min(tile_size, int(std::min(gpu.properties.limits.maxImageDimension2D,
                                                  gpu.properties.limits.maxFramebufferWidth)));
 }
@@ -111,15 +113,15 @@ Renderer::Impl::Impl(const DeviceOptions& device_options)
 // D, step 1.
 std::vector<float> Renderer::Impl::pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
                                                  Picture& picture) {
-    const SunOrder order = order_from_sun(cloud, picture.shadow_frame, kMaxSlabs);
-    // Without clouds the map is white, and the smallest will do.
-    const int size = cloud.visible.empty() ? 16 : options.shadow_map_size;
-    const std::vector<float> ordered = light_pass.run(gpu, order, picture.shadow_frame, size);
+    const SunOrder order = order_from_sun(cloud, picture.shadow_frame, options.shadow_map_size);
+    if (cloud.visible.empty()) {  // the map is white, and the smallest will do
+        picture.shadow.assign(square(std::size_t(options.shadow_map_size)), 1.0f);
+        std::vector<float> small;
+        return light_tiles.run(gpu, order, 16, small);
+    }
+    const std::vector<float> ordered = light_tiles.run(gpu, order, options.shadow_map_size, picture.shadow);
     std::vector<float> light(ordered.size());
-    for (std::size_t i = 0; i < ordered.size(); ++i) light[order.balls[i].source] = ordered[i];
-    picture.shadow = cloud.visible.empty()
-                         ? std::vector<float>(square(std::size_t(picture.shadow_size)), 1.0f)
-                         : light_pass.read_shadow_map(gpu);
+    for (std::size_t i = 0; i < ordered.size(); ++i) light[order.source[i]] = ordered[i];
     return light;
 }
 
@@ -128,7 +130,7 @@ std::vector<float> Renderer::Impl::absorb_sunlight(const PreparedCloud& cloud, c
                                                    const RenderOptions& options, Picture& picture) {
     const double distance = options.light.light_distance_m;
     picture.shadow = shadow_by_absorption(blocks, picture.shadow_frame, picture.shadow_size, distance);
-    light_pass.use(gpu, picture.shadow, picture.shadow_size);
+    light_tiles.use(gpu, picture.shadow, picture.shadow_size);
     return light_by_absorption(cloud, blocks, direction_to_sun(options.sun), distance);
 }
 
@@ -154,13 +156,23 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
 
     const EyeOrder order = order_from_eye(prepared, {light, lightning}, splats, camera,
                                           pixels_per_unit(options.camera, camera), options.ground);
-    view_pass.use_shadow_map(gpu, light_pass.shadow_map(), white_beyond);
+    const bool by_tiles = splatting == Splatting::tiles && order.puffs.empty();
+    if (by_tiles) {
+        view_tiles.use_shadow_map(gpu, light_tiles.shadow_map(), white_beyond);
+    } else {
+        if (!view_pass) view_pass.emplace(gpu, layout, attenuation, clamped);
+        view_pass->use_shadow_map(gpu, light_tiles.shadow_map(), white_beyond);
+    }
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {
             const Tile tile{x, y, std::min(tile_size, picture.width - x),
                             std::min(tile_size, picture.height - y)};
-            view_pass.draw_tile(gpu, frame_data(options, camera, picture.shadow_frame, flash, tile), tile,
-                                order, picture);
+            const shader::Frame frame = frame_data(options, camera, picture.shadow_frame, flash, tile);
+            if (by_tiles) {
+                view_tiles.draw_tile(gpu, options, camera, frame, tile, order, picture);
+            } else {
+                view_pass->draw_tile(gpu, frame, tile, order, picture);
+            }
         }
     }
     return picture;

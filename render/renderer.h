@@ -26,6 +26,13 @@
 
 namespace nephos {
 
+// How metaballs are drawn; the picture is the same within 1/255.
+enum class Splatting {
+    tiles,       // compute shaders, tile by tile, front to back: fast
+    billboards,  // blended billboards with attenuation textures, back to front, as D has it: the reference,
+                 // and what draws pictures that hold T's billboards
+};
+
 struct DeviceOptions {
     // Part of a device's name ("llvmpipe") or its number in device_names(). Empty: the environment variable
     // NEPHOS_DEVICE in the same form; without it a discrete card, then an integrated, a virtual and a
@@ -37,6 +44,7 @@ struct DeviceOptions {
     // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
     // the picture; memory on the device is about 24 bytes * tile_size^2.
     int tile_size = 2048;
+    Splatting splatting = Splatting::tiles;
 };
 
 class Renderer {

@@ -149,21 +149,21 @@ void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const
     draw_background(gpu, area);
     draw_splats(gpu, area, order);
     read_back(gpu, area);
-    store(tile, order.depth, picture);
+    store_tile(reinterpret_cast<const float*>(radiance_pixels_.mapped),
+               order.depth ? reinterpret_cast<const float*>(depth_pixels_.mapped) : nullptr, tile, picture);
 }
 
-void ViewPass::store(const Tile& tile, bool with_depth, Picture& picture) const {
-    const auto* radiance = reinterpret_cast<const float*>(radiance_pixels_.mapped);
-    const auto* depth = reinterpret_cast<const float*>(depth_pixels_.mapped);
+void store_tile(const float* radiance, const float* depth, const Tile& tile, Picture& picture) {
     for (int y = 0; y < tile.height; ++y) {
         std::size_t to = std::size_t(tile.y + y) * std::size_t(picture.width) + std::size_t(tile.x);
-        for (int x = 0; x < tile.width; ++x, ++to, radiance += 4, ++depth) {
-            std::copy_n(radiance, 3, &picture.beauty[3 * to]);
-            const float transmittance = radiance[3];
+        std::size_t from = std::size_t(y) * std::size_t(tile.width);
+        for (int x = 0; x < tile.width; ++x, ++to, ++from) {
+            std::copy_n(radiance + 4 * from, 3, &picture.beauty[3 * to]);
+            const float transmittance = radiance[4 * from + 3];
             picture.transmittance[to] = transmittance;
             const float opacity = 1.0f - transmittance;
-            picture.depth_m[to] = with_depth && opacity >= kLeastOpacity
-                                      ? *depth / opacity
+            picture.depth_m[to] = depth != nullptr && opacity >= kLeastOpacity
+                                      ? depth[from] / opacity
                                       : std::numeric_limits<float>::infinity();
         }
     }

@@ -13,6 +13,10 @@
 
 namespace nephos {
 
+// Stores the pixels of a tile: radiance with the clouds' transmittance, and the distance weighted by opacity,
+// which may be null.
+void store_tile(const float* radiance, const float* depth, const Tile& tile, Picture& picture);
+
 class ViewPass {
   public:
     ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
@@ -33,7 +37,6 @@ class ViewPass {
     void draw_batch(const GpuDevice& gpu, vk::Extent2D area, const EyeOrder& order,
                     std::span<const Run> runs);
     void read_back(const GpuDevice& gpu, vk::Extent2D area) const;
-    void store(const Tile& tile, bool with_depth, Picture& picture) const;
 
     const PipelineLayout* layout_;
     vk::raii::Pipeline background_, splat_, integrated_splat_;

@@ -2,39 +2,15 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.h"
-// Step 2, first: sky gradient, and the ground plane that wears the shadow map.
+// Step 2, first: what lies behind the clouds.
+#include "frame.glsl"
 #include "ray.glsl"
-
-layout(set = 0, binding = 4) uniform sampler2D shadow_map;
+#include "background.glsl"
 
 layout(location = 0) out vec4 radiance;  // alpha: transmittance of the clouds, none so far
 layout(location = 1) out vec4 depth;
 
-// The air is thickest at the horizon: its colour falls off exponentially with height, and reaches zero at the zenith.
-vec3 sky(float height) {
-    const float falloff = 4.0;
-    float haze = (exp(-falloff * height) - exp(-falloff)) / (1.0 - exp(-falloff));
-    return mix(frame.zenith.rgb, frame.horizon.rgb, haze);
-}
-
-vec3 ground(vec3 ray, float distance) {
-    vec3 point = distance * ray;
-    vec2 coordinate = vec2(dot(frame.shadow_u.xyz, point) + frame.shadow_u.w,
-                           dot(frame.shadow_v.xyz, point) + frame.shadow_v.w);
-    float shadow = textureLod(shadow_map, coordinate, 0.0).r;
-    vec3 colour = frame.ground.rgb + frame.ground_sun.rgb * shadow;
-    if (frame.flash.w > 0.0) {
-        vec3 way = frame.flash.xyz - point;
-        float squared = dot(way, way);
-        colour += frame.ground_flash.rgb * flash_falloff(squared) * max(way.z, 0.0) * inversesqrt(max(squared, 1.0e-6));
-    }
-    return mix(frame.horizon.rgb, colour, exp(-frame.air_extinction.rgb * distance));
-}
-
 void main() {
-    vec3 ray = fragment_ray();
-    float distance = ground_distance(ray);
-    vec3 colour = distance < 1.0e30 ? ground(ray, distance) : sky(max(ray.z, 0.0));
-    radiance = vec4(colour, 1.0);
+    radiance = vec4(background(pixel_ray(gl_FragCoord.xy)), 1.0);
     depth = vec4(0.0, 0.0, 0.0, 1.0);
 }

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ray through a pixel; for fragment shaders.
-#include "frame.glsl"
+// The ray through a pixel; needs frame.glsl.
 
-// Unit direction of the ray through this fragment.
-vec3 fragment_ray() {
-    vec2 pixel = gl_FragCoord.xy + frame.picture.zw;
+// Direction of the ray through a point of the tile of the picture, in pixels; its part along the view axis is 1.
+vec3 pixel_direction(vec2 point) {
+    vec2 pixel = point + frame.picture.zw;
     vec2 plane = vec2(2.0, -2.0) * pixel / frame.picture.xy + vec2(-1.0, 1.0);
-    return normalize(frame.forward.xyz + plane.x * frame.right.xyz + plane.y * frame.up.xyz);
+    return frame.forward.xyz + plane.x * frame.right.xyz + plane.y * frame.up.xyz;
 }
+
+vec3 pixel_ray(vec2 point) { return normalize(pixel_direction(point)); }
 
 // Distance along a ray at which it meets the ground; a very large number when it does not.
 float ground_distance(vec3 ray) {

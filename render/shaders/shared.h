@@ -30,10 +30,17 @@ NEPHOS_CONST float kMaxDepthScale = 32.0f;    // depth scale of the last level, 
 NEPHOS_CONST float kNearDistance = 1.5f;      // in radii: nearer metaballs are integrated, not textured
 NEPHOS_CONST float kMinRadiusPixels = 1.25f;  // smaller billboards are widened to it and thinned out
 NEPHOS_CONST float kPi = 3.14159265358979f;
-NEPHOS_CONST uint kComputeGroup = 64u;  // invocations in a work group
-NEPHOS_CONST uint kIntegrate = 1u;      // flag: evaluate the integral along the ray, do not use the textures
-NEPHOS_CONST uint kAround = 2u;         // flag: around or close to the eye, covers the whole picture
-NEPHOS_CONST float kMinPuffPixels = 1.0f;   // smaller billboards of T are widened to this half size
+NEPHOS_CONST uint kComputeGroup = 64u;  // invocations in a work group, where nothing else decides
+NEPHOS_CONST uint kTileWidth = 8u;      // pixels
+NEPHOS_CONST uint kTileHeight = 16u;
+NEPHOS_CONST uint kQueriesPerLane = 4u;
+NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
+NEPHOS_CONST float kMaxFittedDepth = 6.0f;    // depth scale; denser metaballs are integrated in the tiles
+NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance at which what lies behind is left out
+NEPHOS_CONST uint kIntegrate = 1u;  // flag: evaluate the integral along the ray, do not use the textures
+NEPHOS_CONST uint kNotFitted = 4u;  // flag: the tiles evaluate the integral, whatever the billboards do
+NEPHOS_CONST uint kAround = 2u;     // flag: around or close to the eye, covers the whole picture
+NEPHOS_CONST float kMinPuffPixels = 1.0f;  // smaller billboards of T are widened to this half size
 
 // A metaball as the eye sees it; 32 bytes.
 struct ViewBall {
@@ -42,7 +49,7 @@ struct ViewBall {
     float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * column()
     float light;        // transmittance towards the sun
     float height;       // in the cloud: 0 base, 1 top
-    uint flags;    // lower half; upper half: share of the lightning that arrives, 0..65535
+    uint flags;         // lower half; upper half: share of the lightning that arrives, 0..65535
 };
 
 // One of T's billboards as the eye sees it; 32 bytes.
@@ -63,23 +70,52 @@ struct PuffCloud {
     uint pad0, pad1, pad2;
 };
 
-// A metaball as the sun sees it; 32 bytes.
-struct LightBall {
-    float u, v;    // metres in the plane of the shadow map, from its middle
-    float radius;  // metres
-    float depth_scale;
-    float fraction;  // where in its slab the centre lies: 0 at the side of the sun, 1 at the far side
-    uint source;     // its place in the cloud; not used by shaders
-    uint pad0, pad1;
+// A metaball on the screen, as the tiles draw it; 16 bytes, and 4 more of SplatTail. As small as can be:
+// lavapipe fetches words from a buffer one by one, which costs more than drawing a splat's pixels.
+struct ViewSplat {
+    float x, y;           // of the centre, pixels
+    uint size_and_depth;  // halves: radius at the centre's depth, pixels; square root of the depth scale
+    uint red_and_green;   // halves: radiance at opacity 1
+};
+// halves: blue; distance in units of kDistanceUnit, or 0: evaluate the integral of its ViewBall along each
+// ray instead.
+#define SplatTail uint
+
+// A metaball on the shadow map, as the tiles draw it; 16 bytes.
+struct LightSplat {
+    float x, y;         // of the centre, texels
+    uint radii;         // halves: along x and y, texels
+    float depth_scale;  // optical depth through the middle = depth_scale * column(1)
+};
+// Its place along the light; 8 bytes.
+struct LightPlace {
+    float z;           // metres from the first centre
+    float per_radius;  // 1 / radius in metres
 };
 
-// Push constants of the light pass.
-struct LightStep {
-    float clip_per_metre_u, clip_per_metre_v;  // from metres to -1..1 across the map
-    float min_radius_u, min_radius_v;          // metres; billboards are widened to these half sizes
-    uint first;                                // compute: first metaball,
-    uint middle;                               // first one of the next slab,
-    uint end;                                  // end of the next slab
+// A place whose light is asked for; 16 bytes.
+struct LightQuery {
+    float x, y, z;  // as in LightSplat
+    float depth;    // optical depth towards the sun; what is found is added to it
+};
+
+// Queries that lie in one tile: up to kQueriesPerLane for each invocation.
+struct LightItem {
+    uint tile, first, count, pad0;
+};
+
+// Entries of the list of splats that belong to a tile: list[begin] .. list[end - 1].
+struct TileRange {
+    uint begin, end;
+};
+
+// Push constants of the compute passes.
+struct TileStep {
+    uint width, height;            // of the picture or the map, pixels
+    uint tiles_x;                  // tiles in a row
+    uint tile_count;               // or number of splats, or of items
+    uint first_batch, last_batch;  // booleans: clear the sums before; finish them after
+    float largest_radius;          // light: metres, of any splat
     uint pad0;
 };
 
@@ -94,7 +130,8 @@ struct Frame {
     vec4 sunlight;        // rgb: colour of the direct sun; w: strength of multiple scattering
     vec4 ambient_top;     // rgb; w: albedo of the cloud
     vec4 ambient_base;    // rgb; w: decay of diffuse light per optical depth
-    vec4 air_extinction;  // rgb: per metre; w: 1 = light of metaballs is T's (1 - absorbed), 0 = a transmittance
+    vec4 air_extinction;  // rgb: per metre; w: 1 = light of metaballs is T's (1 - absorbed), 0 = a
+                          // transmittance
     vec4 horizon;         // rgb: sky at the horizon, and light of the air itself
     vec4 zenith;          // rgb
     vec4 ground;  // rgb: radiance of the ground under open sky without the sun; w: height above the eye (< 0)
@@ -120,6 +157,32 @@ NEPHOS_FUNCTION float column(float w) {
     return w * w * sqrt(w) * (0.592592592592593f + 0.406349206349206f * w);
 }
 
+// 1 - exp(-d column(w)) as w^2 (c0 + c1 w + ... + c5 w^5), for depth scales d up to kMaxFittedDepth; the
+// coefficients are polynomials of s = d / (d + 4). Largest error 0.0005 min(1, d); from
+// tests/reference/fit_opacity.py.
+NEPHOS_FUNCTION float fit_parameter(float depth_scale) { return depth_scale / (depth_scale + 4.0f); }
+NEPHOS_FUNCTION float fit_row(float s, float a, float b, float c, float d, float e) {
+    return s * (a + s * (b + s * (c + s * (d + s * e))));
+}
+NEPHOS_FUNCTION float opacity_c0(float s) {
+    return fit_row(s, 0.4231499f, 1.2760525f, -11.549244f, 42.971609f, -38.80289f);
+}
+NEPHOS_FUNCTION float opacity_c1(float s) {
+    return fit_row(s, 5.0145599f, -34.206589f, 320.55556f, -886.62836f, 752.04615f);
+}
+NEPHOS_FUNCTION float opacity_c2(float s) {
+    return fit_row(s, -6.3734665f, 194.69115f, -1524.4345f, 4065.3462f, -3188.8959f);
+}
+NEPHOS_FUNCTION float opacity_c3(float s) {
+    return fit_row(s, 10.831419f, -377.91478f, 2859.7263f, -7389.1236f, 5301.7407f);
+}
+NEPHOS_FUNCTION float opacity_c4(float s) {
+    return fit_row(s, -8.3280895f, 306.77561f, -2368.4252f, 5817.7935f, -3754.5104f);
+}
+NEPHOS_FUNCTION float opacity_c5(float s) {
+    return fit_row(s, 2.426292f, -94.490722f, 721.69415f, -1645.7595f, 927.43252f);
+}
+
 // The integral from the middle of the chord up to s (|s| <= sqrt(w)), odd in s.
 NEPHOS_FUNCTION float column_part(float w, float s) {
     float s2 = s * s;
@@ -139,8 +202,9 @@ NEPHOS_FUNCTION float phase_function(float cos_theta, float g) {
 #ifdef __cplusplus
 static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&
               offsetof(ViewBall, flags) == 28);
-static_assert(sizeof(LightBall) == 32 && offsetof(LightBall, fraction) == 16);
-static_assert(sizeof(LightStep) == 32 && offsetof(LightStep, first) == 16 && offsetof(LightStep, end) == 24);
+static_assert(sizeof(ViewSplat) == 16 && sizeof(LightSplat) == 16 && sizeof(LightPlace) == 8);
+static_assert(sizeof(LightQuery) == 16 && sizeof(LightItem) == 16);
+static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 32);
 static_assert(sizeof(Puff) == 32 && offsetof(Puff, half_size) == 12 && offsetof(Puff, cloud) == 28);
 static_assert(sizeof(PuffCloud) == 32 && offsetof(PuffCloud, inverse_height) == 16);
 static_assert(sizeof(Frame) == 19 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&

@@ -4,7 +4,9 @@
 #include "shared.h"
 // Step 2: buffer = buffer * transmittance + colour. Alpha of both outputs is the transmittance, the blend factor.
 #include "attenuation.glsl"
+#include "frame.glsl"
 #include "ray.glsl"
+#include "integral.glsl"
 
 // Metaballs with kIntegrate have a pipeline of their own.
 layout(constant_id = 0) const bool kExact = false;
@@ -18,26 +20,11 @@ layout(location = 4) flat in vec4 centre_radius;
 layout(location = 0) out vec4 radiance;
 layout(location = 1) out vec4 depth;
 
-// The part of the ball between the eye and the ground, for balls that reach beyond either. The cross product keeps the
-// distance from the ray exact where a difference of squares would drown in the distance from the eye.
-float integrated_opacity(vec3 ray, float depth_scale) {
-    vec3 centre = centre_radius.xyz / centre_radius.w;
-    vec3 offset = cross(centre, ray);
-    float w = 1.0 - dot(offset, offset);
-    if (w <= 0.0) return 0.0;
-    float half_chord = sqrt(w);
-    float middle = dot(centre, ray);
-    float start = max(-half_chord, -middle);
-    float end = min(half_chord, ground_distance(ray) / centre_radius.w - middle);
-    if (end <= start) return 0.0;
-    return 1.0 - exp(-depth_scale * (column_part(w, end) - column_part(w, start)));
-}
-
 void main() {
-    vec3 ray = fragment_ray();
+    vec3 ray = pixel_ray(gl_FragCoord.xy);
     float opacity;
     if (kExact) {
-        opacity = integrated_opacity(ray, shape.x);
+        opacity = integrated_opacity(centre_radius.xyz, centre_radius.w, ray, shape.x);
     } else {
         // Where the ray pierces the billboard's plane is farther from the centre than the ray itself.
         vec2 nearest = point * inversesqrt(1.0 + dot(point, point) * shape.z);

@@ -6,6 +6,7 @@
 #include "attenuation.glsl"
 #include "billboard.glsl"
 #include "frame.glsl"
+#include "lighting.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Balls {
     ViewBall balls[];
@@ -26,26 +27,6 @@ void perpendicular(vec3 n, out vec3 u, out vec3 v) {
     v = vec3(b, sign_z + n.y * n.y * a, -n.y);
 }
 
-// Light that arrives along many paths: it decays with the optical depth towards the sun like diffusion through a slab,
-// far slower than the direct beam, and comes from all sides.
-void scattered_light(ViewBall ball, float distance) {
-    float optical_depth = -log(max(ball.light, 1.0e-30));
-    bool absorbs = frame.air_extinction.w > 0.0;  // T: light falls off in proportion to the way, to nothing
-    float multiple = frame.sunlight.w * (absorbs ? ball.light : 1.0 / (1.0 + frame.ambient_base.w * optical_depth));
-    vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, ball.height);
-    vec3 beta = exp(-frame.air_extinction.rgb * distance);
-    float albedo = frame.ambient_top.w;
-    vec3 light = frame.sunlight.rgb * multiple + ambient;
-    if (frame.flash.w > 0.0) {
-        vec3 way = frame.flash.xyz - vec3(ball.x, ball.y, ball.z);
-        float arrives = float(ball.flags >> 16) / 65535.0;
-        light += frame.flash.w * flash_falloff(dot(way, way)) * arrives * frame.flash_colour.rgb;
-    }
-    diffuse = mix(frame.horizon.rgb, albedo * light, beta);
-    // A white surface facing the sun has radiance 1 here, 1 / pi of its irradiance: hence pi times the phase function.
-    direct = beta * albedo * kPi * ball.light * frame.sunlight.rgb;
-}
-
 vec4 clip_position(vec3 position, float radius) {
     float depth = dot(frame.forward.xyz, position);
     vec2 picture = vec2(dot(frame.right.xyz, position) / dot(frame.right.xyz, frame.right.xyz),
@@ -61,7 +42,9 @@ void main() {
     vec3 centre = vec3(ball.x, ball.y, ball.z);
     float distance = length(centre);
     centre_radius = vec4(centre, ball.radius);
-    scattered_light(ball, distance);
+    Scattered light = scattered_light(ball, distance);
+    diffuse = light.diffuse;
+    direct = light.direct;
     if ((ball.flags & kAround) != 0u) {
         // There is no useful plane: the whole picture asks for the integral.
         point = corner;
@@ -70,11 +53,15 @@ void main() {
         return;
     }
     // Widen what is smaller than a pixel and thin it out: its optical depth times area stays.
-    float radius = max(ball.radius, kMinRadiusPixels * distance / frame.up.w);
+    float radius = drawn_radius(ball, distance);
     float thinning = ball.radius / radius;
     float depth_scale = ball.depth_scale * thinning * thinning;
     centre_radius.w = radius;
     float ratio = radius / distance;
+    if ((ball.flags & kIntegrate) == 0u) {  // so small that every ray to it sees the same phase
+        diffuse = radiance_along(light, centre / distance);
+        direct = vec3(0.0);
+    }
     // Seen from a finite distance the ball's outline is a circle a little larger than its radius.
     float outline = inversesqrt(max(1.0 - ratio * ratio, 0.1));
     vec3 u, v;

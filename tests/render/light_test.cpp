@@ -57,6 +57,22 @@ TEST(Column, IsTheIntegralOfTheField) {
     }
 }
 
+// The polynomial of the tiles, for every depth scale that they use it for.
+TEST(OpacityFit, IsTheOpacity) {
+    for (float depth_scale = 1e-4f; depth_scale <= shader::kMaxFittedDepth; depth_scale *= 1.05f) {
+        const float s = shader::fit_parameter(depth_scale);
+        const float c[] = {shader::opacity_c0(s), shader::opacity_c1(s), shader::opacity_c2(s),
+                           shader::opacity_c3(s), shader::opacity_c4(s), shader::opacity_c5(s)};
+        for (float w = 0; w <= 1; w += 1.0f / 512) {
+            const float fitted =
+                w * w * (c[0] + w * (c[1] + w * (c[2] + w * (c[3] + w * (c[4] + w * c[5])))));
+            const double exact = -std::expm1(-double(depth_scale) * double(shader::column(w)));
+            EXPECT_NEAR(double(fitted), exact, 0.0006 * std::min(1.0, double(depth_scale)))
+                << "depth scale " << depth_scale << ", w " << w;
+        }
+    }
+}
+
 TEST(AttenuationTextures, HoldTheOpacityOfEachLevel) {
     const std::vector<float> texels = attenuation_textures();
     constexpr std::size_t kSide = shader::kAttenuationTexels, kLevels = shader::kAttenuationLevels;

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/light_tiles.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <span>
+
+#include <Imath/half.h>
+#include <tbb/parallel_for.h>
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kMaxSplats = std::size_t{1} << 20;   // on the device at once: 32 MiB
+constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of their lists: 64 MiB
+constexpr std::size_t kMaxQueries = std::size_t{1} << 20;
+
+std::vector<PixelBox> boxes_of(std::span<const shader::LightSplat> splats) {
+    std::vector<PixelBox> boxes(splats.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, splats.size(), 8192), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const shader::LightSplat& s = splats[i];
+            Imath::half x, y;
+            x.setBits(std::uint16_t(s.radii & 0xFFFF));
+            y.setBits(std::uint16_t(s.radii >> 16));
+            const float rx = x, ry = y;
+            boxes[i] = {int(std::floor(s.x - rx)), int(std::floor(s.y - ry)), int(std::ceil(s.x + rx)),
+                        int(std::ceil(s.y + ry))};
+        }
+    });
+    return boxes;
+}
+
+}  // namespace
+
+// All centres, tile by tile, and in each tile in order from the sun.
+struct LightTiles::Queries {
+    std::vector<shader::LightQuery> queries;
+    std::vector<std::uint32_t> source;  // index into the order
+    std::vector<shader::LightItem> items;
+
+    Queries(const SunOrder& order, const TileGrid& grid, std::uint32_t per_item) {
+        std::vector<PixelBox> centres(order.splats.size());
+        for (std::size_t i = 0; i < centres.size(); ++i) {
+            const shader::LightSplat& s = order.splats[i];
+            const int x = std::clamp(int(s.x), 0, grid.width - 1),
+                      y = std::clamp(int(s.y), 0, grid.height - 1);
+            centres[i] = {x, y, x + 1, y + 1};
+        }
+        const TileBins bins = bin_into_tiles(centres, grid);
+        source = bins.list;
+        queries.reserve(source.size());
+        for (const std::uint32_t i : source)
+            queries.push_back({order.splats[i].x, order.splats[i].y, order.places[i].z, 0.0f});
+        for (std::uint32_t tile = 0; tile < bins.ranges.size(); ++tile) {
+            const shader::TileRange range = bins.ranges[tile];
+            for (std::uint32_t first = range.begin; first < range.end; first += per_item)
+                items.push_back({tile, first, std::min(per_item, range.end - first), 0});
+        }
+    }
+};
+
+LightTiles::LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+                       const vk::raii::Sampler& sampler)
+    : layout_(&layout),
+      sampler_(&sampler),
+      map_pipeline_(create_tile_pipeline(gpu, layout, shaders().light_map_comp)),
+      centres_pipeline_(create_tile_pipeline(gpu, layout, shaders().light_centres_comp)),
+      bindings_(create_bindings(gpu, layout)) {
+    bind_image(gpu, bindings_, 3, attenuation, sampler);
+}
+
+void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
+    const auto size = std::uint32_t(shadow_size);
+    if (map_.width == size) return;
+    map_ = {};
+    map_ = create_image(gpu, size, size, 1, vk::Format::eR32Sfloat,
+                        vk::ImageUsageFlagBits::eStorage | vk::ImageUsageFlagBits::eSampled |
+                            vk::ImageUsageFlagBits::eTransferDst);
+    bind_image(gpu, bindings_, 4, map_, *sampler_);
+    bind_storage_image(gpu, bindings_, 10, map_);
+    depths_ = create_buffer(gpu, std::size_t{size} * size * sizeof(float),
+                            vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::read);
+    bind_buffer(gpu, bindings_, 8, depths_);
+    submit_and_wait(
+        gpu, [&](const vk::raii::CommandBuffer& commands) { begin_image(commands, map_, access::compute); });
+}
+
+void LightTiles::use(const GpuDevice& gpu, std::span<const float> shadow, int shadow_size) {
+    resize_map(gpu, shadow_size);
+    const GpuBuffer staging =
+        create_buffer(gpu, shadow.size_bytes(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    std::memcpy(staging.mapped, shadow.data(), shadow.size_bytes());
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        image_barrier(commands, map_, access::sample, access::copy_to);
+        const vk::BufferImageCopy region(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, 0, 0},
+                                         {map_.width, map_.height, 1});
+        commands.copyBufferToImage(*staging.buffer, *map_.image, vk::ImageLayout::eGeneral, region);
+        image_barrier(commands, map_, access::copy_to, access::sample);
+    });
+}
+
+void LightTiles::upload_bins(const GpuDevice& gpu, const TileBins& bins) {
+    upload(gpu, bindings_, 5, ranges_, std::as_bytes(std::span(bins.ranges)));
+    upload(gpu, bindings_, 6, list_, std::as_bytes(std::span(bins.list)));
+}
+
+void LightTiles::draw_map(const GpuDevice& gpu, const TileGrid& grid, bool first, bool last) {
+    const shader::TileStep step{.width = shader::uint(grid.width),
+                                .height = shader::uint(grid.height),
+                                .tiles_x = shader::uint(grid.columns()),
+                                .tile_count = shader::uint(grid.tiles()),
+                                .first_batch = first,
+                                .last_batch = last,
+                                .largest_radius = 0,
+                                .pad0 = 0};
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        begin_compute(commands, *layout_, bindings_, map_pipeline_, step);
+        image_barrier(commands, map_, access::sample, access::compute);
+        dispatch_groups(commands, grid.tiles());
+        buffer_barrier(commands, depths_, access::compute, access::host);
+        image_barrier(commands, map_, access::compute, access::sample);
+    });
+}
+
+// Adds what the splats on the device take from the light of all centres.
+void LightTiles::ask(const GpuDevice& gpu, const SunOrder& order, const TileGrid& grid, Queries& queries) {
+    for (std::size_t begin = 0; begin < queries.items.size();) {
+        const std::uint32_t first = queries.items[begin].first;
+        std::vector<shader::LightItem> items;
+        std::uint32_t end = first;
+        for (; begin < queries.items.size() && end - first < kMaxQueries; ++begin) {
+            shader::LightItem item = queries.items[begin];
+            end = item.first + item.count;
+            item.first -= first;
+            items.push_back(item);
+        }
+        const std::span asked = std::span(queries.queries).subspan(first, end - first);
+        upload(gpu, bindings_, 1, queries_, std::as_bytes(asked));
+        upload(gpu, bindings_, 7, items_, std::as_bytes(std::span(items)));
+        const shader::TileStep step{.width = shader::uint(grid.width),
+                                    .height = shader::uint(grid.height),
+                                    .tiles_x = shader::uint(grid.columns()),
+                                    .tile_count = shader::uint(items.size()),
+                                    .first_batch = 0,
+                                    .last_batch = 0,
+                                    .largest_radius = order.largest_radius,
+                                    .pad0 = 0};
+        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+            begin_compute(commands, *layout_, bindings_, centres_pipeline_, step);
+            dispatch_groups(commands, items.size());
+            buffer_barrier(commands, queries_, access::compute, access::host);
+        });
+        std::memcpy(asked.data(), queries_.mapped, asked.size_bytes());
+    }
+}
+
+std::vector<float> LightTiles::run(const GpuDevice& gpu, const SunOrder& order, int shadow_size,
+                                   std::vector<float>& shadow) {
+    resize_map(gpu, shadow_size);
+    const TileGrid grid{shadow_size, shadow_size};
+    const std::vector<PixelBox> boxes = boxes_of(order.splats);
+    Queries queries(order, grid, shader::kQueriesPerLane * gpu.tile_lanes);
+    std::size_t begin = 0;
+    do {  // once even without any splat: the map is then all light
+        const std::size_t end = end_of_batch(boxes, begin, grid, kMaxSplats, kMaxEntries);
+        const std::span splats = std::span(order.splats).subspan(begin, end - begin);
+        upload(gpu, bindings_, 2, splats_, std::as_bytes(splats));
+        upload(gpu, bindings_, 9, places_,
+               std::as_bytes(std::span(order.places).subspan(begin, end - begin)));
+        upload_bins(gpu, bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid));
+        draw_map(gpu, grid, begin == 0, end == boxes.size());
+        ask(gpu, order, grid, queries);
+        begin = end;
+    } while (begin < boxes.size());
+
+    shadow.resize(std::size_t(shadow_size) * std::size_t(shadow_size));
+    std::memcpy(shadow.data(), depths_.mapped, shadow.size() * sizeof(float));
+    std::vector<float> light(order.splats.size());
+    for (std::size_t i = 0; i < light.size(); ++i)
+        light[queries.source[i]] = std::exp(-queries.queries[i].depth);
+    return light;
+}
+
+}  // namespace nephos

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/screen_box.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "render/vector_math.h"
+
+namespace nephos {
+namespace {
+
+// Least and largest of a sphere's tangents: `across` and `depth` are its centre's coordinates across and
+// along the view, with depth > radius.
+struct Tangents {
+    double least, largest;
+};
+
+Tangents tangents(double across, double depth, double radius) {
+    const double root = radius * std::sqrt(across * across + depth * depth - radius * radius);
+    const double scale = 1.0 / (depth * depth - radius * radius);
+    return {(across * depth - root) * scale, (across * depth + root) * scale};
+}
+
+// Far beyond any picture, and far from the limits of int.
+int to_pixel(double value) { return int(std::clamp(value, -1e6, 1e6)); }
+
+PixelBox screen_box(const shader::ViewBall& ball, const CameraFrame& camera, const Camera& options,
+                    const Tile& tile) {
+    const PixelBox everything{0, 0, tile.width, tile.height};
+    const Vec3 centre{ball.x, ball.y, ball.z};
+    const double depth = dot(centre, camera.forward);
+    const double least = double(shader::kMinRadiusPixels) * length(centre) / pixels_per_unit(options, camera);
+    const double radius = 1.0001 * std::max(double(ball.radius), least);
+    if ((ball.flags & shader::kAround) != 0 || depth <= 1.001 * radius) return everything;
+    const Tangents x = tangents(dot(centre, camera.right), depth, radius);
+    const Tangents y = tangents(dot(centre, camera.up), depth, radius);
+    const double half_width = 0.5 * options.width, half_height = 0.5 * options.height;
+    const double per_x = half_width / camera.half_width, per_y = half_height / camera.half_height;
+    return {to_pixel(std::floor(half_width + x.least * per_x)) - tile.x,
+            to_pixel(std::floor(half_height - y.largest * per_y)) - tile.y,
+            to_pixel(std::ceil(half_width + x.largest * per_x)) - tile.x,
+            to_pixel(std::ceil(half_height - y.least * per_y)) - tile.y};
+}
+
+}  // namespace
+
+std::vector<PixelBox> screen_boxes(const EyeOrder& order, const CameraFrame& camera, const Camera& options,
+                                   const Tile& tile) {
+    const std::size_t count = order.balls.size();
+    std::vector<PixelBox> boxes(count);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i)
+            boxes[i] = screen_box(order.balls[count - 1 - i], camera, options, tile);
+    });
+    return boxes;
+}
+
+}  // namespace nephos

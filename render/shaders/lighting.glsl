@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// The light that a metaball scatters towards the eye; needs frame.glsl.
+
+struct Scattered {
+    vec3 diffuse;  // radiance that does not depend on the ray
+    vec3 direct;   // radiance per phase function
+};
+
+// Light that arrives along many paths decays with the optical depth towards the sun like diffusion through a slab, far
+// slower than the direct beam, and comes from all sides.
+Scattered scattered_light(ViewBall ball, float distance) {
+    float optical_depth = -log(max(ball.light, 1.0e-30));
+    bool absorbs = frame.air_extinction.w > 0.0;  // T: light falls off in proportion to the way, to nothing
+    float multiple = frame.sunlight.w * (absorbs ? ball.light : 1.0 / (1.0 + frame.ambient_base.w * optical_depth));
+    vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, ball.height);
+    vec3 beta = exp(-frame.air_extinction.rgb * distance);
+    float albedo = frame.ambient_top.w;
+    vec3 arriving = frame.sunlight.rgb * multiple + ambient;
+    if (frame.flash.w > 0.0) {
+        vec3 way = frame.flash.xyz - vec3(ball.x, ball.y, ball.z);
+        float share = float(ball.flags >> 16) / 65535.0;
+        arriving += frame.flash.w * flash_falloff(dot(way, way)) * share * frame.flash_colour.rgb;
+    }
+    Scattered light;
+    light.diffuse = mix(frame.horizon.rgb, albedo * arriving, beta);
+    // A white surface facing the sun has radiance 1 here, 1 / pi of its irradiance: hence pi times the phase function.
+    light.direct = beta * albedo * kPi * ball.light * frame.sunlight.rgb;
+    return light;
+}
+
+// Radiance towards the eye along `ray`. The sunlight travels along -to_sun and goes on along -ray.
+vec3 radiance_along(Scattered light, vec3 ray) {
+    return light.diffuse + light.direct * phase_function(dot(frame.to_sun.xyz, ray), frame.to_sun.w);
+}
+
+// Radius in metres of what is drawn: widened to a part of a pixel, see kMinRadiusPixels.
+float drawn_radius(ViewBall ball, float distance) {
+    return max(ball.radius, kMinRadiusPixels * distance / frame.up.w);
+}

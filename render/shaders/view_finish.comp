@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.h"
+// Tiles, last: what is seen of the background behind the clouds.
+#include "frame.glsl"
+#include "ray.glsl"
+#include "background.glsl"
+
+layout(local_size_x = kComputeGroup) in;
+layout(set = 0, binding = 8, std430) buffer Radiance {
+    vec4 radiance[];  // w: transmittance
+};
+layout(push_constant) uniform Step {
+    TileStep step;
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.y * (32768u * kComputeGroup) + gl_GlobalInvocationID.x;
+    if (index >= step.width * step.height) return;
+    vec2 pixel = vec2(index % step.width, index / step.width) + 0.5;
+    vec4 clouds = radiance[index];
+    if (clouds.a > 0.0) radiance[index].rgb = clouds.rgb + clouds.a * background(pixel_ray(pixel));
+}

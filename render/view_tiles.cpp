@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/view_tiles.h"
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+
+#include "render/screen_box.h"
+#include "render/view_pass.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kMaxBalls = std::size_t{1} << 20;    // on the device at once: 52 MiB with their splats
+constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of the tiles' lists: 64 MiB
+
+vk::raii::Pipeline make_tiles(const GpuDevice& gpu, const PipelineLayout& layout, bool mixed,
+                              bool distances) {
+    return create_tile_pipeline(gpu, layout, shaders().view_tiles_comp, {mixed, distances});
+}
+
+}  // namespace
+
+ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+                     const vk::raii::Sampler& sampler)
+    : layout_(&layout),
+      project_(create_compute_pipeline(gpu, layout, shaders().view_project_comp)),
+      finish_(create_compute_pipeline(gpu, layout, shaders().view_finish_comp)),
+      tiles_{{make_tiles(gpu, layout, false, false), make_tiles(gpu, layout, false, true)},
+             {make_tiles(gpu, layout, true, false), make_tiles(gpu, layout, true, true)}},
+      bindings_(create_bindings(gpu, layout)),
+      frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
+                           HostAccess::write)) {
+    bind_buffer(gpu, bindings_, 0, frame_);
+    bind_image(gpu, bindings_, 3, attenuation, sampler);
+}
+
+void ViewTiles::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler) {
+    bind_image(gpu, bindings_, 4, map, sampler);
+}
+
+void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order,
+                           std::size_t balls, bool first, bool last) {
+    shader::TileStep step{.width = shader::uint(grid.width),
+                          .height = shader::uint(grid.height),
+                          .tiles_x = shader::uint(grid.columns()),
+                          .tile_count = shader::uint(balls),
+                          .first_batch = first,
+                          .last_batch = last,
+                          .largest_radius = 0,
+                          .pad0 = 0};
+    const auto groups = [](std::size_t invocations) {
+        return (invocations + shader::kComputeGroup - 1) / shader::kComputeGroup;
+    };
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        begin_compute(commands, *layout_, bindings_, project_, step);
+        dispatch_groups(commands, groups(balls));
+        compute_barrier(commands);
+        step.tile_count = shader::uint(grid.tiles());
+        begin_compute(commands, *layout_, bindings_, tiles_[order.all_fitted ? 0 : 1][order.depth ? 1 : 0],
+                      step);
+        dispatch_groups(commands, grid.tiles());
+        compute_barrier(commands);
+        if (last) {
+            begin_compute(commands, *layout_, bindings_, finish_, step);
+            dispatch_groups(commands, groups(std::size_t(grid.width) * std::size_t(grid.height)));
+        }
+        buffer_barrier(commands, radiance_, access::compute, access::host);
+        buffer_barrier(commands, depth_, access::compute, access::host);
+    });
+}
+
+void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, const CameraFrame& camera,
+                          const shader::Frame& frame, const Tile& tile, const EyeOrder& order,
+                          Picture& picture) {
+    std::memcpy(frame_.mapped, &frame, sizeof frame);
+    const TileGrid grid{tile.width, tile.height};
+    const std::size_t pixels = std::size_t(tile.width) * std::size_t(tile.height);
+    reserve(gpu, bindings_, 8, radiance_, 4 * sizeof(float) * pixels, HostAccess::read);
+    reserve(gpu, bindings_, 9, depth_, sizeof(float) * pixels, HostAccess::read);
+
+    const std::vector<PixelBox> boxes = screen_boxes(order, camera, options.camera, tile);
+    std::vector<shader::ViewBall> balls;
+    std::size_t begin = 0;
+    do {  // once even without any ball, for the background
+        const std::size_t end = end_of_batch(boxes, begin, grid, kMaxBalls, kMaxEntries);
+        balls.assign(order.balls.rbegin() + std::ptrdiff_t(begin),
+                     order.balls.rbegin() + std::ptrdiff_t(end));
+        upload(gpu, bindings_, 1, balls_, std::as_bytes(std::span(balls)));
+        reserve(gpu, bindings_, 2, splats_, sizeof(shader::ViewSplat) * balls.size(), HostAccess::write);
+        reserve(gpu, bindings_, 7, tails_, sizeof(shader::uint) * balls.size(), HostAccess::write);
+        const TileBins bins = bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid);
+        upload(gpu, bindings_, 5, ranges_, std::as_bytes(std::span(bins.ranges)));
+        upload(gpu, bindings_, 6, list_, std::as_bytes(std::span(bins.list)));
+        draw_batch(gpu, grid, order, balls.size(), begin == 0, end == boxes.size());
+        begin = end;
+    } while (begin < boxes.size());
+    store_tile(reinterpret_cast<const float*>(radiance_.mapped),
+               order.depth ? reinterpret_cast<const float*>(depth_.mapped) : nullptr, tile, picture);
+}
+
+}  // namespace nephos

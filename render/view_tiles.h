@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Step 2 of D in compute shaders: the fast path. Metaballs are binned into tiles of 8x16 pixels and added up
+// front to back, with a polynomial instead of a texture for their attenuation, until a tile is opaque. The
+// same picture as that of the blended billboards (view_pass.h), which remain as the reference. Private to the
+// module.
+
+#include "render/camera.h"
+#include "render/eye_order.h"
+#include "render/frame_data.h"
+#include "render/gpu_pipeline.h"
+#include "render/tile_bins.h"
+
+namespace nephos {
+
+class ViewTiles {
+  public:
+    // `attenuation` is not read, but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
+    ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+              const vk::raii::Sampler& sampler);
+
+    // The map that the ground wears; in the layout GENERAL and readable by compute shaders.
+    void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
+
+    // Draws one tile of the picture and stores its pixels.
+    void draw_tile(const GpuDevice& gpu, const RenderOptions& options, const CameraFrame& camera,
+                   const shader::Frame& frame, const Tile& tile, const EyeOrder& order, Picture& picture);
+
+  private:
+    void draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order, std::size_t balls,
+                    bool first, bool last);
+
+    const PipelineLayout* layout_;
+    vk::raii::Pipeline project_, finish_;
+    vk::raii::Pipeline tiles_[2][2];  // [some are not fitted][with distances]
+    Bindings bindings_;
+    GpuBuffer frame_, balls_, splats_, ranges_, tails_, list_, radiance_, depth_;
+};
+
+}  // namespace nephos
