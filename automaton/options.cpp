@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <string_view>
 
 #include "automaton/error.h"
 #include "automaton/text.h"
@@ -17,17 +18,31 @@ void require(bool good, const std::string& message) {
 
 std::string number(double value) { return number_text(value, 6); }
 
-void require_finite(double value, const std::string& name) {
-    require(std::isfinite(value), name + " = " + number(value) + ": expected a finite number");
+// The name of a value, put together only for a message: thousands of ellipsoids may be checked in every step.
+struct Name {
+    std::string_view base, part;
+    Name(std::string_view of, std::string_view its = {}) : base(of), part(its) {}
+    Name(const std::string& whole) : base(whole) {}
+    Name(const char* whole) : base(whole) {}
+    std::string text() const { return std::string(base).append(part); }
+};
+
+[[noreturn]] void refuse(const Name& name, const std::string& why) {
+    throw Error(ErrorCode::usage, name.text() + why);
 }
 
-void check(const Probabilities& p, const std::string& name) {
+void require_finite(double value, const Name& name) {
+    if (!std::isfinite(value)) refuse(name, " = " + number(value) + ": expected a finite number");
+}
+
+void check(const Probabilities& p, const Name& name) {
     const auto one = [&](double value, const char* part) {
-        require(value >= 0 && value <= 1, name + "." + part + " = " + number(value) + ": expected 0..1");
+        if (value >= 0 && value <= 1) return;
+        refuse(name, std::string(part) + " = " + number(value) + ": expected 0..1");
     };
-    one(p.hum, "hum");
-    one(p.act, "act");
-    one(p.ext, "ext");
+    one(p.hum, ".hum");
+    one(p.act, ".act");
+    one(p.ext, ".ext");
 }
 
 void check(const Range& r, const std::string& name) {
@@ -36,20 +51,22 @@ void check(const Range& r, const std::string& name) {
             name + ": expected finite numbers");
 }
 
-void check_life(double birth_s, double life_s, double fade_in_s, double fade_out_s, const std::string& name) {
-    require_finite(birth_s, name + ".birth_s");
-    require(life_s > 0, name + ".life_s = " + number(life_s) + ": expected > 0 s");
-    require(fade_in_s >= 0 && std::isfinite(fade_in_s), name + ".fade_in_s: expected a finite number >= 0 s");
-    require(fade_out_s >= 0 && std::isfinite(fade_out_s),
-            name + ".fade_out_s: expected a finite number >= 0 s");
+void check_life(double birth_s, double life_s, double fade_in_s, double fade_out_s, std::string_view name) {
+    require_finite(birth_s, {name, ".birth_s"});
+    if (!(life_s > 0)) refuse({name, ".life_s"}, " = " + number(life_s) + ": expected > 0 s");
+    const auto fade = [&](double value, const char* part) {
+        if (!(value >= 0 && std::isfinite(value))) refuse({name, part}, ": expected a finite number >= 0 s");
+    };
+    fade(fade_in_s, ".fade_in_s");
+    fade(fade_out_s, ".fade_out_s");
 }
 
 // The images of an ellipsoid that a periodic axis repeats are all visited, so they must stay few.
-void check_semi_axis(double semi_axis_m, double box_m, bool periodic, const std::string& name) {
-    require(semi_axis_m > 0 && std::isfinite(semi_axis_m),
-            name + " = " + number(semi_axis_m) + ": expected a finite number > 0 m");
-    require(!periodic || semi_axis_m <= 16 * box_m,
-            name + " = " + number(semi_axis_m) + ": at most 16 times the length of a periodic axis");
+void check_semi_axis(double semi_axis_m, double box_m, bool periodic, const Name& name) {
+    if (!(semi_axis_m > 0 && std::isfinite(semi_axis_m)))
+        refuse(name, " = " + number(semi_axis_m) + ": expected a finite number > 0 m");
+    if (periodic && !(semi_axis_m <= 16 * box_m))
+        refuse(name, " = " + number(semi_axis_m) + ": at most 16 times the length of a periodic axis");
 }
 
 void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::string& name) {
@@ -116,19 +133,19 @@ double images_of(const Vec3& semi_axes_m, const AutomatonOptions& o) {
 }  // namespace
 
 void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& name) {
-    require_finite(e.centre_m.x, name + ".centre_m.x");
-    require_finite(e.centre_m.y, name + ".centre_m.y");
-    require_finite(e.centre_m.z, name + ".centre_m.z");
+    require_finite(e.centre_m.x, {name, ".centre_m.x"});
+    require_finite(e.centre_m.y, {name, ".centre_m.y"});
+    require_finite(e.centre_m.z, {name, ".centre_m.z"});
     const double cell = o.placement.cell_size_m;
     const bool periodic_xy = o.boundaries.x == Boundary::periodic || o.boundaries.y == Boundary::periodic;
     const double shorter = std::min(o.extent.x, o.extent.y) * cell;
-    check_semi_axis(e.semi_axes_m.x, shorter, periodic_xy, name + ".semi_axes_m.x");
-    check_semi_axis(e.semi_axes_m.y, shorter, periodic_xy, name + ".semi_axes_m.y");
+    check_semi_axis(e.semi_axes_m.x, shorter, periodic_xy, {name, ".semi_axes_m.x"});
+    check_semi_axis(e.semi_axes_m.y, shorter, periodic_xy, {name, ".semi_axes_m.y"});
     check_semi_axis(e.semi_axes_m.z, o.extent.z * cell, o.boundaries.z == Boundary::periodic,
-                    name + ".semi_axes_m.z");
-    require_finite(e.yaw_deg, name + ".yaw_deg");
-    check(e.centre, name + ".centre");
-    check(e.rim, name + ".rim");
+                    {name, ".semi_axes_m.z"});
+    require_finite(e.yaw_deg, {name, ".yaw_deg"});
+    check(e.centre, {name, ".centre"});
+    check(e.rim, {name, ".rim"});
     check_life(e.birth_s, e.life_s, e.fade_in_s, e.fade_out_s, name);
 }
 
