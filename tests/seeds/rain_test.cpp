@@ -124,6 +124,48 @@ TEST(RainArea, AttachedToClouds) {
     expect_error(ErrorCode::usage, "state", [] { check(AttachedRain{.state = {0.7, 0.2}}); });
 }
 
+TEST(RainArea, BetweenTwoMoments) {
+    const RainArea a{.id = 1, .x_m = 0, .y_m = 100, .semi_a_m = 200, .semi_b_m = 50, .intensity_mm_per_h = 4};
+    RainArea b = a;
+    b.x_m = 80;
+    b.semi_a_m = 400;
+    b.intensity_mm_per_h = 8;
+    b.axis_x = 0;
+    b.axis_y = -1;  // the same axis as (0, 1)
+    const RainArea gone{.id = 2, .x_m = 5, .intensity_mm_per_h = 3},
+        born{.id = 3, .x_m = 7, .intensity_mm_per_h = 6};
+    const std::vector<RainArea> from{a, gone}, to{born, b};
+    const std::vector<RainArea> half = mix(from, to, 0.5);
+    ASSERT_EQ(half.size(), 3u);
+    EXPECT_EQ(half[0].id, 1u);
+    EXPECT_EQ(half[0].x_m, 40);
+    EXPECT_EQ(half[0].y_m, 100);
+    EXPECT_EQ(half[0].semi_a_m, 300);
+    EXPECT_EQ(half[0].intensity_mm_per_h, 6);
+    EXPECT_NEAR(half[0].axis_x * half[0].axis_x + half[0].axis_y * half[0].axis_y, 1, 1e-12);
+    EXPECT_NEAR(std::abs(half[0].axis_x), std::sqrt(0.5), 1e-12);
+    EXPECT_EQ(half[1].id, 2u);
+    EXPECT_EQ(half[1].intensity_mm_per_h, 1.5);
+    EXPECT_EQ(half[2].id, 3u);
+    EXPECT_EQ(half[2].intensity_mm_per_h, 3);
+    EXPECT_EQ(mix(from, to, 0).size(), 2u) << "what only begins is not there yet";
+    EXPECT_EQ(mix(from, from, 0.3), from);
+
+    // Through a periodic side: it does not sweep over the whole world.
+    b.x_m = 10000;
+    EXPECT_EQ(mix(std::vector{a}, std::vector{b}, 0.5), std::vector{a});
+    EXPECT_TRUE(mix({}, {}, 0.5).empty());
+}
+
+TEST(RainArea, PlacedAreasOfLayersHaveDifferentIds) {
+    const std::vector<PlacedRain> rains(2);
+    const auto low = placed_areas(rains, 0, {}), high = placed_areas(rains, 0, {}, 1);
+    ASSERT_EQ(low.size(), 2u);
+    EXPECT_NE(low[0].id, low[1].id);
+    EXPECT_NE(low[0].id, high[0].id);
+    EXPECT_NE(low[1].id, high[0].id);
+}
+
 TEST(RainArea, HumidColumns) {
     const std::vector<RainArea> areas{{.x_m = 1,
                                        .y_m = 2,
