@@ -16,11 +16,9 @@ vec3 ground(vec3 ray, float distance) {
                            dot(frame.shadow_v.xyz, point) + frame.shadow_v.w);
     float shadow = textureLod(shadow_map, coordinate, 0.0).r;
     vec3 colour = frame.ground.rgb + frame.ground_sun.rgb * shadow;
-    if (frame.flash.w > 0.0) {
-        vec3 way = frame.flash.xyz - point;
-        float squared = dot(way, way);
-        colour += frame.ground_flash.rgb * flash_falloff(squared) * max(way.z, 0.0) * inversesqrt(max(squared, 1.0e-6));
-    }
+    vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark, no branch: see lighting.glsl
+    float squared = dot(way, way);
+    colour += frame.ground_flash.rgb * flash_falloff(squared) * max(way.z, 0.0) * inversesqrt(max(squared, 1.0e-6));
     return mix(frame.horizon.rgb, colour, exp(-frame.air_extinction.rgb * distance));
 }
 

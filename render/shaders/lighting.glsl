@@ -10,17 +10,17 @@ struct Scattered {
 // slower than the direct beam, and comes from all sides.
 Scattered scattered_light(ViewBall ball, float distance) {
     float optical_depth = -log(max(ball.light, 1.0e-30));
-    bool absorbs = frame.air_extinction.w > 0.0;  // T: light falls off in proportion to the way, to nothing
-    float multiple = frame.sunlight.w * (absorbs ? ball.light : 1.0 / (1.0 + frame.ambient_base.w * optical_depth));
+    // Or T's absorption: light falls off in proportion to the way, to nothing. No branches on what is the same for the
+    // whole picture: lavapipe then compiles the shader anew for each draw.
+    float multiple = frame.sunlight.w * mix(1.0 / (1.0 + frame.ambient_base.w * optical_depth), ball.light,
+                                            frame.air_extinction.w);
     vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, ball.height);
     vec3 beta = exp(-frame.air_extinction.rgb * distance);
     float albedo = frame.ambient_top.w;
     vec3 arriving = frame.sunlight.rgb * multiple + ambient;
-    if (frame.flash.w > 0.0) {
-        vec3 way = frame.flash.xyz - vec3(ball.x, ball.y, ball.z);
-        float share = float(ball.flags >> 16) / 65535.0;
-        arriving += frame.flash.w * flash_falloff(dot(way, way)) * share * frame.flash_colour.rgb;
-    }
+    vec3 way = frame.flash.xyz - vec3(ball.x, ball.y, ball.z);  // lightning; adds nothing in the dark
+    float share = float(ball.flags >> 16) / 65535.0;
+    arriving += frame.flash.w * flash_falloff(dot(way, way)) * share * frame.flash_colour.rgb;
     Scattered light;
     light.diffuse = mix(frame.horizon.rgb, albedo * arriving, beta);
     // A white surface facing the sun has radiance 1 here, 1 / pi of its irradiance: hence pi times the phase function.

@@ -30,13 +30,10 @@ vec3 light_at(vec3 position, Puff puff, PuffCloud cloud) {
     float height = clamp((position.z - cloud.base) * cloud.inverse_height, 0.0, 1.0);
     vec3 light = diffuse(frame.to_sun.xyz, outwards, frame.sunlight.rgb, absorbed.x) +
                  mix(frame.ambient_base.rgb, frame.ambient_top.rgb, height);
-    if (frame.flash.w > 0.0) {
-        vec3 way = frame.flash.xyz - position;
-        float squared = dot(way, way);
-        vec3 to_flash = way * inversesqrt(max(squared, 1.0e-6));
-        light += frame.flash.w * flash_falloff(squared) *
-                 diffuse(to_flash, outwards, frame.flash_colour.rgb, absorbed.y);
-    }
+    vec3 way = frame.flash.xyz - position;  // adds nothing in the dark; no branch, see lighting.glsl
+    float squared = dot(way, way);
+    vec3 to_flash = way * inversesqrt(max(squared, 1.0e-6));
+    light += frame.flash.w * flash_falloff(squared) * diffuse(to_flash, outwards, frame.flash_colour.rgb, absorbed.y);
     return frame.ambient_top.w * light;
 }
 
