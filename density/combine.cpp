@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "density/openvdb_access.h"
 
 namespace nephos {
@@ -141,8 +142,8 @@ GridBox common_box(std::span<const GridBox> boxes) {
     const double most = double(std::numeric_limits<int>::max());
     if (nx > most || ny > most || nz > most) {
         throw Error(ErrorCode::usage, "the grids lie too far apart for one grid of their smallest voxels: " +
-                                          std::to_string(nx) + " x " + std::to_string(ny) + " x " +
-                                          std::to_string(nz));
+                                          number_text(nx, 17) + " x " + number_text(ny, 17) + " x " +
+                                          number_text(nz, 17));
     }
     return {{int(nx), int(ny), int(nz)},
             {{origin.x + x * size, origin.y + y * size, origin.z + z * size}, size}};
@@ -184,7 +185,7 @@ DensityGrid combine(std::span<const DensityGrid> grids) {
 DensityGrid scaled(const DensityGrid& grid, double factor) {
     if (!(factor > 0 && factor <= 1)) {
         throw Error(ErrorCode::usage,
-                    "factor of a density is " + std::to_string(factor) + ": must be above 0 and at most 1");
+                    "factor of a density is " + number_text(factor, 6) + ": must be above 0 and at most 1");
     }
     if (factor == 1) return grid;
     const std::vector<Block> sources = blocks_of(grid);

@@ -28,7 +28,7 @@ using Node1 = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
 void check_placement(const Placement& placement) {
     if (!(placement.cell_size_m > 0) || !std::isfinite(placement.cell_size_m)) {
         throw Error(ErrorCode::usage,
-                    "cell size " + std::to_string(placement.cell_size_m) + " m: must be above 0 and finite");
+                    "cell size " + number_text(placement.cell_size_m, 6) + " m: must be above 0 and finite");
     }
 }
 

@@ -9,6 +9,7 @@
 #include <Imath/half.h>
 
 #include "automaton/error.h"
+#include "automaton/text.h"
 #include "render/keyed_order.h"
 #include "render/vector_math.h"
 
@@ -26,8 +27,8 @@ void check(const Metaball& ball, std::size_t index) {
     if (!finite || !(ball.radius > 0))
         throw Error(ErrorCode::usage, "metaball " + std::to_string(index) +
                                           ": expected finite numbers and a radius above 0, got radius " +
-                                          std::to_string(ball.radius) + ", density " +
-                                          std::to_string(ball.density));
+                                          number_text(double(ball.radius), 6) + ", density " +
+                                          number_text(double(ball.density), 6));
 }
 
 // Two half floats, the first in the low bits.

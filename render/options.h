@@ -39,7 +39,7 @@ Vec3 direction_to_sun(const Sun& sun);
 
 // How the light of the sun finds its way into voxel clouds.
 enum class Lighting {
-    light_pass,  // D, step 1: metaballs drawn from the sun, each behind the attenuation of those before it
+    light_pass,  // D, step 1: exponential attenuation by the metaballs between a centre and the sun
     cfa,         // T's light absorption factor over blocks of voxels (voxel_absorption.h)
 };
 
@@ -57,9 +57,10 @@ struct CloudLight {
     Rgb ambient_base{0.11, 0.14, 0.19};  // ... and its base; between them by height
     Lighting lighting =
         Lighting::light_pass;  // of voxel clouds; clouds drawn as billboards always have the CFA
-    // T: the way in a voxel cloud of density 1 after which a light is absorbed, by the CFA; > 0, may be infinite.
-    // Larger: light reaches deeper. 2 / extinction_per_m lets in as much light in all as the light pass (the area
-    // below 1 - x / distance is that below exp(-extinction x)). Clouds drawn as billboards have that of their model.
+    // T: the way in a voxel cloud of density 1 after which a light is absorbed, by the CFA; > 0, may be
+    // infinite. Larger: light reaches deeper. 2 / extinction_per_m lets in as much light in all as the light
+    // pass (the area below 1 - x / distance is that below exp(-extinction x)). Clouds drawn as billboards
+    // have that of their model.
     double light_distance_m = 100.0;
     // Clouds drawn as billboards whose absorption is computed anew in one frame because the light moved (T:
     // 1);

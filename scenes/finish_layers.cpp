@@ -146,6 +146,7 @@ void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& laye
     if (!below(reader, "coupling").find("min_semi_axis_m")) {
         layer.coupling.min_semi_axis_m = layer.placement.cell_size_m;
     }
+    if (!reader.find("cross_edges_whole")) layer.cross_edges_whole = layer.automaton;
     HumidColumn& column = layer.rain.column;
     if (std::isinf(column.bottom_m)) column.bottom_m = layer.placement.origin_m.z;
     if (std::isinf(column.top_m)) {

@@ -7,6 +7,7 @@
 #include "automaton/error.h"
 #include "automaton/random.h"
 #include "scenes/scene.h"
+#include "scenes/text.h"
 
 namespace nephos {
 namespace {
@@ -102,7 +103,7 @@ std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer) {
 SkiesAtTime skies_at(const Scene& scene, double time_s) {
     if (!(time_s >= 0) || !std::isfinite(time_s)) {
         throw Error(ErrorCode::usage,
-                    "no sky at " + std::to_string(time_s) + " s, expected a time of 0 s or later");
+                    "no sky at " + number_text(time_s) + " s, expected a time of 0 s or later");
     }
     const double step_s = scene.automaton.time_step_s;
     // A product of decimal fractions seldom meets a step exactly.

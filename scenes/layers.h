@@ -83,7 +83,7 @@ struct LayerOptions {
     std::vector<StatePoint> schedule;  // no point: the climate's
 
     double formation_s = 300, dissolution_s = 300, formation_softness = 0.5;  // as in SkyOptions
-    bool cross_edges_whole = true;
+    bool cross_edges_whole = true;  // the reader's default: only with an automaton
     CouplingOptions coupling;
     LayerRain rain;
     bool operator==(const LayerOptions&) const = default;

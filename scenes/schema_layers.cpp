@@ -326,10 +326,11 @@ const Section& layer_section() {
                  "formation_softness", "", between(1e-3, 1e3),
                  "How gently one box appears: small, one after the other; large, "
                  "all together."),
-             key<&LayerOptions::cross_edges_whole>(
-                 "cross_edges_whole", "", kAny,
-                 "Whether clouds cross the world's edge whole; otherwise they form "
-                 "while they enter and dissolve once they have left."),
+             default_is(key<&LayerOptions::cross_edges_whole>(
+                            "cross_edges_whole", "", kAny,
+                            "Whether clouds cross the world's edge whole; otherwise they form "
+                            "while they enter and dissolve once they have left."),
+                        "that of `automaton`: clouds that are drawn directly can be seen beyond the edge"),
              table<&LayerOptions::coupling>("coupling", coupling_section(), coupling_section().effect),
              table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect)},
             nullptr};

@@ -171,7 +171,8 @@ const Section& light_section() {
              "ambient_base", "", kLight, "The same at its base; between them by height."),
          word<&Scene::render, &RenderOptions::light, &CloudLight::lighting>(
              "lighting", {"light_pass", "cfa"},
-             "How sunlight finds its way into clouds of the automaton: drawn from the sun, or absorbed in "
+             "How sunlight finds its way into clouds of the automaton: attenuated exponentially, or absorbed "
+             "in "
              "proportion to the way through them (light absorption factor).",
              "D, step 1; T, CFA"),
          render_key<&RenderOptions::light, &CloudLight::light_distance_m>(

@@ -14,7 +14,6 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <tbb/global_control.h>
 #include <unistd.h>
 
 #include "apps/layer_simulation.h"
@@ -25,6 +24,7 @@
 #include "density/vdb_file.h"
 #include "scenes/reader.h"
 #include "scenes/writer.h"
+#include "tests/reference/with_threads.h"
 
 namespace nephos {
 namespace {
@@ -55,13 +55,15 @@ TEST(Climate, HasTheGoldenHashesOnAnyNumberOfThreads) {
     const std::map<std::uint64_t, std::string> golden = golden_hashes();
     ASSERT_GE(golden.size(), 5u);
     ASSERT_EQ(golden.rbegin()->first, 500u);
-    for (std::size_t threads : {1, 2, 3, 4, 8}) {
-        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-        std::vector<LayerSimulation> layers = make_layers(climate());
-        for (const auto& [step, hash] : golden) {
-            while (layers.front().steps() < step) step_all(layers);
-            EXPECT_EQ(combined_hash(layers).hex(), hash) << "step " << step << ", " << threads << " threads";
-        }
+    for (std::size_t threads = 1; threads <= 8; ++threads) {
+        test::with_threads(threads, [&] {
+            std::vector<LayerSimulation> layers = make_layers(climate());
+            for (const auto& [step, hash] : golden) {
+                while (layers.front().steps() < step) step_all(layers);
+                EXPECT_EQ(combined_hash(layers).hex(), hash)
+                    << "step " << step << ", " << threads << " threads";
+            }
+        });
     }
 }
 
@@ -328,6 +330,40 @@ TEST(Climate, ALayerWithoutAutomatonIsASkyAlone) {
         EXPECT_EQ(at.skies[0].ahead(at.skies[0].clouds()[n], 10, at.since_step_s), low.clouds[n]);
     }
     EXPECT_NE(make_layers(scene)[0].hash(), sink.frames[0].hash);
+}
+
+// The shipped climate: fair weather without rain, then a cloudy sky that rains below clouds and where rain is
+// found. No area flickers: each is listed without a gap, drifts no faster than the wind and the growth of its
+// patch, and sets in and fades by small steps.
+TEST(Climate, TheShippedSceneGoesFromFairWeatherToRainWithoutFlicker) {
+    const Scene scene = read_scene(fs::path(NEPHOS_SOURCE_DIR) / "scenes/climate.toml");
+    std::vector<LayerSimulation> layers;
+    layers.emplace_back(scene, 0);
+    const LayerSimulation& low = layers[0];
+    const auto cells = [&] { return low.automaton()->cld().count(); };
+    std::map<std::uint64_t, std::pair<std::uint64_t, RainArea>> last;  // step and area by id
+    std::map<std::uint64_t, std::size_t> sources;
+    std::uint64_t fair = 0;
+    for (std::uint64_t step = 1; step <= std::uint64_t(scene.steps); ++step) {
+        step_all(layers);
+        if (step == 60) fair = cells();
+        for (const RainArea& area : low.rain()) {
+            EXPECT_GT(step, 60u) << "rain in fair weather";
+            if (const auto known = last.find(area.id); known != last.end()) {
+                const auto& [when, before] = known->second;
+                EXPECT_EQ(when + 1, step) << "area " << area.id << " was gone for a while";
+                EXPECT_LT(std::hypot(area.x_m - before.x_m, area.y_m - before.y_m), 600);
+                EXPECT_LT(std::abs(area.intensity_mm_per_h - before.intensity_mm_per_h), 0.5);
+            } else {
+                ++sources[area.id >> 62];
+            }
+            last[area.id] = {step, area};
+        }
+    }
+    EXPECT_GT(fair, 1000u);
+    EXPECT_GT(cells(), 10 * fair);
+    EXPECT_GT(sources[1], 20u) << "attached to nimbostratus";
+    EXPECT_GT(sources[2], 5u) << "found in the automaton";
 }
 
 // Every shipped scene with layers is stepped: all its skies live, and what has an automaton grows cloud.

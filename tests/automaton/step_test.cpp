@@ -8,11 +8,11 @@
 
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
-#include <tbb/global_control.h>
 
 #include "automaton/automaton.h"
 #include "automaton/kernels.h"
 #include "tests/reference/reference_automaton.h"
+#include "tests/reference/with_threads.h"
 
 namespace nephos {
 namespace {
@@ -169,8 +169,8 @@ TEST(Determinism, ThreadsDoNotChangeTheBits) {
     const AutomatonOptions options = busy_options(7);
     const auto expected = hashes_of(options, 6);
     for (std::size_t threads : {1, 2, 3, 4, 8, 32}) {
-        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-        EXPECT_EQ(hashes_of(options, 6), expected) << threads << " threads";
+        EXPECT_EQ(test::with_threads(threads, [&] { return hashes_of(options, 6); }), expected)
+            << threads << " threads";
     }
 }
 

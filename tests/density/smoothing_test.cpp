@@ -13,11 +13,10 @@
 
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include "automaton/error.h"
 #include "tests/density/naive_smoothing.h"
+#include "tests/reference/with_threads.h"
 
 namespace nephos {
 namespace {
@@ -204,9 +203,9 @@ TEST(Smoothing, DoesNotDependOnThreads) {
     const TimedPlane timed[] = {{plane.view(), 0}};
     const SmoothingOptions options{SmoothingKernel::tent, 2, 2, 1, 1};
     std::vector<std::vector<float>> results;
-    for (int threads : {1, 2, 3, 7}) {
-        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
-        results.push_back(smooth(timed, options, Placement{}, {}).to_dense());
+    for (std::size_t threads : {1, 2, 3, 7}) {
+        results.push_back(
+            test::with_threads(threads, [&] { return smooth(timed, options, Placement{}, {}).to_dense(); }));
     }
     for (const auto& result : results) EXPECT_EQ(result, results.front());
 }

@@ -10,10 +10,10 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include "automaton/automaton.h"
 #include "scenes/reader.h"
+#include "tests/reference/with_threads.h"
 
 namespace nephos {
 namespace {
@@ -46,13 +46,14 @@ TEST(GoldenHashes, AreReachedWithAnyNumberOfThreads) {
     for (const auto& [name, hashes] : golden_hashes()) {
         const Scene scene = read_scene(kSource / "scenes" / name);
         for (std::size_t threads : {1, 2, 3, 8}) {
-            const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-            Automaton automaton(scene.automaton);
-            for (const auto& [step, hash] : hashes) {
-                while (automaton.steps() < step) automaton.step();
-                EXPECT_EQ(automaton.hash().hex(), hash)
-                    << name << ", step " << step << ", " << threads << " threads";
-            }
+            test::with_threads(threads, [&] {
+                Automaton automaton(scene.automaton);
+                for (const auto& [step, hash] : hashes) {
+                    while (automaton.steps() < step) automaton.step();
+                    EXPECT_EQ(automaton.hash().hex(), hash)
+                        << name << ", step " << step << ", " << threads << " threads";
+                }
+            });
         }
     }
 }

@@ -166,6 +166,19 @@ TEST(Layers, TakeWhatTheySayNotFromTheScene) {
     EXPECT_EQ(scene.layers[1].rain.column.top_m, 4000);
 }
 
+// A camera looks beyond the edge of a world of clouds that are drawn directly: they must not pop up there.
+TEST(Layers, CloudsDrawnDirectlyFormAndDissolveAtTheEdges) {
+    const auto whole = [](std::vector<std::string> overrides) {
+        const Scene scene = read_scene_text(kTwoLayers, "two.toml", {}, overrides);
+        EXPECT_EQ(read_scene_text(to_toml(scene), "again.toml"), scene);
+        return sky_options(scene, 0).cross_edges_whole;
+    };
+    EXPECT_TRUE(whole({}));
+    EXPECT_FALSE(whole({"layer[0].cross_edges_whole=false"}));
+    EXPECT_FALSE(whole({"layer[0].automaton=false"}));
+    EXPECT_TRUE(whole({"layer[0].automaton=false", "layer[0].cross_edges_whole=true"}));
+}
+
 TEST(Layers, HaveSeedsThatNeverRepeat) {
     std::vector<std::uint64_t> seeds;
     for (std::uint64_t scene : {0ull, 1ull, 77ull, ~0ull}) {
