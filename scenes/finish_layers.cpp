@@ -119,19 +119,6 @@ void check_layer_skies(const SectionReader& reader, const Scene& scene, const La
     }
 }
 
-void check_layer_wind(const SectionReader& reader, const Wind& wind) {
-    for (std::size_t n = 1; n < wind.keyframes.size(); ++n) {
-        if (wind.keyframes[n].time_s > wind.keyframes[n - 1].time_s) continue;
-        const SectionReader profile{
-            reader.document, reader.find("wind")->value.items[n], indexed(reader.path + ".wind", n), {}};
-        profile.report("time_s",
-                       profile.quoted("time_s") + " is " + number_text(wind.keyframes[n].time_s) +
-                           ", not after the profile before it at " +
-                           number_text(wind.keyframes[n - 1].time_s),
-                       "expected times that rise from profile to profile, in seconds");
-    }
-}
-
 // Keys that are missing take the values of the scene, or of other keys of the layer.
 void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
     const SectionReader lattice = below(reader, "lattice"), background = below(reader, "background");
@@ -245,7 +232,7 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
         LayerOptions& layer = scene.layers[n];
         check_layer_name(item, layer.name);
         check_layer_skies(item, scene, layer);
-        check_layer_wind(item, layer.wind);
+        check_wind_times(item, layer.wind);
         fill_in(item, scene, layer);
         fill_in_base_height(item, scene, layer);
         check_rain(item, scene, layer);

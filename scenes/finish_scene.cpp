@@ -31,20 +31,6 @@ void check_name(const SectionReader& reader, const Scene& scene) {
                   "expected 1 to 100 letters, digits, `-`, `_` or `.`, starting with none of `-` and `.`");
 }
 
-void check_wind(const SectionReader& reader, const Scene& scene) {
-    if (!reader.sound({"wind"})) return;
-    const auto& keyframes = scene.automaton.wind.keyframes;
-    for (std::size_t n = 1; n < keyframes.size(); ++n) {
-        if (keyframes[n].time_s > keyframes[n - 1].time_s) continue;
-        const Node& item = reader.find("wind")->value.items[n];
-        const SectionReader profile{reader.document, item, indexed("wind", n), {}};
-        profile.report("time_s",
-                       profile.quoted("time_s") + " is " + number_text(keyframes[n].time_s) +
-                           ", not after the profile before it at " + number_text(keyframes[n - 1].time_s),
-                       "expected times that rise from profile to profile, in seconds");
-    }
-}
-
 // The displacement of one step is held as cells * 2^32 in 64 bits.
 void check_wind_speed(const SectionReader& reader, const Scene& scene) {
     if (!reader.sound({"wind", "time", "lattice"})) return;
@@ -139,10 +125,24 @@ void replace_infinite(Range& range, double low, double size) {
 
 }  // namespace
 
+void check_wind_times(const SectionReader& owner, const Wind& wind) {
+    const std::string path = owner.path.empty() ? "wind" : owner.path + ".wind";
+    for (std::size_t n = 1; n < wind.keyframes.size(); ++n) {
+        const double before_s = wind.keyframes[n - 1].time_s, time_s = wind.keyframes[n].time_s;
+        if (time_s > before_s) continue;
+        const Node& item = owner.find("wind")->value.items[n];
+        const SectionReader profile{owner.document, item, indexed(path, n), {}};
+        profile.report("time_s",
+                       profile.quoted("time_s") + " is " + number_text(time_s) +
+                           ", not after the profile before it at " + number_text(before_s),
+                       "expected times that rise from profile to profile, in seconds");
+    }
+}
+
 void finish_scene(const SectionReader& reader, void* owner) {
     auto& scene = *static_cast<Scene*>(owner);
     check_name(reader, scene);
-    check_wind(reader, scene);
+    if (reader.sound({"wind"})) check_wind_times(reader, scene.automaton.wind);
     check_wind_speed(reader, scene);
     check_periodic_sizes(reader, scene);
     check_frames(reader, scene);

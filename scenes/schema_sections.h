@@ -38,6 +38,9 @@ inline constexpr int kMaxModels = 10'000;
 // Checks of values that lie in several sections, and the defaults that depend on them; owner: Scene.
 void finish_scene(const SectionReader& reader, void* owner);
 
+// Reports profiles of the key `wind` of a scene or a layer whose times do not rise.
+void check_wind_times(const SectionReader& owner, const Wind& wind);
+
 // The part of it that concerns models, skies, climate and layers.
 void finish_layers(const SectionReader& reader, Scene& scene);
 

@@ -93,6 +93,27 @@ TEST(ShippedScenes, HaveEveryGenus) {
     }
 }
 
+// Any scene may take the models of all of them, by their names.
+TEST(ShippedScenes, GeneraCanBeUsedInAnyScene) {
+    std::string files, names;
+    for (const GenusFacts& facts : genera()) {
+        std::string file(facts.abbreviation);
+        std::replace(file.begin(), file.end(), ' ', '-');
+        files += "\"" + (kFolder / "genera" / (file + ".toml")).string() + "\", ";
+        names += "\"" + std::string(facts.abbreviation) + "\", ";
+    }
+    const Scene scene =
+        read_scene_text("models = [" + files +
+                            "]\n[lattice]\ncells = [1000, 1000, 10]\n[[sky]]\nname = \"all\"\n"
+                            "state = 0\nclouds = 24\ngenerated = 1\nmodels = [" +
+                            names + "]\n[[layer]]\nname = \"one\"\nskies = \"all\"\nbase_height_m = 300\n",
+                        "all.toml");
+    ASSERT_EQ(scene.models.size(), genera().size());
+    const SkySimulation sky(sky_options(scene, 0));
+    EXPECT_EQ(sky.shapes().size(), genera().size());
+    EXPECT_EQ(sky.clouds().size(), 24u);
+}
+
 // T's table of models and of skies.
 TEST(ShippedScenes, HaveTheNumbersOfTorchelsen) {
     struct Row {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "seeds/rain_area.h"
@@ -122,6 +123,43 @@ TEST(RainArea, AttachedToClouds) {
     EXPECT_TRUE(attached_areas(std::vector<AttachedRain>{{.state = {0, 0.5}}}, sky).empty());
     EXPECT_EQ(attached_areas(std::vector<AttachedRain>{{.state = {0.9, 1}}, {.model = 1}}, sky).size(), 160u);
     expect_error(ErrorCode::usage, "state", [] { check(AttachedRain{.state = {0.7, 0.2}}); });
+}
+
+// An area keeps its id, lies below its cloud, and drifts with it by the way of the wind, which turns.
+TEST(RainArea, AttachedAreasFollowTheirClouds) {
+    SkyOptions options = test::small_sky();
+    options.wind = {{{0, {{0, {12, 3}}}}, {400, {{0, {-9, 6}}}}}};
+    options.schedule = {{0, 0}, {300, 1}};
+    const std::vector<AttachedRain> rule{{.size_scale = 2, .intensity_mm_per_h = 4}};
+    SkySimulation sky(options);
+    std::map<std::uint64_t, RainArea> before;
+    std::size_t followed = 0;
+    for (int step = 0; step < 60; ++step) {
+        const Velocity wind = wind_at(options.wind, 0, sky.time_s());
+        sky.step();
+        std::map<std::uint64_t, RainArea> now;
+        for (const RainArea& area : attached_areas(rule, sky)) now[area.id] = area;
+        for (const SkyCloud& cloud : sky.clouds()) {
+            const auto area = now.find(rain_id(RainSource::attached, 0, 0, cloud.serial));
+            if (cloud.phase == 0) {
+                EXPECT_EQ(area, now.end());
+                continue;
+            }
+            ASSERT_NE(area, now.end());
+            EXPECT_EQ(area->second.x_m, sky.sphere(cloud).centre_m.x);
+            EXPECT_EQ(area->second.y_m, sky.sphere(cloud).centre_m.y);
+            EXPECT_DOUBLE_EQ(area->second.intensity_mm_per_h, 4 * cloud.phase);
+            const auto last = before.find(area->first);
+            if (last == before.end()) continue;
+            ++followed;
+            EXPECT_NEAR(area->second.x_m - last->second.x_m, 10 * wind.east_m_per_s, 1e-6);
+            EXPECT_NEAR(area->second.y_m - last->second.y_m, 10 * wind.north_m_per_s, 1e-6);
+            EXPECT_LE(std::abs(area->second.intensity_mm_per_h - last->second.intensity_mm_per_h),
+                      4 * 10.0 / 300 + 1e-9);
+        }
+        before = std::move(now);
+    }
+    EXPECT_GT(followed, 1000u);
 }
 
 TEST(RainArea, BetweenTwoMoments) {
