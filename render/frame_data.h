@@ -16,6 +16,9 @@ struct Tile {
     int x = 0, y = 0, width = 0, height = 0;
 };
 
+// Clouds that hide less than this have no depth (picture.h).
+inline constexpr float kLeastOpacity = 1.0f / 1024.0f;
+
 // How much of the day's light is left at a sun's elevation.
 struct Daylight {
     double sun = 1;  // direct: 1 above 2 degrees, 0 below -2 (a cloud in 2 km height sees 1.4 degrees below

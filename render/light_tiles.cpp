@@ -7,8 +7,7 @@
 #include <cstring>
 #include <span>
 
-#include <Imath/half.h>
-#include <tbb/parallel_for.h>
+#include "render/light_bins.h"
 
 namespace nephos {
 namespace {
@@ -16,22 +15,6 @@ namespace {
 constexpr std::size_t kMaxSplats = std::size_t{1} << 20;   // on the device at once: 32 MiB
 constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of their lists: 64 MiB
 constexpr std::size_t kMaxQueries = std::size_t{1} << 20;
-
-std::vector<PixelBox> boxes_of(std::span<const shader::LightSplat> splats) {
-    std::vector<PixelBox> boxes(splats.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, splats.size(), 8192), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            const shader::LightSplat& s = splats[i];
-            Imath::half x, y;
-            x.setBits(std::uint16_t(s.radii & 0xFFFF));
-            y.setBits(std::uint16_t(s.radii >> 16));
-            const float rx = x, ry = y;
-            boxes[i] = {int(std::floor(s.x - rx)), int(std::floor(s.y - ry)), int(std::ceil(s.x + rx)),
-                        int(std::ceil(s.y + ry))};
-        }
-    });
-    return boxes;
-}
 
 }  // namespace
 
@@ -42,14 +25,7 @@ struct LightTiles::Queries {
     std::vector<shader::LightItem> items;
 
     Queries(const SunOrder& order, const TileGrid& grid, std::uint32_t per_item) {
-        std::vector<PixelBox> centres(order.splats.size());
-        for (std::size_t i = 0; i < centres.size(); ++i) {
-            const shader::LightSplat& s = order.splats[i];
-            const int x = std::clamp(int(s.x), 0, grid.width - 1),
-                      y = std::clamp(int(s.y), 0, grid.height - 1);
-            centres[i] = {x, y, x + 1, y + 1};
-        }
-        const TileBins bins = bin_into_tiles(centres, grid);
+        const TileBins bins = bin_centres(order.splats, grid);
         source = bins.list;
         queries.reserve(source.size());
         for (const std::uint32_t i : source)
@@ -161,7 +137,7 @@ std::vector<float> LightTiles::run(const GpuDevice& gpu, const SunOrder& order, 
                                    std::vector<float>& shadow) {
     resize_map(gpu, shadow_size);
     const TileGrid grid{shadow_size, shadow_size};
-    const std::vector<PixelBox> boxes = boxes_of(order.splats);
+    const std::vector<PixelBox> boxes = light_boxes(order.splats);
     Queries queries(order, grid, shader::kQueriesPerLane * gpu.tile_lanes);
     std::size_t begin = 0;
     do {  // once even without any splat: the map is then all light

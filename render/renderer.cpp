@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <new>
 #include <optional>
 
@@ -11,6 +12,8 @@
 #include "automaton/text.h"
 #include "render/attenuation_texture.h"
 #include "render/light_tiles.h"
+#include "render/processor_light.h"
+#include "render/processor_view.h"
 #include "render/renderer_test_access.h"
 #include "render/view_pass.h"
 #include "render/view_tiles.h"
@@ -79,21 +82,29 @@ struct Renderer::Impl {
     explicit Impl(const DeviceOptions& device_options);
 
     Picture draw(const Splats& splats, const RenderOptions& options);
-    // The sunlight that arrives at each visible metaball, and the shadow map into picture and light tiles.
+    // The sunlight that arrives at each visible metaball, and the shadow map into the picture; also onto the
+    // device, unless the processor draws.
     std::vector<float> pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
                                      Picture& picture);
     std::vector<float> absorb_sunlight(const PreparedCloud& cloud, const DensityBlocks& blocks,
                                        const RenderOptions& options, Picture& picture);
+    bool on_processor() const { return splatting == Splatting::processor; }
+    LightTiles& light_on_device();
+    // Draws a part of the picture after it has been told the picture's shadow map.
+    using DrawPart = std::function<void(const shader::Frame&, const Tile&)>;
+    DrawPart part_drawer(const EyeOrder& order, const CameraFrame& camera, const RenderOptions& options,
+                         Picture& picture);
 
     int tile_size;
     GpuDevice gpu;
     PipelineLayout layout;
     vk::raii::Sampler clamped, white_beyond;
     GpuImage attenuation;
-    LightTiles light_tiles;
-    ViewTiles view_tiles;
-    Splatting splatting;
-    std::optional<ViewPass> view_pass;  // made when it is needed
+    Splatting splatting;  // not automatic
+    // Made when they are needed.
+    std::optional<LightTiles> light_tiles;
+    std::optional<ViewTiles> view_tiles;
+    std::optional<ViewPass> view_pass;
 };
 
 Renderer::Impl::Impl(const DeviceOptions& device_options)
@@ -103,23 +114,33 @@ Renderer::Impl::Impl(const DeviceOptions& device_options)
       clamped(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
       white_beyond(create_sampler(gpu, vk::SamplerAddressMode::eClampToBorder)),
       attenuation(upload_attenuation(gpu)),
-      light_tiles(gpu, layout, attenuation, clamped),
-      view_tiles(gpu, layout, attenuation, clamped),
       splatting(device_options.splatting) {
+    if (splatting == Splatting::automatic) {
+        const bool software = gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu;
+        splatting = software ? Splatting::processor : Splatting::tiles;
+    }
     tile_size = std::min(tile_size, int(std::min(gpu.properties.limits.maxImageDimension2D,
                                                  gpu.properties.limits.maxFramebufferWidth)));
+}
+
+LightTiles& Renderer::Impl::light_on_device() {
+    if (!light_tiles) light_tiles.emplace(gpu, layout, attenuation, clamped);
+    return *light_tiles;
 }
 
 // D, step 1.
 std::vector<float> Renderer::Impl::pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
                                                  Picture& picture) {
-    const SunOrder order = order_from_sun(cloud, picture.shadow_frame, options.shadow_map_size);
-    if (cloud.visible.empty()) {  // the map is white, and the smallest will do
-        picture.shadow.assign(square(std::size_t(options.shadow_map_size)), 1.0f);
+    const int size = options.shadow_map_size;
+    const SunOrder order = order_from_sun(cloud, picture.shadow_frame, size);
+    if (cloud.visible.empty()) {  // the map is white, and on the device the smallest will do
+        picture.shadow.assign(square(std::size_t(size)), 1.0f);
         std::vector<float> small;
-        return light_tiles.run(gpu, order, 16, small);
+        return on_processor() ? std::vector<float>{} : light_on_device().run(gpu, order, 16, small);
     }
-    const std::vector<float> ordered = light_tiles.run(gpu, order, options.shadow_map_size, picture.shadow);
+    const std::vector<float> ordered = on_processor()
+                                           ? light_by_processor(order, size, picture.shadow)
+                                           : light_on_device().run(gpu, order, size, picture.shadow);
     std::vector<float> light(ordered.size());
     for (std::size_t i = 0; i < ordered.size(); ++i) light[order.source[i]] = ordered[i];
     return light;
@@ -130,7 +151,7 @@ std::vector<float> Renderer::Impl::absorb_sunlight(const PreparedCloud& cloud, c
                                                    const RenderOptions& options, Picture& picture) {
     const double distance = options.light.light_distance_m;
     picture.shadow = shadow_by_absorption(blocks, picture.shadow_frame, picture.shadow_size, distance);
-    light_tiles.use(gpu, picture.shadow, picture.shadow_size);
+    if (!on_processor()) light_on_device().use(gpu, picture.shadow, picture.shadow_size);
     return light_by_absorption(cloud, blocks, direction_to_sun(options.sun), distance);
 }
 
@@ -156,26 +177,38 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
 
     const EyeOrder order = order_from_eye(prepared, {light, lightning}, splats, camera,
                                           pixels_per_unit(options.camera, camera), options.ground);
-    const bool by_tiles = splatting == Splatting::tiles && order.puffs.empty();
-    if (by_tiles) {
-        view_tiles.use_shadow_map(gpu, light_tiles.shadow_map(), white_beyond);
-    } else {
-        if (!view_pass) view_pass.emplace(gpu, layout, attenuation, clamped);
-        view_pass->use_shadow_map(gpu, light_tiles.shadow_map(), white_beyond);
-    }
+    const DrawPart draw_part = part_drawer(order, camera, options, picture);
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {
             const Tile tile{x, y, std::min(tile_size, picture.width - x),
                             std::min(tile_size, picture.height - y)};
-            const shader::Frame frame = frame_data(options, camera, picture.shadow_frame, flash, tile);
-            if (by_tiles) {
-                view_tiles.draw_tile(gpu, options, camera, frame, tile, order, picture);
-            } else {
-                view_pass->draw_tile(gpu, frame, tile, order, picture);
-            }
+            draw_part(frame_data(options, camera, picture.shadow_frame, flash, tile), tile);
         }
     }
     return picture;
+}
+
+Renderer::Impl::DrawPart Renderer::Impl::part_drawer(const EyeOrder& order, const CameraFrame& camera,
+                                                     const RenderOptions& options, Picture& picture) {
+    if (order.puffs.empty() && on_processor()) {
+        return [&](const shader::Frame& frame, const Tile& tile) {
+            view_by_processor(options, camera, frame, tile, order, picture);
+        };
+    }
+    if (on_processor()) light_on_device().use(gpu, picture.shadow, picture.shadow_size);
+    const GpuImage& map = light_on_device().shadow_map();
+    if (order.puffs.empty() && splatting == Splatting::tiles) {
+        if (!view_tiles) view_tiles.emplace(gpu, layout, attenuation, clamped);
+        view_tiles->use_shadow_map(gpu, map, white_beyond);
+        return [&](const shader::Frame& frame, const Tile& tile) {
+            view_tiles->draw_tile(gpu, options, camera, frame, tile, order, picture);
+        };
+    }
+    if (!view_pass) view_pass.emplace(gpu, layout, attenuation, clamped);
+    view_pass->use_shadow_map(gpu, map, white_beyond);
+    return [&](const shader::Frame& frame, const Tile& tile) {
+        view_pass->draw_tile(gpu, frame, tile, order, picture);
+    };
 }
 
 Renderer::Renderer(const DeviceOptions& options) {

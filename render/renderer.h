@@ -28,6 +28,8 @@ namespace nephos {
 
 // How metaballs are drawn; the picture is the same within 1/255.
 enum class Splatting {
+    automatic,   // processor on a device of type CPU, else tiles
+    processor,   // vectors on the processor, tile by tile, front to back; Vulkan only for T's billboards
     tiles,       // compute shaders, tile by tile, front to back: fast
     billboards,  // blended billboards with attenuation textures, back to front, as D has it: the reference,
                  // and what draws pictures that hold T's billboards
@@ -44,7 +46,7 @@ struct DeviceOptions {
     // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
     // the picture; memory on the device is about 24 bytes * tile_size^2.
     int tile_size = 2048;
-    Splatting splatting = Splatting::tiles;
+    Splatting splatting = Splatting::automatic;
 };
 
 class Renderer {

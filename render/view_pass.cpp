@@ -11,7 +11,6 @@ namespace {
 
 constexpr std::uint32_t kBatch = 1u << 20;  // metaballs, and billboards, on the device at once: 32 MiB each
 constexpr std::array kFormats{vk::Format::eR32G32B32A32Sfloat, vk::Format::eR32Sfloat};
-constexpr float kLeastOpacity = 1.0f / 1024.0f;  // thinner clouds have no depth (picture.h)
 
 }  // namespace
 

@@ -2,6 +2,7 @@
 
 // ./bench: prints the tables of the README. Nothing here passes or fails: figures are for people to judge.
 
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <filesystem>
@@ -35,7 +36,8 @@ void print(const std::vector<nephos::bench::BenchRow>& rows) {
         const bool compared = row.other_ms > 0;  // some rows have a target in ms and no other side
         fmt::print("| {} | {:.3g} | {} | {} | {} | {} |\n", row.work, row.ours_ms,
                    compared ? fmt::format("{:.3g}", row.other_ms) : "",
-                   compared ? fmt::format("{:.2f}x{}", ratio, faster ? " faster" : "") : "", row.target, row.note);
+                   compared ? fmt::format("{:.2f}x{}", ratio, faster ? " faster" : "") : "", row.target,
+                   row.note);
         std::fflush(stdout);
     }
     fmt::print("\n");
@@ -47,12 +49,14 @@ int main(int argc, char** argv) {
     using namespace nephos::bench;
     const std::filesystem::path source = NEPHOS_SOURCE_DIR;
     const std::filesystem::path programs = std::filesystem::canonical("/proc/self/exe").parent_path();
+    const char* const data_variable = std::getenv("NEPHOS_TEST_DATA");
+    const std::filesystem::path data = data_variable != nullptr ? data_variable : NEPHOS_TEST_DATA;
     const std::pair<const char*, std::function<std::vector<BenchRow>()>> groups[] = {
         {"automaton", [&] { return automaton_rows(source, programs); }},
         {"density", [] { return density_bench_rows(); }},
         {"memory", [&] { return memory_rows(source, programs / "../../apps/nephos"); }},
         {"seeds", [] { return seeds_rows(); }},
-        {"render", [] { return render_rows(); }},
+        {"render", [&] { return render_rows(source, data); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {
         fmt::print(

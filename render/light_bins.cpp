@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/light_bins.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Imath/half.h>
+#include <tbb/parallel_for.h>
+
+namespace nephos {
+
+std::vector<PixelBox> light_boxes(std::span<const shader::LightSplat> splats) {
+    std::vector<PixelBox> boxes(splats.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, splats.size(), 8192), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const shader::LightSplat& s = splats[i];
+            Imath::half x, y;
+            x.setBits(std::uint16_t(s.radii & 0xFFFF));
+            y.setBits(std::uint16_t(s.radii >> 16));
+            const float rx = x, ry = y;
+            boxes[i] = {int(std::floor(s.x - rx)), int(std::floor(s.y - ry)), int(std::ceil(s.x + rx)),
+                        int(std::ceil(s.y + ry))};
+        }
+    });
+    return boxes;
+}
+
+TileBins bin_centres(std::span<const shader::LightSplat> splats, const TileGrid& grid) {
+    std::vector<PixelBox> centres(splats.size());
+    for (std::size_t i = 0; i < centres.size(); ++i) {
+        const int x = std::clamp(int(splats[i].x), 0, grid.width - 1),
+                  y = std::clamp(int(splats[i].y), 0, grid.height - 1);
+        centres[i] = {x, y, x + 1, y + 1};
+    }
+    return bin_into_tiles(centres, grid);
+}
+
+}  // namespace nephos
