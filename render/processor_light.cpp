@@ -148,9 +148,6 @@ HWY_EXPORT(to_transmittance);
 
 namespace {
 
-constexpr std::size_t kMaxBalls = std::size_t{1} << 22;    // at once: 128 MiB
-constexpr std::size_t kMaxEntries = std::size_t{1} << 26;  // of the tiles' lists: 256 MiB
-
 std::int16_t to_row(int y) { return std::int16_t(std::clamp(y, -32768, 32767)); }
 
 LightBall light_ball(const shader::LightSplat& splat, const shader::LightPlace& place, const PixelBox& box) {
@@ -230,14 +227,15 @@ void to_transmittance(std::vector<float>& depths) {
 
 }  // namespace
 
-std::vector<float> light_by_processor(const SunOrder& order, int shadow_size, std::vector<float>& shadow) {
+std::vector<float> light_by_processor(const SunOrder& order, int shadow_size, std::vector<float>& shadow,
+                                      const BatchLimits& limits) {
     const TileGrid grid{shadow_size, shadow_size};
     const std::vector<PixelBox> boxes = light_boxes(order.splats);
     Centres centres(order, grid);
     shadow.assign(std::size_t(shadow_size) * std::size_t(shadow_size), 0.0f);
     std::vector<LightBall> balls;
     for (std::size_t begin = 0; begin < boxes.size();) {
-        const std::size_t end = end_of_batch(boxes, begin, grid, kMaxBalls, kMaxEntries);
+        const std::size_t end = end_of_batch(boxes, begin, grid, limits.boxes, limits.entries);
         balls.clear();
         for (std::size_t i = begin; i < end; ++i)
             balls.push_back(light_ball(order.splats[i], order.places[i], boxes[i]));

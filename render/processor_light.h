@@ -9,10 +9,12 @@
 #include <vector>
 
 #include "render/cloud_preparation.h"
+#include "render/tile_bins.h"
 
 namespace nephos {
 
 // Fills `shadow`, shadow_size^2 texels, and returns the light at the centres, in the order of `order`.
-std::vector<float> light_by_processor(const SunOrder& order, int shadow_size, std::vector<float>& shadow);
+std::vector<float> light_by_processor(const SunOrder& order, int shadow_size, std::vector<float>& shadow,
+                                      const BatchLimits& limits = {});
 
 }  // namespace nephos

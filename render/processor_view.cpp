@@ -417,10 +417,6 @@ HWY_EXPORT(finish_tile);
 
 namespace {
 
-constexpr std::size_t kMaxBalls = std::size_t{1}
-                                  << 22;  // at once: 384 MiB with the balls that they are made of
-constexpr std::size_t kMaxEntries = std::size_t{1} << 26;  // of the tiles' lists: 256 MiB
-
 std::int16_t to_row(int y) { return std::int16_t(std::clamp(y, -32768, 32767)); }
 
 struct PreparedBalls {
@@ -474,13 +470,13 @@ void store(const TileSums& sums, const ViewTile& tile, const Tile& part, bool de
 }  // namespace
 
 void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const shader::Frame& frame,
-                       const Tile& part, const EyeOrder& order, Picture& picture) {
+                       const Tile& part, const EyeOrder& order, Picture& picture, const BatchLimits& limits) {
     const TileGrid grid{part.width, part.height};
     const std::vector<PixelBox> boxes = screen_boxes(order, camera, options.camera, part);
     std::vector<TileSums> kept;  // between batches
     std::size_t begin = 0;
     do {  // once even without any ball, for the background
-        const std::size_t end = end_of_batch(boxes, begin, grid, kMaxBalls, kMaxEntries);
+        const std::size_t end = end_of_batch(boxes, begin, grid, limits.boxes, limits.entries);
         const std::span some = std::span(boxes).subspan(begin, end - begin);
         const PreparedBalls balls =
             prepare(std::span(order.balls).subspan(boxes.size() - end, end - begin), some, frame);

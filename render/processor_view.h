@@ -12,12 +12,14 @@
 #include "render/eye_order.h"
 #include "render/frame_data.h"
 #include "render/picture.h"
+#include "render/tile_bins.h"
 
 namespace nephos {
 
 // Draws the metaballs of `order` and what lies behind them into a part of the picture; `frame` is that of the
 // part. The ground wears picture.shadow.
 void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const shader::Frame& frame,
-                       const Tile& part, const EyeOrder& order, Picture& picture);
+                       const Tile& part, const EyeOrder& order, Picture& picture,
+                       const BatchLimits& limits = {});
 
 }  // namespace nephos

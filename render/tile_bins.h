@@ -34,6 +34,12 @@ struct TileBins {
 // In parallel; the result does not depend on the number of threads.
 TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid);
 
+// What is in memory at once.
+struct BatchLimits {
+    std::size_t boxes = std::size_t{1} << 20;
+    std::size_t entries = std::size_t{1} << 24;  // of the tiles' lists: 64 MiB
+};
+
 // End of a batch that starts at `begin`: at most `max_boxes` boxes with at most `max_entries` entries in the
 // list, but at least one box. A box has at most one entry a tile.
 std::size_t end_of_batch(std::span<const PixelBox> boxes, std::size_t begin, const TileGrid& grid,
