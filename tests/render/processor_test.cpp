@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The processor's light and view where they do not fit into one batch, without a Vulkan device.
+// The processor's light and view in batches and for every kind of vector, without a Vulkan device.
 
-#include <cmath>
+#include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include "render/processor_light.h"
 #include "render/processor_view.h"
@@ -50,11 +51,9 @@ void expect_near(const std::vector<float>& a, const std::vector<float>& b, float
     for (std::size_t i = 0; i < a.size(); ++i) ASSERT_NEAR(a[i], b[i], tolerance) << what << ' ' << i;
 }
 
-// From outside, and from inside, where many metaballs are integrated. Batches may stop at another ball once a
-// tile is opaque: what they leave out is below kOpaque.
-TEST(Processor, BatchesDoNotShow) {
-    const std::vector<Metaball> balls = reference::random_metaballs(11, 500);
-    const MetaballCloud cloud{balls, 0.01, 0.7};
+// From outside, and from inside, where many metaballs are integrated.
+std::vector<RenderOptions> outside_and_inside() {
+    std::vector<RenderOptions> all;
     for (const Vec3& eye : {Vec3{0, -4000, 800}, Vec3{50, 60, 1000}}) {
         RenderOptions options;
         options.camera.position_m = eye;
@@ -62,16 +61,47 @@ TEST(Processor, BatchesDoNotShow) {
         options.camera.width = 75;
         options.camera.height = 50;
         options.shadow_map_size = 128;
+        all.push_back(options);
+    }
+    return all;
+}
+
+void expect_near(const Drawn& a, const Drawn& b, float tolerance) {
+    expect_near(a.light, b.light, tolerance, "light");
+    expect_near(a.picture.shadow, b.picture.shadow, tolerance, "shadow");
+    expect_near(a.picture.beauty, b.picture.beauty, tolerance, "beauty");
+    expect_near(a.picture.transmittance, b.picture.transmittance, tolerance, "transmittance");
+}
+
+// Batches may stop at another ball once a tile is opaque: what they leave out is below kOpaque.
+TEST(Processor, BatchesDoNotShow) {
+    const std::vector<Metaball> balls = reference::random_metaballs(11, 500);
+    const MetaballCloud cloud{balls, 0.01, 0.7};
+    for (const RenderOptions& options : outside_and_inside()) {
         const Drawn one = draw(cloud, options, {});
-        const Drawn many = draw(cloud, options, {37, 1000});
-        expect_near(one.light, many.light, 1e-6f, "light");
-        expect_near(one.picture.shadow, many.picture.shadow, 1e-6f, "shadow");
-        expect_near(one.picture.beauty, many.picture.beauty, 1e-3f, "beauty");
-        expect_near(one.picture.transmittance, many.picture.transmittance, 1e-3f, "transmittance");
-        // Not everything is white, and not everything is hidden.
+        expect_near(one, draw(cloud, options, {37, 1000}), 5e-4f);
+        // Not everything is clear, and not everything is hidden.
         const auto [least, most] = std::ranges::minmax(one.picture.transmittance);
         EXPECT_LT(least, 0.5f);
         EXPECT_GT(most, least + 0.1f);
+    }
+}
+
+// Vectors of 4, 8 and 16 lanes, with and without fused multiply-add, as far as this processor has them.
+TEST(Processor, EveryTargetDrawsTheSamePicture) {
+    const std::vector<Metaball> balls = reference::random_metaballs(12, 500);
+    const MetaballCloud cloud{balls, 0.01, 0.7};
+    const std::int64_t all = hwy::SupportedTargets();
+    for (const RenderOptions& options : outside_and_inside()) {
+        const Drawn expected = draw(cloud, options, {});
+        for (std::int64_t rest = all; rest != 0; rest &= rest - 1) {
+            hwy::SetSupportedTargetsForTest(rest & -rest);
+            hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+            SCOPED_TRACE(hwy::TargetName(rest & -rest));
+            expect_near(expected, draw(cloud, options, {}), 1e-4f);
+        }
+        hwy::SetSupportedTargetsForTest(0);
+        hwy::GetChosenTarget().DeInit();
     }
 }
 

@@ -9,9 +9,9 @@
 #include <limits>
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include "automaton/error.h"
+#include "tests/reference/with_threads.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
@@ -267,8 +267,7 @@ TEST_P(RendererTest, ThreadsDoNotChangeTheBits) {
     for (const RenderOptions& options : {view({0, -2000, 800}, {0, 0, 1000}, 50, 160, 120),
                                          view({0, -300, 800}, {0, 0, 1000}, 80, 160, 120)}) {
         const auto draw = [&](std::size_t threads) {
-            const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-            return renderer_.draw(cloud, options);
+            return test::with_threads(threads, [&] { return renderer_.draw(cloud, options); });
         };
         const Picture one = draw(1);
         expect_same_bits(one, draw(2));
