@@ -157,6 +157,8 @@ TEST(LightAbsorptionUpdate, BoundedAndOnlyWhenTheLightMoved) {
     EXPECT_EQ(absorption.update(clouds, noon, 2), 2u);
     EXPECT_EQ(absorption.update(clouds, noon, 2), 1u);
     EXPECT_EQ(absorption.update(clouds, noon, 2), 0u);  // all done, the light stands still
+    LightAbsorption other;
+    EXPECT_EQ(other.update(std::vector{clouds[0], clouds[0]}, noon), 1u);  // named twice, computed once
     for (LitCloud& c : clouds) c.position_m.x += 77;
     EXPECT_EQ(absorption.update(clouds, noon), 0u);  // the sun is as far as before
 
