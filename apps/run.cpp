@@ -188,8 +188,10 @@ void add_run_command(CLI::App& app, Action& action) {
                       "No pictures, only density grids and statistics; needs no GPU");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
     command->add_flag("--resume", a->resume, "Go on where an interrupted run stopped");
-    command->add_flag("--overwrite", a->overwrite,
-                      "Start anew although the folder holds an interrupted run, or files that no run wrote");
+    command->add_flag(
+        "--overwrite", a->overwrite,
+        "Start anew although the folder holds an interrupted run, a run of another scene or seed, or files "
+        "that no run wrote");
     add_value(*command, "--checkpoint-every", "S",
               "Seconds between checkpoints (default: 60); Ctrl-C always leaves one",
               [a](const std::string& text) { a->checkpoint_every_s = parse_real(text, 0, 1e9); });
@@ -200,8 +202,8 @@ void add_run_command(CLI::App& app, Action& action) {
     add_quiet(*command, a->work);
     command->footer(
         "Writes DIR/density/NAME_0001.vdb ..., DIR/frames/NAME_0001.png ..., DIR/statistics.csv,\n"
-        "DIR/manifest.json and DIR/checkpoint.nephos; files of an earlier run of the same name are "
-        "replaced.\n"
+        "DIR/manifest.json and DIR/checkpoint.nephos; files of an earlier run of the same "
+        "scene are replaced.\n"
         "The first Ctrl-C finishes the step and leaves a checkpoint, the second stops at once.\n"
         "\n"
         "Examples:\n"

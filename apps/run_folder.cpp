@@ -365,9 +365,9 @@ void remove_leftovers(const RunFolder& folder) {
                             folder.folder.string(), reason));
 }
 
-// An interrupted run may hold hours of work, and a file that no run wrote is somebody else's: neither is
-// thrown away without being asked.
-void refuse_to_lose(const RunFolder& folder) {
+// An interrupted run may hold hours of work, a run of another scene cannot be had again by this one, and a
+// file that no run wrote is somebody else's: nothing of it is thrown away without being asked.
+void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
     const std::vector<std::filesystem::path> files = earlier_files(folder);
     if (files.empty()) return;
     if (files.back() != folder.manifest()) {
@@ -386,6 +386,9 @@ void refuse_to_lose(const RunFolder& folder) {
     };
     if (is_there(folder.statistics()) && !is_statistics(folder.statistics())) {
         refuse(folder, "the folder holds a statistics.csv that is not of a run");
+    }
+    if (earlier.scene_hash != scene_hash) {
+        refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed", earlier.name));
     }
     if (!is_there(folder.checkpoint())) return;
     if (!is_checkpoint(folder.checkpoint())) {
@@ -547,7 +550,7 @@ RunReport run_scene(const RunSettings& given, const RunObserver& observer) {
     Recorder recorder(settings);  // opens the device
 
     const FolderLock lock(folder.folder);
-    if (!settings.resume && !settings.overwrite) refuse_to_lose(folder);
+    if (!settings.resume && !settings.overwrite) refuse_to_lose(folder, settings.scene_hash);
     if (lock.held()) remove_leftovers(folder);
     Pipeline pipeline = settings.resume ? resumed_pipeline(settings, folder)
                                         : Pipeline(settings.scene, settings.range, settings.simulation_hash,

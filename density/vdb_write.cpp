@@ -215,6 +215,33 @@ openvdb::GridCPtrVec make_grids(const VdbContent& content, const Frame& frame,
     return grids;
 }
 
+// OpenVDB puts a random UUID into every header. One that follows from the content makes files of the same
+// content the same bytes: version 8 of RFC 9562, from two FNV-1a hashes of the metadata, the file's name and
+// the voxel counts.
+std::string uuid_of(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids,
+                    const openvdb::MetaMap& metadata) {
+    std::string text = path.filename().string();
+    for (auto it = metadata.beginMeta(); it != metadata.endMeta(); ++it)
+        text += '\n' + it->first + '=' + it->second->str();
+    for (const auto& grid : grids)
+        text += '\n' + grid->getName() + ':' + std::to_string(grid->activeVoxelCount());
+    std::uint64_t high = 0xCBF29CE484222325u, low = 0x84222325CBF29CE4u;
+    for (const char c : text) {
+        high = (high ^ std::uint8_t(c)) * 0x100000001B3u;
+        low = (low ^ std::uint8_t(~c)) * 0x100000001B3u;
+    }
+    high = (high & ~std::uint64_t{0xF000}) | 0x8000;                   // version
+    low = (low & ~(std::uint64_t{3} << 62)) | std::uint64_t{2} << 62;  // variant
+    char uuid[37];
+    std::snprintf(uuid, sizeof uuid, "%08x-%04x-%04x-%04x-%012llx", unsigned(high >> 32),
+                  unsigned(high >> 16 & 0xFFFF), unsigned(high & 0xFFFF), unsigned(low >> 48),
+                  static_cast<unsigned long long>(low & 0xFFFFFFFFFFFFu));
+    return uuid;
+}
+
+// The UUID's place in a file: behind magic number, versions of file and library, and a flag.
+constexpr std::streamoff kUuidOffset = 8 + 3 * 4 + 1;
+
 void write_file(const std::filesystem::path& temporary, const std::filesystem::path& path,
                 const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) {
     errno = 0;
@@ -223,6 +250,8 @@ void write_file(const std::filesystem::path& temporary, const std::filesystem::p
         stream.exceptions(std::ios::badbit | std::ios::failbit);
         stream.open(temporary, std::ios::binary | std::ios::trunc);
         CheckedArchive().save(stream, grids, metadata);
+        stream.seekp(kUuidOffset);
+        stream << uuid_of(path, grids, metadata);
         stream.close();
     } catch (const std::ios_base::failure&) {
         const int error = errno;

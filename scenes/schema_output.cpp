@@ -75,7 +75,8 @@ const Section& density_section() {
              "Voxels written per cell and axis; above 1 the field of metaballs is sampled on a finer grid.",
              "D, density"),
          density_key<&DensityOptions::half>("half", "", kAny,
-                                            "Write 16-bit floats: half the size, 3 digits."),
+                                            "Write 16-bit floats: 3 digits, half the memory in programs that "
+                                            "keep them so; compressed files are about as large."),
          density_key<&DensityOptions::write_state>("write_state", "", kAny,
                                                    "Write also the bool grids `hum`, `act` and `cld`."),
          density_key<&DensityOptions::write_velocity>("write_velocity", "", kAny,

@@ -297,6 +297,17 @@ class Files(Case):
         self.assertEqual(len(list((self.folder / "out").iterdir())), 1)
         self.call("run", self.scene, "--no-render", "--out", "out", "--overwrite")
 
+    def test_a_run_of_another_scene_stays(self):
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        table = (self.folder / "out/statistics.csv").read_text()
+        for change in (["--seed", "77"], ["--set", "time.step_s=7"]):
+            self.refused(2, "run", self.scene, "--no-render", "--out", "out", *change, says="another scene or seed")
+            self.assertEqual((self.folder / "out/statistics.csv").read_text(), table)
+        self.call("run", self.scene, "--no-render", "--out", "out")  # the same scene: the same files
+        self.assertEqual((self.folder / "out/statistics.csv").read_text(), table)
+        self.call("run", self.scene, "--no-render", "--out", "out", "--seed", "77", "--overwrite")
+        self.assertNotEqual((self.folder / "out/statistics.csv").read_text(), table)
+
     def test_named_pipes_are_refused_and_those_of_commands_read(self):
         os.mkfifo(self.folder / "pipe")
         for arguments in (["info"], ["validate"], ["run"], ["hash"], ["hash", self.scene, "--check"],

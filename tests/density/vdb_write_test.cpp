@@ -7,6 +7,9 @@
 #include <cmath>
 #include <csignal>
 
+#include <fstream>
+#include <iterator>
+
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -144,6 +147,29 @@ TEST(VdbWrite, OpenvdbReadsEveryGridBack) {
     expect_plane(*file.get<openvdb::BoolGrid>("hum"), scene.state.hum, 1);
     expect_plane(*file.get<openvdb::BoolGrid>("act"), scene.state.act, 1);
     expect_plane(*file.get<openvdb::BoolGrid>("cld"), scene.state.cld, 1);
+}
+
+// OpenVDB's own writer makes a random UUID for each file.
+TEST(VdbWrite, SameContentIsTheSameBytes) {
+    const Scene scene;
+    const test::TemporaryFolder folder;
+    const auto bytes = [](const std::filesystem::path& path) {
+        std::ifstream stream(path, std::ios::binary);
+        return std::string(std::istreambuf_iterator<char>(stream), {});
+    };
+    std::filesystem::create_directory(folder / "again");
+    write_vdb(folder / "grid_0001.vdb", scene.content(), scene.metadata);
+    write_vdb(folder / "again/grid_0001.vdb", scene.content(), scene.metadata);
+    write_vdb(folder / "grid_0002.vdb", scene.content(), scene.metadata);
+    const std::string first = bytes(folder / "grid_0001.vdb");
+    EXPECT_TRUE(first == bytes(folder / "again/grid_0001.vdb"));
+    const auto uuid = [&](const char* name) {
+        openvdb::io::File file((folder / name).string());
+        file.open();
+        return file.getUniqueTag();
+    };
+    EXPECT_EQ(uuid("grid_0001.vdb"), first.substr(21, 36));
+    EXPECT_NE(uuid("grid_0001.vdb"), uuid("grid_0002.vdb"));
 }
 
 TEST(VdbWrite, VelocityIsTheWindAtEachVoxel) {
