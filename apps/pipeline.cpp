@@ -53,6 +53,11 @@ void append_plane(std::vector<std::byte>& bytes, const BitPlane& plane) {
     bytes.insert(bytes.end(), words.begin(), words.end());
 }
 
+// In the order of a checkpoint.
+std::array<const BitPlane*, 3> saved_planes(const Lattice& planes) {
+    return {&planes.cld, &planes.hum, &planes.act};
+}
+
 // Number by number: a structure as bytes would have holes of any content.
 void put_clouds(ByteWriter& writer, const std::vector<SkyCloud>& clouds) {
     writer.put(std::uint64_t(clouds.size()));
@@ -297,9 +302,10 @@ LayerFrame Pipeline::layer_frame(std::size_t layer, const Moment& moment) {
     frame.sky = layers_[layer].sky();
     frame.rain = state.rain;
     if (scene_.density.write_state && !frame.direct) {
-        frame.hum = state.hum.view();
-        frame.act = state.act.view();
-        frame.cld = state.cld.view();
+        frame.planes = state.planes;
+        frame.hum = state.planes->hum.view();
+        frame.act = state.planes->act.view();
+        frame.cld = state.planes->cld.view();
     }
     const double step_s = scene_.automaton.time_step_s, at_s = double(moment.step) * step_s;
     for (const SkyCloud& cloud : state.clouds) {
@@ -328,6 +334,7 @@ void Pipeline::report_frame(PipelineSink& sink) {
         result.hum = result.layers.front().hum;
         result.act = result.layers.front().act;
         result.cld = result.layers.front().cld;
+        result.planes = result.layers.front().planes;
         result.layers.clear();
     }
     sink.frame(result);
@@ -339,15 +346,17 @@ Pipeline::PastLayer Pipeline::past_of(const LayerSimulation& layer) const {
     PastLayer state;
     state.hash = layer.hash();
     state.statistics = no_automaton();
+    Lattice planes;
     if (const Automaton* automaton = layer.automaton()) {
         state.statistics = cloud_statistics(automaton->hum(), automaton->act(), automaton->cld(),
                                             automaton->options().placement);
-        state.cld = copy_of(automaton->cld());
+        planes.cld = copy_of(automaton->cld());
         if (scene_.density.write_state) {
-            state.hum = copy_of(automaton->hum());
-            state.act = copy_of(automaton->act());
+            planes.hum = copy_of(automaton->hum());
+            planes.act = copy_of(automaton->act());
         }
     }
+    state.planes = std::make_shared<const Lattice>(std::move(planes));
     if (const SkySimulation* sky = layer.sky()) {
         state.state = sky->state();
         state.clouds.assign(sky->clouds().begin(), sky->clouds().end());
@@ -387,7 +396,8 @@ DensityGrid Pipeline::density_of(std::size_t layer, std::uint64_t step) const {
     const auto reach = std::uint64_t(scene_.density.smoothing.t0);
     std::vector<TimedPlane> planes;
     for (std::uint64_t at = step > reach ? step - reach : 0; at <= step + reach; ++at) {
-        planes.push_back({past(at).layers[layer].cld.view(), int(std::int64_t(at) - std::int64_t(step))});
+        planes.push_back(
+            {past(at).layers[layer].planes->cld.view(), int(std::int64_t(at) - std::int64_t(step))});
     }
     const AutomatonOptions& lattice = automaton->options();
     return scaled(smooth(planes, scene_.density.smoothing, lattice.placement, lattice.boundaries),
@@ -429,12 +439,12 @@ Checkpoint Pipeline::save() {
     // The planes at their exact size: a growing vector would hold them twice.
     std::size_t words = 0;
     for (const PastLayer& layer : history_.front().layers) {
-        for (const BitPlane* plane : {&layer.cld, &layer.hum, &layer.act}) words += plane->words().size();
+        for (const BitPlane* plane : saved_planes(*layer.planes)) words += plane->words().size();
     }
     bytes.reserve(bytes.size() + history_.size() * words * sizeof(std::uint64_t));
     for (const Past& state : history_) {
         for (const PastLayer& layer : state.layers) {
-            for (const BitPlane* plane : {&layer.cld, &layer.hum, &layer.act}) append_plane(bytes, *plane);
+            for (const BitPlane* plane : saved_planes(*layer.planes)) append_plane(bytes, *plane);
         }
     }
     return {simulation_hash_, steps_taken(), combined_hash(layers_), saved_layers(layers_), std::move(bytes)};
@@ -492,13 +502,15 @@ void Pipeline::restore_history(const Checkpoint& checkpoint) {
     }
     for (Past& state : history_) {
         for (std::size_t layer = 0; layer < layers_.size(); ++layer) {
-            const Automaton* automaton = layers_[layer].automaton();
-            if (automaton == nullptr) continue;
-            PastLayer& past = state.layers[layer];
-            past.cld = get_plane(reader, automaton->options().extent);
-            if (!scene_.density.write_state) continue;
-            past.hum = get_plane(reader, automaton->options().extent);
-            past.act = get_plane(reader, automaton->options().extent);
+            Lattice planes;
+            if (const Automaton* automaton = layers_[layer].automaton()) {
+                planes.cld = get_plane(reader, automaton->options().extent);
+                if (scene_.density.write_state) {
+                    planes.hum = get_plane(reader, automaton->options().extent);
+                    planes.act = get_plane(reader, automaton->options().extent);
+                }
+            }
+            state.layers[layer].planes = std::make_shared<const Lattice>(std::move(planes));
         }
     }
     // past() relies on these.

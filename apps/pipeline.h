@@ -17,6 +17,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -60,15 +61,17 @@ struct LayerFrame {
     DensityGrid density;  // one voxel a cell; without automaton there are no voxels
     StateHash hash;
     std::optional<BitPlaneView> hum, act, cld;  // as in FrameResult
+    std::shared_ptr<const Lattice> planes;      // what they look at
     // Clouds at the frame's time; their shapes and models are those of `sky`, which itself stands at a later
     // step.
-    const SkySimulation* sky = nullptr;  // never null, valid during the call
+    const SkySimulation* sky = nullptr;  // null in a scene without layers; lives as long as the pipeline
     std::vector<SkyCloud> clouds;
     bool direct = false;         // to be drawn as billboards: the layer has no automaton
     std::vector<RainArea> rain;  // at the frame's time
 };
 
-// One frame: density at a moment that need not be a step.
+// One frame: density at a moment that need not be a step. A copy is cheap, shares voxels and planes, and
+// stays valid while the pipeline lives; another thread may use it while the pipeline advances.
 struct FrameResult {
     int number = 1;  // as in file names, counted from 1
     double time_s = 0;
@@ -76,9 +79,10 @@ struct FrameResult {
     std::uint64_t step =
         0;  // the last step at or before time_s, whose state the three planes and the hash are
     StateHash hash;
-    // Only when the scene writes the state; valid during the call. A scene with layers has them in these.
+    // Only when the scene writes the state. A scene with layers has them in these.
     std::optional<BitPlaneView> hum, act, cld;
-    std::vector<LayerFrame> layers;  // none in a scene without layers
+    std::shared_ptr<const Lattice> planes;  // what they look at
+    std::vector<LayerFrame> layers;         // none in a scene without layers
 };
 
 // Receives results in the order of time; a step comes before the frames at or after it.
@@ -143,8 +147,8 @@ class Pipeline {
         CloudStatistics statistics;
         StateHash hash;
         double state = 0;
-        BitPlane cld;
-        BitPlane hum, act;  // empty unless the scene writes the state
+        // Never null; without automaton all are empty, hum and act unless the scene writes the state.
+        std::shared_ptr<const Lattice> planes;
         std::vector<SkyCloud> clouds;
         std::vector<RainArea> rain;
     };

@@ -2,27 +2,21 @@
 #include "apps/run_folder.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
-#include <memory>
+#include <exception>
 #include <system_error>
 
 #include <fmt/format.h>
 
 #include "apps/folder_lock.h"
+#include "apps/frame_output.h"
 #include "apps/manifest.h"
-#include "apps/simulation.h"
-#include "apps/sky_picture.h"
 #include "apps/statistics_file.h"
-#include "apps/version.h"
 #include "automaton/atomic_file.h"
 #include "automaton/checkpoint.h"
 #include "automaton/error.h"
-#include "automaton/random.h"
-#include "density/combine.h"
-#include "density/metaballs.h"
 #include "density/vdb_file.h"
-#include "render/image_file.h"
-#include "render/renderer.h"
 #include "render/video.h"
 #include "scenes/writer.h"
 
@@ -41,18 +35,18 @@ void make_folder(const std::filesystem::path& folder) {
     if (error) throw Error(ErrorCode::io, folder.string() + ": cannot make the folder: " + error.message());
 }
 
-bool wants_png(const Scene& scene) { return scene.frames.png || scene.frames.video; }
-
-// Turns results into files.
+// Turns results into files: statistics and manifest here, those of frames beside the simulation.
 class Recorder : public PipelineSink {
   public:
     explicit Recorder(const RunSettings& settings)
-        : settings_(settings), folder_{settings.folder, settings.scene.name} {
-        if (settings.render) renderer_ = std::make_unique<Renderer>();
-        if (renderer_) state_.device = renderer_->device_name();
+        : settings_(settings),
+          folder_{settings.folder, settings.scene.name},
+          output_(settings, [this](const FrameResult& frame) { note(frame); }) {
+        state_.device = output_.device_name();
     }
 
     void step(const StepResult& result) override {
+        output_.check();
         statistics_->add(statistics_row(result));
         for (std::size_t n = 0; n < result.layers.size(); ++n) {
             layer_statistics_[n].add(statistics_row(result, result.layers[n]));
@@ -61,12 +55,10 @@ class Recorder : public PipelineSink {
         state_.steps_reported = result.step + 1;
     }
 
-    void frame(const FrameResult& result) override {
-        write_density(result);
-        if (renderer_) draw(result);
-        state_.frames.push_back({result.number, result.time_s, result.step, result.hash});
-        if (std::string rain = rain_text(result); !rain.empty()) state_.rain[result.number] = std::move(rain);
-    }
+    void frame(const FrameResult& result) override { output_.add(result); }
+
+    // Frames whose files are all there.
+    int frames_done() const { return frames_done_; }
 
     // The files of a run that begins. A folder that cannot be written to is found now.
     void begin() {
@@ -93,6 +85,7 @@ class Recorder : public PipelineSink {
         };
         // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
         statistics_ = StatisticsFile::resume(folder_.statistics(), pipeline.next_step(), record_frames_of);
+        frames_done_ = int(state_.frames.size());
         for (const LayerOptions& layer : settings_.scene.layers) {
             layer_statistics_.push_back(StatisticsFile::resume(
                 folder_.statistics(layer.name), pipeline.next_step(), {}, kLayerStatisticsHeader));
@@ -111,20 +104,37 @@ class Recorder : public PipelineSink {
         }
     }
 
-    // Statistics first: what the checkpoint goes on from is then always there. So is the manifest's rain,
-    // which no other file has.
-    void save(Pipeline& pipeline, bool complete, double wall_s) {
+    // Frames and statistics first: what the checkpoint goes on from is then always there. So is the
+    // manifest's rain, which no other file has.
+    void save(Pipeline& pipeline, double wall_s) {
+        output_.finish();
         statistics_->save();
         for (StatisticsFile& file : layer_statistics_) file.save();
         if (!state_.rain.empty()) write_manifest(false, wall_s);
         write_checkpoint(folder_.checkpoint(), pipeline.save());
-        write_manifest(complete, wall_s);
+        write_manifest(false, wall_s);
+    }
+
+    // After a failure: lists every frame that is there, beside the steps of the last save(). A manifest that
+    // cannot be written either is no news, and the old one is still right.
+    void list_finished_frames(double wall_s) noexcept {
+        output_.finish_quietly();
+        try {
+            ManifestState state = state_;
+            state.steps_reported = steps_saved_;
+            state.state_hash = hash_saved_;
+            state.wall_s = wall_s;
+            nephos::write_manifest(settings_, state);
+        } catch (const std::exception&) {
+        }
     }
 
     void write_manifest(bool complete, double wall_s) {
         state_.complete = complete;
         state_.wall_s = wall_s;
         nephos::write_manifest(settings_, state_);
+        steps_saved_ = state_.steps_reported;
+        hash_saved_ = state_.state_hash;
     }
 
     void encode_video() const {
@@ -154,123 +164,22 @@ class Recorder : public PipelineSink {
     const RunFolder& folder() const { return folder_; }
 
   private:
-    DensityGrid refined(const DensityGrid& density) const {
-        const DensityOptions& options = settings_.scene.density;
-        return options.refine > 1 ? resample(density, options.refine, options.metaball_radius_cells)
-                                  : density;
-    }
-
-    VdbMetadata metadata_of(const FrameResult& result, const StateHash& hash) const {
-        const Scene& scene = settings_.scene;
-        VdbMetadata metadata;
-        metadata.extinction_per_m = scene.density.extinction_per_m;
-        metadata.time_s = result.time_s;
-        metadata.time_step_s = scene.automaton.time_step_s;
-        metadata.frames_per_second = scene.frames.per_second;
-        metadata.time_scale = scene.frames.time_scale;
-        metadata.seed = scene.automaton.seed;
-        metadata.scene_hash = settings_.scene_hash;
-        metadata.state_hash = hash.hex();
-        metadata.nephos_version = version();
-        metadata.random_stream_version = int(kRandomStreamVersion);
-        return metadata;
-    }
-
-    void write_density(const FrameResult& result) {
-        if (!settings_.scene.layers.empty()) {
-            write_layers(result);
-            return;
-        }
-        const Scene& scene = settings_.scene;
-        const DensityGrid written = refined(result.density);
-        VdbContent content;
-        content.density = &written;
-        content.half = scene.density.half;
-        content.hum = result.hum;
-        content.act = result.act;
-        content.cld = result.cld;
-        content.cells = scene.automaton.placement;
-        if (scene.density.write_velocity) content.wind = &scene.automaton.wind;
-        write_vdb(folder_.density(result.number), content, metadata_of(result, result.hash));
-    }
-
-    // A file for each layer, with its own voxels, bits and wind, and one of their densities together.
-    void write_layers(const FrameResult& result) {
-        const Scene& scene = settings_.scene;
-        std::vector<DensityGrid> grids;
-        for (std::size_t n = 0; n < result.layers.size(); ++n) {
-            const LayerFrame& layer = result.layers[n];
-            if (layer.direct) continue;
-            grids.push_back(refined(layer.density));
-            VdbContent content;
-            content.density = &grids.back();
-            content.half = scene.density.half;
-            content.hum = layer.hum;
-            content.act = layer.act;
-            content.cld = layer.cld;
-            content.cells = scene.layers[n].placement;
-            if (scene.density.write_velocity) content.wind = &layer_wind(scene, n);
-            write_vdb(folder_.density(result.number, layer.name), content, metadata_of(result, layer.hash));
-        }
-        if (grids.empty()) return;
-        const DensityGrid whole = scene.density.refine > 1 ? combine(grids) : result.density;
-        VdbContent content;
-        content.density = &whole;
-        content.half = scene.density.half;
-        content.cells = whole.placement();
-        write_vdb(folder_.density(result.number), content, metadata_of(result, result.hash));
-    }
-
-    // The metaballs of every lattice, each with the size of its own cells.
-    std::vector<Metaball> metaballs_of(const FrameResult& result) const {
-        const double radius = settings_.scene.density.metaball_radius_cells;
-        std::uint64_t count = result.layers.empty() ? result.density.active_voxels() : 0;
-        for (const LayerFrame& layer : result.layers) count += layer.density.active_voxels();
-        require_memory(count * 4 * sizeof(Metaball),
-                       fmt::format("{}: drawing frame {}", settings_.scene.name, result.number));
-        if (result.layers.empty()) return metaballs(result.density, radius);
-        std::vector<Metaball> balls;
-        for (const LayerFrame& layer : result.layers) {
-            if (layer.direct) continue;
-            const std::vector<Metaball> more = metaballs(layer.density, radius);
-            balls.insert(balls.end(), more.begin(), more.end());
-        }
-        return balls;
-    }
-
-    void draw(const FrameResult& result) {
-        const Scene& scene = settings_.scene;
-        const double radius = scene.density.metaball_radius_cells;
-        const std::vector<Metaball> balls = metaballs_of(result);
-        const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
-        std::vector<SkyLayer> layers;
-        for (const LayerFrame& layer : result.layers)
-            layers.push_back({layer.sky, layer.clouds, layer.direct});
-        const Picture picture =
-            painter_.draw(*renderer_, cloud, layers, scene.render, result.time_s, scene.frames.exr);
-        PictureMetadata metadata;
-        metadata.scene = scene.name;
-        metadata.seed = scene.automaton.seed;
-        metadata.scene_hash = settings_.scene_hash;
-        metadata.state_hash = result.hash.hex();
-        metadata.version = version();
-        metadata.time_s = result.time_s;
-        metadata.frames_per_second = scene.frames.per_second;
-        metadata.time_scale = scene.frames.time_scale;
-        metadata.extinction_per_m = scene.density.extinction_per_m;
-        if (scene.frames.exr)
-            write_exr(folder_.picture(result.number, ".exr"), picture, scene.render, metadata);
-        if (wants_png(scene))
-            write_png(folder_.picture(result.number, ".png"), picture, scene.render, metadata);
+    // By the thread that writes.
+    void note(const FrameResult& frame) {
+        state_.frames.push_back({frame.number, frame.time_s, frame.step, frame.hash});
+        if (std::string rain = rain_text(frame); !rain.empty()) state_.rain[frame.number] = std::move(rain);
+        frames_done_ = int(state_.frames.size());
     }
 
     const RunSettings& settings_;
     RunFolder folder_;
-    std::unique_ptr<Renderer> renderer_;
-    SkyPainter painter_;
     std::optional<StatisticsFile> statistics_;  // from begin() or take_over() on
     std::vector<StatisticsFile> layer_statistics_;
-    ManifestState state_;
+    ManifestState state_;  // while frames are under way, `frames` and `rain` belong to the thread that writes
+    std::atomic<int> frames_done_ = 0;
+    std::uint64_t steps_saved_ = 0;  // as the manifest names them
+    std::string hash_saved_;
+    FrameOutput output_;  // last: ends first
 };
 
 bool is_frame_of(const std::string& file, const std::string& name) {
@@ -483,7 +392,7 @@ bool stopped(const RunObserver& observer) { return observer.stop && observer.sto
 void report_progress(const RunObserver& observer, const Pipeline& pipeline, const Recorder& recorder,
                      const RunSettings& settings, std::string_view phase) {
     if (!observer.progress) return;
-    observer.progress({pipeline.steps_taken(), pipeline.steps_in_all(), int(recorder.state().frames.size()),
+    observer.progress({pipeline.steps_taken(), pipeline.steps_in_all(), recorder.frames_done(),
                        settings.range.last_frame - settings.range.first_frame + 1, phase});
 }
 
@@ -495,10 +404,11 @@ void simulate(Pipeline& pipeline, Recorder& recorder, const RunSettings& setting
         pipeline.advance(recorder);
         report_progress(observer, pipeline, recorder, settings, "simulating");
         if (seconds_since(saved) < settings.checkpoint_every_s) continue;
-        recorder.save(pipeline, false, seconds_since(begin));
+        recorder.save(pipeline, seconds_since(begin));
         saved = Clock::now();
     }
-    recorder.save(pipeline, false, seconds_since(begin));
+    recorder.save(pipeline, seconds_since(begin));
+    report_progress(observer, pipeline, recorder, settings, "simulating");
 }
 
 // The video, when there is to be one and it is not there yet; false when it was stopped.
@@ -563,7 +473,12 @@ RunReport run_scene(const RunSettings& given, const RunObserver& observer) {
         recorder.begin();
     }
 
-    simulate(pipeline, recorder, settings, observer, begin);
+    try {
+        simulate(pipeline, recorder, settings, observer, begin);
+    } catch (...) {
+        recorder.list_finished_frames(seconds_since(begin));
+        throw;
+    }
     const bool complete = pipeline.finished() && encode(pipeline, recorder, settings, observer);
     if (complete) recorder.write_manifest(true, seconds_since(begin));
     RunReport report = report_of(recorder, settings, pipeline);

@@ -18,8 +18,8 @@ namespace nephos {
 struct MemoryEstimate {
     std::size_t program = 0;    // code, libraries and buffers that no key changes
     std::size_t automaton = 0;  // planes of bits and the work areas beside them
-    std::size_t density =
-        0;  // planes of the time window, grids of two steps, of the frame between them and as written
+    // Planes of the time window, grids of two steps, of frames on their way to the files, and as written.
+    std::size_t density = 0;
     std::size_t pictures = 0;  // metaballs, picture and shadow map; 0 without pictures
     std::size_t total() const;
 };

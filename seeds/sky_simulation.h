@@ -18,8 +18,8 @@
 // lets no cloud enter: the other bracketing sky then has all of them.
 //
 // Positions are fixed-point sums of whole displacements (automaton/wind.h): nothing drifts, and the state can
-// be saved and restored exactly. One object is one simulation; no function is safe to call while another
-// thread steps.
+// be saved and restored exactly. One object is one simulation; while a thread steps, others may call what
+// depends on the options alone: options(), shapes(), shape(), model(), position_m(), sphere() and ahead().
 
 #include <cstddef>
 #include <cstdint>

@@ -428,6 +428,33 @@ class Disk(Case):
         self.call("run", self.scene, "--no-render", "--out", "out")
         self.refused_at(5000, "x.vdb", "state", self.scene, "--out", "x.vdb")
 
+    def test_frames_that_were_finished_stay(self):
+        """Files grow with the clouds: a limit that some later frame is the first to pass."""
+        growing = ["--set", "density.write_state=false", "--set", "field.background.act=0.0002", "--set", "field.background.ext=0",
+                   "--set", "time.steps=20", "--no-render", "--out"]
+        self.call("run", self.scene, *growing, "whole")
+        sizes = [(self.folder / frame["density"]).stat().st_size for frame in self.listed("whole")]
+        limit = 2 * max(sizes) // 3
+        failed = next(n for n, size in enumerate(sizes) if size > limit)
+        self.assertGreater(failed, 2)
+        for threads in (1, 2):
+            with self.subTest(threads=threads):
+                out = f"out{threads}"
+                self.refused_at(limit, f"tiny_{failed + 1:04}.vdb", "run", self.scene, *growing, out, "--threads", threads)
+                self.assertEqual([frame["number"] for frame in self.listed(out)], list(range(1, failed + 1)))
+                on_disk = sorted(p.name for p in (self.folder / out / "density").iterdir())
+                self.assertEqual(on_disk, [f"tiny_{n:04}.vdb" for n in range(1, failed + 1)])
+                self.call("run", self.scene, *growing, out)
+                self.same_runs("whole", out)
+
+    def listed(self, out):
+        """The frames in a run's manifest, each of whose files is there."""
+        frames = json.loads((self.folder / out / "manifest.json").read_text())["frames"]
+        for frame in frames:
+            frame["density"] = f"{out}/{frame['density']}"
+            self.call("info", frame["density"])
+        return frames
+
     def test_statistics(self):
         # Grids of few voxels stay small, the table of many steps does not.
         few = ["--set", "lattice.cells=[8,8,8]", "--set", "density.write_state=false", "--set", "frames.time_scale=100000",
