@@ -20,6 +20,7 @@ namespace nephos {
 namespace {
 
 constexpr png_uint_32 kMaxSide = 16384;
+constexpr int kCompressionLevel = 4;
 
 using Texts = std::vector<std::pair<std::string, std::string>>;
 
@@ -66,6 +67,10 @@ bool encode(Exchange& exchange, png_structp png, png_infop info) {
                  PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
     png_set_sRGB_gAMA_and_cHRM(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+    // Dither makes a pixel a bad guess of the one below. With this one filter and level a file is as small,
+    // up to a tenth, as with the choice among all filters at level 6, and takes a fourth of the time.
+    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+    png_set_compression_level(png, kCompressionLevel);
     png_set_text(png, info, exchange.chunks.data(), int(exchange.chunks.size()));
     png_write_info(png, info);
     png_write_image(png, exchange.rows.data());
