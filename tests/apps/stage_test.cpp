@@ -28,7 +28,7 @@ std::vector<int> numbers(int count) {
 // With a thread and without one.
 class StageTest : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Threads, StageTest, testing::Values(false, true),
-                         [](const auto& info) { return info.param ? "Beside" : "Inside"; });
+                         [](const auto& variant) { return variant.param ? "Beside" : "Inside"; });
 
 TEST_P(StageTest, KeepsTheOrderThroughTwoStages) {
     std::vector<int> out;
