@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/terminal.h"
 #include "automaton/error.h"
 #include "automaton/text.h"
 #include "density/vdb_file.h"
@@ -16,6 +17,13 @@ void require_memory(std::size_t bytes, const std::string& what) {
     throw Error(ErrorCode::usage,
                 fmt::format("{} takes about {}, but {} ({}) are all there is", what, bytes_text(bytes),
                             bytes_text(available.bytes), available.limit));
+}
+
+void note_unused_models(const Scene& scene) {
+    if (scene.models.empty() || !scene.layers.empty()) return;
+    print_note(
+        "the scene has base models but no [[layer]] whose skies use them: nothing of them is simulated "
+        "(scenes/genera/Cu.toml shows a sky and a layer)");
 }
 
 std::optional<Lattice> initial_state(const Scene& scene, const std::string& from) {

@@ -21,6 +21,9 @@ inline constexpr std::uint64_t kMaxSteps = 1'000'000'000;
 // Throws Error(usage) unless `bytes` of memory are available; `what` starts the sentence.
 void require_memory(std::size_t bytes, const std::string& what);
 
+// Says so on standard error when a scene has base models but no layer: nothing of them would be simulated.
+void note_unused_models(const Scene& scene);
+
 // The state that the simulation starts from: the file `from`, else the scene's initial_state_file, else
 // nothing (the scene's own start). Throws as read_state().
 std::optional<Lattice> initial_state(const Scene& scene, const std::string& from = {});

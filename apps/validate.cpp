@@ -9,6 +9,7 @@
 
 #include "apps/arguments.h"
 #include "apps/commands.h"
+#include "apps/simulation.h"
 #include "apps/terminal.h"
 #include "automaton/error.h"
 #include "automaton/text.h"
@@ -81,6 +82,7 @@ int validate(const ValidateArguments& a) {
         one.file = file;
         try {
             const Scene scene = load_scene(one);
+            note_unused_models(scene);
             if (a.print) {
                 output.write(to_toml(scene));
             } else if (a.work.json) {

@@ -223,6 +223,11 @@ step_s = -1
         self.assertGreaterEqual(len(scenes), 4)
         self.call("validate", *scenes)
 
+    def test_base_models_without_a_layer_are_noted(self):
+        lonely = self.write("lonely.toml", f'name = "lonely"\nmodels = ["{SOURCE}/scenes/genera/Cb.toml"]\n')
+        self.assertIn("no [[layer]]", self.call("validate", lonely).stderr)
+        self.assertEqual(self.call("validate", SOURCE / "scenes/genera/Cb.toml").stderr, "")
+
     def test_a_lattice_beyond_memory_is_refused(self):
         result = self.call("run", self.scene, "--no-render", "--set", "lattice.cells=[65536,65536,65536]", status=2)
         self.assertIn("TiB", result.stderr)
