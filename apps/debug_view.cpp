@@ -7,17 +7,13 @@
 #include <utility>
 
 #include "apps/sky_picture.h"
-#include "seeds/trigonometry.h"
+#include "automaton/vector_math.h"
 
 namespace nephos {
 namespace {
 
 constexpr Rgb kBoxes{0.05, 0.15, 0.9}, kRoots{1, 0.75, 0}, kOutside{0.9, 0.9, 0.9}, kInside{0.9, 0.02, 0.02};
 constexpr Rgb kAxes[3] = {{0.8, 0.1, 0.1}, {0.1, 0.6, 0.1}, {0.1, 0.3, 0.9}};
-
-Vec3 sum(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-Vec3 scaled(const Vec3& a, double s) { return {s * a.x, s * a.y, s * a.z}; }
-double length(const Vec3& a) { return std::hypot(a.x, a.y, a.z); }
 
 // The lines of one cloud; everything below is in its model space.
 class CloudLines {
@@ -41,7 +37,7 @@ class CloudLines {
     void axes() {
         const Vec3 ends[3] = {{cloud_.radius_m, 0, 0}, {0, cloud_.radius_m, 0}, {0, 0, cloud_.radius_m}};
         for (int axis = 0; axis < 3; ++axis)
-            add(cloud_.centre_m, sum(cloud_.centre_m, ends[axis]), kAxes[axis], 1.75);
+            add(cloud_.centre_m, cloud_.centre_m + ends[axis], kAxes[axis], 1.75);
     }
 
     void roots() {
@@ -57,19 +53,15 @@ class CloudLines {
 
   private:
     void add(const Vec3& from, const Vec3& to, const Rgb& colour, double width = 1.25) {
-        out_.push_back({sum(from, place_), sum(to, place_), colour, width});
+        out_.push_back({from + place_, to + place_, colour, width});
     }
 
     // One and a half radii long: its head lies beyond where the first children are.
     void arrow(const SeedBox& box, const Root& root) {
-        const Rotation pitch = rotation_of_degrees(root.pitch_deg), yaw = rotation_of_degrees(root.yaw_deg);
+        const RootAxes axes = axes_of(root);
         const double size = 0.75 * length(box.size_m);
         const auto towards = [&](double along, double side, double up) {
-            const Vec3 ahead{pitch.cos * yaw.cos, pitch.cos * yaw.sin, pitch.sin};
-            const Vec3 left{-yaw.sin, yaw.cos, 0},
-                above{-pitch.sin * yaw.cos, -pitch.sin * yaw.sin, pitch.cos};
-            return sum(box.centre_m,
-                       scaled(sum(scaled(ahead, along), sum(scaled(left, side), scaled(above, up))), size));
+            return box.centre_m + size * (along * axes.ahead + (side * axes.side + up * axes.up));
         };
         const Vec3 tip = towards(1, 0, 0);
         add(box.centre_m, tip, kRoots, 1.75);
@@ -82,18 +74,18 @@ class CloudLines {
     // From a box's centre towards the light until a little beyond the cloud.
     void ray(const Vec3& from, const Light& light) {
         Vec3 way = light.towards;
-        if (!light.at_infinity) way = sum(way, scaled(sum(from, place_), -1));
+        if (!light.at_infinity) way = way - (from + place_);
         const double distance = length(way);
         if (!(distance > 0)) return;
-        way = scaled(way, 1 / distance);
-        const Vec3 offset = sum(from, scaled(cloud_.centre_m, -1));
-        const double middle = offset.x * way.x + offset.y * way.y + offset.z * way.z;
+        way = (1 / distance) * way;
+        const Vec3 offset = from - cloud_.centre_m;
+        const double middle = dot(offset, way);
         const double beyond = length(offset) * length(offset) - 1.2 * 1.2 * cloud_.radius_m * cloud_.radius_m;
         double end = -middle + std::sqrt(std::max(middle * middle - beyond, 0.0));
         if (!light.at_infinity) end = std::min(end, distance);
-        add(from, sum(from, scaled(way, end)), kOutside, 1);
+        add(from, from + end * way, kOutside, 1);
         for (const auto& [enter, leave] : inside(from, way, end))
-            add(sum(from, scaled(way, enter)), sum(from, scaled(way, leave)), kInside, 1.75);
+            add(from + enter * way, from + leave * way, kInside, 1.75);
     }
 
     // Where a ray is inside of boxes, as intervals that do not touch; the slab test of Kay and Kajiya.

@@ -5,14 +5,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "automaton/vector_math.h"
+
 namespace nephos {
 namespace {
 
 constexpr double kEyeHeight_m = 2.0;
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
-
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 // How far in front of the box's middle the eye must be for every corner to be within the picture, looking
 // along `forward` with `right` and `up` as the picture's axes (all unit).

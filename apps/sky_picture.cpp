@@ -8,6 +8,7 @@
 
 #include "apps/debug_view.h"
 #include "apps/simulation.h"
+#include "automaton/vector_math.h"
 #include "render/camera.h"
 
 namespace nephos {
@@ -15,13 +16,6 @@ namespace {
 
 constexpr double kFarthest_m = 1e7;
 constexpr double kLeastFlash = 1.0 / 512;  // relative to the sun; less does not show
-
-Vec3 sum(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-
-double squared_distance(const Vec3& a, const Vec3& b) {
-    const double x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
-    return x * x + y * y + z * z;
-}
 
 }  // namespace
 
@@ -76,9 +70,8 @@ void SkyBillboards::light_by_flash(const SkySimulation& sky, const Flash& flash,
     std::vector<LitCloud> lit;
     for (const SkyCloud* cloud : seen) {
         const Sphere sphere = sky.sphere(*cloud);
-        const double nearest = std::max(std::sqrt(squared_distance(sphere.centre_m, flash.position_m)) -
-                                            sphere.radius_m - strewn(sky, *cloud).reach_m,
-                                        1.0);
+        const double nearest = std::max(
+            length(sphere.centre_m - flash.position_m) - sphere.radius_m - strewn(sky, *cloud).reach_m, 1.0);
         if (flash.intensity * 1e6 / (nearest * nearest) < kLeastFlash) continue;
         lit.push_back({cloud->serial, &sky.shape(*cloud), sky.position_m(*cloud)});
     }
@@ -94,13 +87,13 @@ void SkyBillboards::list(const SkySimulation& sky, const SkyCloud& cloud, bool f
     const std::span<const double> lightning =
         flash ? flash_.absorbed(cloud.serial) : std::span<const double>{};
     const auto index = std::uint32_t(out.clouds.size());
-    out.clouds.push_back({sum(shape.centre_m, place), what.low_m + place.z, what.high_m + place.z});
+    out.clouds.push_back({shape.centre_m + place, what.low_m + place.z, what.high_m + place.z});
     for (const Billboard& billboard : what.billboards) {
         const double weight =
             phase_weight(shape.boxes[billboard.box].distance, cloud.phase, sky.options().formation_softness);
         if (weight <= 0) continue;
         CloudBillboard& drawn = out.billboards.emplace_back();
-        drawn.centre_m = sum(billboard.centre_m, place);
+        drawn.centre_m = billboard.centre_m + place;
         drawn.width_m = float(billboard.width_m);
         drawn.height_m = float(billboard.height_m);
         drawn.sun_absorbed = float(sun[billboard.box]);

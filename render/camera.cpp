@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "automaton/error.h"
-#include "render/vector_math.h"
+#include "automaton/vector_math.h"
 
 namespace nephos {
 

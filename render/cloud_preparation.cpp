@@ -6,12 +6,11 @@
 #include <limits>
 #include <string>
 
-#include <Imath/half.h>
-
 #include "automaton/error.h"
 #include "automaton/text.h"
+#include "automaton/vector_math.h"
+#include "render/half_floats.h"
 #include "render/keyed_order.h"
-#include "render/vector_math.h"
 
 namespace nephos {
 namespace {
@@ -29,11 +28,6 @@ void check(const Metaball& ball, std::size_t index) {
                                           ": expected finite numbers and a radius above 0, got radius " +
                                           number_text(double(ball.radius), 6) + ", density " +
                                           number_text(double(ball.density), 6));
-}
-
-// Two half floats, the first in the low bits.
-shader::uint pack_halves(double low, double high) {
-    return shader::uint(Imath::half(float(low)).bits()) | shader::uint(Imath::half(float(high)).bits()) << 16;
 }
 
 struct Interval {
@@ -137,7 +131,7 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
         order.source[i] = source;
         order.splats[i] = {.x = float(dot(u, offset)),
                            .y = float(dot(v, offset)),
-                           .radii = pack_halves(radius_u, radius_v),
+                           .radii = pack_halves(float(radius_u), float(radius_v)),
                            .depth_scale = float(cloud.depth_scale[source] * thinning)};
         order.places[i] = {.z = distance[source], .per_radius = float(1.0 / radius)};
         order.largest_radius = std::max(order.largest_radius, ball.radius);

@@ -8,9 +8,10 @@
 #include <string>
 
 #include "automaton/error.h"
+#include "automaton/vector_math.h"
+#include "render/half_floats.h"
 #include "render/keyed_order.h"
 #include "render/puff_textures.h"
-#include "render/vector_math.h"
 
 namespace nephos {
 namespace {
@@ -37,14 +38,6 @@ void check(const CloudBillboard& billboard, std::size_t index, std::size_t cloud
     require(within(billboard.opacity, 0, 1), "an opacity from 0 to 1");
     require(std::size_t(billboard.texture) < kPuffKinds, "a texture of PuffTexture");
     require(billboard.cloud < clouds, "the index of a cloud");
-}
-
-// Nearest 16-bit float of a number in 0..65504; what is too small for its normal numbers becomes 0.
-std::uint32_t half_bits(float value) {
-    const std::uint32_t bits =
-        std::bit_cast<std::uint32_t>(value) + 0x1000u;  // rounds to 10 bits of fraction
-    const std::int32_t exponent = std::int32_t(bits >> 23) - 112;
-    return exponent <= 0 ? 0 : std::uint32_t(exponent) << 10 | (bits >> 13 & 1023u);
 }
 
 std::uint32_t unorm16(float value) { return std::uint32_t(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f); }
@@ -204,13 +197,12 @@ class Collector {
         const Vec3 offset = billboard.centre_m - eye_;
         const Drawn what = drawn(billboard);
         const PuffPicture picture = puff_picture(billboard.texture, billboard.variant);
-        order.puffs.push_back(
-            {float(offset.x), float(offset.y), float(offset.z),
-             half_bits(float(what.half_width_m)) | half_bits(float(what.half_height_m)) << 16,
-             std::uint32_t(picture.layer) | std::uint32_t(picture.turn) << 8 |
-                 std::uint32_t(level_of(what)) << 12,
-             unorm16(billboard.sun_absorbed) | unorm16(billboard.flash_absorbed) << 16, float(what.opacity),
-             billboard.cloud});
+        order.puffs.push_back({float(offset.x), float(offset.y), float(offset.z),
+                               pack_halves(float(what.half_width_m), float(what.half_height_m)),
+                               std::uint32_t(picture.layer) | std::uint32_t(picture.turn) << 8 |
+                                   std::uint32_t(level_of(what)) << 12,
+                               unorm16(billboard.sun_absorbed) | unorm16(billboard.flash_absorbed) << 16,
+                               float(what.opacity), billboard.cloud});
     }
 
     const PreparedCloud& cloud_;

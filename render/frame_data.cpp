@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "automaton/vector_math.h"
 #include "render/cloud_preparation.h"
-#include "render/vector_math.h"
 
 namespace nephos {
 namespace {
@@ -27,6 +27,17 @@ Daylight daylight(double sun_elevation_deg) {
     const double x = std::clamp((sun_elevation_deg + 2.0) / 4.0, 0.0, 1.0);
     const double below = std::max(0.0, 10.0 - sun_elevation_deg);
     return {x * x * (3.0 - 2.0 * x), std::exp(-0.0079 * below * below)};
+}
+
+Picture blank_picture(const RenderOptions& options) {
+    Picture picture;
+    picture.width = options.camera.width;
+    picture.height = options.camera.height;
+    picture.beauty.resize(3 * picture.pixels());
+    picture.transmittance.resize(picture.pixels());
+    picture.depth_m.resize(picture.pixels());
+    picture.shadow_size = options.shadow_map_size;
+    return picture;
 }
 
 double pixels_per_unit(const Camera& camera, const CameraFrame& frame) {

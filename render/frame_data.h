@@ -32,6 +32,9 @@ Daylight daylight(double sun_elevation_deg);
 shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
                          const Flash* flash, const Tile& tile);
 
+// A picture with room for its pixels, without its shadow map.
+Picture blank_picture(const RenderOptions& options);
+
 // Size in pixels of a unit at distance 1.
 double pixels_per_unit(const Camera& camera, const CameraFrame& frame);
 

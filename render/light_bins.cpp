@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Imath/half.h>
 #include <tbb/parallel_for.h>
+
+#include "render/half_floats.h"
 
 namespace nephos {
 
@@ -14,10 +15,7 @@ std::vector<PixelBox> light_boxes(std::span<const shader::LightSplat> splats) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, splats.size(), 8192), [&](const auto& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
             const shader::LightSplat& s = splats[i];
-            Imath::half x, y;
-            x.setBits(std::uint16_t(s.radii & 0xFFFF));
-            y.setBits(std::uint16_t(s.radii >> 16));
-            const float rx = x, ry = y;
+            const auto [rx, ry] = unpack_halves(s.radii);
             boxes[i] = {int(std::floor(s.x - rx)), int(std::floor(s.y - ry)), int(std::ceil(s.x + rx)),
                         int(std::ceil(s.y + ry))};
         }

@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "automaton/vector_math.h"
 #include "render/camera.h"
-#include "render/vector_math.h"
 
 namespace nephos {
 namespace {

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <span>
 
-#include <Imath/half.h>
 #include <tbb/parallel_for.h>
 
+#include "render/half_floats.h"
 #include "render/light_bins.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -151,10 +151,7 @@ namespace {
 std::int16_t to_row(int y) { return std::int16_t(std::clamp(y, -32768, 32767)); }
 
 LightBall light_ball(const shader::LightSplat& splat, const shader::LightPlace& place, const PixelBox& box) {
-    Imath::half x, y;
-    x.setBits(std::uint16_t(splat.radii & 0xFFFF));
-    y.setBits(std::uint16_t(splat.radii >> 16));
-    const float rx = x, ry = y;
+    const auto [rx, ry] = unpack_halves(splat.radii);
     return {.x = splat.x,
             .y = splat.y,
             .per_x2 = 1.0f / (rx * rx),

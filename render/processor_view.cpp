@@ -9,6 +9,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "render/screen_ball.h"
 #include "render/screen_box.h"
 #include "render/tile_bins.h"
 
@@ -22,31 +23,11 @@
 
 #include "render/background-inl.h"
 #include "render/column-inl.h"
+#include "render/screen_ball-inl.h"
 
 #ifndef NEPHOS_PROCESSOR_VIEW_TYPES_
 #define NEPHOS_PROCESSOR_VIEW_TYPES_
 namespace nephos {
-
-// A metaball on the screen, ready to be drawn; one cache line. With d the direction of a pixel's ray and d0
-// that of the centre c, the squared distance of the ray from the centre is |c x d|^2 / |d|^2, and c x d =
-// c x (d - d0): a quadratic form of the pixel's offset from the centre, exact for any field of view.
-struct ScreenBall {
-    float x, y;        // of the centre, pixels; where `distance` is 0, x has the bits of ExactBall's number
-    float xx, xy, yy;  // squared distance in radii, times |d|^2: xx dx^2 + xy dx dy + yy dy^2
-    float fit[6];      // c0..c5 of the opacity (shaders/shared.h)
-    float red, green, blue;   // radiance at opacity 1
-    float distance;           // metres; 0: not fitted
-    std::int16_t first, end;  // rows of pixels
-};
-static_assert(sizeof(ScreenBall) == 64);
-
-// A metaball whose integral is evaluated along each ray.
-struct ExactBall {
-    float x, y, z;  // centre in radii
-    float per_radius, depth_scale, distance;
-    float diffuse[3];  // radiance that does not depend on the ray
-    float direct[3];   // radiance per phase function
-};
 
 // Sums over the metaballs in front, for the pixels of a tile row by row.
 struct TileSums {
@@ -75,167 +56,6 @@ struct ViewTile {
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
-
-constexpr std::size_t kMaxLanes = 2 * shader::kTileWidth;
-
-// Henyey-Greenstein (phase_function() of shaders/shared.h).
-HWY_INLINE Floats phase_function(Floats cosine, float g) {
-    const Floats base = hn::NegMulAdd(set(2.0f * g), cosine, set(1.0f + g * g));
-    return hn::Div(set((1.0f - g * g) / (4.0f * shader::kPi)), hn::Mul(base, hn::Sqrt(base)));
-}
-
-// Balls of one vector, turned from rows into columns.
-struct BallColumns {
-    HWY_ALIGN float x[kMaxLanes], y[kMaxLanes], z[kMaxLanes], radius[kMaxLanes], least_radius[kMaxLanes],
-        depth_scale[kMaxLanes], light[kMaxLanes], height[kMaxLanes], flash[kMaxLanes];
-
-    BallColumns(std::span<const shader::ViewBall> balls, const shader::Frame& frame) {
-        const std::size_t lanes = hn::Lanes(Lanes());
-        for (std::size_t lane = 0; lane < lanes; ++lane) {
-            const shader::ViewBall& ball = balls[std::min(lane, balls.size() - 1)];
-            x[lane] = ball.x;
-            y[lane] = ball.y;
-            z[lane] = ball.z;
-            radius[lane] = ball.radius;
-            const bool widens = (ball.flags & shader::kAround) == 0;
-            least_radius[lane] = widens ? shader::kMinRadiusPixels / frame.up.w : 0.0f;
-            depth_scale[lane] = ball.depth_scale;
-            light[lane] = ball.light;
-            height[lane] = ball.height;
-            flash[lane] = float(ball.flags >> 16) * (1.0f / 65535.0f);
-        }
-    }
-};
-
-// The light that a metaball scatters towards the eye (shaders/lighting.glsl).
-struct Scattered {
-    Floats3 diffuse;  // radiance that does not depend on the ray
-    Floats3 direct;   // radiance per phase function
-};
-
-HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& centre, Floats distance,
-                                     const shader::Frame& frame) {
-    const Lanes d;
-    const Floats light = hn::Load(d, ball.light), one = set(1.0f);
-    Floats multiple = light;  // T: light falls off in proportion to the way, to nothing
-    if (!(frame.air_extinction.w > 0)) {
-        const Floats depth = hn::Neg(hn::Log(d, hn::Max(light, set(1.0e-30f))));
-        multiple = hn::Div(one, hn::MulAdd(set(frame.ambient_base.w), depth, one));
-    }
-    multiple = hn::Mul(set(frame.sunlight.w), multiple);
-    const Floats height = hn::Load(d, ball.height), albedo = set(frame.ambient_top.w);
-    const Floats3 sunlight = set3(frame.sunlight);
-    Floats3 arriving = times_add(
-        multiple, sunlight, mix(set3(frame.ambient_base), set3(frame.ambient_top), {height, height, height}));
-    if (frame.flash.w > 0) {
-        const Floats3 way = subtract(set3(frame.flash), centre);
-        const Floats share = hn::Mul(set(frame.flash.w), hn::Load(d, ball.flash));
-        arriving =
-            times_add(hn::Mul(share, flash_falloff(dot(way, way))), set3(frame.flash_colour), arriving);
-    }
-    const Floats3 beta = decay(frame.air_extinction, distance);
-    return {mix(set3(frame.horizon), times(albedo, arriving), beta),
-            each_times(times(hn::Mul(hn::Mul(albedo, set(shader::kPi)), light), beta), sunlight)};
-}
-
-HWY_INLINE Floats phase_along(const shader::Frame& frame, const Floats3& ray) {
-    return phase_function(dot(set3(frame.to_sun), ray), frame.to_sun.w);
-}
-
-// c0..c5 of the opacity. Plain loops of a fixed length: the compiler makes vectors of them.
-void fit_opacity(const float* depth_scale, float (*fit)[kMaxLanes]) {
-    float s[kMaxLanes];
-    for (std::size_t i = 0; i < kMaxLanes; ++i) s[i] = shader::fit_parameter(depth_scale[i]);
-    for (std::size_t i = 0; i < kMaxLanes; ++i) fit[0][i] = shader::opacity_c0(s[i]);
-    for (std::size_t i = 0; i < kMaxLanes; ++i) fit[1][i] = shader::opacity_c1(s[i]);
-    for (std::size_t i = 0; i < kMaxLanes; ++i) fit[2][i] = shader::opacity_c2(s[i]);
-    for (std::size_t i = 0; i < kMaxLanes; ++i) fit[3][i] = shader::opacity_c3(s[i]);
-    for (std::size_t i = 0; i < kMaxLanes; ++i) fit[4][i] = shader::opacity_c4(s[i]);
-    for (std::size_t i = 0; i < kMaxLanes; ++i) fit[5][i] = shader::opacity_c5(s[i]);
-}
-
-// A vector of balls: `screen` gets up to one a lane, `exact` those that are not fitted, whose numbers begin
-// with `number`.
-void prepare_vector(std::span<const shader::ViewBall> balls, const shader::Frame& frame, ScreenBall* screen,
-                    ExactBall* exact, std::uint32_t number) {
-    const Lanes d;
-    const BallColumns ball(balls, frame);
-    const Floats3 centre{hn::Load(d, ball.x), hn::Load(d, ball.y), hn::Load(d, ball.z)};
-    const Floats distance = hn::Sqrt(dot(centre, centre)), radius = hn::Load(d, ball.radius);
-    const Floats drawn = hn::Max(radius, hn::Mul(hn::Load(d, ball.least_radius), distance));
-    const Floats thinning = hn::Div(radius, drawn), per_radius = hn::Div(set(1.0f), drawn);
-    const Scattered light = scattered_light(ball, centre, distance, frame);
-    const Floats3 ray = times(hn::Div(set(1.0f), distance), centre);
-    const Floats3 radiance = times_add(phase_along(frame, ray), light.direct, light.diffuse);
-
-    const Floats3 in_radii = times(per_radius, centre), right = set3(frame.right), up = set3(frame.up);
-    const Floats3 along_x = cross(in_radii, times(set(2.0f / frame.picture.x), right)),
-                  along_y = cross(in_radii, times(set(-2.0f / frame.picture.y), up));
-    const Floats depth = dot(set3(frame.forward), centre);
-    const Floats across = hn::Div(dot(right, centre), hn::Mul(dot(right, right), depth)),
-                 upward = hn::Div(dot(up, centre), hn::Mul(dot(up, up), depth));
-    const Floats half_width = set(0.5f * frame.picture.x), half_height = set(0.5f * frame.picture.y);
-
-    HWY_ALIGN float depth_scale[kMaxLanes] = {}, fit[6][kMaxLanes];
-    hn::Store(hn::Mul(hn::Load(d, ball.depth_scale), hn::Mul(thinning, thinning)), d, depth_scale);
-    fit_opacity(depth_scale, fit);
-    HWY_ALIGN float field[18][kMaxLanes];
-    const Floats fields[] = {hn::Sub(hn::MulAdd(across, half_width, half_width), set(frame.picture.z)),
-                             hn::Sub(hn::NegMulAdd(upward, half_height, half_height), set(frame.picture.w)),
-                             dot(along_x, along_x),
-                             hn::Mul(set(2.0f), dot(along_x, along_y)),
-                             dot(along_y, along_y),
-                             radiance.x,
-                             radiance.y,
-                             radiance.z,
-                             distance,
-                             per_radius};
-    for (std::size_t n = 0; n < std::size(fields); ++n) hn::Store(fields[n], d, field[n]);
-    const bool some_exact = std::ranges::any_of(
-        balls, [](const shader::ViewBall& each) { return (each.flags & shader::kNotFitted) != 0; });
-    HWY_ALIGN float scattered[6][kMaxLanes];
-    if (some_exact) {
-        const Floats parts[] = {light.diffuse.x, light.diffuse.y, light.diffuse.z,
-                                light.direct.x,  light.direct.y,  light.direct.z};
-        for (std::size_t n = 0; n < std::size(parts); ++n) hn::Store(parts[n], d, scattered[n]);
-    }
-    for (std::size_t i = 0; i < balls.size(); ++i) {
-        ScreenBall& to = screen[i];
-        to.x = field[0][i];
-        to.y = field[1][i];
-        to.xx = field[2][i];
-        to.xy = field[3][i];
-        to.yy = field[4][i];
-        for (std::size_t n = 0; n < 6; ++n) to.fit[n] = fit[n][i];
-        to.red = field[5][i];
-        to.green = field[6][i];
-        to.blue = field[7][i];
-        to.distance = field[8][i];
-        if ((balls[i].flags & shader::kNotFitted) == 0) continue;
-        const float scale = field[9][i];
-        exact[number] = {.x = scale * balls[i].x,
-                         .y = scale * balls[i].y,
-                         .z = scale * balls[i].z,
-                         .per_radius = scale,
-                         .depth_scale = depth_scale[i],
-                         .distance = to.distance,
-                         .diffuse = {scattered[0][i], scattered[1][i], scattered[2][i]},
-                         .direct = {scattered[3][i], scattered[4][i], scattered[5][i]}};
-        to.x = std::bit_cast<float>(number++);
-        to.distance = 0.0f;
-    }
-}
-
-// `number`: of the first of these balls that is not fitted.
-void prepare_balls(std::span<const shader::ViewBall> balls, const shader::Frame& frame, ScreenBall* screen,
-                   ExactBall* exact, std::uint32_t number) {
-    const std::size_t lanes = hn::Lanes(Lanes());
-    for (std::size_t begin = 0; begin < balls.size(); begin += lanes) {
-        const auto some = balls.subspan(begin, std::min(lanes, balls.size() - begin));
-        prepare_vector(some, frame, screen + begin, exact, number);
-        for (const shader::ViewBall& ball : some) number += (ball.flags & shader::kNotFitted) != 0 ? 1 : 0;
-    }
-}
 
 // The pixels of a tile as the kernels need them.
 struct TileRays {

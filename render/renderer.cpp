@@ -65,17 +65,6 @@ GpuImage upload_attenuation(const GpuDevice& gpu) {
     return image;
 }
 
-Picture allocate_picture(const RenderOptions& options) {
-    Picture picture;
-    picture.width = options.camera.width;
-    picture.height = options.camera.height;
-    picture.beauty.resize(3 * picture.pixels());
-    picture.transmittance.resize(picture.pixels());
-    picture.depth_m.resize(picture.pixels());
-    picture.shadow_size = options.shadow_map_size;
-    return picture;
-}
-
 }  // namespace
 
 struct Renderer::Impl {
@@ -99,9 +88,10 @@ struct Renderer::Impl {
     GpuDevice gpu;
     PipelineLayout layout;
     vk::raii::Sampler clamped, white_beyond;
-    GpuImage attenuation;
     Splatting splatting;  // not automatic
+    const GpuImage& attenuation_on_device();
     // Made when they are needed.
+    std::optional<GpuImage> attenuation;
     std::optional<LightTiles> light_tiles;
     std::optional<ViewTiles> view_tiles;
     std::optional<ViewPass> view_pass;
@@ -113,7 +103,6 @@ Renderer::Impl::Impl(const DeviceOptions& device_options)
       layout(create_pipeline_layout(gpu)),
       clamped(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
       white_beyond(create_sampler(gpu, vk::SamplerAddressMode::eClampToBorder)),
-      attenuation(upload_attenuation(gpu)),
       splatting(device_options.splatting) {
     if (splatting == Splatting::automatic) {
         const bool software = gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu;
@@ -123,8 +112,13 @@ Renderer::Impl::Impl(const DeviceOptions& device_options)
                                                  gpu.properties.limits.maxFramebufferWidth)));
 }
 
+const GpuImage& Renderer::Impl::attenuation_on_device() {
+    if (!attenuation) attenuation.emplace(upload_attenuation(gpu));
+    return *attenuation;
+}
+
 LightTiles& Renderer::Impl::light_on_device() {
-    if (!light_tiles) light_tiles.emplace(gpu, layout, attenuation, clamped);
+    if (!light_tiles) light_tiles.emplace(gpu, layout, attenuation_on_device(), clamped);
     return *light_tiles;
 }
 
@@ -160,7 +154,7 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     const PreparedCloud prepared = prepare(cloud);
     const CameraFrame camera = camera_frame(options.camera);
-    Picture picture = allocate_picture(options);
+    Picture picture = blank_picture(options);
 
     picture.shadow_frame = shadow_frame(prepared, direction_to_sun(options.sun), options.shadow_map_size);
     std::optional<DensityBlocks> blocks;
@@ -198,13 +192,13 @@ Renderer::Impl::DrawPart Renderer::Impl::part_drawer(const EyeOrder& order, cons
     if (on_processor()) light_on_device().use(gpu, picture.shadow, picture.shadow_size);
     const GpuImage& map = light_on_device().shadow_map();
     if (order.puffs.empty() && splatting == Splatting::tiles) {
-        if (!view_tiles) view_tiles.emplace(gpu, layout, attenuation, clamped);
+        if (!view_tiles) view_tiles.emplace(gpu, layout, attenuation_on_device(), clamped);
         view_tiles->use_shadow_map(gpu, map, white_beyond);
         return [&](const shader::Frame& frame, const Tile& tile) {
             view_tiles->draw_tile(gpu, options, camera, frame, tile, order, picture);
         };
     }
-    if (!view_pass) view_pass.emplace(gpu, layout, attenuation, clamped);
+    if (!view_pass) view_pass.emplace(gpu, layout, attenuation_on_device(), clamped);
     view_pass->use_shadow_map(gpu, map, white_beyond);
     return [&](const shader::Frame& frame, const Tile& tile) {
         view_pass->draw_tile(gpu, frame, tile, order, picture);

@@ -6,7 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "render/vector_math.h"
+#include "automaton/vector_math.h"
 
 namespace nephos {
 namespace {

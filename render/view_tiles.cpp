@@ -14,11 +14,6 @@ namespace {
 constexpr std::size_t kMaxBalls = std::size_t{1} << 20;    // on the device at once: 52 MiB with their splats
 constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of the tiles' lists: 64 MiB
 
-vk::raii::Pipeline make_tiles(const GpuDevice& gpu, const PipelineLayout& layout, bool mixed,
-                              bool distances) {
-    return create_tile_pipeline(gpu, layout, shaders().view_tiles_comp, {mixed, distances});
-}
-
 }  // namespace
 
 ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
@@ -26,8 +21,6 @@ ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const G
     : layout_(&layout),
       project_(create_compute_pipeline(gpu, layout, shaders().view_project_comp)),
       finish_(create_compute_pipeline(gpu, layout, shaders().view_finish_comp)),
-      tiles_{{make_tiles(gpu, layout, false, false), make_tiles(gpu, layout, false, true)},
-             {make_tiles(gpu, layout, true, false), make_tiles(gpu, layout, true, true)}},
       bindings_(create_bindings(gpu, layout)),
       frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)) {
@@ -37,6 +30,14 @@ ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const G
 
 void ViewTiles::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler) {
     bind_image(gpu, bindings_, 4, map, sampler);
+}
+
+const vk::raii::Pipeline& ViewTiles::tiles_for(const GpuDevice& gpu, const EyeOrder& order) {
+    vk::raii::Pipeline& pipeline = tiles_[order.all_fitted ? 0 : 1][order.depth ? 1 : 0];
+    if (!*pipeline)
+        pipeline =
+            create_tile_pipeline(gpu, *layout_, shaders().view_tiles_comp, {!order.all_fitted, order.depth});
+    return pipeline;
 }
 
 void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order,
@@ -52,13 +53,13 @@ void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const Eye
     const auto groups = [](std::size_t invocations) {
         return (invocations + shader::kComputeGroup - 1) / shader::kComputeGroup;
     };
+    const vk::raii::Pipeline& tiles = tiles_for(gpu, order);
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_compute(commands, *layout_, bindings_, project_, step);
         dispatch_groups(commands, groups(balls));
         compute_barrier(commands);
         step.tile_count = shader::uint(grid.tiles());
-        begin_compute(commands, *layout_, bindings_, tiles_[order.all_fitted ? 0 : 1][order.depth ? 1 : 0],
-                      step);
+        begin_compute(commands, *layout_, bindings_, tiles, step);
         dispatch_groups(commands, grid.tiles());
         compute_barrier(commands);
         if (last) {

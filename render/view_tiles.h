@@ -28,12 +28,14 @@ class ViewTiles {
                    const shader::Frame& frame, const Tile& tile, const EyeOrder& order, Picture& picture);
 
   private:
+    const vk::raii::Pipeline& tiles_for(const GpuDevice& gpu, const EyeOrder& order);
     void draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order, std::size_t balls,
                     bool first, bool last);
 
     const PipelineLayout* layout_;
     vk::raii::Pipeline project_, finish_;
-    vk::raii::Pipeline tiles_[2][2];  // [some are not fitted][with distances]
+    // [some are not fitted][with distances]; made when they are needed.
+    vk::raii::Pipeline tiles_[2][2] = {{nullptr, nullptr}, {nullptr, nullptr}};
     Bindings bindings_;
     GpuBuffer frame_, balls_, splats_, ranges_, tails_, list_, radiance_, depth_;
 };

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "render/vector_math.h"
+#include "automaton/vector_math.h"
 
 namespace nephos {
 namespace {
@@ -138,27 +138,32 @@ double DensityBlocks::absorbed_from(const Vec3& from_m, const Vec3& light_m, dou
                       0.0, 1.0);
 }
 
-std::vector<float> light_by_absorption(const PreparedCloud& cloud, const DensityBlocks& blocks,
-                                       const Vec3& to_sun, double light_distance_m) {
+namespace {
+
+// 1 - absorbed(centre) of each visible metaball.
+template <class Absorbed>
+std::vector<float> light_at_centres(const PreparedCloud& cloud, const Absorbed& absorbed) {
     std::vector<float> light;
     light.reserve(cloud.visible.size());
     for (const std::uint32_t index : cloud.visible) {
         const Metaball& ball = cloud.metaballs[index];
-        light.push_back(
-            float(1 - blocks.absorbed_towards({ball.x, ball.y, ball.z}, to_sun, light_distance_m)));
+        light.push_back(float(1 - absorbed(Vec3{ball.x, ball.y, ball.z})));
     }
     return light;
 }
 
+}  // namespace
+
+std::vector<float> light_by_absorption(const PreparedCloud& cloud, const DensityBlocks& blocks,
+                                       const Vec3& to_sun, double light_distance_m) {
+    return light_at_centres(
+        cloud, [&](const Vec3& from) { return blocks.absorbed_towards(from, to_sun, light_distance_m); });
+}
+
 std::vector<float> flash_by_absorption(const PreparedCloud& cloud, const DensityBlocks& blocks,
                                        const Vec3& flash_m, double light_distance_m) {
-    std::vector<float> light;
-    light.reserve(cloud.visible.size());
-    for (const std::uint32_t index : cloud.visible) {
-        const Metaball& ball = cloud.metaballs[index];
-        light.push_back(float(1 - blocks.absorbed_from({ball.x, ball.y, ball.z}, flash_m, light_distance_m)));
-    }
-    return light;
+    return light_at_centres(
+        cloud, [&](const Vec3& from) { return blocks.absorbed_from(from, flash_m, light_distance_m); });
 }
 
 std::vector<float> shadow_by_absorption(const DensityBlocks& blocks, const ShadowFrame& frame,

@@ -113,50 +113,46 @@ auto read_three(const Reading& reading, const Node& node, Read&& read) {
     return result;
 }
 
-void read_range(const Reading& reading, const Node& node, Range& range) {
+// Two numbers [min, max], or one for both; `read` reads one. Nothing, and a report, when they are not.
+template <class Read>
+auto read_ends(const Reading& reading, const Node& node, const Read& read) {
+    using Value = typename decltype(read(reading, node))::value_type;
+    std::optional<std::array<Value, 2>> result;
     if (node.kind != Node::Kind::array) {
-        if (const auto number = number_of(reading, node)) range = {*number, *number};
-        return;
+        if (const auto number = read(reading, node)) result = {*number, *number};
+        return result;
     }
     if (node.items.size() != 2) {
         const std::size_t size = node.items.size();
         reading.report(node.place,
                        "has " + std::to_string(size) + (size == 1 ? " item" : " items") + ", not 2");
-        return;
+        return result;
     }
-    const auto min = number_of({reading.document, reading.key, indexed(reading.path, 0)}, node.items[0]);
-    const auto max = number_of({reading.document, reading.key, indexed(reading.path, 1)}, node.items[1]);
-    if (!min || !max) return;
+    const auto min = read({reading.document, reading.key, indexed(reading.path, 0)}, node.items[0]);
+    const auto max = read({reading.document, reading.key, indexed(reading.path, 1)}, node.items[1]);
+    if (!min || !max) return result;
     if (*min > *max) {
-        reading.report(node.place, "runs from " + number_text(*min) + " down to " + number_text(*max));
-        return;
+        reading.report(node.place,
+                       "runs from " + number_text(double(*min)) + " down to " + number_text(double(*max)));
+        return result;
     }
-    if (std::isinf(*max) && !std::isinf(*min)) {
+    result = {*min, *max};
+    return result;
+}
+
+void read_range(const Reading& reading, const Node& node, Range& range) {
+    const auto ends = read_ends(reading, node, number_of);
+    if (!ends) return;
+    const auto [min, max] = *ends;
+    if (std::isinf(max) && !std::isinf(min)) {
         reading.report(node.items[1].place, "has an infinite end: no number can be drawn from it");
         return;
     }
-    range = {*min, *max};
+    range = {min, max};
 }
 
 void read_counts(const Reading& reading, const Node& node, CountRange& counts) {
-    if (node.kind != Node::Kind::array) {
-        if (const auto number = integer_of(reading, node)) counts = {int(*number), int(*number)};
-        return;
-    }
-    if (node.items.size() != 2) {
-        const std::size_t size = node.items.size();
-        reading.report(node.place,
-                       "has " + std::to_string(size) + (size == 1 ? " item" : " items") + ", not 2");
-        return;
-    }
-    const auto min = integer_of({reading.document, reading.key, indexed(reading.path, 0)}, node.items[0]);
-    const auto max = integer_of({reading.document, reading.key, indexed(reading.path, 1)}, node.items[1]);
-    if (!min || !max) return;
-    if (*min > *max) {
-        reading.report(node.place, "runs from " + std::to_string(*min) + " down to " + std::to_string(*max));
-        return;
-    }
-    counts = {int(*min), int(*max)};
+    if (const auto ends = read_ends(reading, node, integer_of)) counts = {int((*ends)[0]), int((*ends)[1])};
 }
 
 void read_texts(const Reading& reading, const Node& node, std::vector<std::string>& texts) {

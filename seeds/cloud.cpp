@@ -4,17 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "automaton/vector_math.h"
 #include "seeds/checks.h"
 #include "seeds/trigonometry.h"
 
 namespace nephos {
 namespace {
-
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
-Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 Vec3 sum(const Vec3& a, double fa, const Vec3& b, double fb) {
     return {a.x * fa + b.x * fb, a.y * fa + b.y * fb, a.z * fa + b.z * fb};

@@ -44,20 +44,13 @@ void check_seed(const std::string& where, const Seed& seed) {
         check_root(where + ", root " + std::to_string(r), seed.roots[r]);
 }
 
-// The frame of a root and its opening: where children may go.
+// The axes of a root and its opening: where children may go.
 struct Cone {
-    Vec3 axis, side, up;  // orthonormal; side towards growing yaw, up towards growing pitch
+    RootAxes axes;
     double half_yaw_deg, half_pitch_deg;
 };
 
-Cone cone_of(const Root& root) {
-    const Rotation pitch = rotation_of_degrees(root.pitch_deg), yaw = rotation_of_degrees(root.yaw_deg);
-    return {{pitch.cos * yaw.cos, pitch.cos * yaw.sin, pitch.sin},
-            {-yaw.sin, yaw.cos, 0},
-            {-pitch.sin * yaw.cos, -pitch.sin * yaw.sin, pitch.cos},
-            root.open_yaw_deg / 2,
-            root.open_pitch_deg / 2};
-}
+Cone cone_of(const Root& root) { return {axes_of(root), root.open_yaw_deg / 2, root.open_pitch_deg / 2}; }
 
 // A direction in the elliptic cone: at a uniform place of the ellipse of the two half angles, with the angle
 // from the axis chosen by 1 - cos, which makes a circular cone (and the whole sphere) uniform per solid
@@ -66,13 +59,13 @@ Vec3 direction_in(const Cone& cone, double azimuth_fraction, double area_fractio
     const Rotation turn = rotation_of_degrees(360 * azimuth_fraction);
     const double a = cone.half_yaw_deg * turn.cos, b = cone.half_pitch_deg * turn.sin;
     const double rim_deg = std::sqrt(a * a + b * b);
-    if (!(rim_deg > 0)) return cone.axis;
+    if (!(rim_deg > 0)) return cone.axes.ahead;
     const double c = 1 - area_fraction * (1 - rotation_of_degrees(rim_deg).cos);
     const double s = std::sqrt(std::max(0.0, 1 - c * c)) / rim_deg;
     const double fs = s * a, fu = s * b;
-    return {c * cone.axis.x + fs * cone.side.x + fu * cone.up.x,
-            c * cone.axis.y + fs * cone.side.y + fu * cone.up.y,
-            c * cone.axis.z + fs * cone.side.z + fu * cone.up.z};
+    const auto& [ahead, side, up] = cone.axes;
+    return {c * ahead.x + fs * side.x + fu * up.x, c * ahead.y + fs * side.y + fu * up.y,
+            c * ahead.z + fs * side.z + fu * up.z};
 }
 
 double sphere_radius(const Vec3& size) {
@@ -144,6 +137,13 @@ void check(const BaseModel& model) {
         usage_error(where + " can make a cloud of " + std::to_string(boxes) + " seeds, at most " +
                     std::to_string(kMaxBoxes) + " are possible");
     }
+}
+
+RootAxes axes_of(const Root& root) {
+    const Rotation pitch = rotation_of_degrees(root.pitch_deg), yaw = rotation_of_degrees(root.yaw_deg);
+    return {{pitch.cos * yaw.cos, pitch.cos * yaw.sin, pitch.sin},
+            {-yaw.sin, yaw.cos, 0},
+            {-pitch.sin * yaw.cos, -pitch.sin * yaw.sin, pitch.cos}};
 }
 
 int children_of_level(const Root& root, int level, int levels) {

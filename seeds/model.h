@@ -86,6 +86,12 @@ std::int64_t largest_cloud(const BaseModel& model);
 // Throws Error(usage) with the model's name, the value and what was expected.
 void check(const BaseModel& model);
 
+// The directions of a root, orthonormal: ahead, towards growing yaw, and towards growing pitch. Pure.
+struct RootAxes {
+    Vec3 ahead, side, up;
+};
+RootAxes axes_of(const Root& root);
+
 // Children of level 1..levels: start + (end - start) (level - 1) / (levels - 1), rounded half up; start if
 // there is but one level.
 int children_of_level(const Root& root, int level, int levels);

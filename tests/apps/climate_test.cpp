@@ -25,6 +25,7 @@
 #include "density/vdb_file.h"
 #include "scenes/reader.h"
 #include "scenes/writer.h"
+#include "tests/apps/file_content.h"
 #include "tests/reference/with_threads.h"
 
 namespace nephos {
@@ -391,14 +392,6 @@ TEST(Climate, EveryShippedSceneCanBeStepped) {
         ++scenes;
     }
     EXPECT_GE(scenes, 18u);
-}
-
-std::string content(const fs::path& path) {
-    std::ifstream stream(path, std::ios::binary);
-    EXPECT_TRUE(stream) << path;
-    std::stringstream text;
-    text << stream.rdbuf();
-    return text.str();
 }
 
 // A run with layers on disk: its files, and that an interruption leaves no trace.

@@ -20,6 +20,7 @@
 #include "automaton/error.h"
 #include "density/vdb_file.h"
 #include "scenes/writer.h"
+#include "tests/apps/file_content.h"
 
 namespace nephos {
 namespace {
@@ -58,15 +59,7 @@ class RunFolderTest : public testing::Test {
     fs::path base_;
 };
 
-std::string content(const fs::path& path) {
-    std::ifstream stream(path, std::ios::binary);
-    EXPECT_TRUE(stream) << path;
-    std::stringstream text;
-    text << stream.rdbuf();
-    return text.str();
-}
-
-// Everything but wall time; a VDB file has a random identifier, so its voxels and metadata are compared.
+// Everything but wall time; of a VDB file its voxels and metadata.
 void expect_same_folders(const fs::path& a, const fs::path& b) {
     EXPECT_EQ(content(a / "statistics.csv"), content(b / "statistics.csv"));
     auto ja = nlohmann::json::parse(content(a / "manifest.json"));

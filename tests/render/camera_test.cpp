@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "automaton/error.h"
+#include "automaton/vector_math.h"
 #include "render/cloud_preparation.h"
-#include "render/vector_math.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {

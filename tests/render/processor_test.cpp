@@ -23,13 +23,7 @@ Drawn draw(const MetaballCloud& cloud, const RenderOptions& options, const Batch
     const PreparedCloud prepared = prepare(cloud);
     const CameraFrame camera = camera_frame(options.camera);
     Drawn drawn;
-    Picture& picture = drawn.picture;
-    picture.width = options.camera.width;
-    picture.height = options.camera.height;
-    picture.beauty.resize(3 * picture.pixels());
-    picture.transmittance.resize(picture.pixels());
-    picture.depth_m.resize(picture.pixels());
-    picture.shadow_size = options.shadow_map_size;
+    Picture& picture = drawn.picture = blank_picture(options);
     picture.shadow_frame = shadow_frame(prepared, direction_to_sun(options.sun), options.shadow_map_size);
     const SunOrder sun = order_from_sun(prepared, picture.shadow_frame, options.shadow_map_size);
     const std::vector<float> ordered = light_by_processor(sun, picture.shadow_size, picture.shadow, limits);

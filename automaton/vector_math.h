@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The few operations on Vec3 that geometry needs. Private to the module.
+// The few operations on Vec3 that geometry needs, for all modules; not installed.
 
 #include <cmath>
 
