@@ -82,6 +82,16 @@ HWY_INLINE Floats flash_falloff(Floats squared_m) {
     return hn::Div(set(1.0e6f), hn::Max(squared_m, set(1.0e4f)));
 }
 
+// shaders/air.glsl: D's beta, and the radiance of the air itself in full light.
+HWY_INLINE Floats3 air_transmittance(const shader::Frame& frame, const Floats3& /*ray*/, Floats distance_m) {
+    return decay(frame.air_extinction, distance_m);
+}
+HWY_INLINE Floats3 air_light(const shader::Frame& frame, const Floats3& /*ray*/, const Floats3& beta) {
+    const Floats one = set(1.0f);
+    return each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)},
+                      set3(frame.horizon));
+}
+
 struct ShadowTexels {
     const float* texels = nullptr;
     int size = 0;
@@ -134,7 +144,8 @@ HWY_INLINE Floats3 ground(const shader::Frame& frame, const ShadowTexels& map, c
             hn::Div(hn::Max(way.z, hn::Zero(Lanes())), hn::Sqrt(hn::Max(squared, set(1.0e-6f))));
         colour = times_add(hn::Mul(flash_falloff(squared), cosine), set3(frame.ground_flash), colour);
     }
-    return mix(set3(frame.horizon), colour, decay(frame.air_extinction, distance));
+    const Floats3 beta = air_transmittance(frame, ray, distance);
+    return add(each_times(beta, colour), air_light(frame, ray, beta));
 }
 
 // What lies behind the clouds along unit rays.

@@ -84,8 +84,9 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
         arriving =
             times_add(hn::Mul(share, flash_falloff(dot(way, way))), set3(frame.flash_colour), arriving);
     }
-    const Floats3 beta = decay(frame.air_extinction, distance);
-    return {mix(set3(frame.horizon), times(albedo, arriving), beta),
+    const Floats3 ray = times(hn::Div(one, hn::Max(distance, set(1.0e-6f))), centre);
+    const Floats3 beta = air_transmittance(frame, ray, distance);
+    return {add(each_times(beta, times(albedo, arriving)), air_light(frame, ray, beta)),
             each_times(times(hn::Mul(hn::Mul(albedo, set(shader::kPi)), light), beta), sunlight)};
 }
 

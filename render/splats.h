@@ -61,6 +61,7 @@ struct Splats {
     std::span<const CloudBillboard> billboards;
     MetaballCloud metaballs;
     std::optional<Flash> flash;
+    double time_s = 0;  // simulated time of the picture
     // False: nobody asks for Picture::depth_m, which is infinity then; billboards are drawn a sixth faster.
     bool depth = true;
 };

@@ -5,6 +5,7 @@
 // Step 2, first: what lies behind the clouds.
 #include "frame.glsl"
 #include "ray.glsl"
+#include "air.glsl"
 #include "background.glsl"
 
 layout(location = 0) out vec4 radiance;  // alpha: transmittance of the clouds, none so far

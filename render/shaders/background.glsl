@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sky gradient, and the ground plane that wears the shadow map; needs ray.glsl.
+// Sky gradient, and the ground plane that wears the shadow map; needs ray.glsl and air.glsl.
 
 layout(set = 0, binding = 4) uniform sampler2D shadow_map;
 
@@ -19,7 +19,8 @@ vec3 ground(vec3 ray, float distance) {
     vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark, no branch: see lighting.glsl
     float squared = dot(way, way);
     colour += frame.ground_flash.rgb * flash_falloff(squared) * max(way.z, 0.0) * inversesqrt(max(squared, 1.0e-6));
-    return mix(frame.horizon.rgb, colour, exp(-frame.air_extinction.rgb * distance));
+    vec3 beta = air_transmittance(ray, distance);
+    return beta * colour + air_light(ray, beta);
 }
 
 vec3 background(vec3 ray) {

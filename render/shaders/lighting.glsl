@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The light that a metaball scatters towards the eye; needs frame.glsl.
+// The light that a metaball scatters towards the eye; needs frame.glsl and air.glsl.
 
 struct Scattered {
     vec3 diffuse;  // radiance that does not depend on the ray
@@ -15,14 +15,15 @@ Scattered scattered_light(ViewBall ball, float distance) {
     float multiple = frame.sunlight.w * mix(1.0 / (1.0 + frame.ambient_base.w * optical_depth), ball.light,
                                             frame.air_extinction.w);
     vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, ball.height);
-    vec3 beta = exp(-frame.air_extinction.rgb * distance);
+    vec3 ray = vec3(ball.x, ball.y, ball.z) / max(distance, 1.0e-6);
+    vec3 beta = air_transmittance(ray, distance);
     float albedo = frame.ambient_top.w;
     vec3 arriving = frame.sunlight.rgb * multiple + ambient;
     vec3 way = frame.flash.xyz - vec3(ball.x, ball.y, ball.z);  // lightning; adds nothing in the dark
     float share = float(ball.flags >> 16) / 65535.0;
     arriving += frame.flash.w * flash_falloff(dot(way, way)) * share * frame.flash_colour.rgb;
     Scattered light;
-    light.diffuse = mix(frame.horizon.rgb, albedo * arriving, beta);
+    light.diffuse = beta * albedo * arriving + air_light(ray, beta);
     // A white surface facing the sun has radiance 1 here, 1 / pi of its irradiance: hence pi times the phase function.
     light.direct = beta * albedo * kPi * ball.light * frame.sunlight.rgb;
     return light;

@@ -5,6 +5,7 @@
 // Step 2, T's billboards: their corners, and T's light at each of them.
 #include "billboard.glsl"
 #include "frame.glsl"
+#include "air.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Puffs {
     Puff puffs[];
@@ -57,9 +58,10 @@ void main() {
     gl_Position = vec4(picture * frame.tile.xy + depth * frame.tile.zw, 0.5 * depth, depth);
 
     vec3 position = centre + reach.x * right + reach.y * up;
-    vec3 beta = exp(-frame.air_extinction.rgb * distance);
+    vec3 ray = centre / max(distance, 1.0e-6);
+    vec3 beta = air_transmittance(ray, distance);
     coordinate = turned(corner, puff.texture_bits >> 8 & 15u);
     lit = puff.opacity * beta * light_at(position, puff, clouds[puff.cloud]);
-    veil = puff.opacity * vec4((1.0 - beta) * frame.horizon.rgb, 1.0);
+    veil = puff.opacity * vec4(air_light(ray, beta), 1.0);
     layer_level_distance = vec3(uvec2(puff.texture_bits & 255u, puff.texture_bits >> 12), distance);
 }

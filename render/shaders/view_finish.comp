@@ -5,6 +5,7 @@
 // Tiles, last: what is seen of the background behind the clouds.
 #include "frame.glsl"
 #include "ray.glsl"
+#include "air.glsl"
 #include "background.glsl"
 
 layout(local_size_x = kComputeGroup) in;

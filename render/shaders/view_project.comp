@@ -4,6 +4,7 @@
 #include "shared.h"
 // Tiles, first: each metaball as a splat on the screen, with its light.
 #include "frame.glsl"
+#include "air.glsl"
 #include "lighting.glsl"
 
 layout(local_size_x = kComputeGroup) in;

@@ -6,6 +6,7 @@
 #include "attenuation.glsl"
 #include "billboard.glsl"
 #include "frame.glsl"
+#include "air.glsl"
 #include "lighting.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Balls {

@@ -8,6 +8,7 @@
 #include "frame.glsl"
 #include "ray.glsl"
 #include "integral.glsl"
+#include "air.glsl"
 #include "lighting.glsl"
 #include "tiles.glsl"
 
