@@ -146,7 +146,7 @@ void add_json(CLI::App& command, WorkArguments& arguments) {
 }
 
 void add_quiet(CLI::App& command, WorkArguments& arguments) {
-    command.add_flag("-q,--quiet", arguments.quiet, "No progress bar and no notes");
+    command.add_flag("-q,--quiet", arguments.quiet, "No progress bar, notes or summary");
 }
 
 Scene load_scene(const SceneArguments& arguments) {

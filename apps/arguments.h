@@ -37,7 +37,7 @@ struct WorkArguments {
 // Frames by their number as in file names, counted from 1; both ends belong to the range.
 struct FrameRange {
     int first = 1;
-    int last = std::numeric_limits<int>::max();
+    int last = std::numeric_limits<int>::max();  // or the last that there is
     bool operator==(const FrameRange&) const = default;
 };
 

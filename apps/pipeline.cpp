@@ -90,8 +90,8 @@ PipelineRange full_range(const Scene& scene) { return {scene.steps, 1, frame_cou
 
 PipelineRange range_of_frames(const Scene& scene, int first, int last) {
     const int count = frame_count(scene);
-    last = std::min(last, count);
-    if (first < 1 || last < first) {
+    if (last == kLastFrame) last = count;
+    if (first < 1 || last < first || last > count) {
         throw Error(ErrorCode::usage,
                     count == 0
                         ? fmt::format("the scene '{}' has no frames", scene.name)

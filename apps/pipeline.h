@@ -17,6 +17,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -102,7 +103,8 @@ struct PipelineRange {
 };
 
 // Everything that the scene names; with a range of frames, these and the steps up to the last of them.
-// Throws Error(usage) when the scene has no such frame.
+// `last` = kLastFrame is the last that there is; throws Error(usage) when the scene has no such frame.
+inline constexpr int kLastFrame = std::numeric_limits<int>::max();
 PipelineRange full_range(const Scene& scene);
 PipelineRange range_of_frames(const Scene& scene, int first, int last);
 

@@ -26,7 +26,8 @@ struct RunArguments {
     SceneArguments scene;
     std::string out;
     std::optional<FrameRange> frames;
-    bool no_render = false, video = false, resume = false, overwrite = false, needs = false;
+    bool no_render = false, statistics_only = false, video = false, resume = false, overwrite = false,
+         needs = false;
     double checkpoint_every_s = 60;
     WorkArguments work;
 };
@@ -42,8 +43,9 @@ Scene scene_of(const RunArguments& a) {
 void print_needs(const RunArguments& a) {
     const Scene scene = scene_of(a);
     Output output;
-    if (!a.no_render && wants_pictures(scene)) output.line("vulkan");
-    if (!a.no_render && wants_video(scene)) output.line("ffmpeg");
+    const bool render = !a.no_render && !a.statistics_only;
+    if (render && wants_pictures(scene)) output.line("vulkan");
+    if (render && wants_video(scene)) output.line("ffmpeg");
 }
 
 RunSettings settings_of(const RunArguments& a) {
@@ -54,7 +56,8 @@ RunSettings settings_of(const RunArguments& a) {
     settings.scene_text = to_toml(scene);
     settings.scene_hash = scene_hash(scene);
     settings.range = a.frames ? range_of_frames(scene, a.frames->first, a.frames->last) : full_range(scene);
-    settings.render = !a.no_render;
+    if (a.statistics_only) settings.range = {settings.range.last_step, 1, 0};
+    settings.render = !a.no_render && !a.statistics_only;
     settings.folder =
         a.out.empty() ? std::filesystem::path("out") / scene.name : std::filesystem::path(a.out);
     settings.resume = a.resume;
@@ -89,6 +92,10 @@ std::uint64_t total_bytes(const RunFiles& files) {
     return bytes;
 }
 
+std::string counted(std::uint64_t number, std::string_view what) {
+    return fmt::format("{} {}{}", number, what, number == 1 ? "" : "s");
+}
+
 void print_files(Output& output, const RunReport& report) {
     struct Row {
         std::string files, size, opened_by;
@@ -111,10 +118,11 @@ void print_files(Output& output, const RunReport& report) {
 
 void print_report(const RunReport& report, const RunSettings& settings) {
     Output output;
-    output.line(styled(fmt::format("{}: {} steps, {} frames in {}{}", settings.scene.name,
-                                   report.steps_reported - 1, report.frames, human_duration(report.wall_s),
-                                   report.device.empty() ? "" : ", drawn by " + report.device),
-                       Style::bold, colours_on(stdout)));
+    output.line(styled(
+        fmt::format("{}: {}, {} in {}{}", settings.scene.name, counted(report.steps_reported - 1, "step"),
+                    counted(std::uint64_t(report.frames), "frame"), human_duration(report.wall_s),
+                    report.device.empty() ? "" : ", drawn by " + report.device),
+        Style::bold, colours_on(stdout)));
     print_files(output, report);
 }
 
@@ -143,6 +151,8 @@ void print_json(const RunReport& report, const RunSettings& settings) {
 
 int run(const RunArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
+    if (a.statistics_only && (a.frames || a.video))
+        throw Error(ErrorCode::usage, "--statistics-only writes no frames: leave out --frames and --video");
     if (a.needs) {
         print_needs(a);
         return 0;
@@ -165,13 +175,13 @@ int run(const RunArguments& a) {
     bar.reset();
     if (a.work.json) {
         print_json(report, settings);
-    } else if (report.complete) {
+    } else if (report.complete && !a.work.quiet) {
         print_report(report, settings);
     }
     if (report.complete) return 0;
-    print_note(fmt::format(
-        "stopped after {} of {} steps and {} frames; the same command with --resume goes on",
-        report.steps_reported == 0 ? 0 : report.steps_reported - 1, settings.range.last_step, report.frames));
+    print_note(fmt::format("stopped after {} of {} steps and {}; the same command with --resume goes on",
+                           report.steps_reported == 0 ? 0 : report.steps_reported - 1,
+                           settings.range.last_step, counted(std::uint64_t(report.frames), "frame")));
     return 128 + pending_signal();
 }
 
@@ -187,6 +197,8 @@ void add_run_command(CLI::App& app, Action& action) {
               [a](const std::string& text) { a->frames = parse_frames(text); });
     command->add_flag("--no-render", a->no_render,
                       "No pictures, only density grids and statistics; needs no GPU");
+    command->add_flag("--statistics-only", a->statistics_only,
+                      "No frames at all, only statistics of every step, the manifest and the checkpoint");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
     command->add_flag("--resume", a->resume, "Go on where an interrupted run stopped");
     command->add_flag(

@@ -148,6 +148,8 @@ class Usage(Case):
             (["run", self.scene, "--frames", "5..2"], "--frames '5..2'"),
             (["run", self.scene, "--frames", "0..2"], "--frames '0..2'"),
             (["run", self.scene, "--frames", "90"], "1 to 5"),
+            (["run", self.scene, "--frames", "2..6"], "1 to 5"),
+            (["run", self.scene, "--statistics-only", "--frames", "2..3"], "--statistics-only"),
             (["run", self.scene, "--checkpoint-every", "soon"], "--checkpoint-every 'soon'"),
             (["run", self.scene, "--resume", "--overwrite"], "--overwrite"),
             (["hash", self.scene, "--steps", "1e3"], "--steps '1e3'"),
@@ -635,6 +637,14 @@ class Results(Case):
         self.assertEqual(names, ["tiny_0002.vdb", "tiny_0003.vdb"])
         for name in names:
             self.assertEqual(voxels(self.folder / "some/density" / name), voxels(self.folder / "all/density" / name))
+
+    def test_statistics_only_writes_the_same_statistics_and_no_frames(self):
+        self.call("run", self.scene, "--no-render", "--out", "all")
+        result = self.call("run", self.scene, "--statistics-only", "--out", "some", "--quiet")
+        self.assertEqual((result.stdout, result.stderr), ("", ""))
+        self.assertEqual((self.folder / "some/statistics.csv").read_bytes(),
+                         (self.folder / "all/statistics.csv").read_bytes())
+        self.assertEqual(list(self.folder.glob("some/**/*.vdb")) + list(self.folder.glob("some/**/*.png")), [])
 
     def test_names_of_files_do_not_matter_to_info(self):
         self.call("run", self.scene, "--no-render", "--out", "out")

@@ -221,7 +221,8 @@ TEST(Pipeline, RefusesFramesThatAreNotThere) {
     Scene scene = small_scene();
     EXPECT_THROW(range_of_frames(scene, 19, 20), Error);
     EXPECT_THROW(range_of_frames(scene, 0, 1), Error);
-    EXPECT_EQ(range_of_frames(scene, 17, 1000).last_frame, 18);
+    EXPECT_THROW(range_of_frames(scene, 17, 19), Error);
+    EXPECT_EQ(range_of_frames(scene, 17, kLastFrame).last_frame, 18);
     scene.frames.count = 100;  // more than the simulated time holds
     EXPECT_THROW(Pipeline(scene, full_range(scene), std::string(32, '0')), Error);
 }
