@@ -135,7 +135,7 @@ Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::s
     for (std::size_t i = 0; i < layers.size(); ++i)
         if (layers[i].direct) layers_[i].append(*layers[i].sky, layers[i].clouds, options, flash, drawn_);
     Picture picture =
-        renderer.draw_splats({drawn_.clouds, drawn_.billboards, voxels, flash, time_s, depth}, options);
+        renderer.draw_splats({drawn_.clouds, drawn_.billboards, voxels, flash, time_s, depth, depth}, options);
     for (const SkyLayer& layer : layers) {
         const std::vector<WorldLine> lines =
             debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun));

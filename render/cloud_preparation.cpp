@@ -6,6 +6,10 @@
 #include <limits>
 #include <string>
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
 #include "automaton/error.h"
 #include "automaton/text.h"
 #include "automaton/vector_math.h"
@@ -20,10 +24,13 @@ constexpr double kNoDepth = 1e-9;
 
 Vec3 centre_of(const Metaball& ball) { return {ball.x, ball.y, ball.z}; }
 
+bool is_good(const Metaball& ball) {
+    return std::isfinite(ball.x) && std::isfinite(ball.y) && std::isfinite(ball.z) &&
+           std::isfinite(ball.radius) && std::isfinite(ball.density) && ball.radius > 0;
+}
+
 void check(const Metaball& ball, std::size_t index) {
-    const bool finite = std::isfinite(ball.x) && std::isfinite(ball.y) && std::isfinite(ball.z) &&
-                        std::isfinite(ball.radius) && std::isfinite(ball.density);
-    if (!finite || !(ball.radius > 0))
+    if (!is_good(ball))
         throw Error(ErrorCode::usage, "metaball " + std::to_string(index) +
                                           ": expected finite numbers and a radius above 0, got radius " +
                                           number_text(double(ball.radius), 6) + ", density " +
@@ -40,6 +47,62 @@ struct Interval {
     double middle() const { return 0.5 * (min + max); }
 };
 
+constexpr std::size_t kPart = 8192;  // metaballs that one thread looks at
+
+// What one part of the metaballs adds to a PreparedCloud.
+struct VisiblePart {
+    std::vector<std::uint32_t> visible;
+    std::vector<float> depth_scale;
+    Interval height;
+    std::size_t bad = std::numeric_limits<std::size_t>::max();  // the first that check() refuses
+};
+
+VisiblePart visible_part(std::span<const Metaball> balls, std::size_t begin, std::size_t end,
+                         double per_density) {
+    VisiblePart part;
+    part.visible.reserve(end - begin);
+    part.depth_scale.reserve(end - begin);
+    for (std::size_t i = begin; i < end; ++i) {
+        const Metaball& ball = balls[i];
+        if (!is_good(ball)) {
+            part.bad = i;
+            break;
+        }
+        const double depth_scale = per_density * ball.density * ball.radius;
+        if (!(depth_scale > kNoDepth)) continue;
+        part.visible.push_back(std::uint32_t(i));
+        part.depth_scale.push_back(float(std::min(depth_scale, 1e30)));
+        part.height.add(ball.z, ball.z);
+    }
+    return part;
+}
+
+// What a cloud takes up along three axes.
+struct Extent {
+    Interval u, v, sun;
+};
+
+Extent extent_along(const PreparedCloud& cloud, const Vec3& u, const Vec3& v, const Vec3& to_sun) {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, cloud.visible.size(), kPart), Extent{},
+        [&](const auto& range, Extent extent) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                const Metaball& ball = cloud.metaballs[cloud.visible[i]];
+                const Vec3 centre = centre_of(ball);
+                extent.u.add(dot(u, centre) - ball.radius, dot(u, centre) + ball.radius);
+                extent.v.add(dot(v, centre) - ball.radius, dot(v, centre) + ball.radius);
+                extent.sun.add(dot(to_sun, centre) - ball.radius, dot(to_sun, centre) + ball.radius);
+            }
+            return extent;
+        },
+        [](Extent a, const Extent& b) {
+            a.u.add(b.u.min, b.u.max);
+            a.v.add(b.v.min, b.v.max);
+            a.sun.add(b.sun.min, b.sun.max);
+            return a;
+        });
+}
+
 }  // namespace
 
 PreparedCloud prepare(const MetaballCloud& cloud) {
@@ -52,15 +115,19 @@ PreparedCloud prepare(const MetaballCloud& cloud) {
 
     PreparedCloud prepared;
     prepared.metaballs = cloud.metaballs;
+    const double per_density = cloud.extinction_per_m * cloud.normalisation;
+    const std::size_t count = cloud.metaballs.size(), parts = (count + kPart - 1) / kPart;
+    std::vector<VisiblePart> found(parts);
+    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
+        found[p] = visible_part(cloud.metaballs, p * kPart, std::min(count, (p + 1) * kPart), per_density);
+    });
     Interval height;
-    for (std::size_t i = 0; i < cloud.metaballs.size(); ++i) {
-        const Metaball& ball = cloud.metaballs[i];
-        check(ball, i);
-        const double depth_scale = cloud.extinction_per_m * cloud.normalisation * ball.density * ball.radius;
-        if (!(depth_scale > kNoDepth)) continue;
-        prepared.visible.push_back(std::uint32_t(i));
-        prepared.depth_scale.push_back(float(std::min(depth_scale, 1e30)));
-        height.add(ball.z, ball.z);
+    for (const VisiblePart& part : found) {
+        if (part.bad < count) check(cloud.metaballs[part.bad], part.bad);
+        prepared.visible.insert(prepared.visible.end(), part.visible.begin(), part.visible.end());
+        prepared.depth_scale.insert(prepared.depth_scale.end(), part.depth_scale.begin(),
+                                    part.depth_scale.end());
+        height.add(part.height.min, part.height.max);
     }
     if (!prepared.visible.empty()) {
         prepared.base_m = height.min;
@@ -74,14 +141,7 @@ ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int sha
     const bool zenith = std::hypot(to_sun.x, to_sun.y) < 1e-6;
     const Vec3 u = zenith ? Vec3{1, 0, 0} : normalised(cross(Vec3{0, 0, 1}, to_sun));
     const Vec3 v = normalised(cross(to_sun, u));
-    Interval along_u, along_v, along_sun;
-    for (const std::uint32_t index : cloud.visible) {
-        const Metaball& ball = cloud.metaballs[index];
-        const Vec3 centre = centre_of(ball);
-        along_u.add(dot(u, centre) - ball.radius, dot(u, centre) + ball.radius);
-        along_v.add(dot(v, centre) - ball.radius, dot(v, centre) + ball.radius);
-        along_sun.add(dot(to_sun, centre) - ball.radius, dot(to_sun, centre) + ball.radius);
-    }
+    auto [along_u, along_v, along_sun] = extent_along(cloud, u, v, to_sun);
     if (cloud.visible.empty()) {
         along_u.add(-0.5, 0.5);
         along_v.add(-0.5, 0.5);
@@ -103,13 +163,13 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
     SunOrder order;
     const std::size_t count = cloud.visible.size();
     const Vec3 middle = frame.origin_m + 0.5 * frame.u_axis_m + 0.5 * frame.v_axis_m;
-    KeyedOrder by_distance(count);
     std::vector<float> distance(count);
-    for (std::size_t i = 0; i < count; ++i) {
+    KeyedOrder by_distance(count);
+    by_distance.add_all(count, [&](std::uint32_t i, float& key) {
         const Metaball& ball = cloud.metaballs[cloud.visible[i]];
-        distance[i] = float(std::max(0.0, dot(frame.direction, centre_of(ball) - middle)));
-        by_distance.add(distance[i], std::uint32_t(i));
-    }
+        key = distance[i] = float(std::max(0.0, dot(frame.direction, centre_of(ball) - middle)));
+        return true;
+    });
     by_distance.sort();
 
     const double width = length(frame.u_axis_m), height = length(frame.v_axis_m);
@@ -119,7 +179,7 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
     order.splats.resize(count);
     order.places.resize(count);
     order.source.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
+    const auto fill = [&](std::size_t i) {
         const std::uint32_t source = by_distance[i];
         const Metaball& ball = cloud.metaballs[cloud.visible[source]];
         const Vec3 offset = centre_of(ball) - frame.origin_m;
@@ -134,8 +194,17 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
                            .radii = pack_halves(float(radius_u), float(radius_v)),
                            .depth_scale = float(cloud.depth_scale[source] * thinning)};
         order.places[i] = {.z = distance[source], .per_radius = float(1.0 / radius)};
-        order.largest_radius = std::max(order.largest_radius, ball.radius);
-    }
+    };
+    order.largest_radius = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, count, kPart), 0.0f,
+        [&](const auto& range, float largest) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                fill(i);
+                largest = std::max(largest, cloud.metaballs[cloud.visible[order.source[i]]].radius);
+            }
+            return largest;
+        },
+        [](float a, float b) { return std::max(a, b); });
     return order;
 }
 

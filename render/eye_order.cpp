@@ -7,6 +7,9 @@
 #include <limits>
 #include <string>
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include "automaton/error.h"
 #include "automaton/vector_math.h"
 #include "render/half_floats.h"
@@ -73,13 +76,13 @@ class Collector {
           by_distance_(cloud.visible.size() + splats.billboards.size()) {}
 
     void add_metaballs() {
-        for (std::size_t i = 0; i < cloud_.visible.size(); ++i) {
+        by_distance_.add_all(cloud_.visible.size(), [this](std::uint32_t i, float& distance) {
             const Metaball& ball = cloud_.metaballs[cloud_.visible[i]];
-            if (above_ground_ && ball.z + ball.radius < ground_m_) continue;
+            if (above_ground_ && ball.z + ball.radius < ground_m_) return false;
             // Metaballs reach up to 1.35 radii (view_splat.vert), and never less than part of a pixel.
-            add({ball.x, ball.y, ball.z}, ball.radius, 1.5, double(shader::kMinRadiusPixels),
-                std::uint32_t(i));
-        }
+            return sees({ball.x, ball.y, ball.z}, ball.radius, 1.5, double(shader::kMinRadiusPixels),
+                        distance);
+        });
     }
 
     void add_billboards() {
@@ -89,38 +92,78 @@ class Collector {
             check(billboard, i, splats_.clouds.size());
             if (above_ground_ && billboard.centre_m.z < ground_m_) continue;
             if (!(drawn(billboard).opacity > 0)) continue;
-            add(billboard.centre_m, 0.5 * std::max(billboard.width_m, billboard.height_m), 1.4143,
-                double(shader::kMinPuffPixels), first + std::uint32_t(i));
+            float distance = 0;
+            if (sees(billboard.centre_m, 0.5 * std::max(billboard.width_m, billboard.height_m), 1.4143,
+                     double(shader::kMinPuffPixels), distance))
+                by_distance_.add(distance, first + std::uint32_t(i));
         }
     }
 
-    EyeOrder order(const MetaballLight& light) {
+    EyeOrder order() {
         by_distance_.sort();
         EyeOrder order;
         order.depth = splats_.depth;
-        const std::size_t balls = by_distance_.count_below(std::uint32_t(cloud_.visible.size()));
-        order.balls.reserve(balls);
-        order.puffs.reserve(by_distance_.size() - balls);
-        for (std::size_t i = by_distance_.size(); i-- > 0;) {
-            const std::uint32_t source = by_distance_[i];
-            if (source < cloud_.visible.size())
-                append_metaball(order, source, light);
-            else
-                append_billboard(order, splats_.billboards[source - cloud_.visible.size()]);
-        }
+        place_splats(order);
+        const std::size_t parts = first_ball_.size() - 1;
+        std::vector<std::uint8_t> kinds(by_distance_.size()), fitted(parts, 1);
+        tbb::parallel_for(std::size_t{0}, parts,
+                          [&](std::size_t p) { fitted[p] = fill_part(order, p, kinds) ? 1 : 0; });
+        order.all_fitted = std::ranges::count(fitted, 0) == 0;
+        for (const std::uint8_t kind : kinds) extend(order, SplatKind(kind));
         for (std::size_t i = 0; i < splats_.clouds.size(); ++i)
             order.clouds.push_back(puff_cloud(splats_.clouds[i], i, eye_));
         return order;
     }
 
   private:
+    static constexpr std::size_t kPart = 4096;  // splats that one thread looks at
+
+    // Where the splats of each part go: the part's share of balls and puffs, from the farthest on.
+    void place_splats(EyeOrder& order) {
+        const std::size_t count = by_distance_.size(), parts = (count + kPart - 1) / kPart;
+        first_ball_.assign(parts + 1, 0);
+        tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
+            for (std::size_t i = p * kPart; i < std::min(count, (p + 1) * kPart); ++i)
+                if (is_ball(from_far(i))) ++first_ball_[p + 1];
+        });
+        for (std::size_t p = 0; p < parts; ++p) first_ball_[p + 1] += first_ball_[p];
+        order.balls.resize(first_ball_[parts]);
+        order.source.resize(first_ball_[parts]);
+        order.puffs.resize(count - first_ball_[parts]);
+    }
+
+    bool is_ball(std::uint32_t index) const { return index < cloud_.visible.size(); }
+    std::uint32_t from_far(std::size_t i) const { return by_distance_[by_distance_.size() - 1 - i]; }
+
+    // False if a metaball of the part is not fitted.
+    bool fill_part(EyeOrder& order, std::size_t part, std::vector<std::uint8_t>& kinds) const {
+        bool fitted = true;
+        std::size_t ball = first_ball_[part], puff = part * kPart - ball;
+        for (std::size_t i = part * kPart; i < std::min(by_distance_.size(), (part + 1) * kPart); ++i) {
+            const std::uint32_t source = from_far(i);
+            SplatKind kind = SplatKind::billboard;
+            if (is_ball(source)) {
+                const shader::ViewBall& seen = order.balls[ball] = view_ball(source);
+                order.source[ball++] = source;
+                fitted = fitted && (seen.flags & shader::kNotFitted) == 0;
+                kind = (seen.flags & (shader::kAround | shader::kIntegrate)) != 0
+                           ? SplatKind::integrated_metaball
+                           : SplatKind::metaball;
+            } else {
+                order.puffs[puff++] = view_puff(splats_.billboards[source - cloud_.visible.size()]);
+            }
+            kinds[i] = std::uint8_t(kind);
+        }
+        return fitted;
+    }
+
     // `reach` times the radius is what the splat covers; no radius is less than `least_pixels`.
-    void add(const Vec3& centre, double radius, double reach, double least_pixels, std::uint32_t index) {
+    bool sees(const Vec3& centre, double radius, double reach, double least_pixels, float& distance_m) const {
         const Vec3 offset = centre - eye_;
         const double distance = std::sqrt(dot(offset, offset));
         const double least = least_pixels * distance / pixels_per_unit_;
-        if (pyramid_.may_see(offset, reach * std::max(radius, least)))
-            by_distance_.add(float(distance), index);
+        distance_m = float(distance);
+        return pyramid_.may_see(offset, reach * std::max(radius, least));
     }
 
     // A billboard as it is drawn.
@@ -156,11 +199,11 @@ class Collector {
         return level;
     }
 
-    static std::uint32_t extend(EyeOrder& order, SplatKind kind) {
-        const std::size_t index = kind == SplatKind::billboard ? order.puffs.size() : order.balls.size();
-        if (order.runs.empty() || order.runs.back().kind != kind)
-            order.runs.push_back({std::uint32_t(index), std::uint32_t(index), kind});
-        return ++order.runs.back().end;
+    // One more splat, the next of its kind from far to near.
+    void extend(EyeOrder& order, SplatKind kind) {
+        std::uint32_t& next = kind == SplatKind::billboard ? runs_puffs_ : runs_balls_;
+        if (order.runs.empty() || order.runs.back().kind != kind) order.runs.push_back({next, next, kind});
+        order.runs.back().end = ++next;
     }
 
     // Whether the tiles can draw it as an ellipse with a polynomial. Beside or behind the eye the outline is
@@ -172,7 +215,8 @@ class Collector {
                radius * pixels_per_unit_ <= 60000.0 * depth;
     }
 
-    void append_metaball(EyeOrder& order, std::uint32_t source, const MetaballLight& light) const {
+    // Without its light.
+    shader::ViewBall view_ball(std::uint32_t source) const {
         const Metaball& ball = cloud_.metaballs[cloud_.visible[source]];
         const Vec3 offset = Vec3{ball.x, ball.y, ball.z} - eye_;
         shader::uint flags = 0;
@@ -180,29 +224,32 @@ class Collector {
             flags |= shader::kAround | shader::kIntegrate;
         if (above_ground_ && ball.z - ball.radius < ground_m_) flags |= shader::kIntegrate;
         if (cloud_.depth_scale[source] > shader::kMaxDepthScale) flags |= shader::kIntegrate;
-        extend(order, flags != 0 ? SplatKind::integrated_metaball : SplatKind::metaball);
-        if (flags != 0 || !is_fitted(offset, ball.radius, cloud_.depth_scale[source])) {
+        if (flags != 0 || !is_fitted(offset, ball.radius, cloud_.depth_scale[source]))
             flags |= shader::kNotFitted;
-            order.all_fitted = false;
-        }
-        if (!light.flash.empty()) flags |= unorm16(light.flash[source]) << 16;
         const double scale = cloud_.top_m > cloud_.base_m ? 1.0 / (cloud_.top_m - cloud_.base_m) : 0.0;
-        order.balls.push_back({float(offset.x), float(offset.y), float(offset.z), ball.radius,
-                               cloud_.depth_scale[source], light.sun[source],
-                               float((ball.z - cloud_.base_m) * scale), flags});
+        return {float(offset.x),
+                float(offset.y),
+                float(offset.z),
+                ball.radius,
+                cloud_.depth_scale[source],
+                1.0f,
+                float((ball.z - cloud_.base_m) * scale),
+                flags};
     }
 
-    void append_billboard(EyeOrder& order, const CloudBillboard& billboard) const {
-        extend(order, SplatKind::billboard);
+    shader::Puff view_puff(const CloudBillboard& billboard) const {
         const Vec3 offset = billboard.centre_m - eye_;
         const Drawn what = drawn(billboard);
         const PuffPicture picture = puff_picture(billboard.texture, billboard.variant);
-        order.puffs.push_back({float(offset.x), float(offset.y), float(offset.z),
-                               pack_halves(float(what.half_width_m), float(what.half_height_m)),
-                               std::uint32_t(picture.layer) | std::uint32_t(picture.turn) << 8 |
-                                   std::uint32_t(level_of(what)) << 12,
-                               unorm16(billboard.sun_absorbed) | unorm16(billboard.flash_absorbed) << 16,
-                               float(what.opacity), billboard.cloud});
+        return {float(offset.x),
+                float(offset.y),
+                float(offset.z),
+                pack_halves(float(what.half_width_m), float(what.half_height_m)),
+                std::uint32_t(picture.layer) | std::uint32_t(picture.turn) << 8 |
+                    std::uint32_t(level_of(what)) << 12,
+                unorm16(billboard.sun_absorbed) | unorm16(billboard.flash_absorbed) << 16,
+                float(what.opacity),
+                billboard.cloud};
     }
 
     const PreparedCloud& cloud_;
@@ -212,7 +259,9 @@ class Collector {
     ViewPyramid pyramid_;
     double pixels_per_unit_, ground_m_;
     bool above_ground_;
-    KeyedOrder by_distance_;  // indices: metaballs first, then billboards
+    KeyedOrder by_distance_;               // indices: metaballs first, then billboards
+    std::vector<std::size_t> first_ball_;  // of each part of the splats, and their number
+    std::uint32_t runs_balls_ = 0, runs_puffs_ = 0;
 };
 
 }  // namespace
@@ -229,14 +278,25 @@ bool ViewPyramid::may_see(const Vec3& offset, double radius) const {
     return true;
 }
 
-EyeOrder order_from_eye(const PreparedCloud& cloud, const MetaballLight& light, const Splats& splats,
-                        const CameraFrame& camera, double pixels_per_unit, const Ground& ground) {
+EyeOrder order_from_eye(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
+                        double pixels_per_unit, const Ground& ground) {
     if (splats.billboards.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
         throw Error(ErrorCode::usage, "more than 2^31 billboards");
     Collector collector(cloud, splats, camera, pixels_per_unit, ground);
     collector.add_metaballs();
     collector.add_billboards();
-    return collector.order(light);
+    return collector.order();
+}
+
+void set_light(EyeOrder& order, const MetaballLight& light) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.balls.size(), 8192), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            shader::ViewBall& ball = order.balls[i];
+            ball.light = light.sun[order.source[i]];
+            if (!light.flash.empty())
+                ball.flags = (ball.flags & 0xffffu) | unorm16(light.flash[order.source[i]]) << 16;
+        }
+    });
 }
 
 }  // namespace nephos

@@ -33,6 +33,7 @@ struct Run {
 
 struct EyeOrder {
     std::vector<shader::ViewBall> balls;  // farthest first
+    std::vector<std::uint32_t> source;    // of each ball: index into PreparedCloud::visible
     std::vector<shader::Puff> puffs;      // farthest first
     std::vector<Run> runs;  // none is empty; together they are all of balls and puffs, farthest first
     std::vector<shader::PuffCloud> clouds;  // one for each of Splats::clouds
@@ -46,10 +47,14 @@ struct MetaballLight {
     std::span<const float> flash;  // share of the lightning that arrives, 0..1; empty without
 };
 
-// The splats that the camera can see. `pixels_per_unit` is the size in pixels of a unit at distance 1.
-// Throws Error(usage) naming the first billboard or cloud that is not as splats.h wants it.
-EyeOrder order_from_eye(const PreparedCloud& cloud, const MetaballLight& light, const Splats& splats,
-                        const CameraFrame& camera, double pixels_per_unit, const Ground& ground);
+// The splats that the camera can see; metaballs without their light. `pixels_per_unit` is the size in pixels
+// of a unit at distance 1. Throws Error(usage) naming the first billboard or cloud that is not as splats.h
+// wants it.
+EyeOrder order_from_eye(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
+                        double pixels_per_unit, const Ground& ground);
+
+// Gives the metaballs of an order their light.
+void set_light(EyeOrder& order, const MetaballLight& light);
 
 // What the camera sees: inside of the four planes through the eye and the sides of the picture, not behind
 // the eye.

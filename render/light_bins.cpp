@@ -23,13 +23,17 @@ std::vector<PixelBox> light_boxes(std::span<const shader::LightSplat> splats) {
     return boxes;
 }
 
-TileBins bin_centres(std::span<const shader::LightSplat> splats, const TileGrid& grid) {
+TileBins bin_centres(std::span<const shader::LightSplat> splats, const TileGrid& grid,
+                     std::span<const std::uint8_t> wanted) {
     std::vector<PixelBox> centres(splats.size());
-    for (std::size_t i = 0; i < centres.size(); ++i) {
-        const int x = std::clamp(int(splats[i].x), 0, grid.width - 1),
-                  y = std::clamp(int(splats[i].y), 0, grid.height - 1);
-        centres[i] = {x, y, x + 1, y + 1};
-    }
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, centres.size(), 8192), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            if (!wanted.empty() && wanted[i] == 0) continue;
+            const int x = std::clamp(int(splats[i].x), 0, grid.width - 1),
+                      y = std::clamp(int(splats[i].y), 0, grid.height - 1);
+            centres[i] = {x, y, x + 1, y + 1};
+        }
+    });
     return bin_into_tiles(centres, grid);
 }
 

@@ -14,7 +14,9 @@ namespace nephos {
 // The texels that each splat can touch.
 std::vector<PixelBox> light_boxes(std::span<const shader::LightSplat> splats);
 
-// Which centres lie in which tile, in each tile in order from the sun. Every centre is in one tile.
-TileBins bin_centres(std::span<const shader::LightSplat> splats, const TileGrid& grid);
+// Which centres lie in which tile, in each tile in order from the sun. Every centre is in one tile, but for
+// those whose `wanted` is 0; without it all are wanted.
+TileBins bin_centres(std::span<const shader::LightSplat> splats, const TileGrid& grid,
+                     std::span<const std::uint8_t> wanted = {});
 
 }  // namespace nephos

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -15,6 +17,7 @@
 #define HWY_TARGET_INCLUDE "render/processor_light.cpp"
 #include <hwy/foreach_target.h>
 // foreach_target.h must come first
+#include <hwy/cache_control.h>
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
@@ -40,6 +43,12 @@ struct LightCentres {
     std::span<float> depth;
 };
 
+// Optical depths beyond these count as these: they change no bit of what is seen, but end the sums. A texel
+// of the map has 4e-8 then; of the light at a centre the logarithm is taken (shaders/lighting.glsl), down to
+// a light of 1e-30.
+inline constexpr float kDarkTexel = 17.0f, kDarkCentre = 70.0f;
+inline constexpr std::size_t kAtOnce = 16;  // balls between two looks at the sums
+
 // One tile of the map.
 struct LightTile {
     int x = 0, y = 0;                  // first texel
@@ -53,28 +62,41 @@ struct LightTile {
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
-// Adds the optical depth of all balls along the light through the texels of a tile.
+// Adds the optical depth of some balls along the light through the texels of a tile.
+HWY_INLINE void add_to_texels(const LightTile& tile, std::span<const LightBall> balls, const Layout& layout,
+                              std::size_t block, float* HWY_RESTRICT sums) {
+    const Lanes d;
+    const FirstPixels first(layout, block);
+    const Floats x = hn::Add(hn::Load(d, first.x), set(float(tile.x))),
+                 y = hn::Add(hn::Load(d, first.y), set(float(tile.y)));
+    for (const LightBall& ball : balls) {
+        const int row0 = std::max(0, ball.first - tile.y),
+                  row1 = std::min(int(shader::kTileHeight), ball.end - tile.y);
+        const Floats dx = hn::Sub(x, set(ball.x)), scale = set(ball.depth_scale);
+        const Floats across = hn::NegMulAdd(hn::Mul(set(ball.per_x2), dx), dx, set(1.0f));
+        const Floats per_y2 = set(ball.per_y2), down = hn::Sub(y, set(ball.y));
+        for (std::size_t row = std::size_t(row0) / layout.rows * layout.rows; int(row) < row1;
+             row += layout.rows) {
+            float* const sum = sums + row * shader::kTileWidth + block * layout.lanes;
+            const Floats dy = hn::Add(down, set(float(row)));
+            const Floats w = hn::Max(hn::NegMulAdd(hn::Mul(per_y2, dy), dy, across), hn::Zero(d));
+            hn::Store(hn::MulAdd(scale, column(w, hn::Sqrt(w)), hn::Load(d, sum)), d, sum);
+        }
+    }
+}
+
+// Until the whole tile is dark.
 void add_to_map(const LightTile& tile, float* HWY_RESTRICT sums) {
     const Lanes d;
     const Layout layout;
-    for (std::size_t block = 0; block < layout.blocks; ++block) {
-        const FirstPixels first(layout, block);
-        const Floats x = hn::Add(hn::Load(d, first.x), set(float(tile.x))),
-                     y = hn::Add(hn::Load(d, first.y), set(float(tile.y)));
-        for (const LightBall& ball : tile.balls) {
-            const int row0 = std::max(0, ball.first - tile.y),
-                      row1 = std::min(int(shader::kTileHeight), ball.end - tile.y);
-            const Floats dx = hn::Sub(x, set(ball.x)), scale = set(ball.depth_scale);
-            const Floats across = hn::NegMulAdd(hn::Mul(set(ball.per_x2), dx), dx, set(1.0f));
-            const Floats per_y2 = set(ball.per_y2), down = hn::Sub(y, set(ball.y));
-            for (std::size_t row = std::size_t(row0) / layout.rows * layout.rows; int(row) < row1;
-                 row += layout.rows) {
-                float* const sum = sums + row * shader::kTileWidth + block * layout.lanes;
-                const Floats dy = hn::Add(down, set(float(row)));
-                const Floats w = hn::Max(hn::NegMulAdd(hn::Mul(per_y2, dy), dy, across), hn::Zero(d));
-                hn::Store(hn::MulAdd(scale, column(w, hn::Sqrt(w)), hn::Load(d, sum)), d, sum);
-            }
-        }
+    for (std::size_t begin = 0; begin < tile.balls.size(); begin += 4 * kAtOnce) {
+        const auto some = tile.balls.subspan(begin, std::min(4 * kAtOnce, tile.balls.size() - begin));
+        for (std::size_t block = 0; block < layout.blocks; ++block)
+            add_to_texels(tile, some, layout, block, sums);
+        Floats least = hn::Load(d, sums);
+        for (std::size_t at = layout.lanes; at < kTilePixels; at += layout.lanes)
+            least = hn::Min(least, hn::Load(d, sums + at));
+        if (hn::AllTrue(d, hn::Gt(least, set(kDarkTexel)))) return;
     }
 }
 
@@ -86,23 +108,33 @@ HWY_INLINE Floats half_chord_squared(const LightBall& ball, Floats x, Floats y) 
 }
 
 // Adds the optical depth of the part of every ball that lies between a centre and the sun: of the whole ball
-// as long as it lies in front of all centres of the vector.
+// as long as it lies in front of all centres of the vector. A lane's sum does not depend on the other lanes:
+// a ball that lies wholly before or behind its centre adds the same as in a vector without the others.
 Floats depth_of_centres(const LightTile& tile, Floats x, Floats y, Floats z, float nearest, float farthest) {
     const Lanes d;
     Floats depth = hn::Zero(d);
+    const auto is_dark = [&](std::size_t i) {
+        return i % kAtOnce == 0 && hn::AllTrue(d, hn::Gt(depth, set(kDarkCentre)));
+    };
+    const float reach = 1.0001f * tile.largest_radius;
     std::size_t i = 0;
-    for (; i < tile.balls.size() && tile.balls[i].z < nearest - tile.largest_radius; ++i) {
+    for (; i < tile.balls.size() && tile.balls[i].z < nearest - reach; ++i) {
+        if (is_dark(i)) return depth;
         const LightBall& ball = tile.balls[i];
         const Floats w = half_chord_squared(ball, x, y);
         depth = hn::MulAdd(set(ball.depth_scale), column(w, hn::Sqrt(w)), depth);
     }
-    for (; i < tile.balls.size() && tile.balls[i].z <= farthest + tile.largest_radius; ++i) {
+    for (; i < tile.balls.size() && tile.balls[i].z <= farthest + reach; ++i) {
+        if (is_dark(i)) return depth;
         const LightBall& ball = tile.balls[i];
         const Floats w = half_chord_squared(ball, x, y), half_chord = hn::Sqrt(w);
-        const Floats behind = hn::Mul(hn::Sub(z, set(ball.z)), set(ball.per_radius));
-        const Floats end = hn::Max(hn::Min(behind, half_chord), hn::Neg(half_chord));
-        const Floats part = hn::MulAdd(set(0.5f), column(w, half_chord), column_part(w, end));
-        depth = hn::MulAdd(set(ball.depth_scale), part, depth);
+        const Floats whole = column(w, half_chord);
+        const Floats end = hn::Mul(hn::Sub(z, set(ball.z)), set(ball.per_radius));
+        const Floats inside = hn::Max(hn::Min(end, half_chord), hn::Neg(half_chord));
+        const Floats part = hn::MulAdd(set(0.5f), whole, column_part(w, inside));
+        const Floats before = hn::IfThenElse(hn::Ge(end, half_chord), whole, hn::Max(part, hn::Zero(d)));
+        const Floats added = hn::IfThenZeroElse(hn::Le(end, hn::Neg(half_chord)), before);
+        depth = hn::MulAdd(set(ball.depth_scale), added, depth);
     }
     return depth;
 }
@@ -126,14 +158,14 @@ void add_to_centres(const LightTile& tile, const LightCentres& centres) {
     }
 }
 
-// exp(-depth) of some optical depths, in place.
-void to_transmittance(float* depths, std::size_t count) {
+// exp(-depth) of some optical depths, in place; those beyond `dark` count as that.
+void to_transmittance(float* depths, std::size_t count, float dark) {
     const Lanes d;
     const std::size_t lanes = hn::Lanes(d);
     std::size_t i = 0;
     for (; i + lanes <= count; i += lanes)
-        hn::StoreU(hn::Exp(d, hn::Neg(hn::LoadU(d, depths + i))), d, depths + i);
-    for (; i < count; ++i) depths[i] = hn::GetLane(hn::Exp(d, set(-depths[i])));
+        hn::StoreU(hn::Exp(d, hn::Neg(hn::Min(hn::LoadU(d, depths + i), set(dark)))), d, depths + i);
+    for (; i < count; ++i) depths[i] = hn::GetLane(hn::Exp(d, set(-std::min(depths[i], dark))));
 }
 
 }  // namespace nephos::HWY_NAMESPACE
@@ -163,18 +195,26 @@ LightBall light_ball(const shader::LightSplat& splat, const shader::LightPlace& 
             .end = to_row(box.y1)};
 }
 
-// All centres, tile by tile, and in each tile in order from the sun.
+// The wanted centres, tile by tile, and in each tile in order from the sun.
 struct Centres {
     TileBins bins;
     std::vector<float> x, y, z, depth;
 
-    Centres(const SunOrder& order, const TileGrid& grid) : bins(bin_centres(order.splats, grid)) {
-        for (const std::uint32_t i : bins.list) {
-            x.push_back(order.splats[i].x);
-            y.push_back(order.splats[i].y);
-            z.push_back(order.places[i].z);
-        }
-        depth.assign(x.size(), 0.0f);
+    Centres(const SunOrder& order, const TileGrid& grid, std::span<const std::uint8_t> wanted)
+        : bins(bin_centres(order.splats, grid, wanted)) {
+        const std::size_t count = bins.list.size();
+        x.resize(count);
+        y.resize(count);
+        z.resize(count);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 8192), [&](const auto& range) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                const std::uint32_t source = bins.list[i];
+                x[i] = order.splats[source].x;
+                y[i] = order.splats[source].y;
+                z[i] = order.places[source].z;
+            }
+        });
+        depth.assign(count, 0.0f);
     }
     LightCentres of_tile(std::size_t tile) {
         const std::size_t begin = bins.ranges[tile].begin, count = bins.ranges[tile].end - begin;
@@ -183,68 +223,136 @@ struct Centres {
     }
 };
 
-// Adds a tile's sums to its texels of the map.
-void add_texels(const float* sums, const LightTile& tile, const TileGrid& grid, std::vector<float>& map) {
-    const int columns = std::min(int(shader::kTileWidth), grid.width - tile.x),
-              rows = std::min(int(shader::kTileHeight), grid.height - tile.y);
-    for (int y = 0; y < rows; ++y) {
-        float* to = &map[std::size_t(tile.y + y) * std::size_t(grid.width) + std::size_t(tile.x)];
-        for (int x = 0; x < columns; ++x) to[x] += sums[y * int(shader::kTileWidth) + x];
+bool is_wanted(std::span<const std::uint8_t> wanted, std::size_t i) {
+    return wanted.empty() || wanted[i] != 0;
+}
+
+// Calls work(first texel of a row, how many) for the rows of a tile of the map.
+template <class Work>
+void for_each_row(std::size_t tile, const TileGrid& grid, const Work& work) {
+    const int x = int(tile % std::size_t(grid.columns())) * int(shader::kTileWidth),
+              y = int(tile / std::size_t(grid.columns())) * int(shader::kTileHeight);
+    const int columns = std::min(int(shader::kTileWidth), grid.width - x),
+              rows = std::min(int(shader::kTileHeight), grid.height - y);
+    for (int row = 0; row < rows; ++row)
+        work(std::size_t(y + row) * std::size_t(grid.width) + std::size_t(x), std::size_t(columns));
+}
+
+// The shadow map and the centres while batches of balls are added.
+struct LightSums {
+    TileGrid grid;
+    std::span<const std::uint8_t> map_tiles;  // as LightWanted
+    std::vector<std::uint8_t> tiles;          // those of which anything is wanted
+    Centres centres;
+    std::vector<float>& map;
+
+    LightSums(const SunOrder& order, const TileGrid& of, const LightWanted& wanted,
+              std::vector<float>& shadow)
+        : grid(of),
+          map_tiles(wanted.map_tiles),
+          tiles(of.tiles()),
+          centres(order, of, wanted.centres),
+          map(shadow) {
+        for (std::size_t t = 0; t < tiles.size(); ++t) {
+            const shader::TileRange range = centres.bins.ranges[t];
+            tiles[t] = is_wanted(map_tiles, t) || range.begin < range.end ? 1 : 0;
+        }
+    }
+};
+
+// Copied together, they serve the map and the centres.
+void gather(std::span<const LightBall> balls, const TileBins& bins, std::size_t tile,
+            std::vector<LightBall>& out) {
+    constexpr std::uint32_t kAhead = 16;
+    const shader::TileRange range = bins.ranges[tile];
+    out.resize(range.end - range.begin);
+    for (std::uint32_t i = range.begin; i < range.end; ++i) {
+        hwy::Prefetch(&balls[bins.list[std::min(i + kAhead, std::uint32_t(bins.list.size() - 1))]]);
+        out[i - range.begin] = balls[bins.list[i]];
     }
 }
 
 // What some of the balls, consecutive in the order from the sun, take from the light.
-void add_balls(std::span<const LightBall> balls, const TileBins& bins, const TileGrid& grid,
-               float largest_radius, Centres& centres, std::vector<float>& map) {
+void add_balls(std::span<const LightBall> balls, const TileBins& bins, float largest_radius,
+               LightSums& light) {
+    const TileGrid& grid = light.grid;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, grid.tiles(), 8), [&](const auto& range) {
         std::vector<LightBall> of_tile;
         for (std::size_t t = range.begin(); t != range.end(); ++t) {
             if (bins.ranges[t].begin == bins.ranges[t].end) continue;
-            of_tile.clear();
-            for (std::uint32_t i = bins.ranges[t].begin; i < bins.ranges[t].end; ++i)
-                of_tile.push_back(balls[bins.list[i]]);
+            gather(balls, bins, t, of_tile);
             const auto columns = std::size_t(grid.columns());
             const LightTile tile{.x = int(t % columns) * int(shader::kTileWidth),
                                  .y = int(t / columns) * int(shader::kTileHeight),
                                  .balls = of_tile,
                                  .largest_radius = largest_radius};
+            HWY_DYNAMIC_DISPATCH(add_to_centres)(tile, light.centres.of_tile(t));
+            if (!is_wanted(light.map_tiles, t)) continue;
             alignas(64) float sums[shader::kTileWidth * shader::kTileHeight] = {};
             HWY_DYNAMIC_DISPATCH(add_to_map)(tile, sums);
-            add_texels(sums, tile, grid, map);
-            HWY_DYNAMIC_DISPATCH(add_to_centres)(tile, centres.of_tile(t));
+            const float* from = sums;
+            for_each_row(t, grid, [&](std::size_t at, std::size_t count) {
+                for (std::size_t i = 0; i < count; ++i) light.map[at + i] += from[i];
+                from += shader::kTileWidth;
+            });
         }
     });
 }
 
-void to_transmittance(std::vector<float>& depths) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, depths.size(), 65536), [&](const auto& range) {
-        HWY_DYNAMIC_DISPATCH(to_transmittance)(depths.data() + range.begin(), range.size());
+void clear_map(LightSums& light) {
+    for (std::size_t t = 0; t < light.tiles.size(); ++t) {
+        if (!is_wanted(light.map_tiles, t)) continue;
+        for_each_row(t, light.grid, [&](std::size_t at, std::size_t count) {
+            std::fill_n(light.map.begin() + std::ptrdiff_t(at), count, 0.0f);
+        });
+    }
+}
+
+// From optical depths to light.
+void finish(LightSums& light) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, light.tiles.size(), 64), [&](const auto& range) {
+        for (std::size_t t = range.begin(); t != range.end(); ++t) {
+            if (!is_wanted(light.map_tiles, t)) continue;
+            for_each_row(t, light.grid, [&](std::size_t at, std::size_t count) {
+                HWY_DYNAMIC_DISPATCH(to_transmittance)(&light.map[at], count, kDarkTexel);
+            });
+        }
+    });
+    std::vector<float>& depth = light.centres.depth;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, depth.size(), 65536), [&](const auto& range) {
+        HWY_DYNAMIC_DISPATCH(to_transmittance)(depth.data() + range.begin(), range.size(), kDarkCentre);
     });
 }
 
 }  // namespace
 
-std::vector<float> light_by_processor(const SunOrder& order, int shadow_size, std::vector<float>& shadow,
-                                      const BatchLimits& limits) {
+void light_by_processor(const SunOrder& order, int shadow_size, const LightWanted& wanted,
+                        std::vector<float>& light, std::vector<float>& shadow, const BatchLimits& limits,
+                        StageTimes* times) {
     const TileGrid grid{shadow_size, shadow_size};
+    shadow.resize(std::size_t(shadow_size) * std::size_t(shadow_size), 1.0f);
+    light.resize(order.splats.size(), 1.0f);
+    std::optional<StageTimer> timer(std::in_place, times, DrawStage::sun_bins);
     const std::vector<PixelBox> boxes = light_boxes(order.splats);
-    Centres centres(order, grid);
-    shadow.assign(std::size_t(shadow_size) * std::size_t(shadow_size), 0.0f);
+    LightSums sums(order, grid, wanted, shadow);
+    clear_map(sums);
     std::vector<LightBall> balls;
     for (std::size_t begin = 0; begin < boxes.size();) {
         const std::size_t end = end_of_batch(boxes, begin, grid, limits.boxes, limits.entries);
-        balls.clear();
-        for (std::size_t i = begin; i < end; ++i)
-            balls.push_back(light_ball(order.splats[i], order.places[i], boxes[i]));
-        add_balls(balls, bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid), grid,
-                  order.largest_radius, centres, shadow);
+        timer.emplace(times, DrawStage::sun_bins);
+        balls.resize(end - begin);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 8192), [&](const auto& range) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i)
+                balls[i - begin] = light_ball(order.splats[i], order.places[i], boxes[i]);
+        });
+        const TileBins bins = bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid, sums.tiles);
+        timer.emplace(times, DrawStage::light);
+        add_balls(balls, bins, order.largest_radius, sums);
         begin = end;
     }
-    to_transmittance(shadow);
-    to_transmittance(centres.depth);
-    std::vector<float> light(order.splats.size());
-    for (std::size_t i = 0; i < light.size(); ++i) light[centres.bins.list[i]] = centres.depth[i];
-    return light;
+    finish(sums);
+    const std::vector<std::uint32_t>& source = sums.centres.bins.list;
+    for (std::size_t i = 0; i < source.size(); ++i) light[source[i]] = sums.centres.depth[i];
 }
 
 }  // namespace nephos

@@ -6,15 +6,27 @@
 // where there is no graphics card. The result does not depend on the number of threads. Private to the
 // module.
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "render/cloud_preparation.h"
+#include "render/stage_times.h"
 #include "render/tile_bins.h"
 
 namespace nephos {
 
-// Fills `shadow`, shadow_size^2 texels, and returns the light at the centres, in the order of `order`.
-std::vector<float> light_by_processor(const SunOrder& order, int shadow_size, std::vector<float>& shadow,
-                                      const BatchLimits& limits = {});
+// What is asked for; an empty span asks for all.
+struct LightWanted {
+    std::span<const std::uint8_t> centres;    // one for each of SunOrder::splats: not 0 if wanted
+    std::span<const std::uint8_t> map_tiles;  // one for each tile of the map: not 0 if wanted
+};
+
+// Fills what is wanted of `shadow`, shadow_size^2 texels, and of `light`, which has one for each of
+// order.splats, and leaves the rest of both as it is. What one centre or texel gets has the same bits
+// whatever else is wanted.
+void light_by_processor(const SunOrder& order, int shadow_size, const LightWanted& wanted,
+                        std::vector<float>& light, std::vector<float>& shadow, const BatchLimits& limits = {},
+                        StageTimes* times = nullptr);
 
 }  // namespace nephos

@@ -6,18 +6,70 @@
 // where there is no graphics card. The result does not depend on the number of threads. Private to the
 // module.
 
+#include <cstdint>
 #include <span>
+#include <vector>
 
 #include "render/camera.h"
 #include "render/eye_order.h"
 #include "render/frame_data.h"
 #include "render/picture.h"
+#include "render/screen_ball.h"
+#include "render/stage_times.h"
 #include "render/tile_bins.h"
 
 namespace nephos {
 
-// Draws the metaballs of `order` and what lies behind them into a part of the picture; `frame` is that of the
-// part. The ground wears picture.shadow.
+// What a picture shows of the light: 1 = some pixel does. Where nearly everything is seen, all is 1.
+struct SeenLight {
+    std::vector<std::uint8_t> balls;      // one for each of EyeOrder::balls
+    std::vector<std::uint8_t> map_tiles;  // one for each tile of the shadow map: the ground wears it
+
+    SeenLight(const EyeOrder& order, int shadow_size)
+        : balls(order.balls.size(), 0), map_tiles(TileGrid{shadow_size, shadow_size}.tiles(), 0) {}
+};
+
+// A part of the picture in two steps, between which the light can be computed where it is seen. `options`,
+// `camera` and `order` must live until the last.
+class ProcessorView {
+  public:
+    // `frame` is that of the part.
+    ProcessorView(const RenderOptions& options, const CameraFrame& camera, const shader::Frame& frame,
+                  const Tile& part, const EyeOrder& order, const BatchLimits& limits = {},
+                  StageTimes* times = nullptr);
+
+    // Adds what the part shows.
+    void look(int shadow_size, SeenLight& seen);
+
+    // Draws metaballs and what lies behind them; the ground wears `shadow`, shadow_size^2 texels. The light
+    // of balls that are not `seen` is not looked at; without it all are.
+    void draw(Picture& picture, const float* shadow, int shadow_size, const SeenLight* seen = nullptr);
+
+  private:
+    struct Batch {
+        std::size_t begin = 0, end = 0;  // of the boxes
+        std::vector<ScreenBall> screen;  // nearest first
+        std::vector<ExactBall> exact;
+        TileBins bins;  // cut off where a tile is opaque, once look() knows
+    };
+    Batch prepare_batch(std::size_t begin, std::size_t end) const;
+    void light(Batch& batch, const SeenLight* seen) const;
+    bool look_at_tiles(std::size_t first, std::size_t step, std::vector<std::uint32_t>& drawn,
+                       SeenLight* seen, int shadow_size);
+    void look_at_ground(int shadow_size, SeenLight& seen) const;
+
+    const RenderOptions* options_;
+    const CameraFrame* camera_;
+    const EyeOrder* order_;
+    shader::Frame frame_;
+    Tile part_;
+    BatchLimits limits_;
+    StageTimes* times_;
+    std::vector<PixelBox> boxes_;  // nearest first
+    std::vector<Batch> kept_;      // one, if look() has made it
+};
+
+// Both steps with light that is all there; the ground wears picture.shadow.
 void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const shader::Frame& frame,
                        const Tile& part, const EyeOrder& order, Picture& picture,
                        const BatchLimits& limits = {});

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <functional>
 #include <new>
 #include <optional>
 
@@ -12,6 +11,7 @@
 #include "automaton/text.h"
 #include "render/attenuation_texture.h"
 #include "render/light_tiles.h"
+#include "render/lit_cloud.h"
 #include "render/processor_light.h"
 #include "render/processor_view.h"
 #include "render/renderer_test_access.h"
@@ -28,8 +28,8 @@ std::size_t square(std::size_t side) { return side * side; }
 std::size_t memory_needed(const Splats& splats, const RenderOptions& options, int tile_size) {
     const std::size_t pixels = std::size_t(options.camera.width) * std::size_t(options.camera.height);
     const std::size_t tile = std::min(pixels, square(std::size_t(tile_size)));
-    // Orders, sort keys, light, box and splat of a metaball.
-    constexpr std::size_t kPerMetaball = 32 + 16 + 4 * 5 + 16 + 64, kPerBillboard = 2 * 32 + 16;
+    // Orders, sort keys, light, box and splat of a metaball, and what is kept of it.
+    constexpr std::size_t kPerMetaball = 36 + 16 + 4 * 5 + 16 + 64 + 16, kPerBillboard = 2 * 32 + 16;
     return 20 * pixels + 40 * tile + 12 * square(std::size_t(options.shadow_map_size)) +
            kPerMetaball * splats.metaballs.metaballs.size() + kPerBillboard * splats.billboards.size() +
            (std::size_t(96) << 20);
@@ -71,19 +71,27 @@ struct Renderer::Impl {
     explicit Impl(const DeviceOptions& device_options);
 
     Picture draw(const Splats& splats, const RenderOptions& options);
-    // The sunlight that arrives at each visible metaball, and the shadow map into the picture; also onto the
-    // device, unless the processor draws.
-    std::vector<float> pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
-                                     Picture& picture);
-    std::vector<float> absorb_sunlight(const PreparedCloud& cloud, const DensityBlocks& blocks,
-                                       const RenderOptions& options, Picture& picture);
+    // A part of the picture that is drawn at once.
+    struct PartFrame {
+        Tile tile;
+        shader::Frame frame;
+    };
+    void pass_sunlight(LitCloud& kept);
+    void absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks, const RenderOptions& options);
+    std::vector<float> light_up(const Splats& splats, const RenderOptions& options, const EyeOrder& order,
+                                const SeenLight* seen);
+    void put_map_on_device();
+    void draw_on_processor(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
+                           const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
+    void draw_on_device(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
+                        const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
     bool on_processor() const { return splatting == Splatting::processor; }
     LightTiles& light_on_device();
-    // Draws a part of the picture after it has been told the picture's shadow map.
-    using DrawPart = std::function<void(const shader::Frame&, const Tile&)>;
-    DrawPart part_drawer(const EyeOrder& order, const CameraFrame& camera, const RenderOptions& options,
-                         Picture& picture);
 
+    LitCloud lit;  // of the last picture
+    std::optional<LightKey> map_on_device;
+    std::size_t light_passes = 0;
+    StageTimes times;
     int tile_size;
     GpuDevice gpu;
     PipelineLayout layout;
@@ -122,87 +130,129 @@ LightTiles& Renderer::Impl::light_on_device() {
     return *light_tiles;
 }
 
-// D, step 1.
-std::vector<float> Renderer::Impl::pass_sunlight(const PreparedCloud& cloud, const RenderOptions& options,
-                                                 Picture& picture) {
-    const int size = options.shadow_map_size;
-    const SunOrder order = order_from_sun(cloud, picture.shadow_frame, size);
-    if (cloud.visible.empty()) {  // the map is white, and on the device the smallest will do
-        picture.shadow.assign(square(std::size_t(size)), 1.0f);
+// D, step 1, in compute shaders.
+void Renderer::Impl::pass_sunlight(LitCloud& kept) {
+    const SunOrder order = order_from_sun(kept.cloud, kept.frame, kept.shadow_size);
+    if (kept.cloud.visible.empty()) {  // on the device the smallest map will do
         std::vector<float> small;
-        return on_processor() ? std::vector<float>{} : light_on_device().run(gpu, order, 16, small);
+        light_on_device().run(gpu, order, 16, small);
+    } else {
+        const std::vector<float> ordered = light_on_device().run(gpu, order, kept.shadow_size, kept.shadow);
+        for (std::size_t i = 0; i < ordered.size(); ++i) kept.light[order.source[i]] = ordered[i];
     }
-    const std::vector<float> ordered = on_processor()
-                                           ? light_by_processor(order, size, picture.shadow)
-                                           : light_on_device().run(gpu, order, size, picture.shadow);
-    std::vector<float> light(ordered.size());
-    for (std::size_t i = 0; i < ordered.size(); ++i) light[order.source[i]] = ordered[i];
-    return light;
+    kept.all_known = true;
+    map_on_device = kept.key;
 }
 
 // T's absorption factor in its place.
-std::vector<float> Renderer::Impl::absorb_sunlight(const PreparedCloud& cloud, const DensityBlocks& blocks,
-                                                   const RenderOptions& options, Picture& picture) {
+void Renderer::Impl::absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks,
+                                     const RenderOptions& options) {
     const double distance = options.light.light_distance_m;
-    picture.shadow = shadow_by_absorption(blocks, picture.shadow_frame, picture.shadow_size, distance);
-    if (!on_processor()) light_on_device().use(gpu, picture.shadow, picture.shadow_size);
-    return light_by_absorption(cloud, blocks, direction_to_sun(options.sun), distance);
+    kept.shadow = shadow_by_absorption(blocks, kept.frame, kept.shadow_size, distance);
+    kept.light = light_by_absorption(kept.cloud, blocks, direction_to_sun(options.sun), distance);
+    kept.all_known = true;
+}
+
+// What is missing of the light that the picture needs, and the lightning.
+std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOptions& options,
+                                            const EyeOrder& order, const SeenLight* seen) {
+    const Flash* flash = splats.flash ? &*splats.flash : nullptr;
+    const bool absorbs = options.light.lighting == Lighting::cfa && !lit.all_known;
+    std::optional<DensityBlocks> blocks;
+    if (!lit.cloud.visible.empty() && (flash != nullptr || absorbs))
+        blocks.emplace(lit.cloud, splats.metaballs.extinction_per_m);
+    const bool on_device = !on_processor() && (!lit.all_known || map_on_device != lit.key);
+    if (blocks && absorbs) {
+        absorb_sunlight(lit, *blocks, options);
+        ++light_passes;
+    } else if (on_processor()) {
+        if (light_seen(lit, order.source, seen != nullptr ? &seen->balls : nullptr,
+                       seen != nullptr ? &seen->map_tiles : nullptr, &times))
+            ++light_passes;
+    } else if (on_device && options.light.lighting == Lighting::light_pass) {
+        pass_sunlight(lit);
+        ++light_passes;
+    }
+    if (!on_processor() && map_on_device != lit.key) put_map_on_device();
+    if (flash == nullptr || !blocks) return {};
+    return flash_by_absorption(lit.cloud, *blocks, flash->position_m, options.light.light_distance_m);
+}
+
+void Renderer::Impl::put_map_on_device() {
+    light_on_device().use(gpu, lit.shadow, lit.shadow_size);
+    map_on_device = lit.key;
 }
 
 Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options) {
-    const MetaballCloud& cloud = splats.metaballs;
-    const Flash* flash = splats.flash ? &*splats.flash : nullptr;
-    const PreparedCloud prepared = prepare(cloud);
+    times = {};
     const CameraFrame camera = camera_frame(options.camera);
     Picture picture = blank_picture(options);
-
-    picture.shadow_frame = shadow_frame(prepared, direction_to_sun(options.sun), options.shadow_map_size);
-    std::optional<DensityBlocks> blocks;
-    if (!prepared.visible.empty() && (flash != nullptr || options.light.lighting == Lighting::cfa))
-        blocks.emplace(prepared, cloud.extinction_per_m);
-    const std::vector<float> light = options.light.lighting == Lighting::cfa && blocks
-                                         ? absorb_sunlight(prepared, *blocks, options, picture)
-                                         : pass_sunlight(prepared, options, picture);
-    std::vector<float> lightning;
-    if (flash != nullptr && blocks)
-        lightning = flash_by_absorption(prepared, *blocks, flash->position_m, options.light.light_distance_m);
-    picture.light.assign(cloud.metaballs.size(), 1.0f);
-    for (std::size_t i = 0; i < light.size(); ++i) picture.light[prepared.visible[i]] = light[i];
-
-    const EyeOrder order = order_from_eye(prepared, {light, lightning}, splats, camera,
-                                          pixels_per_unit(options.camera, camera), options.ground);
-    const DrawPart draw_part = part_drawer(order, camera, options, picture);
+    {
+        const StageTimer timer(&times, DrawStage::prepare);
+        keep_cloud(lit, splats.metaballs, options);
+    }
+    picture.shadow_frame = lit.frame;
+    EyeOrder order;
+    {
+        const StageTimer timer(&times, DrawStage::eye_order);
+        order = order_from_eye(lit.cloud, splats, camera, pixels_per_unit(options.camera, camera),
+                               options.ground);
+    }
+    const Flash* flash = splats.flash ? &*splats.flash : nullptr;
+    std::vector<PartFrame> parts;
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {
             const Tile tile{x, y, std::min(tile_size, picture.width - x),
                             std::min(tile_size, picture.height - y)};
-            draw_part(frame_data(options, camera, picture.shadow_frame, flash, tile), tile);
+            parts.push_back({tile, frame_data(options, camera, lit.frame, flash, tile)});
         }
+    }
+    if (order.puffs.empty() && on_processor())
+        draw_on_processor(splats, options, camera, parts, order, picture);
+    else
+        draw_on_device(splats, options, camera, parts, order, picture);
+    if (splats.light) {
+        picture.light.assign(splats.metaballs.metaballs.size(), 1.0f);
+        for (std::size_t i = 0; i < lit.light.size(); ++i) picture.light[lit.cloud.visible[i]] = lit.light[i];
+        picture.shadow = lit.shadow;
     }
     return picture;
 }
 
-Renderer::Impl::DrawPart Renderer::Impl::part_drawer(const EyeOrder& order, const CameraFrame& camera,
-                                                     const RenderOptions& options, Picture& picture) {
-    if (order.puffs.empty() && on_processor()) {
-        return [&](const shader::Frame& frame, const Tile& tile) {
-            view_by_processor(options, camera, frame, tile, order, picture);
-        };
+void Renderer::Impl::draw_on_processor(const Splats& splats, const RenderOptions& options,
+                                       const CameraFrame& camera, const std::vector<PartFrame>& parts,
+                                       EyeOrder& order, Picture& picture) {
+    std::vector<ProcessorView> views;
+    for (const PartFrame& part : parts)
+        views.emplace_back(options, camera, part.frame, part.tile, order, BatchLimits{}, &times);
+    std::optional<SeenLight> seen;
+    if (!splats.light && !lit.all_known) {
+        seen.emplace(order, lit.shadow_size);
+        for (ProcessorView& view : views) view.look(lit.shadow_size, *seen);
     }
-    if (on_processor()) light_on_device().use(gpu, picture.shadow, picture.shadow_size);
+    const SeenLight* const known = seen ? &*seen : nullptr;
+    const std::vector<float> lightning = light_up(splats, options, order, known);
+    set_light(order, {lit.light, lightning});
+    for (ProcessorView& view : views) view.draw(picture, lit.shadow.data(), lit.shadow_size, known);
+}
+
+void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& options,
+                                    const CameraFrame& camera, const std::vector<PartFrame>& parts,
+                                    EyeOrder& order, Picture& picture) {
+    const std::vector<float> lightning = light_up(splats, options, order, nullptr);
+    set_light(order, {lit.light, lightning});
+    if (on_processor() && map_on_device != lit.key) put_map_on_device();
     const GpuImage& map = light_on_device().shadow_map();
     if (order.puffs.empty() && splatting == Splatting::tiles) {
         if (!view_tiles) view_tiles.emplace(gpu, layout, attenuation_on_device(), clamped);
         view_tiles->use_shadow_map(gpu, map, white_beyond);
-        return [&](const shader::Frame& frame, const Tile& tile) {
-            view_tiles->draw_tile(gpu, options, camera, frame, tile, order, picture);
-        };
+        for (const PartFrame& part : parts)
+            view_tiles->draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
+        return;
     }
     if (!view_pass) view_pass.emplace(gpu, layout, attenuation_on_device(), clamped);
     view_pass->use_shadow_map(gpu, map, white_beyond);
-    return [&](const shader::Frame& frame, const Tile& tile) {
-        view_pass->draw_tile(gpu, frame, tile, order, picture);
-    };
+    for (const PartFrame& part : parts) view_pass->draw_tile(gpu, part.frame, part.tile, order, picture);
 }
 
 Renderer::Renderer(const DeviceOptions& options) {
@@ -234,6 +284,8 @@ Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options
     }
 }
 
+const StageTimes& Renderer::times() const { return impl_->times; }
+
 std::string Renderer::device_name() const { return std::string(impl_->gpu.properties.deviceName.data()); }
 
 std::vector<std::string> Renderer::validation_messages() const {
@@ -241,6 +293,10 @@ std::vector<std::string> Renderer::validation_messages() const {
     if (log == nullptr) return {};
     const std::scoped_lock lock(log->mutex);
     return log->messages;
+}
+
+std::size_t RendererTestAccess::light_passes(const Renderer& renderer) {
+    return renderer.impl_->light_passes;
 }
 
 // Two copies into the same buffer with no barrier between them.

@@ -24,6 +24,7 @@
 #include "render/options.h"
 #include "render/picture.h"
 #include "render/splats.h"
+#include "render/stage_times.h"
 
 namespace nephos {
 
@@ -69,10 +70,16 @@ class Renderer {
     // finite or have no radius, on billboards that are not as splats.h wants them, and when the picture does
     // not fit into memory; Error(gpu) when the device fails, after which this Renderer cannot be used any
     // more.
+    //
+    // What does not depend on the camera is kept for the next picture and used again if neither metaballs nor
+    // extinction, sun or size of the shadow map have changed, which their contents tell.
     Picture draw_splats(const Splats& splats, const RenderOptions& options);
     Picture draw(const MetaballCloud& cloud, const RenderOptions& options);
 
     std::string device_name() const;
+
+    // Where the time of the last picture went.
+    const StageTimes& times() const;
 
     // What the validation layer has said so far; empty without DeviceOptions::validation.
     std::vector<std::string> validation_messages() const;

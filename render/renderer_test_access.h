@@ -8,6 +8,8 @@
 namespace nephos {
 
 struct RendererTestAccess {
+    // How often light was computed so far.
+    static std::size_t light_passes(const Renderer& renderer);
     // Submits a deliberate write-after-write hazard, which the synchronization validation must report.
     static void provoke_hazard(Renderer& renderer);
 };

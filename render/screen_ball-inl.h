@@ -106,21 +106,31 @@ inline void fit_opacity(const float* depth_scale, float (*fit)[kMaxLanes]) {
     for (std::size_t i = 0; i < kMaxLanes; ++i) fit[5][i] = shader::opacity_c5(s[i]);
 }
 
-// A vector of balls: `screen` gets up to one a lane, `exact` those that are not fitted, whose numbers begin
-// with `number`.
-inline void prepare_vector(std::span<const shader::ViewBall> balls, const shader::Frame& frame,
-                           ScreenBall* screen, ExactBall* exact, std::uint32_t number) {
+// Distances from the eye of a vector of balls, and what is drawn of their radii: at least a part of a pixel.
+struct BallSizes {
+    Floats3 centre;
+    Floats distance, drawn, thinning;
+
+    explicit BallSizes(const BallColumns& ball) {
+        const Lanes d;
+        centre = {hn::Load(d, ball.x), hn::Load(d, ball.y), hn::Load(d, ball.z)};
+        distance = hn::Sqrt(dot(centre, centre));
+        const Floats radius = hn::Load(d, ball.radius);
+        drawn = hn::Max(radius, hn::Mul(hn::Load(d, ball.least_radius), distance));
+        thinning = hn::Div(radius, drawn);
+    }
+};
+
+// The shapes of a vector of balls: `screen` gets up to one a lane, `exact` those that are not fitted, whose
+// numbers begin with `number`.
+inline void shape_vector(std::span<const shader::ViewBall> balls, const shader::Frame& frame,
+                         ScreenBall* screen, ExactBall* exact, std::uint32_t number) {
     const Lanes d;
     const BallColumns ball(balls, frame);
-    const Floats3 centre{hn::Load(d, ball.x), hn::Load(d, ball.y), hn::Load(d, ball.z)};
-    const Floats distance = hn::Sqrt(dot(centre, centre)), radius = hn::Load(d, ball.radius);
-    const Floats drawn = hn::Max(radius, hn::Mul(hn::Load(d, ball.least_radius), distance));
-    const Floats thinning = hn::Div(radius, drawn), per_radius = hn::Div(set(1.0f), drawn);
-    const Scattered light = scattered_light(ball, centre, distance, frame);
-    const Floats3 ray = times(hn::Div(set(1.0f), distance), centre);
-    const Floats3 radiance = times_add(phase_along(frame, ray), light.direct, light.diffuse);
-
-    const Floats3 in_radii = times(per_radius, centre), right = set3(frame.right), up = set3(frame.up);
+    const BallSizes size(ball);
+    const Floats3 &centre = size.centre, right = set3(frame.right), up = set3(frame.up);
+    const Floats per_radius = hn::Div(set(1.0f), size.drawn);
+    const Floats3 in_radii = times(per_radius, centre);
     const Floats3 along_x = cross(in_radii, times(set(2.0f / frame.picture.x), right)),
                   along_y = cross(in_radii, times(set(-2.0f / frame.picture.y), up));
     const Floats depth = dot(set3(frame.forward), centre);
@@ -129,28 +139,17 @@ inline void prepare_vector(std::span<const shader::ViewBall> balls, const shader
     const Floats half_width = set(0.5f * frame.picture.x), half_height = set(0.5f * frame.picture.y);
 
     HWY_ALIGN float depth_scale[kMaxLanes] = {}, fit[6][kMaxLanes];
-    hn::Store(hn::Mul(hn::Load(d, ball.depth_scale), hn::Mul(thinning, thinning)), d, depth_scale);
+    hn::Store(hn::Mul(hn::Load(d, ball.depth_scale), hn::Mul(size.thinning, size.thinning)), d, depth_scale);
     fit_opacity(depth_scale, fit);
-    HWY_ALIGN float field[18][kMaxLanes];
+    HWY_ALIGN float field[7][kMaxLanes];
     const Floats fields[] = {hn::Sub(hn::MulAdd(across, half_width, half_width), set(frame.picture.z)),
                              hn::Sub(hn::NegMulAdd(upward, half_height, half_height), set(frame.picture.w)),
                              dot(along_x, along_x),
                              hn::Mul(set(2.0f), dot(along_x, along_y)),
                              dot(along_y, along_y),
-                             radiance.x,
-                             radiance.y,
-                             radiance.z,
-                             distance,
+                             size.distance,
                              per_radius};
     for (std::size_t n = 0; n < std::size(fields); ++n) hn::Store(fields[n], d, field[n]);
-    const bool some_exact = std::ranges::any_of(
-        balls, [](const shader::ViewBall& each) { return (each.flags & shader::kNotFitted) != 0; });
-    HWY_ALIGN float scattered[6][kMaxLanes];
-    if (some_exact) {
-        const Floats parts[] = {light.diffuse.x, light.diffuse.y, light.diffuse.z,
-                                light.direct.x,  light.direct.y,  light.direct.z};
-        for (std::size_t n = 0; n < std::size(parts); ++n) hn::Store(parts[n], d, scattered[n]);
-    }
     for (std::size_t i = 0; i < balls.size(); ++i) {
         ScreenBall& to = screen[i];
         to.x = field[0][i];
@@ -159,33 +158,62 @@ inline void prepare_vector(std::span<const shader::ViewBall> balls, const shader
         to.xy = field[3][i];
         to.yy = field[4][i];
         for (std::size_t n = 0; n < 6; ++n) to.fit[n] = fit[n][i];
-        to.red = field[5][i];
-        to.green = field[6][i];
-        to.blue = field[7][i];
-        to.distance = field[8][i];
+        to.distance = field[5][i];
         if ((balls[i].flags & shader::kNotFitted) == 0) continue;
-        const float scale = field[9][i];
+        const float scale = field[6][i];
         exact[number] = {.x = scale * balls[i].x,
                          .y = scale * balls[i].y,
                          .z = scale * balls[i].z,
                          .per_radius = scale,
                          .depth_scale = depth_scale[i],
                          .distance = to.distance,
-                         .diffuse = {scattered[0][i], scattered[1][i], scattered[2][i]},
-                         .direct = {scattered[3][i], scattered[4][i], scattered[5][i]}};
+                         .diffuse = {},
+                         .direct = {}};
         to.x = std::bit_cast<float>(number++);
         to.distance = 0.0f;
     }
 }
 
 // `number`: of the first of these balls that is not fitted.
-inline void prepare_balls(std::span<const shader::ViewBall> balls, const shader::Frame& frame,
-                          ScreenBall* screen, ExactBall* exact, std::uint32_t number) {
+inline void shape_balls(std::span<const shader::ViewBall> balls, const shader::Frame& frame,
+                        ScreenBall* screen, ExactBall* exact, std::uint32_t number) {
     const std::size_t lanes = hn::Lanes(Lanes());
     for (std::size_t begin = 0; begin < balls.size(); begin += lanes) {
         const auto some = balls.subspan(begin, std::min(lanes, balls.size() - begin));
-        prepare_vector(some, frame, screen + begin, exact, number);
+        shape_vector(some, frame, screen + begin, exact, number);
         for (const shader::ViewBall& ball : some) number += (ball.flags & shader::kNotFitted) != 0 ? 1 : 0;
+    }
+}
+
+// The light of some balls that have their shapes: `screen` has one for each of `balls`.
+inline void light_balls(std::span<const shader::ViewBall> balls, const shader::Frame& frame,
+                        ScreenBall* const* screen, ExactBall* exact) {
+    const Lanes d;
+    const std::size_t lanes = hn::Lanes(d);
+    for (std::size_t begin = 0; begin < balls.size(); begin += lanes) {
+        const auto some = balls.subspan(begin, std::min(lanes, balls.size() - begin));
+        const BallColumns ball(some, frame);
+        const BallSizes size(ball);
+        const Scattered light = scattered_light(ball, size.centre, size.distance, frame);
+        const Floats3 ray = times(hn::Div(set(1.0f), size.distance), size.centre);
+        const Floats3 radiance = times_add(phase_along(frame, ray), light.direct, light.diffuse);
+        HWY_ALIGN float field[9][kMaxLanes];
+        const Floats fields[] = {radiance.x,      radiance.y,      radiance.z,
+                                 light.diffuse.x, light.diffuse.y, light.diffuse.z,
+                                 light.direct.x,  light.direct.y,  light.direct.z};
+        for (std::size_t n = 0; n < std::size(fields); ++n) hn::Store(fields[n], d, field[n]);
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            ScreenBall& to = *screen[begin + i];
+            to.red = field[0][i];
+            to.green = field[1][i];
+            to.blue = field[2][i];
+            if (to.distance > 0) continue;
+            ExactBall& whole = exact[std::bit_cast<std::uint32_t>(to.x)];
+            for (std::size_t c = 0; c < 3; ++c) {
+                whole.diffuse[c] = field[3 + c][i];
+                whole.direct[c] = field[6 + c][i];
+            }
+        }
     }
 }
 

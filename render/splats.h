@@ -64,6 +64,9 @@ struct Splats {
     double time_s = 0;  // simulated time of the picture
     // False: nobody asks for Picture::depth_m, which is infinity then; billboards are drawn a sixth faster.
     bool depth = true;
+    // False: nobody asks for Picture::light and Picture::shadow, which are empty then. On the processor light
+    // is then computed only where the picture shows it; its pixels are the same.
+    bool light = true;
 };
 
 }  // namespace nephos

@@ -13,11 +13,16 @@ std::size_t area(const PixelBox& box) {
 }
 
 template <class Work>
-void for_each_tile(const PixelBox& box, const TileGrid& grid, const Work& work) {
+void for_each_tile(const PixelBox& box, const TileGrid& grid, std::span<const std::uint8_t> wanted,
+                   const Work& work) {
     const PixelBox tiles = tiles_of(box, grid);
     const auto columns = std::size_t(grid.columns());
-    for (int y = tiles.y0; y < tiles.y1; ++y)
-        for (int x = tiles.x0; x < tiles.x1; ++x) work(std::size_t(y) * columns + std::size_t(x));
+    for (int y = tiles.y0; y < tiles.y1; ++y) {
+        for (int x = tiles.x0; x < tiles.x1; ++x) {
+            const std::size_t tile = std::size_t(y) * columns + std::size_t(x);
+            if (wanted.empty() || wanted[tile] != 0) work(tile);
+        }
+    }
 }
 
 }  // namespace
@@ -43,7 +48,8 @@ std::size_t end_of_batch(std::span<const PixelBox> boxes, std::size_t begin, con
 
 // A counting sort by tile. Each part of the boxes counts for itself; its entries of a tile follow those of
 // the parts before it.
-TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid) {
+TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid,
+                        std::span<const std::uint8_t> wanted) {
     constexpr std::size_t kPart = 16384;
     const std::size_t parts = std::max<std::size_t>(1, std::min<std::size_t>(16, boxes.size() / kPart));
     const auto part = [&](std::size_t p) {
@@ -55,7 +61,7 @@ TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid) {
         next[p].assign(grid.tiles(), 0);
         const auto [begin, end] = part(p);
         for (std::size_t i = begin; i < end; ++i)
-            for_each_tile(boxes[i], grid, [&](std::size_t tile) { ++next[p][tile]; });
+            for_each_tile(boxes[i], grid, wanted, [&](std::size_t tile) { ++next[p][tile]; });
     });
 
     TileBins bins;
@@ -74,7 +80,7 @@ TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid) {
     tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
         const auto [begin, end] = part(p);
         for (std::size_t i = begin; i < end; ++i)
-            for_each_tile(boxes[i], grid,
+            for_each_tile(boxes[i], grid, wanted,
                           [&](std::size_t tile) { bins.list[next[p][tile]++] = std::uint32_t(i); });
     });
     return bins;

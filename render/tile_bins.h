@@ -31,13 +31,15 @@ struct TileBins {
     std::vector<std::uint32_t> list;        // indices into the boxes, rising in each tile
 };
 
-// In parallel; the result does not depend on the number of threads.
-TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid);
+// In parallel; the result does not depend on the number of threads. `wanted`: 0 for tiles whose list stays
+// empty; without it all are filled.
+TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid,
+                        std::span<const std::uint8_t> wanted = {});
 
 // What is in memory at once.
 struct BatchLimits {
-    std::size_t boxes = std::size_t{1} << 20;
-    std::size_t entries = std::size_t{1} << 24;  // of the tiles' lists: 64 MiB
+    std::size_t boxes = std::size_t{1} << 22;
+    std::size_t entries = std::size_t{1} << 26;  // of the tiles' lists: 256 MiB
 };
 
 // End of a batch that starts at `begin`: at most `max_boxes` boxes with at most `max_entries` entries in the

@@ -26,13 +26,15 @@ Drawn draw(const MetaballCloud& cloud, const RenderOptions& options, const Batch
     Picture& picture = drawn.picture = blank_picture(options);
     picture.shadow_frame = shadow_frame(prepared, direction_to_sun(options.sun), options.shadow_map_size);
     const SunOrder sun = order_from_sun(prepared, picture.shadow_frame, options.shadow_map_size);
-    const std::vector<float> ordered = light_by_processor(sun, picture.shadow_size, picture.shadow, limits);
+    std::vector<float> ordered;
+    light_by_processor(sun, picture.shadow_size, {}, ordered, picture.shadow, limits);
     drawn.light.resize(ordered.size());
     for (std::size_t i = 0; i < ordered.size(); ++i) drawn.light[sun.source[i]] = ordered[i];
     Splats splats;
     splats.metaballs = cloud;
-    const EyeOrder eye = order_from_eye(prepared, {drawn.light, {}}, splats, camera,
-                                        pixels_per_unit(options.camera, camera), options.ground);
+    EyeOrder eye =
+        order_from_eye(prepared, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
+    set_light(eye, {drawn.light, {}});
     const Tile whole{0, 0, picture.width, picture.height};
     const shader::Frame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);
     view_by_processor(options, camera, frame, whole, eye, picture, limits);
