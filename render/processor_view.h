@@ -20,7 +20,8 @@
 
 namespace nephos {
 
-// What a picture shows of the light: 1 = some pixel does. Where nearly everything is seen, all is 1.
+// What a picture shows of the light: 1 = some pixel does. Where nearly everything is seen, all is 1. Light is
+// computed for nothing else: whoever reads the shadow map for more than the ground must mark its tiles, too.
 struct SeenLight {
     std::vector<std::uint8_t> balls;      // one for each of EyeOrder::balls
     std::vector<std::uint8_t> map_tiles;  // one for each tile of the shadow map: the ground wears it

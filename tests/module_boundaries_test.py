@@ -27,7 +27,7 @@ LIBRARIES = {
     "CLI/": {"apps"},
     "toml++/": {"scenes"},
     "Random123/": {"automaton", "seeds"},
-    "xxhash.h": {"automaton", "scenes"},
+    "xxhash.h": {"automaton", "render", "scenes"},
 }
 # Seconds and hundreds of megabytes each: never in a public header (those that the module's CMakeLists.txt lists).
 HEAVY = ("openvdb/", "vulkan/")
