@@ -166,7 +166,10 @@ Picture FrameOutput::draw(const FrameResult& frame) {
     const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
     std::vector<SkyLayer> layers;
     for (const LayerFrame& layer : frame.layers) layers.push_back({layer.sky, layer.clouds, layer.direct});
-    Picture picture = painter_.draw(*renderer_, cloud, layers, scene.render, frame.time_s, scene.frames.exr);
+    std::optional<GroundCoverView> ground;
+    if (frame.ground) ground = view_of(*frame.ground);
+    Picture picture =
+        painter_.draw(*renderer_, cloud, layers, scene.render, frame.time_s, scene.frames.exr, ground);
     picture.light = {};  // no file has it
     return picture;
 }

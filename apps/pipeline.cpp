@@ -69,6 +69,11 @@ class TotalStatistics {
     double base_ = std::numeric_limits<double>::quiet_NaN(), top_ = base_;
 };
 
+std::optional<GroundCover> dry_or_covered(const Scene& scene) {
+    if (!scene.ground_cover.enabled) return {};
+    return GroundCover(scene.ground_cover, whole_world(scene));
+}
+
 CloudStatistics no_automaton() {
     CloudStatistics none;
     none.base_m = none.top_m = std::numeric_limits<double>::quiet_NaN();
@@ -107,6 +112,7 @@ Pipeline::Pipeline(const Scene& scene, const PipelineRange& range, std::string s
       range_(range),
       simulation_hash_(std::move(simulation_hash)),
       layers_(make_layers(scene, std::move(initial))),
+      ground_(dry_or_covered(scene)),
       next_frame_(range.first_frame) {
     if (range_.last_frame >= range_.first_frame &&
         steps_up_to(moment_of_frame(range_.last_frame)) > range_.last_step) {
@@ -123,7 +129,8 @@ Pipeline::Pipeline(const Scene& scene, const PipelineRange& range, std::string s
     : scene_(scene),
       range_(range),
       simulation_hash_(std::move(simulation_hash)),
-      layers_(blank_layers(scene)) {
+      layers_(blank_layers(scene)),
+      ground_(dry_or_covered(scene)) {
     if (checkpoint.simulation_hash != simulation_hash_) {
         throw Error(ErrorCode::usage, "the checkpoint belongs to another simulation");
     }
@@ -170,6 +177,7 @@ void Pipeline::advance(PipelineSink& sink) {
 
 void Pipeline::step() {
     for (LayerSimulation& layer : layers_) layer.step();
+    if (ground_) ground_->advance(scene_.automaton.time_step_s);
     remember();
 }
 
@@ -234,6 +242,13 @@ LayerFrame Pipeline::layer_frame(std::size_t layer, const Moment& moment) {
     return frame;
 }
 
+std::shared_ptr<const GroundCoverMap> Pipeline::ground_at(const Moment& moment) const {
+    const std::shared_ptr<const GroundCoverMap>& before = past(moment.step).ground;
+    if (moment.fraction == 0 || !before) return before;
+    return std::make_shared<const GroundCoverMap>(
+        mix(*before, *past(moment.step + 1).ground, moment.fraction));
+}
+
 void Pipeline::report_frame(PipelineSink& sink) {
     const Moment moment = moment_of_frame(next_frame_);
     FrameResult result;
@@ -247,6 +262,7 @@ void Pipeline::report_frame(PipelineSink& sink) {
         if (layers_[n].automaton()) densities.push_back(result.layers.back().density);
     }
     if (!densities.empty()) result.density = combine(densities);
+    result.ground = ground_at(moment);
     if (scene_.layers.empty()) {
         result.hum = result.layers.front().hum;
         result.act = result.layers.front().act;
@@ -291,8 +307,23 @@ void Pipeline::remember() {
         hashes.push_back(state.layers.back().hash);
     }
     state.hash = combined_hash(hashes);
+    if (ground_) expose_ground(state);
     history_.push_back(std::move(state));
     forget();
+}
+
+// The rain areas of a new state fall onto the ground, which lies as it does now.
+void Pipeline::expose_ground(Past& state) {
+    const double time_s = double(state.step) * scene_.automaton.time_step_s;
+    std::vector<FallingRain> falling;
+    for (std::size_t n = 0; n < scene_.layers.size(); ++n) {
+        const Range& base_m = scene_.layers[n].base_height_m;
+        falling.push_back({state.layers[n].rain,
+                           drift_m(layer_wind(scene_, n), time_s, (base_m.min + base_m.max) / 2,
+                                   scene_.render.ground.height_m, scene_.ground_cover.fall_speed_m_per_s)});
+    }
+    ground_->expose(falling);
+    state.ground = std::make_shared<const GroundCoverMap>(ground_->map());
 }
 
 void Pipeline::forget() {

@@ -30,8 +30,11 @@
 #include "density/density_grid.h"
 #include "density/statistics.h"
 #include "scenes/scene.h"
+#include "seeds/ground_cover.h"
 
 namespace nephos {
+
+class ByteReader;
 
 // One layer after a step; a row of its own file of statistics.
 struct LayerStep {
@@ -82,8 +85,9 @@ struct FrameResult {
     StateHash hash;
     // Only when the scene writes the state. A scene with layers has them in these.
     std::optional<BitPlaneView> hum, act, cld;
-    std::shared_ptr<const Lattice> planes;  // what they look at
-    std::vector<LayerFrame> layers;         // none in a scene without layers
+    std::shared_ptr<const Lattice> planes;         // what they look at
+    std::vector<LayerFrame> layers;                // none in a scene without layers
+    std::shared_ptr<const GroundCoverMap> ground;  // at time_s; null when the scene does not ask for it
 };
 
 // Receives results in the order of time; a step comes before the frames at or after it.
@@ -158,6 +162,7 @@ class Pipeline {
         std::uint64_t step = 0;
         StateHash hash;
         std::vector<PastLayer> layers;
+        std::shared_ptr<const GroundCoverMap> ground;  // null without ground cover
     };
     // q of all layers at a step; empty grids where there is no automaton.
     struct Densities {
@@ -167,6 +172,7 @@ class Pipeline {
 
     void step();
     void remember();
+    void expose_ground(Past& state);
     PastLayer past_of(const LayerSimulation& layer) const;
     void forget();
     bool density_is_due(std::uint64_t step) const;
@@ -177,15 +183,18 @@ class Pipeline {
     void report_step(PipelineSink& sink);
     void report_frame(PipelineSink& sink);
     LayerFrame layer_frame(std::size_t layer, const Moment& moment);
+    std::shared_ptr<const GroundCoverMap> ground_at(const Moment& moment) const;
     Moment moment_of_frame(int number) const;
     std::uint64_t lowest_needed() const;
     void restore_layers(const Checkpoint& checkpoint);
     void restore_history(const Checkpoint& checkpoint);
+    void restore_ground(ByteReader& reader);
 
     Scene scene_;
     PipelineRange range_;
     std::string simulation_hash_;
     std::vector<LayerSimulation> layers_;  // never empty; the one of a scene without layers has no sky
+    std::optional<GroundCover> ground_;    // at the last step taken
     std::deque<Past> history_;             // consecutive steps, the newest last; never empty
     std::vector<Densities> densities_;     // q at steps that are still needed
     std::uint64_t next_step_ = 0;

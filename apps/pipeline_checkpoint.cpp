@@ -80,6 +80,21 @@ std::vector<RainArea> get_rain(ByteReader& reader) {
     return areas;
 }
 
+void put_ground(ByteWriter& writer, const GroundCoverMap& map) {
+    writer.put(std::array{map.outside.water_mm, map.outside.snow_mm, map.outside_rain_mm_per_h});
+    for (const std::vector<float>* values : {&map.water_mm, &map.snow_mm, &map.rain_mm_per_h})
+        writer.put_bytes(std::as_bytes(std::span(*values)));
+}
+
+// `map` has the size of the scene's map.
+void get_ground(ByteReader& reader, GroundCoverMap& map) {
+    const auto outside = reader.get<std::array<double, 3>>();
+    map.outside = {outside[0], outside[1]};
+    map.outside_rain_mm_per_h = outside[2];
+    for (std::vector<float>* values : {&map.water_mm, &map.snow_mm, &map.rain_mm_per_h})
+        reader.get_bytes(std::as_writable_bytes(std::span(*values)));
+}
+
 std::vector<std::byte> saved_layers(const std::vector<LayerSimulation>& layers) {
     if (layers.front().sky() == nullptr) return layers.front().save();  // without a copy: it may be large
     ByteWriter writer;
@@ -120,6 +135,8 @@ Checkpoint Pipeline::save() {
             put_rain(writer, layer.rain);
         }
     }
+    for (const Past& state : history_)
+        if (state.ground) put_ground(writer, *state.ground);
     std::vector<std::byte> bytes = writer.take();
     // The planes at their exact size: a growing vector would hold them twice.
     std::size_t words = 0;
@@ -154,6 +171,15 @@ void Pipeline::restore_layers(const Checkpoint& checkpoint) {
         throw Error(ErrorCode::io, "the checkpoint's layers are damaged");
 }
 
+void Pipeline::restore_ground(ByteReader& reader) {
+    GroundCoverMap map = ground_->map();
+    for (Past& state : history_) {
+        get_ground(reader, map);
+        state.ground = std::make_shared<const GroundCoverMap>(map);
+    }
+    ground_->restore(std::move(map));
+}
+
 void Pipeline::restore_history(const Checkpoint& checkpoint) {
     ByteReader reader(checkpoint.history);
     if (reader.get<std::uint32_t>() != kHistoryVersion) {
@@ -185,6 +211,7 @@ void Pipeline::restore_history(const Checkpoint& checkpoint) {
         }
         history_.push_back(std::move(state));
     }
+    if (ground_) restore_ground(reader);
     for (Past& state : history_) {
         for (std::size_t layer = 0; layer < layers_.size(); ++layer) {
             Lattice planes;

@@ -10,6 +10,7 @@
 #include "apps/simulation.h"
 #include "automaton/vector_math.h"
 #include "render/camera.h"
+#include "render/wet_ground.h"
 
 namespace nephos {
 namespace {
@@ -21,6 +22,21 @@ constexpr double kLeastFlash = 1.0 / 512;  // relative to the sun; less does not
 
 Light light_of(const Sun& sun) { return {direction_to_sun(sun), true}; }
 Light light_of(const Flash& flash) { return {flash.position_m, false}; }
+
+GroundCoverView view_of(const GroundCoverMap& map) {
+    return {map.x_m,
+            map.y_m,
+            map.texel_x_m,
+            map.texel_y_m,
+            map.columns,
+            map.rows,
+            map.water_mm,
+            map.snow_mm,
+            map.rain_mm_per_h,
+            map.outside.water_mm,
+            map.outside.snow_mm,
+            map.outside_rain_mm_per_h};
+}
 
 Frustum frustum_of(const Camera& camera) {
     const CameraFrame frame = camera_frame(camera);
@@ -107,14 +123,15 @@ void SkyBillboards::list(const SkySimulation& sky, const SkyCloud& cloud, bool f
 
 void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
                            const RenderOptions& options, const std::optional<Flash>& flash, DrawnClouds& out,
-                           bool cull) {
+                           bool cull, const std::optional<Camera>& mirrored) {
     light_by_sun(sky, clouds, options);
     const Frustum frustum = frustum_of(options.camera);
+    const Frustum below = frustum_of(mirrored.value_or(options.camera));
     std::vector<const SkyCloud*> seen;
     for (const SkyCloud& cloud : clouds) {
         Sphere sphere = sky.sphere(cloud);
         sphere.radius_m += strewn(sky, cloud).reach_m;
-        if (!cull || may_see(frustum, sphere)) seen.push_back(&cloud);
+        if (!cull || may_see(frustum, sphere) || may_see(below, sphere)) seen.push_back(&cloud);
     }
     if (flash) light_by_flash(sky, *flash, seen);
     std::size_t billboards = out.billboards.size();
@@ -127,15 +144,23 @@ void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> c
 }
 
 Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
-                         const RenderOptions& options, double time_s, bool depth) {
+                         const RenderOptions& options, double time_s, bool depth,
+                         const std::optional<GroundCoverView>& ground_cover) {
     layers_.resize(layers.size());
     drawn_.clouds.clear();
     drawn_.billboards.clear();
     const std::optional<Flash> flash = flash_at(options.lightning, time_s);
-    for (std::size_t i = 0; i < layers.size(); ++i)
-        if (layers[i].direct) layers_[i].append(*layers[i].sky, layers[i].clouds, options, flash, drawn_);
-    Picture picture =
-        renderer.draw_splats({drawn_.clouds, drawn_.billboards, voxels, flash, time_s, depth, depth}, options);
+    std::optional<Camera> mirrored;
+    if (ground_cover && shows_reflections(options, *ground_cover)) {
+        mirrored =
+            mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
+    }
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+        const SkyLayer& layer = layers[i];
+        if (layer.direct) layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn_, true, mirrored);
+    }
+    Picture picture = renderer.draw_splats(
+        {drawn_.clouds, drawn_.billboards, voxels, flash, time_s, depth, depth, ground_cover}, options);
     for (const SkyLayer& layer : layers) {
         const std::vector<WorldLine> lines =
             debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun));

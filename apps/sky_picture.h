@@ -17,6 +17,7 @@
 #include "render/renderer.h"
 #include "render/splats.h"
 #include "seeds/billboards.h"
+#include "seeds/ground_cover.h"
 #include "seeds/light_absorption.h"
 #include "seeds/sky_simulation.h"
 
@@ -34,9 +35,10 @@ class SkyBillboards {
     // absorption of all clouds of the layer, of which at most options.light.cfa_clouds_per_frame are computed
     // anew (0: all; clouds never lit before always are), and the lightning's of those that it reaches. So
     // with a bound a picture depends on those drawn before it. `cull` false lists also what the camera cannot
-    // see: the picture is the same.
+    // see: the picture is the same. `mirrored`: another camera whose clouds are listed as well.
     void append(const SkySimulation& sky, std::span<const SkyCloud> clouds, const RenderOptions& options,
-                const std::optional<Flash>& flash, DrawnClouds& out, bool cull = true);
+                const std::optional<Flash>& flash, DrawnClouds& out, bool cull = true,
+                const std::optional<Camera>& mirrored = {});
 
     // Absorbed sunlight of a cloud's boxes as it was used last; empty before the first append().
     std::span<const double> sun_absorbed(const SkyCloud& cloud) const { return sun_.absorbed(cloud.serial); }
@@ -69,11 +71,12 @@ struct SkyLayer {
 // Draws pictures of skies, one after the other: keeps what they have in common. Not thread-safe.
 class SkyPainter {
   public:
-    // Voxel clouds, the billboards of layers, the lightning of options.lightning that burns at `time_s`, and
-    // the debug view over it. Every call has the same layers in the same order. Throws as
-    // Renderer::draw_splats().
+    // Voxel clouds, the billboards of layers, the lightning of options.lightning that burns at `time_s`, what
+    // lies on the ground, and the debug view over it. Every call has the same layers in the same order.
+    // Throws as Renderer::draw_splats().
     Picture draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
-                 const RenderOptions& options, double time_s, bool depth = true);
+                 const RenderOptions& options, double time_s, bool depth = true,
+                 const std::optional<GroundCoverView>& ground_cover = {});
 
   private:
     std::vector<SkyBillboards> layers_;
@@ -83,6 +86,9 @@ class SkyPainter {
 // The light of the sun, or of a flash, as the absorption factor takes it.
 Light light_of(const Sun& sun);
 Light light_of(const Flash& flash);
+
+// A map as the renderer reads it; it must outlive the view.
+GroundCoverView view_of(const GroundCoverMap& map);
 
 // What the camera of a picture sees.
 Frustum frustum_of(const Camera& camera);

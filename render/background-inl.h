@@ -131,21 +131,23 @@ HWY_INLINE Floats3 sky(const shader::Frame& frame, Floats height) {
     return mix(set3(frame.zenith), set3(frame.horizon), {haze, haze, haze});
 }
 
-HWY_INLINE Floats3 ground(const shader::Frame& frame, const ShadowTexels& map, const Floats3& ray,
-                          Floats distance) {
-    const Floats3 point = times(distance, ray);
+// Radiance of the ground at a point relative to the eye, without the air before it.
+HWY_INLINE Floats3 ground_light(const shader::Frame& frame, const ShadowTexels& map, const Floats3& point) {
     const Floats u = hn::Add(dot(set3(frame.shadow_u), point), set(frame.shadow_u.w)),
                  v = hn::Add(dot(set3(frame.shadow_v), point), set(frame.shadow_v.w));
-    Floats3 colour = times_add(shadow_at(map, u, v), set3(frame.ground_sun), set3(frame.ground));
-    if (frame.flash.w > 0) {
-        const Floats3 way = subtract(set3(frame.flash), point);
-        const Floats squared = dot(way, way);
-        const Floats cosine =
-            hn::Div(hn::Max(way.z, hn::Zero(Lanes())), hn::Sqrt(hn::Max(squared, set(1.0e-6f))));
-        colour = times_add(hn::Mul(flash_falloff(squared), cosine), set3(frame.ground_flash), colour);
-    }
+    const Floats3 colour = times_add(shadow_at(map, u, v), set3(frame.ground_sun), set3(frame.ground));
+    if (!(frame.flash.w > 0)) return colour;
+    const Floats3 way = subtract(set3(frame.flash), point);
+    const Floats squared = dot(way, way);
+    const Floats cosine =
+        hn::Div(hn::Max(way.z, hn::Zero(Lanes())), hn::Sqrt(hn::Max(squared, set(1.0e-6f))));
+    return times_add(hn::Mul(flash_falloff(squared), cosine), set3(frame.ground_flash), colour);
+}
+
+HWY_INLINE Floats3 ground(const shader::Frame& frame, const ShadowTexels& map, const Floats3& ray,
+                          Floats distance) {
     const Floats3 beta = air_transmittance(frame, ray, distance);
-    return add(each_times(beta, colour), air_light(frame, ray, beta));
+    return add(each_times(beta, ground_light(frame, map, times(distance, ray))), air_light(frame, ray, beta));
 }
 
 // What lies behind the clouds along unit rays.

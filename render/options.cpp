@@ -58,6 +58,7 @@ void check(const RenderOptions& options) {
     check_colour(options.air.zenith, "air.zenith");
     require(std::isfinite(options.ground.height_m), "ground.height_m", "finite metres");
     require(colour_within(options.ground.albedo, 1), "ground.albedo", "three numbers from 0 to 1");
+    check(options.wet_ground);
     require(within(options.shadow_map_size, 16, 8192), "shadow_map_size", "16..8192 texels");
     for (const LightningFlash& flash : options.lightning) {
         require(finite(flash.position_m), "lightning.position_m", "finite metres");

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "automaton/lattice.h"
+#include "render/wet_ground_options.h"
 
 namespace nephos {
 
@@ -123,7 +124,8 @@ struct RenderOptions {
     CloudLight light;
     Air air;
     Ground ground;
-    int shadow_map_size = 1024;  // texels on a side, 16..8192
+    WetGroundOptions wet_ground;  // how it looks where it is wet or white
+    int shadow_map_size = 1024;   // texels on a side, 16..8192
     std::vector<LightningFlash> lightning;
     DebugView debug_view;
     bool operator==(const RenderOptions&) const = default;

@@ -18,6 +18,7 @@
 #include "render/view_pass.h"
 #include "render/view_tiles.h"
 #include "render/voxel_absorption.h"
+#include "render/wet_ground.h"
 
 namespace nephos {
 namespace {
@@ -71,6 +72,8 @@ struct Renderer::Impl {
     explicit Impl(const DeviceOptions& device_options);
 
     Picture draw(const Splats& splats, const RenderOptions& options);
+    // The same, and what lies on the ground.
+    Picture draw_with_ground(const Splats& splats, const RenderOptions& options);
     // A part of the picture that is drawn at once.
     struct PartFrame {
         Tile tile;
@@ -184,7 +187,6 @@ void Renderer::Impl::put_map_on_device() {
 }
 
 Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options) {
-    times = {};
     const CameraFrame camera = camera_frame(options.camera);
     Picture picture = blank_picture(options);
     {
@@ -216,6 +218,27 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
         for (std::size_t i = 0; i < lit.light.size(); ++i) picture.light[lit.cloud.visible[i]] = lit.light[i];
         picture.shadow = lit.shadow;
     }
+    return picture;
+}
+
+Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptions& options) {
+    times = {};
+    Picture picture = draw(splats, options);
+    if (!splats.ground_cover || !shows_wet_ground(options, *splats.ground_cover)) return picture;
+    WetGround ground{options, *splats.ground_cover, splats.flash ? &*splats.flash : nullptr, splats.time_s};
+    ground.shadow = lit.shadow.data();
+    ground.shadow_size = lit.shadow_size;
+    std::optional<MirrorView> mirror;
+    if (shows_reflections(options, *splats.ground_cover)) {
+        RenderOptions below = options;
+        below.camera =
+            mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
+        Splats mirrored = splats;
+        mirrored.depth = mirrored.light = false;
+        mirror = mirror_view(draw(mirrored, below), below.camera);
+        ground.mirror = &*mirror;
+    }
+    draw_wet_ground(ground, picture);
     return picture;
 }
 
@@ -276,9 +299,10 @@ Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options
     const std::uint32_t limit = impl_->gpu.properties.limits.maxImageDimension2D;
     if (std::uint32_t(options.shadow_map_size) > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
+    if (splats.ground_cover) check(*splats.ground_cover);
     check_memory(splats, options, impl_->tile_size);
     try {
-        return with_gpu_errors("drawing", [&] { return impl_->draw(splats, options); });
+        return with_gpu_errors("drawing", [&] { return impl_->draw_with_ground(splats, options); });
     } catch (const std::bad_alloc&) {
         throw Error(ErrorCode::usage, "not enough memory for a picture of this size");
     }

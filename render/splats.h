@@ -10,6 +10,7 @@
 #include <span>
 
 #include "density/metaballs.h"
+#include "render/ground_cover_view.h"
 #include "render/options.h"
 
 namespace nephos {
@@ -67,6 +68,7 @@ struct Splats {
     // False: nobody asks for Picture::light and Picture::shadow, which are empty then. On the processor light
     // is then computed only where the picture shows it; its pixels are the same.
     bool light = true;
+    std::optional<GroundCoverView> ground_cover{};  // none: the ground is dry
 };
 
 }  // namespace nephos

@@ -49,6 +49,22 @@ const Wind& layer_wind(const Scene& scene, std::size_t layer) {
     return own.keyframes.empty() ? scene.automaton.wind : own;
 }
 
+WorldRectangle whole_world(const Scene& scene) {
+    WorldRectangle world;
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        const AutomatonOptions lattice = automaton_options(scene, n);
+        const Vec3& origin = lattice.placement.origin_m;
+        const double x_m = lattice.extent.x * lattice.placement.cell_size_m,
+                     y_m = lattice.extent.y * lattice.placement.cell_size_m;
+        const WorldRectangle layer{origin.x, origin.y, origin.x + x_m, origin.y + y_m};
+        world = n == 0 ? layer
+                       : WorldRectangle{
+                             std::min(world.min_x_m, layer.min_x_m), std::min(world.min_y_m, layer.min_y_m),
+                             std::max(world.max_x_m, layer.max_x_m), std::max(world.max_y_m, layer.max_y_m)};
+    }
+    return world;
+}
+
 SkyOptions sky_options(const Scene& scene, std::size_t layer) {
     const LayerOptions& given = scene.layers[layer];
     SkyOptions options;

@@ -108,6 +108,9 @@ SkyOptions sky_options(const Scene& scene, std::size_t layer);
 AutomatonOptions automaton_options(const Scene& scene, std::size_t layer);
 std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer);
 
+// The rectangle in which clouds live, of all layers together: the world that has a map of its ground.
+WorldRectangle whole_world(const Scene& scene);
+
 // The wind of a layer: its own or the scene's.
 const Wind& layer_wind(const Scene& scene, std::size_t layer);
 

@@ -14,6 +14,7 @@
 #include "density/options.h"
 #include "render/options.h"
 #include "scenes/layers.h"
+#include "seeds/ground_cover.h"
 #include "seeds/model.h"
 
 namespace nephos {
@@ -44,6 +45,7 @@ struct Scene {
     std::vector<NamedSky> skies;
     ClimateOptions climate;
     std::vector<LayerOptions> layers;
+    GroundCoverOptions ground_cover;  // water and snow on the ground over time
     DensityOptions density;
     RenderOptions render;
     FrameOptions frames;

@@ -162,6 +162,12 @@ const Section& scene_section() {
         climate.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->climate == ClimateOptions{});
         };
+        Key wet_ground = group("wet_ground", wet_ground_section());
+        wet_ground.written = [](const void* owner) {
+            const auto& scene = *static_cast<const Scene*>(owner);
+            return !(scene.ground_cover == GroundCoverOptions{} &&
+                     scene.render.wet_ground == WetGroundOptions{});
+        };
         return Section{
             "Scene",
             "",
@@ -185,6 +191,7 @@ const Section& scene_section() {
              tables<&Scene::render, &RenderOptions::lightning>("lightning", lightning_section(), 0, 10'000),
              group("air", air_section()),
              group("ground", ground_section()),
+             std::move(wet_ground),
              group("debug_view", debug_view_section())},
             &finish_scene};
     }();

@@ -20,6 +20,7 @@ const Section& lightning_section();
 const Section& debug_view_section();
 const Section& air_section();
 const Section& ground_section();
+const Section& wet_ground_section();
 
 // Owner: WindKeyframe.
 const Section& wind_section();

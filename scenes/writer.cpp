@@ -204,6 +204,10 @@ std::string simulation_hash(const Scene& scene, std::string_view initial_state_h
     simulation.climate = scene.climate;
     simulation.layers = scene.layers;
     simulation.density = scene.density;
+    if (scene.ground_cover.enabled) {
+        simulation.ground_cover = scene.ground_cover;
+        simulation.render.ground.height_m = scene.render.ground.height_m;  // how far drops drift
+    }
     simulation.steps = 0;
     if (scene.initial_state_file) simulation.initial_state_file = "state";
     std::string text = to_toml(simulation);

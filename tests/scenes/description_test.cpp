@@ -66,11 +66,12 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"light"}), member_count<CloudLight>());
     EXPECT_EQ(keys_at({"air"}), member_count<Air>());
     EXPECT_EQ(keys_at({"ground"}), member_count<Ground>());
+    EXPECT_EQ(keys_at({"wet_ground"}), member_count<GroundCoverOptions>() + member_count<WetGroundOptions>());
     EXPECT_EQ(keys_at({"lightning"}), member_count<LightningFlash>());
     EXPECT_EQ(keys_at({"debug_view"}), member_count<DebugView>());
     // [sun] also holds the size of the shadow map, the one plain member of RenderOptions.
     EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 1);
-    EXPECT_EQ(member_count<RenderOptions>(), 8u);
+    EXPECT_EQ(member_count<RenderOptions>(), 9u);
     EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());
@@ -83,7 +84,7 @@ TEST(Description, EveryOptionHasAKey) {
     // The others of AutomatonOptions: time.step_s, seed, field, wind.
     EXPECT_EQ(member_count<AutomatonOptions>(), 8u);
     EXPECT_EQ(keys_at({"time"}), 2u);
-    EXPECT_EQ(member_count<Scene>(), 11u);
+    EXPECT_EQ(member_count<Scene>(), 12u);
 }
 
 TEST(Description, EveryOptionOfCloudsHasAKey) {

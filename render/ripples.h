@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The rings that drops make on water (S): a square of its surface that repeats in both directions, on which
+//
+//     y_tt = v^2 (y_xx + y_yy),   z = exp(-d (t - t0)) y
+//
+// for the ring z of each drop from its time t0 on: waves of every length fade alike. Steps have one fixed
+// length, below the limit of Courant, Friedrichs and Lewy, and one fixed place on the axis of time: the
+// surface at a time depends on that time alone, not on the frames drawn before, and no frame can be so long
+// that it becomes unstable. (An exact step per Fourier mode would be as stable, but costs each drop a sum
+// over all modes.) Fading makes its memory short: it is computed from rest kRippleMemory_s before, after
+// which a wave has 1.1e-7 of its height, the rounding of a float.
+//
+// Leapfrog in time; in space the isotropic Laplacian of nine texels, so that rings are round:
+//
+//     z(n+1) = q (2 z(n) + (v t / h)^2 L z(n)) - q^2 z(n-1),   q = exp(-d t)
+//     energy = |z(n+1) / q - z(n)|^2 / (2 t^2) - (v / h)^2 / 2 <L z(n), z(n+1) / q>,   q^2 of it after a step
+//
+// L has eigenvalues from -16/3 to 0, so v t / h must be below sqrt(3) / 2; here it is 0.32.
+
+#include <cstdint>
+#include <vector>
+
+namespace nephos {
+
+inline constexpr int kRippleTexels = 128;             // on a side, a power of two
+inline constexpr double kRippleSize_m = 2.0;          // side of the square
+inline constexpr double kRippleStep_s = 0.02;         // t
+inline constexpr double kRippleSpeed_m_per_s = 0.25;  // v: of capillary waves of some centimetres
+inline constexpr double kRippleDamping_per_s = 6.0;   // d
+inline constexpr double kRippleMemory_s = 16 / kRippleDamping_per_s;
+
+// The surface at two consecutive steps; heights in metres, row after row.
+struct Ripples {
+    std::vector<float> before, now;
+};
+
+Ripples still_water();
+
+// One step without drops.
+void step(Ripples& ripples);
+
+// As above, per area of a texel and unit mass; >= 0 up to rounding, and never grows without drops.
+double energy(const Ripples& ripples);
+
+// Drops that fall within a step, of rain of `rain_mm_per_h`, at places that follow from the step's number
+// alone. Those above 1.5 mm make rings that can be seen; by Marshall and Palmer (1948) their number is
+// 8000 / L exp(-1.5 L) per cubic metre, L = 4.1 R^-0.21 per mm, and they fall at about 6.5 m/s.
+void add_drops(Ripples& ripples, std::int64_t step, double rain_mm_per_h);
+
+// The surface at a time, `before` at the step at or before it, `now` at the next one, after steady rain for
+// `history_s`. A pure function.
+Ripples ripples_at(double time_s, double rain_mm_per_h, double history_s = kRippleMemory_s);
+
+// What the picture needs: slopes, texel after texel, and the mean of their squares.
+struct RippleSlopes {
+    std::vector<float> x, y;  // kRippleTexels^2, of the surface at the time itself
+    double variance = 0;      // mean of x^2 + y^2
+};
+RippleSlopes ripple_slopes(double time_s, double rain_mm_per_h);
+
+}  // namespace nephos
