@@ -226,8 +226,6 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
     Picture picture = draw(splats, options);
     if (!splats.ground_cover || !shows_wet_ground(options, *splats.ground_cover)) return picture;
     WetGround ground{options, *splats.ground_cover, splats.flash ? &*splats.flash : nullptr, splats.time_s};
-    ground.shadow = lit.shadow.data();
-    ground.shadow_size = lit.shadow_size;
     std::optional<MirrorView> mirror;
     if (shows_reflections(options, *splats.ground_cover)) {
         RenderOptions below = options;
@@ -238,6 +236,8 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
         mirror = mirror_view(draw(mirrored, below), below.camera);
         ground.mirror = &*mirror;
     }
+    ground.shadow = lit.shadow.data();  // the mirrored view may have completed it
+    ground.shadow_size = lit.shadow_size;
     draw_wet_ground(ground, picture);
     return picture;
 }
