@@ -158,6 +158,15 @@ RenderOptions picture_options(const RenderArguments& a, const std::optional<Scen
     return options;
 }
 
+// What lies on the scene's ground at its start: a file of density knows no rain.
+std::optional<GroundCoverView> initial_cover(const std::optional<Scene>& scene) {
+    if (!scene || !scene->ground_cover.enabled) return {};
+    GroundCoverView cover;
+    cover.outside_water_mm = scene->ground_cover.initial_water_mm;
+    cover.outside_snow_mm = scene->ground_cover.initial_snow_mm;
+    return cover;
+}
+
 void check_outputs(const RenderArguments& a) {
     for (const std::string& out : a.out) {
         if (extension_of(out) == ".png" || extension_of(out) == ".exr") continue;
@@ -243,7 +252,10 @@ int render(const RenderArguments& a) {
     const RenderOptions options = picture_options(a, scene, grid);
     Renderer renderer(DeviceOptions{.device = a.device});
     const std::vector<Metaball> balls = metaballs(grid, radius);
-    const Picture picture = renderer.draw({balls, extinction_per_m, metaball_normalisation(radius)}, options);
+    Splats splats;
+    splats.metaballs = {balls, extinction_per_m, metaball_normalisation(radius)};
+    splats.ground_cover = initial_cover(scene);
+    const Picture picture = renderer.draw_splats(splats, options);
     write_pictures(a, picture, options, picture_metadata(a, loaded, extinction_per_m));
 
     Output output;

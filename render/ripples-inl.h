@@ -57,7 +57,7 @@ HWY_INLINE Slopes ripples_at(const RippleGrid& grid, const Floats3& point, Float
     // Slopes of twice as many drops are sqrt(2) as large.
     const Floats height =
         hn::Mul(set(grid.strength), hn::Sqrt(hn::Min(hn::Mul(rain, set(1 / grid.most_mm_per_h)), one)));
-    const Floats seen = hn::Sub(one, smooth_step(set(0.012f), set(0.06f), pixel_m));
+    const Floats seen = hn::Sub(one, smooth_step(set(0.016f), set(0.07f), pixel_m));
     const Floats variance = hn::Mul(hn::Mul(height, height), set(float(grid.slopes.variance)));
     const Floats unseen = hn::Mul(variance, hn::NegMulAdd(seen, seen, one));
     if (hn::AllFalse(d, hn::Gt(hn::Mul(seen, height), zero))) return {zero, zero, unseen};

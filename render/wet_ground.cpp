@@ -157,16 +157,20 @@ HWY_INLINE Surface wet_surface(const GroundPass& pass, const Seen& seen, const L
     surface.reflected = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     if (pass.mirror == nullptr) return surface;
     const Floats strength = set(pass.reflection);
-    const Floats blur = hn::Mul(set(2.0f), hn::Sqrt(slopes.variance));
-    const Floats3 water = reflected(pass, seen, mirrored_ray(seen.ray, slopes.x, slopes.y), blur);
-    const Floats3 soil = reflected(pass, seen, mirrored_ray(seen.ray, hn::Zero(d), hn::Zero(d)), set(0.6f));
-    surface.reflected = times_add(hn::Mul(strength, hn::Mul(puddle, of_water)), water,
-                                  times(hn::Mul(strength, hn::Mul(hn::Sub(one, puddle), of_soil)), soil));
+    const auto reflects = [&](Floats share, Floats slope_x, Floats slope_y, Floats blur) {
+        if (hn::AllFalse(d, hn::Gt(share, set(1.0e-4f)))) return;
+        const Floats3 light = reflected(pass, seen, mirrored_ray(seen.ray, slope_x, slope_y), blur);
+        surface.reflected = times_add(hn::Mul(strength, share), light, surface.reflected);
+    };
+    reflects(hn::Mul(puddle, of_water), slopes.x, slopes.y, hn::Mul(set(2.0f), hn::Sqrt(slopes.variance)));
+    reflects(hn::Mul(hn::Sub(one, puddle), of_soil), hn::Zero(d), hn::Zero(d), set(0.6f));
     return surface;
 }
 
 // Below snow; its grain shows as a little light and shade.
 HWY_INLINE void lay_snow(const GroundPass& pass, const Seen& seen, const Lying& lying, Surface& surface) {
+    const Lanes d;
+    if (hn::AllFalse(d, hn::Gt(lying.snow_mm, hn::Zero(d)))) return;
     const WetGroundOptions& look = *pass.look;
     const ResolvedNoise tufts = resolved_noise(pass.tufts, seen.point, seen.pixel_m);
     const Floats white = covered(lying.snow_mm, float(look.snow_cover_mm), tufts), one = set(1.0f);

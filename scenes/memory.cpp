@@ -105,6 +105,26 @@ double combined_bytes(const Scene& scene, double under_way) {
 
 }  // namespace
 
+namespace {
+
+// Maps of the ground: those that the history remembers, and of frames under way; the history's again in
+// checkpoints.
+double ground_bytes(const Scene& scene, double under_way) {
+    if (!scene.ground_cover.enabled) return 0;
+    const double map = 3.0 * sizeof(float) * scene.ground_cover.texels * scene.ground_cover.texels;
+    const double history = 2.0 * scene.density.smoothing.t0 + 2;
+    return map * (history * (1 + kCheckpointCopies) + under_way);
+}
+
+// The mirrored view and its levels.
+double mirror_bytes(const Scene& scene, double pixels) {
+    if (!scene.ground_cover.enabled || scene.render.wet_ground.reflection == 0) return 0;
+    const double scale = 1.15 * scene.render.wet_ground.reflection_scale;
+    return pixels * scale * scale * (kBytesPerPixel + 4 * sizeof(float) * 4 / 3);
+}
+
+}  // namespace
+
 MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
     MemoryEstimate estimate;
     estimate.program = kProgram;
@@ -118,13 +138,15 @@ MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
         estimate.density = sum(estimate.density, lattice.density);
         cells += double(options.extent.x) * options.extent.y * options.extent.z;
     }
-    estimate.density = sum(estimate.density, saturated(combined_bytes(scene, under_way)));
+    estimate.density =
+        sum(estimate.density, saturated(combined_bytes(scene, under_way) + ground_bytes(scene, under_way)));
     if (!with_pictures) return estimate;
     const double pixels = double(scene.render.camera.width) * scene.render.camera.height;
     const double texels = double(scene.render.shadow_map_size) * scene.render.shadow_map_size;
     const double metaballs = cells * kPlannedCover;
     estimate.pictures =
         saturated(metaballs * kBytesPerMetaball + pixels * kBytesPerPixel + texels * kBytesPerShadowTexel +
+                  mirror_bytes(scene, pixels) +
                   kFramesWritten * (pixels * kBytesPerPictureWritten + texels * sizeof(float)));
     return estimate;
 }

@@ -14,6 +14,7 @@
 #include "automaton/kernels.h"
 #include "tests/bench/automaton_bench.h"
 #include "tests/bench/density_bench.h"
+#include "tests/bench/ground_bench.h"
 #include "tests/bench/memory_bench.h"
 #include "tests/bench/render_bench.h"
 #include "tests/bench/seeds_bench.h"
@@ -56,6 +57,7 @@ int main(int argc, char** argv) {
         {"density", [] { return density_bench_rows(); }},
         {"memory", [&] { return memory_rows(source, programs / "../../apps/nephos"); }},
         {"seeds", [] { return seeds_rows(); }},
+        {"ground", [] { return ground_rows(); }},
         {"render", [&] { return render_rows(source, data); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {
