@@ -325,7 +325,7 @@ void draw_wet_ground(const WetGround& ground, Picture& picture) {
     pass.cover = texels_of(ground.cover, eye);
     const double puddle_m = options.wet_ground.puddle_size_m;
     pass.hollows = noise_octaves({150 * puddle_m, 0.45, 10, 1.0, 0x77657400u}, eye);
-    pass.tufts = noise_octaves({60, 0.4, 7, 0.9, 0x736e6f77u}, eye);
+    pass.tufts = noise_octaves({900, 0.42, 11, 1.0, 0x736e6f77u}, eye);
     pass.ripples = ripple_grid(ground.cover, ground.time_s, options.wet_ground.ripples, eye);
     pass.mirror = ground.mirror;
     pass.reflection = float(options.wet_ground.reflection);
