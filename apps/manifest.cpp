@@ -13,8 +13,8 @@
 #include "automaton/descriptor.h"
 #include "automaton/error.h"
 #include "automaton/random.h"
+#include "automaton/trigonometry.h"
 #include "density/combine.h"
-#include "seeds/trigonometry.h"
 
 namespace nephos {
 namespace {
@@ -45,7 +45,7 @@ Json frame_json(const RunSettings& settings, const FrameRecord& frame, const Man
         entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
     Json layers = Json::object();
     for (const LayerOptions& layer : settings.scene.layers) {
-        if (layer.automaton)
+        if (has_density(layer))
             layers[layer.name] = relative(settings, folder.density(frame.number, layer.name));
     }
     if (!layers.empty()) entry["layers"] = std::move(layers);
@@ -83,7 +83,7 @@ Json bounds_json(const Scene& scene, const GridBox& box) {
 GridBox whole_box(const Scene& scene) {
     std::vector<GridBox> boxes;
     for (const LayerOptions& layer : scene.layers) {
-        if (layer.automaton) boxes.push_back({layer.extent, layer.placement});
+        if (has_density(layer)) boxes.push_back({layer.extent, layer.placement});
     }
     if (boxes.empty()) boxes.push_back({scene.automaton.extent, scene.automaton.placement});
     return common_box(boxes);
@@ -94,6 +94,7 @@ Json layers_json(const RunSettings& settings, const RunFolder& folder) {
     for (const LayerOptions& layer : settings.scene.layers) {
         layers.push_back({{"name", layer.name},
                           {"automaton", layer.automaton},
+                          {"veil", layer.is_veil},
                           {"opacity", layer.opacity},
                           {"bounds", bounds_json(settings.scene, {layer.extent, layer.placement})},
                           {"statistics", relative(settings, folder.statistics(layer.name))}});

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/statistics.h"
 
+#include <algorithm>
 #include <limits>
 #include <vector>
 
 #include "automaton/error.h"
 #include "density/bit_count.h"
+#include "density/openvdb_access.h"
 
 namespace nephos {
 namespace {
@@ -41,6 +43,32 @@ CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& ac
     result.base_m = lowest < 0 ? nan : placement.origin_m.z + lowest * placement.cell_size_m;
     result.top_m = highest < 0 ? nan : placement.origin_m.z + (highest + 1) * placement.cell_size_m;
     result.mean_density = double(result.cld) / double(extent.cells());
+    return result;
+}
+
+CloudStatistics cloud_statistics(const DensityGrid& density) {
+    const Extent extent = density.extent();
+    const Placement& placement = density.placement();
+    CloudStatistics result;
+    std::vector<bool> columns(std::size_t(extent.x) * std::size_t(extent.y));
+    int lowest = extent.z, highest = -1;
+    for (const Block& block : blocks_of(density)) {
+        for (int n = 0; n < kBlockVoxels; ++n) {
+            if (!(block.value(n) > 0)) continue;
+            const openvdb::Coord& o = block.origin;
+            const int x = o.x() + (n >> 6), y = o.y() + (n >> 3 & 7), z = o.z() + (n & 7);
+            if (x >= extent.x || y >= extent.y || z >= extent.z) continue;  // a whole block beyond the box
+            ++result.cld;
+            columns[std::size_t(y) * std::size_t(extent.x) + std::size_t(x)] = true;
+            lowest = std::min(lowest, z);
+            highest = std::max(highest, z);
+        }
+    }
+    const double size = placement.cell_size_m, nan = std::numeric_limits<double>::quiet_NaN();
+    result.cover = double(std::ranges::count(columns, true)) / double(columns.size());
+    result.base_m = highest < 0 ? nan : placement.origin_m.z + lowest * size;
+    result.top_m = highest < 0 ? nan : placement.origin_m.z + (highest + 1) * size;
+    result.mean_density = density.sum() / double(extent.cells());
     return result;
 }
 

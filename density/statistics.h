@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "automaton/lattice.h"
+#include "density/density_grid.h"
 
 namespace nephos {
 
@@ -22,5 +23,9 @@ struct CloudStatistics {
 // on the number of threads.
 CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& act, const BitPlaneView& cld,
                                  const Placement& placement);
+
+// Of density without an automaton: cells above 0 are cloud, none humid or active, and the mean is that of the
+// density. Thread-safe; does not depend on the number of threads.
+CloudStatistics cloud_statistics(const DensityGrid& density);
 
 }  // namespace nephos

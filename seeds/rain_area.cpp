@@ -6,7 +6,7 @@
 #include <map>
 
 #include "seeds/checks.h"
-#include "seeds/trigonometry.h"
+#include "automaton/trigonometry.h"
 
 namespace nephos {
 namespace {

@@ -14,7 +14,9 @@
 #include "density/metaballs.h"
 #include "density/smoothing.h"
 #include "density/vdb_file.h"
+#include "density/veil.h"
 #include "tests/density/naive_smoothing.h"
+#include "tests/reference/reference_veil.h"
 
 namespace {
 
@@ -53,6 +55,42 @@ void write_json(const std::filesystem::path& path, Extent e, double voxel_m, boo
     stream << "]}\n";
 }
 
+// A veil as it is written, and its voxels as the naive twin has them.
+void write_veil(const std::filesystem::path& folder, const VdbMetadata& metadata) {
+    const Extent extent{45, 30, 18};
+    const Placement placement{{-300, 1200, 450}, 32};
+    VeilOptions options;
+    options.octave_count = 3;
+    options.wavelength_m = 700;
+    options.stretch = 2;
+    options.displacement = 0.3;
+    options.direction_deg = 20;
+    options.base_m = 450;
+    options.top_m = 450 + 18 * 32;
+    options.soft_base_m = 300;
+    options.soft_top_m = 50;
+    options.fallstreak_m = 400;
+    const Velocity wind{7, -3};
+    const DensityGrid density =
+        veil_density(options, {{{0, {{0, wind}}}}}, extent, placement, metadata.time_s);
+    VdbContent content{&density, false, {}, {}, {}, placement, nullptr};
+    write_vdb(folder / "veil.vdb", content, metadata);
+    const test::ReferenceVeil twin(options, wind, metadata.time_s);
+    const VeilThresholds at = veil_thresholds(options);
+    std::vector<float> values;
+    for (int k = 0; k < extent.z; ++k) {
+        for (int j = 0; j < extent.y; ++j) {
+            for (int i = 0; i < extent.x; ++i) {
+                const Vec3 p{-300 + (i + 0.5) * 32, 1200 + (j + 0.5) * 32, 450 + (k + 0.5) * 32};
+                values.push_back(float(twin.density(twin.sum_at(p), double(at.low), double(at.high),
+                                                    twin.weight_at(p.z, 1e9, 1e9))));
+            }
+        }
+    }
+    write_array(folder / "veil.density", values);
+    write_json(folder / "veil.json", extent, 32, false, 1, {});
+}
+
 void write_samples(const std::filesystem::path& folder) {
     const Extent extent{45, 30, 18};
     const Placement placement{{-300, 1200, 450}, 32};
@@ -68,6 +106,7 @@ void write_samples(const std::filesystem::path& folder) {
     Wind wind;
     wind.keyframes = {{0, {{0, {3, -1}}, {2000, {23, -1}}}}};
     const VdbMetadata metadata{0.04, 33.5, 5, 24, 150, 12345678901234567890u, "scene", "state", "0.1.0", 1};
+    write_veil(folder, metadata);
     for (const auto& [name, half, refine] :
          {std::tuple{"float", false, 1}, {"half", true, 1}, {"refined", false, 2}}) {
         const DensityGrid density = refine == 1 ? coarse : resample(coarse, refine, 1.5);

@@ -7,7 +7,7 @@
 
 #include "seeds/billboards.h"
 #include "seeds/draw.h"
-#include "seeds/trigonometry.h"
+#include "automaton/trigonometry.h"
 #include "tests/seeds/fixtures.h"
 
 namespace nephos {
