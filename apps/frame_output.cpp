@@ -165,7 +165,9 @@ Picture FrameOutput::draw(const FrameResult& frame) {
     const std::vector<Metaball> balls = metaballs_of(frame);
     const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
     std::vector<SkyLayer> layers;
-    for (const LayerFrame& layer : frame.layers) layers.push_back({layer.sky, layer.clouds, layer.direct});
+    for (const LayerFrame& layer : frame.layers) {
+        if (layer.sky != nullptr) layers.push_back({layer.sky, layer.clouds, layer.direct});
+    }
     std::optional<GroundCoverView> ground;
     if (frame.ground) ground = view_of(*frame.ground);
     Picture picture =

@@ -6,6 +6,7 @@
 #include "automaton/bytes.h"
 #include "automaton/checkpoint.h"
 #include "automaton/error.h"
+#include "scenes/writer.h"
 #include "seeds/coupling.h"
 
 namespace nephos {
@@ -35,12 +36,29 @@ double metres(std::int64_t after, std::int64_t before) {
     return double(std::int64_t(std::uint64_t(after) - std::uint64_t(before))) * 0x1p-32;
 }
 
+// All that a veil's density depends on, but for the time.
+std::string text_of_veil(const Scene& scene, std::size_t layer) {
+    Scene alone;
+    alone.automaton.seed = layer_seed(scene.automaton.seed, layer);
+    alone.automaton.time_step_s = scene.automaton.time_step_s;
+    alone.automaton.wind = layer_wind(scene, layer);
+    alone.layers = {scene.layers[layer]};
+    alone.layers.front().wind = {};
+    return to_toml(alone);
+}
+
 }  // namespace
 
 LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::optional<Lattice> initial)
     : number_(std::uint32_t(layer)), time_step_s_(scene.automaton.time_step_s) {
     if (!scene.layers.empty()) {
         options_ = scene.layers[layer];
+        if (options_.is_veil) {
+            veil_ = veil_options(scene, layer);
+            wind_ = layer_wind(scene, layer);
+            veil_text_ = text_of_veil(scene, layer);
+            return;
+        }
         attached_ = attached_rain(scene, layer);
         sky_.emplace(sky_options(scene, layer));
     }
@@ -56,9 +74,25 @@ LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::opt
     }
 }
 
-std::uint64_t LayerSimulation::steps() const { return automaton_ ? automaton_->steps() : sky_->steps(); }
+std::uint64_t LayerSimulation::steps() const {
+    if (is_veil()) return steps_;
+    return automaton_ ? automaton_->steps() : sky_->steps();
+}
+
+DensityGrid LayerSimulation::veil_at(double time_s) const {
+    return scaled(veil_density(veil_, wind_, options_.extent, options_.placement, time_s), options_.opacity);
+}
+
+GridBox LayerSimulation::box() const {
+    if (is_veil()) return {options_.extent, options_.placement};
+    return {automaton_->options().extent, automaton_->options().placement};
+}
 
 void LayerSimulation::step() {
+    if (is_veil()) {
+        ++steps_;
+        return;
+    }
     if (sky_ && automaton_) {
         std::vector<ActiveEllipsoid> ellipsoids = ellipsoids_of(*sky_, options_.coupling);
         append_columns(ellipsoids, rain(), options_.rain.column);
@@ -86,10 +120,21 @@ std::vector<RainArea> LayerSimulation::rain() const {
 }
 
 StateHash LayerSimulation::hash() const {
+    if (is_veil()) {
+        ByteWriter writer;
+        writer.put_bytes(std::as_bytes(std::span(veil_text_)));
+        writer.put(steps_);
+        return hash_of_bytes(writer.bytes());
+    }
     return automaton_ ? automaton_->hash() : hash_of_bytes(sky_->save());
 }
 
 std::vector<std::byte> LayerSimulation::save() const {
+    if (is_veil()) {
+        ByteWriter writer;
+        writer.put(steps_);
+        return writer.take();
+    }
     if (!sky_) return automaton_->save();
     ByteWriter writer;
     put_part(writer, automaton_);
@@ -99,6 +144,12 @@ std::vector<std::byte> LayerSimulation::save() const {
 }
 
 void LayerSimulation::restore(std::span<const std::byte> bytes) {
+    if (is_veil()) {
+        ByteReader reader(bytes);
+        steps_ = reader.get<std::uint64_t>();
+        if (!reader.rest().empty()) throw Error(ErrorCode::io, "the saved state is not of this layer");
+        return;
+    }
     if (!sky_) {
         automaton_->restore(bytes);
         return;

@@ -9,7 +9,8 @@
 //     4. rain is looked for in the automaton at n + 1
 //
 // so that sky and automaton are carried by the same wind over the same way. A layer without automaton has a
-// sky alone; a scene without layers is one nameless layer with an automaton alone.
+// sky alone; a scene without layers is one nameless layer with an automaton alone; a veil has none of these,
+// only the number of its steps.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,6 +20,7 @@
 #include <vector>
 
 #include "automaton/automaton.h"
+#include "density/combine.h"
 #include "scenes/scene.h"
 #include "seeds/rain_finder.h"
 #include "seeds/sky_simulation.h"
@@ -38,9 +40,16 @@ class LayerSimulation {
     const Automaton* automaton() const { return automaton_ ? &*automaton_ : nullptr; }
     const SkySimulation* sky() const { return sky_ ? &*sky_ : nullptr; }
     double opacity() const { return options_.opacity; }
+    // Whether the layer is a veil; its density at any time, times the opacity, does not depend on steps.
+    bool is_veil() const { return options_.is_veil; }
+    DensityGrid veil_at(double time_s) const;
+    // Whether there is a density, and the box that it fills.
+    bool has_density() const { return automaton_ || options_.is_veil; }
+    GridBox box() const;
     // Rain areas now: placed, attached, found.
     std::vector<RainArea> rain() const;
-    // Of the automaton's planes; without automaton of the sky's saved state.
+    // Of the automaton's planes; without automaton of the sky's saved state; of a veil, XXH3-128 of what
+    // decides its density: the layer as canonical scene text with its seed, and the step.
     StateHash hash() const;
 
     // The complete state; `restore` throws Error(io) on bytes that no layer of this scene wrote.
@@ -51,6 +60,10 @@ class LayerSimulation {
     LayerOptions options_;  // its defaults in a scene without layers
     std::uint32_t number_ = 0;
     double time_step_s_ = 10;
+    VeilOptions veil_;
+    Wind wind_;                // of a veil
+    std::string veil_text_;    // what its hash is made of
+    std::uint64_t steps_ = 0;  // of a veil
     std::vector<AttachedRain> attached_;
     std::optional<Automaton> automaton_;
     std::optional<SkySimulation> sky_;

@@ -36,9 +36,9 @@ BitPlane copy_of(const BitPlaneView& view) {
 std::uint64_t steps_up_to(const Moment& moment) { return moment.step + (moment.fraction > 0 ? 1 : 0); }
 
 // Cells of a box in all, and the volume that they fill.
-double volume_m3(const AutomatonOptions& options) {
-    const double edge = options.placement.cell_size_m;
-    return double(options.extent.cells()) * edge * edge * edge;
+double volume_m3(const GridBox& box) {
+    const double edge = box.placement.cell_size_m;
+    return double(box.extent.cells()) * edge * edge * edge;
 }
 
 // Statistics of several layers as those of the whole sky (StepResult).
@@ -196,10 +196,11 @@ void Pipeline::report_step(PipelineSink& sink) {
         for (const RainArea& area : past.rain) {
             layer.rain_mm_per_h = std::max(layer.rain_mm_per_h, area.intensity_mm_per_h);
         }
-        if (layers_[n].automaton()) {
-            const AutomatonOptions& lattice = layers_[n].automaton()->options();
-            layer.statistics.mean_density = densities[n].sum() / double(lattice.extent.cells());
-            total.add(layer.statistics, volume_m3(lattice));
+        if (layers_[n].has_density()) {
+            const GridBox box = layers_[n].box();
+            if (layers_[n].is_veil()) layer.statistics = cloud_statistics(densities[n]);
+            layer.statistics.mean_density = densities[n].sum() / double(box.extent.cells());
+            total.add(layer.statistics, volume_m3(box));
         }
         result.layers.push_back(std::move(layer));
     }
@@ -210,7 +211,12 @@ void Pipeline::report_step(PipelineSink& sink) {
     forget();
 }
 
+double Pipeline::time_s(const Moment& moment) const {
+    return (double(moment.step) + moment.fraction) * scene_.automaton.time_step_s;
+}
+
 DensityGrid Pipeline::density_at(std::size_t layer, const Moment& moment) {
+    if (moment.fraction != 0 && layers_[layer].is_veil()) return layers_[layer].veil_at(time_s(moment));
     const DensityGrid before = densities_at_step(moment.step)[layer];
     if (moment.fraction == 0 || !layers_[layer].automaton()) return before;
     return mix(before, densities_at_step(moment.step + 1)[layer], moment.fraction);
@@ -223,10 +229,10 @@ LayerFrame Pipeline::layer_frame(std::size_t layer, const Moment& moment) {
     frame.density = density_at(layer, moment);
     const PastLayer& state = past(moment.step).layers[layer];
     frame.hash = state.hash;
-    frame.direct = layers_[layer].automaton() == nullptr;
+    frame.direct = !layers_[layer].has_density();
     frame.sky = layers_[layer].sky();
     frame.rain = state.rain;
-    if (scene_.density.write_state && !frame.direct) {
+    if (scene_.density.write_state && layers_[layer].automaton()) {
         frame.planes = state.planes;
         frame.hum = state.planes->hum.view();
         frame.act = state.planes->act.view();
@@ -259,7 +265,7 @@ void Pipeline::report_frame(PipelineSink& sink) {
     std::vector<DensityGrid> densities;
     for (std::size_t n = 0; n < layers_.size(); ++n) {
         result.layers.push_back(layer_frame(n, moment));
-        if (layers_[n].automaton()) densities.push_back(result.layers.back().density);
+        if (layers_[n].has_density()) densities.push_back(result.layers.back().density);
     }
     if (!densities.empty()) result.density = combine(densities);
     result.ground = ground_at(moment);
@@ -339,6 +345,7 @@ const Pipeline::Past& Pipeline::past(std::uint64_t step) const {
 }
 
 DensityGrid Pipeline::density_of(std::size_t layer, std::uint64_t step) const {
+    if (layers_[layer].is_veil()) return layers_[layer].veil_at(time_s({step, 0}));
     const Automaton* automaton = layers_[layer].automaton();
     if (automaton == nullptr) return {};
     const auto reach = std::uint64_t(scene_.density.smoothing.t0);

@@ -43,7 +43,7 @@ struct LayerStep {
     std::size_t clouds = 0;  // in the sky, those that form or dissolve included
     std::size_t rain_areas = 0;
     double rain_mm_per_h = 0;    // the strongest of them
-    CloudStatistics statistics;  // all 0 without automaton
+    CloudStatistics statistics;  // of a veil, of its voxels; all 0 of clouds drawn directly
     StateHash hash;
 };
 
@@ -68,9 +68,9 @@ struct LayerFrame {
     std::shared_ptr<const Lattice> planes;      // what they look at
     // Clouds at the frame's time; their shapes and models are those of `sky`, which itself stands at a later
     // step.
-    const SkySimulation* sky = nullptr;  // null in a scene without layers; lives as long as the pipeline
+    const SkySimulation* sky = nullptr;  // null without clouds of its own; lives as long as the pipeline
     std::vector<SkyCloud> clouds;
-    bool direct = false;         // to be drawn as billboards: the layer has no automaton
+    bool direct = false;         // there is no density: clouds are drawn as billboards
     std::vector<RainArea> rain;  // at the frame's time
 };
 
@@ -178,6 +178,7 @@ class Pipeline {
     bool density_is_due(std::uint64_t step) const;
     const std::vector<DensityGrid>& densities_at_step(std::uint64_t step);
     DensityGrid density_of(std::size_t layer, std::uint64_t step) const;
+    double time_s(const Moment& moment) const;
     DensityGrid density_at(std::size_t layer, const Moment& moment);
     const Past& past(std::uint64_t step) const;
     void report_step(PipelineSink& sink);

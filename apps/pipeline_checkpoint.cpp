@@ -96,7 +96,7 @@ void get_ground(ByteReader& reader, GroundCoverMap& map) {
 }
 
 std::vector<std::byte> saved_layers(const std::vector<LayerSimulation>& layers) {
-    if (layers.front().sky() == nullptr) return layers.front().save();  // without a copy: it may be large
+    if (layers.front().name().empty()) return layers.front().save();  // without a copy: it may be large
     ByteWriter writer;
     for (const LayerSimulation& layer : layers) {
         const std::vector<std::byte> bytes = layer.save();

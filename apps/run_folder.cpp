@@ -149,7 +149,7 @@ class Recorder : public PipelineSink {
         for (const FrameRecord& frame : state_.frames) {
             if (has_density(settings_.scene)) density.files.push_back(folder_.density(frame.number));
             for (const LayerOptions& layer : settings_.scene.layers) {
-                if (layer.automaton) density.files.push_back(folder_.density(frame.number, layer.name));
+                if (has_density(layer)) density.files.push_back(folder_.density(frame.number, layer.name));
             }
             if (!settings_.render) continue;
             if (wants_png(settings_.scene)) png.files.push_back(folder_.picture(frame.number, ".png"));

@@ -40,6 +40,7 @@ std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string&
     }
     std::size_t bytes = 0;
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        if (!scene.layers.empty() && scene.layers[n].is_veil) continue;  // holds nothing
         bytes += Automaton::memory_bytes(automaton_options(scene, n));
     }
     const Extent& extent = scene.automaton.extent;

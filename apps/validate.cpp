@@ -42,6 +42,7 @@ Json scene_json(const std::string& file, const Scene& scene) {
     for (const LayerOptions& layer : scene.layers) {
         layers.push_back({{"name", layer.name},
                           {"automaton", layer.automaton},
+                          {"veil", layer.is_veil},
                           {"cells", {layer.extent.x, layer.extent.y, layer.extent.z}}});
     }
     return {{"file", file},
@@ -60,11 +61,15 @@ std::string cells_text(const Extent& cells) {
     return fmt::format("{} x {} x {} cells", cells.x, cells.y, cells.z);
 }
 
+std::string kind_text(const LayerOptions& layer) {
+    if (layer.is_veil) return "veil of " + cells_text(layer.extent);
+    return layer.automaton ? cells_text(layer.extent) : "drawn directly";
+}
+
 std::string summary(const std::string& file, const Scene& scene) {
     std::vector<std::string> lattices;
     for (const LayerOptions& layer : scene.layers) {
-        lattices.push_back(fmt::format("{} ({})", layer.name,
-                                       layer.automaton ? cells_text(layer.extent) : "drawn directly"));
+        lattices.push_back(fmt::format("{} ({})", layer.name, kind_text(layer)));
     }
     if (lattices.empty()) lattices.push_back(cells_text(scene.automaton.extent));
     return fmt::format("{}: valid: {}, {} steps, {} frames, up to {} of memory, scene hash {}", file,

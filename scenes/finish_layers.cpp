@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "automaton/trigonometry.h"
 #include "scenes/schema_sections.h"
 #include "scenes/text.h"
 #include "seeds/sky_simulation.h"
@@ -99,6 +100,11 @@ void check_layer_name(const SectionReader& reader, const std::string& name) {
 
 // The skies that a layer names: known, and no two of one state.
 void check_layer_skies(const SectionReader& reader, const Scene& scene, const LayerOptions& layer) {
+    if (reader.find("skies") == nullptr) {
+        reader.report("skies", reader.quoted("skies") + " is missing",
+                      "expected the name of a sky or several, or a `veil`");
+        return;
+    }
     if (layer.skies.empty()) {
         reader.report("skies", "the layer " + enclosed(layer.name, '"') + " has no sky",
                       "expected at least one");
@@ -120,12 +126,18 @@ void check_layer_skies(const SectionReader& reader, const Scene& scene, const La
 }
 
 // Keys that are missing take the values of the scene, or of other keys of the layer.
-void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
-    const SectionReader lattice = below(reader, "lattice"), background = below(reader, "background");
+void fill_in_lattice(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
+    const SectionReader lattice = below(reader, "lattice");
     const AutomatonOptions& shared = scene.automaton;
     if (!lattice.find("cells")) layer.extent = shared.extent;
     if (!lattice.find("cell_size_m")) layer.placement.cell_size_m = shared.placement.cell_size_m;
     if (!lattice.find("origin_m")) layer.placement.origin_m = shared.placement.origin_m;
+}
+
+void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
+    const SectionReader lattice = below(reader, "lattice"), background = below(reader, "background");
+    const AutomatonOptions& shared = scene.automaton;
+    fill_in_lattice(reader, scene, layer);
     if (!lattice.find("boundaries")) layer.boundaries = shared.boundaries;
     if (!background.find("hum")) layer.background.hum = shared.field.background.hum;
     if (!background.find("act")) layer.background.act = shared.field.background.act;
@@ -187,10 +199,42 @@ void check_rain(const SectionReader& reader, const Scene& scene, const LayerOpti
     }
 }
 
+// A layer that is a veil: what it leaves to its lattice and wind, and keys that mean nothing to it.
+void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
+    for (const std::string_view key : keys_of_clouds()) {
+        if (reader.find(key) == nullptr) continue;
+        reader.report(key, reader.quoted(key) + " stands beside `veil`",
+                      "expected `name`, `opacity`, `lattice`, `wind` and `veil` alone: a veil has no clouds "
+                      "and no automaton");
+    }
+    const SectionReader lattice = below(reader, "lattice"), veil = below(reader, "veil");
+    if (lattice.find("boundaries") != nullptr) {
+        lattice.report("boundaries", lattice.quoted("boundaries") + " stands beside `veil`",
+                       "expected none: a veil is a function of place and goes on beyond its lattice");
+    }
+    fill_in_lattice(reader, scene, layer);
+    const double bottom = layer.placement.origin_m.z;
+    if (!veil.find("base_m")) layer.veil.base_m = bottom;
+    if (!veil.find("top_m")) layer.veil.top_m = bottom + layer.extent.z * layer.placement.cell_size_m;
+    if (veil.find("direction_deg")) return;
+    const Wind& wind = layer.wind.keyframes.empty() ? scene.automaton.wind : layer.wind;
+    const Velocity velocity = wind_at(wind, layer.veil.top_m, 0);
+    layer.veil.direction_deg = degrees_of_vector(velocity.east_m_per_s, velocity.north_m_per_s);
+}
+
 // The libraries' own checks, and whether every cloud fits into the world: makes the clouds.
 void check_simulation(const SectionReader& reader, const Scene& scene, std::size_t layer) {
+    const LayerOptions& options = scene.layers[layer];
+    if (options.is_veil) {
+        try {
+            check(veil_options(scene, layer), options.extent, options.placement);
+        } catch (const Error& error) {
+            reader.report("veil", error.what());
+        }
+        return;
+    }
     try {
-        if (scene.layers[layer].automaton) check(automaton_options(scene, layer));
+        if (options.automaton) check(automaton_options(scene, layer));
         SkySimulation(sky_options(scene, layer));
     } catch (const Error& error) {
         reader.report("name", error.what());
@@ -231,8 +275,12 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
         const SectionReader item = item_of(reader, "layer", n);
         LayerOptions& layer = scene.layers[n];
         check_layer_name(item, layer.name);
-        check_layer_skies(item, scene, layer);
         check_wind_times(item, layer.wind);
+        if (layer.is_veil) {
+            finish_veil_layer(item, scene, layer);
+            continue;
+        }
+        check_layer_skies(item, scene, layer);
         fill_in(item, scene, layer);
         fill_in_base_height(item, scene, layer);
         check_rain(item, scene, layer);

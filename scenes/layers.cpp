@@ -40,8 +40,11 @@ std::uint64_t layer_seed(std::uint64_t scene_seed, std::size_t layer) {
 
 std::size_t lattice_count(const Scene& scene) { return scene.layers.empty() ? 1 : scene.layers.size(); }
 
+bool has_density(const LayerOptions& layer) { return layer.automaton || layer.is_veil; }
+
 bool has_density(const Scene& scene) {
-    return scene.layers.empty() || std::ranges::any_of(scene.layers, &LayerOptions::automaton);
+    return scene.layers.empty() ||
+           std::ranges::any_of(scene.layers, [](const LayerOptions& layer) { return has_density(layer); });
 }
 
 const Wind& layer_wind(const Scene& scene, std::size_t layer) {
@@ -51,16 +54,21 @@ const Wind& layer_wind(const Scene& scene, std::size_t layer) {
 
 WorldRectangle whole_world(const Scene& scene) {
     WorldRectangle world;
+    // Of veils only when there is nothing else: no rain falls out of them, and they may reach to the horizon.
+    const bool veils_alone = std::ranges::all_of(scene.layers, &LayerOptions::is_veil);
+    bool first = true;
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        if (!veils_alone && scene.layers[n].is_veil) continue;
         const AutomatonOptions lattice = automaton_options(scene, n);
         const Vec3& origin = lattice.placement.origin_m;
         const double x_m = lattice.extent.x * lattice.placement.cell_size_m,
                      y_m = lattice.extent.y * lattice.placement.cell_size_m;
         const WorldRectangle layer{origin.x, origin.y, origin.x + x_m, origin.y + y_m};
-        world = n == 0 ? layer
-                       : WorldRectangle{
-                             std::min(world.min_x_m, layer.min_x_m), std::min(world.min_y_m, layer.min_y_m),
-                             std::max(world.max_x_m, layer.max_x_m), std::max(world.max_y_m, layer.max_y_m)};
+        world = first ? layer
+                      : WorldRectangle{
+                            std::min(world.min_x_m, layer.min_x_m), std::min(world.min_y_m, layer.min_y_m),
+                            std::max(world.max_x_m, layer.max_x_m), std::max(world.max_y_m, layer.max_y_m)};
+        first = false;
     }
     return world;
 }
@@ -116,6 +124,12 @@ std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer) {
     return rains;
 }
 
+VeilOptions veil_options(const Scene& scene, std::size_t layer) {
+    VeilOptions options = scene.layers[layer].veil;
+    options.seed = layer_seed(scene.automaton.seed, layer);
+    return options;
+}
+
 SkiesAtTime skies_at(const Scene& scene, double time_s) {
     if (!(time_s >= 0) || !std::isfinite(time_s)) {
         throw Error(ErrorCode::usage,
@@ -126,6 +140,7 @@ SkiesAtTime skies_at(const Scene& scene, double time_s) {
     const double steps = std::floor(time_s / step_s * (1 + 1e-12) + 1e-9);
     SkiesAtTime result{{}, std::max(0.0, time_s - steps * step_s)};
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        if (scene.layers[n].is_veil) continue;
         SkySimulation& sky = result.skies.emplace_back(sky_options(scene, n));
         while (double(sky.steps()) < steps) sky.step();
     }

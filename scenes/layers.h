@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "automaton/options.h"
+#include "density/veil.h"
 #include "seeds/coupling.h"
 #include "seeds/genera.h"
 #include "seeds/rain_area.h"
@@ -68,9 +69,13 @@ struct LayerRain {
 
 struct LayerOptions {
     std::string name;  // letters, digits, '-' and '_': part of file names; no two layers share one
+    // The density is that of `veil`, a function of place and time: no skies, no clouds, no automaton. What
+    // follows further down but for lattice, opacity and wind is nothing to such a layer.
+    bool is_veil = false;
+    VeilOptions veil;                // its seed is that of veil_options()
     std::vector<std::string> skies;  // names, at least one
     bool automaton = true;           // false: clouds are drawn directly as billboards, there is no density
-    double opacity = 1;              // times the density of the automaton, above 0, at most 1: veils are thin
+    double opacity = 1;              // times the density, above 0, at most 1: veils are thin
 
     // The lattice, as in AutomatonOptions. Its horizontal rectangle is the world in which the clouds live.
     Extent extent{256, 128, 20};
@@ -99,7 +104,8 @@ std::uint64_t layer_seed(std::uint64_t scene_seed, std::size_t layer);
 // Lattices that the scene is simulated on: its layers, or the one of a scene without layers.
 std::size_t lattice_count(const Scene& scene);
 
-// Whether any of them has an automaton, and frames a density.
+// Whether frames have a density: of a layer with an automaton or a veil; of any of them.
+bool has_density(const LayerOptions& layer);
 bool has_density(const Scene& scene);
 
 // What the libraries need to simulate layer `layer` < scene.layers.size(). Pure; throw Error(usage) when the
@@ -107,6 +113,8 @@ bool has_density(const Scene& scene);
 SkyOptions sky_options(const Scene& scene, std::size_t layer);
 AutomatonOptions automaton_options(const Scene& scene, std::size_t layer);
 std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer);
+// Of a layer that is a veil, with the layer's seed.
+VeilOptions veil_options(const Scene& scene, std::size_t layer);
 
 // The rectangle in which clouds live, of all layers together: the world that has a map of its ground.
 WorldRectangle whole_world(const Scene& scene);
@@ -114,10 +122,10 @@ WorldRectangle whole_world(const Scene& scene);
 // The wind of a layer: its own or the scene's.
 const Wind& layer_wind(const Scene& scene, std::size_t layer);
 
-// Every layer's sky, the first layer's first, as it stands at a time: at its last step, with `since_step_s`
-// the rest. SkySimulation::ahead(cloud, time_s(), since_step_s) moves a cloud on to the moment itself. All
-// steps from 0 are taken again, microseconds each. For pictures of clouds without an automaton; a run has
-// them in its frames (apps/pipeline.h).
+// The sky of every layer that has one, the first layer's first, as it stands at a time: at its last step,
+// with `since_step_s` the rest. SkySimulation::ahead(cloud, time_s(), since_step_s) moves a cloud on to the
+// moment itself. All steps from 0 are taken again, microseconds each. For pictures of clouds without an
+// automaton; a run has them in its frames (apps/pipeline.h).
 struct SkiesAtTime {
     std::vector<SkySimulation> skies;
     double since_step_s = 0;

@@ -87,17 +87,26 @@ MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& latt
     return estimate;
 }
 
+// A veil has grids alone: nothing of it is remembered.
+MemoryEstimate veil_estimate(const Scene& scene, const AutomatonOptions& lattice, double under_way) {
+    DensityOptions density = scene.density;
+    density.write_state = false;
+    MemoryEstimate estimate;
+    estimate.density = saturated(grid_bytes(lattice.extent, density, under_way));
+    return estimate;
+}
+
 // Grids of all layers together, which have the smallest voxels of all: of the frame that is made and of those
 // under way. A refined one is of one frame alone.
 double combined_bytes(const Scene& scene, double under_way) {
     if (scene.layers.size() < 2) return 0;
     double finest_m = std::numeric_limits<double>::infinity(), voxels = 0;
     for (const LayerOptions& layer : scene.layers) {
-        if (layer.automaton)
+        if (has_density(layer))
             finest_m = std::min(finest_m, layer.placement.cell_size_m / scene.density.refine);
     }
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
-        if (scene.layers[n].automaton) voxels += voxels_of_size(automaton_options(scene, n), finest_m);
+        if (has_density(scene.layers[n])) voxels += voxels_of_size(automaton_options(scene, n), finest_m);
     }
     const double coarse = voxels / std::pow(double(scene.density.refine), 3);
     return (voxels + under_way * coarse) * kBytesPerVoxel;
@@ -131,9 +140,11 @@ MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
     const double under_way = kFramesWritten + (with_pictures ? kFramesDrawn : 0);
     double cells = 0;
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
-        if (!scene.layers.empty() && !scene.layers[n].automaton) continue;
+        if (!scene.layers.empty() && !has_density(scene.layers[n])) continue;
         const AutomatonOptions options = automaton_options(scene, n);
-        const MemoryEstimate lattice = lattice_estimate(scene, options, under_way);
+        const bool veil = !scene.layers.empty() && scene.layers[n].is_veil;
+        const MemoryEstimate lattice =
+            veil ? veil_estimate(scene, options, under_way) : lattice_estimate(scene, options, under_way);
         estimate.automaton = sum(estimate.automaton, lattice.automaton);
         estimate.density = sum(estimate.density, lattice.density);
         cells += double(options.extent.x) * options.extent.y * options.extent.z;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sections of climate and layers.
 
+#include <algorithm>
+
 #include "scenes/schema_build.h"
 #include "scenes/schema_sections.h"
 #include "scenes/text.h"
@@ -79,6 +81,15 @@ const Section& layer_climate_section() {
     return section;
 }
 
+bool of_clouds(const void* owner) { return !static_cast<const LayerOptions*>(owner)->is_veil; }
+bool of_veils(const void* owner) { return static_cast<const LayerOptions*>(owner)->is_veil; }
+
+// A key that means something only in a layer of clouds, or only in a veil.
+Key written_if(bool (*condition)(const void*), Key key) {
+    key.written = condition;
+    return key;
+}
+
 const Section& layer_lattice_section() {
     const std::string same = "that of `[lattice]`";
     Key boundaries = key<&LayerOptions::boundaries>(
@@ -100,7 +111,7 @@ const Section& layer_lattice_section() {
                         "origin_m", "m", between(-kFarthest_m, kFarthest_m),
                         "Where the lower south-west corner of the box stands."),
                     same),
-         default_is(boundaries, same)},
+         written_if(&of_clouds, default_is(boundaries, same))},
         nullptr};
     return section;
 }
@@ -264,6 +275,12 @@ const Section& rain_section() {
     return section;
 }
 
+void finish_layer(const SectionReader& reader, void* owner) {
+    auto& layer = *static_cast<LayerOptions*>(owner);
+    layer.is_veil = reader.find("veil") != nullptr;
+    if (layer.is_veil) layer.automaton = false;
+}
+
 }  // namespace
 
 const Section& climate_section() {
@@ -289,14 +306,16 @@ const Section& layer_section() {
                       "they lie in the lattice.",
                       "T, 2");
         for (const GenusFacts& facts : genera()) genus.words.push_back(facts.abbreviation);
-        return Section{
+        Section layers{
             "Layers",
-            "Layers of clouds, simulated together: each has its own lattice, skies and wind. With layers, "
+            "Layers of clouds, simulated together: each has its own lattice, skies and wind, or is a veil. "
+            "With layers, "
             "the field "
             "comes from their clouds alone.",
             {required(key<&LayerOptions::name>("name", "", kAny,
                                                "Part of its files' names: letters, digits, `-` and `_`.")),
-             required(key<&LayerOptions::skies>("skies", "", kAny, "Names of its skies.", "T, 3.4")),
+             default_is(key<&LayerOptions::skies>("skies", "", kAny, "Names of its skies.", "T, 3.4"),
+                        "required without `veil`"),
              key<&LayerOptions::automaton>(
                  "automaton", "", kAny,
                  "Whether its clouds drive an automaton; otherwise they are drawn directly, "
@@ -332,10 +351,25 @@ const Section& layer_section() {
                             "while they enter and dissolve once they have left."),
                         "that of `automaton`: clouds that are drawn directly can be seen beyond the edge"),
              table<&LayerOptions::coupling>("coupling", coupling_section(), coupling_section().effect),
-             table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect)},
-            nullptr};
+             table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect),
+             written_if(&of_veils,
+                        table<&LayerOptions::veil>("veil", veil_section(), veil_section().effect))},
+            &finish_layer};
+        for (Key& key : layers.keys) {
+            if (std::ranges::find(keys_of_clouds(), key.name) != keys_of_clouds().end()) {
+                key.written = &of_clouds;
+            }
+        }
+        return layers;
     }();
     return section;
+}
+
+std::span<const std::string_view> keys_of_clouds() {
+    static constexpr std::string_view kKeys[] = {
+        "skies",       "automaton",     "background",         "base_height_m",     "genus",    "climate",
+        "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole", "coupling", "rain"};
+    return kKeys;
 }
 
 Key model_files_key() {

@@ -3,6 +3,9 @@
 
 // The sections of a scene file; see schema.h. Internal to scenes/.
 
+#include <span>
+#include <string_view>
+
 #include "scenes/schema.h"
 
 namespace nephos {
@@ -31,6 +34,11 @@ const Section& model_section();
 const Section& sky_section();
 const Section& climate_section();
 const Section& layer_section();
+// Owner: VeilOptions.
+const Section& veil_section();
+
+// Keys of a layer that mean nothing beside `veil`.
+std::span<const std::string_view> keys_of_clouds();
 
 // The key `models`: files that base models are taken from (model_files.h); it has no value of its own.
 Key model_files_key();

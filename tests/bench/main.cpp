@@ -18,6 +18,7 @@
 #include "tests/bench/memory_bench.h"
 #include "tests/bench/render_bench.h"
 #include "tests/bench/seeds_bench.h"
+#include "tests/bench/veil_bench.h"
 
 namespace {
 
@@ -56,6 +57,7 @@ int main(int argc, char** argv) {
         {"automaton", [&] { return automaton_rows(source, programs); }},
         {"density", [] { return density_bench_rows(); }},
         {"memory", [&] { return memory_rows(source, programs / "../../apps/nephos"); }},
+        {"veil", [] { return veil_bench_rows(); }},
         {"seeds", [] { return seeds_rows(); }},
         {"ground", [] { return ground_rows(); }},
         {"render", [&] { return render_rows(source, data); }},
