@@ -10,6 +10,7 @@
 
 #include "apps/simulation.h"
 #include "apps/version.h"
+#include "apps/weather.h"
 #include "automaton/random.h"
 #include "density/combine.h"
 #include "render/image_file.h"
@@ -170,8 +171,8 @@ Picture FrameOutput::draw(const FrameResult& frame) {
     }
     std::optional<GroundCoverView> ground;
     if (frame.ground) ground = view_of(*frame.ground);
-    Picture picture =
-        painter_.draw(*renderer_, cloud, layers, scene.render, frame.time_s, scene.frames.exr, ground);
+    Picture picture = painter_.draw(*renderer_, cloud, layers, scene.render, frame.time_s, scene.frames.exr,
+                                    ground, weather_of(scene, frame.layers, frame.time_s));
     picture.light = {};  // no file has it
     return picture;
 }
@@ -189,10 +190,10 @@ void FrameOutput::write_picture(const Drawn& drawn) const {
     metadata.frames_per_second = scene.frames.per_second;
     metadata.time_scale = scene.frames.time_scale;
     metadata.extinction_per_m = scene.density.extinction_per_m;
-    if (scene.frames.exr)
-        write_exr(folder_.picture(frame.number, ".exr"), drawn.picture, scene.render, metadata);
-    if (wants_png(scene))
-        write_png(folder_.picture(frame.number, ".png"), drawn.picture, scene.render, metadata);
+    RenderOptions options = scene.render;
+    options.camera = camera_at(options.camera, frame.time_s);
+    if (scene.frames.exr) write_exr(folder_.picture(frame.number, ".exr"), drawn.picture, options, metadata);
+    if (wants_png(scene)) write_png(folder_.picture(frame.number, ".png"), drawn.picture, options, metadata);
 }
 
 }  // namespace nephos

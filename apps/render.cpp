@@ -133,11 +133,12 @@ void add_cloud_options(CLI::App& command, RenderArguments& a) {
 // What the picture is drawn with: the scene's options, or defaults that fit the cloud, changed by the command
 // line.
 RenderOptions picture_options(const RenderArguments& a, const std::optional<Scene>& scene,
-                              const DensityGrid& grid) {
+                              const DensityGrid& grid, double time_s) {
     RenderOptions options;
     const WorldBox box = cloud_box(grid);
     if (scene) {
         options = scene->render;
+        options.camera = camera_at(options.camera, time_s);
     } else {
         options.camera.width = 1280;
         options.camera.height = 720;
@@ -249,7 +250,8 @@ int render(const RenderArguments& a) {
 
     const double radius = radius_in_voxels(scene, loaded);
     const double extinction_per_m = extinction_of(a, scene, loaded);
-    const RenderOptions options = picture_options(a, scene, grid);
+    const RenderOptions options =
+        picture_options(a, scene, grid, loaded.metadata ? loaded.metadata->time_s : 0.0);
     Renderer renderer(DeviceOptions{.device = a.device});
     const std::vector<Metaball> balls = metaballs(grid, radius);
     Splats splats;

@@ -144,8 +144,12 @@ void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> c
 }
 
 Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
-                         const RenderOptions& options, double time_s, bool depth,
-                         const std::optional<GroundCoverView>& ground_cover) {
+                         const RenderOptions& moving, double time_s, bool depth,
+                         const std::optional<GroundCoverView>& ground_cover, const Weather& weather) {
+    check(moving);
+    RenderOptions options = moving;
+    options.camera = camera_at(moving.camera, time_s);
+    const bool rain = options.precipitation.enabled && !weather.curtains.empty();
     layers_.resize(layers.size());
     drawn_.clouds.clear();
     drawn_.billboards.clear();
@@ -159,8 +163,11 @@ Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::s
         const SkyLayer& layer = layers[i];
         if (layer.direct) layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn_, true, mirrored);
     }
+    // Rain wants the depth of the clouds and their shadow.
+    const bool all = depth || rain;
     Picture picture = renderer.draw_splats(
-        {drawn_.clouds, drawn_.billboards, voxels, flash, time_s, depth, depth, ground_cover}, options);
+        {drawn_.clouds, drawn_.billboards, voxels, flash, time_s, all, all, ground_cover}, options);
+    precipitation_.draw(picture, moving, weather, time_s);
     for (const SkyLayer& layer : layers) {
         const std::vector<WorldLine> lines =
             debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun));

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "render/options.h"
+#include "render/precipitation.h"
 #include "render/renderer.h"
 #include "render/splats.h"
 #include "seeds/billboards.h"
@@ -72,15 +73,17 @@ struct SkyLayer {
 class SkyPainter {
   public:
     // Voxel clouds, the billboards of layers, the lightning of options.lightning that burns at `time_s`, what
-    // lies on the ground, and the debug view over it. Every call has the same layers in the same order.
+    // lies on the ground, and the debug view over it, as the camera is at that time; over all of it the rain
+    // of `weather`, where options.precipitation is enabled. Every call has the same layers in the same order.
     // Throws as Renderer::draw_splats().
     Picture draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                  const RenderOptions& options, double time_s, bool depth = true,
-                 const std::optional<GroundCoverView>& ground_cover = {});
+                 const std::optional<GroundCoverView>& ground_cover = {}, const Weather& weather = {});
 
   private:
     std::vector<SkyBillboards> layers_;
     DrawnClouds drawn_;
+    PrecipitationPainter precipitation_;
 };
 
 // The light of the sun, or of a flash, as the absorption factor takes it.

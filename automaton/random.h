@@ -29,6 +29,7 @@ enum class Domain : std::uint32_t {
     seeds = 3,          // clouds from base models
     skies = 4,          // which clouds enter, and where
     layers = 5,         // seeds of the layers of a scene
+    particles = 6,      // rain and snow
 };
 
 // What is drawn for a block of 8x8x8 cells: the number of sparse events, the events, and the dense draws.

@@ -30,6 +30,18 @@ void check_colour(const Rgb& colour, const char* name) {
     require(colour_within(colour, 1e6), name, "three numbers from 0 to 1e6");
 }
 
+void check_path(const Camera& camera) {
+    for (std::size_t n = 0; n < camera.path.size(); ++n) {
+        const CameraKey& key = camera.path[n];
+        require(std::isfinite(key.time_s), "camera.path.time_s", "finite seconds");
+        require(n == 0 || key.time_s > camera.path[n - 1].time_s, "camera.path.time_s",
+                "times that rise from key to key");
+        require(finite(key.position_m), "camera.path.position_m", "finite metres");
+        require(finite(key.target_m), "camera.path.target_m", "finite metres");
+        require(key.position_m != key.target_m, "camera.path.target_m", "another point than position_m");
+    }
+}
+
 }  // namespace
 
 void check(const RenderOptions& options) {
@@ -41,6 +53,8 @@ void check(const RenderOptions& options) {
     require(within(camera.width, 1, 16384), "camera.width", "1..16384 pixels");
     require(within(camera.height, 1, 16384), "camera.height", "1..16384 pixels");
     require(within(camera.exposure_ev, -50, 50), "camera.exposure_ev", "-50..50 stops");
+    check_path(camera);
+    check(options.precipitation);
     require(within(options.sun.elevation_deg, -18, 90), "sun.elevation_deg", "-18..90 degrees");
     require(within(options.sun.azimuth_deg, -360, 360), "sun.azimuth_deg", "-360..360 degrees");
     check_colour(options.sun.colour, "sun.colour");

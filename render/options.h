@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "automaton/lattice.h"
+#include "render/camera_path.h"
+#include "render/precipitation_options.h"
 #include "render/wet_ground_options.h"
 
 namespace nephos {
@@ -25,6 +27,8 @@ struct Camera {
     double vertical_fov_deg = 50.0;  // 1..170
     int width = 640, height = 480;   // pixels, 1..16384
     double exposure_ev = 0.0;        // stops; the picture is multiplied by 2^ev before tone mapping
+    // Where it is at which time, instead of position_m and target_m (camera_at()); empty: it stands still.
+    std::vector<CameraKey> path;
     bool operator==(const Camera&) const = default;
 };
 
@@ -127,6 +131,7 @@ struct RenderOptions {
     WetGroundOptions wet_ground;  // how it looks where it is wet or white
     int shadow_map_size = 1024;   // texels on a side, 16..8192
     std::vector<LightningFlash> lightning;
+    Precipitation precipitation;
     DebugView debug_view;
     bool operator==(const RenderOptions&) const = default;
 };

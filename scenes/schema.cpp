@@ -168,6 +168,10 @@ const Section& scene_section() {
             return !(scene.ground_cover == GroundCoverOptions{} &&
                      scene.render.wet_ground == WetGroundOptions{});
         };
+        Key precipitation = group("precipitation", precipitation_section());
+        precipitation.written = [](const void* scene) {
+            return !(static_cast<const Scene*>(scene)->render.precipitation == Precipitation{});
+        };
         return Section{
             "Scene",
             "",
@@ -192,6 +196,7 @@ const Section& scene_section() {
              group("air", air_section()),
              group("ground", ground_section()),
              std::move(wet_ground),
+             std::move(precipitation),
              group("debug_view", debug_view_section())},
             &finish_scene};
     }();

@@ -53,6 +53,7 @@ void finish_camera(const SectionReader& reader, void* owner) {
                       "the camera looks at the point where it stands",
                       "expected `position_m` and `target_m` to differ");
     }
+    check_camera_path(reader, camera);
 }
 
 }  // namespace
@@ -126,7 +127,9 @@ const Section& camera_section() {
          render_key<&RenderOptions::camera, &Camera::height>("height", "pixels", kPixels,
                                                              "Height of the picture."),
          render_key<&RenderOptions::camera, &Camera::exposure_ev>(
-             "exposure_ev", "stops", between(-30, 30), "Each stop doubles the brightness of the picture.")},
+             "exposure_ev", "stops", between(-30, 30), "Each stop doubles the brightness of the picture."),
+         tables<&Scene::render, &RenderOptions::camera, &Camera::path>("path", camera_path_section(), 0,
+                                                                       10'000)},
         &finish_camera};
     return section;
 }

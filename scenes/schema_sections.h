@@ -24,7 +24,10 @@ const Section& debug_view_section();
 const Section& air_section();
 const Section& ground_section();
 const Section& wet_ground_section();
+const Section& precipitation_section();
 
+// Owner: CameraKey.
+const Section& camera_path_section();
 // Owner: WindKeyframe.
 const Section& wind_section();
 // Owner: Probabilities.
@@ -49,6 +52,9 @@ void finish_scene(const SectionReader& reader, void* owner);
 
 // Reports profiles of the key `wind` of a scene or a layer whose times do not rise.
 void check_wind_times(const SectionReader& owner, const Wind& wind);
+
+// Reports key frames of the camera whose times do not rise; the reader is that of [camera].
+void check_camera_path(const SectionReader& reader, const Camera& camera);
 
 // The part of it that concerns models, skies, climate and layers.
 void finish_layers(const SectionReader& reader, Scene& scene);

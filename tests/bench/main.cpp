@@ -16,6 +16,7 @@
 #include "tests/bench/density_bench.h"
 #include "tests/bench/ground_bench.h"
 #include "tests/bench/memory_bench.h"
+#include "tests/bench/rain_bench.h"
 #include "tests/bench/render_bench.h"
 #include "tests/bench/seeds_bench.h"
 #include "tests/bench/veil_bench.h"
@@ -60,6 +61,7 @@ int main(int argc, char** argv) {
         {"veil", [] { return veil_bench_rows(); }},
         {"seeds", [] { return seeds_rows(); }},
         {"ground", [] { return ground_rows(); }},
+        {"rain", [] { return rain_rows(); }},
         {"render", [&] { return render_rows(source, data); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {

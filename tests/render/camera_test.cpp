@@ -144,5 +144,30 @@ TEST(RenderOptions, BadValuesAreNamed) {
     EXPECT_EQ(message([](RenderOptions&) {}), "no error");
 }
 
+// A camera on a path goes through its keys with a continuous velocity, and stands still outside of them.
+TEST(CameraPath, GoesSmoothlyThroughItsKeys) {
+    Camera camera;
+    camera.path = {
+        {10, {0, 0, 0}, {0, 100, 0}}, {12, {10, 0, 0}, {10, 100, 0}}, {20, {10, 80, 5}, {50, 100, 0}}};
+    for (const CameraKey& key : camera.path) {
+        const Camera at = camera_at(camera, key.time_s);
+        EXPECT_NEAR(length(at.position_m - key.position_m), 0, 1e-9);
+        EXPECT_NEAR(length(at.target_m - key.target_m), 0, 1e-9);
+        EXPECT_TRUE(at.path.empty());
+    }
+    EXPECT_EQ(camera_at(camera, 0).position_m, camera.path.front().position_m);
+    EXPECT_EQ(camera_at(camera, 1e6).position_m, camera.path.back().position_m);
+    Vec3 before{};
+    for (double t = 9; t < 21; t += 0.01) {
+        const Vec3 speed = 100.0 * (camera_at(camera, t + 0.01).position_m - camera_at(camera, t).position_m);
+        EXPECT_LT(length(speed - before), 0.5) << t;
+        before = speed;
+    }
+    camera.path[1].time_s = 10;
+    RenderOptions options;
+    options.camera = camera;
+    EXPECT_THROW(check(options), Error);
+}
+
 }  // namespace
 }  // namespace nephos

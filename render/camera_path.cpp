@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/camera_path.h"
+
+#include <algorithm>
+
+#include "automaton/vector_math.h"
+#include "render/options.h"
+
+namespace nephos {
+namespace {
+
+using Member = Vec3 CameraKey::*;
+
+Vec3 chord(const std::vector<CameraKey>& path, std::size_t n, Member member) {
+    return (1.0 / (path[n + 1].time_s - path[n].time_s)) * (path[n + 1].*member - path[n].*member);
+}
+
+// Velocity at a key: the slope of the parabola through it and its neighbours; at the ends it rests.
+Vec3 slope(const std::vector<CameraKey>& path, std::size_t n, Member member) {
+    if (n == 0 || n + 1 == path.size()) return {0, 0, 0};
+    const double before = path[n].time_s - path[n - 1].time_s, after = path[n + 1].time_s - path[n].time_s;
+    const double share = after / (before + after);
+    return share * chord(path, n - 1, member) + (1 - share) * chord(path, n, member);
+}
+
+Vec3 between(const std::vector<CameraKey>& path, std::size_t n, double s, Member member) {
+    const double duration = path[n + 1].time_s - path[n].time_s;
+    const double s2 = s * s, s3 = s2 * s;
+    return (2 * s3 - 3 * s2 + 1) * (path[n].*member) + (3 * s2 - 2 * s3) * (path[n + 1].*member) +
+           duration * ((s3 - 2 * s2 + s) * slope(path, n, member) + (s3 - s2) * slope(path, n + 1, member));
+}
+
+}  // namespace
+
+Camera camera_at(const Camera& camera, double time_s) {
+    if (camera.path.empty()) return camera;
+    const std::vector<CameraKey>& path = camera.path;
+    const auto after = std::upper_bound(path.begin(), path.end(), time_s,
+                                        [](double t, const CameraKey& key) { return t < key.time_s; });
+    Camera result = camera;
+    result.path.clear();
+    const std::size_t n = after == path.begin() ? 0 : std::size_t(after - path.begin()) - 1;
+    result.position_m = path[n].position_m;
+    result.target_m = path[n].target_m;
+    if (after == path.begin() || after == path.end()) return result;
+    const double s = (time_s - path[n].time_s) / (path[n + 1].time_s - path[n].time_s);
+    result.position_m = between(path, n, s, &CameraKey::position_m);
+    result.target_m = between(path, n, s, &CameraKey::target_m);
+    if (result.position_m == result.target_m)
+        result.target_m = result.position_m + (path[n].target_m - path[n].position_m);
+    return result;
+}
+
+}  // namespace nephos

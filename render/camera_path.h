@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A camera that moves: key frames of position and target over simulated time.
+
+#include <vector>
+
+#include "automaton/lattice.h"
+
+namespace nephos {
+
+struct Camera;
+
+struct CameraKey {
+    double time_s = 0;  // simulated; keys rise strictly
+    Vec3 position_m{0, -4000, 300};
+    Vec3 target_m{0, 0, 1200};  // differs from position_m
+    bool operator==(const CameraKey&) const = default;
+};
+
+// The camera at a time: without a path as it is. Through the keys go cubic Hermite curves whose slopes are
+// those of the parabola through three neighbours (Catmull and Rom 1974, for keys that are not evenly spaced),
+// so that position and velocity are continuous; before the first key and after the last it stands still. The
+// result has no path. Where position and target would meet, the view of the key before is kept. Pure.
+Camera camera_at(const Camera& camera, double time_s);
+
+}  // namespace nephos

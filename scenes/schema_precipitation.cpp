@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rain and snow, and the camera's way.
+
+#include "scenes/schema_build.h"
+#include "scenes/schema_sections.h"
+#include "scenes/text.h"
+
+namespace nephos {
+
+using namespace schema_build;
+
+namespace {
+
+template <auto... Members>
+Key rain_key(std::string name, std::string unit, Limits limits, std::string effect, std::string source = {}) {
+    return key<&Scene::render, &RenderOptions::precipitation, Members...>(
+        std::move(name), std::move(unit), limits, std::move(effect), std::move(source));
+}
+
+void finish_camera_key(const SectionReader& reader, void* owner) {
+    const auto& key = *static_cast<const CameraKey*>(owner);
+    if (key.position_m != key.target_m) return;
+    reader.report("target_m", "the camera looks at the point where it stands",
+                  "expected `position_m` and `target_m` to differ");
+}
+
+}  // namespace
+
+const Section& precipitation_section() {
+    static const Section section{
+        "Precipitation",
+        "Rain and snow below the rain areas of the layers: particles near the eye, shafts from afar.",
+        {rain_key<&Precipitation::enabled>("enabled", "", kAny, "Draw rain or snow in the rain areas.", "P"),
+         word<&Scene::render, &RenderOptions::precipitation, &Precipitation::kind>(
+             "kind", {"rain", "snow"}, "What falls: drops as streaks, or flakes that sway.", "P; S"),
+         rain_key<&Precipitation::particles>(
+             "particles", "", between(0, 2e6),
+             "Drops or flakes in the container before the eye, always the same number; 0: shafts alone.",
+             "P, level of detail"),
+         rain_key<&Precipitation::exposure_s>(
+             "exposure_s", "s", between(0, 1),
+             "Exposure of a picture: a streak is as long as a drop falls, and the camera moves, in this "
+             "time.",
+             "P, persistence"),
+         rain_key<&Precipitation::visibility>(
+             "visibility", "", between(0, 1000),
+             "Opacity of drops and flakes as a multiple of the true one; 1 is hard to see in a small "
+             "picture."),
+         rain_key<&Precipitation::intensity_scale>("intensity_scale", "", between(0, 100),
+                                                   "Multiplies the rain of all areas."),
+         rain_key<&Precipitation::wind_drift>(
+             "wind_drift", "", between(0, 10),
+             "Share of the wind that carries drops, flakes and the lower end of shafts."),
+         rain_key<&Precipitation::depth_m>(
+             "depth_m", "m", between(1, 1000),
+             "Depth of the container of particles around the eye; deeper has fewer in the same space.",
+             "P, container"),
+         rain_key<&Precipitation::margin_m>("margin_m", "m", between(0, 100),
+                                            "How far the eye moves before the container follows.",
+                                            "P, near rain"),
+         rain_key<&Precipitation::reach_m>(
+             "reach_m", "m", between(1, 1e5),
+             "Distance from an area beyond which it is drawn without particles, by its shaft alone.",
+             "P, far rain"),
+         rain_key<&Precipitation::edge>(
+             "edge", "", between(0, 1),
+             "Outer share of an area in which the rain falls off smoothly; 0 is a wall of rain.", "P"),
+         rain_key<&Precipitation::shafts>("shafts", "", between(0, 100),
+                                          "Opacity of rain shafts as a multiple of the true one; 0: none.",
+                                          "Marshall and Palmer 1948, van de Hulst 1957"),
+         rain_key<&Precipitation::shaft_texture>("shaft_texture", "", between(0, 1),
+                                                 "Contrast of the streaks in rain shafts."),
+         rain_key<&Precipitation::evaporation>("evaporation", "", between(0, 1),
+                                               "Virga: 0 lets rain reach the ground; above 0 it thins out on "
+                                               "its way, and is gone at this share "
+                                               "of "
+                                               "the way up from the ground to the cloud.")},
+        nullptr};
+    return section;
+}
+
+const Section& camera_path_section() {
+    constexpr Limits kWorld = between(-1e7, 1e7);
+    static const Section section{
+        "Camera path",
+        "Where the camera is at which simulated time, in the place of `position_m` and `target_m`: it moves "
+        "smoothly from key to key and stands still before the first and after the last.",
+        {required(key<&CameraKey::time_s>("time_s", "s", between(0, 1e15), "Simulated time; rises.")),
+         required(key<&CameraKey::position_m>("position_m", "m", kWorld, "Where it is then.")),
+         required(key<&CameraKey::target_m>("target_m", "m", kWorld, "What it looks at then."))},
+        &finish_camera_key};
+    return section;
+}
+
+void check_camera_path(const SectionReader& reader, const Camera& camera) {
+    for (std::size_t n = 1; n < camera.path.size(); ++n) {
+        const double before_s = camera.path[n - 1].time_s, time_s = camera.path[n].time_s;
+        if (time_s > before_s) continue;
+        const Node& item = reader.find("path")->value.items[n];
+        const SectionReader at{reader.document, item, indexed(reader.path + ".path", n), {}};
+        at.report("time_s",
+                  at.quoted("time_s") + " is " + number_text(time_s) + ", not after the key before it at " +
+                      number_text(before_s),
+                  "expected times that rise from key to key, in seconds");
+    }
+}
+
+}  // namespace nephos
