@@ -15,12 +15,21 @@ Vec3 chord(const std::vector<CameraKey>& path, std::size_t n, Member member) {
     return (1.0 / (path[n + 1].time_s - path[n].time_s)) * (path[n + 1].*member - path[n].*member);
 }
 
-// Velocity at a key: the slope of the parabola through it and its neighbours; at the ends it rests.
+// Velocity at a key along one axis: the harmonic mean of the velocities before and after, weighted by their
+// times; 0 where the way turns.
+double slope(double before, double after, double time_before, double time_after) {
+    if (!(before * after > 0)) return 0;
+    const double sum = 3 * (time_before + time_after);
+    return sum / ((2 * time_after + time_before) / before + (time_after + 2 * time_before) / after);
+}
+
 Vec3 slope(const std::vector<CameraKey>& path, std::size_t n, Member member) {
-    if (n == 0 || n + 1 == path.size()) return {0, 0, 0};
-    const double before = path[n].time_s - path[n - 1].time_s, after = path[n + 1].time_s - path[n].time_s;
-    const double share = after / (before + after);
-    return share * chord(path, n - 1, member) + (1 - share) * chord(path, n, member);
+    if (n == 0 || n + 1 == path.size()) return {0, 0, 0};  // at the ends it rests
+    const double before_s = path[n].time_s - path[n - 1].time_s,
+                 after_s = path[n + 1].time_s - path[n].time_s;
+    const Vec3 before = chord(path, n - 1, member), after = chord(path, n, member);
+    return {slope(before.x, after.x, before_s, after_s), slope(before.y, after.y, before_s, after_s),
+            slope(before.z, after.z, before_s, after_s)};
 }
 
 Vec3 between(const std::vector<CameraKey>& path, std::size_t n, double s, Member member) {

@@ -18,10 +18,11 @@ struct CameraKey {
     bool operator==(const CameraKey&) const = default;
 };
 
-// The camera at a time: without a path as it is. Through the keys go cubic Hermite curves whose slopes are
-// those of the parabola through three neighbours (Catmull and Rom 1974, for keys that are not evenly spaced),
-// so that position and velocity are continuous; before the first key and after the last it stands still. The
-// result has no path. Where position and target would meet, the view of the key before is kept. Pure.
+// The camera at a time: without a path as it is. Through the keys go cubic Hermite curves with the slopes of
+// Fritsch and Butland (1984): position and velocity are continuous, and between two keys no coordinate leaves
+// the range of the two, so that a camera near the ground stays above it. Before the first key and after the
+// last it stands still. The result has no path. Where position and target would meet, the view of the key
+// before is kept. Pure.
 Camera camera_at(const Camera& camera, double time_s);
 
 }  // namespace nephos

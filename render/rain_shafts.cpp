@@ -19,6 +19,8 @@ namespace {
 
 constexpr int kSteps = 12;
 constexpr double kTopFade = 0.15;      // share of a curtain's height over which it begins in the cloud
+constexpr double kSoftest = 0.6;       // least edge of a curtain that has one: it is seen from afar
+constexpr double kFray = 0.4;          // share of the radius by which its outline varies
 constexpr double kSlowFall = 6;        // m/s, of the texture
 constexpr double kOpaque = 1.0 / 256;  // transmittance at which a ray ends
 
@@ -137,16 +139,20 @@ struct Met {
     Point2 u;
 };
 
-// Contrast of the rain: strands along the fall, and denser falls on their way down. Mean about 1.
-double texture(const Shafts& s, const Curtain& c, const Vec3& place, double height_m) {
-    const double contrast = s.options.precipitation.shaft_texture;
-    if (contrast <= 0) return 1;
+// Strands along the fall, 0..1.
+double strands_at(const Shafts& s, const Curtain& c, const Vec3& place, double height_m) {
     const double x = (place.x - c.what->x_m - c.what->lean_x * height_m) / c.grain_m,
                  y = (place.y - c.what->y_m - c.what->lean_y * height_m) / c.grain_m;
     const double own = double(c.what->id % 61);
-    const double strands =
-        0.6 * double(s.noise.at(x + own, y)) + 0.4 * double(s.noise.at(4 * x, 4 * y + own));
-    const double falls = double(s.noise.at(x + y, (height_m + kSlowFall * s.time_s) / 700 + own));
+    return 0.6 * double(s.noise.at(x + own, y)) + 0.4 * double(s.noise.at(4 * x, 4 * y + own));
+}
+
+// Contrast of the rain: its strands, and denser falls on their way down. Mean about 1.
+double texture(const Shafts& s, const Curtain& c, const Vec3& place, double height_m, double strands) {
+    const double contrast = s.options.precipitation.shaft_texture;
+    if (contrast <= 0) return 1;
+    const double falls = double(s.noise.at(
+        (place.x + place.y) / c.grain_m, (height_m + kSlowFall * s.time_s) / 700 + double(c.what->id % 61)));
     return std::exp(contrast * (4.5 * (strands - 0.5) + 1.5 * (falls - 0.5)) - 0.25 * contrast * contrast);
 }
 
@@ -158,13 +164,19 @@ double extinction(const Shafts& s, std::span<const Met> met, const Vec3& ray, do
         if (t < m.in.begin || t > m.in.end) continue;
         const Curtain& c = *m.curtain;
         const double x = c.eye.x + t * m.u.x, y = c.eye.y + t * m.u.y, r = std::sqrt(x * x + y * y);
-        const double inner = p.edge > 0 ? std::clamp((1 - r) / p.edge, 0.0, 1.0) : 1.0;
         const double height_m = c.eye.z + t * ray.z, h = height_m / c.height_m;
         const double top = std::clamp((1 - h) / kTopFade, 0.0, 1.0);
-        const double most =
-            c.extinction_per_m * inner * inner * (3 - 2 * inner) * top * left_of_rain(h, p.evaporation);
+        const double most = c.extinction_per_m * top * left_of_rain(h, p.evaporation);
         if (most * 8 <= densest) continue;
-        densest = std::max(densest, most * texture(s, c, s.camera.position_m + t * ray, height_m));
+        const Vec3 place = s.camera.position_m + t * ray;
+        const double strands = strands_at(s, c, place, height_m);
+        // The outline frays with the strands, inwards.
+        const double inside = 1 - r - kFray * p.shaft_texture * strands * r;
+        const double inner =
+            p.edge > 0 ? std::clamp(inside / std::max(p.edge, kSoftest), 0.0, 1.0) : double(inside > 0);
+        if (inner > 0)
+            densest = std::max(
+                densest, most * inner * inner * (3 - 2 * inner) * texture(s, c, place, height_m, strands));
     }
     if (s.clear_m > 0) {
         const double clear = std::clamp(2 * t / s.clear_m - 1, 0.0, 1.0);
