@@ -19,7 +19,7 @@ const Wind& common_wind(const Scene& scene) {
 }
 
 // Relative to its cloud, rain falls back with the wind's difference below it.
-void lean(RainCurtain& curtain, const Wind& wind, const Precipitation& p, double time_s) {
+void lean(RainCurtain& curtain, const Wind& wind, const PrecipitationOptions& p, double time_s) {
     const double fall = p.kind == PrecipitationKind::snow ? 1 : 6;
     const double height = curtain.base_m - curtain.ground_m;
     const Velocity cloud = wind_at(wind, curtain.base_m, time_s),
@@ -50,7 +50,7 @@ Velocity carried_m(const Wind& wind, double height_m, double time_s) {
 }
 
 Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, double time_s) {
-    const Precipitation& p = scene.render.precipitation;
+    const PrecipitationOptions& p = scene.render.precipitation;
     Weather weather;
     weather.seed = scene.automaton.seed;
     if (!p.enabled) return weather;

@@ -131,7 +131,7 @@ struct RenderOptions {
     WetGroundOptions wet_ground;  // how it looks where it is wet or white
     int shadow_map_size = 1024;   // texels on a side, 16..8192
     std::vector<LightningFlash> lightning;
-    Precipitation precipitation;
+    PrecipitationOptions precipitation;
     DebugView debug_view;
     bool operator==(const RenderOptions&) const = default;
 };

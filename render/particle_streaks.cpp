@@ -54,7 +54,8 @@ Sway sway_of(std::size_t i, double diameter_mm, double time_s) {
 
 // Real particles per m^3 at a place by drawn ones per m^3: the strongest rain there, less what another pass
 // draws.
-double real_particles(const ParticlePass& pass, const Precipitation& p, const Vec3& place, double d_mm) {
+double real_particles(const ParticlePass& pass, const PrecipitationOptions& p, const Vec3& place,
+                      double d_mm) {
     const auto strongest = [&](const std::vector<CurtainTerm>& terms) {
         double most = 0;
         for (const CurtainTerm& term : terms) {
@@ -98,6 +99,18 @@ Ends ends_of(const Pass& p, const Vec3& place, const Vec3& velocity) {
     return {project(p.view.opening, camera, place - half), project(p.view.closing, camera, place + half)};
 }
 
+// Drawn out from their middle to a length in pixels; upright where they coincide.
+Ends at_least(const Ends& e, double length) {
+    double dx = e.to.x - e.from.x, dy = e.to.y - e.from.y;
+    const double span = std::hypot(dx, dy);
+    if (span >= length) return e;
+    const double x = 0.5 * (e.from.x + e.to.x), y = 0.5 * (e.from.y + e.to.y);
+    const double factor = span > 1e-3 ? 0.5 * length / span : 0;
+    dx *= factor;
+    dy = span > 1e-3 ? dy * factor : 0.5 * length;
+    return {{x - dx, y - dy, true}, {x + dx, y + dy, true}};
+}
+
 bool beside_picture(const Ends& e, double margin, const Camera& camera) {
     return std::max(e.from.x, e.to.x) < -margin || std::min(e.from.x, e.to.x) > camera.width + margin ||
            std::max(e.from.y, e.to.y) < -margin || std::min(e.from.y, e.to.y) > camera.height + margin;
@@ -128,7 +141,7 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     if (present <= 0) return;
 
     const double d_mm = double(p.particles.diameter_mm[i]);
-    const Precipitation& options = p.view.options.precipitation;
+    const PrecipitationOptions& options = p.view.options.precipitation;
     const Sway sway = p.snow ? sway_of(i, d_mm, p.view.time_s) : Sway{};
     place = place + Vec3{sway.x, sway.y, 0};
     const double growth = kGrowth[int(p.particles.kind)];
@@ -145,20 +158,8 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     const double stands_for = real / drawn_per_m3(p.particles.size(), boxes, d);
     const double shadow =
         stands_for * 1e-6 * shadow_mm2(p.particles.kind, d_mm) * scale * scale * sway.cover;  // pixels
-    double dx = ends.to.x - ends.from.x, dy = ends.to.y - ends.from.y, span = std::hypot(dx, dy);
-    const double least = p.snow ? width : 1.0;  // of the length
-    if (span < least) {
-        const double mx = 0.5 * (ends.from.x + ends.to.x), my = 0.5 * (ends.from.y + ends.to.y);
-        if (span > 1e-3) {
-            dx *= least / span;
-            dy *= least / span;
-        } else {
-            dx = 0;
-            dy = least;
-        }
-        ends = {{mx - 0.5 * dx, my - 0.5 * dy, true}, {mx + 0.5 * dx, my + 0.5 * dy, true}};
-        span = least;
-    }
+    ends = at_least(ends, p.snow ? width : 1.0);
+    const double span = std::hypot(ends.to.x - ends.from.x, ends.to.y - ends.from.y);
     const double opacity = present * std::min(kMostOpaque, options.visibility * shadow / (width * span));
     if (opacity < kLeastOpaque) return;
     Rgb light = particle_radiance(p.view.light, (1 / distance) * way, place, p.sunlight);
@@ -178,7 +179,7 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
 
 // s0: see the header. Of a particle of the size that takes the most light, at the eye.
 double size_at_eye(const Particles& particles, const ParticlePass& pass, const StreakView& view) {
-    const Precipitation& p = view.options.precipitation;
+    const PrecipitationOptions& p = view.options.precipitation;
     double largest = 1;
     for (const CurtainTerm& term : pass.rain) {
         const double d_mm = std::clamp(2 / term.law.slope, kSmallest_mm, kLargest_mm);

@@ -38,9 +38,9 @@ struct CurtainTerm {
 // 0 it is all near: both transitions are continuous.
 struct RainShares {
     double near = 1, far = 0;  // sum 1
-    double far_number = 1;     // share of the far particles, falling to 0 at Precipitation::reach_m
+    double far_number = 1;     // share of the far particles, falling to 0 at PrecipitationOptions::reach_m
 };
-RainShares rain_shares(const Precipitation& precipitation, double outside_m);
+RainShares rain_shares(const PrecipitationOptions& precipitation, double outside_m);
 
 // One container of particles in one picture.
 struct ParticlePass {

@@ -32,7 +32,7 @@ double smooth(double s) {
 
 }  // namespace
 
-RainShares rain_shares(const Precipitation& p, double outside_m) {
+RainShares rain_shares(const PrecipitationOptions& p, double outside_m) {
     RainShares shares;
     shares.near = 1 - smooth(outside_m / (kFadeDepths * p.depth_m));
     shares.far = (1 - shares.near);
@@ -42,7 +42,7 @@ RainShares rain_shares(const Precipitation& p, double outside_m) {
 
 std::vector<ParticlePass> particle_passes(const RenderOptions& options, const CameraFrame& camera,
                                           const Weather& weather, double time_s) {
-    const Precipitation& p = options.precipitation;
+    const PrecipitationOptions& p = options.precipitation;
     const double far_depth = kFarDepths * p.depth_m;
     std::vector<CurtainTerm> near, far;
     std::vector<RainContainer> outside;
@@ -107,7 +107,7 @@ const Particles& PrecipitationPainter::particles(PrecipitationKind kind, std::ui
 void PrecipitationPainter::draw(Picture& picture, const RenderOptions& options, const Weather& weather,
                                 double time_s) {
     streaks_ = 0;
-    const Precipitation& p = options.precipitation;
+    const PrecipitationOptions& p = options.precipitation;
     if (!p.enabled || weather.curtains.empty()) return;
     check(p);
     RenderOptions now = options;

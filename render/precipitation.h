@@ -26,7 +26,7 @@ namespace nephos {
 struct Weather {
     std::uint64_t seed = 0;
     std::vector<RainCurtain> curtains;
-    double wind_x_m_per_s = 0, wind_y_m_per_s = 0;  // near the ground, times Precipitation::wind_drift
+    double wind_x_m_per_s = 0, wind_y_m_per_s = 0;  // near the ground, times PrecipitationOptions::wind_drift
     double carried_x_m = 0, carried_y_m = 0;        // the way of the air since time 0, likewise
 };
 

@@ -16,7 +16,7 @@ void require_within(double value, double min, double max, const char* name, cons
 
 }  // namespace
 
-void check(const Precipitation& p) {
+void check(const PrecipitationOptions& p) {
     require_within(p.particles, 0, 2e6, "particles", "0..2,000,000");
     require_within(p.exposure_s, 0, 1, "exposure_s", "0..1 seconds");
     require_within(p.visibility, 0, 1000, "visibility", "0..1000");

@@ -7,7 +7,7 @@ namespace nephos {
 
 enum class PrecipitationKind { rain, snow };
 
-struct Precipitation {
+struct PrecipitationOptions {
     bool enabled = false;
     PrecipitationKind kind = PrecipitationKind::rain;
     // Drops or flakes in the container before the eye (P: fixed, 50,000), 0..2,000,000; 0: only the shafts.
@@ -29,10 +29,10 @@ struct Precipitation {
     // Virga: rain thins out on its way and is gone at this share of the way up from the ground to the cloud;
     // 0: it reaches the ground.
     double evaporation = 0;  // 0..1
-    bool operator==(const Precipitation&) const = default;
+    bool operator==(const PrecipitationOptions&) const = default;
 };
 
 // Throws Error(usage) naming the first value that is out of its range.
-void check(const Precipitation& precipitation);
+void check(const PrecipitationOptions& precipitation);
 
 }  // namespace nephos

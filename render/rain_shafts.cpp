@@ -86,7 +86,7 @@ struct Shafts {
     Rgb air{};           // radiance of an endless way through the air
 };
 
-Curtain curtain_of(const RainCurtain& c, const Precipitation& p, const Vec3& eye) {
+Curtain curtain_of(const RainCurtain& c, const PrecipitationOptions& p, const Vec3& eye) {
     Curtain out;
     out.what = &c;
     out.height_m = c.base_m - c.ground_m;
@@ -158,7 +158,7 @@ double texture(const Shafts& s, const Curtain& c, const Vec3& place, double heig
 
 // Extinction at a distance along the ray: the densest curtain there.
 double extinction(const Shafts& s, std::span<const Met> met, const Vec3& ray, double t) {
-    const Precipitation& p = s.options.precipitation;
+    const PrecipitationOptions& p = s.options.precipitation;
     double densest = 0;
     for (const Met& m : met) {
         if (t < m.in.begin || t > m.in.end) continue;
@@ -290,7 +290,7 @@ double left_of_rain(double height, double evaporation) {
 void draw_shafts(Picture& picture, const RenderOptions& options, const CameraFrame& camera,
                  std::span<const RainCurtain> curtains, const PrecipitationLight& light, double time_s,
                  std::uint64_t seed) {
-    const Precipitation& p = options.precipitation;
+    const PrecipitationOptions& p = options.precipitation;
     const double sky = daylight(options.sun.elevation_deg).sky;
     Shafts shafts{picture, options, camera, light, {}, NoisePlane(seed), time_s, 0, {}};
     for (const RainCurtain& c : curtains)

@@ -170,7 +170,7 @@ const Section& scene_section() {
         };
         Key precipitation = group("precipitation", precipitation_section());
         precipitation.written = [](const void* scene) {
-            return !(static_cast<const Scene*>(scene)->render.precipitation == Precipitation{});
+            return !(static_cast<const Scene*>(scene)->render.precipitation == PrecipitationOptions{});
         };
         return Section{
             "Scene",

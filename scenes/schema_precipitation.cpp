@@ -30,51 +30,51 @@ const Section& precipitation_section() {
     static const Section section{
         "Precipitation",
         "Rain and snow below the rain areas of the layers: particles near the eye, shafts from afar.",
-        {rain_key<&Precipitation::enabled>("enabled", "", kAny, "Draw rain or snow in the rain areas.", "P"),
-         word<&Scene::render, &RenderOptions::precipitation, &Precipitation::kind>(
+        {rain_key<&PrecipitationOptions::enabled>("enabled", "", kAny, "Draw rain or snow in the rain areas.",
+                                                  "P"),
+         word<&Scene::render, &RenderOptions::precipitation, &PrecipitationOptions::kind>(
              "kind", {"rain", "snow"}, "What falls: drops as streaks, or flakes that sway.", "P; S"),
-         rain_key<&Precipitation::particles>(
+         rain_key<&PrecipitationOptions::particles>(
              "particles", "", between(0, 2e6),
              "Drops or flakes in the container before the eye, always the same number; 0: shafts alone.",
              "P, level of detail"),
-         rain_key<&Precipitation::exposure_s>(
+         rain_key<&PrecipitationOptions::exposure_s>(
              "exposure_s", "s", between(0, 1),
              "Exposure of a picture: a streak is as long as a drop falls, and the camera moves, in this "
              "time.",
              "P, persistence"),
-         rain_key<&Precipitation::visibility>(
+         rain_key<&PrecipitationOptions::visibility>(
              "visibility", "", between(0, 1000),
              "Opacity of drops and flakes as a multiple of the true one; 1 is hard to see in a small "
              "picture."),
-         rain_key<&Precipitation::intensity_scale>("intensity_scale", "", between(0, 100),
-                                                   "Multiplies the rain of all areas."),
-         rain_key<&Precipitation::wind_drift>(
+         rain_key<&PrecipitationOptions::intensity_scale>("intensity_scale", "", between(0, 100),
+                                                          "Multiplies the rain of all areas."),
+         rain_key<&PrecipitationOptions::wind_drift>(
              "wind_drift", "", between(0, 10),
              "Share of the wind that carries drops, flakes and the lower end of shafts."),
-         rain_key<&Precipitation::depth_m>(
+         rain_key<&PrecipitationOptions::depth_m>(
              "depth_m", "m", between(1, 1000),
              "Depth of the container of particles around the eye; deeper has fewer in the same space.",
              "P, container"),
-         rain_key<&Precipitation::margin_m>("margin_m", "m", between(0, 100),
-                                            "How far the eye moves before the container follows.",
-                                            "P, near rain"),
-         rain_key<&Precipitation::reach_m>(
+         rain_key<&PrecipitationOptions::margin_m>("margin_m", "m", between(0, 100),
+                                                   "How far the eye moves before the container follows.",
+                                                   "P, near rain"),
+         rain_key<&PrecipitationOptions::reach_m>(
              "reach_m", "m", between(1, 1e5),
              "Distance from an area beyond which it is drawn without particles, by its shaft alone.",
              "P, far rain"),
-         rain_key<&Precipitation::edge>(
+         rain_key<&PrecipitationOptions::edge>(
              "edge", "", between(0, 1),
              "Outer share of an area in which the rain falls off smoothly; 0 is a wall of rain.", "P"),
-         rain_key<&Precipitation::shafts>("shafts", "", between(0, 100),
-                                          "Opacity of rain shafts as a multiple of the true one; 0: none.",
-                                          "Marshall and Palmer 1948, van de Hulst 1957"),
-         rain_key<&Precipitation::shaft_texture>("shaft_texture", "", between(0, 1),
-                                                 "Contrast of the streaks in rain shafts."),
-         rain_key<&Precipitation::evaporation>("evaporation", "", between(0, 1),
-                                               "Virga: 0 lets rain reach the ground; above 0 it thins out on "
-                                               "its way, and is gone at this share "
-                                               "of "
-                                               "the way up from the ground to the cloud.")},
+         rain_key<&PrecipitationOptions::shafts>(
+             "shafts", "", between(0, 100), "Opacity of rain shafts as a multiple of the true one; 0: none.",
+             "Marshall and Palmer 1948, van de Hulst 1957"),
+         rain_key<&PrecipitationOptions::shaft_texture>("shaft_texture", "", between(0, 1),
+                                                        "Contrast of the streaks in rain shafts."),
+         rain_key<&PrecipitationOptions::evaporation>(
+             "evaporation", "", between(0, 1),
+             "Virga: 0 lets rain reach the ground; above 0 it thins out and is "
+             "gone at this share of the way up to the cloud.")},
         nullptr};
     return section;
 }

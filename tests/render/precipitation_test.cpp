@@ -315,12 +315,12 @@ TEST(Precipitation, IsContinuousAcrossThePerimeter) {
     }
     EXPECT_GT(least, 0);
     EXPECT_GT(most, least);
-    const RainShares at = rain_shares(Precipitation{}, 0);
+    const RainShares at = rain_shares(PrecipitationOptions{}, 0);
     EXPECT_EQ(at.near, 1);
     EXPECT_EQ(at.far, 0);
     double near = 1, number = 1;
     for (double outside = 0; outside < 700; outside += 1) {
-        const RainShares shares = rain_shares(Precipitation{}, outside);
+        const RainShares shares = rain_shares(PrecipitationOptions{}, outside);
         EXPECT_NEAR(shares.near + shares.far, 1, 1e-12);
         EXPECT_LE(shares.near, near);
         EXPECT_LE(shares.far_number, number);
@@ -391,7 +391,7 @@ TEST(RainShafts, HaveTheirOpticalDepth) {
     curtain.axis_x = 1;
     curtain.axis_y = 0;
     RenderOptions options = options_at({0, -3000, 300}, {0, 0, 300});
-    Precipitation& p = options.precipitation;
+    PrecipitationOptions& p = options.precipitation;
     p.particles = 0;
     p.edge = 0;
     p.shaft_texture = 0;

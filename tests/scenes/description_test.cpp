@@ -71,7 +71,7 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"debug_view"}), member_count<DebugView>());
     // [sun] also holds the size of the shadow map, the one plain member of RenderOptions.
     EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 1);
-    EXPECT_EQ(keys_at({"precipitation"}), member_count<Precipitation>());
+    EXPECT_EQ(keys_at({"precipitation"}), member_count<PrecipitationOptions>());
     EXPECT_EQ(keys_at({"camera", "path"}), member_count<CameraKey>());
     EXPECT_EQ(member_count<RenderOptions>(), 10u);
     EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
