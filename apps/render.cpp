@@ -147,7 +147,11 @@ RenderOptions picture_options(const RenderArguments& a, const std::optional<Scen
     if (a.size) std::tie(options.camera.width, options.camera.height) = *a.size;
     if (a.fov_deg) options.camera.vertical_fov_deg = *a.fov_deg;
     if (a.exposure_ev) options.camera.exposure_ev = *a.exposure_ev;
-    if (a.sun_deg) std::tie(options.sun.elevation_deg, options.sun.azimuth_deg) = *a.sun_deg;
+    if (a.sun_deg) {
+        std::tie(options.sun.elevation_deg, options.sun.azimuth_deg) = *a.sun_deg;
+        options.sun.date.clear();
+        options.sun.time.clear();
+    }
     if (a.albedo) options.light.albedo = *a.albedo;
     if (a.g) options.light.g = *a.g;
     if (!scene) frame(options.camera, box, a.view, options.ground.height_m);
@@ -250,8 +254,8 @@ int render(const RenderArguments& a) {
 
     const double radius = radius_in_voxels(scene, loaded);
     const double extinction_per_m = extinction_of(a, scene, loaded);
-    const RenderOptions options =
-        picture_options(a, scene, grid, loaded.metadata ? loaded.metadata->time_s : 0.0);
+    RenderOptions options = picture_options(a, scene, grid, loaded.metadata ? loaded.metadata->time_s : 0.0);
+    options.sun = sun_at(options.sun, loaded.metadata ? loaded.metadata->time_s : 0);
     Renderer renderer(DeviceOptions{.device = a.device});
     const std::vector<Metaball> balls = metaballs(grid, radius);
     Splats splats;

@@ -149,6 +149,7 @@ Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::s
     check(moving);
     RenderOptions options = moving;
     options.camera = camera_at(moving.camera, time_s);
+    options.sun = sun_at(moving.sun, time_s);
     const bool rain = options.precipitation.enabled && !weather.curtains.empty();
     layers_.resize(layers.size());
     drawn_.clouds.clear();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// shaders/ray.glsl and shaders/background.glsl for vectors of pixels.
+// shaders/ray.glsl, air.glsl and background.glsl for vectors of pixels.
 
 #if defined(NEPHOS_RENDER_BACKGROUND_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_RENDER_BACKGROUND_INL_H_
@@ -16,6 +16,7 @@
 #include <hwy/highway.h>
 
 #include "render/column-inl.h"
+#include "render/frame_data.h"
 #include "render/shaders/shared.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -61,7 +62,7 @@ HWY_INLINE Floats3 decay(const shader::vec4& per_m, Floats distance_m) {
 }
 
 // Direction of the ray through a point of the part of the picture; its part along the view axis is 1.
-HWY_INLINE Floats3 pixel_direction(const shader::Frame& frame, Floats x, Floats y) {
+HWY_INLINE Floats3 pixel_direction(const PictureFrame& frame, Floats x, Floats y) {
     const Floats across =
                      hn::MulAdd(hn::Add(x, set(frame.picture.z)), set(2.0f / frame.picture.x), set(-1.0f)),
                  upward =
@@ -71,7 +72,7 @@ HWY_INLINE Floats3 pixel_direction(const shader::Frame& frame, Floats x, Floats 
 
 inline constexpr float kNowhere = 1.0e30f;  // distance of the ground where a ray does not meet it
 
-HWY_INLINE Floats ground_distance(const shader::Frame& frame, Floats ray_z) {
+HWY_INLINE Floats ground_distance(const PictureFrame& frame, Floats ray_z) {
     const auto meets = hn::Lt(ray_z, set(frame.ground_sun.w > 0 ? 0.0f : -2.0f));
     const Floats distance = hn::Min(hn::Div(set(frame.ground.w), ray_z), set(kNowhere));
     return hn::IfThenElse(meets, distance, set(kNowhere));
@@ -82,14 +83,116 @@ HWY_INLINE Floats flash_falloff(Floats squared_m) {
     return hn::Div(set(1.0e6f), hn::Max(squared_m, set(1.0e4f)));
 }
 
-// shaders/air.glsl: D's beta, and the radiance of the air itself in full light.
-HWY_INLINE Floats3 air_transmittance(const shader::Frame& frame, const Floats3& /*ray*/, Floats distance_m) {
-    return decay(frame.air_extinction, distance_m);
+// sky_across(), sky_upwards(), layer_column(), molecule_phase() and particle_phase() of shaders/shared.h.
+HWY_INLINE Floats sky_across(Floats cos_azimuth) {
+    return hn::Sqrt(hn::Max(hn::NegMulAdd(set(0.5f), cos_azimuth, set(0.5f)), hn::Zero(Lanes())));
 }
-HWY_INLINE Floats3 air_light(const shader::Frame& frame, const Floats3& /*ray*/, const Floats3& beta) {
+HWY_INLINE Floats sky_upwards(Floats sine) {
+    const Floats one = set(1.0f), rest = hn::Max(hn::Sub(one, sine), hn::Zero(Lanes()));
+    return hn::Sqrt(hn::Div(sine, hn::Add(one, hn::Sqrt(rest))));
+}
+HWY_INLINE Floats layer_column(float altitude, Floats slope, Floats distance, float per_height) {
+    const Lanes d;
+    const Floats x = hn::Max(hn::Mul(hn::Mul(slope, distance), set(per_height)), set(-80.0f)),
+                 one = set(1.0f);
+    const Floats near = hn::NegMulAdd(x, hn::NegMulAdd(x, set(1.0f / 6.0f), set(0.5f)), one);
+    const auto is_near = hn::Lt(hn::Mul(x, x), set(1.0e-4f));
+    const Floats far = hn::Div(hn::Sub(one, hn::Exp(d, hn::Neg(x))), hn::IfThenElse(is_near, one, x));
+    return hn::Mul(hn::Mul(set(std::exp(-altitude * per_height)), distance),
+                   hn::IfThenElse(is_near, near, far));
+}
+HWY_INLINE Floats molecule_phase(Floats cosine) {
+    return hn::Mul(set(3.0f / (16.0f * shader::kPi)), hn::MulAdd(cosine, cosine, set(1.0f)));
+}
+HWY_INLINE Floats particle_phase(Floats cosine, float g) {
+    const Floats base = hn::NegMulAdd(set(2.0f * g), cosine, set(1.0f + g * g));
+    const float factor = 3.0f / (8.0f * shader::kPi) * (1.0f - g * g) / (2.0f + g * g);
+    return hn::Div(hn::Mul(set(factor), hn::MulAdd(cosine, cosine, set(1.0f))),
+                   hn::Mul(base, hn::Sqrt(base)));
+}
+
+// shaders/air.glsl. A layer of the sky's tables between four texels; places are 0..1.
+HWY_INLINE Floats3 sky_layer(const PictureFrame& frame, Floats across, Floats upwards, std::size_t layer) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    constexpr int kColumns = int(shader::kSkyColumns), kRows = int(shader::kSkyRows);
+    const Floats x = hn::Mul(across, set(float(kColumns - 1))), y = hn::Mul(upwards, set(float(kRows - 1)));
+    const Floats x0 = hn::Min(hn::Floor(x), set(float(kColumns - 2))),
+                 y0 = hn::Min(hn::Floor(y), set(float(kRows - 2)));
+    const Floats share_x = hn::Sub(x, x0), share_y = hn::Sub(y, y0);
+    const auto index = hn::ShiftLeft<2>(
+        hn::Add(hn::Mul(hn::ConvertTo(di, y0), hn::Set(di, kColumns)), hn::ConvertTo(di, x0)));
+    const float* texels = frame.sky + 4 * layer * std::size_t(kColumns * kRows);
+    const auto channel = [&](const float* from) {
+        const auto row = [&](const float* first) {
+            const Floats a = hn::GatherIndex(d, first, index), b = hn::GatherIndex(d, first + 4, index);
+            return hn::MulAdd(share_x, hn::Sub(b, a), a);
+        };
+        const Floats a = row(from), b = row(from + 4 * kColumns);
+        return hn::MulAdd(share_y, hn::Sub(b, a), a);
+    };
+    return {channel(texels), channel(texels + 1), channel(texels + 2)};
+}
+
+HWY_INLINE Floats3 sky_scattered(const PictureFrame& frame, const Floats3& ray) {
     const Floats one = set(1.0f);
-    return each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)},
-                      set3(frame.horizon));
+    const Floats level = hn::MulAdd(ray.x, ray.x, hn::Mul(ray.y, ray.y));
+    const float sun_level = frame.to_sun.x * frame.to_sun.x + frame.to_sun.y * frame.to_sun.y;
+    const Floats beside = hn::Div(hn::MulAdd(ray.x, set(frame.to_sun.x), hn::Mul(ray.y, set(frame.to_sun.y))),
+                                  hn::Sqrt(hn::Max(hn::Mul(level, set(sun_level)), set(1.0e-12f))));
+    const Floats across = sky_across(hn::Max(hn::Min(beside, one), hn::Neg(one))),
+                 upwards = sky_upwards(hn::Min(hn::Abs(ray.z), one));
+    const Floats phase = particle_phase(dot(set3(frame.to_sun), ray), frame.air.y);
+    return times_add(phase, sky_layer(frame, across, upwards, 1), sky_layer(frame, across, upwards, 0));
+}
+
+HWY_INLINE Floats3 sunlight_at(const PictureFrame& frame, Floats height) {
+    if (frame.sky == nullptr) return set3(frame.sunlight);
+    const Floats altitude = hn::Mul(hn::Add(set(frame.air.x), height), set(1.0f / shader::kSunlightTop));
+    const Floats zero = hn::Zero(Lanes());
+    return sky_layer(frame, hn::Max(hn::Min(altitude, set(1.0f)), zero), zero, 2);
+}
+
+HWY_INLINE Floats3 air_transmittance(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
+    if (frame.sky == nullptr) return decay(frame.air_extinction, distance_m);
+    const Lanes d;
+    const Floats rayleigh = layer_column(frame.air.x, ray.z, distance_m, frame.rayleigh.w),
+                 haze = layer_column(frame.air.x, ray.z, distance_m, frame.haze.w);
+    const Floats3 depth = times_add(rayleigh, set3(frame.rayleigh), times(haze, set3(frame.haze)));
+    return {hn::Exp(d, hn::Neg(depth.x)), hn::Exp(d, hn::Neg(depth.y)), hn::Exp(d, hn::Neg(depth.z))};
+}
+
+HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, const Floats3& beta) {
+    const Lanes d;
+    const Floats one = set(1.0f);
+    const Floats3 in_front{hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)};
+    if (frame.sky == nullptr) return each_times(in_front, set3(frame.horizon));
+    const Floats slope = hn::Max(hn::Abs(ray.z), set(1.0e-5f));
+    const auto column = [&](float per_height) {
+        return hn::Div(set(std::exp(-frame.air.x * per_height) / per_height), slope);
+    };
+    const Floats3 depth = times_add(column(frame.rayleigh.w), set3(frame.rayleigh),
+                                    times(column(frame.haze.w), set3(frame.haze)));
+    const auto share = [&](Floats part, Floats whole) {
+        return hn::Div(part, hn::Max(hn::Sub(one, hn::Exp(d, hn::Neg(whole))), set(1.0e-4f)));
+    };
+    return each_times(sky_scattered(frame, ray),
+                      {share(in_front.x, depth.x), share(in_front.y, depth.y), share(in_front.z, depth.z)});
+}
+
+HWY_INLINE Floats3 air_sunlight(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
+    if (frame.sky == nullptr)
+        return times(set(shader::kAirSunShare), each_times(set3(frame.air_extinction), set3(frame.horizon)));
+    const Lanes d;
+    const Floats height = hn::Mul(ray.z, distance_m), cosine = dot(set3(frame.to_sun), ray);
+    const Floats altitude = hn::Max(hn::Add(set(frame.air.x), height), hn::Zero(d));
+    const Floats molecules =
+        hn::Mul(hn::Exp(d, hn::Mul(altitude, set(-frame.rayleigh.w))), molecule_phase(cosine));
+    const Floats particles = hn::Mul(
+        hn::Mul(hn::Exp(d, hn::Mul(altitude, set(-frame.haze.w))), particle_phase(cosine, frame.air.y)),
+        set(frame.air.z));
+    const Floats3 scattered = times_add(molecules, set3(frame.rayleigh), times(particles, set3(frame.haze)));
+    return each_times(times(set(shader::kPi), scattered), sunlight_at(frame, height));
 }
 
 struct ShadowTexels {
@@ -121,9 +224,37 @@ HWY_INLINE Floats shadow_at(const ShadowTexels& map, Floats u, Floats v) {
                    between(texel(x0, y1), texel(x1, y1), share_x), share_y);
 }
 
-// The air is thickest at the horizon: its colour falls off exponentially with height, and reaches zero at the
-// zenith.
-HWY_INLINE Floats3 sky(const shader::Frame& frame, Floats height) {
+// shaders/background.glsl.
+HWY_INLINE Floats3 sun_disc(const PictureFrame& frame, const Floats3& ray) {
+    const Lanes d;
+    const Floats zero = hn::Zero(d), one = set(1.0f);
+    constexpr float kRadius = shader::kSunRadius;
+    const Floats3 apart = subtract(ray, set3(frame.to_sun));
+    const Floats angle = hn::Sqrt(dot(apart, apart));
+    const Floats edge = hn::MulAdd(hn::Sub(set(kRadius), angle), set(frame.up.w), set(0.5f));
+    const Floats covered = hn::Mul(hn::Max(hn::Min(edge, one), zero), set(frame.sun_disc.w));
+    if (hn::AllFalse(d, hn::Gt(covered, zero))) return {zero, zero, zero};
+    const Floats across = hn::Min(hn::Mul(angle, set(1.0f / kRadius)), one);
+    const Floats log_cosine =
+        hn::Mul(set(0.5f), hn::Log(d, hn::Max(hn::NegMulAdd(across, across, one), set(1.0e-4f))));
+    const Floats rise = hn::Max(hn::Min(apart.z, set(kRadius)), set(-kRadius));
+    const auto of = [&](float middle, float fade, float darkening) {
+        const Floats power = hn::MulAdd(set(darkening), log_cosine, hn::Mul(set(fade), rise));
+        return hn::Mul(hn::Mul(covered, set(middle)), hn::Exp(d, power));
+    };
+    return {of(frame.sun_disc.x, frame.sun_fade.x, shader::kLimbDarkeningRed),
+            of(frame.sun_disc.y, frame.sun_fade.y, shader::kLimbDarkeningGreen),
+            of(frame.sun_disc.z, frame.sun_fade.z, shader::kLimbDarkeningBlue)};
+}
+
+// Gradient: the air is thickest at the horizon; its colour falls off exponentially with height, and reaches
+// zero at the zenith. Below the horizon the sky is that of the horizon.
+HWY_INLINE Floats3 sky(const PictureFrame& frame, const Floats3& ray) {
+    const Floats height = hn::Max(ray.z, hn::Zero(Lanes()));
+    if (frame.sky != nullptr) {
+        const Floats3 upwards{ray.x, ray.y, height};
+        return add(sky_scattered(frame, upwards), sun_disc(frame, upwards));
+    }
     constexpr float kFalloff = 4.0f;
     const float least = std::exp(-kFalloff);
     const Floats haze = hn::Mul(hn::Sub(hn::Exp(Lanes(), hn::Mul(set(-kFalloff), height)), set(least)),
@@ -132,7 +263,7 @@ HWY_INLINE Floats3 sky(const shader::Frame& frame, Floats height) {
 }
 
 // Radiance of the ground at a point relative to the eye, without the air before it.
-HWY_INLINE Floats3 ground_light(const shader::Frame& frame, const ShadowTexels& map, const Floats3& point) {
+HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& map, const Floats3& point) {
     const Floats u = hn::Add(dot(set3(frame.shadow_u), point), set(frame.shadow_u.w)),
                  v = hn::Add(dot(set3(frame.shadow_v), point), set(frame.shadow_v.w));
     const Floats3 colour = times_add(shadow_at(map, u, v), set3(frame.ground_sun), set3(frame.ground));
@@ -144,21 +275,21 @@ HWY_INLINE Floats3 ground_light(const shader::Frame& frame, const ShadowTexels& 
     return times_add(hn::Mul(flash_falloff(squared), cosine), set3(frame.ground_flash), colour);
 }
 
-HWY_INLINE Floats3 ground(const shader::Frame& frame, const ShadowTexels& map, const Floats3& ray,
+HWY_INLINE Floats3 ground(const PictureFrame& frame, const ShadowTexels& map, const Floats3& ray,
                           Floats distance) {
     const Floats3 beta = air_transmittance(frame, ray, distance);
     return add(each_times(beta, ground_light(frame, map, times(distance, ray))), air_light(frame, ray, beta));
 }
 
 // What lies behind the clouds along unit rays.
-HWY_INLINE Floats3 background(const shader::Frame& frame, const ShadowTexels& map, const Floats3& ray) {
+HWY_INLINE Floats3 background(const PictureFrame& frame, const ShadowTexels& map, const Floats3& ray) {
     const Lanes d;
     const Floats distance = ground_distance(frame, ray.z);
     const auto meets = hn::Lt(distance, set(kNowhere));
-    if (hn::AllFalse(d, meets)) return sky(frame, hn::Max(ray.z, hn::Zero(d)));
+    if (hn::AllFalse(d, meets)) return sky(frame, ray);
     const Floats3 below = ground(frame, map, ray, hn::IfThenElse(meets, distance, hn::Zero(d)));
     if (hn::AllTrue(d, meets)) return below;
-    const Floats3 above = sky(frame, hn::Max(ray.z, hn::Zero(d)));
+    const Floats3 above = sky(frame, ray);
     return {hn::IfThenElse(meets, below.x, above.x), hn::IfThenElse(meets, below.y, above.y),
             hn::IfThenElse(meets, below.z, above.z)};
 }

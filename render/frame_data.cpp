@@ -21,6 +21,30 @@ shader::vec4 shadow_row(const Vec3& axis, const ShadowFrame& shadow, const Vec3&
     return to_vec4(row, dot(row, eye - shadow.origin_m));
 }
 
+// What the physical sky has in place of the gradient.
+void use_sky(const RenderOptions& options, const SkyLight& sky, PictureFrame& frame) {
+    const AtmosphereModel& air = sky.model;
+    frame.sky = sky.texels.data();
+    frame.sunlight = to_vec4(sky.ground_sun, 1.0, options.light.multiple_scattering);
+    frame.ambient_top = to_vec4(sky.ambient_top, 1.0, frame.ambient_top.w);
+    frame.ambient_base = to_vec4(sky.ambient_base, 1.0, frame.ambient_base.w);
+    frame.rayleigh = to_vec4(air.rayleigh_per_m, 1.0, 1.0 / air.rayleigh_height_m);
+    const double haze = air.mie_extinction_per_m;
+    frame.haze = to_vec4(Rgb{haze, haze, haze}, 1.0, 1.0 / air.mie_height_m);
+    frame.air = {float(sky.eye_altitude_m), float(air.mie_g),
+                 haze > 0 ? float(air.mie_scattering_per_m / haze) : 0.0f, 1.0f};
+    frame.sun_disc = to_vec4(sky.disc, 1.0, sky.has_disc ? 1.0 : 0.0);
+    frame.sun_fade = to_vec4(sky.disc_fade, 1.0, 0.0);
+    const double sine = std::max(0.0, direction_to_sun(options.sun).z);
+    Rgb skylit{}, sunlit{};
+    for (std::size_t c = 0; c < 3; ++c) {
+        skylit[c] = options.ground.albedo[c] * sky.ground_sky[c];
+        sunlit[c] = options.ground.albedo[c] * sky.ground_sun[c] * sine;
+    }
+    frame.ground = to_vec4(skylit, 1.0, frame.ground.w);
+    frame.ground_sun = to_vec4(sunlit, 1.0, frame.ground_sun.w);
+}
+
 }  // namespace
 
 Daylight daylight(double sun_elevation_deg) {
@@ -44,15 +68,15 @@ double pixels_per_unit(const Camera& camera, const CameraFrame& frame) {
     return camera.height / (2.0 * frame.half_height);
 }
 
-shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
-                         const Flash* flash, const Tile& tile) {
+PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
+                        const Flash* flash, const Tile& tile, const SkyLight* sky) {
     const Vec3 to_sun = direction_to_sun(options.sun);
     const Daylight day = daylight(options.sun.elevation_deg);
     const CloudLight& light = options.light;
     const double width = options.camera.width, height = options.camera.height;
     const Vec3& eye = camera.position_m;
 
-    shader::Frame frame;
+    PictureFrame frame;
     frame.right = to_vec4(camera.half_width * camera.right, 0);
     frame.up = to_vec4(camera.half_height * camera.up, pixels_per_unit(options.camera, camera));
     frame.forward = to_vec4(camera.forward, 0);
@@ -93,6 +117,7 @@ shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera
         frame.flash_colour = to_vec4(flash->colour, 1.0, 0);
         frame.ground_flash = to_vec4(lit, flash->intensity, 0);
     }
+    if (sky != nullptr) use_sky(options, *sky, frame);
     return frame;
 }
 

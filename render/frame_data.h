@@ -8,6 +8,7 @@
 #include "render/options.h"
 #include "render/picture.h"
 #include "render/shaders/shared.h"
+#include "render/sky_light.h"
 
 namespace nephos {
 
@@ -28,9 +29,14 @@ struct Daylight {
 };
 Daylight daylight(double sun_elevation_deg);
 
-// `flash` is null in the dark.
-shader::Frame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
-                         const Flash* flash, const Tile& tile);
+// A frame with what is in images on the device.
+struct PictureFrame : shader::Frame {
+    const float* sky = nullptr;  // SkyLight::texels; null: gradient
+};
+
+// `flash` is null in the dark, `sky` with AirModel::gradient; the latter must outlive the frame.
+PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
+                        const Flash* flash, const Tile& tile, const SkyLight* sky = nullptr);
 
 // A picture with room for its pixels, without its shadow map.
 Picture blank_picture(const RenderOptions& options);

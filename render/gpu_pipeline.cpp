@@ -28,6 +28,18 @@ vk::raii::ShaderModule create_module(const GpuDevice& gpu, ShaderCode code) {
     return {gpu.device, vk::ShaderModuleCreateInfo({}, code.size_bytes(), code.data())};
 }
 
+// A variant as specialization constants; constants that a shader does not have are ignored.
+struct VariantConstants {
+    std::array<vk::Bool32, 2> values;
+    std::array<vk::SpecializationMapEntry, 2> entries{vk::SpecializationMapEntry(0, 0, sizeof(vk::Bool32)),
+                                                      vk::SpecializationMapEntry(5, 4, sizeof(vk::Bool32))};
+    explicit VariantConstants(const ShaderVariant& variant)
+        : values{vk::Bool32(variant.exact), vk::Bool32(variant.physical_sky)} {}
+    vk::SpecializationInfo info() const {
+        return {std::uint32_t(entries.size()), entries.data(), sizeof values, values.data()};
+    }
+};
+
 vk::PipelineColorBlendAttachmentState blend_state(Blend blend) {
     using Factor = vk::BlendFactor;
     vk::PipelineColorBlendAttachmentState state;
@@ -67,6 +79,7 @@ PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
         vk::DescriptorSetLayoutBinding(8, Type::eStorageBuffer, 1, Stage::eCompute),
         vk::DescriptorSetLayoutBinding(9, Type::eStorageBuffer, 1, Stage::eCompute),
         vk::DescriptorSetLayoutBinding(10, Type::eStorageImage, 1, Stage::eCompute),
+        vk::DescriptorSetLayoutBinding(11, Type::eCombinedImageSampler, 1, all),
     };
     PipelineLayout result;
     result.set = vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
@@ -78,17 +91,16 @@ PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
 
 vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                             ShaderCode vertex, ShaderCode fragment,
-                                            std::span<const vk::Format> attachments, Blend blend, bool exact,
-                                            std::size_t written) {
+                                            std::span<const vk::Format> attachments, Blend blend,
+                                            ShaderVariant variant, std::size_t written) {
     const vk::raii::ShaderModule vertex_module = create_module(gpu, vertex);
     const vk::raii::ShaderModule fragment_module = create_module(gpu, fragment);
-    const vk::Bool32 exact_value = exact ? VK_TRUE : VK_FALSE;
-    const vk::SpecializationMapEntry entry(0, 0, sizeof exact_value);
-    const vk::SpecializationInfo constants(1, &entry, sizeof exact_value, &exact_value);
-    const std::array stages{
-        vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eVertex, *vertex_module, "main"),
-        vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eFragment, *fragment_module, "main",
-                                          &constants)};
+    const VariantConstants values(variant);
+    const vk::SpecializationInfo constants = values.info();
+    const std::array stages{vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eVertex,
+                                                              *vertex_module, "main", &constants),
+                            vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eFragment,
+                                                              *fragment_module, "main", &constants)};
     const vk::PipelineVertexInputStateCreateInfo no_vertices;
     const vk::PipelineInputAssemblyStateCreateInfo triangles({}, vk::PrimitiveTopology::eTriangleList);
     const vk::PipelineViewportStateCreateInfo viewport({}, 1, nullptr, 1, nullptr);
@@ -114,20 +126,26 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
 }
 
 vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
-                                           ShaderCode code) {
+                                           ShaderCode code, ShaderVariant variant) {
     const vk::raii::ShaderModule module = create_module(gpu, code);
-    const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main");
+    const VariantConstants values(variant);
+    const vk::SpecializationInfo constants = values.info();
+    const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main",
+                                                  &constants);
     return {gpu.device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *layout.layout)};
 }
 
 vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
-                                        std::array<bool, 2> switches) {
+                                        std::array<bool, 2> switches, ShaderVariant variant) {
     const vk::raii::ShaderModule module = create_module(gpu, code);
-    // Lanes, rows of a lane, whether lanes hand splats round, and the switches.
+    // Lanes, rows of a lane, whether lanes hand splats round, the switches, and the sky.
     const std::uint32_t lanes = gpu.tile_lanes;
-    const std::array<std::uint32_t, 5> values{lanes, shader::kTileWidth * shader::kTileHeight / lanes,
+    const std::array<std::uint32_t, 6> values{lanes,
+                                              shader::kTileWidth * shader::kTileHeight / lanes,
                                               std::uint32_t(gpu.tiles_are_subgroups),
-                                              std::uint32_t(switches[0]), std::uint32_t(switches[1])};
+                                              std::uint32_t(switches[0]),
+                                              std::uint32_t(switches[1]),
+                                              std::uint32_t(variant.physical_sky)};
     std::array<vk::SpecializationMapEntry, values.size()> entries;
     for (std::uint32_t i = 0; i < entries.size(); ++i) entries[i] = vk::SpecializationMapEntry(i, 4 * i, 4);
     const vk::SpecializationInfo constants(entries.size(), entries.data(), sizeof values, values.data());
@@ -162,7 +180,7 @@ void compute_barrier(const vk::raii::CommandBuffer& commands) {
 Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
     const std::array sizes{vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, 1),
                            vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, 7),
-                           vk::DescriptorPoolSize(vk::DescriptorType::eCombinedImageSampler, 2),
+                           vk::DescriptorPoolSize(vk::DescriptorType::eCombinedImageSampler, 3),
                            vk::DescriptorPoolSize(vk::DescriptorType::eStorageImage, 1)};
     Bindings bindings;
     bindings.pool = vk::raii::DescriptorPool(gpu.device, vk::DescriptorPoolCreateInfo({}, 1, sizes));

@@ -9,8 +9,9 @@
 //     3  attenuation textures, or puff textures (array)  8  storage  radiance, or optical depth
 //     4  shadow map, to be sampled                       9  storage  distance, or places along the light
 //                                                       10  shadow map, to be written
+//                                                       11  tables of the sky, to be sampled (array)
 //
-// Both samplers of a set must be bound before a draw, used or not: lavapipe looks at them.
+// All samplers of a set must be bound before a draw, used or not: lavapipe looks at them.
 //
 // Private to the module.
 
@@ -43,20 +44,25 @@ enum class Blend {
     over,  // dst = src + dst * alpha of src; alpha of dst = alpha of both multiplied
 };
 
-// Draws triangles; viewport and scissor are dynamic. `exact` becomes specialization constant 0 of the
-// fragment shader. Attachments from `written` on stay as they are.
+// What shaders are compiled for: specialization constants of those that know them.
+struct ShaderVariant {
+    bool exact = false;         // 0, fragment shaders of metaballs: integrate along each ray
+    bool physical_sky = false;  // 5, whatever includes air.glsl
+};
+
+// Draws triangles; viewport and scissor are dynamic. Attachments from `written` on stay as they are.
 vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                             ShaderCode vertex, ShaderCode fragment,
                                             std::span<const vk::Format> attachments, Blend blend,
-                                            bool exact = false, std::size_t written = SIZE_MAX);
+                                            ShaderVariant variant = {}, std::size_t written = SIZE_MAX);
 
 vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
-                                           ShaderCode code);
+                                           ShaderCode code, ShaderVariant variant = {});
 
 // One whose work groups are tiles (shaders/tiles.glsl): one subgroup each, where the device has subgroups
-// that fit. `variant` becomes specialization constant 3.
+// that fit. `switches` become specialization constants 3 and 4.
 vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
-                                        std::array<bool, 2> switches = {});
+                                        std::array<bool, 2> switches = {}, ShaderVariant variant = {});
 
 // A pool with room for one set of the layout above, and the set.
 struct Bindings {

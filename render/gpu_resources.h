@@ -46,9 +46,10 @@ inline constexpr Access none{vk::PipelineStageFlagBits2::eNone, {}};
 inline constexpr Access draw{
     vk::PipelineStageFlagBits2::eColorAttachmentOutput,
     vk::AccessFlagBits2::eColorAttachmentRead | vk::AccessFlagBits2::eColorAttachmentWrite};
-inline constexpr Access sample{
-    vk::PipelineStageFlagBits2::eFragmentShader | vk::PipelineStageFlagBits2::eComputeShader,
-    vk::AccessFlagBits2::eShaderSampledRead};
+inline constexpr Access sample{vk::PipelineStageFlagBits2::eVertexShader |
+                                   vk::PipelineStageFlagBits2::eFragmentShader |
+                                   vk::PipelineStageFlagBits2::eComputeShader,
+                               vk::AccessFlagBits2::eShaderSampledRead};
 inline constexpr Access copy_from{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferRead};
 inline constexpr Access copy_to{vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferWrite};
 inline constexpr Access compute{

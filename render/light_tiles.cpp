@@ -45,7 +45,7 @@ LightTiles::LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const
       map_pipeline_(create_tile_pipeline(gpu, layout, shaders().light_map_comp)),
       centres_pipeline_(create_tile_pipeline(gpu, layout, shaders().light_centres_comp)),
       bindings_(create_bindings(gpu, layout)) {
-    bind_image(gpu, bindings_, 3, attenuation, sampler);
+    for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
 }
 
 void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/options.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
 #include "automaton/error.h"
 #include "render/camera.h"
+#include "render/sun_position.h"
 
 namespace nephos {
 namespace {
@@ -42,6 +44,15 @@ void check_path(const Camera& camera) {
     }
 }
 
+void check(const AtmosphereOptions& atmosphere) {
+    require(within(atmosphere.haze, 0, 100), "atmosphere.haze", "0..100");
+    require(within(atmosphere.haze_g, 0, 0.95), "atmosphere.haze_g", "0..0.95");
+    require(within(atmosphere.ozone, 0, 10), "atmosphere.ozone", "0..10");
+    require(within(atmosphere.ambient, 0, 10), "atmosphere.ambient", "0..10");
+    require(within(atmosphere.adaptation, 0, 1), "atmosphere.adaptation", "0..1");
+    check_colour(atmosphere.night, "atmosphere.night");
+}
+
 }  // namespace
 
 void check(const RenderOptions& options) {
@@ -58,6 +69,8 @@ void check(const RenderOptions& options) {
     require(within(options.sun.elevation_deg, -18, 90), "sun.elevation_deg", "-18..90 degrees");
     require(within(options.sun.azimuth_deg, -360, 360), "sun.azimuth_deg", "-360..360 degrees");
     check_colour(options.sun.colour, "sun.colour");
+    require(within(options.sun.latitude_deg, -90, 90), "sun.latitude_deg", "-90..90 degrees");
+    require(within(options.sun.longitude_deg, -180, 180), "sun.longitude_deg", "-180..180 degrees");
     const CloudLight& light = options.light;
     require(within(light.albedo, 0, 1), "light.albedo", "0..1");
     require(within(light.g, -0.99, 0.99), "light.g", "-0.99..0.99");
@@ -70,6 +83,7 @@ void check(const RenderOptions& options) {
             "three numbers from 0 to 1 per metre");
     check_colour(options.air.horizon, "air.horizon");
     check_colour(options.air.zenith, "air.zenith");
+    check(options.atmosphere);
     require(std::isfinite(options.ground.height_m), "ground.height_m", "finite metres");
     require(colour_within(options.ground.albedo, 1), "ground.albedo", "three numbers from 0 to 1");
     check(options.wet_ground);
@@ -89,6 +103,20 @@ Vec3 direction_to_sun(const Sun& sun) {
     const double elevation = sun.elevation_deg * kRadians, azimuth = sun.azimuth_deg * kRadians;
     return {std::sin(azimuth) * std::cos(elevation), std::cos(azimuth) * std::cos(elevation),
             std::sin(elevation)};
+}
+
+Sun sun_at(const Sun& sun, double time_s) {
+    Sun now = sun;
+    if (sun.date.empty() && sun.time.empty()) return now;
+    const std::optional<double> days = days_since_2000(sun.date, sun.time);
+    require(days.has_value(), "sun.date and sun.time", "a moment such as 2026-06-21 and 18:30");
+    const SunPosition position =
+        sun_position(*days + (sun.moves ? time_s / 86400 : 0), sun.latitude_deg, sun.longitude_deg);
+    now.elevation_deg = std::max(position.elevation_deg, -18.0);
+    now.azimuth_deg = position.azimuth_deg;
+    now.date.clear();
+    now.time.clear();
+    return now;
 }
 
 std::optional<Flash> flash_at(std::span<const LightningFlash> lightning, double time_s) {

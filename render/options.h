@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "automaton/lattice.h"
+#include "render/atmosphere_options.h"
 #include "render/camera_path.h"
 #include "render/precipitation_options.h"
 #include "render/wet_ground_options.h"
@@ -35,12 +36,21 @@ struct Camera {
 struct Sun {
     double elevation_deg = 40.0;  // above the horizon, -18..90
     double azimuth_deg = 135.0;   // where the sun stands, clockwise from north
-    Rgb colour{1.0, 0.96, 0.9};   // >= 0
+    Rgb colour{1.0, 0.96, 0.9};   // >= 0; with the physical sky that above the air
+    // Instead of elevation and azimuth: day ("2026-06-21") and universal time ("18:30" or "18:30:15") at a
+    // place; both texts or neither.
+    std::string date, time;
+    double latitude_deg = 0, longitude_deg = 0;  // -90..90, north; -180..180, east
+    bool moves = false;  // with simulated time, which begins at that moment; needs a date
     bool operator==(const Sun&) const = default;
 };
 
-// Direction from the world to the sun; unit.
+// Direction from the world to the sun by its elevation and azimuth; unit.
 Vec3 direction_to_sun(const Sun& sun);
+
+// The sun at a simulated time, with elevation and azimuth from its date where it has one; below -18 degrees,
+// where nothing changes any more, it stays at -18. Throws Error(usage) when date and time are no moment.
+Sun sun_at(const Sun& sun, double time_s);
 
 // How the light of the sun finds its way into voxel clouds.
 enum class Lighting {
@@ -127,6 +137,7 @@ struct RenderOptions {
     Sun sun;
     CloudLight light;
     Air air;
+    AtmosphereOptions atmosphere;
     Ground ground;
     WetGroundOptions wet_ground;  // how it looks where it is wet or white
     int shadow_map_size = 1024;   // texels on a side, 16..8192

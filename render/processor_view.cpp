@@ -40,7 +40,7 @@ struct TileSums {
 
 // What all tiles of a part of the picture share.
 struct ViewScene {
-    const shader::Frame* frame = nullptr;
+    const PictureFrame* frame = nullptr;
     std::span<const ScreenBall> balls;  // nearest first
     std::span<const ExactBall> exact;
     const float* shadow = nullptr;
@@ -69,7 +69,7 @@ struct TileRays {
     HWY_ALIGN float per_square[kTilePixels];  // 1 / |direction|^2
     HWY_ALIGN float x[kTilePixels], y[kTilePixels], z[kTilePixels], ground[kTilePixels];
 
-    TileRays(const shader::Frame& frame, const ViewTile& tile, bool whole) {
+    TileRays(const PictureFrame& frame, const ViewTile& tile, bool whole) {
         const Lanes d;
         const Layout layout;
         for (std::size_t block = 0; block < layout.blocks; ++block) {
@@ -171,7 +171,7 @@ HWY_INLINE Floats integrated_opacity(const ExactBall& ball, const Floats3& ray, 
 
 template <bool kColours>
 void add_exact(const ScreenBall& screen, const ExactBall& ball, const ViewTile& tile, const Layout& layout,
-               const shader::Frame& frame, const TileRays& rays, TileSums& sums) {
+               const PictureFrame& frame, const TileRays& rays, TileSums& sums) {
     const Lanes d;
     const Rows rows = rows_of(screen, tile, layout);
     const Floats3 diffuse{set(ball.diffuse[0]), set(ball.diffuse[1]), set(ball.diffuse[2])},
@@ -233,7 +233,7 @@ void mark_ground(const ViewScene& scene, const ViewTile& tile, const TileSums& s
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
     const Layout layout;
-    const shader::Frame& frame = *scene.frame;
+    const PictureFrame& frame = *scene.frame;
     const Floats size = set(float(scene.shadow_size)), last = set(float(scene.shadow_size - 1));
     const int columns = TileGrid{scene.shadow_size, scene.shadow_size}.columns();
     int marked = -1;
@@ -347,7 +347,7 @@ void store(const TileSums& sums, const ViewTile& tile, const Tile& part, bool de
 }  // namespace
 
 ProcessorView::ProcessorView(const RenderOptions& options, const CameraFrame& camera,
-                             const shader::Frame& frame, const Tile& part, const EyeOrder& order,
+                             const PictureFrame& frame, const Tile& part, const EyeOrder& order,
                              const BatchLimits& limits, StageTimes* times)
     : options_(&options),
       camera_(&camera),
@@ -488,7 +488,7 @@ void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size,
     kept_.clear();
 }
 
-void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const shader::Frame& frame,
+void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
                        const Tile& part, const EyeOrder& order, Picture& picture, const BatchLimits& limits) {
     ProcessorView(options, camera, frame, part, order, limits)
         .draw(picture, picture.shadow.data(), picture.shadow_size);

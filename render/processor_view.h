@@ -35,7 +35,7 @@ struct SeenLight {
 class ProcessorView {
   public:
     // `frame` is that of the part.
-    ProcessorView(const RenderOptions& options, const CameraFrame& camera, const shader::Frame& frame,
+    ProcessorView(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
                   const Tile& part, const EyeOrder& order, const BatchLimits& limits = {},
                   StageTimes* times = nullptr);
 
@@ -62,7 +62,7 @@ class ProcessorView {
     const RenderOptions* options_;
     const CameraFrame* camera_;
     const EyeOrder* order_;
-    shader::Frame frame_;
+    PictureFrame frame_;
     Tile part_;
     BatchLimits limits_;
     StageTimes* times_;
@@ -71,7 +71,7 @@ class ProcessorView {
 };
 
 // Both steps with light that is all there; the ground wears picture.shadow.
-void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const shader::Frame& frame,
+void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
                        const Tile& part, const EyeOrder& order, Picture& picture,
                        const BatchLimits& limits = {});
 

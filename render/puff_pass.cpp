@@ -58,15 +58,20 @@ void fill(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
 }  // namespace
 
 PuffPass::PuffPass(const GpuDevice& gpu, const PipelineLayout& layout,
-                   std::span<const vk::Format> attachments, const GpuBuffer& frame)
+                   std::span<const vk::Format> attachments, const GpuBuffer& frame, bool physical_sky)
     : layout_(&layout),
+      physical_sky_(physical_sky),
       pipeline_(create_graphics_pipeline(gpu, layout, shaders().puff_vert, shaders().puff_frag, attachments,
-                                         Blend::over)),
+                                         Blend::over, {false, physical_sky})),
       without_depth_(create_graphics_pipeline(gpu, layout, shaders().puff_vert, shaders().puff_frag,
-                                              attachments, Blend::over, false, 1)),
+                                              attachments, Blend::over, {false, physical_sky}, 1)),
       sampler_(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
       bindings_(create_bindings(gpu, layout)) {
     bind_buffer(gpu, bindings_, 0, frame);
+}
+
+void PuffPass::use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler) {
+    bind_image(gpu, bindings_, 11, tables, sampler);
 }
 
 void PuffPass::use_clouds(const GpuDevice& gpu, std::span<const shader::PuffCloud> clouds) {
@@ -77,6 +82,7 @@ void PuffPass::use_puffs(const GpuDevice& gpu, std::span<const shader::Puff> puf
     if (!puffs.empty() && textures_.width == 0) {
         textures_ = upload_puffs(gpu);
         for (const std::uint32_t binding : {3u, 4u}) bind_image(gpu, bindings_, binding, textures_, sampler_);
+        if (!physical_sky_) bind_image(gpu, bindings_, 11, textures_, sampler_);
     }
     fill(gpu, bindings_, 1, puffs_, puffs);
 }

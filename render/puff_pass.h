@@ -15,7 +15,10 @@ class PuffPass {
   public:
     // `attachments` are those of the view pass, `frame` its buffer of shader::Frame.
     PuffPass(const GpuDevice& gpu, const PipelineLayout& layout, std::span<const vk::Format> attachments,
-             const GpuBuffer& frame);
+             const GpuBuffer& frame, bool physical_sky);
+
+    // Tables of the physical sky; readable by shaders.
+    void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
 
     // What following draws refer to. The textures are made when the first billboard is.
     void use_clouds(const GpuDevice& gpu, std::span<const shader::PuffCloud> clouds);
@@ -28,6 +31,7 @@ class PuffPass {
 
   private:
     const PipelineLayout* layout_;
+    bool physical_sky_;
     vk::raii::Pipeline pipeline_, without_depth_;
     vk::raii::Sampler sampler_;
     Bindings bindings_;

@@ -15,6 +15,8 @@
 #include "render/processor_light.h"
 #include "render/processor_view.h"
 #include "render/renderer_test_access.h"
+#include "render/sky_image.h"
+#include "render/sky_light.h"
 #include "render/view_pass.h"
 #include "render/view_tiles.h"
 #include "render/voxel_absorption.h"
@@ -66,6 +68,17 @@ GpuImage upload_attenuation(const GpuDevice& gpu) {
     return image;
 }
 
+CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats) {
+    CloudHeights heights{cloud.base_m, cloud.top_m};
+    bool some = !cloud.visible.empty();
+    for (const BillboardCloud& each : splats.clouds) {
+        heights.base_m = some ? std::min(heights.base_m, each.base_m) : each.base_m;
+        heights.top_m = some ? std::max(heights.top_m, each.top_m) : each.top_m;
+        some = true;
+    }
+    return heights;
+}
+
 }  // namespace
 
 struct Renderer::Impl {
@@ -77,7 +90,7 @@ struct Renderer::Impl {
     // A part of the picture that is drawn at once.
     struct PartFrame {
         Tile tile;
-        shader::Frame frame;
+        PictureFrame frame;
     };
     void pass_sunlight(LitCloud& kept);
     void absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks, const RenderOptions& options);
@@ -88,6 +101,11 @@ struct Renderer::Impl {
                            const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
     void draw_on_device(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
                         const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
+    // The passes for the physical sky or the gradient, made when they are needed.
+    ViewTiles& tiles_under(const SkyLight* sky);
+    ViewPass& pass_under(const SkyLight* sky);
+    const GpuImage& image_of(const SkyLight& sky);
+    const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
     bool on_processor() const { return splatting == Splatting::processor; }
     LightTiles& light_on_device();
 
@@ -104,8 +122,11 @@ struct Renderer::Impl {
     // Made when they are needed.
     std::optional<GpuImage> attenuation;
     std::optional<LightTiles> light_tiles;
-    std::optional<ViewTiles> view_tiles;
-    std::optional<ViewPass> view_pass;
+    std::optional<ViewTiles> view_tiles[2];  // without and with the physical sky
+    std::optional<ViewPass> view_pass[2];
+    std::optional<SkyImage> sky_image;
+    SkyLights sky_lights;
+    const SkyLight* sky = nullptr;  // of the picture that is drawn; null: gradient
 };
 
 Renderer::Impl::Impl(const DeviceOptions& device_options)
@@ -201,12 +222,13 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
                                options.ground);
     }
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
+    sky = sky_of(splats, options);
     std::vector<PartFrame> parts;
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {
             const Tile tile{x, y, std::min(tile_size, picture.width - x),
                             std::min(tile_size, picture.height - y)};
-            parts.push_back({tile, frame_data(options, camera, lit.frame, flash, tile)});
+            parts.push_back({tile, frame_data(options, camera, lit.frame, flash, tile, sky)});
         }
     }
     if (order.puffs.empty() && on_processor())
@@ -238,6 +260,7 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
     }
     ground.shadow = lit.shadow.data();  // the mirrored view may have completed it
     ground.shadow_size = lit.shadow_size;
+    ground.sky = sky_of(splats, options);  // the mirrored view has another
     draw_wet_ground(ground, picture);
     return picture;
 }
@@ -267,15 +290,41 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
     if (on_processor() && map_on_device != lit.key) put_map_on_device();
     const GpuImage& map = light_on_device().shadow_map();
     if (order.puffs.empty() && splatting == Splatting::tiles) {
-        if (!view_tiles) view_tiles.emplace(gpu, layout, attenuation_on_device(), clamped);
-        view_tiles->use_shadow_map(gpu, map, white_beyond);
+        ViewTiles& tiles = tiles_under(sky);
+        tiles.use_shadow_map(gpu, map, white_beyond);
         for (const PartFrame& part : parts)
-            view_tiles->draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
+            tiles.draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
         return;
     }
-    if (!view_pass) view_pass.emplace(gpu, layout, attenuation_on_device(), clamped);
-    view_pass->use_shadow_map(gpu, map, white_beyond);
-    for (const PartFrame& part : parts) view_pass->draw_tile(gpu, part.frame, part.tile, order, picture);
+    ViewPass& pass = pass_under(sky);
+    pass.use_shadow_map(gpu, map, white_beyond);
+    for (const PartFrame& part : parts) pass.draw_tile(gpu, part.frame, part.tile, order, picture);
+}
+
+// Null: gradient. Until the next call.
+const SkyLight* Renderer::Impl::sky_of(const Splats& splats, const RenderOptions& options) {
+    if (options.atmosphere.model == AirModel::gradient) return nullptr;
+    return &sky_lights.at(options, heights_of(lit.cloud, splats));
+}
+
+ViewTiles& Renderer::Impl::tiles_under(const SkyLight* light) {
+    std::optional<ViewTiles>& tiles = view_tiles[light != nullptr ? 1 : 0];
+    if (!tiles) tiles.emplace(gpu, layout, attenuation_on_device(), clamped, light != nullptr);
+    if (light != nullptr) tiles->use_sky(gpu, image_of(*light), clamped);
+    return *tiles;
+}
+
+ViewPass& Renderer::Impl::pass_under(const SkyLight* light) {
+    std::optional<ViewPass>& pass = view_pass[light != nullptr ? 1 : 0];
+    if (!pass) pass.emplace(gpu, layout, attenuation_on_device(), clamped, light != nullptr);
+    if (light != nullptr) pass->use_sky(gpu, image_of(*light), clamped);
+    return *pass;
+}
+
+const GpuImage& Renderer::Impl::image_of(const SkyLight& light) {
+    if (!sky_image) sky_image.emplace(gpu);
+    sky_image->use(gpu, light);
+    return sky_image->image();
 }
 
 Renderer::Renderer(const DeviceOptions& options) {

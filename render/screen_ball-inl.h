@@ -40,7 +40,7 @@ struct BallColumns {
     HWY_ALIGN float x[kMaxLanes], y[kMaxLanes], z[kMaxLanes], radius[kMaxLanes], least_radius[kMaxLanes],
         depth_scale[kMaxLanes], light[kMaxLanes], height[kMaxLanes], flash[kMaxLanes];
 
-    BallColumns(std::span<const shader::ViewBall> balls, const shader::Frame& frame) {
+    BallColumns(std::span<const shader::ViewBall> balls, const PictureFrame& frame) {
         const std::size_t lanes = hn::Lanes(Lanes());
         for (std::size_t lane = 0; lane < lanes; ++lane) {
             const shader::ViewBall& ball = balls[std::min(lane, balls.size() - 1)];
@@ -65,7 +65,7 @@ struct Scattered {
 };
 
 HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& centre, Floats distance,
-                                     const shader::Frame& frame) {
+                                     const PictureFrame& frame) {
     const Lanes d;
     const Floats light = hn::Load(d, ball.light), one = set(1.0f);
     Floats multiple = light;  // T: light falls off in proportion to the way, to nothing
@@ -75,7 +75,7 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
     }
     multiple = hn::Mul(set(frame.sunlight.w), multiple);
     const Floats height = hn::Load(d, ball.height), albedo = set(frame.ambient_top.w);
-    const Floats3 sunlight = set3(frame.sunlight);
+    const Floats3 sunlight = sunlight_at(frame, centre.z);
     Floats3 arriving = times_add(
         multiple, sunlight, mix(set3(frame.ambient_base), set3(frame.ambient_top), {height, height, height}));
     if (frame.flash.w > 0) {
@@ -90,7 +90,7 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
             each_times(times(hn::Mul(hn::Mul(albedo, set(shader::kPi)), light), beta), sunlight)};
 }
 
-HWY_INLINE Floats phase_along(const shader::Frame& frame, const Floats3& ray) {
+HWY_INLINE Floats phase_along(const PictureFrame& frame, const Floats3& ray) {
     return phase_function(dot(set3(frame.to_sun), ray), frame.to_sun.w);
 }
 
@@ -123,7 +123,7 @@ struct BallSizes {
 
 // The shapes of a vector of balls: `screen` gets up to one a lane, `exact` those that are not fitted, whose
 // numbers begin with `number`.
-inline void shape_vector(std::span<const shader::ViewBall> balls, const shader::Frame& frame,
+inline void shape_vector(std::span<const shader::ViewBall> balls, const PictureFrame& frame,
                          ScreenBall* screen, ExactBall* exact, std::uint32_t number) {
     const Lanes d;
     const BallColumns ball(balls, frame);
@@ -175,7 +175,7 @@ inline void shape_vector(std::span<const shader::ViewBall> balls, const shader::
 }
 
 // `number`: of the first of these balls that is not fitted.
-inline void shape_balls(std::span<const shader::ViewBall> balls, const shader::Frame& frame,
+inline void shape_balls(std::span<const shader::ViewBall> balls, const PictureFrame& frame,
                         ScreenBall* screen, ExactBall* exact, std::uint32_t number) {
     const std::size_t lanes = hn::Lanes(Lanes());
     for (std::size_t begin = 0; begin < balls.size(); begin += lanes) {
@@ -186,7 +186,7 @@ inline void shape_balls(std::span<const shader::ViewBall> balls, const shader::F
 }
 
 // The light of some balls that have their shapes: `screen` has one for each of `balls`.
-inline void light_balls(std::span<const shader::ViewBall> balls, const shader::Frame& frame,
+inline void light_balls(std::span<const shader::ViewBall> balls, const PictureFrame& frame,
                         ScreenBall* const* screen, ExactBall* exact) {
     const Lanes d;
     const std::size_t lanes = hn::Lanes(d);

@@ -15,23 +15,29 @@ constexpr std::array kFormats{vk::Format::eR32G32B32A32Sfloat, vk::Format::eR32S
 }  // namespace
 
 ViewPass::ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-                   const vk::raii::Sampler& sampler)
+                   const vk::raii::Sampler& sampler, bool physical_sky)
     : layout_(&layout),
       background_(create_graphics_pipeline(gpu, layout, shaders().background_vert, shaders().background_frag,
-                                           kFormats, Blend::none)),
+                                           kFormats, Blend::none, {false, physical_sky})),
       splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert, shaders().view_splat_frag,
-                                      kFormats, Blend::over)),
+                                      kFormats, Blend::over, {false, physical_sky})),
       integrated_splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert,
-                                                 shaders().view_splat_frag, kFormats, Blend::over, true)),
+                                                 shaders().view_splat_frag, kFormats, Blend::over,
+                                                 {true, physical_sky})),
       bindings_(create_bindings(gpu, layout)),
       frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
       balls_(create_buffer(gpu, kBatch * sizeof(shader::ViewBall), vk::BufferUsageFlagBits::eStorageBuffer,
                            HostAccess::write)),
-      puffs_(gpu, layout, kFormats, frame_) {
+      puffs_(gpu, layout, kFormats, frame_, physical_sky) {
     bind_buffer(gpu, bindings_, 0, frame_);
     bind_buffer(gpu, bindings_, 1, balls_);
-    bind_image(gpu, bindings_, 3, attenuation, sampler);
+    for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
+}
+
+void ViewPass::use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler) {
+    bind_image(gpu, bindings_, 11, tables, sampler);
+    puffs_.use_sky(gpu, tables, sampler);
 }
 
 void ViewPass::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler) {

@@ -20,8 +20,10 @@ void store_tile(const float* radiance, const float* depth, const Tile& tile, Pic
 class ViewPass {
   public:
     ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-             const vk::raii::Sampler& sampler);
+             const vk::raii::Sampler& sampler, bool physical_sky);
 
+    // Tables of the physical sky; readable by shaders.
+    void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
     // The map that the ground wears; in the layout GENERAL and readable by fragment shaders.
     void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
 

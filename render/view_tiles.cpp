@@ -17,15 +17,20 @@ constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of the tiles' list
 }  // namespace
 
 ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-                     const vk::raii::Sampler& sampler)
+                     const vk::raii::Sampler& sampler, bool physical_sky)
     : layout_(&layout),
-      project_(create_compute_pipeline(gpu, layout, shaders().view_project_comp)),
-      finish_(create_compute_pipeline(gpu, layout, shaders().view_finish_comp)),
+      physical_sky_(physical_sky),
+      project_(create_compute_pipeline(gpu, layout, shaders().view_project_comp, {false, physical_sky})),
+      finish_(create_compute_pipeline(gpu, layout, shaders().view_finish_comp, {false, physical_sky})),
       bindings_(create_bindings(gpu, layout)),
       frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)) {
     bind_buffer(gpu, bindings_, 0, frame_);
-    bind_image(gpu, bindings_, 3, attenuation, sampler);
+    for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
+}
+
+void ViewTiles::use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler) {
+    bind_image(gpu, bindings_, 11, tables, sampler);
 }
 
 void ViewTiles::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler) {
@@ -35,8 +40,8 @@ void ViewTiles::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const 
 const vk::raii::Pipeline& ViewTiles::tiles_for(const GpuDevice& gpu, const EyeOrder& order) {
     vk::raii::Pipeline& pipeline = tiles_[order.all_fitted ? 0 : 1][order.depth ? 1 : 0];
     if (!*pipeline)
-        pipeline =
-            create_tile_pipeline(gpu, *layout_, shaders().view_tiles_comp, {!order.all_fitted, order.depth});
+        pipeline = create_tile_pipeline(gpu, *layout_, shaders().view_tiles_comp,
+                                        {!order.all_fitted, order.depth}, {false, physical_sky_});
     return pipeline;
 }
 

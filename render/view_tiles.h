@@ -18,8 +18,10 @@ class ViewTiles {
   public:
     // `attenuation` is not read, but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
     ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-              const vk::raii::Sampler& sampler);
+              const vk::raii::Sampler& sampler, bool physical_sky);
 
+    // Tables of the physical sky; readable by shaders.
+    void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
     // The map that the ground wears; in the layout GENERAL and readable by compute shaders.
     void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
 
@@ -33,6 +35,7 @@ class ViewTiles {
                     bool first, bool last);
 
     const PipelineLayout* layout_;
+    bool physical_sky_;
     vk::raii::Pipeline project_, finish_;
     // [some are not fitted][with distances]; made when they are needed.
     vk::raii::Pipeline tiles_[2][2] = {{nullptr, nullptr}, {nullptr, nullptr}};

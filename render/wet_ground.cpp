@@ -35,8 +35,8 @@ struct CoverTexels {
 // What all pixels share.
 struct GroundPass {
     const WetGroundOptions* look = nullptr;
-    decltype(frame_data({}, {}, {}, nullptr, {})) white;  // of ground with an albedo of 1
-    shader::vec4 dry;                                     // its albedo
+    PictureFrame white;  // of ground with an albedo of 1
+    shader::vec4 dry;    // its albedo
     const float* shadow = nullptr;
     int shadow_size = 0;
     CoverTexels cover;
@@ -317,7 +317,7 @@ void draw_wet_ground(const WetGround& ground, Picture& picture) {
     RenderOptions white = options;
     white.ground.albedo = {1, 1, 1};
     pass.white = frame_data(white, camera_frame(options.camera), picture.shadow_frame, ground.flash,
-                            {0, 0, picture.width, picture.height});
+                            {0, 0, picture.width, picture.height}, ground.sky);
     const Rgb& albedo = options.ground.albedo;
     pass.dry = {float(albedo[0]), float(albedo[1]), float(albedo[2]), 0};
     pass.shadow = ground.shadow;

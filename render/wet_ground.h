@@ -27,6 +27,7 @@
 #include "render/mirror_view.h"
 #include "render/options.h"
 #include "render/picture.h"
+#include "render/sky_light.h"
 
 namespace nephos {
 
@@ -59,6 +60,7 @@ struct WetGround {
     const MirrorView* mirror = nullptr;  // null: no reflections
     const float* shadow = nullptr;       // the map that the ground wears, known where the picture shows it
     int shadow_size = 0;
+    const SkyLight* sky = nullptr;  // of the picture; null: gradient
 };
 
 // Rows in parallel; the result does not depend on the number of threads.

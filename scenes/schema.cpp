@@ -194,6 +194,7 @@ const Section& scene_section() {
              group("light", light_section()),
              tables<&Scene::render, &RenderOptions::lightning>("lightning", lightning_section(), 0, 10'000),
              group("air", air_section()),
+             group("atmosphere", atmosphere_section()),
              group("ground", ground_section()),
              std::move(wet_ground),
              std::move(precipitation),

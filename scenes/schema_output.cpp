@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sections that decide what is made of the bits: density, frames and pictures.
 
+#include "render/sun_position.h"
 #include "scenes/schema_build.h"
 #include "scenes/schema_sections.h"
 #include "scenes/text.h"
@@ -54,6 +55,23 @@ void finish_camera(const SectionReader& reader, void* owner) {
                       "expected `position_m` and `target_m` to differ");
     }
     check_camera_path(reader, camera);
+}
+
+void finish_sun(const SectionReader& reader, void* owner) {
+    const Sun& sun = static_cast<const Scene*>(owner)->render.sun;
+    const bool with_date = !sun.date.empty(), with_time = !sun.time.empty();
+    if (with_date != with_time) {
+        const char* given = with_date ? "date" : "time";
+        reader.report(given, reader.quoted(given) + " stands alone", "expected `date` and `time` together");
+    } else if (with_date && !days_since_2000(sun.date, "00:00")) {
+        reader.report("date", reader.quoted("date") + " is \"" + shortened(sun.date) + "\"",
+                      "expected a day from 1900 to 2100 such as \"2026-06-21\"");
+    } else if (with_date && !days_since_2000(sun.date, sun.time)) {
+        reader.report("time", reader.quoted("time") + " is \"" + shortened(sun.time) + "\"",
+                      "expected a universal time such as \"18:30\" or \"18:30:15\"");
+    } else if (sun.moves && !with_date) {
+        reader.report("moves", "the sun moves, but nothing says from where", "expected `date` and `time`");
+    }
 }
 
 }  // namespace
@@ -144,10 +162,23 @@ const Section& sun_section() {
                                                             "Where it stands, clockwise from north."),
          render_key<&RenderOptions::sun, &Sun::colour>("colour", "", kLight,
                                                        "Its linear colour and strength.", "D, step 1"),
+         render_key<&RenderOptions::sun, &Sun::date>(
+             "date", "", kAny,
+             "Day such as \"2026-06-21\": the sun stands where it is seen from `latitude_deg` and "
+             "`longitude_deg` at that `time`, whatever `elevation_deg` and `azimuth_deg` say.",
+             "S; Michalsky 1988"),
+         render_key<&RenderOptions::sun, &Sun::time>(
+             "time", "", kAny, "Universal time such as \"18:30\" or \"18:30:15\", with `date`."),
+         render_key<&RenderOptions::sun, &Sun::latitude_deg>("latitude_deg", "deg", between(-90, 90),
+                                                             "Place for `date`; north is positive."),
+         render_key<&RenderOptions::sun, &Sun::longitude_deg>("longitude_deg", "deg", between(-180, 180),
+                                                              "Place for `date`; east is positive."),
+         render_key<&RenderOptions::sun, &Sun::moves>(
+             "moves", "", kAny, "Move the sun with simulated time, which begins at `date` and `time`."),
          render_key<&RenderOptions::shadow_map_size>(
              "shadow_map_size", "texels", between(16, 8192),
              "Side of the map of the clouds' shadow; larger is sharper.", "D, step 1")},
-        nullptr};
+        &finish_sun};
     return section;
 }
 

@@ -22,6 +22,7 @@ const Section& light_section();
 const Section& lightning_section();
 const Section& debug_view_section();
 const Section& air_section();
+const Section& atmosphere_section();
 const Section& ground_section();
 const Section& wet_ground_section();
 const Section& precipitation_section();

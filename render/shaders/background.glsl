@@ -1,10 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sky gradient, and the ground plane that wears the shadow map; needs ray.glsl and air.glsl.
+// Sky, and the ground plane that wears the shadow map; needs ray.glsl and air.glsl.
 
 layout(set = 0, binding = 4) uniform sampler2D shadow_map;
 
-// The air is thickest at the horizon: its colour falls off exponentially with height, and reaches zero at the zenith.
-vec3 sky(float height) {
+// The sun's disc: darker towards its limb, and with an edge as wide as a pixel.
+vec3 sun_disc(vec3 ray) {
+    vec3 apart = ray - frame.to_sun.xyz;
+    float angle = sqrt(dot(apart, apart));
+    float covered = clamp((kSunRadius - angle) * frame.up.w + 0.5, 0.0, 1.0) * frame.sun_disc.w;
+    float across = min(angle / kSunRadius, 1.0);
+    float cosine = sqrt(max(1.0 - across * across, 1.0e-4));
+    vec3 fade = exp(frame.sun_fade.rgb * clamp(apart.z, -kSunRadius, kSunRadius));
+    return covered * frame.sun_disc.rgb * fade * pow(vec3(cosine), vec3(kLimbDarkeningRed, kLimbDarkeningGreen, kLimbDarkeningBlue));
+}
+
+// Gradient: the air is thickest at the horizon; its colour falls off exponentially with height, and reaches zero at the
+// zenith. Below the horizon the sky is that of the horizon.
+vec3 sky(vec3 ray) {
+    float height = max(ray.z, 0.0);
+    if (kPhysicalSky) {
+        vec3 upwards = vec3(ray.xy, height);
+        return sky_scattered(upwards) + sun_disc(upwards);
+    }
     const float falloff = 4.0;
     float haze = (exp(-falloff * height) - exp(-falloff)) / (1.0 - exp(-falloff));
     return mix(frame.zenith.rgb, frame.horizon.rgb, haze);
@@ -25,5 +42,5 @@ vec3 ground(vec3 ray, float distance) {
 
 vec3 background(vec3 ray) {
     float distance = ground_distance(ray);
-    return distance < 1.0e30 ? ground(ray, distance) : sky(max(ray.z, 0.0));
+    return distance < 1.0e30 ? ground(ray, distance) : sky(ray);
 }

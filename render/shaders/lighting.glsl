@@ -18,14 +18,15 @@ Scattered scattered_light(ViewBall ball, float distance) {
     vec3 ray = vec3(ball.x, ball.y, ball.z) / max(distance, 1.0e-6);
     vec3 beta = air_transmittance(ray, distance);
     float albedo = frame.ambient_top.w;
-    vec3 arriving = frame.sunlight.rgb * multiple + ambient;
+    vec3 sunlight = sunlight_at(ball.z);
+    vec3 arriving = sunlight * multiple + ambient;
     vec3 way = frame.flash.xyz - vec3(ball.x, ball.y, ball.z);  // lightning; adds nothing in the dark
     float share = float(ball.flags >> 16) / 65535.0;
     arriving += frame.flash.w * flash_falloff(dot(way, way)) * share * frame.flash_colour.rgb;
     Scattered light;
     light.diffuse = beta * albedo * arriving + air_light(ray, beta);
     // A white surface facing the sun has radiance 1 here, 1 / pi of its irradiance: hence pi times the phase function.
-    light.direct = beta * albedo * kPi * ball.light * frame.sunlight.rgb;
+    light.direct = beta * albedo * kPi * ball.light * sunlight;
     return light;
 }
 

@@ -29,7 +29,7 @@ vec3 light_at(vec3 position, Puff puff, PuffCloud cloud) {
     vec3 outwards = offset / max(length(offset), 1.0e-6);
     vec2 absorbed = unpackUnorm2x16(puff.absorbed);
     float height = clamp((position.z - cloud.base) * cloud.inverse_height, 0.0, 1.0);
-    vec3 light = diffuse(frame.to_sun.xyz, outwards, frame.sunlight.rgb, absorbed.x) +
+    vec3 light = diffuse(frame.to_sun.xyz, outwards, sunlight_at(position.z), absorbed.x) +
                  mix(frame.ambient_base.rgb, frame.ambient_top.rgb, height);
     vec3 way = frame.flash.xyz - position;  // adds nothing in the dark; no branch, see lighting.glsl
     float squared = dot(way, way);

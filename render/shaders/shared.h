@@ -16,6 +16,7 @@ struct vec4 {
     float x = 0, y = 0, z = 0, w = 0;
 };
 using uint = std::uint32_t;
+using std::exp;
 using std::sqrt;
 #define NEPHOS_CONST inline constexpr
 #define NEPHOS_FUNCTION inline
@@ -37,9 +38,21 @@ NEPHOS_CONST uint kQueriesPerLane = 4u;
 NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
 NEPHOS_CONST float kMaxFittedDepth = 6.0f;    // depth scale; denser metaballs are integrated in the tiles
 NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance at which what lies behind is left out
-NEPHOS_CONST uint kIntegrate = 1u;  // flag: evaluate the integral along the ray, do not use the textures
-NEPHOS_CONST uint kNotFitted = 4u;  // flag: the tiles evaluate the integral, whatever the billboards do
-NEPHOS_CONST uint kAround = 2u;     // flag: around or close to the eye, covers the whole picture
+NEPHOS_CONST uint kIntegrate = 1u;    // flag: evaluate the integral along the ray, do not use the textures
+NEPHOS_CONST uint kNotFitted = 4u;    // flag: the tiles evaluate the integral, whatever the billboards do
+NEPHOS_CONST uint kAround = 2u;       // flag: around or close to the eye, covers the whole picture
+NEPHOS_CONST uint kSkyColumns = 64u;  // of the tables of the sky (atmosphere.h)
+NEPHOS_CONST uint kSkyRows = 96u;
+NEPHOS_CONST uint kSkyLayers = 3u;            // scattered, haze, and sunlight by altitude
+NEPHOS_CONST float kSunlightTop = 16000.0f;   // metres above the ground: sunlight changes no more
+NEPHOS_CONST float kSunRadius = 0.00462512f;  // radians
+// Radiance of the sun's disc falls off towards its limb as cosine^exponent; red, green, blue (near 680, 550
+// and 440 nm): D. Hestroffer and C. Magnan, "Wavelength dependency of the Solar limb darkening", 1998.
+NEPHOS_CONST float kLimbDarkeningRed = 0.397f;
+NEPHOS_CONST float kLimbDarkeningGreen = 0.503f;
+NEPHOS_CONST float kLimbDarkeningBlue = 0.652f;
+// Gradient sky: share of the air's light that is sunlight scattered straight towards the eye.
+NEPHOS_CONST float kAirSunShare = 0.5f;
 NEPHOS_CONST float kMinPuffPixels = 1.0f;  // smaller billboards of T are widened to this half size
 
 // A metaball as the eye sees it; 32 bytes.
@@ -141,11 +154,51 @@ struct Frame {
     vec4 flash;         // xyz: lightning relative to the eye; w: irradiance at 1 km, 0 = none
     vec4 flash_colour;  // rgb
     vec4 ground_flash;  // rgb: what it adds to ground 1 km below it
+    // The physical sky (air.glsl); zero with the gradient.
+    vec4 rayleigh;  // rgb: extinction by molecules per metre on the ground; w: 1 / height of the layer
+    vec4 haze;      // rgb: extinction by particles; w: likewise
+    vec4 air;       // eye's altitude above the ground, m; asymmetry and albedo of particles; 1 = physical sky
+    vec4 sun_disc;  // rgb: radiance of its middle; w: 1 = there is a disc
+    vec4 sun_fade;  // rgb: change of the logarithm of its radiance with the sine of the elevation
 };
 
 // Irradiance of lightning relative to that at 1 km.
 NEPHOS_FUNCTION float flash_falloff(float squared_distance_m) {
     return 1.0e6f / (squared_distance_m > 1.0e4f ? squared_distance_m : 1.0e4f);
+}
+
+// Where the tables of the sky have a direction, 0..1. Across: sine of half the azimuth from the sun's. Up,
+// from the sine of the elevation: q = 1 - sqrt(1 - sine), which is even around the zenith, and half of the
+// rows lie in the lowest quarter of q, where the sky changes fastest.
+NEPHOS_FUNCTION float sky_across(float cos_azimuth) {
+    float square = 0.5f - 0.5f * cos_azimuth;
+    return sqrt(square > 0.0f ? square : 0.0f);
+}
+NEPHOS_FUNCTION float sky_upwards(float sine) {
+    float rest = 1.0f - sine;
+    return sqrt(sine / (1.0f + sqrt(rest > 0.0f ? rest : 0.0f)));
+}
+
+// Integral of exp(-altitude / height) in metres along a ray over a flat Earth, from an altitude on, whose
+// sine of elevation is `slope`: exp(-altitude / height) distance (1 - exp(-x)) / x, x = slope distance /
+// height.
+NEPHOS_FUNCTION float layer_column(float altitude, float slope, float distance, float per_height) {
+    float x = slope * distance * per_height;
+    x = x > -80.0f ? x : -80.0f;
+    float near = 1.0f - x * (0.5f - x * (1.0f / 6.0f));
+    float share = x * x < 1.0e-4f ? near : (1.0f - exp(-x)) / (x * x < 1.0e-4f ? 1.0f : x);
+    return exp(-altitude * per_height) * distance * share;
+}
+
+// Phase functions of molecules (Rayleigh) and of particles (Cornette and Shanks 1992; Sapronov's F / 4 pi),
+// per steradian; each integrates to 1 over the sphere. cos_theta: as below.
+NEPHOS_FUNCTION float molecule_phase(float cos_theta) {
+    return 3.0f / (16.0f * kPi) * (1.0f + cos_theta * cos_theta);
+}
+NEPHOS_FUNCTION float particle_phase(float cos_theta, float g) {
+    float base = 1.0f + g * g - 2.0f * g * cos_theta;
+    return 3.0f / (8.0f * kPi) * (1.0f - g * g) * (1.0f + cos_theta * cos_theta) /
+           ((2.0f + g * g) * base * sqrt(base));
 }
 
 // The field of a metaball with u = 1 - a^2 is f = u^2 (5 + 4 u) / 9. Along a line at distance b from the
@@ -207,8 +260,8 @@ static_assert(sizeof(LightQuery) == 16 && sizeof(LightItem) == 16);
 static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 32);
 static_assert(sizeof(Puff) == 32 && offsetof(Puff, half_size) == 12 && offsetof(Puff, cloud) == 28);
 static_assert(sizeof(PuffCloud) == 32 && offsetof(PuffCloud, inverse_height) == 16);
-static_assert(sizeof(Frame) == 19 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
-              offsetof(Frame, flash_colour) == 272);
+static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
+              offsetof(Frame, flash_colour) == 272 && offsetof(Frame, sun_fade) == 368);
 
 }  // namespace nephos::shader
 #endif

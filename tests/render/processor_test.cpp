@@ -36,7 +36,7 @@ Drawn draw(const MetaballCloud& cloud, const RenderOptions& options, const Batch
         order_from_eye(prepared, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
     set_light(eye, {drawn.light, {}});
     const Tile whole{0, 0, picture.width, picture.height};
-    const shader::Frame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);
+    const PictureFrame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);
     view_by_processor(options, camera, frame, whole, eye, picture, limits);
     return drawn;
 }

@@ -65,6 +65,7 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"camera"}), member_count<Camera>());
     EXPECT_EQ(keys_at({"light"}), member_count<CloudLight>());
     EXPECT_EQ(keys_at({"air"}), member_count<Air>());
+    EXPECT_EQ(keys_at({"atmosphere"}), member_count<AtmosphereOptions>());
     EXPECT_EQ(keys_at({"ground"}), member_count<Ground>());
     EXPECT_EQ(keys_at({"wet_ground"}), member_count<GroundCoverOptions>() + member_count<WetGroundOptions>());
     EXPECT_EQ(keys_at({"lightning"}), member_count<LightningFlash>());
@@ -73,7 +74,7 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 1);
     EXPECT_EQ(keys_at({"precipitation"}), member_count<PrecipitationOptions>());
     EXPECT_EQ(keys_at({"camera", "path"}), member_count<CameraKey>());
-    EXPECT_EQ(member_count<RenderOptions>(), 10u);
+    EXPECT_EQ(member_count<RenderOptions>(), 11u);
     EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());
@@ -282,6 +283,11 @@ bool is_reference(const std::string& path) {
            path.ends_with("/model") || path.ends_with("/initial_state");
 }
 
+// What must fit its neighbours.
+bool is_moment(const std::string& path) {
+    return path == "/sun/date" || path == "/sun/time" || path == "/sun/moves";
+}
+
 // Every value, changed alone, is written, read back as it was, and seen by the hash; and no two keys share a
 // value.
 void expect_own_values(Scene (*make)(), std::size_t at_least) {
@@ -303,7 +309,7 @@ void expect_own_values(Scene (*make)(), std::size_t at_least) {
                         });
         const std::string text = to_toml(scene);
         EXPECT_TRUE(hashes.insert(scene_hash(scene)).second) << "the hash does not see it";
-        if (make != &full_scene && is_reference(wanted)) continue;
+        if (is_moment(wanted) || (make != &full_scene && is_reference(wanted))) continue;
         EXPECT_EQ(read_scene_text(text, "again.toml"), scene) << text;
         EXPECT_EQ(to_toml(read_scene_text(text, "again.toml")), text);
     }

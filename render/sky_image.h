@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The tables of the sky on the device. Private to the module.
+
+#include "render/gpu_resources.h"
+#include "render/sky_light.h"
+
+namespace nephos {
+
+class SkyImage {
+  public:
+    explicit SkyImage(const GpuDevice& gpu);
+    // Copies the tables unless they are there already.
+    void use(const GpuDevice& gpu, const SkyLight& light);
+    const GpuImage& image() const { return image_; }  // readable by shaders
+
+  private:
+    GpuImage image_;
+    GpuBuffer staging_;
+    std::uint64_t serial_ = 0;
+};
+
+}  // namespace nephos

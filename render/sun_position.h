@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Where the sun stands at a place on the Earth at a moment. Low precision: within 0.01 degrees (without
+// refraction) from 1950 to 2050: J. J. Michalsky, "The Astronomical
+// Almanac's algorithm for approximate solar position (1950-2050)", Solar Energy 40, 1988.
+
+#include <chrono>
+#include <optional>
+#include <string_view>
+
+namespace nephos {
+
+namespace sun_text {
+
+// So many digits and nothing else.
+inline std::optional<int> digits(std::string_view text, std::size_t count) {
+    if (text.size() != count) return {};
+    int value = 0;
+    for (const char c : text) {
+        if (c < '0' || c > '9') return {};
+        value = 10 * value + (c - '0');
+    }
+    return value;
+}
+
+inline std::optional<double> day_share(std::string_view time) {
+    if (time.size() != 5 && time.size() != 8) return {};
+    const auto hour = digits(time.substr(0, 2), 2), minute = digits(time.substr(3, 2), 2),
+               second = time.size() == 8 ? digits(time.substr(6), 2) : std::optional(0);
+    const bool marks = time[2] == ':' && (time.size() == 5 || time[5] == ':');
+    if (!marks || !hour || !minute || !second || *hour > 23 || *minute > 59 || *second > 59) return {};
+    return (*hour + (*minute + *second / 60.0) / 60.0) / 24.0;
+}
+
+}  // namespace sun_text
+
+// Universal time, in days since 2000-01-01 12:00 (Julian date - 2451545).
+// Texts are "2026-06-21" (years 1900..2100) and "18:30" or "18:30:15"; empty when they are not such a moment.
+// In the header: scenes are checked without this module's library.
+inline std::optional<double> days_since_2000(std::string_view date, std::string_view time) {
+    using namespace std::chrono;
+    using namespace sun_text;
+    if (date.size() != 10 || date[4] != '-' || date[7] != '-') return {};
+    const auto y = digits(date.substr(0, 4), 4), m = digits(date.substr(5, 2), 2),
+               d = digits(date.substr(8), 2);
+    const std::optional<double> share = day_share(time);
+    if (!y || !m || !d || !share || *y < 1900 || *y > 2100) return {};
+    const year_month_day day{year(*y), month(unsigned(*m)), std::chrono::day(unsigned(*d))};
+    if (!day.ok()) return {};
+    const auto days = sys_days(day) - sys_days(year(2000) / 1 / 1);
+    return double(days.count()) + *share - 0.5;
+}
+
+struct SunPosition {
+    double elevation_deg = 0;  // of the disc's middle above the horizon, without refraction
+    double azimuth_deg = 0;    // clockwise from north, 0..360
+};
+
+// Latitude: -90..90, north is positive. Longitude: -180..180, east is positive.
+SunPosition sun_position(double days_since_2000, double latitude_deg, double longitude_deg);
+
+}  // namespace nephos
