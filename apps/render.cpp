@@ -153,7 +153,7 @@ RenderOptions picture_options(const RenderArguments& a, const std::optional<Scen
         options.sun.time.clear();
     }
     if (a.albedo) options.light.albedo = *a.albedo;
-    if (a.g) options.light.g = *a.g;
+    if (a.g) options.light.phase.g = *a.g;
     if (!scene) frame(options.camera, box, a.view, options.ground.height_m);
     if (a.camera_m) options.camera.position_m = *a.camera_m;
     if (a.target_m) options.camera.target_m = *a.target_m;

@@ -292,7 +292,7 @@ void set_light(EyeOrder& order, const MetaballLight& light) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.balls.size(), 8192), [&](const auto& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
             shader::ViewBall& ball = order.balls[i];
-            ball.light = light.sun[order.source[i]];
+            ball.sun_depth = light.sun[order.source[i]];
             if (!light.flash.empty())
                 ball.flags = (ball.flags & 0xffffu) | unorm16(light.flash[order.source[i]]) << 16;
         }

@@ -43,7 +43,7 @@ struct EyeOrder {
 
 // The light of each of cloud.visible.
 struct MetaballLight {
-    std::span<const float> sun;    // as the view pass takes it
+    std::span<const float> sun;    // optical depth, as shader::ViewBall::sun_depth
     std::span<const float> flash;  // share of the lightning that arrives, 0..1; empty without
 };
 

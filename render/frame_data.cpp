@@ -25,9 +25,9 @@ shader::vec4 shadow_row(const Vec3& axis, const ShadowFrame& shadow, const Vec3&
 void use_sky(const RenderOptions& options, const SkyLight& sky, PictureFrame& frame) {
     const AtmosphereModel& air = sky.model;
     frame.sky = sky.texels.data();
-    frame.sunlight = to_vec4(sky.ground_sun, 1.0, options.light.multiple_scattering);
+    frame.sunlight = to_vec4(sky.ground_sun, 1.0, 0);
     frame.ambient_top = to_vec4(sky.ambient_top, 1.0, frame.ambient_top.w);
-    frame.ambient_base = to_vec4(sky.ambient_base, 1.0, frame.ambient_base.w);
+    frame.ambient_base = to_vec4(sky.ambient_base, 1.0, 0);
     frame.rayleigh = to_vec4(air.rayleigh_per_m, 1.0, 1.0 / air.rayleigh_height_m);
     const double haze = air.mie_extinction_per_m;
     frame.haze = to_vec4(Rgb{haze, haze, haze}, 1.0, 1.0 / air.mie_height_m);
@@ -85,15 +85,11 @@ PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera,
     frame.tile = {float(width / tile.width), float(height / tile.height),
                   float((width - 2.0 * tile.x - tile.width) / tile.width),
                   float((height - 2.0 * tile.y - tile.height) / tile.height)};
-    frame.to_sun = to_vec4(to_sun, light.g);
-    frame.sunlight = to_vec4(options.sun.colour, day.sun, light.multiple_scattering);
+    frame.to_sun = to_vec4(to_sun, 0);
+    frame.sunlight = to_vec4(options.sun.colour, day.sun, 0);
     frame.ambient_top = to_vec4(light.ambient_top, day.sky, light.albedo);
-    // Diffusion through a slab of optical depth tau lets 1 / (1 + 3/4 (1 - g) tau) through when nothing is
-    // absorbed. A cloud is no slab and loses light through its sides as well: twice the decay shows its
-    // relief.
-    frame.ambient_base = to_vec4(light.ambient_base, day.sky, 1.5 * (1.0 - light.g));
-    frame.air_extinction =
-        to_vec4(options.air.extinction_per_m, 1.0, light.lighting == Lighting::cfa ? 1.0 : 0.0);
+    frame.ambient_base = to_vec4(light.ambient_base, day.sky, 0);
+    frame.air_extinction = to_vec4(options.air.extinction_per_m, 1.0, 0);
     frame.horizon = to_vec4(options.air.horizon, day.sky, 0);
     frame.zenith = to_vec4(options.air.zenith, day.sky, 0);
 

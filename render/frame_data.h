@@ -31,7 +31,8 @@ Daylight daylight(double sun_elevation_deg);
 
 // A frame with what is in images on the device.
 struct PictureFrame : shader::Frame {
-    const float* sky = nullptr;  // SkyLight::texels; null: gradient
+    const float* sky = nullptr;         // SkyLight::texels; null: gradient
+    const float* scattering = nullptr;  // scattering_table.h, for metaballs on the processor
 };
 
 // `flash` is null in the dark, `sky` with AirModel::gradient; the latter must outlive the frame.

@@ -80,6 +80,7 @@ PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
         vk::DescriptorSetLayoutBinding(9, Type::eStorageBuffer, 1, Stage::eCompute),
         vk::DescriptorSetLayoutBinding(10, Type::eStorageImage, 1, Stage::eCompute),
         vk::DescriptorSetLayoutBinding(11, Type::eCombinedImageSampler, 1, all),
+        vk::DescriptorSetLayoutBinding(12, Type::eStorageBuffer, 1, all),
     };
     PipelineLayout result;
     result.set = vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
@@ -179,7 +180,7 @@ void compute_barrier(const vk::raii::CommandBuffer& commands) {
 
 Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
     const std::array sizes{vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, 1),
-                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, 7),
+                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, 8),
                            vk::DescriptorPoolSize(vk::DescriptorType::eCombinedImageSampler, 3),
                            vk::DescriptorPoolSize(vk::DescriptorType::eStorageImage, 1)};
     Bindings bindings;

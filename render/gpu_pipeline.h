@@ -10,6 +10,7 @@
 //     4  shadow map, to be sampled                       9  storage  distance, or places along the light
 //                                                       10  shadow map, to be written
 //                                                       11  tables of the sky, to be sampled (array)
+//                                                       12  storage  scattering table
 //
 // All samplers of a set must be bound before a draw, used or not: lavapipe looks at them.
 //

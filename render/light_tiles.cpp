@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <span>
 
@@ -154,10 +153,9 @@ std::vector<float> LightTiles::run(const GpuDevice& gpu, const SunOrder& order, 
 
     shadow.resize(std::size_t(shadow_size) * std::size_t(shadow_size));
     std::memcpy(shadow.data(), depths_.mapped, shadow.size() * sizeof(float));
-    std::vector<float> light(order.splats.size());
-    for (std::size_t i = 0; i < light.size(); ++i)
-        light[queries.source[i]] = std::exp(-queries.queries[i].depth);
-    return light;
+    std::vector<float> depths(order.splats.size());
+    for (std::size_t i = 0; i < depths.size(); ++i) depths[queries.source[i]] = queries.queries[i].depth;
+    return depths;
 }
 
 }  // namespace nephos

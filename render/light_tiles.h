@@ -27,8 +27,8 @@ class LightTiles {
     LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
                const vk::raii::Sampler& sampler);
 
-    // Leaves the shadow map in shadow_map() and `shadow` and returns the light at the centres, in the order
-    // of `order`.
+    // Leaves the shadow map in shadow_map() and `shadow` and returns the optical depth between each
+    // centre and the sun, in the order of `order`.
     std::vector<float> run(const GpuDevice& gpu, const SunOrder& order, int shadow_size,
                            std::vector<float>& shadow);
 

@@ -66,9 +66,9 @@ void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions&
     kept.key = key;
     kept.frame = shadow_frame(kept.cloud, direction_to_sun(options.sun), options.shadow_map_size);
     const TileGrid grid{options.shadow_map_size, options.shadow_map_size};
-    kept.light.assign(kept.cloud.visible.size(), 1.0f);
+    kept.sun_depths.assign(kept.cloud.visible.size(), 0.0f);
     kept.shadow.assign(std::size_t(grid.width) * std::size_t(grid.height), 1.0f);
-    kept.known_light.assign(kept.light.size(), 0);
+    kept.known_light.assign(kept.sun_depths.size(), 0);
     kept.known_tiles.assign(grid.tiles(), 0);
     kept.all_known = kept.cloud.visible.empty();  // the map is white
     kept.drawn_again = false;
@@ -79,7 +79,7 @@ bool light_seen(LitCloud& kept, const std::vector<std::uint32_t>& source,
                 const std::vector<std::uint8_t>* seen_balls, const std::vector<std::uint8_t>* seen_tiles,
                 StageTimes* times) {
     if (kept.all_known) return false;
-    std::vector<std::uint8_t> balls(kept.light.size(), seen_balls == nullptr ? 1 : 0);
+    std::vector<std::uint8_t> balls(kept.sun_depths.size(), seen_balls == nullptr ? 1 : 0);
     std::vector<std::uint8_t> tiles(kept.known_tiles.size(), 1);
     if (seen_balls != nullptr) {
         for (std::size_t i = 0; i < source.size(); ++i) balls[source[i]] = (*seen_balls)[i];
@@ -102,10 +102,10 @@ bool light_seen(LitCloud& kept, const std::vector<std::uint32_t>& source,
     }
     std::vector<std::uint8_t> centres(order.source.size());
     for (std::size_t i = 0; i < centres.size(); ++i) centres[i] = balls[order.source[i]];
-    std::vector<float> light;
-    light_by_processor(order, kept.shadow_size, {centres, tiles}, light, kept.shadow, {}, times);
+    std::vector<float> depths;
+    light_by_processor(order, kept.shadow_size, {centres, tiles}, depths, kept.shadow, {}, times);
     for (std::size_t i = 0; i < centres.size(); ++i)
-        if (centres[i] != 0) kept.light[order.source[i]] = light[i];
+        if (centres[i] != 0) kept.sun_depths[order.source[i]] = depths[i];
     return true;
 }
 

@@ -25,9 +25,9 @@ struct LitCloud {
     PreparedCloud cloud;
     ShadowFrame frame;
     int shadow_size = 0;
-    std::vector<float> light;               // one for each of cloud.visible
+    std::vector<float> sun_depths;          // optical depth to the sun, one for each of cloud.visible
     std::vector<float> shadow;              // texels of the shadow map
-    std::vector<std::uint8_t> known_light;  // of `light`; 1 = computed
+    std::vector<std::uint8_t> known_light;  // of `sun_depths`; 1 = computed
     std::vector<std::uint8_t> known_tiles;  // of `shadow`, one a tile
     bool all_known = false;
     bool drawn_again = false;  // this is not the first picture of the cloud

@@ -73,7 +73,13 @@ void check(const RenderOptions& options) {
     require(within(options.sun.longitude_deg, -180, 180), "sun.longitude_deg", "-180..180 degrees");
     const CloudLight& light = options.light;
     require(within(light.albedo, 0, 1), "light.albedo", "0..1");
-    require(within(light.g, -0.99, 0.99), "light.g", "-0.99..0.99");
+    require(within(light.phase.g, -0.99, 0.99), "light.g", "-0.99..0.99");
+    require(within(light.phase.droplet_diameter_um, kMinDroplet_um, kMaxDroplet_um),
+            "light.droplet_diameter_um", "5..50 micrometres");
+    require(within(light.octaves.count, 1, 8), "light.octaves.count", "1..8");
+    require(within(light.octaves.scattering, 0, 1), "light.octaves.scattering", "0..1");
+    require(within(light.octaves.extinction, 0, 1), "light.octaves.extinction", "0..1");
+    require(within(light.octaves.asymmetry, 0, 1), "light.octaves.asymmetry", "0..1");
     require(within(light.multiple_scattering, 0, 10), "light.multiple_scattering", "0..10");
     check_colour(light.ambient_top, "light.ambient_top");
     check_colour(light.ambient_base, "light.ambient_base");

@@ -14,7 +14,9 @@
 #include "automaton/lattice.h"
 #include "render/atmosphere_options.h"
 #include "render/camera_path.h"
+#include "render/phase_function.h"
 #include "render/precipitation_options.h"
+#include "render/scattering_options.h"
 #include "render/wet_ground_options.h"
 
 namespace nephos {
@@ -62,9 +64,10 @@ enum class Lighting {
 // has a radiance of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
     double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker
-    // Henyey-Greenstein asymmetry, -0.99..0.99. Forward is > 0: brighter rims against the sun, and sunlight
-    // that reaches deeper.
-    double g = 0.5;
+    // Forward (g > 0): brighter rims against the sun, and sunlight that reaches deeper.
+    PhaseFunction phase;
+    MultipleScattering multiple = MultipleScattering::diffusion;
+    ScatteringOctaves octaves;
     // Strength of the sunlight that arrives after many scatterings, 0..10; it reaches far into a cloud, where
     // the direct beam does not. 0 = single scattering only, as in D: grey tops, dark bases.
     double multiple_scattering = 1.0;

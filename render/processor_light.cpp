@@ -43,10 +43,9 @@ struct LightCentres {
     std::span<float> depth;
 };
 
-// Optical depths beyond these count as these: they change no bit of what is seen, but end the sums. A texel
-// of the map has 4e-8 then; of the light at a centre the logarithm is taken (shaders/lighting.glsl), down to
-// a light of 1e-30.
-inline constexpr float kDarkTexel = 17.0f, kDarkCentre = 70.0f;
+// Optical depths beyond these count as these: they change nothing that is seen, but end the sums. A texel
+// of the map has 4e-8 then; light that was scattered often reaches deeper.
+inline constexpr float kDarkTexel = 17.0f, kDarkCentre = 1000.0f;
 inline constexpr std::size_t kAtOnce = 16;  // balls between two looks at the sums
 
 // One tile of the map.
@@ -308,7 +307,7 @@ void clear_map(LightSums& light) {
     }
 }
 
-// From optical depths to light.
+// From optical depths to the light of the map.
 void finish(LightSums& light) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, light.tiles.size(), 64), [&](const auto& range) {
         for (std::size_t t = range.begin(); t != range.end(); ++t) {
@@ -318,20 +317,16 @@ void finish(LightSums& light) {
             });
         }
     });
-    std::vector<float>& depth = light.centres.depth;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, depth.size(), 65536), [&](const auto& range) {
-        HWY_DYNAMIC_DISPATCH(to_transmittance)(depth.data() + range.begin(), range.size(), kDarkCentre);
-    });
 }
 
 }  // namespace
 
 void light_by_processor(const SunOrder& order, int shadow_size, const LightWanted& wanted,
-                        std::vector<float>& light, std::vector<float>& shadow, const BatchLimits& limits,
+                        std::vector<float>& depths, std::vector<float>& shadow, const BatchLimits& limits,
                         StageTimes* times) {
     const TileGrid grid{shadow_size, shadow_size};
     shadow.resize(std::size_t(shadow_size) * std::size_t(shadow_size), 1.0f);
-    light.resize(order.splats.size(), 1.0f);
+    depths.resize(order.splats.size(), 0.0f);
     std::optional<StageTimer> timer(std::in_place, times, DrawStage::sun_bins);
     const std::vector<PixelBox> boxes = light_boxes(order.splats);
     LightSums sums(order, grid, wanted, shadow);
@@ -352,7 +347,8 @@ void light_by_processor(const SunOrder& order, int shadow_size, const LightWante
     }
     finish(sums);
     const std::vector<std::uint32_t>& source = sums.centres.bins.list;
-    for (std::size_t i = 0; i < source.size(); ++i) light[source[i]] = sums.centres.depth[i];
+    for (std::size_t i = 0; i < source.size(); ++i)
+        depths[source[i]] = std::min(sums.centres.depth[i], kDarkCentre);
 }
 
 }  // namespace nephos

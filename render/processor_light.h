@@ -22,11 +22,12 @@ struct LightWanted {
     std::span<const std::uint8_t> map_tiles;  // one for each tile of the map: not 0 if wanted
 };
 
-// Fills what is wanted of `shadow`, shadow_size^2 texels, and of `light`, which has one for each of
+// Fills what is wanted of `shadow`, shadow_size^2 texels, and of `depths`, the optical depths between
+// centres and sun, which has one for each of
 // order.splats, and leaves the rest of both as it is. What one centre or texel gets has the same bits
 // whatever else is wanted.
 void light_by_processor(const SunOrder& order, int shadow_size, const LightWanted& wanted,
-                        std::vector<float>& light, std::vector<float>& shadow, const BatchLimits& limits = {},
-                        StageTimes* times = nullptr);
+                        std::vector<float>& depths, std::vector<float>& shadow,
+                        const BatchLimits& limits = {}, StageTimes* times = nullptr);
 
 }  // namespace nephos

@@ -2,6 +2,7 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <new>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "render/processor_light.h"
 #include "render/processor_view.h"
 #include "render/renderer_test_access.h"
+#include "render/scattering_table.h"
 #include "render/sky_image.h"
 #include "render/sky_light.h"
 #include "render/view_pass.h"
@@ -97,6 +99,7 @@ struct Renderer::Impl {
     std::vector<float> light_up(const Splats& splats, const RenderOptions& options, const EyeOrder& order,
                                 const SeenLight* seen);
     void put_map_on_device();
+    void use_scattering(const CloudLight& light);
     void draw_on_processor(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
                            const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
     void draw_on_device(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
@@ -121,6 +124,9 @@ struct Renderer::Impl {
     const GpuImage& attenuation_on_device();
     // Made when they are needed.
     std::optional<GpuImage> attenuation;
+    std::vector<float> scattering;  // table of `scattering_light`
+    CloudLight scattering_light;
+    GpuBuffer scattering_buffer;  // its copy on the device
     std::optional<LightTiles> light_tiles;
     std::optional<ViewTiles> view_tiles[2];  // without and with the physical sky
     std::optional<ViewPass> view_pass[2];
@@ -162,7 +168,7 @@ void Renderer::Impl::pass_sunlight(LitCloud& kept) {
         light_on_device().run(gpu, order, 16, small);
     } else {
         const std::vector<float> ordered = light_on_device().run(gpu, order, kept.shadow_size, kept.shadow);
-        for (std::size_t i = 0; i < ordered.size(); ++i) kept.light[order.source[i]] = ordered[i];
+        for (std::size_t i = 0; i < ordered.size(); ++i) kept.sun_depths[order.source[i]] = ordered[i];
     }
     kept.all_known = true;
     map_on_device = kept.key;
@@ -173,7 +179,8 @@ void Renderer::Impl::absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks
                                      const RenderOptions& options) {
     const double distance = options.light.light_distance_m;
     kept.shadow = shadow_by_absorption(blocks, kept.frame, kept.shadow_size, distance);
-    kept.light = light_by_absorption(kept.cloud, blocks, direction_to_sun(options.sun), distance);
+    kept.sun_depths = light_by_absorption(kept.cloud, blocks, direction_to_sun(options.sun), distance);
+    to_sun_depths(kept.sun_depths);
     kept.all_known = true;
 }
 
@@ -207,6 +214,16 @@ void Renderer::Impl::put_map_on_device() {
     map_on_device = lit.key;
 }
 
+// Makes the table anew when the light is another one.
+void Renderer::Impl::use_scattering(const CloudLight& light) {
+    if (!scattering.empty() && light == scattering_light) return;
+    scattering = scattering_table(light);
+    scattering_light = light;
+    const std::size_t bytes = scattering.size() * sizeof(float);
+    scattering_buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::write);
+    std::memcpy(scattering_buffer.mapped, scattering.data(), bytes);
+}
+
 Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options) {
     const CameraFrame camera = camera_frame(options.camera);
     Picture picture = blank_picture(options);
@@ -221,6 +238,7 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
         order = order_from_eye(lit.cloud, splats, camera, pixels_per_unit(options.camera, camera),
                                options.ground);
     }
+    use_scattering(options.light);
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     sky = sky_of(splats, options);
     std::vector<PartFrame> parts;
@@ -229,6 +247,7 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
             const Tile tile{x, y, std::min(tile_size, picture.width - x),
                             std::min(tile_size, picture.height - y)};
             parts.push_back({tile, frame_data(options, camera, lit.frame, flash, tile, sky)});
+            parts.back().frame.scattering = scattering.data();
         }
     }
     if (order.puffs.empty() && on_processor())
@@ -237,7 +256,8 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
         draw_on_device(splats, options, camera, parts, order, picture);
     if (splats.light) {
         picture.light.assign(splats.metaballs.metaballs.size(), 1.0f);
-        for (std::size_t i = 0; i < lit.light.size(); ++i) picture.light[lit.cloud.visible[i]] = lit.light[i];
+        for (std::size_t i = 0; i < lit.sun_depths.size(); ++i)
+            picture.light[lit.cloud.visible[i]] = std::exp(-lit.sun_depths[i]);
         picture.shadow = lit.shadow;
     }
     return picture;
@@ -278,7 +298,7 @@ void Renderer::Impl::draw_on_processor(const Splats& splats, const RenderOptions
     }
     const SeenLight* const known = seen ? &*seen : nullptr;
     const std::vector<float> lightning = light_up(splats, options, order, known);
-    set_light(order, {lit.light, lightning});
+    set_light(order, {lit.sun_depths, lightning});
     for (ProcessorView& view : views) view.draw(picture, lit.shadow.data(), lit.shadow_size, known);
 }
 
@@ -286,18 +306,20 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
                                     const CameraFrame& camera, const std::vector<PartFrame>& parts,
                                     EyeOrder& order, Picture& picture) {
     const std::vector<float> lightning = light_up(splats, options, order, nullptr);
-    set_light(order, {lit.light, lightning});
+    set_light(order, {lit.sun_depths, lightning});
     if (on_processor() && map_on_device != lit.key) put_map_on_device();
     const GpuImage& map = light_on_device().shadow_map();
     if (order.puffs.empty() && splatting == Splatting::tiles) {
         ViewTiles& tiles = tiles_under(sky);
         tiles.use_shadow_map(gpu, map, white_beyond);
+        tiles.use_scattering(gpu, scattering_buffer);
         for (const PartFrame& part : parts)
             tiles.draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
         return;
     }
     ViewPass& pass = pass_under(sky);
     pass.use_shadow_map(gpu, map, white_beyond);
+    pass.use_scattering(gpu, scattering_buffer);
     for (const PartFrame& part : parts) pass.draw_tile(gpu, part.frame, part.tile, order, picture);
 }
 

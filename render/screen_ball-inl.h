@@ -29,16 +29,60 @@ namespace nephos::HWY_NAMESPACE {
 
 inline constexpr std::size_t kMaxLanes = 2 * shader::kTileWidth;
 
-// Henyey-Greenstein (phase_function() of shaders/shared.h).
-HWY_INLINE Floats phase_function(Floats cosine, float g) {
-    const Floats base = hn::NegMulAdd(set(2.0f * g), cosine, set(1.0f + g * g));
-    return hn::Div(set((1.0f - g * g) / (4.0f * shader::kPi)), hn::Mul(base, hn::Sqrt(base)));
+// A place between two nodes of the scattering table.
+struct Between {
+    hn::Vec<hn::RebindToSigned<Lanes>> below;
+    Floats share;  // of the node above
+};
+
+HWY_INLINE Between between(Floats place, shader::uint nodes) {
+    const hn::RebindToSigned<Lanes> di;
+    const auto below = hn::Min(hn::ConvertTo(di, place), hn::Set(di, int(nodes) - 2));
+    return {below, hn::Sub(place, hn::ConvertTo(Lanes(), below))};
+}
+
+// scatter_column() and scatter_row() of shaders/shared.h.
+HWY_INLINE Between scatter_column(Floats cosine) {
+    const Floats off = hn::Max(hn::Sub(set(1.0f), hn::Abs(cosine)), hn::Zero(Lanes()));
+    const Floats v = hn::Mul(set(0.5f), hn::Sqrt(hn::Sqrt(off)));
+    const Floats place = hn::IfThenElse(hn::Lt(cosine, hn::Zero(Lanes())), hn::Sub(set(1.0f), v), v);
+    return between(hn::Mul(set(float(shader::kScatterAngles - 1)), place), shader::kScatterAngles);
+}
+
+HWY_INLINE Between scatter_row(Floats depth) {
+    constexpr float kPerE = shader::kScatterRowsPerDoubling * 1.442695041f;
+    const Floats row = hn::Mul(set(kPerE), hn::Log(Lanes(), hn::Add(set(1.0f), depth)));
+    return between(hn::Min(row, set(float(shader::kScatterDepths - 1))), shader::kScatterDepths);
+}
+
+// `first`: index of the row's first node.
+HWY_INLINE Floats scattering_at(const float* HWY_RESTRICT table, hn::Vec<hn::RebindToSigned<Lanes>> first,
+                                const Between& angle) {
+    const auto at = hn::Add(first, angle.below);
+    const Floats a = hn::GatherIndex(Lanes(), table, at), b = hn::GatherIndex(Lanes(), table + 1, at);
+    return hn::MulAdd(angle.share, hn::Sub(b, a), a);
+}
+
+// Pi times the phase function of the cosine (shaders/lighting.glsl).
+HWY_INLINE Floats scattered_once(const PictureFrame& frame, Floats cosine) {
+    const hn::RebindToSigned<Lanes> di;
+    return scattering_at(frame.scattering, hn::Zero(di), scatter_column(cosine));
+}
+
+HWY_INLINE Floats scattered_often(const PictureFrame& frame, const Floats3& ray, Floats sun_depth) {
+    const hn::RebindToSigned<Lanes> di;
+    const Between column = scatter_column(dot(set3(frame.to_sun), ray)), row = scatter_row(sun_depth);
+    const auto angles = hn::Set(di, int(shader::kScatterAngles));
+    const auto first = hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles);
+    const Floats a = scattering_at(frame.scattering, first, column),
+                 b = scattering_at(frame.scattering, hn::Add(first, angles), column);
+    return hn::MulAdd(row.share, hn::Sub(b, a), a);
 }
 
 // Balls of one vector, turned from rows into columns.
 struct BallColumns {
     HWY_ALIGN float x[kMaxLanes], y[kMaxLanes], z[kMaxLanes], radius[kMaxLanes], least_radius[kMaxLanes],
-        depth_scale[kMaxLanes], light[kMaxLanes], height[kMaxLanes], flash[kMaxLanes];
+        depth_scale[kMaxLanes], sun_depth[kMaxLanes], height[kMaxLanes], flash[kMaxLanes];
 
     BallColumns(std::span<const shader::ViewBall> balls, const PictureFrame& frame) {
         const std::size_t lanes = hn::Lanes(Lanes());
@@ -51,7 +95,7 @@ struct BallColumns {
             const bool widens = (ball.flags & shader::kAround) == 0;
             least_radius[lane] = widens ? shader::kMinRadiusPixels / frame.up.w : 0.0f;
             depth_scale[lane] = ball.depth_scale;
-            light[lane] = ball.light;
+            sun_depth[lane] = ball.sun_depth;
             height[lane] = ball.height;
             flash[lane] = float(ball.flags >> 16) * (1.0f / 65535.0f);
         }
@@ -61,37 +105,29 @@ struct BallColumns {
 // The light that a metaball scatters towards the eye (shaders/lighting.glsl).
 struct Scattered {
     Floats3 diffuse;  // radiance that does not depend on the ray
-    Floats3 direct;   // radiance per phase function
+    Floats3 direct;   // radiance per light that is scattered once
 };
 
 HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& centre, Floats distance,
                                      const PictureFrame& frame) {
     const Lanes d;
-    const Floats light = hn::Load(d, ball.light), one = set(1.0f);
-    Floats multiple = light;  // T: light falls off in proportion to the way, to nothing
-    if (!(frame.air_extinction.w > 0)) {
-        const Floats depth = hn::Neg(hn::Log(d, hn::Max(light, set(1.0e-30f))));
-        multiple = hn::Div(one, hn::MulAdd(set(frame.ambient_base.w), depth, one));
-    }
-    multiple = hn::Mul(set(frame.sunlight.w), multiple);
+    const Floats one = set(1.0f), sun_depth = hn::Load(d, ball.sun_depth);
+    const Floats3 ray = times(hn::Div(one, hn::Max(distance, set(1.0e-6f))), centre);
     const Floats height = hn::Load(d, ball.height), albedo = set(frame.ambient_top.w);
     const Floats3 sunlight = sunlight_at(frame, centre.z);
-    Floats3 arriving = times_add(
-        multiple, sunlight, mix(set3(frame.ambient_base), set3(frame.ambient_top), {height, height, height}));
+    Floats3 arriving =
+        times_add(scattered_often(frame, ray, sun_depth), sunlight,
+                  mix(set3(frame.ambient_base), set3(frame.ambient_top), {height, height, height}));
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), centre);
         const Floats share = hn::Mul(set(frame.flash.w), hn::Load(d, ball.flash));
         arriving =
             times_add(hn::Mul(share, flash_falloff(dot(way, way))), set3(frame.flash_colour), arriving);
     }
-    const Floats3 ray = times(hn::Div(one, hn::Max(distance, set(1.0e-6f))), centre);
     const Floats3 beta = air_transmittance(frame, ray, distance);
+    const Floats light = hn::Exp(d, hn::Neg(sun_depth));
     return {add(each_times(beta, times(albedo, arriving)), air_light(frame, ray, beta)),
-            each_times(times(hn::Mul(hn::Mul(albedo, set(shader::kPi)), light), beta), sunlight)};
-}
-
-HWY_INLINE Floats phase_along(const PictureFrame& frame, const Floats3& ray) {
-    return phase_function(dot(set3(frame.to_sun), ray), frame.to_sun.w);
+            each_times(times(hn::Mul(albedo, light), beta), sunlight)};
 }
 
 // c0..c5 of the opacity. Plain loops of a fixed length: the compiler makes vectors of them.
@@ -196,7 +232,10 @@ inline void light_balls(std::span<const shader::ViewBall> balls, const PictureFr
         const BallSizes size(ball);
         const Scattered light = scattered_light(ball, size.centre, size.distance, frame);
         const Floats3 ray = times(hn::Div(set(1.0f), size.distance), size.centre);
-        const Floats3 radiance = times_add(phase_along(frame, ray), light.direct, light.diffuse);
+        const Floats ratio = hn::Div(size.drawn, size.distance);
+        const Floats cosine =
+            hn::NegMulAdd(hn::Mul(set(shader::kDiscSpread), ratio), ratio, dot(set3(frame.to_sun), ray));
+        const Floats3 radiance = times_add(scattered_once(frame, cosine), light.direct, light.diffuse);
         HWY_ALIGN float field[9][kMaxLanes];
         const Floats fields[] = {radiance.x,      radiance.y,      radiance.z,
                                  light.diffuse.x, light.diffuse.y, light.diffuse.z,
@@ -209,9 +248,10 @@ inline void light_balls(std::span<const shader::ViewBall> balls, const PictureFr
             to.blue = field[2][i];
             if (to.distance > 0) continue;
             ExactBall& whole = exact[std::bit_cast<std::uint32_t>(to.x)];
+            const bool each_ray = (some[i].flags & shader::kIntegrate) != 0;  // else one phase serves for all
             for (std::size_t c = 0; c < 3; ++c) {
-                whole.diffuse[c] = field[3 + c][i];
-                whole.direct[c] = field[6 + c][i];
+                whole.diffuse[c] = field[(each_ray ? 3 : 0) + c][i];
+                whole.direct[c] = each_ray ? field[6 + c][i] : 0.0f;
             }
         }
     }

@@ -25,7 +25,7 @@ struct ExactBall {
     float x, y, z;  // centre in radii
     float per_radius, depth_scale, distance;
     float diffuse[3];  // radiance that does not depend on the ray
-    float direct[3];   // radiance per phase function
+    float direct[3];   // radiance per light that is scattered once
 };
 
 }  // namespace nephos

@@ -44,6 +44,10 @@ void ViewPass::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const v
     bind_image(gpu, bindings_, 4, map, sampler);
 }
 
+void ViewPass::use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
+    bind_buffer(gpu, bindings_, 12, table);
+}
+
 void ViewPass::resize_targets(const GpuDevice& gpu, const Tile& tile) {
     const std::uint32_t width = std::uint32_t(tile.width), height = std::uint32_t(tile.height);
     if (radiance_.width >= width && radiance_.height >= height) return;

@@ -27,6 +27,9 @@ class ViewPass {
     // The map that the ground wears; in the layout GENERAL and readable by fragment shaders.
     void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
 
+    // scattering_table.h
+    void use_scattering(const GpuDevice& gpu, const GpuBuffer& table);
+
     // Draws one tile and stores its pixels in the picture.
     void draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile, const EyeOrder& order,
                    Picture& picture);

@@ -37,6 +37,10 @@ void ViewTiles::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const 
     bind_image(gpu, bindings_, 4, map, sampler);
 }
 
+void ViewTiles::use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
+    bind_buffer(gpu, bindings_, 12, table);
+}
+
 const vk::raii::Pipeline& ViewTiles::tiles_for(const GpuDevice& gpu, const EyeOrder& order) {
     vk::raii::Pipeline& pipeline = tiles_[order.all_fitted ? 0 : 1][order.depth ? 1 : 0];
     if (!*pipeline)

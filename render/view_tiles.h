@@ -25,6 +25,9 @@ class ViewTiles {
     // The map that the ground wears; in the layout GENERAL and readable by compute shaders.
     void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
 
+    // scattering_table.h
+    void use_scattering(const GpuDevice& gpu, const GpuBuffer& table);
+
     // Draws one tile of the picture and stores its pixels.
     void draw_tile(const GpuDevice& gpu, const RenderOptions& options, const CameraFrame& camera,
                    const shader::Frame& frame, const Tile& tile, const EyeOrder& order, Picture& picture);

@@ -182,50 +182,6 @@ const Section& sun_section() {
     return section;
 }
 
-const Section& light_section() {
-    static const Section section{
-        "Light in clouds",
-        "How clouds scatter light.",
-        {render_key<&RenderOptions::light, &CloudLight::albedo>(
-             "albedo", "", between(0, 1),
-             "Share of the light that is scattered and not absorbed; below 1 the whole cloud is darker.",
-             "D, step 1"),
-         render_key<&RenderOptions::light, &CloudLight::g>(
-             "g", "", between(-0.99, 0.99),
-             "Asymmetry of the phase function: above 0 light goes forward, so the rims of clouds before the "
-             "sun shine.",
-             "Henyey and Greenstein 1941"),
-         render_key<&RenderOptions::light, &CloudLight::multiple_scattering>(
-             "multiple_scattering", "", between(0, 10),
-             "Strength of the sunlight that arrives after many scatterings and reaches deep into a cloud; 0 "
-             "is single "
-             "scattering alone, with grey tops and dark bases."),
-         render_key<&RenderOptions::light, &CloudLight::ambient_top>(
-             "ambient_top", "", kLight, "Light of the sky that the top of a cloud scatters, linear colour."),
-         render_key<&RenderOptions::light, &CloudLight::ambient_base>(
-             "ambient_base", "", kLight, "The same at its base; between them by height."),
-         word<&Scene::render, &RenderOptions::light, &CloudLight::lighting>(
-             "lighting", {"light_pass", "cfa"},
-             "How sunlight finds its way into clouds of the automaton: attenuated exponentially, or absorbed "
-             "in "
-             "proportion to the way through them (light absorption factor).",
-             "D, step 1; T, CFA"),
-         render_key<&RenderOptions::light, &CloudLight::light_distance_m>(
-             "light_distance_m", "m", or_infinite(above(0, 0)),
-             "Way of light in a cloud of density 1 after which it is absorbed, for `cfa` and for lightning; "
-             "clouds "
-             "drawn as billboards have that of their base model.",
-             "T, CFA"),
-         render_key<&RenderOptions::light, &CloudLight::cfa_clouds_per_frame>(
-             "cfa_clouds_per_frame", "", between(0, 1e6),
-             "Clouds drawn as billboards whose absorption is computed anew in a frame because the sun moved; "
-             "0: "
-             "all.",
-             "T, CFA")},
-        nullptr};
-    return section;
-}
-
 const Section& lightning_section() {
     constexpr Limits kWorld = between(-kFarthest_m, kFarthest_m);
     static const Section section{

@@ -16,7 +16,9 @@ struct vec4 {
     float x = 0, y = 0, z = 0, w = 0;
 };
 using uint = std::uint32_t;
+using std::abs;
 using std::exp;
+using std::log2;
 using std::sqrt;
 #define NEPHOS_CONST inline constexpr
 #define NEPHOS_FUNCTION inline
@@ -53,14 +55,18 @@ NEPHOS_CONST float kLimbDarkeningGreen = 0.503f;
 NEPHOS_CONST float kLimbDarkeningBlue = 0.652f;
 // Gradient sky: share of the air's light that is sunlight scattered straight towards the eye.
 NEPHOS_CONST float kAirSunShare = 0.5f;
-NEPHOS_CONST float kMinPuffPixels = 1.0f;  // smaller billboards of T are widened to this half size
+NEPHOS_CONST uint kScatterAngles = 513u;            // nodes of the scattering table, see scatter_column()
+NEPHOS_CONST uint kScatterDepths = 97u;             // ... and scatter_row()
+NEPHOS_CONST float kScatterRowsPerDoubling = 8.0f;  // of 1 + optical depth
+NEPHOS_CONST float kMaxSunDepth = 4095.0f;          // of the last row; beyond it nothing changes
+NEPHOS_CONST float kMinPuffPixels = 1.0f;           // smaller billboards of T are widened to this half size
 
 // A metaball as the eye sees it; 32 bytes.
 struct ViewBall {
     float x, y, z;      // centre relative to the eye
     float radius;       // metres
     float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * column()
-    float light;        // transmittance towards the sun
+    float sun_depth;    // optical depth towards the sun: exp(-sun_depth) arrives
     float height;       // in the cloud: 0 base, 1 top
     uint flags;         // lower half; upper half: share of the lightning that arrives, 0..65535
 };
@@ -139,12 +145,11 @@ struct Frame {
     vec4 forward;         // xyz: unit
     vec4 picture;         // width, height of the picture; column and row of the tile's corner, pixels
     vec4 tile;            // clip position in the tile = position in the picture * tile.xy + tile.zw
-    vec4 to_sun;          // xyz: unit; w: asymmetry g
-    vec4 sunlight;        // rgb: colour of the direct sun; w: strength of multiple scattering
+    vec4 to_sun;          // xyz: unit
+    vec4 sunlight;        // rgb: colour of the direct sun
     vec4 ambient_top;     // rgb; w: albedo of the cloud
-    vec4 ambient_base;    // rgb; w: decay of diffuse light per optical depth
-    vec4 air_extinction;  // rgb: per metre; w: 1 = light of metaballs is T's (1 - absorbed), 0 = a
-                          // transmittance
+    vec4 ambient_base;    // rgb
+    vec4 air_extinction;  // rgb: per metre
     vec4 horizon;         // rgb: sky at the horizon, and light of the air itself
     vec4 zenith;          // rgb
     vec4 ground;  // rgb: radiance of the ground under open sky without the sun; w: height above the eye (< 0)
@@ -244,12 +249,22 @@ NEPHOS_FUNCTION float column_part(float w, float s) {
     return s * (5.0f / 9.0f * square + 4.0f / 9.0f * cube);
 }
 
-// Henyey-Greenstein phase function, per steradian; integrates to 1 over the sphere. cos_theta is the cosine
-// of the angle between the directions of travel before and after: 1 = straight on. Forward scattering is g >
-// 0.
-NEPHOS_FUNCTION float phase_function(float cos_theta, float g) {
-    float base = 1.0f + g * g - 2.0f * g * cos_theta;
-    return (1.0f - g * g) / (4.0f * kPi * base * sqrt(base));
+// A metaball is seen under all angles within its outline, not only that of its centre: with the square of its
+// angular radius and its opacity as weights, the mean of 1 - cos is larger by this much of that square. A
+// lobe narrower than the metaball then is as bright as its disc, and not one bright dot.
+NEPHOS_CONST float kDiscSpread = 0.11f;
+
+// Where an angle and an optical depth lie in the scattering table (scattering_table.h), in nodes. With v =
+// (1 - |cos|)^(1/4) nodes are evenly spaced in v, from v = 0 (straight on) over 1 (sideways) back to 0
+// (back): near both ends the angle itself grows with the square of their number.
+NEPHOS_FUNCTION float scatter_column(float cos_theta) {
+    float off = 1.0f - abs(cos_theta);
+    float v = 0.5f * sqrt(sqrt(off > 0.0f ? off : 0.0f));
+    return float(kScatterAngles - 1u) * (cos_theta < 0.0f ? 1.0f - v : v);
+}
+NEPHOS_FUNCTION float scatter_row(float depth) {
+    float row = kScatterRowsPerDoubling * log2(1.0f + depth);
+    return row < float(kScatterDepths - 1u) ? row : float(kScatterDepths - 1u);
 }
 
 #ifdef __cplusplus

@@ -5,6 +5,7 @@
 // Tiles, first: each metaball as a splat on the screen, with its light.
 #include "frame.glsl"
 #include "air.glsl"
+#include "scattering.glsl"
 #include "lighting.glsl"
 
 layout(local_size_x = kComputeGroup) in;
@@ -33,7 +34,8 @@ void main() {
 
     float depth = dot(frame.forward.xyz, centre);
     float radius_pixels = radius * frame.up.w / depth;
-    vec3 radiance = min(radiance_along(scattered_light(ball, distance), centre / distance), vec3(60000.0));
+    vec3 radiance = radiance_of_disc(scattered_light(ball, distance), centre / distance, radius / distance);
+    radiance = min(radiance, vec3(60000.0));
     vec2 plane = vec2(dot(frame.right.xyz, centre) / dot(frame.right.xyz, frame.right.xyz),
                       dot(frame.up.xyz, centre) / dot(frame.up.xyz, frame.up.xyz)) / depth;
     vec2 pixel = (0.5 * vec2(plane.x, -plane.y) + 0.5) * frame.picture.xy - frame.picture.zw;

@@ -7,6 +7,7 @@
 #include "frame.glsl"
 #include "ray.glsl"
 #include "integral.glsl"
+#include "scattering.glsl"
 
 // Metaballs with kIntegrate have a pipeline of their own.
 layout(constant_id = 0) const bool kExact = false;
@@ -30,8 +31,6 @@ void main() {
         vec2 nearest = point * inversesqrt(1.0 + dot(point, point) * shape.z);
         opacity = billboard_opacity(nearest, shape.y);
     }
-    // The sunlight travels along -to_sun and goes on towards the eye along -ray.
-    float phase = phase_function(dot(frame.to_sun.xyz, ray), frame.to_sun.w);
-    radiance = vec4((diffuse + direct * phase) * opacity, 1.0 - opacity);
+    radiance = vec4((diffuse + direct * scattered_once(dot(frame.to_sun.xyz, ray))) * opacity, 1.0 - opacity);
     depth = vec4(shape.w * opacity, 0.0, 0.0, 1.0 - opacity);
 }

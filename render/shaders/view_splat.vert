@@ -7,6 +7,7 @@
 #include "billboard.glsl"
 #include "frame.glsl"
 #include "air.glsl"
+#include "scattering.glsl"
 #include "lighting.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Balls {
@@ -15,7 +16,7 @@ layout(set = 0, binding = 1, std430) readonly buffer Balls {
 
 layout(location = 0) out vec2 point;              // on the billboard, in radii
 layout(location = 1) flat out vec3 diffuse;       // radiance that does not depend on the ray
-layout(location = 2) flat out vec3 direct;        // radiance per phase function
+layout(location = 2) flat out vec3 direct;        // radiance per light that is scattered once
 layout(location = 3) flat out vec4 shape;         // depth scale, level, (radius / distance)^2, distance
 layout(location = 4) flat out vec4 centre_radius;
 
@@ -59,8 +60,8 @@ void main() {
     float depth_scale = ball.depth_scale * thinning * thinning;
     centre_radius.w = radius;
     float ratio = radius / distance;
-    if ((ball.flags & kIntegrate) == 0u) {  // so small that every ray to it sees the same phase
-        diffuse = radiance_along(light, centre / distance);
+    if ((ball.flags & kIntegrate) == 0u) {  // so small that one phase serves for all rays
+        diffuse = radiance_of_disc(light, centre / distance, ratio);
         direct = vec3(0.0);
     }
     // Seen from a finite distance the ball's outline is a circle a little larger than its radius.

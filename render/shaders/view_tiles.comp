@@ -9,6 +9,7 @@
 #include "ray.glsl"
 #include "integral.glsl"
 #include "air.glsl"
+#include "scattering.glsl"
 #include "lighting.glsl"
 #include "tiles.glsl"
 
@@ -95,6 +96,10 @@ void add_exact(uint index, vec2 pixel) {
     float radius = (ball.flags & kAround) != 0u ? ball.radius : drawn_radius(ball, distance);
     float thinning = ball.radius / radius;
     Scattered light = scattered_light(ball, distance);
+    if ((ball.flags & kIntegrate) == 0u) {
+        light.diffuse = radiance_of_disc(light, centre / distance, radius / distance);
+        light.direct = vec3(0.0);
+    }
     [[unroll]] for (uint row = 0u; row < kRows; ++row) {
         vec3 ray = pixel_ray(pixel + vec2(0.0, float(row)));
         float opacity = integrated_opacity(centre, radius, ray, ball.depth_scale * thinning * thinning);

@@ -136,7 +136,7 @@ TEST(RenderOptions, BadValuesAreNamed) {
     EXPECT_TRUE(
         names(message([](RenderOptions& o) { o.camera.target_m = o.camera.position_m; }), "target_m"));
     EXPECT_TRUE(names(message([](RenderOptions& o) { o.sun.elevation_deg = -19; }), "elevation_deg"));
-    EXPECT_TRUE(names(message([](RenderOptions& o) { o.light.g = 1; }), "light.g"));
+    EXPECT_TRUE(names(message([](RenderOptions& o) { o.light.phase.g = 1; }), "light.g"));
     EXPECT_TRUE(names(message([](RenderOptions& o) { o.light.albedo = 1.5; }), "light.albedo"));
     EXPECT_TRUE(names(message([](RenderOptions& o) { o.air.horizon[1] = -1; }), "air.horizon"));
     EXPECT_TRUE(names(message([](RenderOptions& o) { o.ground.albedo[2] = 2; }), "ground.albedo"));

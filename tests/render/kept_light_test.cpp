@@ -76,7 +76,8 @@ TEST_P(KeptLight, ThreadsDoNotChangeTheBits) {
         return draw(renderer, cloud, options, false);
     };
     const Picture expected = drawn();
-    for (const int threads : {1, 3, 8}) expect_same_pixels(test::with_threads(std::size_t(threads), drawn), expected);
+    for (const int threads : {1, 3, 8})
+        expect_same_pixels(test::with_threads(std::size_t(threads), drawn), expected);
 }
 
 TEST_P(KeptLight, IsComputedWhenSomethingChanged) {
@@ -111,7 +112,7 @@ TEST_P(KeptLight, IsComputedWhenSomethingChanged) {
     EXPECT_EQ(passes({balls_, 0.03, 0.7}, options), 0u);
     options.light.light_distance_m = 50;
     EXPECT_EQ(passes({balls_, 0.03, 0.7}, options), 1u) << "light distance";
-    options.light.g = 0.3;
+    options.light.phase.g = 0.3;
     EXPECT_EQ(passes({balls_, 0.03, 0.7}, options), 0u) << "the phase function is the view's";
 }
 

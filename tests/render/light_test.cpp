@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Closed forms and conventions: phase function, line integral, attenuation textures, dusk, tone curve.
+// Closed forms and conventions: line integral, attenuation textures, dusk, tone curve.
 
 #include <cmath>
 #include <limits>
@@ -17,32 +17,6 @@ namespace nephos {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-// All that is scattered goes somewhere: the integral over the sphere is 1, whatever the asymmetry.
-TEST(Phase, IntegratesToOne) {
-    for (const float g : {-0.9f, -0.3f, 0.0f, 0.5f, 0.85f, 0.99f}) {
-        constexpr int kSteps = 2000000;
-        double sum = 0;
-        for (int i = 0; i < kSteps; ++i)
-            sum += double(shader::phase_function(float(-1 + (i + 0.5) * 2.0 / kSteps), g));
-        EXPECT_NEAR(2 * kPi * sum * 2.0 / kSteps, 1.0, 2e-3) << "g = " << g;
-    }
-}
-
-// The mean cosine of Henyey and Greenstein is g itself; this also fixes the sign: forward is g > 0.
-TEST(Phase, MeanCosineIsG) {
-    for (const float g : {-0.6f, 0.0f, 0.5f, 0.8f}) {
-        constexpr int kSteps = 200000;
-        double sum = 0;
-        for (int i = 0; i < kSteps; ++i) {
-            const double cosine = -1 + (i + 0.5) * 2.0 / kSteps;
-            sum += cosine * double(shader::phase_function(float(cosine), g));
-        }
-        EXPECT_NEAR(2 * kPi * sum * 2.0 / kSteps, double(g), 1e-4) << "g = " << g;
-    }
-    EXPECT_GT(shader::phase_function(1, 0.5f), shader::phase_function(-1, 0.5f));
-    EXPECT_NEAR(shader::phase_function(0.3f, 0), 1 / (4 * kPi), 1e-7);
-}
 
 TEST(Column, IsTheIntegralOfTheField) {
     for (double b = 0; b < 1; b += 0.05) {

@@ -2,6 +2,7 @@
 // The processor's light and view in batches and for every kind of vector, without a Vulkan device.
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -9,6 +10,7 @@
 
 #include "render/processor_light.h"
 #include "render/processor_view.h"
+#include "render/scattering_table.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
@@ -36,8 +38,11 @@ Drawn draw(const MetaballCloud& cloud, const RenderOptions& options, const Batch
         order_from_eye(prepared, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
     set_light(eye, {drawn.light, {}});
     const Tile whole{0, 0, picture.width, picture.height};
-    const PictureFrame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);
+    PictureFrame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);
+    const std::vector<float> scattering = scattering_table(options.light);
+    frame.scattering = scattering.data();
     view_by_processor(options, camera, frame, whole, eye, picture, limits);
+    for (float& each : drawn.light) each = std::exp(-each);
     return drawn;
 }
 

@@ -63,7 +63,9 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"density", "smoothing"}), member_count<SmoothingOptions>());
     EXPECT_EQ(keys_at({"frames"}), member_count<FrameOptions>());
     EXPECT_EQ(keys_at({"camera"}), member_count<Camera>());
-    EXPECT_EQ(keys_at({"light"}), member_count<CloudLight>());
+    // The phase function's keys stand among the light's.
+    EXPECT_EQ(keys_at({"light"}), member_count<CloudLight>() - 1 + member_count<PhaseFunction>());
+    EXPECT_EQ(keys_at({"light", "octaves"}), member_count<ScatteringOctaves>());
     EXPECT_EQ(keys_at({"air"}), member_count<Air>());
     EXPECT_EQ(keys_at({"atmosphere"}), member_count<AtmosphereOptions>());
     EXPECT_EQ(keys_at({"ground"}), member_count<Ground>());
