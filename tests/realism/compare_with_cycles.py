@@ -102,7 +102,7 @@ def by_nephos(name, cloud, volume, options):
     keys = {"camera.position_m": listed(cloud["eye_m"]), "camera.target_m": listed(cloud["target_m"]),
             "camera.vertical_fov_deg": "50", "camera.width": SIZE[0], "camera.height": SIZE[1],
             "sun.elevation_deg": cloud["sun"][0], "sun.azimuth_deg": cloud["sun"][1], "sun.colour": listed(SUN),
-            "air.extinction_per_m": "[0, 0, 0]", "air.horizon": listed(SKY), "air.zenith": listed(SKY),
+            "atmosphere.model": '"gradient"', "air.extinction_per_m": "[0, 0, 0]", "air.horizon": listed(SKY), "air.zenith": listed(SKY),
             "ground.height_m": "100000", "light.ambient_top": listed(SKY), "light.ambient_base": listed(SKY),
             "light.g": options.g}
     words = [each for key, value in keys.items() for each in ("--set", f"{key}={value}")]
