@@ -69,7 +69,7 @@ TEST(VoxelAbsorption, EqualsNumericalIntegrationAlongTheRays) {
         ++count;
     };
     // Above, low, and below the horizon; and a place at which lightning strikes.
-    for (const Sun sun : {Sun{60, 100, {}}, Sun{5, 230, {}}, Sun{-15, 20, {}}, Sun{90, 0, {}}}) {
+    for (const Sun& sun : {Sun{60, 100, {}}, Sun{5, 230, {}}, Sun{-15, 20, {}}, Sun{90, 0, {}}}) {
         const Vec3 way = direction_to_sun(sun);
         for (std::size_t i = 0; i < balls.size(); i += 23)
             compare(blocks.absorbed_towards(centre(balls[i]), way, kLightDistance_m),

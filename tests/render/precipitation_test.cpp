@@ -308,7 +308,9 @@ TEST(Precipitation, IsContinuousAcrossThePerimeter) {
         RenderOptions options = options_at({gate.x, gate.y + way, 2}, {gate.x, gate.y + way + 100, 12});
         options.precipitation.edge = 0.05;
         const double now = energy(options, weather, 5);
-        if (before >= 0) EXPECT_NEAR(now / before, 1, 0.12) << way;
+        if (before >= 0) {
+            EXPECT_NEAR(now / before, 1, 0.12) << way;
+        }
         before = now;
         least = std::min(least, now);
         most = std::max(most, now);
