@@ -168,7 +168,9 @@ Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::s
     const bool all = depth || rain;
     Picture picture = renderer.draw_splats(
         {drawn_.clouds, drawn_.billboards, voxels, flash, time_s, all, all, ground_cover}, options);
-    precipitation_.draw(picture, moving, weather, time_s);
+    RenderOptions raining = moving;  // knows the camera's path itself
+    raining.sun = options.sun;
+    precipitation_.draw(picture, raining, weather, time_s);
     for (const SkyLayer& layer : layers) {
         const std::vector<WorldLine> lines =
             debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun));

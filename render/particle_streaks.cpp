@@ -170,8 +170,7 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
                   float(width),       float(opacity),     float(distance),  float(light[0]),
                   float(light[1]),    float(light[2])};
     if (p.pass.far) {
-        const Air& air = p.view.options.air;
-        const double kept = std::exp(-air.extinction_per_m[1] * distance);
+        const double kept = std::exp(-p.view.light.air_extinction_per_m[1] * distance);
         streak.opacity *= float(kept);
     }
     out.push_back(streak);

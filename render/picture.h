@@ -4,8 +4,10 @@
 // What the renderer hands out: a picture with its auxiliary layers, and what is written beside it into a
 // file. Plain data in main memory; row 0 is the top row, x runs fastest, no padding between rows.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,14 @@ struct ShadowFrame {
     Vec3 direction;  // unit; the way the light travels
 };
 
+// Light in the air of a picture, for what is drawn over it; linear colours.
+struct PictureAir {
+    std::array<double, 3> sun{};               // radiance of a white surface that faces the unshaded sun
+    std::array<double, 3> sky{};               // mean radiance of the sky
+    std::array<double, 3> horizon{};           // radiance of the air itself, far away
+    std::array<double, 3> extinction_per_m{};  // near the ground
+};
+
 struct Picture {
     int width = 0, height = 0;
     std::vector<float> beauty;  // 3 * width * height, linear RGB, exposure not applied
@@ -32,6 +42,8 @@ struct Picture {
     // by what the eye sees of it. Infinity where the cloud hides less than 1/1024 of what lies behind (sky
     // and ground).
     std::vector<float> depth_m;
+
+    std::optional<PictureAir> air;  // of the physical sky; none: as RenderOptions::air says
 
     int shadow_size = 0;        // texels on a side
     std::vector<float> shadow;  // shadow_size^2, transmittance of the whole cloud along the sun's rays

@@ -54,11 +54,8 @@ Rgb mean_of(const Picture& picture, const RenderOptions& options, const CameraFr
 }
 
 Rgb surroundings(const Picture& picture, const RenderOptions& options, const CameraFrame& camera) {
-    Rgb sky{}, ground{};
-    for (std::size_t c = 0; c < 3; ++c)
-        sky[c] =
-            0.5 * (options.air.horizon[c] + options.air.zenith[c]) * daylight(options.sun.elevation_deg).sky;
-    sky = mean_of(picture, options, camera, true, sky);
+    Rgb ground{};
+    const Rgb sky = mean_of(picture, options, camera, true, air_of(picture, options).sky);
     for (std::size_t c = 0; c < 3; ++c) ground[c] = options.ground.albedo[c] * sky[c];
     ground = mean_of(picture, options, camera, false, ground);
     const double share = kSkyShare[int(options.precipitation.kind)];
@@ -69,14 +66,28 @@ Rgb surroundings(const Picture& picture, const RenderOptions& options, const Cam
 
 }  // namespace
 
+PictureAir air_of(const Picture& picture, const RenderOptions& options) {
+    if (picture.air) return *picture.air;
+    const Daylight day = daylight(options.sun.elevation_deg);
+    PictureAir air;
+    air.extinction_per_m = options.air.extinction_per_m;
+    for (std::size_t c = 0; c < 3; ++c) {
+        air.sun[c] = day.sun * options.sun.colour[c];
+        air.sky[c] = 0.5 * (options.air.horizon[c] + options.air.zenith[c]) * day.sky;
+        air.horizon[c] = day.sky * options.air.horizon[c];
+    }
+    return air;
+}
+
 PrecipitationLight precipitation_light(const Picture& picture, const RenderOptions& options,
                                        const CameraFrame& camera, double time_s) {
     PrecipitationLight light;
     light.kind = options.precipitation.kind;
     light.surroundings = surroundings(picture, options, camera);
     light.to_sun = direction_to_sun(options.sun);
-    const double sun = daylight(options.sun.elevation_deg).sun;
-    for (std::size_t c = 0; c < 3; ++c) light.sun[c] = sun * options.sun.colour[c];
+    const PictureAir air = air_of(picture, options);
+    light.sun = air.sun;
+    light.air_extinction_per_m = air.extinction_per_m;
     if (const std::optional<Flash> flash = flash_at(options.lightning, time_s)) {
         for (std::size_t c = 0; c < 3; ++c) light.flash[c] = flash->intensity * flash->colour[c];
         light.flash_m = flash->position_m;

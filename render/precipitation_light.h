@@ -16,6 +16,7 @@ struct PrecipitationLight {
     Vec3 to_sun{0, 0, 1};
     Rgb flash{};  // of lightning: the same at 1 km from it
     Vec3 flash_m;
+    Rgb air_extinction_per_m{};
     PrecipitationKind kind = PrecipitationKind::rain;
 };
 
@@ -26,6 +27,9 @@ struct PrecipitationLight {
 // step in.
 PrecipitationLight precipitation_light(const Picture& picture, const RenderOptions& options,
                                        const CameraFrame& camera, double time_s);
+
+// That of the picture, or where it has none of the options' gradient.
+PictureAir air_of(const Picture& picture, const RenderOptions& options);
 
 // The share of the sunlight that reaches a place past the clouds: the picture's shadow map, which holds what
 // is in front of all of it; places above the clouds' shadow are taken to be in it, too.

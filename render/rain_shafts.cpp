@@ -83,7 +83,7 @@ struct Shafts {
     NoisePlane noise;
     double time_s = 0;
     double clear_m = 0;  // around the eye, where particles are drawn instead
-    Rgb air{};           // radiance of an endless way through the air
+    PictureAir air;
 };
 
 Curtain curtain_of(const RainCurtain& c, const PrecipitationOptions& p, const Vec3& eye) {
@@ -197,8 +197,8 @@ Rgb arriving(const Shafts& s, const Vec3& ray, double t) {
     const Rgb own = particle_radiance(s.light, ray, place, double(sunlight_at(s.picture, place)));
     Rgb seen;
     for (std::size_t c = 0; c < 3; ++c) {
-        const double beta = std::exp(-s.options.air.extinction_per_m[c] * t);
-        seen[c] = beta * own[c] + (1 - beta) * s.air[c];
+        const double beta = std::exp(-s.air.extinction_per_m[c] * t);
+        seen[c] = beta * own[c] + (1 - beta) * s.air.horizon[c];
     }
     return seen;
 }
@@ -291,14 +291,13 @@ void draw_shafts(Picture& picture, const RenderOptions& options, const CameraFra
                  std::span<const RainCurtain> curtains, const PrecipitationLight& light, double time_s,
                  std::uint64_t seed) {
     const PrecipitationOptions& p = options.precipitation;
-    const double sky = daylight(options.sun.elevation_deg).sky;
     Shafts shafts{picture, options, camera, light, {}, NoisePlane(seed), time_s, 0, {}};
     for (const RainCurtain& c : curtains)
         if (c.base_m > c.ground_m && c.rate_mm_per_h > 0)
             shafts.curtains.push_back(curtain_of(c, p, camera.position_m));
     if (shafts.curtains.empty() || p.shafts <= 0) return;
     shafts.clear_m = p.particles > 0 ? p.depth_m : 0;
-    for (std::size_t c = 0; c < 3; ++c) shafts.air[c] = sky * options.air.horizon[c];
+    shafts.air = air_of(picture, options);
     tbb::parallel_for(0, picture.height, [&](int y) {
         Scratch scratch;
         for (int x = 0; x < picture.width; ++x) draw_pixel(shafts, scratch, picture, x, y);

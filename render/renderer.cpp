@@ -70,6 +70,12 @@ GpuImage upload_attenuation(const GpuDevice& gpu) {
     return image;
 }
 
+PictureAir air_of(const SkyLight& sky) {
+    PictureAir air{sky.ground_sun, sky.ground_sky, sky.horizon, sky.model.rayleigh_per_m};
+    for (double& extinction : air.extinction_per_m) extinction += sky.model.mie_extinction_per_m;
+    return air;
+}
+
 CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats) {
     CloudHeights heights{cloud.base_m, cloud.top_m};
     bool some = !cloud.visible.empty();
@@ -241,6 +247,7 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
     use_scattering(options.light);
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     sky = sky_of(splats, options);
+    if (sky != nullptr) picture.air = air_of(*sky);
     std::vector<PartFrame> parts;
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {

@@ -99,6 +99,11 @@ void SkyLights::mix_tables(const RenderOptions& options, double elevation_deg) {
             haze[i] = full * (a.haze[i] + share * (b.haze[i] - a.haze[i]));
         }
     }
+    light_.horizon = {};
+    for (std::size_t i = 0; i < shader::kSkyColumns; ++i)
+        for (std::size_t c = 0; c < 3; ++c)
+            light_.horizon[c] += (double(scattered[4 * i + c]) + double(haze[4 * i + c]) / (4 * kPi)) /
+                                 double(shader::kSkyColumns);
     for (std::size_t i = 0; i < shader::kSkyColumns; ++i) {
         const double altitude_m = double(shader::kSunlightTop) * double(i) / double(shader::kSkyColumns - 1);
         const Rgb light = times(sun_above_air, atmosphere_->sunlight(altitude_m, options.sun.elevation_deg));

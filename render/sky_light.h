@@ -22,6 +22,7 @@ struct SkyLight {
     double eye_altitude_m = 0;          // above the ground, at least 0
     Rgb ground_sun{}, ground_sky{};     // of a white surface on the ground that faces the sun; in sky light
     Rgb ambient_top{}, ambient_base{};  // light that arrives at a cloud's top and base
+    Rgb horizon{};                      // mean around the horizon
     Rgb disc{}, disc_fade{};            // shader::Frame::sun_disc, sun_fade
     bool has_disc = false;
 };

@@ -182,6 +182,33 @@ TEST(SkyPainter, DrawsTheSameTwiceAndLightningInItsTime) {
     EXPECT_TRUE(renderer.validation_messages().empty());
 }
 
+// A sun with a date moves with the time of the picture, and with it the physical sky and its light on
+// billboards; one that does not move stays.
+TEST(SkyPainter, MovesTheSunWithTime) {
+    const SkySimulation sky(sky_of(60));
+    const SkyLayer layer{&sky, sky.clouds()};
+    RenderOptions options = from_the_edge();
+    options.atmosphere.model = AirModel::physical;
+    options.sun.date = "2026-06-21";
+    options.sun.time = "10:00";
+    options.sun.latitude_deg = 50;
+    Renderer renderer{DeviceOptions{{}, true, 2048}};
+    SkyPainter painter;
+    const auto at = [&](double time_s) {
+        return painter.draw(renderer, {}, {&layer, 1}, options, time_s).beauty;
+    };
+    const std::vector<float> morning = at(0);
+    EXPECT_EQ(at(7200), morning);
+    options.sun.moves = true;
+    EXPECT_EQ(at(0), morning);
+    const std::vector<float> noon = at(7200);
+    EXPECT_NE(noon, morning);
+    options.sun = sun_at(options.sun, 7200);
+    EXPECT_NEAR(options.sun.elevation_deg, 63.4, 0.3);
+    EXPECT_EQ(at(0), noon);
+    for (const std::string& message : renderer.validation_messages()) ADD_FAILURE() << message;
+}
+
 // Twelve edges a box, an axis for each direction, four strokes a root and more; the red parts of the rays are
 // as long as what the absorption counts where boxes do not overlap.
 TEST(DebugView, ShowsBoxesAxesRootsAndRays) {
