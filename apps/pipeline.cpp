@@ -71,7 +71,7 @@ class TotalStatistics {
 
 std::optional<GroundCover> dry_or_covered(const Scene& scene) {
     if (!scene.ground_cover.enabled) return {};
-    return GroundCover(scene.ground_cover, whole_world(scene));
+    return GroundCover(scene.ground_cover, scene.render.precipitation.kind, whole_world(scene));
 }
 
 CloudStatistics no_automaton() {

@@ -3,9 +3,9 @@
 
 // How rain and snow are drawn (P, S); where they fall is for the rain areas to say (precipitation.h).
 
-namespace nephos {
+#include "automaton/precipitation_kind.h"
 
-enum class PrecipitationKind { rain, snow };
+namespace nephos {
 
 struct PrecipitationOptions {
     bool enabled = false;

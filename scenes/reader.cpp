@@ -32,6 +32,8 @@ void find_namesakes(const Section& section, const std::string& path, std::string
 }
 
 std::string advice_on_unknown_key(const Section& section, const std::string& name) {
+    for (const Elsewhere& other : section.elsewhere)
+        if (other.name == name) return "did you mean " + enclosed(other.meant, '`') + "?";
     std::vector<std::string_view> names;
     for (const Key& key : section.keys) names.push_back(key.name);
     const std::string_view meant = closest_word(name, names);

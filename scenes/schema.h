@@ -104,6 +104,12 @@ struct SectionReader {
     void report(std::string_view key, std::string message, std::string expected = {}) const;
 };
 
+// A name that is looked for in a section although another key says it.
+struct Elsewhere {
+    std::string name;
+    std::string meant;  // path of that key: "precipitation.kind"
+};
+
 struct Section {
     std::string title;
     std::string effect;
@@ -111,6 +117,7 @@ struct Section {
     // Checks what concerns several keys, and reads keys without a value. Called when every key was read
     // without a problem; for the whole scene always, with SectionReader::failed. May be null.
     void (*finish)(const SectionReader& reader, void* owner) = nullptr;
+    std::vector<Elsewhere> elsewhere{};  // for messages on unknown keys
 
     const Key* find(std::string_view name) const;
 };

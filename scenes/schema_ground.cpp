@@ -36,8 +36,6 @@ std::vector<Key> cover_keys() {
                                             "Film of water everywhere at the start."),
         cover_key<&Cover::initial_snow_mm>("initial_snow_mm", "mm", between(0, 1000),
                                            "Snow everywhere at the start, as the water that it holds."),
-        word<&Scene::ground_cover, &Cover::kind>("precipitation", {"rain", "snow"},
-                                                 "What falls from rain areas onto the ground."),
         cover_key<&Cover::capacity_mm>(
             "capacity_mm", "mm", between(0.01, 100),
             "Film that hollows can hold: the nearer to it, the more of what falls runs off.",
@@ -97,7 +95,9 @@ const Section& wet_ground_section() {
             "Wet and snowy ground",
             "Water and snow on the ground: rain areas wet it over time, it dries, darkens, mirrors "
             "sky and clouds, and turns white.",
-            std::move(keys), nullptr};
+            std::move(keys),
+            nullptr,
+            {{"precipitation", "precipitation.kind"}, {"kind", "precipitation.kind"}}};
     }();
     return section;
 }

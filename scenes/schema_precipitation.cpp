@@ -33,7 +33,11 @@ const Section& precipitation_section() {
         {rain_key<&PrecipitationOptions::enabled>("enabled", "", kAny, "Draw rain or snow in the rain areas.",
                                                   "P"),
          word<&Scene::render, &RenderOptions::precipitation, &PrecipitationOptions::kind>(
-             "kind", {"rain", "snow"}, "What falls: drops as streaks, or flakes that sway.", "P; S"),
+             "kind", {"rain", "snow"},
+             "What falls from rain areas: drops, which are drawn as streaks and wet the ground, or flakes "
+             "that "
+             "sway and lie. Also the ground's, with or without precipitation drawn.",
+             "P; S"),
          rain_key<&PrecipitationOptions::particles>(
              "particles", "", between(0, 2e6),
              "Drops or flakes in the container before the eye, always the same number; 0: shafts alone.",

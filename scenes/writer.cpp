@@ -207,6 +207,7 @@ std::string simulation_hash(const Scene& scene, std::string_view initial_state_h
     if (scene.ground_cover.enabled) {
         simulation.ground_cover = scene.ground_cover;
         simulation.render.ground.height_m = scene.render.ground.height_m;  // how far drops drift
+        simulation.render.precipitation.kind = scene.render.precipitation.kind;
     }
     simulation.steps = 0;
     if (scene.initial_state_file) simulation.initial_state_file = "state";

@@ -100,7 +100,9 @@ Drift drift_m(const Wind& wind, double time_s, double base_m, double ground_m, d
     return {drift.x_m * seconds, drift.y_m * seconds};
 }
 
-GroundCover::GroundCover(const GroundCoverOptions& options, const WorldRectangle& world) : options_(options) {
+GroundCover::GroundCover(const GroundCoverOptions& options, PrecipitationKind kind,
+                         const WorldRectangle& world)
+    : options_(options), kind_(kind) {
     check(options);
     const double wide_m = world.max_x_m - world.min_x_m, high_m = world.max_y_m - world.min_y_m;
     map_.x_m = world.min_x_m - options.margin * wide_m;
@@ -147,7 +149,7 @@ void GroundCover::rain_on(const RainArea& area, const Drift& drift) {
 }
 
 void GroundCover::advance(double duration_s) {
-    const bool snows = options_.kind == Precipitation::snow;
+    const bool snows = kind_ == PrecipitationKind::snow;
     const auto after = [&](const GroundFilm& film, double falls) {
         return advanced(film, snows ? 0 : falls, snows ? falls : 0, duration_s, options_);
     };

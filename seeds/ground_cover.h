@@ -3,7 +3,7 @@
 
 // Water and snow on the ground over time: a map over a rectangle of the world that rain wets and air dries.
 //
-//     GroundCover cover(options, world);          // as it lies at time 0
+//     GroundCover cover(options, kind, world);    // as it lies at time 0; what falls
 //     cover.expose(falling);                      // the rain areas now; fills map().rain_mm_per_h
 //     cover.advance(step_s); cover.expose(...);   // a step, during which it rained as it was exposed
 //
@@ -25,23 +25,21 @@
 #include <span>
 #include <vector>
 
+#include "automaton/precipitation_kind.h"
 #include "automaton/wind.h"
 #include "seeds/rain_area.h"
 #include "seeds/sky.h"
 
 namespace nephos {
 
-enum class Precipitation { rain, snow };
-
 struct GroundCoverOptions {
-    bool enabled = false;                      // false: the ground is dry for ever and nothing is computed
-    double initial_water_mm = 0;               // of the film everywhere at time 0, 0..100
-    double initial_snow_mm = 0;                // of water in the snow everywhere at time 0, 0..1000
-    Precipitation kind = Precipitation::rain;  // what falls from rain areas
-    double capacity_mm = 3;                    // S: film at which all that falls runs off, 0.01..100
-    double drying_s = 5400;                    // tau: a film dries to 1/e in this time, > 0, may be infinite
-    double melting_mm_per_h = 0;               // M, of water, 0..100
-    double edge = 0.5;                         // outer share of a rain area over which rain falls off, 0..1
+    bool enabled = false;             // false: the ground is dry for ever and nothing is computed
+    double initial_water_mm = 0;      // of the film everywhere at time 0, 0..100
+    double initial_snow_mm = 0;       // of water in the snow everywhere at time 0, 0..1000
+    double capacity_mm = 3;           // S: film at which all that falls runs off, 0.01..100
+    double drying_s = 5400;           // tau: a film dries to 1/e in this time, > 0, may be infinite
+    double melting_mm_per_h = 0;      // M, of water, 0..100
+    double edge = 0.5;                // outer share of a rain area over which rain falls off, 0..1
     double fall_speed_m_per_s = 6.5;  // of drops on their way from the cloud's base, > 0, may be infinite
     int texels = 256;                 // of the map on each side, 2..1024
     double margin = 0.1;              // by which the map is wider than the world on each side, 0..10
@@ -96,8 +94,9 @@ struct FallingRain {
 
 class GroundCover {
   public:
-    // Over `world`, widened by options.margin. Throws Error(usage) on options that check() refuses.
-    GroundCover(const GroundCoverOptions& options, const WorldRectangle& world);
+    // Over `world`, widened by options.margin; `kind` is what falls from all rain areas. Throws Error(usage)
+    // on options that check() refuses.
+    GroundCover(const GroundCoverOptions& options, PrecipitationKind kind, const WorldRectangle& world);
 
     // It rains from these areas from now on.
     void expose(std::span<const FallingRain> falling);
@@ -112,6 +111,7 @@ class GroundCover {
     void rain_on(const RainArea& area, const Drift& drift);
 
     GroundCoverOptions options_;
+    PrecipitationKind kind_;
     GroundCoverMap map_;
 };
 

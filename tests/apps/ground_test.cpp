@@ -67,7 +67,7 @@ TEST(PipelineGroundTest, IsTheCoverUnderTheScenesRain) {
     const Scene scene = showery_scene();
     const Grounds found = run(scene);
     ASSERT_EQ(int(found.maps.size()), frame_count(scene));
-    GroundCover cover(scene.ground_cover, whole_world(scene));
+    GroundCover cover(scene.ground_cover, scene.render.precipitation.kind, whole_world(scene));
     SkySimulation sky(sky_options(scene, 0));
     const Drift drift = drift_m(scene.automaton.wind, 0, 1000, 0, scene.ground_cover.fall_speed_m_per_s);
     std::vector<GroundCoverMap> maps;
@@ -133,6 +133,22 @@ TEST(PipelineGroundTest, IsOffUnlessAskedFor) {
     for (const auto& map : run(scene).maps) EXPECT_EQ(map, nullptr);
     EXPECT_EQ(to_toml(scene).find("wet_ground"), std::string::npos);
     EXPECT_NE(simulation_hash(scene), with);
+}
+
+// The scene says once what falls; for the ground it need not be drawn.
+TEST(PipelineGroundTest, TurnsWhiteWhereThePrecipitationIsSnow) {
+    Scene scene = showery_scene();
+    scene.ground_cover.initial_snow_mm = scene.ground_cover.melting_mm_per_h = 0;
+    const std::string rainy = simulation_hash(scene);
+    scene.render.precipitation.kind = PrecipitationKind::snow;
+    EXPECT_NE(simulation_hash(scene), rainy);
+    const auto map = run(scene).maps.back();
+    EXPECT_GT(*std::max_element(map->snow_mm.begin(), map->snow_mm.end()), 0.3f);
+    EXPECT_EQ(*std::max_element(map->water_mm.begin(), map->water_mm.end()), 0.0f);
+    scene.ground_cover = {};
+    const std::string dry = simulation_hash(scene);
+    scene.render.precipitation.kind = PrecipitationKind::rain;
+    EXPECT_EQ(simulation_hash(scene), dry) << "a matter of pictures alone";
 }
 
 // Without rain areas, and without layers, it dries from what lay there at the start.

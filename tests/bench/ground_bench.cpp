@@ -36,7 +36,7 @@ RainArea shower() {
 BenchRow cover_row() {
     GroundCoverOptions options;
     options.initial_snow_mm = 1;
-    GroundCover cover(options, {0, 0, 12000, 12000});
+    GroundCover cover(options, PrecipitationKind::rain, {0, 0, 12000, 12000});
     const RainArea area = shower();
     const FallingRain falling[] = {{{&area, 1}, {}}};
     const std::size_t texels = cover.map().water_mm.size();

@@ -111,7 +111,7 @@ RainArea shower() {
 TEST(GroundCoverTest, IsExposedToTheRainAboveIt) {
     GroundCoverOptions options;
     options.texels = 64;
-    GroundCover cover(options, {-1500, -1500, 1500, 1500});
+    GroundCover cover(options, PrecipitationKind::rain, {-1500, -1500, 1500, 1500});
     RainArea second = shower();
     second.x_m = -400;
     second.intensity_mm_per_h = 5;
@@ -140,7 +140,7 @@ TEST(GroundCoverTest, WetsWhereItRainsAndDriesElsewhere) {
     GroundCoverOptions options;
     options.texels = 48;
     options.initial_water_mm = 1;
-    GroundCover cover(options, {-1000, -1000, 1000, 1000});
+    GroundCover cover(options, PrecipitationKind::rain, {-1000, -1000, 1000, 1000});
     const RainArea areas[] = {shower()};
     const FallingRain falling[] = {{areas, {}}};
     cover.expose(falling);
@@ -160,8 +160,7 @@ TEST(GroundCoverTest, WetsWhereItRainsAndDriesElsewhere) {
 TEST(GroundCoverTest, BecomesWhiteWhereItSnows) {
     GroundCoverOptions options;
     options.texels = 48;
-    options.kind = Precipitation::snow;
-    GroundCover cover(options, {-1000, -1000, 1000, 1000});
+    GroundCover cover(options, PrecipitationKind::snow, {-1000, -1000, 1000, 1000});
     const RainArea areas[] = {shower()};
     const FallingRain falling[] = {{areas, {}}};
     cover.expose(falling);
@@ -177,7 +176,7 @@ TEST(GroundCoverTest, BecomesWhiteWhereItSnows) {
 TEST(GroundCoverTest, GroundBeyondTheMapHasTheWeatherOfItsEdge) {
     GroundCoverOptions options;
     options.texels = 16;
-    GroundCover cover(options, {0, 0, 100, 100});
+    GroundCover cover(options, PrecipitationKind::rain, {0, 0, 100, 100});
     RainArea wide = shower();
     wide.semi_a_m = wide.semi_b_m = 1e6;
     const FallingRain falling[] = {{{&wide, 1}, {}}};
@@ -191,7 +190,7 @@ TEST(GroundCoverTest, IsMixedLinearly) {
     GroundCoverOptions options;
     options.texels = 4;
     options.initial_water_mm = 2;
-    GroundCover cover(options, {0, 0, 100, 100});
+    GroundCover cover(options, PrecipitationKind::rain, {0, 0, 100, 100});
     const GroundCoverMap before = cover.map();
     cover.advance(3000);
     const GroundCoverMap half = mix(before, cover.map(), 0.5);
@@ -225,7 +224,7 @@ TEST(GroundCoverTest, RefusesBadOptions) {
     refused([](GroundCoverOptions& o) { o.texels = 1; });
     refused([](GroundCoverOptions& o) { o.edge = 1.5; });
     refused([](GroundCoverOptions& o) { o.initial_snow_mm = -1; });
-    GroundCover cover({}, {0, 0, 1, 1});
+    GroundCover cover({}, PrecipitationKind::rain, {0, 0, 1, 1});
     GroundCoverMap other = cover.map();
     other.water_mm.pop_back();
     EXPECT_THROW(cover.restore(other), Error);
