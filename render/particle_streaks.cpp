@@ -26,6 +26,9 @@ constexpr double kOpacityAtEye = 0.5;
 constexpr double kFlicker = 0.25;
 constexpr double kNumberFade = 0.1;  // share of the particles that fade when their number falls
 
+// Far from overflow, which std::hypot() takes its time to rule out.
+double flat_length(double x, double y) { return std::sqrt(x * x + y * y); }
+
 // What all particles of a pass share.
 struct Pass {
     const Particles& particles;
@@ -102,7 +105,7 @@ Ends ends_of(const Pass& p, const Vec3& place, const Vec3& velocity) {
 // Drawn out from their middle to a length in pixels; upright where they coincide.
 Ends at_least(const Ends& e, double length) {
     double dx = e.to.x - e.from.x, dy = e.to.y - e.from.y;
-    const double span = std::hypot(dx, dy);
+    const double span = flat_length(dx, dy);
     if (span >= length) return e;
     const double x = 0.5 * (e.from.x + e.to.x), y = 0.5 * (e.from.y + e.to.y);
     const double factor = span > 1e-3 ? 0.5 * length / span : 0;
@@ -131,7 +134,8 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     const RainContainer& container = p.pass.container;
     const Vec3& eye = p.view.camera.position_m;
     Vec3 place{boxes.centre_x_m + double(x), boxes.centre_y_m + double(y), boxes.centre_z_m + double(z)};
-    const double d = std::hypot(place.x - container.nearest.x, place.y - container.nearest.y) / boxes.depth_m;
+    const double d =
+        flat_length(place.x - container.nearest.x, place.y - container.nearest.y) / boxes.depth_m;
     if (d >= double(p.particles.reach[i])) return;
     const Vec3 way = place - eye;
     if (!container.whole && way.x * container.axis.x + way.y * container.axis.y < 0) return;
@@ -159,7 +163,7 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     const double shadow =
         stands_for * 1e-6 * shadow_mm2(p.particles.kind, d_mm) * scale * scale * sway.cover;  // pixels
     ends = at_least(ends, p.snow ? width : 1.0);
-    const double span = std::hypot(ends.to.x - ends.from.x, ends.to.y - ends.from.y);
+    const double span = flat_length(ends.to.x - ends.from.x, ends.to.y - ends.from.y);
     const double opacity = present * std::min(kMostOpaque, options.visibility * shadow / (width * span));
     if (opacity < kLeastOpaque) return;
     Rgb light = particle_radiance(p.view.light, (1 / distance) * way, place, p.sunlight);

@@ -22,49 +22,57 @@ double phase(double g, double cosine) {
 }
 
 double particle_phase(PrecipitationKind kind, double cosine) {
-    const double g = kind == PrecipitationKind::rain ? 0.85 : 0.6;
-    return 0.8 * phase(g, cosine) + 0.2 * 0.25;
+    return kForwardShare * phase(forward_g(kind), cosine) + (1 - kForwardShare) * 0.25;
 }
 
 constexpr double kSkyShare[2] = {0.68, 0.8};  // of a drop's and a flake's light, the rest is the ground's
 
-// Mean radiance of the picture above or below the horizon.
-Rgb mean_of(const Picture& picture, const RenderOptions& options, const CameraFrame& camera, bool above,
-            const Rgb& otherwise) {
+// A mean of the picture's pixels, with a share of what the options say, which steps in where there are none.
+struct Mean {
+    Rgb sum{};
+    double weights = 0;
+    void add(const float* pixel, double weight) {
+        // Whatever is brighter than white is the sun or its rim, which has a term of its own.
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * std::min(1.0, double(pixel[c]));
+        weights += weight;
+    }
+    Rgb with(const Rgb& otherwise, double more) const {
+        Rgb mean;
+        for (std::size_t c = 0; c < 3; ++c) mean[c] = (sum[c] + more * otherwise[c]) / (weights + more);
+        return mean;
+    }
+};
+
+Rgb surroundings(const Picture& picture, const RenderOptions& options, const CameraFrame& camera) {
     constexpr double kShareOfOptions = 0.1;  // of the picture
     const int step = std::max(1, picture.width / 160);
-    double weights = 0;
-    Rgb sum{};
+    Mean above, below;
     std::size_t looked = 0;
     for (int y = step / 2; y < picture.height; y += step) {
+        const double upward = (1 - (2 * y + 1.0) / options.camera.height) * camera.half_height;
         for (int x = step / 2; x < picture.width; x += step, ++looked) {
-            const double up = pixel_ray(camera, options.camera, x + 0.5, y + 0.5).z;
-            const double weight = above ? smooth(-0.05, 0.15, up) : smooth(0.02, -0.2, up);
-            if (weight <= 0) continue;
+            const double across = ((2 * x + 1.0) / options.camera.width - 1) * camera.half_width;
+            const double up = (camera.forward.z + across * camera.right.z + upward * camera.up.z) /
+                              std::sqrt(1 + across * across + upward * upward);
             const float* pixel =
                 &picture.beauty[3 * (std::size_t(y) * std::size_t(picture.width) + std::size_t(x))];
-            // Whatever is brighter than white is the sun or its rim, which has a term of its own.
-            for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * std::min(1.0, double(pixel[c]));
-            weights += weight;
+            above.add(pixel, smooth(-0.05, 0.15, up));
+            below.add(pixel, smooth(0.02, -0.2, up));
         }
     }
     const double more = kShareOfOptions * double(std::max<std::size_t>(looked, 1));
-    for (std::size_t c = 0; c < 3; ++c) sum[c] = (sum[c] + more * otherwise[c]) / (weights + more);
-    return sum;
-}
-
-Rgb surroundings(const Picture& picture, const RenderOptions& options, const CameraFrame& camera) {
-    Rgb ground{};
-    const Rgb sky = mean_of(picture, options, camera, true, air_of(picture, options).sky);
-    for (std::size_t c = 0; c < 3; ++c) ground[c] = options.ground.albedo[c] * sky[c];
-    ground = mean_of(picture, options, camera, false, ground);
-    const double share = kSkyShare[int(options.precipitation.kind)];
+    const Rgb sky = above.with(air_of(picture, options).sky, more);
     Rgb both{};
+    for (std::size_t c = 0; c < 3; ++c) both[c] = options.ground.albedo[c] * sky[c];
+    const Rgb ground = below.with(both, more);
+    const double share = kSkyShare[int(options.precipitation.kind)];
     for (std::size_t c = 0; c < 3; ++c) both[c] = share * sky[c] + (1 - share) * ground[c];
     return both;
 }
 
 }  // namespace
+
+double forward_g(PrecipitationKind kind) { return kind == PrecipitationKind::rain ? 0.85 : 0.6; }
 
 PictureAir air_of(const Picture& picture, const RenderOptions& options) {
     if (picture.air) return *picture.air;

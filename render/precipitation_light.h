@@ -35,9 +35,13 @@ PictureAir air_of(const Picture& picture, const RenderOptions& options);
 // is in front of all of it; places above the clouds' shadow are taken to be in it, too.
 float sunlight_at(const Picture& picture, const Vec3& place_m);
 
+// Drops scatter forward (Henyey and Greenstein 1941) with g = 0.85, flakes with 0.6: kForwardShare of the
+// light, and the rest evenly.
+inline constexpr double kForwardShare = 0.8;
+double forward_g(PrecipitationKind kind);
+
 // Radiance of a particle (or of a thick curtain of them) seen along a unit ray, at a place that `sunlight`
-// (0..1) of the sun reaches. Drops scatter forward (Henyey-Greenstein g = 0.85 for four fifths of the light,
-// the rest evenly), flakes less (g = 0.6): brighter against the light.
+// (0..1) of the sun reaches: brighter against the light.
 Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Vec3& place_m, double sunlight);
 
 }  // namespace nephos

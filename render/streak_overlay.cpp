@@ -67,7 +67,7 @@ void draw_thin(Picture& picture, const Streak& s, const Rows& band) {
 
 // By the distance from the line between the centres of the round ends; the wider, the softer.
 void draw_wide(Picture& picture, const Streak& s, const Rows& band) {
-    const float dx = s.x1 - s.x0, dy = s.y1 - s.y0, length = std::hypot(dx, dy);
+    const float dx = s.x1 - s.x0, dy = s.y1 - s.y0, length = std::sqrt(dx * dx + dy * dy);
     const float half = 0.5f * s.width, cut = std::min(half, 0.5f * length) / std::max(length, 1e-6f);
     const float ax = s.x0 + cut * dx, ay = s.y0 + cut * dy;
     const float bx = (1.0f - 2.0f * cut) * dx, by = (1.0f - 2.0f * cut) * dy;
@@ -79,7 +79,8 @@ void draw_wide(Picture& picture, const Streak& s, const Rows& band) {
         for (int x = columns.first; x < columns.end; ++x) {
             const float px = float(x) + 0.5f - ax, py = float(y) + 0.5f - ay;
             const float t = squared > 0 ? std::clamp((px * bx + py * by) / squared, 0.0f, 1.0f) : 0.0f;
-            const float distance = std::hypot(px - t * bx, py - t * by);
+            const float beside_x = px - t * bx, beside_y = py - t * by;
+            const float distance = std::sqrt(beside_x * beside_x + beside_y * beside_y);
             const float cover = std::clamp((half + 0.5f * soft - distance) / soft, 0.0f, 1.0f);
             if (cover > 0.0f) blend(picture, s, x, y, cover);
         }

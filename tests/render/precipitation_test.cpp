@@ -386,37 +386,6 @@ TEST(Precipitation, LiesBehindNearerClouds) {
     EXPECT_NE(near.beauty, grey(options.camera).beauty);
 }
 
-// A shaft lets through what Beer and Lambert say: through its middle, with neither edge nor texture.
-TEST(RainShafts, HaveTheirOpticalDepth) {
-    RainCurtain curtain = area();
-    curtain.x_m = 0;
-    curtain.axis_x = 1;
-    curtain.axis_y = 0;
-    RenderOptions options = options_at({0, -3000, 300}, {0, 0, 300});
-    PrecipitationOptions& p = options.precipitation;
-    p.particles = 0;
-    p.edge = 0;
-    p.shaft_texture = 0;
-    options.air.extinction_per_m = {0, 0, 0};
-    const Weather weather = weather_of(curtain);
-    Picture dark = grey(options.camera, 0.0f), bright = grey(options.camera, 0.5f);
-    PrecipitationPainter painter;
-    // The same light of the surroundings in both: only what is behind differs.
-    const CameraFrame camera = camera_frame(options.camera);
-    const PrecipitationLight light = precipitation_light(dark, options, camera, 0);
-    draw_shafts(dark, options, camera, weather.curtains, light, 0, 1);
-    draw_shafts(bright, options, camera, weather.curtains, light, 0, 1);
-    const std::size_t middle = 3 * (60 * 160 + 80);
-    const double expected = std::exp(-rain_extinction_per_m(kRain, 20) * 800);
-    EXPECT_NEAR(double(bright.beauty[middle] - dark.beauty[middle]) / 0.5, expected, 0.01);
-    // Beside it nothing changes.
-    EXPECT_EQ(bright.beauty[3 * 60 * 160], 0.5f);
-    // Virga: none is left below.
-    EXPECT_EQ(left_of_rain(0.2, 0), 1);
-    EXPECT_EQ(left_of_rain(0.2, 0.3), 0);
-    EXPECT_NEAR(left_of_rain(1, 0.3), 1, 1e-12);
-}
-
 TEST(Precipitation, RefusesBadOptions) {
     RenderOptions options = options_at({0, 0, 2}, {0, 1, 2});
     options.precipitation.exposure_s = -1;

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rain seen from afar: what it lets through, and the picture against a twin that goes ray by ray.
+
+#include "render/rain_shafts.h"
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "tests/reference/with_threads.h"
+#include "tests/render/reference_shafts.h"
+
+namespace nephos {
+namespace {
+
+RainCurtain area() {
+    RainCurtain c;
+    c.id = 7;
+    c.x_m = 100;
+    c.y_m = 900;
+    c.semi_a_m = 700;
+    c.semi_b_m = 400;
+    c.axis_x = std::cos(0.4);
+    c.axis_y = std::sin(0.4);
+    c.base_m = 800;
+    c.rate_mm_per_h = 20;
+    return c;
+}
+
+RenderOptions options_at(const Vec3& eye, const Vec3& target) {
+    RenderOptions options;
+    options.camera.position_m = eye;
+    options.camera.target_m = target;
+    options.camera.width = 77;
+    options.camera.height = 30;
+    options.precipitation.enabled = true;
+    options.precipitation.particles = 0;
+    return options;
+}
+
+Picture grey(const Camera& camera, float value) {
+    Picture picture;
+    picture.width = camera.width;
+    picture.height = camera.height;
+    picture.beauty.assign(3 * picture.pixels(), value);
+    picture.transmittance.assign(picture.pixels(), 1.0f);
+    picture.depth_m.assign(picture.pixels(), std::numeric_limits<float>::infinity());
+    return picture;
+}
+
+// A picture with clouds at all distances before and behind the rain, and their shadow.
+Picture cloudy(const Camera& camera, std::mt19937& random) {
+    Picture picture = grey(camera, 0.2f);
+    std::uniform_real_distribution<float> share(0.0f, 1.0f);
+    for (std::size_t i = 0; i < picture.pixels(); ++i) {
+        if (share(random) < 0.3f) continue;
+        picture.transmittance[i] = share(random);
+        picture.depth_m[i] = 3000 * share(random);
+        for (std::size_t c = 0; c < 3; ++c) picture.beauty[3 * i + c] = share(random);
+    }
+    picture.shadow_size = 16;
+    picture.shadow_frame = {{-2000, -2000, 0}, {4000, 300, 0}, {-300, 4000, 200}, {0, 0, -1}};
+    for (int i = 0; i < 16 * 16; ++i) picture.shadow.push_back(share(random));
+    return picture;
+}
+
+struct Drawn {
+    Picture picture;
+    int apart = 0;  // pixels that differ from the twin's by more than a step of eight bits
+};
+
+Drawn draw(Picture picture, const RenderOptions& options, const std::vector<RainCurtain>& curtains,
+           double time_s) {
+    const CameraFrame camera = camera_frame(options.camera);
+    const PrecipitationLight light = precipitation_light(picture, options, camera, time_s);
+    Drawn drawn{picture, 0};
+    draw_shafts(drawn.picture, options, camera, curtains, light, time_s, 5);
+    const reference::Shafts twin{
+        picture, options, camera,         curtains,
+        light,   time_s,  shaft_noise(5), reference::whole_per_m(options.precipitation, curtains)};
+    for (int y = 0; y < picture.height; ++y) {
+        for (int x = 0; x < picture.width; ++x) {
+            const Rgb expected = reference::pixel_with_shafts(twin, x, y);
+            const float* pixel = &drawn.picture.beauty[3 * std::size_t(y * picture.width + x)];
+            double most = 0;
+            for (std::size_t c = 0; c < 3; ++c)
+                most = std::max(most, std::abs(double(pixel[c]) - expected[c]) / std::max(1.0, expected[c]));
+            if (!(most < 1.0 / 255)) ++drawn.apart;
+        }
+    }
+    return drawn;
+}
+
+// A shaft lets through what Beer and Lambert say: through its middle, with neither edge nor texture.
+TEST(RainShafts, HaveTheirOpticalDepth) {
+    RainCurtain curtain = area();
+    curtain.x_m = 0;
+    curtain.axis_x = 1;
+    curtain.axis_y = 0;
+    RenderOptions options = options_at({0, -3000, 300}, {0, 0, 300});
+    PrecipitationOptions& p = options.precipitation;
+    p.edge = 0;
+    p.shaft_texture = 0;
+    options.air.extinction_per_m = {0, 0, 0};
+    Picture dark = grey(options.camera, 0.0f), bright = grey(options.camera, 0.5f);
+    // The same light of the surroundings in both: only what is behind differs.
+    const CameraFrame camera = camera_frame(options.camera);
+    const PrecipitationLight light = precipitation_light(dark, options, camera, 0);
+    draw_shafts(dark, options, camera, {&curtain, 1}, light, 0, 1);
+    draw_shafts(bright, options, camera, {&curtain, 1}, light, 0, 1);
+    const std::size_t middle = 3 * (15 * 77 + 38);
+    const double expected = std::exp(-rain_extinction_per_m(PrecipitationKind::rain, 20) * 800);
+    EXPECT_NEAR(double(bright.beauty[middle] - dark.beauty[middle]) / 0.5, expected, 0.01);
+    // Beside it nothing changes.
+    EXPECT_EQ(bright.beauty[3 * 15 * 77], 0.5f);
+    // Virga: none is left below.
+    EXPECT_EQ(left_of_rain(0.2, 0), 1);
+    EXPECT_EQ(left_of_rain(0.2, 0.3), 0);
+    EXPECT_NEAR(left_of_rain(1, 0.3), 1, 1e-12);
+}
+
+// Three curtains, two of which overlap and the third behind them, all leaning in their own ways; from
+// outside, from within, from above, steeply and level, with all that light them.
+TEST(RainShafts, AreThoseOfTheTwin) {
+    std::vector<RainCurtain> curtains(3, area());
+    curtains[0].lean_x = 0.3;
+    curtains[0].lean_y = -0.2;
+    curtains[1].id = 62;
+    curtains[1].x_m = 600;
+    curtains[1].semi_b_m = 650;
+    curtains[1].lean_x = -0.5;
+    curtains[1].rate_mm_per_h = 60;
+    curtains[2].id = 4711;
+    curtains[2].x_m = -500;
+    curtains[2].y_m = 4200;
+    curtains[2].semi_a_m = 2500;
+    curtains[2].ground_m = 100;
+    curtains[2].base_m = 1500;
+    std::mt19937 random(2026);
+    const Vec3 eyes[] = {{-400, -900, 20}, {150, 850, 200}, {300, 300, 2600}, {-12000, -30000, 500}};
+    const Vec3 targets[] = {{100, 900, 300}, {150, 1850, 200}, {150, 800, 0}, {100, 900, 400}};
+    for (std::size_t n = 0; n < std::size(eyes); ++n) {
+        RenderOptions options = options_at(eyes[n], targets[n]);
+        options.lightning = {{{600, 700, 500}, 100, 1, {0.8, 0.8, 1}, 3}};
+        options.sun.elevation_deg = 15;
+        if (n == 3) options.camera.vertical_fov_deg = 5;
+        if (n == 1) options.precipitation.particles = 1000;
+        options.precipitation.evaporation = n == 2 ? 0.3 : 0;
+        options.precipitation.kind = n == 0 ? PrecipitationKind::snow : PrecipitationKind::rain;
+        const Picture picture = cloudy(options.camera, random);
+        for (const double time_s : {100.1, 1234.5}) {
+            const Drawn drawn = draw(picture, options, curtains, time_s);
+            EXPECT_EQ(drawn.apart, 0) << "eye " << n << " at " << time_s;
+            EXPECT_NE(drawn.picture.beauty, picture.beauty);
+        }
+        // A wall of rain: a step on the other side of it is another picture.
+        options.precipitation.edge = 0;
+        EXPECT_LT(draw(picture, options, curtains, 0).apart, 20) << n;
+    }
+}
+
+TEST(RainShafts, AreTheSameForAnyNumberOfThreads) {
+    std::mt19937 random(7);
+    const RenderOptions options = options_at({-400, -900, 20}, {100, 900, 300});
+    const Picture picture = cloudy(options.camera, random);
+    const RainCurtain curtain = area();
+    const CameraFrame camera = camera_frame(options.camera);
+    const PrecipitationLight light = precipitation_light(picture, options, camera, 0);
+    const auto drawn = [&](std::size_t threads) {
+        Picture copy = picture;
+        test::with_threads(threads, [&] { draw_shafts(copy, options, camera, {&curtain, 1}, light, 0, 5); });
+        return copy.beauty;
+    };
+    const std::vector<float> one = drawn(1);
+    for (const std::size_t threads : {2, 3, 8}) EXPECT_EQ(drawn(threads), one);
+}
+
+}  // namespace
+}  // namespace nephos
