@@ -261,6 +261,8 @@ int render(const RenderArguments& a) {
     Splats splats;
     splats.metaballs = {balls, extinction_per_m, metaball_normalisation(radius)};
     splats.ground_cover = initial_cover(scene);
+    splats.light = splats.depth =
+        std::ranges::any_of(a.out, [](const std::string& out) { return extension_of(out) == ".exr"; });
     const Picture picture = renderer.draw_splats(splats, options);
     write_pictures(a, picture, options, picture_metadata(a, loaded, extinction_per_m));
 

@@ -162,12 +162,10 @@ HWY_INLINE Floats3 air_transmittance(const PictureFrame& frame, const Floats3& r
     return {hn::Exp(d, hn::Neg(depth.x)), hn::Exp(d, hn::Neg(depth.y)), hn::Exp(d, hn::Neg(depth.z))};
 }
 
-HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, const Floats3& beta) {
+HWY_INLINE Floats3 endless_air(const PictureFrame& frame, const Floats3& ray) {
+    if (frame.sky == nullptr) return set3(frame.horizon);
     const Lanes d;
-    const Floats one = set(1.0f);
-    const Floats3 in_front{hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)};
-    if (frame.sky == nullptr) return each_times(in_front, set3(frame.horizon));
-    const Floats slope = hn::Max(hn::Abs(ray.z), set(1.0e-5f));
+    const Floats one = set(1.0f), slope = hn::Max(hn::Abs(ray.z), set(1.0e-5f));
     const auto column = [&](float per_height) {
         return hn::Div(set(std::exp(-frame.air.x * per_height) / per_height), slope);
     };
@@ -176,23 +174,62 @@ HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, cons
     const auto share = [&](Floats part, Floats whole) {
         return hn::Div(part, hn::Max(hn::Sub(one, hn::Exp(d, hn::Neg(whole))), set(1.0e-4f)));
     };
-    return each_times(sky_scattered(frame, ray),
-                      {share(in_front.x, depth.x), share(in_front.y, depth.y), share(in_front.z, depth.z)});
+    const Floats3 sky = sky_scattered(frame, ray);
+    return {share(sky.x, depth.x), share(sky.y, depth.y), share(sky.z, depth.z)};
 }
 
-HWY_INLINE Floats3 air_sunlight(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
-    if (frame.sky == nullptr)
-        return times(set(shader::kAirSunShare), each_times(set3(frame.air_extinction), set3(frame.horizon)));
+HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, const Floats3& beta) {
+    const Floats one = set(1.0f);
+    return each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)},
+                      endless_air(frame, ray));
+}
+
+HWY_INLINE Floats3 gradient_sky(const PictureFrame& frame, Floats height) {
+    constexpr float kFalloff = 4.0f;
+    const float least = std::exp(-kFalloff);
+    const Floats haze = hn::Mul(hn::Sub(hn::Exp(Lanes(), hn::Mul(set(-kFalloff), height)), set(least)),
+                                set(1.0f / (1.0f - least)));
+    return mix(set3(frame.zenith), set3(frame.horizon), {haze, haze, haze});
+}
+
+struct SunlitAir {
+    Floats3 most;
+    Floats molecules, particles;
+};
+
+HWY_INLINE Floats3 least(const Floats3& a, const Floats3& b) {
+    return {hn::Min(a.x, b.x), hn::Min(a.y, b.y), hn::Min(a.z, b.z)};
+}
+
+HWY_INLINE SunlitAir sunlit_air(const PictureFrame& frame, const Floats3& ray) {
+    const Floats zero = hn::Zero(Lanes()), cosine = dot(set3(frame.to_sun), ray);
+    if (frame.sky != nullptr)
+        return {endless_air(frame, ray), hn::Mul(set(shader::kPi), molecule_phase(cosine)),
+                hn::Mul(set(shader::kPi * frame.air.z), particle_phase(cosine, frame.air.y))};
+    const Floats phase = particle_phase(cosine, frame.zenith.w);
+    const Floats direct = hn::Mul(set(frame.horizon.w * 4.0f * shader::kPi), phase);
+    const Floats share = hn::Div(direct, hn::Add(direct, set(1.0f - frame.horizon.w + 1.0e-6f)));
+    const Floats3 above = gradient_sky(frame, hn::Max(ray.z, zero));
+    return {times(share, least(set3(frame.horizon), above)), zero, zero};
+}
+
+HWY_INLINE Floats3 sunlit_at(const PictureFrame& frame, const SunlitAir& air, const Floats3& ray,
+                             Floats distance_m) {
+    if (frame.sky == nullptr) return air.most;
     const Lanes d;
-    const Floats height = hn::Mul(ray.z, distance_m), cosine = dot(set3(frame.to_sun), ray);
+    const Floats height = hn::Mul(ray.z, distance_m);
     const Floats altitude = hn::Max(hn::Add(set(frame.air.x), height), hn::Zero(d));
-    const Floats molecules =
-        hn::Mul(hn::Exp(d, hn::Mul(altitude, set(-frame.rayleigh.w))), molecule_phase(cosine));
-    const Floats particles = hn::Mul(
-        hn::Mul(hn::Exp(d, hn::Mul(altitude, set(-frame.haze.w))), particle_phase(cosine, frame.air.y)),
-        set(frame.air.z));
-    const Floats3 scattered = times_add(molecules, set3(frame.rayleigh), times(particles, set3(frame.haze)));
-    return each_times(times(set(shader::kPi), scattered), sunlight_at(frame, height));
+    const auto density = [&](float per_height) { return hn::Exp(d, hn::Mul(altitude, set(-per_height))); };
+    const Floats3 molecules = times(density(frame.rayleigh.w), set3(frame.rayleigh)),
+                  particles = times(density(frame.haze.w), set3(frame.haze));
+    const Floats3 scattered = times_add(air.molecules, molecules, times(air.particles, particles));
+    const Floats3 extinct = add(molecules, particles), sunlight = sunlight_at(frame, height);
+    const auto source = [&](Floats light, Floats part, Floats whole) {
+        return hn::Div(hn::Mul(light, part), hn::Max(whole, set(1.0e-12f)));
+    };
+    return least({source(sunlight.x, scattered.x, extinct.x), source(sunlight.y, scattered.y, extinct.y),
+                  source(sunlight.z, scattered.z, extinct.z)},
+                 air.most);
 }
 
 struct ShadowTexels {
@@ -247,19 +284,13 @@ HWY_INLINE Floats3 sun_disc(const PictureFrame& frame, const Floats3& ray) {
             of(frame.sun_disc.z, frame.sun_fade.z, shader::kLimbDarkeningBlue)};
 }
 
-// Gradient: the air is thickest at the horizon; its colour falls off exponentially with height, and reaches
-// zero at the zenith. Below the horizon the sky is that of the horizon.
 HWY_INLINE Floats3 sky(const PictureFrame& frame, const Floats3& ray) {
     const Floats height = hn::Max(ray.z, hn::Zero(Lanes()));
     if (frame.sky != nullptr) {
         const Floats3 upwards{ray.x, ray.y, height};
         return add(sky_scattered(frame, upwards), sun_disc(frame, upwards));
     }
-    constexpr float kFalloff = 4.0f;
-    const float least = std::exp(-kFalloff);
-    const Floats haze = hn::Mul(hn::Sub(hn::Exp(Lanes(), hn::Mul(set(-kFalloff), height)), set(least)),
-                                set(1.0f / (1.0f - least)));
-    return mix(set3(frame.zenith), set3(frame.horizon), {haze, haze, haze});
+    return gradient_sky(frame, height);
 }
 
 // Radiance of the ground at a point relative to the eye, without the air before it.

@@ -165,7 +165,7 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
     const Vec3 middle = frame.origin_m + 0.5 * frame.u_axis_m + 0.5 * frame.v_axis_m;
     std::vector<float> distance(count);
     KeyedOrder by_distance(count);
-    by_distance.add_all(count, [&](std::uint32_t i, float& key) {
+    by_distance.add_all(0, count, [&](std::uint32_t i, float& key) {
         const Metaball& ball = cloud.metaballs[cloud.visible[i]];
         key = distance[i] = float(std::max(0.0, dot(frame.direction, centre_of(ball) - middle)));
         return true;

@@ -76,7 +76,7 @@ class Collector {
           by_distance_(cloud.visible.size() + splats.billboards.size()) {}
 
     void add_metaballs() {
-        by_distance_.add_all(cloud_.visible.size(), [this](std::uint32_t i, float& distance) {
+        by_distance_.add_all(0, cloud_.visible.size(), [this](std::uint32_t i, float& distance) {
             const Metaball& ball = cloud_.metaballs[cloud_.visible[i]];
             if (above_ground_ && ball.z + ball.radius < ground_m_) return false;
             // Metaballs reach up to 1.35 radii (view_splat.vert), and never less than part of a pixel.
@@ -87,16 +87,16 @@ class Collector {
 
     void add_billboards() {
         const auto first = std::uint32_t(cloud_.visible.size());
-        for (std::size_t i = 0; i < splats_.billboards.size(); ++i) {
-            const CloudBillboard& billboard = splats_.billboards[i];
-            check(billboard, i, splats_.clouds.size());
-            if (above_ground_ && billboard.centre_m.z < ground_m_) continue;
-            if (!(drawn(billboard).opacity > 0)) continue;
-            float distance = 0;
-            if (sees(billboard.centre_m, 0.5 * std::max(billboard.width_m, billboard.height_m), 1.4143,
-                     double(shader::kMinPuffPixels), distance))
-                by_distance_.add(distance, first + std::uint32_t(i));
-        }
+        for (std::size_t i = 0; i < splats_.billboards.size(); ++i)
+            check(splats_.billboards[i], i, splats_.clouds.size());
+        by_distance_.add_all(
+            first, splats_.billboards.size(), [this, first](std::uint32_t i, float& distance) {
+                const CloudBillboard& billboard = splats_.billboards[i - first];
+                if (above_ground_ && billboard.centre_m.z < ground_m_) return false;
+                if (!(drawn(billboard).opacity > 0)) return false;
+                return sees(billboard.centre_m, 0.5 * std::max(billboard.width_m, billboard.height_m), 1.4143,
+                            double(shader::kMinPuffPixels), distance);
+            });
     }
 
     EyeOrder order() {

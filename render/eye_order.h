@@ -22,6 +22,7 @@ enum class SplatKind {
     metaball,             // shader::ViewBall, from the textures
     integrated_metaball,  // shader::ViewBall with shader::kIntegrate
     billboard,            // shader::Puff
+    shell,                // a shell of air (air_shells.h), not a splat; never in EyeOrder::runs
 };
 
 // Consecutive splats in the order from the eye that one pipeline draws: of EyeOrder::balls or

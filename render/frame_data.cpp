@@ -90,8 +90,8 @@ PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera,
     frame.ambient_top = to_vec4(light.ambient_top, day.sky, light.albedo);
     frame.ambient_base = to_vec4(light.ambient_base, day.sky, 0);
     frame.air_extinction = to_vec4(options.air.extinction_per_m, 1.0, 0);
-    frame.horizon = to_vec4(options.air.horizon, day.sky, 0);
-    frame.zenith = to_vec4(options.air.zenith, day.sky, 0);
+    frame.horizon = to_vec4(options.air.horizon, day.sky, options.light_shafts.sun_share);
+    frame.zenith = to_vec4(options.air.zenith, day.sky, options.light_shafts.g);
 
     // The open sky lights the ground with about the mean of its two colours; radiance of a white surface in
     // it is that.

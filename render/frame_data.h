@@ -12,6 +12,8 @@
 
 namespace nephos {
 
+struct AirShells;
+
 // A rectangle of the picture that is drawn at once, in pixels.
 struct Tile {
     int x = 0, y = 0, width = 0, height = 0;
@@ -33,6 +35,7 @@ Daylight daylight(double sun_elevation_deg);
 struct PictureFrame : shader::Frame {
     const float* sky = nullptr;         // SkyLight::texels; null: gradient
     const float* scattering = nullptr;  // scattering_table.h, for metaballs on the processor
+    const AirShells* shells = nullptr;  // likewise; null: none
 };
 
 // `flash` is null in the dark, `sky` with AirModel::gradient; the latter must outlive the frame.

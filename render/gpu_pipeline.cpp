@@ -17,8 +17,11 @@ namespace spirv {
 #include "light_map_comp.h"
 #include "puff_frag.h"
 #include "puff_vert.h"
+#include "shell_frag.h"
+#include "shell_vert.h"
 #include "view_finish_comp.h"
 #include "view_project_comp.h"
+#include "view_shells_comp.h"
 #include "view_splat_frag.h"
 #include "view_splat_vert.h"
 #include "view_tiles_comp.h"
@@ -30,11 +33,12 @@ vk::raii::ShaderModule create_module(const GpuDevice& gpu, ShaderCode code) {
 
 // A variant as specialization constants; constants that a shader does not have are ignored.
 struct VariantConstants {
-    std::array<vk::Bool32, 2> values;
-    std::array<vk::SpecializationMapEntry, 2> entries{vk::SpecializationMapEntry(0, 0, sizeof(vk::Bool32)),
-                                                      vk::SpecializationMapEntry(5, 4, sizeof(vk::Bool32))};
+    std::array<vk::Bool32, 3> values;
+    std::array<vk::SpecializationMapEntry, 3> entries{vk::SpecializationMapEntry(0, 0, sizeof(vk::Bool32)),
+                                                      vk::SpecializationMapEntry(5, 4, sizeof(vk::Bool32)),
+                                                      vk::SpecializationMapEntry(6, 8, sizeof(vk::Bool32))};
     explicit VariantConstants(const ShaderVariant& variant)
-        : values{vk::Bool32(variant.exact), vk::Bool32(variant.physical_sky)} {}
+        : values{vk::Bool32(variant.exact), vk::Bool32(variant.physical_sky), vk::Bool32(variant.shells)} {}
     vk::SpecializationInfo info() const {
         return {std::uint32_t(entries.size()), entries.data(), sizeof values, values.data()};
     }
@@ -59,7 +63,8 @@ const ShaderSet& shaders() {
     static constexpr ShaderSet kShaders{
         spirv::light_map_comp,   spirv::light_centres_comp, spirv::view_project_comp, spirv::view_tiles_comp,
         spirv::view_finish_comp, spirv::background_vert,    spirv::background_frag,   spirv::view_splat_vert,
-        spirv::view_splat_frag,  spirv::puff_vert,          spirv::puff_frag};
+        spirv::view_splat_frag,  spirv::puff_vert,          spirv::puff_frag,         spirv::view_shells_comp,
+        spirv::shell_vert,       spirv::shell_frag};
     return kShaders;
 }
 
@@ -81,6 +86,8 @@ PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
         vk::DescriptorSetLayoutBinding(10, Type::eStorageImage, 1, Stage::eCompute),
         vk::DescriptorSetLayoutBinding(11, Type::eCombinedImageSampler, 1, all),
         vk::DescriptorSetLayoutBinding(12, Type::eStorageBuffer, 1, all),
+        vk::DescriptorSetLayoutBinding(13, Type::eUniformBuffer, 1, all),
+        vk::DescriptorSetLayoutBinding(14, Type::eStorageBuffer, 1, all),
     };
     PipelineLayout result;
     result.set = vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
@@ -139,14 +146,15 @@ vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineL
 vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
                                         std::array<bool, 2> switches, ShaderVariant variant) {
     const vk::raii::ShaderModule module = create_module(gpu, code);
-    // Lanes, rows of a lane, whether lanes hand splats round, the switches, and the sky.
+    // Lanes, rows of a lane, whether lanes hand splats round, the switches, sky and shells.
     const std::uint32_t lanes = gpu.tile_lanes;
-    const std::array<std::uint32_t, 6> values{lanes,
+    const std::array<std::uint32_t, 7> values{lanes,
                                               shader::kTileWidth * shader::kTileHeight / lanes,
                                               std::uint32_t(gpu.tiles_are_subgroups),
                                               std::uint32_t(switches[0]),
                                               std::uint32_t(switches[1]),
-                                              std::uint32_t(variant.physical_sky)};
+                                              std::uint32_t(variant.physical_sky),
+                                              std::uint32_t(variant.shells)};
     std::array<vk::SpecializationMapEntry, values.size()> entries;
     for (std::uint32_t i = 0; i < entries.size(); ++i) entries[i] = vk::SpecializationMapEntry(i, 4 * i, 4);
     const vk::SpecializationInfo constants(entries.size(), entries.data(), sizeof values, values.data());
@@ -179,8 +187,8 @@ void compute_barrier(const vk::raii::CommandBuffer& commands) {
 }
 
 Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
-    const std::array sizes{vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, 1),
-                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, 8),
+    const std::array sizes{vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, 2),
+                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, 9),
                            vk::DescriptorPoolSize(vk::DescriptorType::eCombinedImageSampler, 3),
                            vk::DescriptorPoolSize(vk::DescriptorType::eStorageImage, 1)};
     Bindings bindings;
@@ -196,8 +204,8 @@ Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
 
 void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
                  const GpuBuffer& buffer) {
-    const vk::DescriptorType type =
-        binding == 0 ? vk::DescriptorType::eUniformBuffer : vk::DescriptorType::eStorageBuffer;
+    const vk::DescriptorType type = binding == 0 || binding == 13 ? vk::DescriptorType::eUniformBuffer
+                                                                  : vk::DescriptorType::eStorageBuffer;
     const vk::DescriptorBufferInfo info(*buffer.buffer, 0, VK_WHOLE_SIZE);
     gpu.device.updateDescriptorSets(vk::WriteDescriptorSet(bindings.set, binding, 0, type, {}, info), {});
 }

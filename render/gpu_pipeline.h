@@ -11,6 +11,7 @@
 //                                                       10  shadow map, to be written
 //                                                       11  tables of the sky, to be sampled (array)
 //                                                       12  storage  scattering table
+//    13  uniform  Shells                                 14  storage  shade map of the shells
 //
 // All samplers of a set must be bound before a draw, used or not: lavapipe looks at them.
 //
@@ -31,6 +32,7 @@ struct ShaderSet {
     ShaderCode light_map_comp, light_centres_comp, view_project_comp, view_tiles_comp, view_finish_comp;
     ShaderCode background_vert, background_frag, view_splat_vert, view_splat_frag;
     ShaderCode puff_vert, puff_frag;
+    ShaderCode view_shells_comp, shell_vert, shell_frag;
 };
 const ShaderSet& shaders();
 
@@ -49,6 +51,7 @@ enum class Blend {
 struct ShaderVariant {
     bool exact = false;         // 0, fragment shaders of metaballs: integrate along each ray
     bool physical_sky = false;  // 5, whatever includes air.glsl
+    bool shells = false;        // 6, whatever includes shells.glsl
 };
 
 // Draws triangles; viewport and scissor are dynamic. Attachments from `written` on stay as they are.

@@ -36,7 +36,7 @@ void sort_by_digit(const std::vector<std::uint64_t>& from, std::vector<std::uint
 
 }  // namespace
 
-void KeyedOrder::add_all(std::size_t count,
+void KeyedOrder::add_all(std::uint32_t first, std::size_t count,
                          const std::function<bool(std::uint32_t index, float& key)>& work) {
     constexpr std::size_t kPart = 4096;
     const std::size_t parts = (count + kPart - 1) / kPart;
@@ -46,7 +46,8 @@ void KeyedOrder::add_all(std::size_t count,
         found[part].reserve(end - part * kPart);
         for (std::size_t i = part * kPart; i < end; ++i) {
             float key = 0;
-            if (work(std::uint32_t(i), key)) found[part].push_back(entry(key, std::uint32_t(i)));
+            const std::uint32_t index = first + std::uint32_t(i);
+            if (work(index, key)) found[part].push_back(entry(key, index));
         }
     });
     for (const std::vector<std::uint64_t>& some : found)

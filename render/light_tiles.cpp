@@ -90,6 +90,8 @@ void LightTiles::draw_map(const GpuDevice& gpu, const TileGrid& grid, bool first
                                 .first_batch = first,
                                 .last_batch = last,
                                 .largest_radius = 0,
+                                .first = 0,
+                                .end = 0,
                                 .pad0 = 0};
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_compute(commands, *layout_, bindings_, map_pipeline_, step);
@@ -122,6 +124,8 @@ void LightTiles::ask(const GpuDevice& gpu, const SunOrder& order, const TileGrid
                                     .first_batch = 0,
                                     .last_batch = 0,
                                     .largest_radius = order.largest_radius,
+                                    .first = 0,
+                                    .end = 0,
                                     .pad0 = 0};
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
             begin_compute(commands, *layout_, bindings_, centres_pipeline_, step);

@@ -100,6 +100,8 @@ bool light_seen(LitCloud& kept, const std::vector<std::uint32_t>& source,
         const StageTimer timer(times, DrawStage::sun_order);
         order = order_from_sun(kept.cloud, kept.frame, kept.shadow_size);
     }
+    if (times != nullptr)  // as for the order from the eye
+        (*times)[DrawStage::sun_order].bytes = order.splats.size() * (2 * sizeof(Metaball) + 7 * 8 + 28);
     std::vector<std::uint8_t> centres(order.source.size());
     for (std::size_t i = 0; i < centres.size(); ++i) centres[i] = balls[order.source[i]];
     std::vector<float> depths;

@@ -94,6 +94,8 @@ void check(const RenderOptions& options) {
     require(colour_within(options.ground.albedo, 1), "ground.albedo", "three numbers from 0 to 1");
     check(options.wet_ground);
     require(within(options.shadow_map_size, 16, 8192), "shadow_map_size", "16..8192 texels");
+    check(options.shells);
+    check(options.light_shafts);
     for (const LightningFlash& flash : options.lightning) {
         require(finite(flash.position_m), "lightning.position_m", "finite metres");
         require(flash.time_s >= 0 && std::isfinite(flash.time_s), "lightning.time_s", "0 or more seconds");

@@ -17,6 +17,7 @@
 #include "render/phase_function.h"
 #include "render/precipitation_options.h"
 #include "render/scattering_options.h"
+#include "render/shell_options.h"
 #include "render/wet_ground_options.h"
 
 namespace nephos {
@@ -143,7 +144,9 @@ struct RenderOptions {
     AtmosphereOptions atmosphere;
     Ground ground;
     WetGroundOptions wet_ground;  // how it looks where it is wet or white
-    int shadow_map_size = 1024;   // texels on a side, 16..8192
+    Shells shells;
+    LightShafts light_shafts;
+    int shadow_map_size = 1024;  // texels on a side, 16..8192
     std::vector<LightningFlash> lightning;
     PrecipitationOptions precipitation;
     DebugView debug_view;

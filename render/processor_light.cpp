@@ -2,6 +2,7 @@
 #include "render/processor_light.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -62,12 +63,13 @@ HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
 // Adds the optical depth of some balls along the light through the texels of a tile.
-HWY_INLINE void add_to_texels(const LightTile& tile, std::span<const LightBall> balls, const Layout& layout,
-                              std::size_t block, float* HWY_RESTRICT sums) {
+HWY_INLINE std::size_t add_to_texels(const LightTile& tile, std::span<const LightBall> balls,
+                                     const Layout& layout, std::size_t block, float* HWY_RESTRICT sums) {
     const Lanes d;
     const FirstPixels first(layout, block);
     const Floats x = hn::Add(hn::Load(d, first.x), set(float(tile.x))),
                  y = hn::Add(hn::Load(d, first.y), set(float(tile.y)));
+    std::size_t vectors = 0;
     for (const LightBall& ball : balls) {
         const int row0 = std::max(0, ball.first - tile.y),
                   row1 = std::min(int(shader::kTileHeight), ball.end - tile.y);
@@ -80,23 +82,27 @@ HWY_INLINE void add_to_texels(const LightTile& tile, std::span<const LightBall> 
             const Floats dy = hn::Add(down, set(float(row)));
             const Floats w = hn::Max(hn::NegMulAdd(hn::Mul(per_y2, dy), dy, across), hn::Zero(d));
             hn::Store(hn::MulAdd(scale, column(w, hn::Sqrt(w)), hn::Load(d, sum)), d, sum);
+            ++vectors;
         }
     }
+    return vectors * layout.lanes;
 }
 
-// Until the whole tile is dark.
-void add_to_map(const LightTile& tile, float* HWY_RESTRICT sums) {
+// Until the whole tile is dark; how many pairs of a ball and a texel it took.
+std::size_t add_to_map(const LightTile& tile, float* HWY_RESTRICT sums) {
     const Lanes d;
     const Layout layout;
+    std::size_t pairs = 0;
     for (std::size_t begin = 0; begin < tile.balls.size(); begin += 4 * kAtOnce) {
         const auto some = tile.balls.subspan(begin, std::min(4 * kAtOnce, tile.balls.size() - begin));
         for (std::size_t block = 0; block < layout.blocks; ++block)
-            add_to_texels(tile, some, layout, block, sums);
+            pairs += add_to_texels(tile, some, layout, block, sums);
         Floats least = hn::Load(d, sums);
         for (std::size_t at = layout.lanes; at < kTilePixels; at += layout.lanes)
             least = hn::Min(least, hn::Load(d, sums + at));
-        if (hn::AllTrue(d, hn::Gt(least, set(kDarkTexel)))) return;
+        if (hn::AllTrue(d, hn::Gt(least, set(kDarkTexel)))) break;
     }
+    return pairs;
 }
 
 // A ball seen along the light from centres at x and y: the square of half the chord.
@@ -109,15 +115,15 @@ HWY_INLINE Floats half_chord_squared(const LightBall& ball, Floats x, Floats y) 
 // Adds the optical depth of the part of every ball that lies between a centre and the sun: of the whole ball
 // as long as it lies in front of all centres of the vector. A lane's sum does not depend on the other lanes:
 // a ball that lies wholly before or behind its centre adds the same as in a vector without the others.
-Floats depth_of_centres(const LightTile& tile, Floats x, Floats y, Floats z, float nearest, float farthest) {
+Floats depth_of_centres(const LightTile& tile, Floats x, Floats y, Floats z, float nearest, float farthest,
+                        std::size_t& i) {
     const Lanes d;
     Floats depth = hn::Zero(d);
-    const auto is_dark = [&](std::size_t i) {
-        return i % kAtOnce == 0 && hn::AllTrue(d, hn::Gt(depth, set(kDarkCentre)));
+    const auto is_dark = [&](std::size_t at) {
+        return at % kAtOnce == 0 && hn::AllTrue(d, hn::Gt(depth, set(kDarkCentre)));
     };
     const float reach = 1.0001f * tile.largest_radius;
-    std::size_t i = 0;
-    for (; i < tile.balls.size() && tile.balls[i].z < nearest - reach; ++i) {
+    for (i = 0; i < tile.balls.size() && tile.balls[i].z < nearest - reach; ++i) {
         if (is_dark(i)) return depth;
         const LightBall& ball = tile.balls[i];
         const Floats w = half_chord_squared(ball, x, y);
@@ -138,9 +144,11 @@ Floats depth_of_centres(const LightTile& tile, Floats x, Floats y, Floats z, flo
     return depth;
 }
 
-void add_to_centres(const LightTile& tile, const LightCentres& centres) {
+// How many pairs of a ball and a centre it took.
+std::size_t add_to_centres(const LightTile& tile, const LightCentres& centres) {
     const Lanes d;
     const std::size_t lanes = hn::Lanes(d);
+    std::size_t pairs = 0;
     for (std::size_t begin = 0; begin < centres.x.size(); begin += lanes) {
         const std::size_t count = std::min(lanes, centres.x.size() - begin);
         HWY_ALIGN float x[2 * shader::kTileWidth], y[2 * shader::kTileWidth], z[2 * shader::kTileWidth];
@@ -150,11 +158,14 @@ void add_to_centres(const LightTile& tile, const LightCentres& centres) {
             y[lane] = centres.y[i];
             z[lane] = centres.z[i];
         }
+        std::size_t balls = 0;
         const Floats depth =
-            depth_of_centres(tile, hn::Load(d, x), hn::Load(d, y), hn::Load(d, z), z[0], z[count - 1]);
+            depth_of_centres(tile, hn::Load(d, x), hn::Load(d, y), hn::Load(d, z), z[0], z[count - 1], balls);
+        pairs += balls * lanes;
         hn::Store(depth, d, x);
         for (std::size_t lane = 0; lane < count; ++lane) centres.depth[begin + lane] += x[lane];
     }
+    return pairs;
 }
 
 // exp(-depth) of some optical depths, in place; those beyond `dark` count as that.
@@ -271,10 +282,11 @@ void gather(std::span<const LightBall> balls, const TileBins& bins, std::size_t 
     }
 }
 
-// What some of the balls, consecutive in the order from the sun, take from the light.
-void add_balls(std::span<const LightBall> balls, const TileBins& bins, float largest_radius,
-               LightSums& light) {
+// What some of the balls, consecutive in the order from the sun, take from the light; pairs evaluated.
+std::size_t add_balls(std::span<const LightBall> balls, const TileBins& bins, float largest_radius,
+                      LightSums& light) {
     const TileGrid& grid = light.grid;
+    std::atomic<std::size_t> pairs = 0;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, grid.tiles(), 8), [&](const auto& range) {
         std::vector<LightBall> of_tile;
         for (std::size_t t = range.begin(); t != range.end(); ++t) {
@@ -285,10 +297,10 @@ void add_balls(std::span<const LightBall> balls, const TileBins& bins, float lar
                                  .y = int(t / columns) * int(shader::kTileHeight),
                                  .balls = of_tile,
                                  .largest_radius = largest_radius};
-            HWY_DYNAMIC_DISPATCH(add_to_centres)(tile, light.centres.of_tile(t));
+            pairs += HWY_DYNAMIC_DISPATCH(add_to_centres)(tile, light.centres.of_tile(t));
             if (!is_wanted(light.map_tiles, t)) continue;
             alignas(64) float sums[shader::kTileWidth * shader::kTileHeight] = {};
-            HWY_DYNAMIC_DISPATCH(add_to_map)(tile, sums);
+            pairs += HWY_DYNAMIC_DISPATCH(add_to_map)(tile, sums);
             const float* from = sums;
             for_each_row(t, grid, [&](std::size_t at, std::size_t count) {
                 for (std::size_t i = 0; i < count; ++i) light.map[at + i] += from[i];
@@ -296,6 +308,7 @@ void add_balls(std::span<const LightBall> balls, const TileBins& bins, float lar
             });
         }
     });
+    return pairs;
 }
 
 void clear_map(LightSums& light) {
@@ -342,7 +355,12 @@ void light_by_processor(const SunOrder& order, int shadow_size, const LightWante
         });
         const TileBins bins = bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid, sums.tiles);
         timer.emplace(times, DrawStage::light);
-        add_balls(balls, bins, order.largest_radius, sums);
+        const std::size_t pairs = add_balls(balls, bins, order.largest_radius, sums);
+        if (times != nullptr) {  // boxes written and read twice, balls written, lists written; then gathered
+            (*times)[DrawStage::sun_bins].bytes +=
+                balls.size() * (3 * sizeof(PixelBox) + sizeof(LightBall) + 24) + 4 * bins.list.size();
+            (*times)[DrawStage::light].pairs += pairs;
+        }
         begin = end;
     }
     finish(sums);

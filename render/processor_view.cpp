@@ -4,15 +4,19 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <limits>
+#include <ranges>
 #include <vector>
 
 #include <tbb/parallel_for.h>
 
+#include "render/puff_texels.h"
 #include "render/screen_ball.h"
 #include "render/screen_box.h"
 #include "render/tile_bins.h"
+#include "render/view_scene.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/processor_view.cpp"
@@ -25,41 +29,8 @@
 #include "render/background-inl.h"
 #include "render/column-inl.h"
 #include "render/screen_ball-inl.h"
-
-#ifndef NEPHOS_PROCESSOR_VIEW_TYPES_
-#define NEPHOS_PROCESSOR_VIEW_TYPES_
-namespace nephos {
-
-// Sums over the metaballs in front, for the pixels of a tile row by row.
-struct TileSums {
-    static constexpr std::size_t kPixels = shader::kTileWidth * shader::kTileHeight;
-    alignas(64) float red[kPixels] = {}, green[kPixels] = {}, blue[kPixels] = {}, distance[kPixels] = {};
-    alignas(64) float transmittance[kPixels];
-    TileSums() { std::fill_n(transmittance, kPixels, 1.0f); }
-};
-
-// What all tiles of a part of the picture share.
-struct ViewScene {
-    const PictureFrame* frame = nullptr;
-    std::span<const ScreenBall> balls;  // nearest first
-    std::span<const ExactBall> exact;
-    const float* shadow = nullptr;
-    int shadow_size = 0;
-};
-
-// Many threads may.
-inline void mark(std::uint8_t& byte) {
-    const std::atomic_ref<std::uint8_t> shared(byte);
-    if (shared.load(std::memory_order_relaxed) == 0) shared.store(1, std::memory_order_relaxed);
-}
-
-struct ViewTile {
-    int x = 0, y = 0;                     // first pixel
-    std::span<const std::uint32_t> list;  // of balls, nearest first
-};
-
-}  // namespace nephos
-#endif
+#include "render/screen_puff-inl.h"
+#include "render/view_look-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -68,6 +39,7 @@ namespace nephos::HWY_NAMESPACE {
 struct TileRays {
     HWY_ALIGN float per_square[kTilePixels];  // 1 / |direction|^2
     HWY_ALIGN float x[kTilePixels], y[kTilePixels], z[kTilePixels], ground[kTilePixels];
+    HWY_ALIGN float shell_offset[kTilePixels];  // where in shells of air these pixels sample them
 
     TileRays(const PictureFrame& frame, const ViewTile& tile, bool whole) {
         const Lanes d;
@@ -104,9 +76,73 @@ HWY_INLINE void add_to_sums(TileSums& sums, std::size_t at, Floats opacity, cons
     hn::Store(hn::MulAdd(part, distance, hn::Load(d, sums.distance + at)), d, sums.distance + at);
 }
 
-struct Rows {
-    std::size_t begin, end;  // of the tile
-};
+// Where the pixels of a tile sample shells of air.
+void set_shell_offsets(const PictureFrame& frame, const ViewTile& tile, TileRays& rays) {
+    const Layout layout;
+    const auto x = shader::uint(frame.picture.z) + shader::uint(tile.x),
+               y = shader::uint(frame.picture.w) + shader::uint(tile.y);
+    for (shader::uint block = 0; block < layout.blocks; ++block) {
+        for (shader::uint row = 0; row < shader::kTileHeight; row += shader::uint(layout.rows)) {
+            float* const to = rays.shell_offset + row * shader::kTileWidth + block * layout.lanes;
+            for (shader::uint lane = 0; lane < layout.lanes; ++lane) {
+                const shader::uint pixel = block * shader::uint(layout.lanes) + lane;
+                to[lane] = shader::shell_offset(x + pixel % shader::kTileWidth,
+                                                y + row + pixel / shader::kTileWidth);
+            }
+        }
+    }
+}
+
+// sum += transmittance * light; transmittance *= that of the layer
+HWY_INLINE void add_layer(const AirLayer& layer, Floats3& sum, Floats& transmittance) {
+    sum = times_add(transmittance, layer.light, sum);
+    transmittance = hn::Mul(transmittance, layer.transmittance);
+}
+
+// Shells of air [first, end) over one vector of pixels.
+HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std::size_t at, std::size_t first,
+                              std::size_t end, TileSums& sums) {
+    const Lanes d;
+    const PictureFrame& frame = *scene.frame;
+    const shader::Shells& data = frame.shells->data;
+    Floats transmittance = hn::Load(d, sums.transmittance + at);
+    if (hn::AllTrue(d, hn::Lt(transmittance, set(shader::kOpaque)))) return;
+    const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
+    const ShadePart part = shade_part(*frame.shells, ray);
+    const SunlitAir sunlit = sunlit_air(frame, ray);
+    const Floats ground = hn::Load(d, rays.ground + at), offset = hn::Load(d, rays.shell_offset + at);
+    Floats3 sum{hn::Load(d, sums.red + at), hn::Load(d, sums.green + at), hn::Load(d, sums.blue + at)};
+    const Floats first_m = air_begin(frame, ray);
+    const auto within = [&](float distance_m) { return hn::Min(hn::Max(set(distance_m), first_m), ground); };
+    Floats3 before{};
+    bool begun = false;
+    for (std::size_t k = first; k < end; ++k) {
+        const float begin_m = k == 0 ? 0.0f : shell_end(data, k - 1), end_m = shell_end(data, k);
+        if (end_m <= part.begin) continue;
+        if (begin_m >= part.end) break;
+        const Floats shell_begins = within(begin_m), shell_ends = within(end_m);
+        if (!begun) before = air_transmittance(frame, ray, shell_begins);
+        begun = true;
+        const Floats3 behind = air_transmittance(frame, ray, shell_ends);
+        const Floats place = hn::MulAdd(offset, hn::Sub(shell_ends, shell_begins), shell_begins);
+        add_layer(air_layer(frame, sunlit, ray, subtract(before, behind), place), sum, transmittance);
+        before = behind;
+    }
+    if (!begun) return;
+    hn::Store(transmittance, d, sums.transmittance + at);
+    hn::Store(sum.x, d, sums.red + at);
+    hn::Store(sum.y, d, sums.green + at);
+    hn::Store(sum.z, d, sums.blue + at);
+}
+
+// All shells in front of a ball that are not in the sums yet.
+void add_shells_before(const ViewScene& scene, const TileRays& rays, std::size_t ball, TileSums& sums) {
+    const std::size_t first = sums.next_shell, count = scene.before_shells.size();
+    while (sums.next_shell < count && scene.before_shells[sums.next_shell] <= ball) ++sums.next_shell;
+    if (first == sums.next_shell) return;
+    for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(Lanes()))
+        add_shells_to(scene, rays, at, first, sums.next_shell, sums);
+}
 
 HWY_INLINE Rows rows_of(const ScreenBall& ball, const ViewTile& tile, const Layout& layout) {
     const int begin = std::clamp(ball.first - tile.y, 0, int(shader::kTileHeight)),
@@ -194,23 +230,31 @@ bool is_opaque(const TileSums& sums, std::size_t lanes) {
     return hn::AllTrue(d, hn::Lt(most, set(shader::kOpaque)));
 }
 
-// Front to back, until the tile is opaque; how many it took.
+// Front to back, until the tile is opaque; what it took.
 template <bool kColours>
-HWY_INLINE std::size_t add_some(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
     constexpr std::size_t kAtOnce = 8;  // between two looks at the sums
     const Layout layout;
-    if (tile.list.empty() || is_opaque(sums, layout.lanes)) return 0;
-    const TileRays rays(*scene.frame, tile, !scene.exact.empty());
+    if (tile.list.empty() || is_opaque(sums, layout.lanes)) return {};
+    const bool shells = kColours && !scene.before_shells.empty();
+    TileRays rays(*scene.frame, tile, shells || !scene.exact.empty());
+    if (shells) set_shell_offsets(*scene.frame, tile, rays);
     FirstPixels first[shader::kTileWidth] = {{layout, 0}, {layout, 1}, {layout, 2}, {layout, 3},
                                              {layout, 4}, {layout, 5}, {layout, 6}, {layout, 7}};
-    std::size_t end = 0;
+    std::size_t end = 0, rows = 0;
     for (std::size_t begin = 0; begin < tile.list.size(); begin += kAtOnce) {
         end = std::min(begin + kAtOnce, tile.list.size());
         for (std::size_t i = begin; i < end; ++i) {
             if (i + kAtOnce < tile.list.size()) hwy::Prefetch(&scene.balls[tile.list[i + kAtOnce]]);
             const ScreenBall& ball = scene.balls[tile.list[i]];
+            if (shells) add_shells_before(scene, rays, scene.first_ball + tile.list[i], sums);
+            const Rows of_ball = rows_of(ball, tile, layout);
+            rows += of_ball.end - std::min(of_ball.begin, of_ball.end);
             if (ball.distance > 0) {
                 add_fitted<kColours>(ball, tile, layout, first, rays, sums);
+            } else if (ball.distance < 0) {
+                const ScreenPuff& puff = scene.puffs[std::bit_cast<std::uint32_t>(ball.x)];
+                add_puff<kColours>(puff, of_ball, tile, layout, first, sums);
             } else {
                 const ExactBall& exact = scene.exact[std::bit_cast<std::uint32_t>(ball.x)];
                 add_exact<kColours>(ball, exact, tile, layout, *scene.frame, rays, sums);
@@ -218,53 +262,14 @@ HWY_INLINE std::size_t add_some(const ViewScene& scene, const ViewTile& tile, Ti
         }
         if (is_opaque(sums, layout.lanes)) break;
     }
-    return end;
+    return {end, rows * shader::kTileWidth};
 }
 
-void add_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
-    add_some<true>(scene, tile, sums);
+TileWork add_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+    return add_some<true>(scene, tile, sums);
 }
-std::size_t look_at_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+TileWork look_at_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
     return add_some<false>(scene, tile, sums);
-}
-
-// Marks the tiles of the shadow map that the ground wears where it is seen.
-void mark_ground(const ViewScene& scene, const ViewTile& tile, const TileSums& sums, std::uint8_t* marks) {
-    const Lanes d;
-    const hn::RebindToSigned<Lanes> di;
-    const Layout layout;
-    const PictureFrame& frame = *scene.frame;
-    const Floats size = set(float(scene.shadow_size)), last = set(float(scene.shadow_size - 1));
-    const int columns = TileGrid{scene.shadow_size, scene.shadow_size}.columns();
-    int marked = -1;
-    for (std::size_t at = 0; at < kTilePixels; at += layout.lanes) {
-        const FirstPixels first(layout, at / layout.lanes % layout.blocks);
-        const float row = float(at / (layout.lanes * layout.blocks) * layout.rows);
-        const Floats3 direction = pixel_direction(frame, hn::Add(hn::Load(d, first.x), set(float(tile.x))),
-                                                  hn::Add(hn::Load(d, first.y), set(float(tile.y) + row)));
-        const Floats3 ray = times(hn::Div(set(1.0f), hn::Sqrt(dot(direction, direction))), direction);
-        const Floats distance = ground_distance(frame, ray.z);
-        const auto shown = hn::And(hn::Lt(distance, set(kNowhere)),
-                                   hn::Ge(hn::Load(d, sums.transmittance + at), set(shader::kOpaque)));
-        if (hn::AllFalse(d, shown)) continue;
-        const Floats3 point = times(hn::IfThenElseZero(shown, distance), ray);
-        const auto texel = [&](const shader::vec4& axis) {
-            const Floats place = hn::Add(dot(set3(axis), point), set(axis.w));
-            return hn::Floor(hn::Min(hn::Max(hn::MulSub(place, size, set(0.5f)), set(-2.0f)), last));
-        };
-        HWY_ALIGN std::int32_t x[2 * shader::kTileWidth], y[2 * shader::kTileWidth];
-        hn::Store(hn::ConvertTo(di, texel(frame.shadow_u)), di, x);
-        hn::Store(hn::ConvertTo(di, texel(frame.shadow_v)), di, y);
-        HWY_ALIGN float is_shown[2 * shader::kTileWidth];
-        hn::Store(hn::IfThenElseZero(shown, set(1.0f)), d, is_shown);
-        for (std::size_t lane = 0; lane < layout.lanes; ++lane) {
-            if (!(is_shown[lane] > 0) || (x[lane] << 16 ^ y[lane]) == marked) continue;
-            marked = x[lane] << 16 ^ y[lane];
-            for (const int column : {std::max(x[lane], 0), std::min(x[lane] + 1, scene.shadow_size - 1)})
-                for (const int line : {std::max(y[lane], 0), std::min(y[lane] + 1, scene.shadow_size - 1)})
-                    mark(marks[line / int(shader::kTileHeight) * columns + column / int(shader::kTileWidth)]);
-        }
-    }
 }
 
 // Adds what is seen of the background behind the clouds; distances become means.
@@ -272,6 +277,11 @@ void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
     const Lanes d;
     const Layout layout;
     const ShadowTexels map{scene.shadow, scene.shadow_size};
+    if (sums.next_shell < scene.before_shells.size() && !is_opaque(sums, layout.lanes)) {
+        TileRays rays(*scene.frame, tile, true);
+        set_shell_offsets(*scene.frame, tile, rays);
+        add_shells_before(scene, rays, SIZE_MAX, sums);
+    }
     for (std::size_t block = 0; block < layout.blocks; ++block) {
         const FirstPixels first(layout, block);
         for (std::size_t row = 0; row < shader::kTileHeight; row += layout.rows) {
@@ -304,6 +314,7 @@ HWY_AFTER_NAMESPACE();
 namespace nephos {
 
 HWY_EXPORT(shape_balls);
+HWY_EXPORT(shape_puffs);
 HWY_EXPORT(light_balls);
 HWY_EXPORT(add_balls);
 HWY_EXPORT(look_at_balls);
@@ -317,6 +328,15 @@ constexpr std::size_t kPart = 2048;  // balls that one thread prepares
 // A look pays if it saves light: it goes on only if of some tiles' lists no more than this is seen.
 constexpr double kMostSeen = 0.75;
 constexpr std::size_t kSampleStep = 16;  // tiles from one that is tried to the next
+
+constexpr std::uint32_t kPuff = 1u << 31;
+
+PixelBox puff_box(const ScreenPuff& puff) {
+    const auto to_pixel = [](float value) { return int(std::clamp(value, -1e6f, 1e6f)); };
+    const float half_width = 1 / puff.per_half_width, half_height = 1 / puff.per_half_height;
+    return {to_pixel(std::floor(puff.x - half_width)), to_pixel(std::floor(puff.y - half_height)),
+            to_pixel(std::ceil(puff.x + half_width)), to_pixel(std::ceil(puff.y + half_height))};
+}
 
 std::int16_t to_row(int y) { return std::int16_t(std::clamp(y, -32768, 32767)); }
 
@@ -349,59 +369,105 @@ void store(const TileSums& sums, const ViewTile& tile, const Tile& part, bool de
 ProcessorView::ProcessorView(const RenderOptions& options, const CameraFrame& camera,
                              const PictureFrame& frame, const Tile& part, const EyeOrder& order,
                              const BatchLimits& limits, StageTimes* times)
-    : options_(&options),
-      camera_(&camera),
-      order_(&order),
-      frame_(frame),
-      part_(part),
-      limits_(limits),
-      times_(times) {
+    : order_(&order), frame_(frame), part_(part), limits_(limits), times_(times) {
     const StageTimer timer(times_, DrawStage::eye_bins);
     boxes_ = screen_boxes(order, camera, options.camera, part);
+    if (!order.puffs.empty()) add_puffs();
 }
 
-// The shapes of some balls, and their lists.
+// Puts the billboards between the metaballs.
+void ProcessorView::add_puffs() {
+    puffs_.resize(order_->puffs.size());
+    tbb::parallel_for(std::size_t{0}, (puffs_.size() + kPart - 1) / kPart, [&](std::size_t p) {
+        const std::size_t begin = p * kPart, count = std::min(kPart, puffs_.size() - begin);
+        HWY_DYNAMIC_DISPATCH(shape_puffs)
+        (std::span(order_->puffs).subspan(begin, count), order_->clouds, frame_, &puffs_[begin]);
+    });
+    std::vector<PixelBox> boxes;
+    boxes.reserve(boxes_.size() + puffs_.size());
+    source_.reserve(boxes_.size() + puffs_.size());
+    for (const Run& run : order_->runs | std::views::reverse) {
+        const bool of_puffs = run.kind == SplatKind::billboard;
+        for (std::uint32_t i = run.end; i-- > run.begin;) {
+            source_.push_back(of_puffs ? i | kPuff : i);
+            boxes.push_back(of_puffs ? puff_box(puffs_[i]) : boxes_[order_->balls.size() - 1 - i]);
+        }
+    }
+    boxes_.swap(boxes);
+}
+
+// Of a splat, counted from the nearest: index into order_->balls, or kPuff and one into puffs_.
+std::uint32_t ProcessorView::source(std::size_t splat) const {
+    return source_.empty() ? std::uint32_t(boxes_.size() - 1 - splat) : source_[splat];
+}
+
+// The shapes of splats [first, last) of a batch; its metaballs that are not fitted begin with `number`.
+void ProcessorView::shape(Batch& batch, std::size_t first, std::size_t last, std::uint32_t number) const {
+    std::vector<shader::ViewBall> balls;
+    for (std::size_t i = first; i < last; ++i) {
+        const std::uint32_t from = source(batch.begin + i);
+        if ((from & kPuff) == 0) balls.push_back(order_->balls[from]);
+    }
+    const bool all = balls.size() == last - first;
+    std::vector<ScreenBall> shaped(all ? 0 : balls.size());
+    HWY_DYNAMIC_DISPATCH(shape_balls)
+    (balls, frame_, all ? &batch.screen[first] : shaped.data(), batch.exact.data(), number);
+    std::size_t next = 0;
+    for (std::size_t i = first; i < last; ++i) {
+        const std::uint32_t from = source(batch.begin + i);
+        ScreenBall& splat = batch.screen[i];
+        if ((from & kPuff) != 0) {
+            splat.x = std::bit_cast<float>(from & ~kPuff);
+            splat.distance = -1;
+        } else if (!all) {
+            splat = shaped[next++];
+        }
+        splat.first = to_row(boxes_[batch.begin + i].y0);
+        splat.end = to_row(boxes_[batch.begin + i].y1);
+    }
+}
+
+// The shapes of some splats, and their lists.
 ProcessorView::Batch ProcessorView::prepare_batch(std::size_t begin, std::size_t end) const {
     const StageTimer timer(times_, DrawStage::eye_bins);
     const std::size_t count = end - begin, parts = (count + kPart - 1) / kPart;
-    const std::span balls = std::span(order_->balls).subspan(boxes_.size() - end, count);  // farthest first
     Batch batch{begin, end, {}, {}, {}};
     std::vector<std::uint32_t> numbers(parts + 1, 0);
     if (!order_->all_fitted) {
-        for (std::size_t i = 0; i < count; ++i)
-            numbers[i / kPart + 1] += (balls[count - 1 - i].flags & shader::kNotFitted) != 0 ? 1 : 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::uint32_t from = source(begin + i);
+            const bool exact = (from & kPuff) == 0 && (order_->balls[from].flags & shader::kNotFitted) != 0;
+            numbers[i / kPart + 1] += exact ? 1 : 0;
+        }
         for (std::size_t p = 0; p < parts; ++p) numbers[p + 1] += numbers[p];
     }
     batch.screen.resize(count);
     batch.exact.resize(numbers[parts]);
     tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
-        const std::size_t first = p * kPart, last = std::min(count, first + kPart);
-        const std::vector<shader::ViewBall> near_first(balls.rbegin() + std::ptrdiff_t(first),
-                                                       balls.rbegin() + std::ptrdiff_t(last));
-        HWY_DYNAMIC_DISPATCH(shape_balls)
-        (near_first, frame_, &batch.screen[first], batch.exact.data(), numbers[p]);
-        for (std::size_t i = first; i < last; ++i) {
-            batch.screen[i].first = to_row(boxes_[begin + i].y0);
-            batch.screen[i].end = to_row(boxes_[begin + i].y1);
-        }
+        shape(batch, p * kPart, std::min(count, (p + 1) * kPart), numbers[p]);
     });
     batch.bins = bin_into_tiles(std::span(boxes_).subspan(begin, count), TileGrid{part_.width, part_.height});
+    if (times_ != nullptr)  // boxes written and read twice, balls read twice, shapes and lists written
+        (*times_)[DrawStage::eye_bins].bytes +=
+            count * (3 * sizeof(PixelBox) + 2 * sizeof(shader::ViewBall) + sizeof(ScreenBall)) +
+            4 * batch.bins.list.size();
     return batch;
 }
 
 void ProcessorView::light(Batch& batch, const SeenLight* seen) const {
     const StageTimer timer(times_, DrawStage::colour);
     const std::size_t count = batch.end - batch.begin, parts = (count + kPart - 1) / kPart;
-    const std::size_t last = boxes_.size() - 1 - batch.begin;  // of the order: the batch's nearest ball
     tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
         std::vector<shader::ViewBall> balls;
         std::vector<ScreenBall*> screen;
         for (std::size_t i = p * kPart; i < std::min(count, (p + 1) * kPart); ++i) {
-            if (seen != nullptr && seen->balls[last - i] == 0) continue;
-            balls.push_back(order_->balls[last - i]);
+            const std::uint32_t from = source(batch.begin + i);
+            if ((from & kPuff) != 0 || (seen != nullptr && seen->balls[from] == 0)) continue;
+            balls.push_back(order_->balls[from]);
             screen.push_back(&batch.screen[i]);
         }
-        HWY_DYNAMIC_DISPATCH(light_balls)(balls, frame_, screen.data(), batch.exact.data());
+        HWY_DYNAMIC_DISPATCH(light_balls)
+        (balls, frame_, screen.data(), batch.exact.data());
     });
 }
 
@@ -412,21 +478,24 @@ bool ProcessorView::look_at_tiles(std::size_t first, std::size_t step, std::vect
     const StageTimer timer(times_, DrawStage::look);
     const Batch& batch = kept_.front();
     const TileGrid grid{part_.width, part_.height};
-    const ViewScene scene{&frame_, batch.screen, batch.exact, nullptr, shadow_size};
+    const ViewScene scene{&frame_, batch.screen, batch.exact, puffs_, nullptr, shadow_size};
     const std::size_t count = first < grid.tiles() ? (grid.tiles() - first + step - 1) / step : 0;
-    std::atomic<std::size_t> listed = 0, shown = 0;
+    std::atomic<std::size_t> listed = 0, shown = 0, pairs = 0;
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
         const std::size_t t = first + i * step;
         const ViewTile tile = tile_at(t, grid, batch.bins);
         TileSums sums;
-        drawn[t] = std::uint32_t(HWY_DYNAMIC_DISPATCH(look_at_balls)(scene, tile, sums));
+        const TileWork work = HWY_DYNAMIC_DISPATCH(look_at_balls)(scene, tile, sums);
+        pairs += work.pairs;
+        drawn[t] = std::uint32_t(work.splats);
         listed += tile.list.size();
         shown += drawn[t];
         if (seen == nullptr) return;
-        for (const std::uint32_t ball : tile.list.first(drawn[t]))
-            mark(seen->balls[boxes_.size() - 1 - ball]);
+        for (const std::uint32_t splat : tile.list.first(drawn[t]))
+            if (const std::uint32_t from = source(splat); (from & kPuff) == 0) mark(seen->balls[from]);
         HWY_DYNAMIC_DISPATCH(mark_ground)(scene, tile, sums, seen->map_tiles.data());
     });
+    if (times_ != nullptr) (*times_)[DrawStage::look].pairs += pairs;
     return double(shown) <= kMostSeen * double(listed);
 }
 
@@ -451,7 +520,7 @@ void ProcessorView::look(int shadow_size, SeenLight& seen) {
 void ProcessorView::look_at_ground(int shadow_size, SeenLight& seen) const {
     const StageTimer timer(times_, DrawStage::look);
     const TileGrid grid{part_.width, part_.height};
-    const ViewScene scene{&frame_, {}, {}, nullptr, shadow_size};
+    const ViewScene scene{&frame_, {}, {}, {}, nullptr, shadow_size};
     const TileSums nothing;
     TileBins bins;
     bins.ranges.resize(grid.tiles());
@@ -460,7 +529,10 @@ void ProcessorView::look_at_ground(int shadow_size, SeenLight& seen) const {
     });
 }
 
-void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size, const SeenLight* seen) {
+void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size, const AirShells& shells,
+                         const SeenLight* seen) {
+    frame_.shells = shells.any() ? &shells : nullptr;
+    const std::vector<std::uint32_t> before_shells = balls_before_shells(shells, order_->balls);
     const TileGrid grid{part_.width, part_.height};
     std::vector<TileSums> sums_between;  // batches
     std::size_t begin = 0;
@@ -471,27 +543,31 @@ void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size,
         Batch batch = kept_.empty() ? prepare_batch(begin, end) : std::move(kept_.front());
         light(batch, seen);
         const StageTimer timer(times_, DrawStage::view);
-        const ViewScene scene{&frame_, batch.screen, batch.exact, shadow, shadow_size};
+        const ViewScene scene{&frame_, batch.screen, batch.exact,   puffs_,
+                              shadow,  shadow_size,  before_shells, begin};
         const bool last = end == boxes_.size();
         if (begin == 0 && !last) sums_between.resize(grid.tiles());
+        std::atomic<std::size_t> pairs = 0;
         tbb::parallel_for(std::size_t{0}, grid.tiles(), [&](std::size_t t) {
             const ViewTile tile = tile_at(t, grid, batch.bins);
             TileSums own;
             TileSums& sums = sums_between.empty() ? own : sums_between[t];
-            HWY_DYNAMIC_DISPATCH(add_balls)(scene, tile, sums);
+            pairs += HWY_DYNAMIC_DISPATCH(add_balls)(scene, tile, sums).pairs;
             if (!last) return;
             HWY_DYNAMIC_DISPATCH(finish_tile)(scene, tile, sums);
             store(sums, tile, part_, order_->depth, picture);
         });
+        if (times_ != nullptr) (*times_)[DrawStage::view].pairs += pairs;
         begin = end;
     } while (begin < boxes_.size());
     kept_.clear();
 }
 
 void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
-                       const Tile& part, const EyeOrder& order, Picture& picture, const BatchLimits& limits) {
+                       const Tile& part, const EyeOrder& order, const AirShells& shells, Picture& picture,
+                       const BatchLimits& limits) {
     ProcessorView(options, camera, frame, part, order, limits)
-        .draw(picture, picture.shadow.data(), picture.shadow_size);
+        .draw(picture, picture.shadow.data(), picture.shadow_size, shells);
 }
 
 }  // namespace nephos

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "render/air_shells.h"
 #include "render/camera.h"
 #include "render/eye_order.h"
 #include "render/frame_data.h"
@@ -30,8 +31,8 @@ struct SeenLight {
         : balls(order.balls.size(), 0), map_tiles(TileGrid{shadow_size, shadow_size}.tiles(), 0) {}
 };
 
-// A part of the picture in two steps, between which the light can be computed where it is seen. `options`,
-// `camera` and `order` must live until the last.
+// A part of the picture in two steps, between which the light can be computed where it is seen. `order` must
+// live until the last; only the light of its metaballs may change meanwhile.
 class ProcessorView {
   public:
     // `frame` is that of the part.
@@ -42,9 +43,11 @@ class ProcessorView {
     // Adds what the part shows.
     void look(int shadow_size, SeenLight& seen);
 
-    // Draws metaballs and what lies behind them; the ground wears `shadow`, shadow_size^2 texels. The light
-    // of balls that are not `seen` is not looked at; without it all are.
-    void draw(Picture& picture, const float* shadow, int shadow_size, const SeenLight* seen = nullptr);
+    // Draws splats, the air between them and what lies behind; the ground wears `shadow`, shadow_size^2
+    // texels. The light of balls that are not `seen` is not looked at; without it all are. Not for billboards
+    // and shells together.
+    void draw(Picture& picture, const float* shadow, int shadow_size, const AirShells& shells,
+              const SeenLight* seen = nullptr);
 
   private:
     struct Batch {
@@ -53,26 +56,29 @@ class ProcessorView {
         std::vector<ExactBall> exact;
         TileBins bins;  // cut off where a tile is opaque, once look() knows
     };
+    void add_puffs();
+    std::uint32_t source(std::size_t splat) const;
+    void shape(Batch& batch, std::size_t first, std::size_t last, std::uint32_t number) const;
     Batch prepare_batch(std::size_t begin, std::size_t end) const;
     void light(Batch& batch, const SeenLight* seen) const;
     bool look_at_tiles(std::size_t first, std::size_t step, std::vector<std::uint32_t>& drawn,
                        SeenLight* seen, int shadow_size);
     void look_at_ground(int shadow_size, SeenLight& seen) const;
 
-    const RenderOptions* options_;
-    const CameraFrame* camera_;
     const EyeOrder* order_;
     PictureFrame frame_;
     Tile part_;
     BatchLimits limits_;
     StageTimes* times_;
-    std::vector<PixelBox> boxes_;  // nearest first
-    std::vector<Batch> kept_;      // one, if look() has made it
+    std::vector<PixelBox> boxes_;        // of the splats, nearest first
+    std::vector<std::uint32_t> source_;  // of the splats, see source(); empty without billboards
+    std::vector<ScreenPuff> puffs_;      // in the order of EyeOrder::puffs
+    std::vector<Batch> kept_;            // one, if look() has made it
 };
 
 // Both steps with light that is all there; the ground wears picture.shadow.
 void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
-                       const Tile& part, const EyeOrder& order, Picture& picture,
+                       const Tile& part, const EyeOrder& order, const AirShells& shells, Picture& picture,
                        const BatchLimits& limits = {});
 
 }  // namespace nephos

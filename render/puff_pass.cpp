@@ -4,15 +4,18 @@
 #include <algorithm>
 #include <cstring>
 
+#include "render/half_floats.h"
 #include "render/puff_textures.h"
 
 namespace nephos {
 namespace {
 
+// As 16-bit floats: software devices filter bytes to bytes, which adds up where many billboards lie behind
+// each other.
 GpuImage upload_puffs(const GpuDevice& gpu) {
     const std::vector<PuffLevel>& levels = puff_textures();
     constexpr std::uint32_t kLayers = kPuffKinds * kPuffVariants;
-    GpuImage image = create_image(gpu, kPuffTexels, kPuffTexels, kLayers, vk::Format::eR8G8Unorm,
+    GpuImage image = create_image(gpu, kPuffTexels, kPuffTexels, kLayers, vk::Format::eR16G16Sfloat,
                                   vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst,
                                   std::uint32_t(levels.size()));
     std::size_t bytes = 0;
@@ -25,14 +28,17 @@ GpuImage upload_puffs(const GpuDevice& gpu) {
                            {vk::ImageAspectFlagBits::eColor, std::uint32_t(regions.size()), 0, kLayers},
                            {0, 0, 0},
                            {side, side, 1}});
-        bytes += level.texels.size();
+        bytes += 2 * level.texels.size();
     }
     const GpuBuffer staging =
         create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
     std::size_t to = 0;
     for (const PuffLevel& level : levels) {
-        std::memcpy(staging.mapped + to, level.texels.data(), level.texels.size());
-        to += level.texels.size();
+        for (std::size_t i = 0; i < level.texels.size(); i += 2, to += sizeof(shader::uint)) {
+            const shader::uint texel =
+                pack_halves(float(level.texels[i]) / 255, float(level.texels[i + 1]) / 255);
+            std::memcpy(staging.mapped + to, &texel, sizeof texel);
+        }
     }
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_image(commands, image, access::copy_to);
@@ -58,15 +64,17 @@ void fill(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
 }  // namespace
 
 PuffPass::PuffPass(const GpuDevice& gpu, const PipelineLayout& layout,
-                   std::span<const vk::Format> attachments, const GpuBuffer& frame, bool physical_sky)
+                   std::span<const vk::Format> attachments, const GpuBuffer& frame,
+                   const ShaderVariant& variant)
     : layout_(&layout),
-      physical_sky_(physical_sky),
+      physical_sky_(variant.physical_sky),
       pipeline_(create_graphics_pipeline(gpu, layout, shaders().puff_vert, shaders().puff_frag, attachments,
-                                         Blend::over, {false, physical_sky})),
+                                         Blend::over, variant)),
       without_depth_(create_graphics_pipeline(gpu, layout, shaders().puff_vert, shaders().puff_frag,
-                                              attachments, Blend::over, {false, physical_sky}, 1)),
+                                              attachments, Blend::over, variant, 1)),
       sampler_(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
-      bindings_(create_bindings(gpu, layout)) {
+      bindings_(create_bindings(gpu, layout)),
+      shells_(gpu, bindings_) {
     bind_buffer(gpu, bindings_, 0, frame);
 }
 

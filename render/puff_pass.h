@@ -8,6 +8,7 @@
 
 #include "render/gpu_pipeline.h"
 #include "render/shaders/shared.h"
+#include "render/shell_buffers.h"
 
 namespace nephos {
 
@@ -15,10 +16,12 @@ class PuffPass {
   public:
     // `attachments` are those of the view pass, `frame` its buffer of shader::Frame.
     PuffPass(const GpuDevice& gpu, const PipelineLayout& layout, std::span<const vk::Format> attachments,
-             const GpuBuffer& frame, bool physical_sky);
+             const GpuBuffer& frame, const ShaderVariant& variant);
 
     // Tables of the physical sky; readable by shaders.
     void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
+    // The air between the puffs; see shell_buffers.h.
+    void use_shells(const GpuDevice& gpu, const AirShells& shells) { shells_.use(gpu, bindings_, shells); }
 
     // What following draws refer to. The textures are made when the first billboard is.
     void use_clouds(const GpuDevice& gpu, std::span<const shader::PuffCloud> clouds);
@@ -37,6 +40,7 @@ class PuffPass {
     Bindings bindings_;
     GpuBuffer puffs_, clouds_;
     GpuImage textures_;
+    ShellBuffers shells_;
 };
 
 }  // namespace nephos

@@ -110,9 +110,6 @@ struct Renderer::Impl {
                            const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
     void draw_on_device(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
                         const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
-    // The passes for the physical sky or the gradient, made when they are needed.
-    ViewTiles& tiles_under(const SkyLight* sky);
-    ViewPass& pass_under(const SkyLight* sky);
     const GpuImage& image_of(const SkyLight& sky);
     const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
     bool on_processor() const { return splatting == Splatting::processor; }
@@ -134,8 +131,9 @@ struct Renderer::Impl {
     CloudLight scattering_light;
     GpuBuffer scattering_buffer;  // its copy on the device
     std::optional<LightTiles> light_tiles;
-    std::optional<ViewTiles> view_tiles[2];  // without and with the physical sky
-    std::optional<ViewPass> view_pass[2];
+    // Without and with the physical sky; without and with shells of air.
+    std::optional<ViewTiles> view_tiles[2][2];
+    std::optional<ViewPass> view_pass[2][2];
     std::optional<SkyImage> sky_image;
     SkyLights sky_lights;
     const SkyLight* sky = nullptr;  // of the picture that is drawn; null: gradient
@@ -237,6 +235,7 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
         const StageTimer timer(&times, DrawStage::prepare);
         keep_cloud(lit, splats.metaballs, options);
     }
+    times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
     picture.shadow_frame = lit.frame;
     EyeOrder order;
     {
@@ -245,6 +244,10 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
                                options.ground);
     }
     use_scattering(options.light);
+    // Balls are read twice; keys move through memory three times, and back and forth.
+    times[DrawStage::eye_order].bytes =
+        splats.metaballs.metaballs.size_bytes() +
+        order.balls.size() * (sizeof(Metaball) + 7 * 8 + sizeof(shader::ViewBall));
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     sky = sky_of(splats, options);
     if (sky != nullptr) picture.air = air_of(*sky);
@@ -257,7 +260,9 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
             parts.back().frame.scattering = scattering.data();
         }
     }
-    if (order.puffs.empty() && on_processor())
+    // The processor has no air between billboards.
+    const bool blended = !order.puffs.empty() && looks_at_shade(options);
+    if (on_processor() && !blended)
         draw_on_processor(splats, options, camera, parts, order, picture);
     else
         draw_on_device(splats, options, camera, parts, order, picture);
@@ -302,11 +307,13 @@ void Renderer::Impl::draw_on_processor(const Splats& splats, const RenderOptions
     if (!splats.light && !lit.all_known) {
         seen.emplace(order, lit.shadow_size);
         for (ProcessorView& view : views) view.look(lit.shadow_size, *seen);
+        if (looks_at_shade(options)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
     }
     const SeenLight* const known = seen ? &*seen : nullptr;
     const std::vector<float> lightning = light_up(splats, options, order, known);
     set_light(order, {lit.sun_depths, lightning});
-    for (ProcessorView& view : views) view.draw(picture, lit.shadow.data(), lit.shadow_size, known);
+    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size);
+    for (ProcessorView& view : views) view.draw(picture, lit.shadow.data(), lit.shadow_size, shells, known);
 }
 
 void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& options,
@@ -316,17 +323,24 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
     set_light(order, {lit.sun_depths, lightning});
     if (on_processor() && map_on_device != lit.key) put_map_on_device();
     const GpuImage& map = light_on_device().shadow_map();
+    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size);
+    const auto prepared = [&](auto& passes) -> auto& {
+        const ShaderVariant variant{.physical_sky = sky != nullptr, .shells = shells.any()};
+        auto& pass = passes[variant.physical_sky ? 1 : 0][variant.shells ? 1 : 0];
+        if (!pass) pass.emplace(gpu, layout, attenuation_on_device(), clamped, variant);
+        if (sky != nullptr) pass->use_sky(gpu, image_of(*sky), clamped);
+        pass->use_shadow_map(gpu, map, white_beyond);
+        pass->use_scattering(gpu, scattering_buffer);
+        if (shells.any()) pass->use_shells(gpu, shells, order);
+        return *pass;
+    };
     if (order.puffs.empty() && splatting == Splatting::tiles) {
-        ViewTiles& tiles = tiles_under(sky);
-        tiles.use_shadow_map(gpu, map, white_beyond);
-        tiles.use_scattering(gpu, scattering_buffer);
+        ViewTiles& pass = prepared(view_tiles);
         for (const PartFrame& part : parts)
-            tiles.draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
+            pass.draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
         return;
     }
-    ViewPass& pass = pass_under(sky);
-    pass.use_shadow_map(gpu, map, white_beyond);
-    pass.use_scattering(gpu, scattering_buffer);
+    ViewPass& pass = prepared(view_pass);
     for (const PartFrame& part : parts) pass.draw_tile(gpu, part.frame, part.tile, order, picture);
 }
 
@@ -334,20 +348,6 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
 const SkyLight* Renderer::Impl::sky_of(const Splats& splats, const RenderOptions& options) {
     if (options.atmosphere.model == AirModel::gradient) return nullptr;
     return &sky_lights.at(options, heights_of(lit.cloud, splats));
-}
-
-ViewTiles& Renderer::Impl::tiles_under(const SkyLight* light) {
-    std::optional<ViewTiles>& tiles = view_tiles[light != nullptr ? 1 : 0];
-    if (!tiles) tiles.emplace(gpu, layout, attenuation_on_device(), clamped, light != nullptr);
-    if (light != nullptr) tiles->use_sky(gpu, image_of(*light), clamped);
-    return *tiles;
-}
-
-ViewPass& Renderer::Impl::pass_under(const SkyLight* light) {
-    std::optional<ViewPass>& pass = view_pass[light != nullptr ? 1 : 0];
-    if (!pass) pass.emplace(gpu, layout, attenuation_on_device(), clamped, light != nullptr);
-    if (light != nullptr) pass->use_sky(gpu, image_of(*light), clamped);
-    return *pass;
 }
 
 const GpuImage& Renderer::Impl::image_of(const SkyLight& light) {

@@ -31,10 +31,10 @@ namespace nephos {
 // How metaballs are drawn; the picture is the same within 1/255.
 enum class Splatting {
     automatic,   // processor on a device of type CPU, else tiles
-    processor,   // vectors on the processor, tile by tile, front to back; Vulkan only for T's billboards
+    processor,   // vectors on the processor, tile by tile, front to back
     tiles,       // compute shaders, tile by tile, front to back: fast
     billboards,  // blended billboards with attenuation textures, back to front, as D has it: the reference,
-                 // and what draws pictures that hold T's billboards
+                 // and on a graphics card what draws pictures that hold T's billboards
 };
 
 struct DeviceOptions {

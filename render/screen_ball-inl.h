@@ -23,6 +23,7 @@
 #include "render/column-inl.h"
 #include "render/screen_ball.h"
 #include "render/shaders/shared.h"
+#include "render/shells-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -130,6 +131,27 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
             each_times(times(hn::Mul(albedo, light), beta), sunlight)};
 }
 
+// Where the shells of metaballs begin; beyond the last shell, the distance of the metaball.
+HWY_INLINE Floats shell_begins(const shader::Shells& data, Floats distance) {
+    const Lanes d;
+    HWY_ALIGN float at[kMaxLanes];
+    hn::Store(distance, d, at);
+    const auto count = std::size_t(data.settings.x);
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+        const std::size_t k = shells_before(data, at[lane]);
+        if (k < count) at[lane] = k == 0 ? 0.0f : shell_end(data, k - 1);
+    }
+    return hn::Load(d, at);
+}
+
+// The light of metaballs as it arrives at the beginning of their shells.
+HWY_INLINE Scattered seen_through_shell(const Scattered& light, const PictureFrame& frame, const Floats3& ray,
+                                        Floats distance) {
+    const AirLayer layer = layer_in_front(frame, ray, shell_begins(frame.shells->data, distance), distance);
+    return {add(times(layer.transmittance, light.diffuse), layer.light),
+            times(layer.transmittance, light.direct)};
+}
+
 // c0..c5 of the opacity. Plain loops of a fixed length: the compiler makes vectors of them.
 inline void fit_opacity(const float* depth_scale, float (*fit)[kMaxLanes]) {
     float s[kMaxLanes];
@@ -230,8 +252,9 @@ inline void light_balls(std::span<const shader::ViewBall> balls, const PictureFr
         const auto some = balls.subspan(begin, std::min(lanes, balls.size() - begin));
         const BallColumns ball(some, frame);
         const BallSizes size(ball);
-        const Scattered light = scattered_light(ball, size.centre, size.distance, frame);
         const Floats3 ray = times(hn::Div(set(1.0f), size.distance), size.centre);
+        Scattered light = scattered_light(ball, size.centre, size.distance, frame);
+        if (frame.shells != nullptr) light = seen_through_shell(light, frame, ray, size.distance);
         const Floats ratio = hn::Div(size.drawn, size.distance);
         const Floats cosine =
             hn::NegMulAdd(hn::Mul(set(shader::kDiscSpread), ratio), ratio, dot(set3(frame.to_sun), ray));

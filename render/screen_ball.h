@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Metaballs in the form that the processor draws (processor_view.h). Private to the module.
+// Splats in the form that the processor draws (processor_view.h). Private to the module.
 
+#include <cstddef>
 #include <cstdint>
+
+#include "render/shaders/shared.h"
 
 namespace nephos {
 
@@ -11,11 +14,11 @@ namespace nephos {
 // that of the centre c, the squared distance of the ray from the centre is |c x d|^2 / |d|^2, and c x d =
 // c x (d - d0): a quadratic form of the pixel's offset from the centre, exact for any field of view.
 struct ScreenBall {
-    float x, y;        // of the centre, pixels; where `distance` is 0, x has the bits of ExactBall's number
+    float x, y;        // of the centre, pixels; x has the bits of a number where `distance` is not above 0
     float xx, xy, yy;  // squared distance in radii, times |d|^2: xx dx^2 + xy dx dy + yy dy^2
     float fit[6];      // c0..c5 of the opacity (shaders/shared.h)
     float red, green, blue;   // radiance at opacity 1
-    float distance;           // metres; 0: not fitted
+    float distance;           // metres; 0: not fitted, see ExactBall; < 0: see ScreenPuff
     std::int16_t first, end;  // rows of pixels
 };
 static_assert(sizeof(ScreenBall) == 64);
@@ -26,6 +29,24 @@ struct ExactBall {
     float per_radius, depth_scale, distance;
     float diffuse[3];  // radiance that does not depend on the ray
     float direct[3];   // radiance per light that is scattered once
+};
+
+// One of T's billboards: a rectangle on the screen. With s and t from -1 to 1 across it, to the right and up,
+// its texels lie at linear functions of s and t, and its light is that of its corners, interpolated over two
+// triangles: light[0] + s light[1] + t light[2] + max(t - s, 0) light[3].
+struct ScreenPuff {
+    float x, y;                             // of the centre, pixels
+    float per_half_width, per_half_height;  // 1 / pixels
+    float u[3], v[3];                       // column and row of texels: [0] + s [1] + t [2]
+    float light[4][3];                      // radiance of the cloud where it is opaque, times `opacity`
+    float air[3];                           // radiance of the air, times `opacity`
+    float opacity, distance;                // 0..1; metres
+    std::uint32_t texels, side;             // of its level and layer: the first of puff_texels(); on a side
+};
+
+// Rows of a tile, half-open.
+struct Rows {
+    std::size_t begin, end;
 };
 
 }  // namespace nephos

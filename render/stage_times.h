@@ -21,9 +21,8 @@ enum class DrawStage {
     light,      // the shadow map, and the light at the centres
     colour,     // what the balls scatter towards the eye
     view,       // front to back over the pixels, and the background
-    other,      // what a device does without telling
 };
-inline constexpr std::size_t kDrawStages = 10;
+inline constexpr std::size_t kDrawStages = 9;
 
 struct StageTime {
     double wall_ms = 0;

@@ -15,21 +15,25 @@ constexpr std::array kFormats{vk::Format::eR32G32B32A32Sfloat, vk::Format::eR32S
 }  // namespace
 
 ViewPass::ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-                   const vk::raii::Sampler& sampler, bool physical_sky)
+                   const vk::raii::Sampler& sampler, const ShaderVariant& variant)
     : layout_(&layout),
       background_(create_graphics_pipeline(gpu, layout, shaders().background_vert, shaders().background_frag,
-                                           kFormats, Blend::none, {false, physical_sky})),
+                                           kFormats, Blend::none, variant)),
       splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert, shaders().view_splat_frag,
-                                      kFormats, Blend::over, {false, physical_sky})),
+                                      kFormats, Blend::over, variant)),
       integrated_splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert,
                                                  shaders().view_splat_frag, kFormats, Blend::over,
-                                                 {true, physical_sky})),
+                                                 {true, variant.physical_sky, variant.shells})),
+      shell_(variant.shells ? create_graphics_pipeline(gpu, layout, shaders().shell_vert,
+                                                       shaders().shell_frag, kFormats, Blend::over, variant)
+                            : nullptr),
       bindings_(create_bindings(gpu, layout)),
       frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
       balls_(create_buffer(gpu, kBatch * sizeof(shader::ViewBall), vk::BufferUsageFlagBits::eStorageBuffer,
                            HostAccess::write)),
-      puffs_(gpu, layout, kFormats, frame_, physical_sky) {
+      puffs_(gpu, layout, kFormats, frame_, variant),
+      shells_(gpu, bindings_) {
     bind_buffer(gpu, bindings_, 0, frame_);
     bind_buffer(gpu, bindings_, 1, balls_);
     for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
@@ -42,6 +46,12 @@ void ViewPass::use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::r
 
 void ViewPass::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler) {
     bind_image(gpu, bindings_, 4, map, sampler);
+}
+
+void ViewPass::use_shells(const GpuDevice& gpu, const AirShells& shells, const EyeOrder& order) {
+    shells_.use(gpu, bindings_, shells);
+    puffs_.use_shells(gpu, shells);
+    runs_ = runs_between_shells(shells, order);
 }
 
 void ViewPass::use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
@@ -88,7 +98,11 @@ void ViewPass::draw_splats(const GpuDevice& gpu, vk::Extent2D area, const EyeOrd
     if (!order.runs.empty()) puffs_.use_clouds(gpu, order.clouds);
     std::vector<Run> batch;
     std::uint32_t balls = 0, puffs = 0;
-    for (Run run : order.runs) {
+    for (Run run : runs_.empty() ? order.runs : runs_) {
+        if (run.kind == SplatKind::shell) {
+            batch.push_back(run);
+            continue;
+        }
         std::uint32_t& used = run.kind == SplatKind::billboard ? puffs : balls;
         while (run.begin < run.end) {
             if (used == kBatch) {
@@ -109,6 +123,7 @@ void ViewPass::draw_batch(const GpuDevice& gpu, vk::Extent2D area, const EyeOrde
                           std::span<const Run> runs) {
     Run balls, puffs;  // the consecutive ones of this batch
     for (const Run& run : runs) {
+        if (run.kind == SplatKind::shell) continue;
         Run& all = run.kind == SplatKind::billboard ? puffs : balls;
         if (all.begin == all.end) all.begin = run.begin;
         all.end = run.end;
@@ -127,6 +142,9 @@ void ViewPass::draw_batch(const GpuDevice& gpu, vk::Extent2D area, const EyeOrde
                 const std::uint32_t count = run.end - run.begin;
                 if (run.kind == SplatKind::billboard) {
                     puffs_.draw(commands, run.begin - puffs.begin, count, order.depth);
+                } else if (run.kind == SplatKind::shell) {
+                    bind(commands, shell_);
+                    commands.draw(3, 1, 0, run.begin);
                 } else {
                     bind(commands, run.kind == SplatKind::metaball ? splat_ : integrated_splat_);
                     commands.draw(6 * count, 1, 6 * (run.begin - balls.begin), 0);

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Step 2 of D, tile by tile: background, then metaballs and billboards back to front. Two attachments in
-// 32-bit floats: radiance with the clouds' transmittance in alpha, and the distance weighted by what the eye
-// sees of each metaball, which the same blending accumulates. Private to the module.
+// Step 2 of D, tile by tile: background, then metaballs, billboards and shells of air back to front. Two
+// attachments in 32-bit floats: radiance with the clouds' transmittance in alpha, and the distance weighted
+// by what the eye sees of each metaball, which the same blending accumulates. Private to the module.
 
 #include "render/eye_order.h"
 #include "render/frame_data.h"
 #include "render/gpu_pipeline.h"
 #include "render/picture.h"
 #include "render/puff_pass.h"
+#include "render/shell_buffers.h"
 
 namespace nephos {
 
@@ -20,13 +21,15 @@ void store_tile(const float* radiance, const float* depth, const Tile& tile, Pic
 class ViewPass {
   public:
     ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-             const vk::raii::Sampler& sampler, bool physical_sky);
+             const vk::raii::Sampler& sampler, const ShaderVariant& variant);
 
     // Tables of the physical sky; readable by shaders.
     void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
     // The map that the ground wears; in the layout GENERAL and readable by fragment shaders.
     void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
 
+    // The air between the clouds, in front of what `order` has; for a pass made for shells.
+    void use_shells(const GpuDevice& gpu, const AirShells& shells, const EyeOrder& order);
     // scattering_table.h
     void use_scattering(const GpuDevice& gpu, const GpuBuffer& table);
 
@@ -44,11 +47,13 @@ class ViewPass {
     void read_back(const GpuDevice& gpu, vk::Extent2D area) const;
 
     const PipelineLayout* layout_;
-    vk::raii::Pipeline background_, splat_, integrated_splat_;
+    vk::raii::Pipeline background_, splat_, integrated_splat_, shell_;
     Bindings bindings_;
     GpuBuffer frame_, balls_, radiance_pixels_, depth_pixels_;
     GpuImage radiance_, depth_;
     PuffPass puffs_;
+    ShellBuffers shells_;
+    std::vector<Run> runs_;  // between and with the shells in use; empty without shells
 };
 
 }  // namespace nephos

@@ -14,17 +14,24 @@ namespace {
 constexpr std::size_t kMaxBalls = std::size_t{1} << 20;    // on the device at once: 52 MiB with their splats
 constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of the tiles' lists: 64 MiB
 
+std::size_t groups(std::size_t invocations) {
+    return (invocations + shader::kComputeGroup - 1) / shader::kComputeGroup;
+}
+
 }  // namespace
 
 ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-                     const vk::raii::Sampler& sampler, bool physical_sky)
+                     const vk::raii::Sampler& sampler, const ShaderVariant& variant)
     : layout_(&layout),
-      physical_sky_(physical_sky),
-      project_(create_compute_pipeline(gpu, layout, shaders().view_project_comp, {false, physical_sky})),
-      finish_(create_compute_pipeline(gpu, layout, shaders().view_finish_comp, {false, physical_sky})),
+      variant_(variant),
+      project_(create_compute_pipeline(gpu, layout, shaders().view_project_comp, variant)),
+      finish_(create_compute_pipeline(gpu, layout, shaders().view_finish_comp, variant)),
+      between_(variant.shells ? create_compute_pipeline(gpu, layout, shaders().view_shells_comp, variant)
+                              : nullptr),
       bindings_(create_bindings(gpu, layout)),
       frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
-                           HostAccess::write)) {
+                           HostAccess::write)),
+      shells_(gpu, bindings_) {
     bind_buffer(gpu, bindings_, 0, frame_);
     for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
 }
@@ -37,6 +44,11 @@ void ViewTiles::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const 
     bind_image(gpu, bindings_, 4, map, sampler);
 }
 
+void ViewTiles::use_shells(const GpuDevice& gpu, const AirShells& shells, const EyeOrder& order) {
+    shells_.use(gpu, bindings_, shells);
+    before_shells_ = balls_before_shells(shells, order.balls);
+}
+
 void ViewTiles::use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
     bind_buffer(gpu, bindings_, 12, table);
 }
@@ -45,32 +57,64 @@ const vk::raii::Pipeline& ViewTiles::tiles_for(const GpuDevice& gpu, const EyeOr
     vk::raii::Pipeline& pipeline = tiles_[order.all_fitted ? 0 : 1][order.depth ? 1 : 0];
     if (!*pipeline)
         pipeline = create_tile_pipeline(gpu, *layout_, shaders().view_tiles_comp,
-                                        {!order.all_fitted, order.depth}, {false, physical_sky_});
+                                        {!order.all_fitted, order.depth}, variant_);
     return pipeline;
 }
 
+// Splats up to the next shell, that shell and those that follow at once, splats again. `step` has the tiles.
+void ViewTiles::draw_between_shells(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& tiles,
+                                    const shader::TileStep& step, std::size_t begin, std::size_t end,
+                                    bool last) {
+    const std::size_t shells = before_shells_.size();
+    shader::TileStep own = step;
+    for (std::size_t at = begin;;) {
+        const bool shell_follows = next_shell_ < shells && (last || before_shells_[next_shell_] < end);
+        const std::size_t until =
+            shell_follows ? std::max<std::size_t>(at, before_shells_[next_shell_]) : end;
+        own.first = shader::uint(at - begin);
+        own.end = shader::uint(until - begin);
+        begin_compute(commands, *layout_, bindings_, tiles, own);
+        dispatch_groups(commands, step.tile_count);
+        compute_barrier(commands);
+        own.first_batch = false;
+        if (!shell_follows) return;
+        own.first = shader::uint(next_shell_);
+        while (next_shell_ < shells && before_shells_[next_shell_] <= until) ++next_shell_;
+        own.end = shader::uint(next_shell_);
+        begin_compute(commands, *layout_, bindings_, between_, own);
+        dispatch_groups(commands, groups(std::size_t(step.width) * step.height));
+        compute_barrier(commands);
+        at = until;
+        if (at == end && next_shell_ == shells) return;
+    }
+}
+
 void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order,
-                           std::size_t balls, bool first, bool last) {
+                           std::size_t begin, std::size_t end) {
+    const bool last = end == order.balls.size();
     shader::TileStep step{.width = shader::uint(grid.width),
                           .height = shader::uint(grid.height),
                           .tiles_x = shader::uint(grid.columns()),
-                          .tile_count = shader::uint(balls),
-                          .first_batch = first,
+                          .tile_count = shader::uint(end - begin),
+                          .first_batch = begin == 0,
                           .last_batch = last,
                           .largest_radius = 0,
+                          .first = 0,
+                          .end = 0,
                           .pad0 = 0};
-    const auto groups = [](std::size_t invocations) {
-        return (invocations + shader::kComputeGroup - 1) / shader::kComputeGroup;
-    };
     const vk::raii::Pipeline& tiles = tiles_for(gpu, order);
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_compute(commands, *layout_, bindings_, project_, step);
-        dispatch_groups(commands, groups(balls));
+        dispatch_groups(commands, groups(end - begin));
         compute_barrier(commands);
         step.tile_count = shader::uint(grid.tiles());
-        begin_compute(commands, *layout_, bindings_, tiles, step);
-        dispatch_groups(commands, grid.tiles());
-        compute_barrier(commands);
+        if (variant_.shells) {
+            draw_between_shells(commands, tiles, step, begin, end, last);
+        } else {
+            begin_compute(commands, *layout_, bindings_, tiles, step);
+            dispatch_groups(commands, grid.tiles());
+            compute_barrier(commands);
+        }
         if (last) {
             begin_compute(commands, *layout_, bindings_, finish_, step);
             dispatch_groups(commands, groups(std::size_t(grid.width) * std::size_t(grid.height)));
@@ -92,6 +136,7 @@ void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, co
     const std::vector<PixelBox> boxes = screen_boxes(order, camera, options.camera, tile);
     std::vector<shader::ViewBall> balls;
     std::size_t begin = 0;
+    next_shell_ = 0;
     do {  // once even without any ball, for the background
         const std::size_t end = end_of_batch(boxes, begin, grid, kMaxBalls, kMaxEntries);
         balls.assign(order.balls.rbegin() + std::ptrdiff_t(begin),
@@ -102,7 +147,7 @@ void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, co
         const TileBins bins = bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid);
         upload(gpu, bindings_, 5, ranges_, std::as_bytes(std::span(bins.ranges)));
         upload(gpu, bindings_, 6, list_, std::as_bytes(std::span(bins.list)));
-        draw_batch(gpu, grid, order, balls.size(), begin == 0, end == boxes.size());
+        draw_batch(gpu, grid, order, begin, end);
         begin = end;
     } while (begin < boxes.size());
     store_tile(reinterpret_cast<const float*>(radiance_.mapped),

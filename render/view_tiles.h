@@ -10,6 +10,7 @@
 #include "render/eye_order.h"
 #include "render/frame_data.h"
 #include "render/gpu_pipeline.h"
+#include "render/shell_buffers.h"
 #include "render/tile_bins.h"
 
 namespace nephos {
@@ -18,13 +19,15 @@ class ViewTiles {
   public:
     // `attenuation` is not read, but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
     ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-              const vk::raii::Sampler& sampler, bool physical_sky);
+              const vk::raii::Sampler& sampler, const ShaderVariant& variant);
 
     // Tables of the physical sky; readable by shaders.
     void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
     // The map that the ground wears; in the layout GENERAL and readable by compute shaders.
     void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
 
+    // The air between the metaballs of `order`; for a pass made for shells.
+    void use_shells(const GpuDevice& gpu, const AirShells& shells, const EyeOrder& order);
     // scattering_table.h
     void use_scattering(const GpuDevice& gpu, const GpuBuffer& table);
 
@@ -34,16 +37,22 @@ class ViewTiles {
 
   private:
     const vk::raii::Pipeline& tiles_for(const GpuDevice& gpu, const EyeOrder& order);
-    void draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order, std::size_t balls,
-                    bool first, bool last);
+    // `begin`, `end`: metaballs, nearest first.
+    void draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order, std::size_t begin,
+                    std::size_t end);
+    void draw_between_shells(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& tiles,
+                             const shader::TileStep& step, std::size_t begin, std::size_t end, bool last);
 
     const PipelineLayout* layout_;
-    bool physical_sky_;
-    vk::raii::Pipeline project_, finish_;
+    ShaderVariant variant_;
+    vk::raii::Pipeline project_, finish_, between_;
     // [some are not fitted][with distances]; made when they are needed.
     vk::raii::Pipeline tiles_[2][2] = {{nullptr, nullptr}, {nullptr, nullptr}};
     Bindings bindings_;
     GpuBuffer frame_, balls_, splats_, ranges_, tails_, list_, radiance_, depth_;
+    ShellBuffers shells_;
+    std::vector<std::uint32_t> before_shells_;  // balls_before_shells()
+    std::size_t next_shell_ = 0;                // of the tile of the picture that is being drawn
 };
 
 }  // namespace nephos

@@ -198,6 +198,8 @@ const Section& scene_section() {
              group("ground", ground_section()),
              std::move(wet_ground),
              std::move(precipitation),
+             group("shells", shells_section()),
+             group("light_shafts", light_shafts_section()),
              group("debug_view", debug_view_section())},
             &finish_scene};
     }();

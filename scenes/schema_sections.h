@@ -24,6 +24,8 @@ const Section& debug_view_section();
 const Section& air_section();
 const Section& atmosphere_section();
 const Section& ground_section();
+const Section& shells_section();
+const Section& light_shafts_section();
 const Section& wet_ground_section();
 const Section& precipitation_section();
 

@@ -33,23 +33,49 @@ vec3 air_transmittance(vec3 ray, float distance) {
                layer_column(frame.air.x, ray.z, distance, frame.haze.w) * frame.haze.rgb);
 }
 
-// Radiance of the air itself over that distance, in full light; `beta` is its transmittance. With tables it is the
-// sky's part that lies in front: far away it becomes the sky.
-vec3 air_light(vec3 ray, vec3 beta) {
-    if (!kPhysicalSky) return (1.0 - beta) * frame.horizon.rgb;
+// Radiance that the air along a ray would have if it had no end, in full light. With tables it is the sky's part: far away
+// the air becomes the sky.
+vec3 endless_air(vec3 ray) {
+    if (!kPhysicalSky) return frame.horizon.rgb;
     vec2 heights = vec2(frame.rayleigh.w, frame.haze.w);
     vec2 column = exp(-frame.air.x * heights) / (heights * max(abs(ray.z), 1.0e-5));
     vec3 beyond = exp(-column.x * frame.rayleigh.rgb - column.y * frame.haze.rgb);
-    return sky_scattered(ray) * (1.0 - beta) / max(1.0 - beyond, 1.0e-4);
+    return sky_scattered(ray) / max(1.0 - beyond, 1.0e-4);
 }
 
-// Radiance per metre that the air at a distance along the ray scatters of unshaded sunlight towards the eye, before
-// what lies between takes its share (air_transmittance).
-vec3 air_sunlight(vec3 ray, float distance) {
-    if (!kPhysicalSky) return kAirSunShare * frame.air_extinction.rgb * frame.horizon.rgb;
-    float height = ray.z * distance, cosine = dot(frame.to_sun.xyz, ray);
+// Radiance of the air itself over a distance, in full light; `beta` is its transmittance.
+vec3 air_light(vec3 ray, vec3 beta) { return (1.0 - beta) * endless_air(ray); }
+
+// Gradient: the air is thickest at the horizon; its colour falls off exponentially with height, and reaches zero at the
+// zenith.
+vec3 gradient_sky(float height) {
+    const float falloff = 4.0;
+    float haze = (exp(-falloff * height) - exp(-falloff)) / (1.0 - exp(-falloff));
+    return mix(frame.zenith.rgb, frame.horizon.rgb, haze);
+}
+
+// What clouds can take away of the light of the air along a ray: sunlight, scattered once.
+struct SunlitAir {
+    vec3 most;                   // radiance without end; no more than the air and the sky have, so that none is negative
+    float molecules, particles;  // with tables: pi times the phase functions, and the albedo
+};
+
+SunlitAir sunlit_air(vec3 ray) {
+    float cosine = dot(frame.to_sun.xyz, ray);
+    if (kPhysicalSky)
+        return SunlitAir(endless_air(ray), kPi * molecule_phase(cosine),
+                         kPi * frame.air.z * particle_phase(cosine, frame.air.y));
+    float direct = frame.horizon.w * 4.0 * kPi * particle_phase(cosine, frame.zenith.w);
+    float share = direct / (direct + 1.0 - frame.horizon.w + 1.0e-6);
+    return SunlitAir(share * min(frame.horizon.rgb, gradient_sky(max(ray.z, 0.0))), 0.0, 0.0);
+}
+
+// Radiance that the air would have of sunlight scattered once, were it everywhere as at that distance along the ray.
+vec3 sunlit_at(SunlitAir air, vec3 ray, float distance) {
+    if (!kPhysicalSky) return air.most;
+    float height = ray.z * distance;
     vec2 density = exp(-max(frame.air.x + height, 0.0) * vec2(frame.rayleigh.w, frame.haze.w));
-    vec3 scattered = density.x * molecule_phase(cosine) * frame.rayleigh.rgb +
-                     density.y * particle_phase(cosine, frame.air.y) * frame.air.z * frame.haze.rgb;
-    return kPi * scattered * sunlight_at(height);
+    vec3 molecules = density.x * frame.rayleigh.rgb, particles = density.y * frame.haze.rgb;
+    vec3 scattered = air.molecules * molecules + air.particles * particles;
+    return min(sunlight_at(height) * scattered / max(molecules + particles, 1.0e-12), air.most);
 }

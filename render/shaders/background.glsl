@@ -14,17 +14,14 @@ vec3 sun_disc(vec3 ray) {
     return covered * frame.sun_disc.rgb * fade * pow(vec3(cosine), vec3(kLimbDarkeningRed, kLimbDarkeningGreen, kLimbDarkeningBlue));
 }
 
-// Gradient: the air is thickest at the horizon; its colour falls off exponentially with height, and reaches zero at the
-// zenith. Below the horizon the sky is that of the horizon.
+// Below the horizon the sky is that of the horizon.
 vec3 sky(vec3 ray) {
     float height = max(ray.z, 0.0);
     if (kPhysicalSky) {
         vec3 upwards = vec3(ray.xy, height);
         return sky_scattered(upwards) + sun_disc(upwards);
     }
-    const float falloff = 4.0;
-    float haze = (exp(-falloff * height) - exp(-falloff)) / (1.0 - exp(-falloff));
-    return mix(frame.zenith.rgb, frame.horizon.rgb, haze);
+    return gradient_sky(height);
 }
 
 vec3 ground(vec3 ray, float distance) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The light that a metaball scatters towards the eye; needs frame.glsl, air.glsl and scattering.glsl.
+// The light that a metaball scatters towards the eye; needs air.glsl, scattering.glsl and shells.glsl.
 
 struct Scattered {
     vec3 diffuse;  // radiance that does not depend on the ray
@@ -36,4 +36,12 @@ vec3 radiance_of_disc(Scattered light, vec3 ray, float ratio) {
 // Radius in metres of what is drawn: widened to a part of a pixel, see kMinRadiusPixels.
 float drawn_radius(ViewBall ball, float distance) {
     return max(ball.radius, kMinRadiusPixels * distance / frame.up.w);
+}
+
+// The light of a metaball as it arrives at the beginning of its shell.
+Scattered seen_through_shell(Scattered light, vec3 centre, float distance) {
+    AirLayer air = layer_in_front(centre, distance);
+    light.diffuse = light.diffuse * air.transmittance + air.light;
+    light.direct *= air.transmittance;
+    return light;
 }

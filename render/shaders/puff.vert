@@ -5,7 +5,9 @@
 // Step 2, T's billboards: their corners, and T's light at each of them.
 #include "billboard.glsl"
 #include "frame.glsl"
+#include "ray.glsl"
 #include "air.glsl"
+#include "shells.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Puffs {
     Puff puffs[];
@@ -60,8 +62,9 @@ void main() {
     vec3 position = centre + reach.x * right + reach.y * up;
     vec3 ray = centre / max(distance, 1.0e-6);
     vec3 beta = air_transmittance(ray, distance);
+    AirLayer air = layer_in_front(centre, distance);
     coordinate = turned(corner, puff.texture_bits >> 8 & 15u);
-    lit = puff.opacity * beta * light_at(position, puff, clouds[puff.cloud]);
-    veil = puff.opacity * vec4(air_light(ray, beta), 1.0);
+    lit = puff.opacity * air.transmittance * beta * light_at(position, puff, clouds[puff.cloud]);
+    veil = puff.opacity * vec4(air.transmittance * air_light(ray, beta) + air.light, 1.0);
     layer_level_distance = vec3(uvec2(puff.texture_bits & 255u, puff.texture_bits >> 12), distance);
 }

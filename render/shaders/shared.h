@@ -53,8 +53,7 @@ NEPHOS_CONST float kSunRadius = 0.00462512f;  // radians
 NEPHOS_CONST float kLimbDarkeningRed = 0.397f;
 NEPHOS_CONST float kLimbDarkeningGreen = 0.503f;
 NEPHOS_CONST float kLimbDarkeningBlue = 0.652f;
-// Gradient sky: share of the air's light that is sunlight scattered straight towards the eye.
-NEPHOS_CONST float kAirSunShare = 0.5f;
+NEPHOS_CONST uint kMaxShells = 128u;
 NEPHOS_CONST uint kScatterAngles = 513u;            // nodes of the scattering table, see scatter_column()
 NEPHOS_CONST uint kScatterDepths = 97u;             // ... and scatter_row()
 NEPHOS_CONST float kScatterRowsPerDoubling = 8.0f;  // of 1 + optical depth
@@ -135,6 +134,7 @@ struct TileStep {
     uint tile_count;               // or number of splats, or of items
     uint first_batch, last_batch;  // booleans: clear the sums before; finish them after
     float largest_radius;          // light: metres, of any splat
+    uint first, end;               // view: the splats, or shells, that are drawn
     uint pad0;
 };
 
@@ -150,8 +150,8 @@ struct Frame {
     vec4 ambient_top;     // rgb; w: albedo of the cloud
     vec4 ambient_base;    // rgb
     vec4 air_extinction;  // rgb: per metre
-    vec4 horizon;         // rgb: sky at the horizon, and light of the air itself
-    vec4 zenith;          // rgb
+    vec4 horizon;  // gradient: sky at the horizon, and light of the air; w: share of it straight from the sun
+    vec4 zenith;   // rgb; w: asymmetry g of the haze
     vec4 ground;  // rgb: radiance of the ground under open sky without the sun; w: height above the eye (< 0)
     vec4 ground_sun;  // rgb: what the unshaded sun adds; w: 1 = there is a ground
     vec4 shadow_u;    // shadow map coordinate 0..1 of a point p: dot(xyz, p) + w
@@ -166,6 +166,23 @@ struct Frame {
     vec4 sun_disc;  // rgb: radiance of its middle; w: 1 = there is a disc
     vec4 sun_fade;  // rgb: change of the logarithm of its radiance with the sine of the elevation
 };
+
+// Shells of air around the eye (air_shells.h).
+struct Shells {
+    vec4 ends[kMaxShells / 4u];  // metres from the eye at which each shell ends and the next begins
+    vec4 settings;  // x: number of shells; y: strength of light shafts; z: texels in a row of the shade map;
+                    // w: in all
+    vec4 shade_u;   // shade map: column of a point p relative to the eye, dot(xyz, p) + w, texels
+    vec4 shade_v;   // row
+    vec4 shade_along;  // along the light: 0 where the first cloud begins, 1 where the last one ends
+    vec4 shade;        // x, y: largest column and row; z: along the light, where the first shade begins
+};
+
+// Where in a shell a pixel of the picture samples it, 0..1: an additive recurrence in two dimensions (Roberts
+// 2018, "R2") spreads the samples of neighbouring pixels evenly. In integers: the same on every machine.
+NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
+    return float((x * 3242174889u + y * 2447445414u) >> 8) * (1.0f / 16777216.0f);
+}
 
 // Irradiance of lightning relative to that at 1 km.
 NEPHOS_FUNCTION float flash_falloff(float squared_distance_m) {
@@ -272,9 +289,11 @@ static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&
               offsetof(ViewBall, flags) == 28);
 static_assert(sizeof(ViewSplat) == 16 && sizeof(LightSplat) == 16 && sizeof(LightPlace) == 8);
 static_assert(sizeof(LightQuery) == 16 && sizeof(LightItem) == 16);
-static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 32);
+static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 40);
 static_assert(sizeof(Puff) == 32 && offsetof(Puff, half_size) == 12 && offsetof(Puff, cloud) == 28);
 static_assert(sizeof(PuffCloud) == 32 && offsetof(PuffCloud, inverse_height) == 16);
+static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 5) &&
+              offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 1));
 static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
               offsetof(Frame, flash_colour) == 272 && offsetof(Frame, sun_fade) == 368);
 

@@ -4,8 +4,10 @@
 #include "shared.h"
 // Tiles, first: each metaball as a splat on the screen, with its light.
 #include "frame.glsl"
+#include "ray.glsl"
 #include "air.glsl"
 #include "scattering.glsl"
+#include "shells.glsl"
 #include "lighting.glsl"
 
 layout(local_size_x = kComputeGroup) in;
@@ -34,8 +36,8 @@ void main() {
 
     float depth = dot(frame.forward.xyz, centre);
     float radius_pixels = radius * frame.up.w / depth;
-    vec3 radiance = radiance_of_disc(scattered_light(ball, distance), centre / distance, radius / distance);
-    radiance = min(radiance, vec3(60000.0));
+    Scattered light = seen_through_shell(scattered_light(ball, distance), centre, distance);
+    vec3 radiance = clamp(radiance_of_disc(light, centre / distance, radius / distance), vec3(-60000.0), vec3(60000.0));
     vec2 plane = vec2(dot(frame.right.xyz, centre) / dot(frame.right.xyz, frame.right.xyz),
                       dot(frame.up.xyz, centre) / dot(frame.up.xyz, frame.up.xyz)) / depth;
     vec2 pixel = (0.5 * vec2(plane.x, -plane.y) + 0.5) * frame.picture.xy - frame.picture.zw;

@@ -6,8 +6,10 @@
 #include "attenuation.glsl"
 #include "billboard.glsl"
 #include "frame.glsl"
+#include "ray.glsl"
 #include "air.glsl"
 #include "scattering.glsl"
+#include "shells.glsl"
 #include "lighting.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Balls {
@@ -44,7 +46,7 @@ void main() {
     vec3 centre = vec3(ball.x, ball.y, ball.z);
     float distance = length(centre);
     centre_radius = vec4(centre, ball.radius);
-    Scattered light = scattered_light(ball, distance);
+    Scattered light = seen_through_shell(scattered_light(ball, distance), centre, distance);
     diffuse = light.diffuse;
     direct = light.direct;
     if ((ball.flags & kAround) != 0u) {

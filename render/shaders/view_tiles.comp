@@ -10,6 +10,7 @@
 #include "integral.glsl"
 #include "air.glsl"
 #include "scattering.glsl"
+#include "shells.glsl"
 #include "lighting.glsl"
 #include "tiles.glsl"
 
@@ -95,7 +96,7 @@ void add_exact(uint index, vec2 pixel) {
     float distance = length(centre);
     float radius = (ball.flags & kAround) != 0u ? ball.radius : drawn_radius(ball, distance);
     float thinning = ball.radius / radius;
-    Scattered light = scattered_light(ball, distance);
+    Scattered light = seen_through_shell(scattered_light(ball, distance), centre, distance);
     if ((ball.flags & kIntegrate) == 0u) {
         light.diffuse = radiance_of_disc(light, centre / distance, radius / distance);
         light.direct = vec3(0.0);
@@ -159,9 +160,28 @@ void add_all(TileRange range, vec2 pixel) {
     }
 }
 
+// The first entry from `begin` on whose splat is not nearer than the one with this number.
+uint entry_of(uint splat, TileRange range) {
+    uint begin = range.begin, end = range.end;
+    while (begin < end) {
+        uint middle = (begin + end) / 2u;
+        if (list[middle] < splat) {
+            begin = middle + 1u;
+        } else {
+            end = middle;
+        }
+    }
+    return begin;
+}
+
 void main() {
     uint tile = work_group();
     if (tile >= step.tile_count) return;
+    TileRange range = ranges[tile];
+    if (kShells) {  // only those between two shells
+        range = TileRange(entry_of(step.first, range), entry_of(step.end, range));
+        if (range.begin == range.end && step.first_batch == 0u) return;
+    }
     uvec2 first = first_pixel(tile);
     vec2 pixel = vec2(first) + 0.5;
     [[unroll]] for (uint row = 0u; row < kRows; ++row) {
@@ -180,7 +200,7 @@ void main() {
         vec3 direction = pixel_direction(pixel + vec2(0.0, float(row)));
         per_square[row] = 1.0 / dot(direction, direction);
     }
-    add_all(ranges[tile], pixel);
+    add_all(range, pixel);
     [[unroll]] for (uint row = 0u; row < kRows; ++row) {
         uint y = first.y + row;
         if (first.x < step.width && y < step.height) {

@@ -19,13 +19,14 @@
 namespace nephos {
 namespace {
 
-// Every test draws with the validation layer on and fails when it says anything.
-class BillboardTest : public ::testing::Test {
+// Every test draws in every way that has billboards, with the validation layer on, and fails when it says
+// anything.
+class BillboardTest : public ::testing::TestWithParam<Splatting> {
   protected:
     void TearDown() override {
         for (const std::string& message : renderer_.validation_messages()) ADD_FAILURE() << message;
     }
-    Renderer renderer_{DeviceOptions{{}, true, 2048}};
+    Renderer renderer_{DeviceOptions{{}, true, 2048, GetParam()}};
 };
 
 RenderOptions view(Vec3 from, Vec3 to, int width = 65, int height = 65, double fov = 40) {
@@ -84,7 +85,7 @@ std::array<double, 2> texture(const PuffLevel& level, int layer, double right, d
 
 // A billboard that fills the picture, each kind, seen level from the south: every pixel against the formula.
 // The light is that of the corners, mixed over each of the two triangles.
-TEST_F(BillboardTest, OneBillboardIsTexturedAndLitAsTheFormulaSays) {
+TEST_P(BillboardTest, OneBillboardIsTexturedAndLitAsTheFormulaSays) {
     const std::vector<PuffLevel>& levels = puff_textures();
     for (const PuffTexture kind : {PuffTexture::soft, PuffTexture::wispy, PuffTexture::dense}) {
         RenderOptions options = view({0, -1000, 500}, {0, 0, 500}, 129, 129);
@@ -147,7 +148,7 @@ TEST_F(BillboardTest, OneBillboardIsTexturedAndLitAsTheFormulaSays) {
 }
 
 // Fully absorbed, only ambient light is left; lightning from the other side lights what the sun does not.
-TEST_F(BillboardTest, LightningHasItsOwnAbsorptionAndFallsOffWithTheSquareOfTheDistance) {
+TEST_P(BillboardTest, LightningHasItsOwnAbsorptionAndFallsOffWithTheSquareOfTheDistance) {
     RenderOptions options = view({0, -1000, 500}, {0, 0, 500});
     options.air.extinction_per_m = {0, 0, 0};
     options.light.ambient_top = options.light.ambient_base = {0, 0, 0};
@@ -214,14 +215,14 @@ bool same_bits(const Picture& a, const Picture& b) {
     return same(a.beauty, b.beauty) && same(a.transmittance, b.transmittance) && same(a.depth_m, b.depth_m);
 }
 
-TEST_F(BillboardTest, PicturesDependNeitherOnTheOrderGivenNorOnTiles) {
+TEST_P(BillboardTest, PicturesDependNeitherOnTheOrderGivenNorOnTiles) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
     std::vector<CloudBillboard> billboards = random_billboards(3, 400, 2);
     const Picture first = renderer_.draw_splats(scene_of(kClouds, billboards), options);
     EXPECT_TRUE(same_bits(first, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
     std::shuffle(billboards.begin(), billboards.end(), std::mt19937(4));
     EXPECT_TRUE(same_bits(first, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
-    Renderer tiled{DeviceOptions{{}, true, 32}};
+    Renderer tiled{DeviceOptions{{}, true, 32, GetParam()}};
     const Picture in_tiles = tiled.draw_splats(scene_of(kClouds, billboards), options);
     reference::DifferenceSum sum;
     for (std::size_t i = 0; i < first.beauty.size(); ++i)
@@ -232,7 +233,7 @@ TEST_F(BillboardTest, PicturesDependNeitherOnTheOrderGivenNorOnTiles) {
 }
 
 // A red cloud of metaballs between two billboards, in either order: the nearer hides the farther.
-TEST_F(BillboardTest, BillboardsAndMetaballsHideEachOtherByDistance) {
+TEST_P(BillboardTest, BillboardsAndMetaballsHideEachOtherByDistance) {
     RenderOptions options = view({0, -3000, 1000}, {0, 0, 1000});
     options.air.extinction_per_m = {0, 0, 0};
     const std::vector<BillboardCloud> clouds{{{0, 0, 1000}, 500, 1500}};
@@ -250,8 +251,43 @@ TEST_F(BillboardTest, BillboardsAndMetaballsHideEachOtherByDistance) {
     EXPECT_NEAR(depth(500), 3000, 1);    // and behind it
 }
 
+float largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
+    EXPECT_EQ(a.size(), b.size());
+    float largest = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+    return largest;
+}
+
+// From outside, from among them, and from so far that all are widened; of large and small textures; by day
+// and by lightning; with metaballs between them.
+TEST_P(BillboardTest, AgreesWithTheBlendedPass) {
+    Renderer reference_renderer{DeviceOptions{{}, true, 2048, Splatting::billboards}};
+    const std::vector<CloudBillboard> billboards = random_billboards(8, 400, 2);
+    const std::vector<Metaball> balls = reference::random_metaballs(9, 200);
+    for (const RenderOptions& options :
+         {view({0, -3000, 900}, {0, 0, 1000}, 90, 70), view({0, -600, 1000}, {0, 0, 1000}, 90, 70, 60),
+          view({20000, -30000, 4000}, {0, 0, 1000}, 61, 47, 5), view({0, -300, 3000}, {0, 0, 900}, 50, 75)}) {
+        for (const bool lightning : {false, true}) {
+            for (const bool voxels : {false, true}) {
+                Splats splats = scene_of(kClouds, billboards);
+                if (voxels) splats.metaballs = {balls, 0.01, 0.7};
+                if (lightning) splats.flash = Flash{{100, -200, 1000}, {0.7, 0.8, 1.0}, 2.0};
+                const Picture fast = renderer_.draw_splats(splats, options);
+                const Picture slow = reference_renderer.draw_splats(splats, options);
+                // Close to the lightning radiance is far above 1; there it is the share that counts.
+                const float brightest = std::max(1.0f, *std::ranges::max_element(slow.beauty));
+                EXPECT_LE(largest_difference(fast.beauty, slow.beauty), brightest / 255.0f);
+                EXPECT_LE(largest_difference(fast.transmittance, slow.transmittance), 1.0f / 255.0f);
+                splats.light = false;
+                EXPECT_EQ(renderer_.draw_splats(splats, options).beauty, fast.beauty);
+            }
+        }
+    }
+    for (const std::string& message : reference_renderer.validation_messages()) ADD_FAILURE() << message;
+}
+
 // Whoever does not ask for depth gets the same picture without it.
-TEST_F(BillboardTest, DepthIsLeftOutOnRequest) {
+TEST_P(BillboardTest, DepthIsLeftOutOnRequest) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
     const std::vector<CloudBillboard> billboards = random_billboards(6, 100, 2);
     Splats splats = scene_of(kClouds, billboards);
@@ -265,7 +301,7 @@ TEST_F(BillboardTest, DepthIsLeftOutOnRequest) {
 }
 
 // Billboards far outside of the picture, behind the eye or without opacity change no bit.
-TEST_F(BillboardTest, WhatCannotBeSeenChangesNothing) {
+TEST_P(BillboardTest, WhatCannotBeSeenChangesNothing) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
     std::vector<CloudBillboard> billboards = random_billboards(5, 100, 2);
     const Picture with = renderer_.draw_splats(scene_of(kClouds, billboards), options);
@@ -280,7 +316,7 @@ TEST_F(BillboardTest, WhatCannotBeSeenChangesNothing) {
 }
 
 // Much smaller than a pixel, a billboard takes as much light out of the picture as its area is.
-TEST_F(BillboardTest, BillboardsSmallerThanAPixelKeepTheirOpacity) {
+TEST_P(BillboardTest, BillboardsSmallerThanAPixelKeepTheirOpacity) {
     RenderOptions options = view({0, -20000, 1000}, {0, 0, 1000}, 33, 33, 5);
     const std::vector<BillboardCloud> clouds{{{0, 0, 1000}, 500, 1500}};
     const double pixel_m = 2 * 20000 * std::tan(2.5 * std::numbers::pi / 180) / 33;
@@ -301,7 +337,7 @@ TEST_F(BillboardTest, BillboardsSmallerThanAPixelKeepTheirOpacity) {
     }
 }
 
-TEST_F(BillboardTest, BadBillboardsAreRefusedByNumber) {
+TEST_P(BillboardTest, BadBillboardsAreRefusedByNumber) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000});
     std::vector<CloudBillboard> billboards(3);
     const auto message = [&](auto&& damage) {
@@ -326,6 +362,11 @@ TEST_F(BillboardTest, BadBillboardsAreRefusedByNumber) {
               "billboard 1: expected an opacity from 0 to 1");
     EXPECT_EQ(message([&](CloudBillboard& b) { b.cloud = 2; }), "billboard 1: expected the index of a cloud");
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, BillboardTest, ::testing::Values(Splatting::processor, Splatting::billboards),
+                         [](const auto& way) {
+                             return way.param == Splatting::processor ? "processor" : "billboards";
+                         });
 
 // Every level is dark in its outermost texels, hides as much as the finest, and is no brighter than opaque.
 TEST(PuffTextures, AreDarkAtTheirRimsAndHideTheSameAtAllLevels) {

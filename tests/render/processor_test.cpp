@@ -41,7 +41,7 @@ Drawn draw(const MetaballCloud& cloud, const RenderOptions& options, const Batch
     PictureFrame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);
     const std::vector<float> scattering = scattering_table(options.light);
     frame.scattering = scattering.data();
-    view_by_processor(options, camera, frame, whole, eye, picture, limits);
+    view_by_processor(options, camera, frame, whole, eye, AirShells{}, picture, limits);
     for (float& each : drawn.light) each = std::exp(-each);
     return drawn;
 }

@@ -70,13 +70,15 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"atmosphere"}), member_count<AtmosphereOptions>());
     EXPECT_EQ(keys_at({"ground"}), member_count<Ground>());
     EXPECT_EQ(keys_at({"wet_ground"}), member_count<GroundCoverOptions>() + member_count<WetGroundOptions>());
+    EXPECT_EQ(keys_at({"shells"}), member_count<Shells>());
+    EXPECT_EQ(keys_at({"light_shafts"}), member_count<LightShafts>());
     EXPECT_EQ(keys_at({"lightning"}), member_count<LightningFlash>());
     EXPECT_EQ(keys_at({"debug_view"}), member_count<DebugView>());
     // [sun] also holds the size of the shadow map, the one plain member of RenderOptions.
     EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 1);
     EXPECT_EQ(keys_at({"precipitation"}), member_count<PrecipitationOptions>());
     EXPECT_EQ(keys_at({"camera", "path"}), member_count<CameraKey>());
-    EXPECT_EQ(member_count<RenderOptions>(), 11u);
+    EXPECT_EQ(member_count<RenderOptions>(), 13u);
     EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/air_shells.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "automaton/vector_math.h"
+#include "render/frame_data.h"
+
+namespace nephos {
+namespace {
+
+shader::vec4 to_vec4(const Vec3& v, double w) { return {float(v.x), float(v.y), float(v.z), float(w)}; }
+
+float distance_of(const shader::ViewBall& ball) {
+    return std::sqrt(ball.x * ball.x + ball.y * ball.y + ball.z * ball.z);
+}
+float distance_of(const shader::Puff& puff) {
+    return std::sqrt(puff.x * puff.x + puff.y * puff.y + puff.z * puff.z);
+}
+
+// Texels of the shadow map along an edge of one of the shade map. A shaft is a mean over many shadows; single
+// texels would only be noise.
+int texels_in_one(int shadow_size) { return std::clamp(shadow_size / 256, 1, 4); }
+
+// What the cloud above a texel of the shade map is like, along the light: 0..1 from its first to its last
+// metaball.
+struct Span {
+    double weight = 0, sum = 0, sum_squares = 0;
+};
+
+// A unit of `along` in metres, and where it is 0.
+struct Along {
+    Vec3 row;  // metres^-1
+    double offset = 0;
+    double operator()(const Vec3& p) const { return dot(row, p) + offset; }
+};
+
+Along along_light(const PreparedCloud& cloud, const Vec3& direction) {
+    double first = 1e300, last = -1e300;
+    for (const std::uint32_t i : cloud.visible) {
+        const Metaball& ball = cloud.metaballs[i];
+        const double at = dot(direction, Vec3{ball.x, ball.y, ball.z});
+        first = std::min(first, at - double(ball.radius));
+        last = std::max(last, at + double(ball.radius));
+    }
+    return {(1 / (last - first)) * direction, -first / (last - first)};
+}
+
+class ShadeMap {
+  public:
+    ShadeMap(std::span<const float> shadow, int shadow_size)
+        : shadow_(shadow),
+          shadow_size_(shadow_size),
+          step_(texels_in_one(shadow_size)),
+          inner_((shadow_size_ + step_ - 1) / step_),
+          columns_(inner_ + 2) {}
+
+    int columns() const { return columns_; }
+    std::size_t texels() const { return std::size_t(columns_) * std::size_t(columns_); }
+    // From a shadow map coordinate 0..1 to a column or row whose whole numbers are the middles of texels.
+    double scale() const { return double(shadow_size_) / step_; }
+    static double shift() { return 0.5; }
+
+    std::vector<std::uint32_t> words(const PreparedCloud& cloud, const ShadowFrame& frame, const Along& along,
+                                     float& first_shade) const {
+        const std::vector<float> light = means();
+        const std::vector<std::uint32_t> range = ranges(cloud, frame, along, first_shade);
+        std::vector<std::uint32_t> words(2 * texels());
+        for (std::size_t i = 0; i < texels(); ++i) {
+            const std::size_t right = std::min(i + 1, texels() - 1);
+            words[i] = unorm16(light[i]) | unorm16(light[right]) << 16;
+            words[texels() + i] = range[i] | range[right] << 16;
+        }
+        return words;
+    }
+
+  private:
+    static std::uint32_t unorm16(float value) {
+        return std::uint32_t(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f);
+    }
+    static std::uint32_t byte_of(double value) {
+        return std::uint32_t(std::clamp(value, 0.0, 1.0) * 255.0 + 0.5);
+    }
+
+    // Means of the shadow map, with a border of full light.
+    std::vector<float> means() const {
+        std::vector<float> light(texels(), 1.0f);
+        tbb::parallel_for(0, inner_, [&](int row) {
+            for (int column = 0; column < inner_; ++column) {
+                float sum = 0;
+                int count = 0;
+                for (int y = row * step_; y < std::min(shadow_size_, (row + 1) * step_); ++y) {
+                    for (int x = column * step_; x < std::min(shadow_size_, (column + 1) * step_);
+                         ++x, ++count)
+                        sum += shadow_[std::size_t(y) * std::size_t(shadow_size_) + std::size_t(x)];
+                }
+                light[std::size_t(row + 1) * std::size_t(columns_) + std::size_t(column + 1)] =
+                    sum / float(count);
+            }
+        });
+        return light;
+    }
+
+    // Each metaball goes into the texel of its centre; a texel then takes those around it into account, as
+    // far as metaballs reach.
+    std::vector<Span> spans(const PreparedCloud& cloud, const ShadowFrame& frame, const Along& along,
+                            int& reach) const {
+        std::vector<Span> spans(texels());
+        const Vec3& u = frame.u_axis_m;
+        const Vec3& v = frame.v_axis_m;
+        const Vec3 across = (scale() / dot(u, u)) * u, down = (scale() / dot(v, v)) * v;
+        double radius_sum = 0;
+        for (std::size_t n = 0; n < cloud.visible.size(); ++n) {
+            const Metaball& ball = cloud.metaballs[cloud.visible[n]];
+            const Vec3 centre{ball.x, ball.y, ball.z}, offset = centre - frame.origin_m;
+            const int column = std::clamp(int(dot(across, offset)) + 1, 0, columns_ - 1),
+                      row = std::clamp(int(dot(down, offset)) + 1, 0, columns_ - 1);
+            Span& span = spans[std::size_t(row) * std::size_t(columns_) + std::size_t(column)];
+            const double radius = ball.radius, at = along(centre), half = radius * length(along.row);
+            const double weight = double(cloud.depth_scale[n]) * radius * radius;
+            span.weight += weight;
+            span.sum += weight * at;
+            span.sum_squares += weight * (at * at + 0.15 * half * half);
+            radius_sum += radius;
+        }
+        const double texel_m = std::max(length(u), length(v)) / scale();
+        const double mean_radius_m = cloud.visible.empty() ? 0 : radius_sum / double(cloud.visible.size());
+        reach = std::clamp(int(std::ceil(mean_radius_m / texel_m)), 1, 8);
+        return spans;
+    }
+
+    // Sums over 2 reach + 1 texels of a row, from every `stride`-th.
+    static void blur(std::vector<Span>& spans, std::size_t begin, std::size_t stride, int count, int reach) {
+        std::vector<Span> from(static_cast<std::size_t>(count));
+        for (int i = 0; i < count; ++i) from[std::size_t(i)] = spans[begin + std::size_t(i) * stride];
+        for (int i = 0; i < count; ++i) {
+            Span sum;
+            for (int j = std::max(0, i - reach); j <= std::min(count - 1, i + reach); ++j) {
+                sum.weight += from[std::size_t(j)].weight;
+                sum.sum += from[std::size_t(j)].sum;
+                sum.sum_squares += from[std::size_t(j)].sum_squares;
+            }
+            spans[begin + std::size_t(i) * stride] = sum;
+        }
+    }
+
+    // The shade grows evenly over the length of an even cloud with the same mean and variance.
+    std::vector<std::uint32_t> ranges(const PreparedCloud& cloud, const ShadowFrame& frame,
+                                      const Along& along, float& first_shade) const {
+        int reach = 0;
+        std::vector<Span> all = spans(cloud, frame, along, reach);
+        const auto columns = std::size_t(columns_);
+        tbb::parallel_for(std::size_t{0}, columns,
+                          [&](std::size_t row) { blur(all, row * columns, 1, columns_, reach); });
+        tbb::parallel_for(std::size_t{0}, columns,
+                          [&](std::size_t column) { blur(all, column, columns, columns_, reach); });
+        std::vector<std::uint32_t> range(texels(), 255u << 8);
+        std::uint32_t first = 255;
+        for (std::size_t i = 0; i < texels(); ++i) {
+            if (!(all[i].weight > 0)) continue;
+            const double mean = all[i].sum / all[i].weight;
+            const double variance = std::max(0.0, all[i].sum_squares / all[i].weight - mean * mean);
+            const double half = std::sqrt(3 * variance);
+            range[i] = byte_of(mean - half) | byte_of(mean + half) << 8;
+            first = std::min(first, range[i] & 255u);
+        }
+        first_shade = float(first) / 255.0f;
+        return range;
+    }
+
+    std::span<const float> shadow_;
+    int shadow_size_, step_, inner_, columns_;
+};
+
+void set_ends(shader::Shells& data, const Shells& shells) {
+    double end = 0, thickness = shells.spacing_m;
+    for (std::size_t k = 0; k < shader::kMaxShells; ++k) {
+        if (k < std::size_t(shells.count)) end += thickness;
+        thickness *= shells.growth;
+        shader::vec4& four = data.ends[k / 4];
+        float* const values[] = {&four.x, &four.y, &four.z, &four.w};
+        *values[k % 4] = float(end);
+    }
+}
+
+// Number of splats, in falling order of distance, that are at `end` or beyond.
+template <class Splat>
+std::size_t count_beyond(std::span<const Splat> farthest_first, float end) {
+    const auto beyond = [&](const Splat& splat) { return distance_of(splat) >= end; };
+    return std::size_t(std::ranges::partition_point(farthest_first, beyond) - farthest_first.begin());
+}
+
+std::size_t count_beyond(const EyeOrder& order, const Run& run, float end) {
+    const std::size_t count = run.end - run.begin;
+    if (run.kind == SplatKind::billboard)
+        return count_beyond(std::span(order.puffs).subspan(run.begin, count), end);
+    return count_beyond(std::span(order.balls).subspan(run.begin, count), end);
+}
+
+}  // namespace
+
+std::size_t shells_before(const shader::Shells& data, float distance) {
+    std::size_t first = 0, count = std::size_t(data.settings.x);
+    while (count > 0) {
+        const std::size_t half = count / 2;
+        if (shell_end(data, first + half) <= distance) {
+            first += half + 1;
+            count -= half + 1;
+        } else {
+            count = half;
+        }
+    }
+    return first;
+}
+
+bool looks_at_shade(const RenderOptions& options) {
+    return options.light_shafts.strength > 0 && daylight(options.sun.elevation_deg).sun > 0;
+}
+
+AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
+                     std::span<const float> shadow, int shadow_size) {
+    AirShells shells;
+    if (!looks_at_shade(options) || cloud.visible.empty()) return shells;
+    const double strength = options.light_shafts.strength * daylight(options.sun.elevation_deg).sun;
+    const Along along = along_light(cloud, frame.direction);
+    const ShadeMap map(shadow, shadow_size);
+    float first_shade = 0;
+    shells.shade = map.words(cloud, frame, along, first_shade);
+
+    shader::Shells& data = shells.data;
+    const Vec3& eye = options.camera.position_m;
+    const auto row = [&](const Vec3& axis) {
+        const Vec3 per_m = (map.scale() / dot(axis, axis)) * axis;
+        return to_vec4(per_m, dot(per_m, eye - frame.origin_m) + ShadeMap::shift());
+    };
+    set_ends(data, options.shells);
+    data.settings = {float(options.shells.count), float(strength), float(map.columns()), float(map.texels())};
+    data.shade_u = row(frame.u_axis_m);
+    data.shade_v = row(frame.v_axis_m);
+    data.shade_along = to_vec4(along.row, along(eye));
+    const float largest = float(map.columns()) - 1.001f;
+    data.shade = {largest, largest, first_shade, 0};
+    return shells;
+}
+
+std::vector<std::uint32_t> balls_before_shells(const AirShells& shells,
+                                               std::span<const shader::ViewBall> farthest_first) {
+    std::vector<std::uint32_t> before(shells.count());
+    for (std::size_t k = 0; k < before.size(); ++k)
+        before[k] =
+            std::uint32_t(farthest_first.size() - count_beyond(farthest_first, shell_end(shells.data, k)));
+    return before;
+}
+
+std::vector<Run> runs_between_shells(const AirShells& shells, const EyeOrder& order) {
+    std::vector<Run> runs;
+    std::size_t next = shells.count();  // shells from here on are in `runs`
+    const auto add_shell = [&] {
+        --next;
+        runs.push_back({std::uint32_t(next), std::uint32_t(next) + 1, SplatKind::shell});
+    };
+    for (Run run : order.runs) {
+        while (next > 0) {
+            const auto split =
+                run.begin + std::uint32_t(count_beyond(order, run, shell_end(shells.data, next - 1)));
+            if (split == run.end) break;  // all of it lies beyond the shell
+            if (split > run.begin) runs.push_back({run.begin, split, run.kind});
+            run.begin = split;
+            add_shell();
+        }
+        runs.push_back(run);
+    }
+    while (next > 0) add_shell();
+    return runs;
+}
+
+}  // namespace nephos

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The layers of air around the eye that are drawn between the clouds: D's shells, "interleaved back to front
+// (shell, clouds up to the next shell, next shell ...)". See docs/air.md.
+//
+// Shell k is the air between the distances ends[k - 1] and ends[k] of every ray, cut off by the ground. It is
+// drawn in front of all splats whose centres are at ends[k] or beyond, and behind all others. What lies
+// between the beginning of a splat's own shell and its centre is added to the light of the splat
+// (shaders/shells.glsl, shells-inl.h), so that nothing jumps when a splat crosses from one shell into
+// another.
+//
+// The light that a shell takes away is read off the shade map: the mean of the shadow map over a few texels,
+// and for each texel where along the light its shade begins and where it is complete. Above the clouds the
+// sun shines, whatever lies below. No Vulkan here. Private to the module.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/camera.h"
+#include "render/cloud_preparation.h"
+#include "render/eye_order.h"
+#include "render/picture.h"
+#include "render/shaders/shared.h"
+
+namespace nephos {
+
+struct AirShells {
+    shader::Shells data;
+    // Two planes of words, rows of settings.z of them. The first: transmittance of this texel and, in the
+    // upper half, of its right neighbour, 0..65535. The second, in bytes: where the shade of this texel
+    // begins and where it is complete, and the same of its right neighbour.
+    std::vector<std::uint32_t> shade;
+
+    std::size_t count() const { return std::size_t(data.settings.x); }
+    bool any() const { return count() > 0; }
+};
+
+// Distance from the eye at which shell k ends, metres.
+inline float shell_end(const shader::Shells& data, std::size_t k) {
+    const shader::vec4& four = data.ends[k / 4];
+    return k % 4 == 0 ? four.x : k % 4 == 1 ? four.y : k % 4 == 2 ? four.z : four.w;
+}
+
+// Number of shells that end at a distance or before it.
+std::size_t shells_before(const shader::Shells& data, float distance);
+
+// Whether the air of these options has anything that looks at the whole shadow map.
+bool looks_at_shade(const RenderOptions& options);
+
+// No shells when the options ask for none or when they would draw nothing. `shadow`: the texels of the shadow
+// map.
+AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
+                     std::span<const float> shadow, int shadow_size);
+
+// For each shell the number of balls, nearest first, that are drawn in front of it. Rises.
+std::vector<std::uint32_t> balls_before_shells(const AirShells& shells,
+                                               std::span<const shader::ViewBall> farthest_first);
+
+// The runs of an order with runs of SplatKind::shell between them, one shell each: what is drawn, farthest
+// first.
+std::vector<Run> runs_between_shells(const AirShells& shells, const EyeOrder& order);
+
+}  // namespace nephos

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.h"
+// Tiles, between the splats: shells of air, front to back.
+#include "frame.glsl"
+#include "ray.glsl"
+#include "air.glsl"
+#include "shells.glsl"
+
+layout(local_size_x = kComputeGroup) in;
+layout(set = 0, binding = 8, std430) buffer Radiance {
+    vec4 radiance[];  // w: transmittance
+};
+layout(push_constant) uniform Step {
+    TileStep step;
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.y * (32768u * kComputeGroup) + gl_GlobalInvocationID.x;
+    if (index >= step.width * step.height) return;
+    vec4 sum = radiance[index];
+    if (sum.a < kOpaque) return;
+    uvec2 pixel = uvec2(index % step.width, index / step.width);
+    vec3 ray = pixel_ray(vec2(pixel) + 0.5);
+    SunlitAir sunlit = sunlit_air(ray);
+    pixel += uvec2(frame.picture.zw);
+    for (uint k = step.first; k < step.end; ++k) {
+        AirLayer air = air_shell(k, sunlit, ray, pixel);
+        sum.rgb += sum.a * air.light;
+        sum.a *= air.transmittance;
+    }
+    radiance[index] = sum;
+}
