@@ -45,7 +45,8 @@ HWY_INLINE Floats covered(Floats film_mm, float half_mm, const ResolvedNoise& no
     const Floats level =
         hn::Mul(hn::Log(Lanes(), hn::Mul(film, set(1.0f / half_mm))), set(1.0f / kFilmSpread));
     const Floats deviation = hn::Sqrt(hn::Add(noise.variance, set(kSharpness * kSharpness)));
-    const Floats x = hn::Div(hn::Sub(level, noise.value), deviation);
+    // As far as exp() goes: a film of nanometres is thousands of deviations away.
+    const Floats x = hn::Max(hn::Div(hn::Sub(level, noise.value), deviation), set(-50.0f));
     // The normal distribution's integral, within 0.01.
     const Floats share = hn::Div(set(1.0f), hn::Add(set(1.0f), hn::Exp(Lanes(), hn::Mul(set(-1.702f), x))));
     return hn::IfThenElseZero(hn::Gt(film_mm, hn::Zero(Lanes())), share);

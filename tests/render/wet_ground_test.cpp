@@ -106,6 +106,21 @@ TEST(WetGroundTest, DryGroundStaysAsItIs) {
     EXPECT_EQ(draw(above, {}).beauty, draw(above, everywhere(3, 5)).beauty) << "no ground in view";
 }
 
+// The first drops of a shower wet the ground and leave no puddles, also next to the eye, where the noise of
+// the hollows is resolved and sharp.
+TEST(WetGroundTest, TheFirstDropsMakeNoPuddles) {
+    RenderOptions options = small_options();
+    options.camera.position_m = {0, 0, 3};
+    options.camera.target_m = {0, 12, 0};
+    options.wet_ground.puddle_film_mm = 2;
+    const Picture dry = draw(options, {});
+    for (const double film_mm : {1e-12, 1e-6, 1e-4}) {
+        const Picture wet = draw(options, everywhere(film_mm, 0));
+        for (std::size_t i = 0; i < dry.beauty.size(); ++i)
+            ASSERT_NEAR(wet.beauty[i], dry.beauty[i], 1e-3) << film_mm << ' ' << i;
+    }
+}
+
 // Still water under a sky of one colour: Fresnel's share of the sky and what comes out of the water.
 TEST(WetGroundTest, WaterReflectsASkyThatIsKnown) {
     RenderOptions options = small_options();
