@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// The shipped storm, in which everything that weather has is on at once: each way of drawing clouds shows the
+// same picture of it, whatever was drawn before and by however many threads.
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "apps/pipeline.h"
+#include "apps/sky_picture.h"
+#include "apps/weather.h"
+#include "density/metaballs.h"
+#include "scenes/reader.h"
+#include "tests/reference/with_threads.h"
+
+namespace nephos {
+namespace {
+
+// With cells three to four times as large, to be quick.
+Scene coarse_storm() {
+    const std::vector<std::string> overrides{"camera.width=96",
+                                             "camera.height=72",
+                                             "layer[0].lattice.cells=[60, 67, 9]",
+                                             "layer[0].lattice.cell_size_m=300",
+                                             "layer[1].lattice.cells=[50, 50, 16]",
+                                             "layer[1].lattice.cell_size_m=640",
+                                             "wet_ground.texels=64",
+                                             "precipitation.particles=5000"};
+    return read_scene(std::filesystem::path(NEPHOS_SOURCE_DIR) / "scenes/storm.toml", overrides);
+}
+
+std::vector<float> drawn(const Scene& scene, const FrameResult& frame, Renderer& renderer,
+                         SkyPainter& painter) {
+    const double radius = scene.density.metaball_radius_cells;
+    std::vector<Metaball> balls;
+    std::vector<SkyLayer> layers;
+    for (const LayerFrame& layer : frame.layers) {
+        const std::vector<Metaball> more = metaballs(layer.density, radius);
+        balls.insert(balls.end(), more.begin(), more.end());
+        layers.push_back({layer.sky, layer.clouds, layer.direct});
+    }
+    const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
+    return painter
+        .draw(renderer, cloud, layers, scene.render, frame.time_s, true, view_of(*frame.ground),
+              weather_of(scene, frame.layers, frame.time_s))
+        .beauty;
+}
+
+struct Comparison : PipelineSink {
+    explicit Comparison(const Scene& s) : scene(s) {}
+    void step(const StepResult&) override {}
+    void frame(const FrameResult& frame) override {
+        if (frame.number != 30 && frame.number != 47 && frame.number != 81) return;
+        const std::vector<float> expected = drawn(scene, frame, renderers[0], painters[0]);
+        const auto [least, most] = std::ranges::minmax(expected);
+        EXPECT_GT(most, 2 * least) << "nothing to see";
+        for (std::size_t way = 1; way < 3; ++way) {
+            const std::vector<float> other = drawn(scene, frame, renderers[way], painters[way]);
+            float apart = 0;
+            for (std::size_t i = 0; i < expected.size(); ++i)
+                apart = std::max(apart, std::abs(other[i] - expected[i]) / std::max(1.0f, expected[i]));
+            EXPECT_LT(apart, 1.0f / 255) << "frame " << frame.number << ", way " << way;
+        }
+        SkyPainter new_painter;
+        for (const std::size_t threads : {1, 3})
+            EXPECT_EQ(
+                test::with_threads(threads, [&] { return drawn(scene, frame, renderers[0], new_painter); }),
+                expected)
+                << "frame " << frame.number << ", " << threads << " threads";
+        ++compared;
+    }
+
+    const Scene& scene;
+    Renderer renderers[3] = {Renderer({.splatting = Splatting::processor}),
+                             Renderer({.splatting = Splatting::tiles}),
+                             Renderer({.splatting = Splatting::billboards})};
+    SkyPainter painters[3];
+    int compared = 0;
+};
+
+TEST(Storm, IsTheSameInEveryWayOfDrawing) {
+    const Scene scene = coarse_storm();
+    Comparison comparison(scene);
+    Pipeline pipeline(scene, full_range(scene), std::string(32, '0'));
+    while (!pipeline.finished()) pipeline.advance(comparison);
+    EXPECT_EQ(comparison.compared, 3);
+}
+
+}  // namespace
+}  // namespace nephos
