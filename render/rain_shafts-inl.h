@@ -86,16 +86,17 @@ HWY_INLINE Floats quick_exp(Floats x) {
 HWY_INLINE Floats noise_at(const ShaftPass& p, Floats x, Floats y) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
+    const hn::RebindToUnsigned<Lanes> du;
     const Floats x0 = hn::Floor(x), y0 = hn::Floor(y);
     const Floats sx = smooth(hn::Sub(x, x0)), sy = smooth(hn::Sub(y, y0));
     const auto side = hn::Set(di, kShaftNoiseSide - 1), byte = hn::Set(di, 255);
     const auto column = hn::And(hn::ConvertTo(di, x0), side), row = hn::And(hn::ConvertTo(di, y0), side);
     const auto cell = hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(p.noise.data()),
-                                      hn::Add(hn::ShiftLeft<kShaftNoiseBits>(row), column));
+                                      hn::Or(hn::ShiftLeft<kShaftNoiseBits>(row), column));
     const Floats a = hn::ConvertTo(d, hn::And(cell, byte)),
                  b = hn::ConvertTo(d, hn::And(hn::ShiftRight<8>(cell), byte)),
                  e = hn::ConvertTo(d, hn::And(hn::ShiftRight<16>(cell), byte)),
-                 f = hn::ConvertTo(d, hn::And(hn::ShiftRight<24>(cell), byte));
+                 f = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<24>(hn::BitCast(du, cell))));
     const Floats low = hn::MulAdd(sx, hn::Sub(b, a), a), high = hn::MulAdd(sx, hn::Sub(f, e), e);
     return hn::MulAdd(sy, hn::Sub(high, low), low);
 }
@@ -157,6 +158,26 @@ HWY_INLINE Floats drop_phase(float g, Floats cosine) {
     return hn::MulAdd(set(float(kForwardShare)), forward, set(0.25f * float(1 - kForwardShare)));
 }
 
+// shadow_at() of background-inl.h, faster where no texel lies beyond the map.
+HWY_INLINE Floats shadow_between(const ShaftPass& p, Floats u, Floats v) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    const Floats size = set(float(p.shadow_size)), zero = hn::Zero(d), last = set(float(p.shadow_size - 1));
+    const Floats x = hn::MulSub(u, size, set(0.5f)), y = hn::MulSub(v, size, set(0.5f));
+    const Mask inside =
+        hn::And(hn::And(hn::Ge(x, zero), hn::Lt(x, last)), hn::And(hn::Ge(y, zero), hn::Lt(y, last)));
+    if (!hn::AllTrue(d, inside)) return shadow_at({p.shadow, p.shadow_size}, u, v);
+    const auto column = hn::ConvertTo(di, x), row = hn::ConvertTo(di, y);
+    const auto index = hn::Add(hn::Mul(row, hn::Set(di, p.shadow_size)), column);
+    const Floats share_x = hn::Sub(x, hn::ConvertTo(d, column)), share_y = hn::Sub(y, hn::ConvertTo(d, row));
+    const auto across = [&](const float* from) {
+        const Floats a = hn::GatherIndex(d, from, index), b = hn::GatherIndex(d, from + 1, index);
+        return hn::MulAdd(share_x, hn::Sub(b, a), a);
+    };
+    const Floats low = across(p.shadow), high = across(p.shadow + p.shadow_size);
+    return hn::MulAdd(share_y, hn::Sub(high, low), low);
+}
+
 HWY_INLINE Floats3 radiance(const ShaftPass& p, const Floats3& ray, const Floats3& sun, Floats t) {
     Floats3 light = set3(p.surroundings);
     if (p.has_sun) {
@@ -164,7 +185,7 @@ HWY_INLINE Floats3 radiance(const ShaftPass& p, const Floats3& ray, const Floats
         if (p.shadow != nullptr) {
             const Floats u = hn::MulAdd(t, dot(set3(p.to_u), ray), set(p.shadow_u)),
                          v = hn::MulAdd(t, dot(set3(p.to_v), ray), set(p.shadow_v));
-            share = shadow_at({p.shadow, p.shadow_size}, u, v);
+            share = shadow_between(p, u, v);
         }
         light = times_add(share, sun, light);
     }
@@ -251,9 +272,13 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
     const Floats zero = hn::Zero(d);
     const Floats step = hn::Mul(hn::Sub(end, begin), set(1.0f / kShaftSteps));
     const auto at = [&](int i) { return hn::MulAdd(hn::Add(offset, set(float(i))), step, begin); };
-    Floats3 kept = decay({p.air_per_m.x, p.air_per_m.y, p.air_per_m.z, 0}, at(kShaftStepsPerLight / 2));
-    const Floats3 more = decay({p.air_per_m.x, p.air_per_m.y, p.air_per_m.z, 0},
-                               hn::Mul(set(float(kShaftStepsPerLight)), step));
+    const bool split = !hn::AllTrue(d, hn::Le(end, cloud_m));  // whether some clouds stand in the run
+    const auto through_air = [&](Floats way_m) {
+        const auto of = [&](float per_m) { return quick_exp(hn::Mul(set(-per_m), way_m)); };
+        return Floats3{of(p.air_per_m.x), of(p.air_per_m.y), of(p.air_per_m.z)};
+    };
+    Floats3 kept = through_air(at(kShaftStepsPerLight / 2));
+    const Floats3 more = through_air(hn::Mul(set(float(kShaftStepsPerLight)), step));
     for (int first = 0; first < kShaftSteps; first += kShaftStepsPerLight, kept = each_times(kept, more)) {
         const Floats middle = at(first + kShaftStepsPerLight / 2);
         for (std::size_t m = 0; m < met.count; ++m)
@@ -269,11 +294,11 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
             if (p.clear_m > 0 && !hn::AllFalse(d, hn::Lt(t, set(p.clear_m))))
                 densest = hn::Mul(densest, smooth(clamped(hn::MulSub(set(2 / p.clear_m), t, set(1)), 0, 1)));
             const Floats depth = hn::Mul(densest, step);
-            const Mask front = hn::Lt(t, cloud_m);
-            in_front = hn::Add(in_front, hn::IfThenElseZero(front, depth));
-            beyond = hn::Add(beyond, hn::IfThenZeroElse(front, depth));
+            const Floats hidden = split ? hn::IfThenZeroElse(hn::Lt(t, cloud_m), depth) : zero;
+            in_front = hn::Add(in_front, hn::Sub(depth, hidden));
+            beyond = hn::Add(beyond, hidden);
         }
-        const bool some_beyond = !hn::AllFalse(d, hn::Gt(beyond, zero));
+        const bool some_beyond = split && !hn::AllFalse(d, hn::Gt(beyond, zero));
         if (!some_beyond && hn::AllFalse(d, hn::Gt(in_front, zero))) continue;
         const Floats3 seen = mix(set3(p.horizon), radiance(p, ray, sun, middle), kept);
         add(before, in_front, seen);
