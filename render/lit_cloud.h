@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "render/cloud_preparation.h"
+#include "render/level_of_detail.h"
 #include "render/options.h"
 #include "render/picture.h"
 #include "render/stage_times.h"
@@ -16,13 +17,17 @@
 namespace nephos {
 
 // What the sun's light on a cloud depends on, as a hash of 128 bits: metaballs, extinction, direction to the
-// sun, size of the shadow map, and how the light finds its way. A few 10 microseconds per 10,000 metaballs.
+// sun, size of the shadow map, how the light finds its way, and level of detail. A few 10 microseconds per
+// 10,000 metaballs.
 using LightKey = std::array<std::uint64_t, 2>;
 LightKey light_key(const MetaballCloud& cloud, const RenderOptions& options);
 
 struct LitCloud {
     LightKey key{};
-    PreparedCloud cloud;
+    std::vector<Metaball> merged;  // what is drawn instead of the given metaballs; empty: those
+    DetailBounds bounds;           // of the given metaballs
+    DetailView view;               // from which they were merged
+    PreparedCloud cloud;           // what is drawn: `merged` or the given metaballs
     ShadowFrame frame;
     int shadow_size = 0;
     std::vector<float> sun_depths;          // optical depth to the sun, one for each of cloud.visible
@@ -33,9 +38,11 @@ struct LitCloud {
     bool drawn_again = false;  // this is not the first picture of the cloud
 };
 
-// Makes `kept` that of a cloud, without its light, unless it is already. `cloud` must live as long as `kept`
-// is read.
-void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options);
+// Makes `kept` that of a cloud as it is drawn from a view, without its light, unless it is already. `cloud`
+// must live as long as `kept` is read. Where level of detail does not depend on the view, a moving eye keeps
+// the light.
+void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
+                const DetailView& view);
 
 // Computes on the processor what is missing of the light of the balls numbered `source` whose `seen_balls` is
 // not 0, and of the map's tiles whose `seen_tiles` is not 0; of all of it if `seen_balls` is null or if

@@ -66,6 +66,7 @@ void check(const RenderOptions& options) {
     require(within(camera.exposure_ev, -50, 50), "camera.exposure_ev", "-50..50 stops");
     check_path(camera);
     check(options.precipitation);
+    check(options.level_of_detail);
     require(within(options.sun.elevation_deg, -18, 90), "sun.elevation_deg", "-18..90 degrees");
     require(within(options.sun.azimuth_deg, -360, 360), "sun.azimuth_deg", "-360..360 degrees");
     check_colour(options.sun.colour, "sun.colour");

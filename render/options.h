@@ -14,6 +14,7 @@
 #include "automaton/lattice.h"
 #include "render/atmosphere_options.h"
 #include "render/camera_path.h"
+#include "render/level_of_detail_options.h"
 #include "render/phase_function.h"
 #include "render/precipitation_options.h"
 #include "render/scattering_options.h"
@@ -149,6 +150,7 @@ struct RenderOptions {
     int shadow_map_size = 1024;  // texels on a side, 16..8192
     std::vector<LightningFlash> lightning;
     PrecipitationOptions precipitation;
+    LevelOfDetailOptions level_of_detail;
     DebugView debug_view;
     bool operator==(const RenderOptions&) const = default;
 };

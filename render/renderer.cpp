@@ -34,7 +34,7 @@ std::size_t memory_needed(const Splats& splats, const RenderOptions& options, in
     const std::size_t pixels = std::size_t(options.camera.width) * std::size_t(options.camera.height);
     const std::size_t tile = std::min(pixels, square(std::size_t(tile_size)));
     // Orders, sort keys, light, box and splat of a metaball, and what is kept of it.
-    constexpr std::size_t kPerMetaball = 36 + 16 + 4 * 5 + 16 + 64 + 16, kPerBillboard = 2 * 32 + 16;
+    constexpr std::size_t kPerMetaball = 36 + 16 + 4 * 5 + 16 + 64 + 16 + 24, kPerBillboard = 2 * 32 + 16;
     return 20 * pixels + 40 * tile + 12 * square(std::size_t(options.shadow_map_size)) +
            kPerMetaball * splats.metaballs.metaballs.size() + kPerBillboard * splats.billboards.size() +
            (std::size_t(96) << 20);
@@ -92,7 +92,7 @@ CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats) {
 struct Renderer::Impl {
     explicit Impl(const DeviceOptions& device_options);
 
-    Picture draw(const Splats& splats, const RenderOptions& options);
+    Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail);
     // The same, and what lies on the ground.
     Picture draw_with_ground(const Splats& splats, const RenderOptions& options);
     // A part of the picture that is drawn at once.
@@ -104,6 +104,8 @@ struct Renderer::Impl {
     void absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks, const RenderOptions& options);
     std::vector<float> light_up(const Splats& splats, const RenderOptions& options, const EyeOrder& order,
                                 const SeenLight* seen);
+    void light_all(LitCloud& cloud, const Splats& splats, const RenderOptions& options);
+    void hand_out_light(const Splats& splats, const RenderOptions& options, Picture& picture);
     void put_map_on_device();
     void use_scattering(const CloudLight& light);
     void draw_on_processor(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
@@ -195,7 +197,9 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
     const bool absorbs = options.light.lighting == Lighting::cfa && !lit.all_known;
     std::optional<DensityBlocks> blocks;
     if (!lit.cloud.visible.empty() && (flash != nullptr || absorbs))
-        blocks.emplace(lit.cloud, splats.metaballs.extinction_per_m);
+        blocks.emplace(
+            lit.merged.empty() ? lit.cloud : prepare(splats.metaballs),  // cubes of the voxels' size
+            splats.metaballs.extinction_per_m);
     const bool on_device = !on_processor() && (!lit.all_known || map_on_device != lit.key);
     if (blocks && absorbs) {
         absorb_sunlight(lit, *blocks, options);
@@ -228,12 +232,12 @@ void Renderer::Impl::use_scattering(const CloudLight& light) {
     std::memcpy(scattering_buffer.mapped, scattering.data(), bytes);
 }
 
-Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options) {
+Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail) {
     const CameraFrame camera = camera_frame(options.camera);
     Picture picture = blank_picture(options);
     {
         const StageTimer timer(&times, DrawStage::prepare);
-        keep_cloud(lit, splats.metaballs, options);
+        keep_cloud(lit, splats.metaballs, options, detail);
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
     picture.shadow_frame = lit.frame;
@@ -266,18 +270,43 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options)
         draw_on_processor(splats, options, camera, parts, order, picture);
     else
         draw_on_device(splats, options, camera, parts, order, picture);
-    if (splats.light) {
-        picture.light.assign(splats.metaballs.metaballs.size(), 1.0f);
-        for (std::size_t i = 0; i < lit.sun_depths.size(); ++i)
-            picture.light[lit.cloud.visible[i]] = std::exp(-lit.sun_depths[i]);
-        picture.shadow = lit.shadow;
-    }
+    if (splats.light) hand_out_light(splats, options, picture);
     return picture;
+}
+
+// At full detail: the light of each metaball is that of its own centre.
+void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& options, Picture& picture) {
+    const LitCloud* known = &lit;
+    LitCloud whole;
+    if (!lit.merged.empty()) {
+        RenderOptions given = options;
+        given.level_of_detail.contrast = 0;
+        keep_cloud(whole, splats.metaballs, given, {});
+        light_all(whole, splats, given);
+        known = &whole;
+    }
+    picture.light.assign(splats.metaballs.metaballs.size(), 1.0f);
+    for (std::size_t i = 0; i < known->sun_depths.size(); ++i)
+        picture.light[known->cloud.visible[i]] = std::exp(-known->sun_depths[i]);
+    picture.shadow = known->shadow;
+    picture.shadow_frame = known->frame;
+}
+
+// All of a cloud's light, whether the picture needs it or not.
+void Renderer::Impl::light_all(LitCloud& cloud, const Splats& splats, const RenderOptions& options) {
+    if (options.light.lighting == Lighting::cfa)
+        absorb_sunlight(cloud, DensityBlocks(cloud.cloud, splats.metaballs.extinction_per_m), options);
+    else if (on_processor())
+        light_seen(cloud, {}, nullptr, nullptr, &times);
+    else
+        pass_sunlight(cloud);
 }
 
 Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptions& options) {
     times = {};
-    Picture picture = draw(splats, options);
+    const CameraFrame camera = camera_frame(options.camera);
+    const DetailView detail{camera.position_m, pixels_per_unit(options.camera, camera)};
+    Picture picture = draw(splats, options, detail);
     if (!splats.ground_cover || !shows_wet_ground(options, *splats.ground_cover)) return picture;
     WetGround ground{options, *splats.ground_cover, splats.flash ? &*splats.flash : nullptr, splats.time_s};
     std::optional<MirrorView> mirror;
@@ -287,7 +316,8 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
             mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
         Splats mirrored = splats;
         mirrored.depth = mirrored.light = false;
-        mirror = mirror_view(draw(mirrored, below), below.camera);
+        // What is merged stays, and with it the light.
+        mirror = mirror_view(draw(mirrored, below, detail), below.camera);
         ground.mirror = &*mirror;
     }
     ground.shadow = lit.shadow.data();  // the mirrored view may have completed it

@@ -172,6 +172,10 @@ const Section& scene_section() {
         precipitation.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->render.precipitation == PrecipitationOptions{});
         };
+        Key level_of_detail = group("level_of_detail", level_of_detail_section());
+        level_of_detail.written = [](const void* scene) {
+            return !(static_cast<const Scene*>(scene)->render.level_of_detail == LevelOfDetailOptions{});
+        };
         return Section{
             "Scene",
             "",
@@ -200,6 +204,7 @@ const Section& scene_section() {
              std::move(precipitation),
              group("shells", shells_section()),
              group("light_shafts", light_shafts_section()),
+             std::move(level_of_detail),
              group("debug_view", debug_view_section())},
             &finish_scene};
     }();

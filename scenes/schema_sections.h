@@ -28,6 +28,7 @@ const Section& shells_section();
 const Section& light_shafts_section();
 const Section& wet_ground_section();
 const Section& precipitation_section();
+const Section& level_of_detail_section();
 
 // Owner: CameraKey.
 const Section& camera_path_section();

@@ -77,8 +77,9 @@ TEST(Description, EveryOptionHasAKey) {
     // [sun] also holds the size of the shadow map, the one plain member of RenderOptions.
     EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 1);
     EXPECT_EQ(keys_at({"precipitation"}), member_count<PrecipitationOptions>());
+    EXPECT_EQ(keys_at({"level_of_detail"}), member_count<LevelOfDetailOptions>());
     EXPECT_EQ(keys_at({"camera", "path"}), member_count<CameraKey>());
-    EXPECT_EQ(member_count<RenderOptions>(), 13u);
+    EXPECT_EQ(member_count<RenderOptions>(), 14u);
     EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// What level of detail keeps: optical mass, optical depth along rays, bits for any threads; and that it is
+// continuous.
+
+#include "render/level_of_detail.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "automaton/error.h"
+#include "automaton/vector_math.h"
+#include "tests/reference/with_threads.h"
+#include "tests/render/reference_render.h"
+#include "tests/render/voxel_cloud.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kExtinction = 0.15;
+constexpr DetailView kNear{{0, -3000, 800}, 515};
+
+MetaballCloud cloud_of(const std::vector<Metaball>& balls) {
+    return {balls, kExtinction, test::kVoxelNormalisation};
+}
+
+// The metaballs that are drawn: the given ones if none are merged.
+std::vector<Metaball> drawn(const std::vector<Metaball>& balls, const DetailView& view,
+                            const LevelOfDetailOptions& options = {}) {
+    const MetaballCloud cloud = cloud_of(balls);
+    const std::optional<MergedCloud> merged = merge_voxels(prepare(cloud), cloud, view, options);
+    return merged ? merged->metaballs : balls;
+}
+
+struct Moments {
+    double mass = 0;
+    Vec3 centre{};
+};
+
+Moments moments_of(const std::vector<Metaball>& balls) {
+    Moments sum;
+    for (const Metaball& ball : balls) {
+        const double mass = double(ball.density) * ball.radius * ball.radius * ball.radius;
+        sum.mass += mass;
+        sum.centre = sum.centre + mass * Vec3{ball.x, ball.y, ball.z};
+    }
+    sum.centre = (1 / sum.mass) * sum.centre;
+    return sum;
+}
+
+std::vector<reference::Ray> random_rays(int count) {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> place(-450, 450), height(620, 1200);
+    std::vector<reference::Ray> rays;
+    for (int i = 0; i < count; ++i) {
+        const Vec3 from{place(random), -2000, height(random)}, to{place(random), 2000, height(random)};
+        rays.push_back({from, normalised(to - from)});
+    }
+    return rays;
+}
+
+// At full sharpness, from afar and where everything is one ball for 512 voxels.
+TEST(LevelOfDetail, MassAndItsCentreStay) {
+    const std::vector<Metaball> balls = test::ragged_cloud();
+    const Moments before = moments_of(balls);
+    for (const double y : {-1000.0, -6000.0, -20000.0, -60000.0, -1e6}) {
+        const std::vector<Metaball> merged = drawn(balls, {{0, y, 800}, 515});
+        const Moments after = moments_of(merged);
+        EXPECT_NEAR(after.mass / before.mass, 1, 1e-5) << y;
+        EXPECT_LT(length(after.centre - before.centre), 0.01) << y;
+        std::printf("eye at %.0f m: %zu of %zu metaballs\n", -y, merged.size(), balls.size());
+    }
+    EXPECT_LE(drawn(balls, {{0, -1e6, 800}, 515}).size(), 18u);  // 3 x 3 x 2 blocks
+}
+
+// The naive twin: every ball's field integrated along a ray.
+TEST(LevelOfDetail, OpticalDepthAlongRaysStays) {
+    const std::vector<Metaball> balls = test::ragged_cloud(), merged = drawn(balls, kNear);
+    ASSERT_LT(merged.size(), balls.size() * 3 / 4);
+    double transmittance = 0, depth = 0, depths = 0, bias = 0;
+    const std::vector<reference::Ray> rays = random_rays(400);
+    for (const reference::Ray& ray : rays) {
+        const double full = reference::transmittance(cloud_of(balls), ray),
+                     less = reference::transmittance(cloud_of(merged), ray);
+        transmittance += std::abs(less - full);
+        depth += std::abs(std::log(full) - std::log(less));
+        bias += std::log(full) - std::log(less);
+        depths -= std::log(full);
+    }
+    std::printf("%zu of %zu metaballs: transmittance %.5f, depth %.4f of %.3f, bias %.5f (means)\n",
+                merged.size(), balls.size(), transmittance / 400, depth / 400, depths / 400, bias / 400);
+    EXPECT_LT(transmittance / 400, 1.0 / 255);
+    EXPECT_LT(depth, 0.05 * depths);
+    EXPECT_LT(std::abs(bias), 0.005 * depths);
+}
+
+TEST(LevelOfDetail, ThreadsDoNotChangeTheBits) {
+    const std::vector<Metaball> balls = test::ragged_cloud({.x = 64, .y = 56, .z = 24});
+    const auto merge = [&] { return drawn(balls, kNear); };
+    const std::vector<Metaball> expected = merge();
+    ASSERT_LT(expected.size(), balls.size());
+    for (const int threads : {1, 2, 7}) EXPECT_EQ(test::with_threads(std::size_t(threads), merge), expected);
+}
+
+// Of every ray the optical depth, for each of a row of pictures: from one to the next it must not jump.
+double largest_jump(const std::vector<std::vector<Metaball>>& pictures) {
+    std::vector<reference::Ray> rays = random_rays(25);
+    std::vector<double> before;
+    double largest = 0;
+    for (const std::vector<Metaball>& balls : pictures) {
+        std::vector<double> now;
+        for (const reference::Ray& ray : rays)
+            now.push_back(-std::log(reference::transmittance(cloud_of(balls), ray)));
+        for (std::size_t i = 0; i < before.size(); ++i)
+            largest = std::max(largest, std::abs(now[i] - before[i]));
+        before = now;
+    }
+    return largest;
+}
+
+// An eye that moves away: the cloud's voxels become blocks of 8, of 64 and of 512 on its way, and between
+// neighbouring places a ray through it changes by no more than its share of the whole way.
+TEST(LevelOfDetail, MovingAwayDoesNotPop) {
+    const std::vector<Metaball> balls = test::ragged_cloud({.x = 16, .y = 16, .z = 16});
+    std::vector<std::vector<Metaball>> coarse, fine;
+    for (int step = 0; step <= 40; ++step)
+        coarse.push_back(drawn(balls, {{0, -1000 * std::pow(1.08, step), 800}, 515}));
+    for (int step = 0; step <= 400; ++step)
+        fine.push_back(drawn(balls, {{0, -1000 * std::pow(1.08, 0.1 * step), 800}, 515}));
+    ASSERT_LT(coarse.back().size(), coarse.front().size() / 10);
+    const double of_coarse = largest_jump(coarse), of_fine = largest_jump(fine);
+    std::printf("largest change of a ray's optical depth: %.4f in steps of 8 %%, %.4f in tenths of that\n",
+                of_coarse, of_fine);
+    EXPECT_LT(of_fine, 0.2 * of_coarse);
+}
+
+// The same for a cloud that grows denser.
+TEST(LevelOfDetail, GrowingDoesNotPop) {
+    std::vector<std::vector<Metaball>> coarse, fine;
+    const test::VoxelBox box{.x = 16, .y = 16, .z = 16};
+    for (int step = 0; step <= 40; ++step)
+        coarse.push_back(drawn(test::ragged_cloud(box, 1, 0.02 * step + 0.1), kNear));
+    for (int step = 0; step <= 400; ++step)
+        fine.push_back(drawn(test::ragged_cloud(box, 1, 0.002 * step + 0.1), kNear));
+    const double of_coarse = largest_jump(coarse), of_fine = largest_jump(fine);
+    std::printf("largest change of a ray's optical depth: %.4f, %.4f in tenths of the steps\n", of_coarse,
+                of_fine);
+    EXPECT_LT(of_fine, 0.2 * of_coarse);
+}
+
+// The lattice is the world's: without the first voxels, or with the box elsewhere by whole blocks, the others
+// are merged as before, wherever in the world voxels begin.
+TEST(LevelOfDetail, BlocksStayWhereTheyAre) {
+    for (const double off : {0.0, 13.0, 20.0, 39.999}) {
+        const test::VoxelBox box{.origin_m = {off - 320, 2 * off, 600}, .x = 32, .y = 8, .z = 8};
+        const std::vector<Metaball> all = test::ragged_cloud(box);
+        std::vector<Metaball> less = all;
+        std::erase_if(less, [&](const Metaball& ball) { return ball.x < box.origin_m.x + 8 * 40; });
+        ASSERT_LT(less.size(), all.size());
+        const DetailView view{{0, -4000, 800}, 515};
+        std::vector<Metaball> of_all = drawn(all, view), of_less = drawn(less, view);
+        const auto beyond = [&](const Metaball& ball) { return ball.x > box.origin_m.x + 16.5 * 40; };
+        EXPECT_GT(std::ranges::count_if(of_less, beyond), 10);
+        for (const Metaball& ball : of_less)
+            if (beyond(ball)) EXPECT_EQ(std::ranges::count(of_all, ball), 1) << off;
+    }
+}
+
+TEST(LevelOfDetail, IsOffWithoutContrastAndWithoutVoxels) {
+    const auto merges = [](const std::vector<Metaball>& balls, const LevelOfDetailOptions& options) {
+        const MetaballCloud cloud = cloud_of(balls);
+        return merge_voxels(prepare(cloud), cloud, {{0, -1e5, 800}, 515}, options).has_value();
+    };
+    const std::vector<Metaball> balls = test::ragged_cloud();
+    EXPECT_TRUE(merges(balls, {}));
+    EXPECT_TRUE(merges(balls, {.contrast = 0.2, .pixels = 0}));
+    EXPECT_FALSE(merges(balls, {.contrast = 0}));
+    EXPECT_FALSE(merges({}, {}));
+    EXPECT_FALSE(merges({balls.front()}, {}));
+    EXPECT_FALSE(merges(reference::random_metaballs(3, 500), {})) << "of many sizes";
+    std::vector<Metaball> far = balls;
+    far.front().x = 1e12f;
+    EXPECT_FALSE(merges(far, {})) << "too far away for a number of a block";
+    // Layers with voxels of other sizes are merged each for itself.
+    std::vector<Metaball> layers = balls;
+    for (const Metaball& ball : test::ragged_cloud({.origin_m = {0, 0, 2000}, .edge_m = 25}))
+        layers.push_back(ball);
+    EXPECT_TRUE(merges(layers, {}));
+    EXPECT_NEAR(moments_of(drawn(layers, kNear)).mass / moments_of(layers).mass, 1, 1e-5);
+}
+
+// Where depends_on_view() says no, any nearer place gives the same.
+TEST(LevelOfDetail, NearbyItDoesNotDependOnTheView) {
+    const std::vector<Metaball> balls = test::ragged_cloud();
+    const DetailBounds bounds = detail_bounds(prepare(cloud_of(balls)));
+    const std::vector<Metaball> expected = drawn(balls, {{0, -3000, 800}, 515});
+    ASSERT_LT(expected.size(), balls.size());
+    int independent = 0;
+    for (const Vec3& eye :
+         {Vec3{0, -3000, 800}, Vec3{0, 0, 900}, Vec3{2000, 500, 3000}, Vec3{0, -9000, 800}}) {
+        const DetailView view{eye, 515};
+        if (depends_on_view(bounds, view, {})) continue;
+        ++independent;
+        EXPECT_EQ(drawn(balls, view), expected);
+    }
+    EXPECT_EQ(independent, 3);
+    EXPECT_FALSE(depends_on_view(bounds, {{0, -1e6, 0}, 515}, {.contrast = 0.2, .pixels = 0}));
+    EXPECT_FALSE(depends_on_view(bounds, {{0, -1e6, 0}, 515}, {.contrast = 0}));
+}
+
+TEST(LevelOfDetail, OptionsOutOfRangeAreErrors) {
+    EXPECT_NO_THROW(check(LevelOfDetailOptions{}));
+    EXPECT_THROW(check(LevelOfDetailOptions{.contrast = -0.1}), Error);
+    EXPECT_THROW(check(LevelOfDetailOptions{.contrast = std::nan("")}), Error);
+    EXPECT_THROW(check(LevelOfDetailOptions{.pixels = 1001}), Error);
+}
+
+}  // namespace
+}  // namespace nephos
