@@ -5,13 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 #include <span>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include "automaton/vector_math.h"
 
@@ -163,8 +160,8 @@ struct Merging {
     double per_density = 1;  // optical depth scale per density and metre
     struct Level {
         double side_voxels = 2;
-        double threshold = 0;   // of contrast, near the eye
-        double far_voxels = 0;  // distance from which on it rises
+        double threshold = 1;   // of contrast ...
+        double far_voxels = 0;  // ... at this distance
     };
     Level levels[3];
 
@@ -175,7 +172,7 @@ struct Merging {
           eye_m(view.eye_m),
           radius_voxels(radius),
           per_density(as.extinction_per_m * as.normalisation) {
-        double threshold = options.contrast, child = 1;  // voxels on the side of a child
+        double threshold = 1, child = 1;  // voxels on the side of a child
         for (Level& level : levels) {
             // A full block's, whose second moment is that of its voxels' centres.
             const double child_radius = std::sqrt(radius * radius + (child * child - 1) / (12 * kMoment));
@@ -303,8 +300,8 @@ class BlockTree {
         };
         const Vec3 way = Vec3{middle(0, x), middle(1, y), middle(2, z)} - merging_.eye_m;
         const double far_m = level.far_voxels * lattice_.edge_m;
-        const double smaller = std::clamp(dot(way, way) / (far_m * far_m), 1.0, 1e12);  // n squared
-        sums.share = least * falling_step(contrast, level.threshold * smaller);
+        const double rise = std::clamp(dot(way, way) / (far_m * far_m), 1e-12, 1e12);
+        sums.share = least * falling_step(contrast, level.threshold * rise);
     }
 
     void emit_block(const Sums& sums, float share, MergedCloud& to) const {
@@ -369,7 +366,7 @@ MergedCloud joined(const std::vector<MergedPart>& parts) {
 
 std::optional<MergedCloud> merge_voxels(const PreparedCloud& given, const MetaballCloud& cloud,
                                         const DetailView& view, const LevelOfDetailOptions& options) {
-    if (given.visible.empty() || !(options.contrast > 0)) return std::nullopt;
+    if (given.visible.empty() || !(options.pixels > 0)) return std::nullopt;
     // The inverse of metaball_normalisation().
     const double radius_voxels =
         std::clamp(std::cbrt(2835.0 / (736.0 * std::numbers::pi * cloud.normalisation)), kMinMetaballRadius,
@@ -392,43 +389,6 @@ std::optional<MergedCloud> merge_voxels(const PreparedCloud& given, const Metaba
     });
     if (std::ranges::none_of(parts, &MergedPart::merges)) return std::nullopt;
     return joined(parts);
-}
-
-DetailBounds detail_bounds(const PreparedCloud& given) {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    const DetailBounds nothing{
-        {kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}, kInfinity};
-    const auto join = [](const DetailBounds& a, const DetailBounds& b) {
-        return DetailBounds{
-            {std::min(a.low_m.x, b.low_m.x), std::min(a.low_m.y, b.low_m.y), std::min(a.low_m.z, b.low_m.z)},
-            {std::max(a.high_m.x, b.high_m.x), std::max(a.high_m.y, b.high_m.y),
-             std::max(a.high_m.z, b.high_m.z)},
-            std::min(a.least_radius_m, b.least_radius_m)};
-    };
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, given.visible.size(), kPart), nothing,
-        [&](const auto& range, DetailBounds bounds) {
-            for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                const Metaball& ball = given.metaballs[given.visible[i]];
-                const Vec3 centre{ball.x, ball.y, ball.z};
-                bounds = join(bounds, {centre, centre, ball.radius});
-            }
-            return bounds;
-        },
-        join);
-}
-
-bool depends_on_view(const DetailBounds& bounds, const DetailView& view,
-                     const LevelOfDetailOptions& options) {
-    if (!(options.contrast > 0) || !(options.pixels > 0) || !(bounds.low_m.x <= bounds.high_m.x))
-        return false;
-    const auto farther = [](double low, double high, double eye) { return std::max(eye - low, high - eye); };
-    // A block's middle lies less than its side beyond its voxels.
-    const double beyond = kSide * bounds.least_radius_m;
-    const Vec3 reach{farther(bounds.low_m.x, bounds.high_m.x, view.eye_m.x),
-                     farther(bounds.low_m.y, bounds.high_m.y, view.eye_m.y),
-                     farther(bounds.low_m.z, bounds.high_m.z, view.eye_m.z)};
-    return bounds.least_radius_m * view.pixels_per_unit < options.pixels * (length(reach) + beyond);
 }
 
 }  // namespace nephos

@@ -17,7 +17,6 @@ void require_within(double value, double min, double max, const char* name, cons
 }  // namespace
 
 void check(const LevelOfDetailOptions& options) {
-    require_within(options.contrast, 0, 10, "contrast", "an optical depth of 0..10");
     require_within(options.pixels, 0, 1000, "pixels", "0..1000 pixels");
 }
 

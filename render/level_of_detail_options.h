@@ -6,13 +6,10 @@
 namespace nephos {
 
 struct LevelOfDetailOptions {
-    // Optical depth: a block of 2 x 2 x 2 voxels whose metaballs differ by less is drawn as one, near and
-    // far, because what is lost hardly shows. 0..10; larger is faster and softer, 0: every voxel is drawn for
-    // itself.
-    double contrast = 0.2;
-    // Metaballs whose radius in the picture is n times smaller than this many pixels may differ n^2 times as
-    // much. 0..1000; larger is faster and softer far away, 0: distance makes no difference.
-    double pixels = 4;
+    // Radius in the picture, pixels, at which the metaballs of a block of 2 x 2 x 2 voxels are drawn as one
+    // if their optical depths spread by less than 1; at n times that radius they must spread n^2 times less.
+    // 0..1000; larger is faster and softer, 0: every voxel is drawn for itself.
+    double pixels = 2.5;
     bool operator==(const LevelOfDetailOptions&) const = default;
 };
 

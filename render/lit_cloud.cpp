@@ -40,25 +40,20 @@ void take_missing(std::vector<std::uint8_t>& wanted, std::vector<std::uint8_t>& 
     }
 }
 
-// Whether level of detail makes the same of the cloud from this view as from that it was kept for.
-bool looks_the_same(const LitCloud& kept, const DetailView& view, const LevelOfDetailOptions& options) {
-    return view == kept.view || (!depends_on_view(kept.bounds, view, options) &&
-                                 !depends_on_view(kept.bounds, kept.view, options));
-}
-
-// Puts what is drawn in the place of the given metaballs.
-void merge(LitCloud& kept, const MetaballCloud& cloud, const LevelOfDetailOptions& options,
-           const DetailView& view) {
-    kept.view = view;
-    kept.bounds = detail_bounds(kept.cloud);
-    kept.merged.clear();
-    std::optional<MergedCloud> merged = merge_voxels(kept.cloud, cloud, view, options);
-    if (!merged) return;
+// Puts what is drawn in the place of the given metaballs. True if that is what `kept` has already.
+bool merge(LitCloud& kept, PreparedCloud given, std::optional<MergedCloud> merged) {
+    const bool same = merged ? merged->metaballs == kept.merged : kept.merged.empty();
+    kept.cloud = std::move(given);
+    if (!merged) {
+        kept.merged.clear();
+        return same;
+    }
     kept.merged = std::move(merged->metaballs);
     kept.cloud.metaballs = kept.merged;
     kept.cloud.depth_scale = std::move(merged->depth_scale);
     kept.cloud.visible.resize(kept.merged.size());
     std::iota(kept.cloud.visible.begin(), kept.cloud.visible.end(), 0u);
+    return same;
 }
 
 }  // namespace
@@ -74,7 +69,6 @@ LightKey light_key(const MetaballCloud& cloud, const RenderOptions& options) {
                            double(options.shadow_map_size),
                            double(int(options.light.lighting)),
                            options.light.light_distance_m,
-                           options.level_of_detail.contrast,
                            options.level_of_detail.pixels};
     const XXH128_hash_t hash = XXH3_128bits_withSeed(rest, sizeof rest, balls.low64 ^ balls.high64 << 1);
     return {balls.low64 ^ hash.low64, balls.high64 ^ hash.high64};
@@ -83,18 +77,25 @@ LightKey light_key(const MetaballCloud& cloud, const RenderOptions& options) {
 void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
                 const DetailView& view) {
     const LightKey key = light_key(cloud, options);
-    if (kept.shadow_size != 0 && key == kept.key && looks_the_same(kept, view, options.level_of_detail)) {
+    const bool is_known = kept.shadow_size != 0 && key == kept.key;
+    if (is_known && (view == kept.view || !(options.level_of_detail.pixels > 0))) {
         if (kept.merged.empty())
             kept.cloud.metaballs = cloud.metaballs;  // the same values, perhaps elsewhere
         kept.drawn_again = true;
         return;
     }
     kept.shadow_size = 0;  // nothing is kept if prepare() throws
-    kept.cloud = prepare(cloud);
+    PreparedCloud given = prepare(cloud);
+    std::optional<MergedCloud> merged = merge_voxels(given, cloud, view, options.level_of_detail);
+    // The frame is that of the given metaballs, as are base and top: level of detail does not move it.
+    kept.frame = shadow_frame(given, direction_to_sun(options.sun), options.shadow_map_size);
+    kept.view = view;
     kept.key = key;
-    // The frame is that of the given metaballs, as are base and top: it does not move with level of detail.
-    kept.frame = shadow_frame(kept.cloud, direction_to_sun(options.sun), options.shadow_map_size);
-    merge(kept, cloud, options.level_of_detail, view);
+    if (merge(kept, std::move(given), std::move(merged)) && is_known) {
+        kept.drawn_again = true;
+        kept.shadow_size = options.shadow_map_size;
+        return;
+    }
     const TileGrid grid{options.shadow_map_size, options.shadow_map_size};
     kept.sun_depths.assign(kept.cloud.visible.size(), 0.0f);
     kept.shadow.assign(std::size_t(grid.width) * std::size_t(grid.height), 1.0f);

@@ -25,7 +25,6 @@ LightKey light_key(const MetaballCloud& cloud, const RenderOptions& options);
 struct LitCloud {
     LightKey key{};
     std::vector<Metaball> merged;  // what is drawn instead of the given metaballs; empty: those
-    DetailBounds bounds;           // of the given metaballs
     DetailView view;               // from which they were merged
     PreparedCloud cloud;           // what is drawn: `merged` or the given metaballs
     ShadowFrame frame;
@@ -39,8 +38,8 @@ struct LitCloud {
 };
 
 // Makes `kept` that of a cloud as it is drawn from a view, without its light, unless it is already. `cloud`
-// must live as long as `kept` is read. Where level of detail does not depend on the view, a moving eye keeps
-// the light.
+// must live as long as `kept` is read. Another view keeps the light if it merges the same metaballs, as it
+// does without level of detail.
 void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
                 const DetailView& view);
 

@@ -280,7 +280,7 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
     LitCloud whole;
     if (!lit.merged.empty()) {
         RenderOptions given = options;
-        given.level_of_detail.contrast = 0;
+        given.level_of_detail.pixels = 0;
         keep_cloud(whole, splats.metaballs, given, {});
         light_all(whole, splats, given);
         known = &whole;
