@@ -69,7 +69,7 @@ TEST_P(LevelOfDetailPicture, IsCloseToFullDetail) {
                          through = difference(less.transmittance, full.transmittance);
         std::printf("mean %.2f / 255, largest %.1f / 255; transmittance %.2f / 255\n", 255 * beauty.mean,
                     255 * beauty.largest, 255 * through.mean);
-        EXPECT_LT(beauty.mean, 1.0 / 255);
+        EXPECT_LT(beauty.mean, 1.5 / 255) << "rougher than what the automaton grows";
         EXPECT_LT(through.mean, 1.0 / 255);
         for (std::size_t i = 0; i < full.pixels(); ++i) {
             if (full.transmittance[i] > 0.5f) continue;
