@@ -15,11 +15,11 @@
 namespace nephos {
 namespace {
 
-constexpr double kEdge = 0.15;  // share of a block's mean depth that counts as contrast
-constexpr double kFull = 0.85;  // share of the threshold below which a block is merged wholly
-constexpr double kLevel =
-    0.25;                 // threshold of a block relative to that of its children: it covers more pixels
-constexpr int kSide = 8;  // voxels of the largest block
+constexpr double kEdge = 0.15;   // share of a block's mean depth that counts as contrast
+constexpr double kFull = 0.85;   // share of the threshold below which a block is merged wholly
+constexpr double kLevel = 0.25;  // a block's threshold relative to its children's
+constexpr double kSpread = 1.5;  // of the second moment that a block adds to its metaball
+constexpr int kSide = 8;         // voxels of the largest block
 constexpr std::size_t kMostLattices = 16;
 constexpr double kFarthest = 1 << 22;  // voxels from the origin
 constexpr std::size_t kPart = 8192;    // metaballs that one thread looks at
@@ -288,7 +288,7 @@ class BlockTree {
         const float mx = per_mass * sums.x, my = per_mass * sums.y, mz = per_mass * sums.z;
         const float moment = std::max(0.0f, per_mass * sums.square - (mx * mx + my * my + mz * mz)) / 3;
         const double square = merging_.radius_voxels * merging_.radius_voxels,
-                     larger = square + moment / kMoment;
+                     larger = square + kSpread * moment / kMoment;
         sums.radius = float(std::sqrt(larger));
         sums.own_depth = float(sums.mass * square / larger);
 

@@ -3,8 +3,10 @@
 
 // Level of detail (D, S: voxels far away larger, fewer metaballs): a block of 2 x 2 x 2 voxels becomes one
 // metaball with their optical mass (density * radius^3), their centre of gravity and, by its radius, their
-// second moment. Blocks of blocks likewise, up to 8 x 8 x 8. Blocks lie on a lattice that the world fixes, so
-// neither the eye nor the density moves them.
+// second moment, of which the part that comes from their places counts kSpread times: with it alone full
+// blocks of metaballs of 1.5 edges would get 1.08 of their distance as radius, which ripples
+// (density/metaballs.h). Blocks of blocks likewise, up to 8 x 8 x 8. Blocks lie on a lattice that the world
+// fixes, so neither the eye nor the density moves them.
 //
 // Merging blurs over the size of a block. What that takes from a ray is about the block's contrast: with t_i
 // the optical depths through the centres of its eight children (0 where there is none),

@@ -129,12 +129,13 @@ TEST(LevelOfDetail, MovingAwayDoesNotPop) {
     std::vector<std::vector<Metaball>> coarse, fine;
     for (int step = 0; step <= 40; ++step)
         coarse.push_back(drawn(balls, {{0, -1000 * std::pow(1.12, step), 800}, 515}));
-    for (int step = 0; step <= 400; ++step)
-        fine.push_back(drawn(balls, {{0, -1000 * std::pow(1.12, 0.1 * step), 800}, 515}));
+    for (int step = 0; step <= 800; ++step)
+        fine.push_back(drawn(balls, {{0, -1000 * std::pow(1.12, 0.05 * step), 800}, 515}));
     ASSERT_LT(coarse.back().size(), coarse.front().size() / 10);
     const double of_coarse = largest_jump(coarse), of_fine = largest_jump(fine);
-    std::printf("largest change of a ray's optical depth: %.4f in steps of 12 %%, %.4f in tenths of that\n",
-                of_coarse, of_fine);
+    std::printf(
+        "largest change of a ray's optical depth: %.4f in steps of 12 %%, %.4f in twentieths of that\n",
+        of_coarse, of_fine);
     EXPECT_LT(of_fine, 0.2 * of_coarse);
 }
 
