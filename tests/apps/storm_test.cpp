@@ -64,7 +64,11 @@ struct Comparison : PipelineSink {
             float apart = 0;
             for (std::size_t i = 0; i < expected.size(); ++i)
                 apart = std::max(apart, std::abs(other[i] - expected[i]) / std::max(1.0f, expected[i]));
-            EXPECT_LT(apart, 1.0f / 255) << "frame " << frame.number << ", way " << way;
+            // Tiles end at a transmittance of 1/4096, some a few balls sooner: what stands by a flash behind
+            // them may have a radiance of 30.
+            const bool flashes = flash_at(scene.render.lightning, frame.time_s).has_value();
+            EXPECT_LT(apart, flashes ? 1.0f / 255 + 30.0f / 4096 : 1.0f / 255)
+                << "frame " << frame.number << ", way " << way;
         }
         SkyPainter new_painter;
         for (const std::size_t threads : {1, 3})
