@@ -35,7 +35,7 @@ def picture(nephos, source, frame, folder, settings):
 
 
 def differences(nephos, source, frame, settings):
-    size = ["camera.width=640", "camera.height=480"]
+    size = ["camera.width=640", "camera.height=480"] if source.suffix == ".vdb" else []  # scenes have their own
     pictures = []
     for detail in (["level_of_detail.pixels=0"], []):
         with tempfile.TemporaryDirectory() as folder:
