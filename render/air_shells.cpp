@@ -175,15 +175,50 @@ class ShadeMap {
     int shadow_size_, step_, inner_, columns_;
 };
 
-void set_ends(shader::Shells& data, const Shells& shells) {
+void set_ends(shader::Shells& data, const Shells& shells, bool far_shell) {
     double end = 0, thickness = shells.spacing_m;
-    for (std::size_t k = 0; k < shader::kMaxShells; ++k) {
+    for (std::size_t k = 0; k <= shader::kMaxShells; ++k) {
         if (k < std::size_t(shells.count)) end += thickness;
+        if (far_shell && k == std::size_t(shells.count)) end = std::max(end, double(shader::kFarShell_m));
         thickness *= shells.growth;
         shader::vec4& four = data.ends[k / 4];
         float* const values[] = {&four.x, &four.y, &four.z, &four.w};
         *values[k % 4] = float(end);
     }
+}
+
+double shafts_strength(const RenderOptions& options) {
+    return options.light_shafts.strength * daylight(options.sun.elevation_deg).sun;
+}
+
+// Full light everywhere.
+void set_no_shade(AirShells& shells) {
+    constexpr std::size_t kTexels = 4;
+    shells.shade.assign(kTexels, ~std::uint32_t{0});
+    shells.shade.resize(2 * kTexels, 0);
+    shells.data.settings.z = 2;
+    shells.data.settings.w = kTexels;
+}
+
+void set_shade(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
+               std::span<const float> shadow, int shadow_size, AirShells& shells) {
+    const Along along = along_light(cloud, frame.direction);
+    const ShadeMap map(shadow, shadow_size);
+    float first_shade = 0;
+    shells.shade = map.words(cloud, frame, along, first_shade);
+    shader::Shells& data = shells.data;
+    const Vec3& eye = options.camera.position_m;
+    const auto row = [&](const Vec3& axis) {
+        const Vec3 per_m = (map.scale() / dot(axis, axis)) * axis;
+        return to_vec4(per_m, dot(per_m, eye - frame.origin_m) + ShadeMap::shift());
+    };
+    data.settings.z = float(map.columns());
+    data.settings.w = float(map.texels());
+    data.shade_u = row(frame.u_axis_m);
+    data.shade_v = row(frame.v_axis_m);
+    data.shade_along = to_vec4(along.row, along(eye));
+    const float largest = float(map.columns()) - 1.001f;
+    data.shade = {largest, largest, first_shade, 0};
 }
 
 // Number of splats, in falling order of distance, that are at `end` or beyond.
@@ -216,33 +251,29 @@ std::size_t shells_before(const shader::Shells& data, float distance) {
     return first;
 }
 
-bool looks_at_shade(const RenderOptions& options) {
-    return options.light_shafts.strength > 0 && daylight(options.sun.elevation_deg).sun > 0;
+bool has_shells(const RenderOptions& options) {
+    return shafts_strength(options) > 0 || options.fog.extinction_per_m > 0;
 }
 
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
-                     std::span<const float> shadow, int shadow_size) {
+                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise) {
     AirShells shells;
-    if (!looks_at_shade(options) || cloud.visible.empty()) return shells;
-    const double strength = options.light_shafts.strength * daylight(options.sun.elevation_deg).sun;
-    const Along along = along_light(cloud, frame.direction);
-    const ShadeMap map(shadow, shadow_size);
-    float first_shade = 0;
-    shells.shade = map.words(cloud, frame, along, first_shade);
-
+    const bool has_fog = options.fog.extinction_per_m > 0;
+    if (!has_shells(options) || (cloud.visible.empty() && !has_fog)) return shells;
     shader::Shells& data = shells.data;
-    const Vec3& eye = options.camera.position_m;
-    const auto row = [&](const Vec3& axis) {
-        const Vec3 per_m = (map.scale() / dot(axis, axis)) * axis;
-        return to_vec4(per_m, dot(per_m, eye - frame.origin_m) + ShadeMap::shift());
-    };
-    set_ends(data, options.shells);
-    data.settings = {float(options.shells.count), float(strength), float(map.columns()), float(map.texels())};
-    data.shade_u = row(frame.u_axis_m);
-    data.shade_v = row(frame.v_axis_m);
-    data.shade_along = to_vec4(along.row, along(eye));
-    const float largest = float(map.columns()) - 1.001f;
-    data.shade = {largest, largest, first_shade, 0};
+    if (cloud.visible.empty())
+        set_no_shade(shells);
+    else
+        set_shade(options, cloud, frame, shadow, shadow_size, shells);
+    set_ends(data, options.shells, has_fog);
+    data.settings.x = float(options.shells.count + (has_fog ? 1 : 0));
+    data.settings.y = float(shafts_strength(options));
+    data.shade.w = float(reach_m(options.shells));
+    set_fog(options.fog, options.camera.position_m, time_s, data);
+    if (has_fog) {
+        const std::vector<std::uint32_t>& words = noise.words(options.fog.seed);
+        shells.shade.insert(shells.shade.end(), words.begin(), words.end());
+    }
     return shells;
 }
 

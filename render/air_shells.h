@@ -21,6 +21,7 @@
 #include "render/camera.h"
 #include "render/cloud_preparation.h"
 #include "render/eye_order.h"
+#include "render/fog.h"
 #include "render/picture.h"
 #include "render/shaders/shared.h"
 
@@ -30,11 +31,12 @@ struct AirShells {
     shader::Shells data;
     // Two planes of words, rows of settings.z of them. The first: transmittance of this texel and, in the
     // upper half, of its right neighbour, 0..65535. The second, in bytes: where the shade of this texel
-    // begins and where it is complete, and the same of its right neighbour.
+    // begins and where it is complete, and the same of its right neighbour. With fog, the words of FogNoise.
     std::vector<std::uint32_t> shade;
 
     std::size_t count() const { return std::size_t(data.settings.x); }
     bool any() const { return count() > 0; }
+    bool has_fog() const { return data.fog.x > 0; }
 };
 
 // Distance from the eye at which shell k ends, metres.
@@ -46,13 +48,13 @@ inline float shell_end(const shader::Shells& data, std::size_t k) {
 // Number of shells that end at a distance or before it.
 std::size_t shells_before(const shader::Shells& data, float distance);
 
-// Whether the air of these options has anything that looks at the whole shadow map.
-bool looks_at_shade(const RenderOptions& options);
+// Whether these options have air between the clouds. It looks at the whole shadow map.
+bool has_shells(const RenderOptions& options);
 
 // No shells when the options ask for none or when they would draw nothing. `shadow`: the texels of the shadow
-// map.
+// map; `time_s`: simulated time of the picture.
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
-                     std::span<const float> shadow, int shadow_size);
+                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise);
 
 // For each shell the number of balls, nearest first, that are drawn in front of it. Rises.
 std::vector<std::uint32_t> balls_before_shells(const AirShells& shells,

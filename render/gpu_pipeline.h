@@ -52,6 +52,7 @@ struct ShaderVariant {
     bool exact = false;         // 0, fragment shaders of metaballs: integrate along each ray
     bool physical_sky = false;  // 5, whatever includes air.glsl
     bool shells = false;        // 6, whatever includes shells.glsl
+    bool fog = false;           // 7, likewise
 };
 
 // Draws triangles; viewport and scissor are dynamic. Attachments from `written` on stay as they are.

@@ -97,6 +97,7 @@ void check(const RenderOptions& options) {
     require(within(options.shadow_map_size, 16, 8192), "shadow_map_size", "16..8192 texels");
     check(options.shells);
     check(options.light_shafts);
+    check(options.fog);
     for (const LightningFlash& flash : options.lightning) {
         require(finite(flash.position_m), "lightning.position_m", "finite metres");
         require(flash.time_s >= 0 && std::isfinite(flash.time_s), "lightning.time_s", "0 or more seconds");

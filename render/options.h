@@ -147,6 +147,7 @@ struct RenderOptions {
     WetGroundOptions wet_ground;  // how it looks where it is wet or white
     Shells shells;
     LightShafts light_shafts;
+    Fog fog;
     int shadow_map_size = 1024;  // texels on a side, 16..8192
     std::vector<LightningFlash> lightning;
     PrecipitationOptions precipitation;

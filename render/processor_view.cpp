@@ -108,13 +108,15 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
     Floats transmittance = hn::Load(d, sums.transmittance + at);
     if (hn::AllTrue(d, hn::Lt(transmittance, set(shader::kOpaque)))) return;
     const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
-    const ShadePart part = shade_part(*frame.shells, ray);
+    // Fog is everywhere, shafts only where there is shade.
+    const ShadePart part = frame.shells->has_fog() ? ShadePart{0, kNowhere} : shade_part(*frame.shells, ray);
     const SunlitAir sunlit = sunlit_air(frame, ray);
     const Floats ground = hn::Load(d, rays.ground + at), offset = hn::Load(d, rays.shell_offset + at);
     Floats3 sum{hn::Load(d, sums.red + at), hn::Load(d, sums.green + at), hn::Load(d, sums.blue + at)};
     const Floats first_m = air_begin(frame, ray);
     const auto within = [&](float distance_m) { return hn::Min(hn::Max(set(distance_m), first_m), ground); };
     Floats3 before{};
+    Floats distance = hn::Load(d, sums.distance + at);
     bool begun = false;
     for (std::size_t k = first; k < end; ++k) {
         const float begin_m = k == 0 ? 0.0f : shell_end(data, k - 1), end_m = shell_end(data, k);
@@ -124,11 +126,16 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
         if (!begun) before = air_transmittance(frame, ray, shell_begins);
         begun = true;
         const Floats3 behind = air_transmittance(frame, ray, shell_ends);
-        const Floats place = hn::MulAdd(offset, hn::Sub(shell_ends, shell_begins), shell_begins);
-        add_layer(air_layer(frame, sunlit, ray, subtract(before, behind), place), sum, transmittance);
+        const Floats place = within_shell(*frame.shells, shell_begins, shell_ends, offset);
+        const AirLayer layer =
+            air_layer(frame, sunlit, ray, subtract(before, behind), shell_begins, shell_ends, place);
+        const Floats hidden = hn::Mul(transmittance, hn::Sub(set(1.0f), layer.transmittance));
+        distance = hn::MulAdd(hidden, place, distance);
+        add_layer(layer, sum, transmittance);
         before = behind;
     }
     if (!begun) return;
+    hn::Store(distance, d, sums.distance + at);
     hn::Store(transmittance, d, sums.transmittance + at);
     hn::Store(sum.x, d, sums.red + at);
     hn::Store(sum.y, d, sums.green + at);

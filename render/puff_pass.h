@@ -20,6 +20,10 @@ class PuffPass {
 
     // Tables of the physical sky; readable by shaders.
     void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
+    // scattering_table.h, of the fog
+    void use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
+        bind_buffer(gpu, bindings_, 12, table);
+    }
     // The air between the puffs; see shell_buffers.h.
     void use_shells(const GpuDevice& gpu, const AirShells& shells) { shells_.use(gpu, bindings_, shells); }
 

@@ -133,9 +133,10 @@ struct Renderer::Impl {
     CloudLight scattering_light;
     GpuBuffer scattering_buffer;  // its copy on the device
     std::optional<LightTiles> light_tiles;
-    // Without and with the physical sky; without and with shells of air.
-    std::optional<ViewTiles> view_tiles[2][2];
-    std::optional<ViewPass> view_pass[2][2];
+    // Without and with the physical sky; without shells of air, with them, and with fog in them.
+    std::optional<ViewTiles> view_tiles[2][3];
+    std::optional<ViewPass> view_pass[2][3];
+    FogNoise fog_noise;
     std::optional<SkyImage> sky_image;
     SkyLights sky_lights;
     const SkyLight* sky = nullptr;  // of the picture that is drawn; null: gradient
@@ -265,7 +266,7 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
         }
     }
     // The processor has no air between billboards.
-    const bool blended = !order.puffs.empty() && looks_at_shade(options);
+    const bool blended = !order.puffs.empty() && has_shells(options);
     if (on_processor() && !blended)
         draw_on_processor(splats, options, camera, parts, order, picture);
     else
@@ -337,12 +338,13 @@ void Renderer::Impl::draw_on_processor(const Splats& splats, const RenderOptions
     if (!splats.light && !lit.all_known) {
         seen.emplace(order, lit.shadow_size);
         for (ProcessorView& view : views) view.look(lit.shadow_size, *seen);
-        if (looks_at_shade(options)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
+        if (has_shells(options)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
     }
     const SeenLight* const known = seen ? &*seen : nullptr;
     const std::vector<float> lightning = light_up(splats, options, order, known);
     set_light(order, {lit.sun_depths, lightning});
-    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size);
+    const AirShells shells =
+        air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size, splats.time_s, fog_noise);
     for (ProcessorView& view : views) view.draw(picture, lit.shadow.data(), lit.shadow_size, shells, known);
 }
 
@@ -353,10 +355,12 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
     set_light(order, {lit.sun_depths, lightning});
     if (on_processor() && map_on_device != lit.key) put_map_on_device();
     const GpuImage& map = light_on_device().shadow_map();
-    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size);
+    const AirShells shells =
+        air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size, splats.time_s, fog_noise);
     const auto prepared = [&](auto& passes) -> auto& {
-        const ShaderVariant variant{.physical_sky = sky != nullptr, .shells = shells.any()};
-        auto& pass = passes[variant.physical_sky ? 1 : 0][variant.shells ? 1 : 0];
+        const ShaderVariant variant{
+            .physical_sky = sky != nullptr, .shells = shells.any(), .fog = shells.has_fog()};
+        auto& pass = passes[variant.physical_sky ? 1 : 0][shells.has_fog() ? 2 : shells.any() ? 1 : 0];
         if (!pass) pass.emplace(gpu, layout, attenuation_on_device(), clamped, variant);
         if (sky != nullptr) pass->use_sky(gpu, image_of(*sky), clamped);
         pass->use_shadow_map(gpu, map, white_beyond);

@@ -30,56 +30,6 @@ namespace nephos::HWY_NAMESPACE {
 
 inline constexpr std::size_t kMaxLanes = 2 * shader::kTileWidth;
 
-// A place between two nodes of the scattering table.
-struct Between {
-    hn::Vec<hn::RebindToSigned<Lanes>> below;
-    Floats share;  // of the node above
-};
-
-HWY_INLINE Between between(Floats place, shader::uint nodes) {
-    const hn::RebindToSigned<Lanes> di;
-    const auto below = hn::Min(hn::ConvertTo(di, place), hn::Set(di, int(nodes) - 2));
-    return {below, hn::Sub(place, hn::ConvertTo(Lanes(), below))};
-}
-
-// scatter_column() and scatter_row() of shaders/shared.h.
-HWY_INLINE Between scatter_column(Floats cosine) {
-    const Floats off = hn::Max(hn::Sub(set(1.0f), hn::Abs(cosine)), hn::Zero(Lanes()));
-    const Floats v = hn::Mul(set(0.5f), hn::Sqrt(hn::Sqrt(off)));
-    const Floats place = hn::IfThenElse(hn::Lt(cosine, hn::Zero(Lanes())), hn::Sub(set(1.0f), v), v);
-    return between(hn::Mul(set(float(shader::kScatterAngles - 1)), place), shader::kScatterAngles);
-}
-
-HWY_INLINE Between scatter_row(Floats depth) {
-    constexpr float kPerE = shader::kScatterRowsPerDoubling * 1.442695041f;
-    const Floats row = hn::Mul(set(kPerE), hn::Log(Lanes(), hn::Add(set(1.0f), depth)));
-    return between(hn::Min(row, set(float(shader::kScatterDepths - 1))), shader::kScatterDepths);
-}
-
-// `first`: index of the row's first node.
-HWY_INLINE Floats scattering_at(const float* HWY_RESTRICT table, hn::Vec<hn::RebindToSigned<Lanes>> first,
-                                const Between& angle) {
-    const auto at = hn::Add(first, angle.below);
-    const Floats a = hn::GatherIndex(Lanes(), table, at), b = hn::GatherIndex(Lanes(), table + 1, at);
-    return hn::MulAdd(angle.share, hn::Sub(b, a), a);
-}
-
-// Pi times the phase function of the cosine (shaders/lighting.glsl).
-HWY_INLINE Floats scattered_once(const PictureFrame& frame, Floats cosine) {
-    const hn::RebindToSigned<Lanes> di;
-    return scattering_at(frame.scattering, hn::Zero(di), scatter_column(cosine));
-}
-
-HWY_INLINE Floats scattered_often(const PictureFrame& frame, const Floats3& ray, Floats sun_depth) {
-    const hn::RebindToSigned<Lanes> di;
-    const Between column = scatter_column(dot(set3(frame.to_sun), ray)), row = scatter_row(sun_depth);
-    const auto angles = hn::Set(di, int(shader::kScatterAngles));
-    const auto first = hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles);
-    const Floats a = scattering_at(frame.scattering, first, column),
-                 b = scattering_at(frame.scattering, hn::Add(first, angles), column);
-    return hn::MulAdd(row.share, hn::Sub(b, a), a);
-}
-
 // Balls of one vector, turned from rows into columns.
 struct BallColumns {
     HWY_ALIGN float x[kMaxLanes], y[kMaxLanes], z[kMaxLanes], radius[kMaxLanes], least_radius[kMaxLanes],

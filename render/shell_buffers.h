@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Shells of air on the device: bindings 11 and 12. Private to the module.
+// Shells of air on the device: bindings 13 and 14. Private to the module.
 
 #include "render/air_shells.h"
 #include "render/gpu_pipeline.h"

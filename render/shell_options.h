@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Shells of air around the eye, and what they carry: light shafts. Included by options.h.
+// Shells of air around the eye, and what they carry: light shafts and fog. Included by options.h.
+
+#include <cstdint>
+
+#include "automaton/lattice.h"
 
 namespace nephos {
 
@@ -33,8 +37,23 @@ struct LightShafts {
     bool operator==(const LightShafts&) const = default;
 };
 
+// Droplets near the ground, which scatter light as the clouds do. Along a ray, extinction (per metre) is
+//     extinction_per_m * exp(-(z - base_m) / height_m) * max(0, 1 + 2 patchiness (n - 1)),
+// with n the sum of two looks into noise of 0..1 (fog.h), whose mean is 1. Beyond the last shell n is 1.
+struct Fog {
+    double extinction_per_m = 0;  // at base_m, >= 0; 0 = none. Visibility is about 3.9 / extinction
+    double base_m = 0;            // world z
+    double height_m = 100;        // over which the fog thins out to 1 / e, > 0
+    double patchiness = 0.5;  // 0..1: how much thicker and thinner than its mean it is from place to place
+    double patch_m = 600;     // size of a patch, > 0
+    Vec3 velocity_m_per_s{1, 0, 0};  // at which patches drift
+    std::uint64_t seed = 1;          // of the patches
+    bool operator==(const Fog&) const = default;
+};
+
 // Throw Error(usage) naming the first value that is out of its range.
 void check(const Shells& shells);
 void check(const LightShafts& shafts);
+void check(const Fog& fog);
 
 }  // namespace nephos

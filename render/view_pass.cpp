@@ -23,7 +23,7 @@ ViewPass::ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const Gpu
                                       kFormats, Blend::over, variant)),
       integrated_splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert,
                                                  shaders().view_splat_frag, kFormats, Blend::over,
-                                                 {true, variant.physical_sky, variant.shells})),
+                                                 {true, variant.physical_sky, variant.shells, variant.fog})),
       shell_(variant.shells ? create_graphics_pipeline(gpu, layout, shaders().shell_vert,
                                                        shaders().shell_frag, kFormats, Blend::over, variant)
                             : nullptr),
@@ -56,6 +56,7 @@ void ViewPass::use_shells(const GpuDevice& gpu, const AirShells& shells, const E
 
 void ViewPass::use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
     bind_buffer(gpu, bindings_, 12, table);
+    puffs_.use_scattering(gpu, table);
 }
 
 void ViewPass::resize_targets(const GpuDevice& gpu, const Tile& tile) {

@@ -101,7 +101,7 @@ void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const Eye
                           .largest_radius = 0,
                           .first = 0,
                           .end = 0,
-                          .pad0 = 0};
+                          .distances = order.depth};
     const vk::raii::Pipeline& tiles = tiles_for(gpu, order);
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_compute(commands, *layout_, bindings_, project_, step);

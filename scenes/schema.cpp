@@ -204,6 +204,7 @@ const Section& scene_section() {
              std::move(precipitation),
              group("shells", shells_section()),
              group("light_shafts", light_shafts_section()),
+             group("fog", fog_section()),
              std::move(level_of_detail),
              group("debug_view", debug_view_section())},
             &finish_scene};

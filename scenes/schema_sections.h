@@ -26,6 +26,7 @@ const Section& atmosphere_section();
 const Section& ground_section();
 const Section& shells_section();
 const Section& light_shafts_section();
+const Section& fog_section();
 const Section& wet_ground_section();
 const Section& precipitation_section();
 const Section& level_of_detail_section();

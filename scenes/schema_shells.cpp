@@ -37,8 +37,8 @@ void finish_shells(const SectionReader& reader, void* owner) {
 const Section& shells_section() {
     static const Section section{
         "Shells of air",
-        "Layers around the eye that light shafts are drawn with, between the clouds; without them there are "
-        "none.",
+        "Layers around the eye that light shafts and fog are drawn with, between the clouds; without either "
+        "there are none.",
         {render_key<&RenderOptions::shells, &Shells::count>(
              "count", "", between(1, 128),
              "Their number; more reach farther or sample more finely, and cost time in proportion.",
@@ -75,6 +75,37 @@ const Section& light_shafts_section() {
              "physical "
              "sky takes `atmosphere.haze_g` instead.",
              "S (Cornette and Shanks)")},
+        nullptr};
+    return section;
+}
+
+const Section& fog_section() {
+    static const Section section{
+        "Fog",
+        "Droplets near the ground, drawn in the shells of air and lit as the clouds are, with their shadows "
+        "in "
+        "it. Beyond the last shell it goes on without patches.",
+        {render_key<&RenderOptions::fog, &Fog::extinction_per_m>(
+             "extinction_per_m", "1/m", between(0, 10),
+             "Extinction at `base_m`; 0: no fog. One sees about 3.9 / extinction far: 0.004 is fog of 1 km, "
+             "0.02 thick fog, 0.0008 mist.",
+             "S, fog; Koschmieder 1924"),
+         render_key<&RenderOptions::fog, &Fog::base_m>("base_m", "m", between(-1e5, 1e5),
+                                                       "World z where it has that extinction.", "S, fog"),
+         render_key<&RenderOptions::fog, &Fog::height_m>(
+             "height_m", "m", between(0.1, 1e5), "Height over which it thins out to 1 / e.", "S, fog"),
+         render_key<&RenderOptions::fog, &Fog::patchiness>(
+             "patchiness", "", between(0, 1),
+             "How much thicker and thinner than its mean it is from place to place; 0: even.",
+             "S, inhomogeneous fog"),
+         render_key<&RenderOptions::fog, &Fog::patch_m>(
+             "patch_m", "m", between(1, 1e6),
+             "Size of a patch. Where shells are thicker than half of it, patches blur.",
+             "S, inhomogeneous fog"),
+         render_key<&RenderOptions::fog, &Fog::velocity_m_per_s>(
+             "velocity_m_per_s", "m/s", between(-1000, 1000), "Velocity at which patches drift.",
+             "S, inhomogeneous fog"),
+         render_key<&RenderOptions::fog, &Fog::seed>("seed", "", kAny, "Of the patches.")},
         nullptr};
     return section;
 }

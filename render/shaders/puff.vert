@@ -7,6 +7,7 @@
 #include "frame.glsl"
 #include "ray.glsl"
 #include "air.glsl"
+#include "scattering.glsl"
 #include "shells.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Puffs {

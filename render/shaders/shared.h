@@ -53,6 +53,8 @@ NEPHOS_CONST float kSunRadius = 0.00462512f;  // radians
 NEPHOS_CONST float kLimbDarkeningRed = 0.397f;
 NEPHOS_CONST float kLimbDarkeningGreen = 0.503f;
 NEPHOS_CONST float kLimbDarkeningBlue = 0.652f;
+NEPHOS_CONST uint kFogVoxels = 32u;       // of the noise of fog, on a side; a power of two
+NEPHOS_CONST float kFarShell_m = 1.0e6f;  // with fog, a last shell of all the air beyond the others ends here
 NEPHOS_CONST uint kMaxShells = 128u;
 NEPHOS_CONST uint kScatterAngles = 513u;            // nodes of the scattering table, see scatter_column()
 NEPHOS_CONST uint kScatterDepths = 97u;             // ... and scatter_row()
@@ -135,7 +137,7 @@ struct TileStep {
     uint first_batch, last_batch;  // booleans: clear the sums before; finish them after
     float largest_radius;          // light: metres, of any splat
     uint first, end;               // view: the splats, or shells, that are drawn
-    uint pad0;
+    uint distances;                // view: boolean, whether depth is wanted
 };
 
 // Everything about one picture (or tile of it) that shaders need.
@@ -169,14 +171,31 @@ struct Frame {
 
 // Shells of air around the eye (air_shells.h).
 struct Shells {
-    vec4 ends[kMaxShells / 4u];  // metres from the eye at which each shell ends and the next begins
+    vec4 ends[kMaxShells / 4u + 1u];  // metres from the eye at which each shell ends and the next begins
     vec4 settings;  // x: number of shells; y: strength of light shafts; z: texels in a row of the shade map;
                     // w: in all
     vec4 shade_u;   // shade map: column of a point p relative to the eye, dot(xyz, p) + w, texels
     vec4 shade_v;   // row
     vec4 shade_along;  // along the light: 0 where the first cloud begins, 1 where the last one ends
-    vec4 shade;        // x, y: largest column and row; z: along the light, where the first shade begins
+    vec4 shade;        // x, y: largest column and row; z: along the light, where the first shade begins; w:
+                       // metres from the eye at which shafts end
+    vec4 fog;  // x: extinction at the base, per metre; y: 1 / height over which it falls off; z: height of
+               // the eye above the base; w: how much it varies
+    vec4 fog_coarse;  // xyz: where in the noise the eye is, 0..1; w: 1 / size of the noise in metres
+    vec4 fog_fine;    // the same of the second look-up, for y, z, x
 };
+
+// Integral over a part of a ray of fog that falls off exponentially with height: exp(-height per_height),
+// from `begin` on over `distance`. `slope`: sine of the ray's elevation. The lower end is what counts: no fog
+// is lost to rounding when the eye is far above it.
+NEPHOS_FUNCTION float fog_column(float height_of_begin, float slope, float distance, float per_height) {
+    float low = height_of_begin + (slope < 0.0f ? slope * distance : 0.0f);
+    float x = abs(slope) * distance * per_height;
+    float near = 1.0f - x * (0.5f - x * (1.0f / 6.0f));
+    float share = x < 1.0e-2f ? near : (1.0f - exp(-x)) / (x < 1.0e-2f ? 1.0f : x);
+    float at_low = -low * per_height;
+    return exp(at_low < 60.0f ? at_low : 60.0f) * distance * share;
+}
 
 // Where in a shell a pixel of the picture samples it, 0..1: an additive recurrence in two dimensions (Roberts
 // 2018, "R2") spreads the samples of neighbouring pixels evenly. In integers: the same on every machine.
@@ -292,8 +311,8 @@ static_assert(sizeof(LightQuery) == 16 && sizeof(LightItem) == 16);
 static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 40);
 static_assert(sizeof(Puff) == 32 && offsetof(Puff, half_size) == 12 && offsetof(Puff, cloud) == 28);
 static_assert(sizeof(PuffCloud) == 32 && offsetof(PuffCloud, inverse_height) == 16);
-static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 5) &&
-              offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 1));
+static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 9) &&
+              offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 2));
 static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
               offsetof(Frame, flash_colour) == 272 && offsetof(Frame, sun_fade) == 368);
 

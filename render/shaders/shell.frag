@@ -6,6 +6,7 @@
 #include "frame.glsl"
 #include "ray.glsl"
 #include "air.glsl"
+#include "scattering.glsl"
 #include "shells.glsl"
 
 layout(location = 0) flat in uint shell;
@@ -16,7 +17,8 @@ layout(location = 1) out vec4 depth;
 void main() {
     vec3 ray = pixel_ray(gl_FragCoord.xy);
     uvec2 pixel = uvec2(gl_FragCoord.xy) + uvec2(frame.picture.zw);
-    AirLayer air = air_shell(shell, sunlit_air(ray), ray, pixel);
+    float at;
+    AirLayer air = air_shell(shell, sunlit_air(ray), ray, pixel, at);
     radiance = vec4(air.light, air.transmittance);
-    depth = vec4(0.0, 0.0, 0.0, air.transmittance);
+    depth = vec4((1.0 - air.transmittance) * at, 0.0, 0.0, air.transmittance);
 }

@@ -6,11 +6,15 @@
 #include "frame.glsl"
 #include "ray.glsl"
 #include "air.glsl"
+#include "scattering.glsl"
 #include "shells.glsl"
 
 layout(local_size_x = kComputeGroup) in;
 layout(set = 0, binding = 8, std430) buffer Radiance {
     vec4 radiance[];  // w: transmittance
+};
+layout(set = 0, binding = 9, std430) buffer Depth {
+    float depth[];
 };
 layout(push_constant) uniform Step {
     TileStep step;
@@ -25,10 +29,14 @@ void main() {
     vec3 ray = pixel_ray(vec2(pixel) + 0.5);
     SunlitAir sunlit = sunlit_air(ray);
     pixel += uvec2(frame.picture.zw);
+    float sum_distance = kFog && step.distances != 0u ? depth[index] : 0.0;
     for (uint k = step.first; k < step.end; ++k) {
-        AirLayer air = air_shell(k, sunlit, ray, pixel);
+        float at;
+        AirLayer air = air_shell(k, sunlit, ray, pixel, at);
+        sum_distance += sum.a * (1.0 - air.transmittance) * at;
         sum.rgb += sum.a * air.light;
         sum.a *= air.transmittance;
     }
     radiance[index] = sum;
+    if (kFog && step.distances != 0u) depth[index] = sum_distance;
 }

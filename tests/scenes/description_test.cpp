@@ -72,6 +72,7 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"wet_ground"}), member_count<GroundCoverOptions>() + member_count<WetGroundOptions>());
     EXPECT_EQ(keys_at({"shells"}), member_count<Shells>());
     EXPECT_EQ(keys_at({"light_shafts"}), member_count<LightShafts>());
+    EXPECT_EQ(keys_at({"fog"}), member_count<Fog>());
     EXPECT_EQ(keys_at({"lightning"}), member_count<LightningFlash>());
     EXPECT_EQ(keys_at({"debug_view"}), member_count<DebugView>());
     // [sun] also holds the size of the shadow map, the one plain member of RenderOptions.
