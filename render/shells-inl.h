@@ -136,6 +136,11 @@ HWY_INLINE Floats fog_depth(const AirShells& air, const Floats3& ray, Floats beg
     return hn::Mul(mean, hn::Max(hn::MulAdd(varies, hn::Sub(noise, one), one), hn::Zero(d)));
 }
 
+HWY_INLINE Floats within_shell(const AirShells& air, Floats begin, Floats end, Floats share) {
+    return hn::MulAdd(hn::IfThenElseZero(hn::Lt(begin, set(air.data.shade.w)), share), hn::Sub(end, begin),
+                      begin);
+}
+
 HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const Floats3& ray, Floats at, Floats lit) {
     const Lanes d;
     const shader::Shells& data = frame.shells->data;
@@ -167,12 +172,8 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const SunlitAir& sunlit
     const Floats depth = fog_depth(air, ray, begin, end, at), transmittance = hn::Exp(d, hn::Neg(depth));
     if (hn::AllTrue(d, hn::Lt(depth, set(1.0e-6f)))) return {light, transmittance};
     light = times(hn::MulAdd(set(0.5f), transmittance, set(0.5f)), light);
-    return {times_add(hn::Sub(one, transmittance), fog_radiance(frame, ray, at, lit), light), transmittance};
-}
-
-HWY_INLINE Floats within_shell(const AirShells& air, Floats begin, Floats end, Floats share) {
-    return hn::MulAdd(hn::IfThenElseZero(hn::Lt(begin, set(air.data.shade.w)), share), hn::Sub(end, begin),
-                      begin);
+    const Floats3 of_fog = fog_radiance(frame, ray, within_shell(air, begin, end, set(0.5f)), lit);
+    return {times_add(hn::Sub(one, transmittance), of_fog, light), transmittance};
 }
 
 // Where rays come out of the ground that the eye is below, as those of a mirror image do.

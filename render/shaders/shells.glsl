@@ -62,6 +62,9 @@ float fog_depth(vec3 ray, float begin, float end, float at) {
     return shells.fog.x * column * max(1.0 + varies * (noise - 1.0), 0.0);
 }
 
+// Where a part of a ray is looked up that begins in a shell: in the last shell, which has no end, where it begins.
+float within_shell(float begin, float end, float share) { return begin < shells.shade.w ? mix(begin, end, share) : begin; }
+
 // Radiance at opacity 1 of the fog at a distance, as the eye sees it; lit as the clouds are. `lit`: share of the
 // sunlight that the clouds leave.
 vec3 fog_radiance(vec3 ray, float at, float lit) {
@@ -83,11 +86,10 @@ AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float at)
     if (!kFog) return AirLayer(light, 1.0);
     float transmittance = exp(-fog_depth(ray, begin, end, at));
     light *= 0.5 + 0.5 * transmittance;  // half of the fog is in front
-    return AirLayer(light + (1.0 - transmittance) * fog_radiance(ray, at, lit), transmittance);
+    // Its light changes with height so fast that looking it up here and there would show as grain.
+    vec3 of_fog = fog_radiance(ray, within_shell(begin, end, 0.5), lit);
+    return AirLayer(light + (1.0 - transmittance) * of_fog, transmittance);
 }
-
-// Where a part of a ray is looked up that begins in a shell: in the last shell, which has no end, where it begins.
-float within_shell(float begin, float end, float share) { return begin < shells.shade.w ? mix(begin, end, share) : begin; }
 
 // Where a ray comes out of the ground that the eye is below, as that of a mirror image is.
 float air_begin(vec3 ray) { return frame.ground.w > 0.0 ? frame.ground.w / max(ray.z, 1.0e-6) : 0.0; }
