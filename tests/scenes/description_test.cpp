@@ -80,7 +80,7 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"precipitation"}), member_count<PrecipitationOptions>());
     EXPECT_EQ(keys_at({"level_of_detail"}), member_count<LevelOfDetailOptions>());
     EXPECT_EQ(keys_at({"camera", "path"}), member_count<CameraKey>());
-    EXPECT_EQ(member_count<RenderOptions>(), 14u);
+    EXPECT_EQ(member_count<RenderOptions>(), 15u);
     EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());
