@@ -70,7 +70,7 @@ const SkyBillboards::Strewn& SkyBillboards::strewn(const SkySimulation& sky, con
 
 void SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
                                  const RenderOptions& options) {
-    std::vector<LitCloud> lit;
+    std::vector<CloudToLight> lit;
     std::size_t unlit = 0;
     for (const SkyCloud& cloud : clouds) {
         lit.push_back({cloud.serial, &sky.shape(cloud), sky.position_m(cloud)});
@@ -83,7 +83,7 @@ void SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<const SkyCl
 
 void SkyBillboards::light_by_flash(const SkySimulation& sky, const Flash& flash,
                                    const std::vector<const SkyCloud*>& seen) {
-    std::vector<LitCloud> lit;
+    std::vector<CloudToLight> lit;
     for (const SkyCloud* cloud : seen) {
         const Sphere sphere = sky.sphere(*cloud);
         const double nearest = std::max(

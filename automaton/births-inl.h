@@ -72,8 +72,8 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
     const BlockField& field = *g.random.field;
     s.known_cloud = 0;
     if (field.any_extinction()) find_cloudy(g, s.cloudy);
-    std::uint64_t counters[kSegmentBlocks + kMaxLanes];
-    for (int b = 0; b < kSegmentBlocks + kMaxLanes; ++b) counters[b] = g.counter(Draw::counts, b, 0);
+    std::uint64_t counters[kSegmentBlocks + kMaxLanes64];
+    for (int b = 0; b < kSegmentBlocks + kMaxLanes64; ++b) counters[b] = g.counter(Draw::counts, b, 0);
     philox_counters(g.batch(), counters, g.blocks, s.counts);
 
     field.plan_blocks(g.bx0, g.by, g.bz, s.row, std::span(s.plans).first(std::size_t(g.blocks)));

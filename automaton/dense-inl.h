@@ -129,8 +129,8 @@ HWY_INLINE LayerBits compare_bytes(const std::uint8_t* random, const Top& top) {
 // Decides the queued ties. Cell c takes word c % 4 of counter 32 + c / 4.
 inline void run_ties(const Segment& g, BirthScratch& s) {
     constexpr int kBatch = 64;
-    HWY_ALIGN std::uint64_t counters[kBatch + kMaxLanes] = {};
-    HWY_ALIGN std::uint32_t words[4 * (kBatch + kMaxLanes)];
+    HWY_ALIGN std::uint64_t counters[kBatch + kMaxLanes64] = {};
+    HWY_ALIGN std::uint32_t words[4 * (kBatch + kMaxLanes64)];
     Tie ties[kBatch];
     int count = 0;
     const auto decide = [&]() HWY_ATTR {
@@ -168,7 +168,7 @@ HWY_INLINE void queue_ties(int block, int draw, int layer, std::uint64_t cells, 
 
 // The random bytes of the layers in `layers` (a bit each): 4 counters a layer, 16 bytes a counter.
 inline void random_bytes(const Segment& g, int block, int draw, unsigned layers, std::uint32_t* out) {
-    HWY_ALIGN std::uint64_t counters[32 + kMaxLanes] = {};
+    HWY_ALIGN std::uint64_t counters[32 + kMaxLanes64] = {};
     const std::uint64_t first = g.counter(draw_of(draw), block, 0);
     int count = 0;
     for (; layers != 0; layers &= layers - 1) {
@@ -195,7 +195,7 @@ inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& pl
     }
     unsigned layers = 0;
     for (int layer = 0; layer < 8; ++layer) layers |= unsigned{wanted[layer] != 0} << layer;
-    HWY_ALIGN std::uint32_t random[4 * (32 + kMaxLanes)];
+    HWY_ALIGN std::uint32_t random[4 * (32 + kMaxLanes64)];
     random_bytes(g, block, draw, layers, random);
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(random);
     const bool uniform = draw_plan.kind == DrawPlan::Kind::uniform;

@@ -24,7 +24,7 @@ void step_part_target(const StepPlanes& planes, const StepRandom& random, int bz
     constexpr std::size_t kLargePlane = std::size_t{1} << 18;  // words: 2 MiB
     const std::size_t words =
         planes.words_per_row * std::size_t(planes.extent.y) * std::size_t(planes.extent.z);
-    if (quiet && planes.words_per_row % kMaxLanes == 0 && words >= kLargePlane) {
+    if (quiet && planes.words_per_row % kMaxLanes64 == 0 && words >= kLargePlane) {
         grow<true>(planes, z0, z1, y0, y1);
     } else {
         grow<false>(planes, z0, z1, y0, y1);

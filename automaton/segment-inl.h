@@ -24,7 +24,7 @@ HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-inline constexpr int kMaxLanes = 8;  // of 64 bits, in the widest vector
+inline constexpr int kMaxLanes64 = 8;  // of 64 bits, in the widest vector
 
 // Blocks are taken in segments of 64 along x: their events fill 4 KiB a draw, which stay in the first-level
 // cache, and everything below has a fixed size.
@@ -76,10 +76,10 @@ struct BirthScratch {
     alignas(64) CellBits
         dense_events[3][kSegmentBlocks] = {};          // those of the dense draws; 0 between segments
     alignas(64) CellBits cloud[kSegmentBlocks];        // cells that are cld, see cloud_of_block()
-    std::uint64_t counters[kMaxCounters + kMaxLanes];  // packed, see philox-inl.h
+    std::uint64_t counters[kMaxCounters + kMaxLanes64];  // packed, see philox-inl.h
     std::uint32_t
-        words[4 * (kMaxCounters + kMaxLanes) + 32];  // 32 more: the last vector of events reads beyond
-    std::uint32_t counts[4 * (kSegmentBlocks + kMaxLanes)];
+        words[4 * (kMaxCounters + kMaxLanes64) + 32];  // 32 more: the last vector of events reads beyond
+    std::uint32_t counts[4 * (kSegmentBlocks + kMaxLanes64)];
     std::uint64_t cloudy[kSegmentWords];  // a byte a block: not 0 when it holds any cld
     SparseJob jobs[kSegmentBlocks];
     int job_count = 0, counter_count = 0;

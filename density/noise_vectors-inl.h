@@ -14,7 +14,7 @@
 
 #include <hwy/highway.h>
 
-#include "density/noise_hash.h"
+#include "density/noise_hash-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos {
@@ -26,14 +26,6 @@ using NoiseWords = hn::Repartition<std::uint32_t, NoiseFloats>;
 using NoiseInts = hn::Repartition<std::int32_t, NoiseFloats>;
 using Floats = hn::Vec<NoiseFloats>;
 using Words = hn::Vec<NoiseWords>;
-
-// A 32-bit hash of 32 bits (noise_hash.h: the same for one number).
-HWY_INLINE Words mixed(Words h) {
-    const NoiseWords d;
-    h = hn::Mul(hn::Xor(h, hn::ShiftRight<16>(h)), hn::Set(d, kMixFirst));
-    h = hn::Mul(hn::Xor(h, hn::ShiftRight<15>(h)), hn::Set(d, kMixSecond));
-    return hn::Xor(h, hn::ShiftRight<16>(h));
-}
 
 // One axis of a point: hashes of the lattice points below and above, and the way from the one below.
 struct AxisPoint {

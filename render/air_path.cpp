@@ -135,7 +135,7 @@ void mix_rows(const float* plane, std::size_t width, double coordinate, std::siz
     for (std::size_t i = 0; i < width; ++i) out[i] = a[i] + share * (b[i] - a[i]);
 }
 
-void fill_columns(const AirShells& air, const AirTables& tables, double radius, PartRows& rows) {
+void fill_columns(const SphericalAir& air, const AirTables& tables, double radius, PartRows& rows) {
     float columns[3][kColumnSines];
     const double coordinate = column_coordinate(air, radius);
     for (std::size_t k = 0; k < 3; ++k)
@@ -149,7 +149,7 @@ void fill_columns(const AirShells& air, const AirTables& tables, double radius, 
     }
 }
 
-void fill_rows(const AirShells& air, const AirTables& tables, const AirPath& path, const AirPart& part,
+void fill_rows(const SphericalAir& air, const AirTables& tables, const AirPath& path, const AirPart& part,
                PartRows& rows) {
     const double radius = double(part.radius);
     fill_columns(air, tables, radius, rows);
@@ -197,7 +197,7 @@ struct Densities {
     double rayleigh, mie, ozone;
 };
 
-Densities densities(const AirShells& air, double radius) {
+Densities densities(const SphericalAir& air, double radius) {
     const double altitude = std::max(radius - air.ground, 0.0);
     return {std::exp(-altitude * air.per_rayleigh_height), std::exp(-altitude * air.per_mie_height),
             std::max(0.0, 1 - std::abs(altitude - air.ozone_centre) * air.per_ozone_half_width)};
@@ -205,7 +205,7 @@ Densities densities(const AirShells& air, double radius) {
 
 // One part from `begin` to `end`; `transmittance` is that from the eye to its begin and becomes that to its
 // end.
-AirPart air_part(const AirShells& air, double radius, double sine, double begin, double end,
+AirPart air_part(const SphericalAir& air, double radius, double sine, double begin, double end,
                  double (&transmittance)[3]) {
     constexpr int kFine = 4;
     const double step = (end - begin) / kFine;
@@ -241,7 +241,7 @@ AirPart air_part(const AirShells& air, double radius, double sine, double begin,
 
 }  // namespace
 
-AirShells::AirShells(const AtmosphereModel& m)
+SphericalAir::SphericalAir(const AtmosphereModel& m)
     : ground(m.ground_radius_m / kKilometre),
       top(m.top_radius_m / kKilometre),
       mie_scattering(m.mie_scattering_per_m * kKilometre),
@@ -256,18 +256,18 @@ AirShells::AirShells(const AtmosphereModel& m)
     }
 }
 
-double AirShells::horizontal(double radius) const {
+double SphericalAir::horizontal(double radius) const {
     return std::sqrt(std::max(0.0, (radius - ground) * (radius + ground)));
 }
-double AirShells::to_top(double radius, double sine) const {
+double SphericalAir::to_top(double radius, double sine) const {
     const double along = radius * sine;
     return std::sqrt(std::max(0.0, along * along + (top - radius) * (top + radius))) - along;
 }
-double AirShells::to_ground(double radius, double sine) const {
+double SphericalAir::to_ground(double radius, double sine) const {
     const double along = radius * sine, inside = along * along - (radius - ground) * (radius + ground);
     return sine < 0 && inside >= 0 ? -along - std::sqrt(inside) : -1;
 }
-double AirShells::horizon_sine(double radius) const { return -horizontal(radius) / radius; }
+double SphericalAir::horizon_sine(double radius) const { return -horizontal(radius) / radius; }
 
 double sun_coordinate(double sine) {
     const double s = std::clamp(sine, kLeastSunSine, 1.0);
@@ -278,22 +278,22 @@ double sun_sine(double coordinate) {
     const double bent = kLeastBent + (1 - kLeastBent) * coordinate / double(kSunSines - 1);
     return bent * kSunBend / (1 + kSunBend - std::abs(bent));
 }
-double psi_coordinate(const AirShells& air, double radius) {
+double psi_coordinate(const SphericalAir& air, double radius) {
     return double(kPsiRadii - 1) *
            std::sqrt(std::clamp((radius - air.ground) / (air.top - air.ground), 0.0, 1.0));
 }
-double psi_radius(const AirShells& air, double coordinate) {
+double psi_radius(const SphericalAir& air, double coordinate) {
     const double x = coordinate / double(kPsiRadii - 1);
     return air.ground + (air.top - air.ground) * x * x;
 }
-double column_coordinate(const AirShells& air, double radius) {
+double column_coordinate(const SphericalAir& air, double radius) {
     return double(kColumnRadii - 1) * air.horizontal(radius) / air.most_horizontal();
 }
-double column_radius(const AirShells& air, double coordinate) {
+double column_radius(const SphericalAir& air, double coordinate) {
     return std::hypot(air.ground, air.most_horizontal() * coordinate / double(kColumnRadii - 1));
 }
 
-AirPath air_path(const AirShells& air, double radius, double sine, std::size_t parts, double even) {
+AirPath air_path(const SphericalAir& air, double radius, double sine, std::size_t parts, double even) {
     AirPath path;
     path.start_radius = radius;
     const double ground = air.to_ground(radius, sine);
@@ -312,7 +312,7 @@ ScatteredPlanes::ScatteredPlanes(std::size_t suns) {
         for (std::vector<float>* plane : {&rayleigh[c], &mie[c], &many[c]}) plane->assign(suns, 0.0f);
 }
 
-void scatter_along(const AirShells& air, const AirTables& tables, const AirPath& path,
+void scatter_along(const SphericalAir& air, const AirTables& tables, const AirPath& path,
                    std::span<const float> sun_sine, std::span<const float> cos_to_sun, ScatteredPlanes& out) {
     assert(sun_sine.size() % kAirLanes == 0 && sun_sine.size() == cos_to_sun.size());
     SunBlock suns{sun_sine.data(), cos_to_sun.data(), {}, {}, {}, sun_sine.size()};

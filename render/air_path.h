@@ -24,12 +24,12 @@ inline constexpr std::size_t kSunSines = 128, kPsiRadii = 32;        // table of
 inline constexpr std::size_t kAirLanes = 16;                         // numbers of suns are multiples of it
 
 // Lengths in km, coefficients in 1/km.
-struct AirShells {
+struct SphericalAir {
     double ground, top;                                            // radii
     double rayleigh[3], mie_scattering, mie_extinction, ozone[3];  // on the ground; of ozone at its densest
     double per_rayleigh_height, per_mie_height, ozone_centre, per_ozone_half_width;
 
-    explicit AirShells(const AtmosphereModel& model);
+    explicit SphericalAir(const AtmosphereModel& model);
     double horizontal(double radius) const;  // from a sphere's tangent point to `radius`
     double most_horizontal() const { return horizontal(top); }
     // Along a ray from `radius`: to the top, and to the ground (negative when it passes).
@@ -39,12 +39,12 @@ struct AirShells {
 };
 
 // Places in tables, as indices with fractions.
-double sun_coordinate(double sine);                          // 0..kSunSines - 1, sines from -0.5 on
-double sun_sine(double coordinate);                          // its inverse
-double psi_coordinate(const AirShells& air, double radius);  // 0..kPsiRadii - 1
-double psi_radius(const AirShells& air, double coordinate);
-double column_coordinate(const AirShells& air, double radius);  // 0..kColumnRadii - 1
-double column_radius(const AirShells& air, double coordinate);
+double sun_coordinate(double sine);                             // 0..kSunSines - 1, sines from -0.5 on
+double sun_sine(double coordinate);                             // its inverse
+double psi_coordinate(const SphericalAir& air, double radius);  // 0..kPsiRadii - 1
+double psi_radius(const SphericalAir& air, double coordinate);
+double column_coordinate(const SphericalAir& air, double radius);  // 0..kColumnRadii - 1
+double column_radius(const SphericalAir& air, double coordinate);
 
 struct AirPart {
     float distance, radius;     // of the centre of gravity
@@ -60,7 +60,7 @@ struct AirPath {
 
 // From a point to the top of the air or to the ground. `even`: 0 cuts it most finely where it is lowest, 1
 // evenly.
-AirPath air_path(const AirShells& air, double radius, double sine, std::size_t parts, double even = 0);
+AirPath air_path(const SphericalAir& air, double radius, double sine, std::size_t parts, double even = 0);
 
 // Tables as the kernel reads them: planes for red, green, blue (columns: rayleigh, mie, ozone), rows of
 // radii.
@@ -75,7 +75,7 @@ struct ScatteredPlanes {
     std::vector<float> rayleigh[3], mie[3], many[3];
     explicit ScatteredPlanes(std::size_t suns);
 };
-void scatter_along(const AirShells& air, const AirTables& tables, const AirPath& path,
+void scatter_along(const SphericalAir& air, const AirTables& tables, const AirPath& path,
                    std::span<const float> sun_sine, std::span<const float> cos_to_sun, ScatteredPlanes& out);
 
 // Share of the sun's disc above the horizon.

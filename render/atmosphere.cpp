@@ -86,7 +86,7 @@ struct Atmosphere::Tables {
     Rgb ground_radiance(const AirPath& path, double sun, double cos_to_sun, bool with_sky) const;
 
     AtmosphereModel model;
-    AirShells air;
+    SphericalAir air;
     AirTables tables;
     std::vector<float> ground_sun;  // irradiance on the ground, by the sun's sine: kGroundSuns, 3 planes
     // Logarithms, by height and sun: 3 planes each of light from above, from below and sideways.
@@ -319,7 +319,7 @@ const AtmosphereModel& Atmosphere::model() const { return tables_->model; }
 
 namespace {
 
-double radius_at(const AirShells& air, double altitude_m) {
+double radius_at(const SphericalAir& air, double altitude_m) {
     return std::clamp(air.ground + altitude_m / 1000, air.ground, air.top - 1e-3);
 }
 double sine_of(double degrees) { return std::sin(degrees * kPi / 180); }
@@ -338,7 +338,7 @@ Rgb Atmosphere::sunlight(double altitude_m, double sun_elevation_deg) const {
 }
 
 Rgb Atmosphere::multiple_scattering(double altitude_m, double sun_sine_) const {
-    const AirShells& air = tables_->air;
+    const SphericalAir& air = tables_->air;
     Rgb light{};
     for (std::size_t c = 0; c < 3; ++c)
         light[c] = between_logs(&tables_->tables.psi[c * kPsiRadii * kSunSines], sun_coordinate(sun_sine_),
@@ -353,7 +353,7 @@ SkyIrradiance Atmosphere::irradiance(double altitude_m, double sun_elevation_deg
 }
 
 SkyTable Atmosphere::sky(double eye_altitude_m, double sun_elevation_deg) const {
-    const AirShells& air = tables_->air;
+    const SphericalAir& air = tables_->air;
     const double radius = radius_at(air, eye_altitude_m), sun = sine_of(sun_elevation_deg),
                  sun_cosine = std::sqrt(1 - sun * sun);
     constexpr std::size_t kColumns = shader::kSkyColumns, kRows = shader::kSkyRows;

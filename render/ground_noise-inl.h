@@ -14,7 +14,7 @@
 
 #include <hwy/highway.h>
 
-#include "density/noise_hash.h"
+#include "density/noise_hash-inl.h"
 #include "render/background-inl.h"
 #include "render/ground_noise.h"
 
@@ -31,14 +31,6 @@ HWY_INLINE Floats smooth_step(Floats low, Floats high, Floats x) {
     return hn::Mul(hn::Mul(t, t), hn::NegMulAdd(set(2.0f), t, set(3.0f)));
 }
 HWY_INLINE Floats lerp(Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); }
-
-// mix_bits() of density/noise_hash.h.
-HWY_INLINE Hash mixed(Hash h) {
-    const Words d;
-    h = hn::Mul(hn::Xor(h, hn::ShiftRight<16>(h)), hn::Set(d, kMixFirst));
-    h = hn::Mul(hn::Xor(h, hn::ShiftRight<15>(h)), hn::Set(d, kMixSecond));
-    return hn::Xor(h, hn::ShiftRight<16>(h));
-}
 
 // A floor as a cell's number modulo 2^32; far points, which no octave resolves, have any.
 HWY_INLINE Hash cell_of(Floats floor, std::uint32_t first) {

@@ -109,7 +109,7 @@ std::vector<double> absorbed_light(const Cloud& cloud, const Vec3& position_m, c
     return result;
 }
 
-std::size_t LightAbsorption::update(std::span<const LitCloud> clouds, const Light& light,
+std::size_t LightAbsorption::update(std::span<const CloudToLight> clouds, const Light& light,
                                     std::size_t max_clouds) {
     check_light(light);
     ++calls_;
@@ -129,7 +129,7 @@ std::size_t LightAbsorption::update(std::span<const LitCloud> clouds, const Ligh
     std::ranges::stable_sort(stale, {}, &Stale::computed);
     if (stale.size() > max_clouds) stale.resize(max_clouds);
     for (const Stale& s : stale) {
-        const LitCloud& lit = clouds[s.index];
+        const CloudToLight& lit = clouds[s.index];
         Entry& entry = entries_[lit.id];
         entry.absorbed.resize(lit.cloud->boxes.size());
         absorb_light(*lit.cloud, lit.position_m, light, entry.absorbed);

@@ -44,7 +44,7 @@ void absorb_light(const Cloud& cloud, const Vec3& position_m, const Light& light
 std::vector<double> absorbed_light(const Cloud& cloud, const Vec3& position_m, const Light& light);
 
 // One cloud to keep lit.
-struct LitCloud {
+struct CloudToLight {
     std::uint64_t id = 0;          // the same cloud has the same id in every call
     const Cloud* cloud = nullptr;  // not null; shape of an id never changes
     Vec3 position_m;
@@ -58,7 +58,7 @@ class LightAbsorption {
     // Recomputes at most `max_clouds` of the clouds whose light moved: those never computed first, in the
     // order given, then those computed longest ago. Forgets clouds that are not in the list. Returns how many
     // it did.
-    std::size_t update(std::span<const LitCloud> clouds, const Light& light,
+    std::size_t update(std::span<const CloudToLight> clouds, const Light& light,
                        std::size_t max_clouds = std::numeric_limits<std::size_t>::max());
 
     // As computed last; empty for a cloud that was never computed.

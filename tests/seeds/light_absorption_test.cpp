@@ -146,7 +146,7 @@ TEST(LightAbsorptionUpdate, BoundedAndOnlyWhenTheLightMoved) {
     std::mt19937_64 random(4);
     std::vector<Cloud> shapes;
     for (int i = 0; i < 5; ++i) shapes.push_back(random_cloud(random, 6));
-    std::vector<LitCloud> clouds;
+    std::vector<CloudToLight> clouds;
     for (std::uint64_t i = 0; i < 5; ++i) clouds.push_back({100 + i, &shapes[i], {double(i) * 1000, 0, 500}});
     const Light noon{{0, 0, 1}, true}, evening{{1, 0, 0.1}, true};
     LightAbsorption absorption;
@@ -159,12 +159,12 @@ TEST(LightAbsorptionUpdate, BoundedAndOnlyWhenTheLightMoved) {
     EXPECT_EQ(absorption.update(clouds, noon, 2), 0u);  // all done, the light stands still
     LightAbsorption other;
     EXPECT_EQ(other.update(std::vector{clouds[0], clouds[0]}, noon), 1u);  // named twice, computed once
-    for (LitCloud& c : clouds) c.position_m.x += 77;
+    for (CloudToLight& c : clouds) c.position_m.x += 77;
     EXPECT_EQ(absorption.update(clouds, noon), 0u);  // the sun is as far as before
 
     // The light moves in every call: everyone gets a turn, one cloud a call, oldest first.
     std::vector<std::vector<double>> before;
-    for (const LitCloud& c : clouds) {
+    for (const CloudToLight& c : clouds) {
         const auto a = absorption.absorbed(c.id);
         before.emplace_back(a.begin(), a.end());
     }
