@@ -4,32 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <string>
 
-#include "automaton/error.h"
 #include "render/camera.h"
+#include "render/option_checks.h"
 #include "render/sun_position.h"
 
 namespace nephos {
 namespace {
 
-void require(bool good, const char* name, const char* expected) {
-    if (!good) throw Error(ErrorCode::usage, std::string(name) + ": expected " + expected);
-}
-
-// NaN fails every comparison, so it is out of every range.
-bool within(double value, double min, double max) { return value >= min && value <= max; }
-
-bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
-bool colour_within(const Rgb& colour, double max) {
-    for (const double value : colour)
-        if (!within(value, 0, max)) return false;
-    return true;
-}
-
 void check_colour(const Rgb& colour, const char* name) {
-    require(colour_within(colour, 1e6), name, "three numbers from 0 to 1e6");
+    require(within(colour, 0, 1e6), name, "three numbers from 0 to 1e6");
 }
 
 void check_path(const Camera& camera) {
@@ -86,13 +70,13 @@ void check(const RenderOptions& options) {
     check_colour(light.ambient_base, "light.ambient_base");
     require(light.light_distance_m > 0, "light.light_distance_m", "metres above 0");
     require(light.cfa_clouds_per_frame >= 0, "light.cfa_clouds_per_frame", "0 or more clouds");
-    require(colour_within(options.air.extinction_per_m, 1), "air.extinction_per_m",
+    require(within(options.air.extinction_per_m, 0, 1), "air.extinction_per_m",
             "three numbers from 0 to 1 per metre");
     check_colour(options.air.horizon, "air.horizon");
     check_colour(options.air.zenith, "air.zenith");
     check(options.atmosphere);
     require(std::isfinite(options.ground.height_m), "ground.height_m", "finite metres");
-    require(colour_within(options.ground.albedo, 1), "ground.albedo", "three numbers from 0 to 1");
+    require(within(options.ground.albedo, 0, 1), "ground.albedo", "three numbers from 0 to 1");
     check(options.wet_ground);
     require(within(options.shadow_map_size, 16, 8192), "shadow_map_size", "16..8192 texels");
     check(options.shells);
@@ -103,7 +87,7 @@ void check(const RenderOptions& options) {
         require(flash.time_s >= 0 && std::isfinite(flash.time_s), "lightning.time_s", "0 or more seconds");
         require(flash.duration_s > 0 && std::isfinite(flash.duration_s), "lightning.duration_s",
                 "seconds above 0");
-        require(colour_within(flash.colour, 1), "lightning.colour", "three numbers from 0 to 1");
+        require(within(flash.colour, 0, 1), "lightning.colour", "three numbers from 0 to 1");
         require(within(flash.intensity, 0, 1e6), "lightning.intensity", "0..1e6");
     }
 }

@@ -1,23 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/shell_options.h"
 
-#include <algorithm>
-#include <cmath>
-#include <string>
-
-#include "automaton/error.h"
+#include "render/option_checks.h"
 #include "render/shaders/shared.h"
 
 namespace nephos {
-namespace {
-
-void require(bool good, const char* name, const char* expected) {
-    if (!good) throw Error(ErrorCode::usage, std::string(name) + ": expected " + expected);
-}
-
-bool within(double value, double min, double max) { return value >= min && value <= max; }
-
-}  // namespace
 
 void check(const Shells& shells) {
     require(shells.count >= 1 && shells.count <= int(shader::kMaxShells), "shells.count", "1..128 shells");
@@ -39,7 +26,7 @@ void check(const Fog& fog) {
     require(within(fog.patchiness, 0, 1), "fog.patchiness", "0..1");
     require(within(fog.patch_m, 1, 1e6), "fog.patch_m", "1..1e6 metres");
     const Vec3& v = fog.velocity_m_per_s;
-    require(within(std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}), 0, 1e3), "fog.velocity_m_per_s",
+    require(within({v.x, v.y, v.z}, -1e3, 1e3), "fog.velocity_m_per_s",
             "three numbers, -1000..1000 metres per second");
 }
 

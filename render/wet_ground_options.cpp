@@ -1,32 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/wet_ground_options.h"
 
-#include <string>
-
-#include "automaton/error.h"
+#include "render/option_checks.h"
 
 namespace nephos {
-namespace {
-
-// NaN fails every comparison, so it is out of every range.
-void require_within(double value, double min, double max, const char* name, const char* expected) {
-    if (value >= min && value <= max) return;
-    throw Error(ErrorCode::usage, std::string("wet_ground.") + name + ": expected " + expected);
-}
-
-}  // namespace
 
 void check(const WetGroundOptions& options) {
-    require_within(options.soaking_mm, 1e-3, 100, "soaking_mm", "0.001..100 mm");
-    require_within(options.puddle_film_mm, 1e-3, 100, "puddle_film_mm", "0.001..100 mm");
-    require_within(options.puddle_size_m, 0.1, 1000, "puddle_size_m", "0.1..1000 metres");
-    require_within(options.reflection, 0, 1, "reflection", "0..1");
-    require_within(options.reflection_scale, 0.1, 1, "reflection_scale", "0.1..1");
-    require_within(options.sheen, 0, 1, "sheen", "0..1");
-    require_within(options.ripples, 0, 10, "ripples", "0..10");
-    require_within(options.snow_cover_mm, 1e-3, 1000, "snow_cover_mm", "0.001..1000 mm");
-    for (const double albedo : options.snow_albedo)
-        require_within(albedo, 0, 1, "snow_albedo", "three numbers from 0 to 1");
+    require(within(options.soaking_mm, 1e-3, 100), "wet_ground.soaking_mm", "0.001..100 mm");
+    require(within(options.puddle_film_mm, 1e-3, 100), "wet_ground.puddle_film_mm", "0.001..100 mm");
+    require(within(options.puddle_size_m, 0.1, 1000), "wet_ground.puddle_size_m", "0.1..1000 metres");
+    require(within(options.reflection, 0, 1), "wet_ground.reflection", "0..1");
+    require(within(options.reflection_scale, 0.1, 1), "wet_ground.reflection_scale", "0.1..1");
+    require(within(options.sheen, 0, 1), "wet_ground.sheen", "0..1");
+    require(within(options.ripples, 0, 10), "wet_ground.ripples", "0..10");
+    require(within(options.snow_cover_mm, 1e-3, 1000), "wet_ground.snow_cover_mm", "0.001..1000 mm");
+    require(within(options.snow_albedo, 0, 1), "wet_ground.snow_albedo", "three numbers from 0 to 1");
 }
 
 }  // namespace nephos
