@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "automaton/error.h"
+#include "automaton/smoothstep.h"
 #include "automaton/trigonometry.h"
 #include "density/noise_hash.h"
 #include "density/openvdb_access.h"
@@ -20,15 +21,10 @@ namespace {
 constexpr float kLeastDensity = 0x1p-10f;
 constexpr int kSampleGroups = 64, kSamplesInGroup = 256;
 
-double smoothstep(double t) {
-    t = std::clamp(t, 0.0, 1.0);
-    return t * t * (3 - 2 * t);
-}
-
 // 0 at an end and 1 from `width` on; a step without width.
 double fade(double from_end, double width) {
     if (from_end <= 0) return 0;
-    return width > 0 ? smoothstep(from_end / width) : 1;
+    return width > 0 ? smoothstep(0, width, from_end) : 1;
 }
 
 // Samples of q at random places of the frame, wherever the veil lies: 64 places far apart with 256 points
@@ -240,9 +236,7 @@ void collect(const VeilField& field, const openvdb::Coord& origin, BlockPoints& 
 }
 
 float density_of(const VeilField& field, float q, float weight) {
-    const float range = field.plan.high - field.plan.low;
-    const float t = std::clamp((q - field.plan.low) / range, 0.0f, 1.0f);
-    const float pattern = t * t * (3 - 2 * t);
+    const float pattern = smoothstep(field.plan.low, field.plan.high, q);
     const float density = (field.sheet + (1 - field.sheet) * pattern) * weight;
     return density < kLeastDensity ? 0.0f : density;
 }

@@ -13,7 +13,9 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
+#include "automaton/smoothstep.h"
 #include "render/shaders/shared.h"
+#include "render/smoothstep-inl.h"
 
 #ifndef NEPHOS_AIR_PATH_TYPES_
 #define NEPHOS_AIR_PATH_TYPES_
@@ -84,8 +86,7 @@ void add_part(const PartRows& part, const SunBlock& suns) {
                                            air_set(part.per_twice_disc), air_set(0.5f));
         const AirFloats share = hn::Max(hn::Min(above, one), zero);
         if (!hn::AllFalse(d, hn::Gt(share, zero))) {
-            const AirFloats visible =
-                hn::Mul(hn::Mul(share, share), hn::NegMulAdd(air_set(2.0f), share, air_set(3.0f)));
+            const AirFloats visible = smooth_blend(share);
             const AirFloats along = hn::Mul(sine, air_set(part.radius));
             const AirFloats to_top =
                 hn::Sub(hn::Sqrt(hn::Max(hn::MulAdd(along, along, air_set(part.inside)), zero)), along);
@@ -329,8 +330,7 @@ void scatter_along(const SphericalAir& air, const AirTables& tables, const AirPa
 }
 
 double visible_sun(double sine, double horizon_sine) {
-    const double x = std::clamp(0.5 + 0.5 * (sine - horizon_sine) / double(shader::kSunRadius), 0.0, 1.0);
-    return x * x * (3 - 2 * x);
+    return smoothstep(0, 1, 0.5 + 0.5 * (sine - horizon_sine) / double(shader::kSunRadius));
 }
 
 GaussRule::GaussRule(int count) : nodes(std::size_t(count)), weights(std::size_t(count)) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "automaton/smoothstep.h"
 #include "automaton/vector_math.h"
 #include "render/cloud_preparation.h"
 
@@ -48,9 +49,8 @@ void use_sky(const RenderOptions& options, const SkyLight& sky, PictureFrame& fr
 }  // namespace
 
 Daylight daylight(double sun_elevation_deg) {
-    const double x = std::clamp((sun_elevation_deg + 2.0) / 4.0, 0.0, 1.0);
     const double below = std::max(0.0, 10.0 - sun_elevation_deg);
-    return {x * x * (3.0 - 2.0 * x), std::exp(-0.0079 * below * below)};
+    return {smoothstep(-2, 2, sun_elevation_deg), std::exp(-0.0079 * below * below)};
 }
 
 Picture blank_picture(const RenderOptions& options) {

@@ -17,6 +17,7 @@
 #include "density/noise_hash-inl.h"
 #include "render/background-inl.h"
 #include "render/ground_noise.h"
+#include "render/smoothstep-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -27,8 +28,7 @@ using Hash = hn::Vec<Words>;
 
 HWY_INLINE Floats clamp01(Floats x) { return hn::Max(hn::Min(x, set(1.0f)), hn::Zero(Lanes())); }
 HWY_INLINE Floats smooth_step(Floats low, Floats high, Floats x) {
-    const Floats t = clamp01(hn::Div(hn::Sub(x, low), hn::Sub(high, low)));
-    return hn::Mul(hn::Mul(t, t), hn::NegMulAdd(set(2.0f), t, set(3.0f)));
+    return smooth_blend(clamp01(hn::Div(hn::Sub(x, low), hn::Sub(high, low))));
 }
 HWY_INLINE Floats lerp(Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); }
 

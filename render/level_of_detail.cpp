@@ -10,6 +10,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "automaton/smoothstep.h"
 #include "automaton/vector_math.h"
 
 namespace nephos {
@@ -185,8 +186,7 @@ struct Merging {
 
 // From 1 at kFull of the threshold to 0.
 float falling_step(double contrast, double threshold) {
-    const double t = std::clamp((threshold - contrast) / ((1 - kFull) * threshold), 0.0, 1.0);
-    return float(t * t * (3 - 2 * t));
+    return float(smoothstep(0, (1 - kFull) * threshold, threshold - contrast));
 }
 
 // The blocks of one block of 8 x 8 x 8 voxels.

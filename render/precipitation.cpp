@@ -7,6 +7,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "automaton/smoothstep.h"
 #include "automaton/vector_math.h"
 #include "render/drop_sizes.h"
 #include "render/frame_data.h"
@@ -25,16 +26,11 @@ constexpr double kFadeDepths = 3;
 constexpr double kFarDepths = 10;     // depth of the far container in depths of the near one
 constexpr double kNearHeight = 1.25;  // height of the near container in depths
 
-double smooth(double s) {
-    s = std::clamp(s, 0.0, 1.0);
-    return s * s * (3 - 2 * s);
-}
-
 }  // namespace
 
 RainShares rain_shares(const PrecipitationOptions& p, double outside_m) {
     RainShares shares;
-    shares.near = 1 - smooth(outside_m / (kFadeDepths * p.depth_m));
+    shares.near = 1 - smoothstep(0, kFadeDepths * p.depth_m, outside_m);
     shares.far = (1 - shares.near);
     shares.far_number = std::clamp(1 - outside_m / p.reach_m, 0.0, 1.0);
     return shares;

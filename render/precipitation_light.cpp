@@ -4,16 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "automaton/smoothstep.h"
 #include "automaton/vector_math.h"
 #include "render/frame_data.h"
 
 namespace nephos {
 namespace {
-
-double smooth(double low, double high, double x) {
-    const double s = std::clamp((x - low) / (high - low), 0.0, 1.0);
-    return s * s * (3 - 2 * s);
-}
 
 // Henyey and Greenstein 1941, times pi: radiance per radiance of a white surface that faces the light.
 double phase(double g, double cosine) {
@@ -56,8 +52,8 @@ Rgb surroundings(const Picture& picture, const RenderOptions& options, const Cam
                               std::sqrt(1 + across * across + upward * upward);
             const float* pixel =
                 &picture.beauty[3 * (std::size_t(y) * std::size_t(picture.width) + std::size_t(x))];
-            above.add(pixel, smooth(-0.05, 0.15, up));
-            below.add(pixel, smooth(0.02, -0.2, up));
+            above.add(pixel, smoothstep(-0.05, 0.15, up));
+            below.add(pixel, smoothstep(0.02, -0.2, up));
         }
     }
     const double more = kShareOfOptions * double(std::max<std::size_t>(looked, 1));

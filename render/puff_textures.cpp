@@ -4,36 +4,27 @@
 #include <algorithm>
 #include <cmath>
 
+#include "automaton/smoothstep.h"
+#include "density/noise_hash.h"
+
 namespace nephos {
 namespace {
 
 // Only + - * / and sqrt below: the textures have the same bytes with every C library.
 
-std::uint32_t mixed(std::uint32_t x) {
-    x = (x ^ x >> 16) * 0x7feb352du;
-    x = (x ^ x >> 15) * 0x846ca68bu;
-    return x ^ x >> 16;
-}
-
 // 0..1, a function of its arguments.
 double random_at(std::uint32_t seed, int x, int y) {
-    return mixed(mixed(seed + 0x9e3779b9u * std::uint32_t(x)) ^ 0x85ebca6bu * std::uint32_t(y)) /
+    return mix_bits(mix_bits(seed + 0x9e3779b9u * std::uint32_t(x)) ^ 0x85ebca6bu * std::uint32_t(y)) /
            4294967295.0;
 }
 
 double mix(double a, double b, double t) { return a + (b - a) * t; }
 
-// 0 below a, 1 above b, smooth between.
-double smooth(double a, double b, double x) {
-    const double t = std::clamp((x - a) / (b - a), 0.0, 1.0);
-    return t * t * (3 - 2 * t);
-}
-
 // Values at the integer points, interpolated with zero slope there; 0..1.
 double value_noise(std::uint32_t seed, double x, double y) {
     const double fx = std::floor(x), fy = std::floor(y);
     const int i = int(fx), j = int(fy);
-    const double u = smooth(0, 1, x - fx), v = smooth(0, 1, y - fy);
+    const double u = smoothstep(0, 1, x - fx), v = smoothstep(0, 1, y - fy);
     return mix(mix(random_at(seed, i, j), random_at(seed, i + 1, j), u),
                mix(random_at(seed, i, j + 1), random_at(seed, i + 1, j + 1), u), v);
 }
@@ -61,7 +52,7 @@ Texel soft_puff(std::uint32_t seed, double x, double y) {
     const double ragged = fractal_noise(seed, 2.2 * x + 9, 2.2 * y + 9, 5) - 0.5;
     const double fine = fractal_noise(seed + 7, 5 * x + 31, 5 * y + 31, 4) - 0.5;
     const double r = 0.82 * std::sqrt(x * x + y * y) + 0.75 * ragged;
-    const double body = 1 - smooth(0.05, 0.85, r);
+    const double body = 1 - smoothstep(0.05, 0.85, r);
     return {0.8 * body * std::clamp(1 + 0.7 * fine, 0.0, 1.2),
             0.86 + 0.14 * std::clamp(0.5 + 2 * fine, 0.0, 1.0)};
 }
@@ -75,9 +66,9 @@ Texel wisp(std::uint32_t seed, double x, double y) {
     const double fibres = fractal_noise(seed, 1.3 * x + 20, 7 * across + 20, 5);
     const double strands =
         1 - 2 * std::abs(fractal_noise(seed + 5, 0.9 * x + 40, 3.5 * across + 40, 4) - 0.5);
-    const double patches = smooth(0.3, 0.7, fractal_noise(seed + 9, 1.4 * x + 60, 1.4 * y + 60, 3));
-    const double body = 1 - smooth(0.1, 0.95, std::sqrt(0.85 * x * x + 1.4 * across * across));
-    const double fibre = smooth(0.3, 0.75, fibres) * strands * strands;
+    const double patches = smoothstep(0.3, 0.7, fractal_noise(seed + 9, 1.4 * x + 60, 1.4 * y + 60, 3));
+    const double body = 1 - smoothstep(0.1, 0.95, std::sqrt(0.85 * x * x + 1.4 * across * across));
+    const double fibre = smoothstep(0.3, 0.75, fibres) * strands * strands;
     return {0.85 * body * fibre * (0.35 + 0.65 * patches), 0.95 + 0.05 * fibres};
 }
 
@@ -106,13 +97,13 @@ Texel cauliflower(std::uint32_t seed, double x, double y) {
         bulge = std::max(bulge, height / radius);
     }
     const double fine = fractal_noise(seed + 17, 6 * x + 71, 6 * y + 71, 4) - 0.5;
-    const double opacity = smooth(0.0, 0.75, thickness * (1 + 0.8 * fine));
+    const double opacity = smoothstep(0.0, 0.75, thickness * (1 + 0.8 * fine));
     return {0.97 * opacity, 0.74 + 0.26 * std::clamp(bulge * bulge + 0.5 * fine, 0.0, 1.0)};
 }
 
 // Not even the raggedest picture reaches the circle that touches the sides.
 Texel bounded(Texel texel, double x, double y) {
-    texel.opacity *= 1 - smooth(0.8, 0.985, std::sqrt(x * x + y * y));
+    texel.opacity *= 1 - smoothstep(0.8, 0.985, std::sqrt(x * x + y * y));
     return texel;
 }
 
@@ -123,7 +114,7 @@ PuffLevel finest_level() {
     level.texels.reserve(std::size_t(2) * kPuffKinds * kPuffVariants * kPuffTexels * kPuffTexels);
     constexpr Texel (*kKinds[kPuffKinds])(std::uint32_t, double, double) = {&soft_puff, &wisp, &cauliflower};
     for (int layer = 0; layer < kPuffKinds * kPuffVariants; ++layer) {
-        const std::uint32_t seed = mixed(std::uint32_t(layer) + 1);
+        const std::uint32_t seed = mix_bits(std::uint32_t(layer) + 1);
         for (int j = 0; j < kPuffTexels; ++j) {
             for (int i = 0; i < kPuffTexels; ++i) {
                 const double x = 2 * (i + 0.5) / kPuffTexels - 1, y = 1 - 2 * (j + 0.5) / kPuffTexels;

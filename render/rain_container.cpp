@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "automaton/smoothstep.h"
 #include "automaton/vector_math.h"
 
 namespace nephos {
@@ -102,8 +103,7 @@ double rain_share(const Ellipse& e, double x_m, double y_m, double edge) {
     const double value = ellipse_value(e, x_m, y_m);
     if (value >= 1) return 0;
     if (edge <= 0) return 1;
-    const double s = std::min(1.0, (1 - std::sqrt(value)) / edge);
-    return s * s * (3 - 2 * s);
+    return smoothstep(0, edge, 1 - std::sqrt(value));
 }
 
 SideLines side_lines(const CameraFrame& f) {

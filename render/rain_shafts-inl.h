@@ -18,6 +18,7 @@
 
 #include "render/background-inl.h"
 #include "render/rain_shafts_pass.h"
+#include "render/smoothstep-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -28,7 +29,6 @@ HWY_INLINE Floats3 set3(const Float3& v) { return {set(v.x), set(v.y), set(v.z)}
 HWY_INLINE Floats clamped(Floats v, float low, float high) {
     return hn::Min(hn::Max(v, set(low)), set(high));
 }
-HWY_INLINE Floats smooth(Floats s) { return hn::Mul(hn::Mul(s, s), hn::NegMulAdd(set(2), s, set(3))); }
 
 // The rays of some pixels of a row, and one curtain's part of them.
 struct Way {
@@ -88,7 +88,7 @@ HWY_INLINE Floats noise_at(const ShaftPass& p, Floats x, Floats y) {
     const hn::RebindToSigned<Lanes> di;
     const hn::RebindToUnsigned<Lanes> du;
     const Floats x0 = hn::Floor(x), y0 = hn::Floor(y);
-    const Floats sx = smooth(hn::Sub(x, x0)), sy = smooth(hn::Sub(y, y0));
+    const Floats sx = smooth_blend(hn::Sub(x, x0)), sy = smooth_blend(hn::Sub(y, y0));
     const auto side = hn::Set(di, kShaftNoiseSide - 1), byte = hn::Set(di, 255);
     const auto column = hn::And(hn::ConvertTo(di, x0), side), row = hn::And(hn::ConvertTo(di, y0), side);
     const auto cell = hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(p.noise.data()),
@@ -144,7 +144,7 @@ HWY_INLINE Floats extinction(const ShaftPass& p, const SeenCurtain& c, const Way
     const Floats inside = hn::NegMulAdd(radius, hn::MulAdd(set(p.fray), strands, one), one);
     const Floats inner = p.softness > 0 ? clamped(hn::Mul(inside, set(1 / p.softness)), 0, 1)
                                         : hn::IfThenElseZero(hn::Gt(inside, zero), one);
-    const Floats even = hn::Mul(most, smooth(inner));
+    const Floats even = hn::Mul(most, smooth_blend(inner));
     if (p.contrast <= 0) return even;
     const float mean = -2.25f * p.contrast - 0.25f * p.contrast * p.contrast;
     const Floats power = hn::MulAdd(set(4.5f * p.contrast), strands, set(mean));
@@ -292,7 +292,8 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
                 densest = hn::Max(densest, hn::Mul(steady, met.falls(m)));
             }
             if (p.clear_m > 0 && !hn::AllFalse(d, hn::Lt(t, set(p.clear_m))))
-                densest = hn::Mul(densest, smooth(clamped(hn::MulSub(set(2 / p.clear_m), t, set(1)), 0, 1)));
+                densest =
+                    hn::Mul(densest, smooth_blend(clamped(hn::MulSub(set(2 / p.clear_m), t, set(1)), 0, 1)));
             const Floats depth = hn::Mul(densest, step);
             const Floats hidden = split ? hn::IfThenZeroElse(hn::Lt(t, cloud_m), depth) : zero;
             in_front = hn::Add(in_front, hn::Sub(depth, hidden));

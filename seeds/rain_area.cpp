@@ -6,6 +6,7 @@
 #include <map>
 
 #include "seeds/checks.h"
+#include "automaton/smoothstep.h"
 #include "automaton/trigonometry.h"
 
 namespace nephos {
@@ -16,8 +17,7 @@ constexpr double kMaxIntensity = 500;  // mm/h; the heaviest minutes on record a
 double edge_falloff(double radius, double edge) {
     if (radius >= 1) return 0;
     if (radius <= 1 - edge) return 1;
-    const double s = (1 - radius) / edge;
-    return s * s * (3 - 2 * s);
+    return smooth_blend((1 - radius) / edge);
 }
 
 void check_probabilities(const std::string& what, const Probabilities& p) {
