@@ -3,22 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "automaton/smoothstep.h"
 #include "automaton/vector_math.h"
 #include "render/frame_data.h"
+#include "render/phase_function.h"
 
 namespace nephos {
 namespace {
 
-// Henyey and Greenstein 1941, times pi: radiance per radiance of a white surface that faces the light.
-double phase(double g, double cosine) {
-    const double base = 1 + g * g - 2 * g * cosine;
-    return 0.25 * (1 - g * g) / (base * std::sqrt(base));
-}
-
+// Times pi: radiance per radiance of a white surface that faces the light.
 double particle_phase(PrecipitationKind kind, double cosine) {
-    return kForwardShare * phase(forward_g(kind), cosine) + (1 - kForwardShare) * 0.25;
+    return kForwardShare * std::numbers::pi * henyey_greenstein(cosine, forward_g(kind)) +
+           (1 - kForwardShare) * 0.25;
 }
 
 constexpr double kSkyShare[2] = {0.68, 0.8};  // of a drop's and a flake's light, the rest is the ground's
