@@ -12,6 +12,7 @@
 
 #include "render/renderer.h"
 #include "render/voxel_absorption.h"
+#include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
@@ -111,9 +112,7 @@ TEST(VoxelAbsorption, BoundsAreExact) {
 
 class AbsorptionPictureTest : public ::testing::Test {
   protected:
-    void TearDown() override {
-        for (const std::string& message : renderer_.validation_messages()) ADD_FAILURE() << message;
-    }
+    void TearDown() override { test::expect_no_messages(renderer_); }
     Renderer renderer_{DeviceOptions{{}, true, 2048}};
 };
 

@@ -14,30 +14,17 @@
 #include "render/frame_data.h"
 #include "render/puff_textures.h"
 #include "render/renderer.h"
+#include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
 namespace {
 
-// Every test draws in every way that has billboards, with the validation layer on, and fails when it says
-// anything.
-class BillboardTest : public ::testing::TestWithParam<Splatting> {
-  protected:
-    void TearDown() override {
-        for (const std::string& message : renderer_.validation_messages()) ADD_FAILURE() << message;
-    }
-    Renderer renderer_{DeviceOptions{{}, true, 2048, GetParam()}};
-};
+// In the ways that have billboards.
+class BillboardTest : public test::EveryWay {};
 
 RenderOptions view(Vec3 from, Vec3 to, int width = 65, int height = 65, double fov = 40) {
-    RenderOptions options;
-    options.camera.position_m = from;
-    options.camera.target_m = to;
-    options.camera.vertical_fov_deg = fov;
-    options.camera.width = width;
-    options.camera.height = height;
-    options.shadow_map_size = 64;
-    return options;
+    return test::view(from, to, fov, width, height, 64);
 }
 
 Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -222,14 +209,14 @@ TEST_P(BillboardTest, PicturesDependNeitherOnTheOrderGivenNorOnTiles) {
     EXPECT_TRUE(same_bits(first, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
     std::shuffle(billboards.begin(), billboards.end(), std::mt19937(4));
     EXPECT_TRUE(same_bits(first, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
-    Renderer tiled{DeviceOptions{{}, true, 32, GetParam()}};
+    Renderer tiled(test::validated(GetParam(), 32));
     const Picture in_tiles = tiled.draw_splats(scene_of(kClouds, billboards), options);
     reference::DifferenceSum sum;
     for (std::size_t i = 0; i < first.beauty.size(); ++i)
         sum.add(double(first.beauty[i]), double(in_tiles.beauty[i]));
     EXPECT_LT(sum.result().max, 0.04);
     EXPECT_LT(sum.result().mean, 1e-3);
-    EXPECT_TRUE(tiled.validation_messages().empty());
+    test::expect_no_messages(tiled);
 }
 
 // A red cloud of metaballs between two billboards, in either order: the nearer hides the farther.
@@ -251,17 +238,10 @@ TEST_P(BillboardTest, BillboardsAndMetaballsHideEachOtherByDistance) {
     EXPECT_NEAR(depth(500), 3000, 1);    // and behind it
 }
 
-float largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
-    EXPECT_EQ(a.size(), b.size());
-    float largest = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
-    return largest;
-}
-
 // From outside, from among them, and from so far that all are widened; of large and small textures; by day
 // and by lightning; with metaballs between them.
 TEST_P(BillboardTest, AgreesWithTheBlendedPass) {
-    Renderer reference_renderer{DeviceOptions{{}, true, 2048, Splatting::billboards}};
+    Renderer reference_renderer(test::validated(Splatting::billboards));
     const std::vector<CloudBillboard> billboards = random_billboards(8, 400, 2);
     const std::vector<Metaball> balls = reference::random_metaballs(9, 200);
     for (const RenderOptions& options :
@@ -276,14 +256,14 @@ TEST_P(BillboardTest, AgreesWithTheBlendedPass) {
                 const Picture slow = reference_renderer.draw_splats(splats, options);
                 // Close to the lightning radiance is far above 1; there it is the share that counts.
                 const float brightest = std::max(1.0f, *std::ranges::max_element(slow.beauty));
-                EXPECT_LE(largest_difference(fast.beauty, slow.beauty), brightest / 255.0f);
-                EXPECT_LE(largest_difference(fast.transmittance, slow.transmittance), 1.0f / 255.0f);
+                EXPECT_LE(test::largest_difference(fast.beauty, slow.beauty), brightest / 255.0f);
+                EXPECT_LE(test::largest_difference(fast.transmittance, slow.transmittance), 1.0f / 255.0f);
                 splats.light = false;
                 EXPECT_EQ(renderer_.draw_splats(splats, options).beauty, fast.beauty);
             }
         }
     }
-    for (const std::string& message : reference_renderer.validation_messages()) ADD_FAILURE() << message;
+    test::expect_no_messages(reference_renderer);
 }
 
 // Whoever does not ask for depth gets the same picture without it.
@@ -364,9 +344,7 @@ TEST_P(BillboardTest, BadBillboardsAreRefusedByNumber) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, BillboardTest, ::testing::Values(Splatting::processor, Splatting::billboards),
-                         [](const auto& way) {
-                             return way.param == Splatting::processor ? "processor" : "billboards";
-                         });
+                         test::way_name);
 
 // Every level is dark in its outermost texels, hides as much as the finest, and is no brighter than opaque.
 TEST(PuffTextures, AreDarkAtTheirRimsAndHideTheSameAtAllLevels) {

@@ -11,19 +11,14 @@
 #include "automaton/error.h"
 #include "density/noise.h"
 #include "render/renderer.h"
+#include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
 namespace {
 
 RenderOptions view(const Vec3& from, const Vec3& to, double fov = 60, int width = 96, int height = 64) {
-    RenderOptions options;
-    options.camera.position_m = from;
-    options.camera.target_m = to;
-    options.camera.vertical_fov_deg = fov;
-    options.camera.width = width;
-    options.camera.height = height;
-    options.shadow_map_size = 128;
+    RenderOptions options = test::view(from, to, fov, width, height);
     options.sun.elevation_deg = 25;
     options.sun.azimuth_deg = 10;
     options.shells = {40, 10, 1.12};
@@ -60,20 +55,9 @@ std::vector<RenderOptions> views() {
     return all;
 }
 
-float largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
-    EXPECT_EQ(a.size(), b.size());
-    float largest = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
-    return largest;
-}
-
-void expect_no_messages(const Renderer& renderer) {
-    for (const std::string& message : renderer.validation_messages()) ADD_FAILURE() << message;
-}
-
 TEST(Fog, TheThreeWaysAgree) {
-    Renderer reference({{}, true, 2048, Splatting::billboards});
-    Renderer tiles({{}, true, 2048, Splatting::tiles}), processor({{}, true, 2048, Splatting::processor});
+    Renderer reference(test::validated(Splatting::billboards));
+    Renderer tiles(test::validated(Splatting::tiles)), processor(test::validated(Splatting::processor));
     const std::vector<Metaball> some = clouds(3);
     float worst = 0;
     for (const RenderOptions& options : views()) {
@@ -82,9 +66,10 @@ TEST(Fog, TheThreeWaysAgree) {
             const Picture expected = reference.draw(cloud, options);
             for (Renderer* renderer : {&tiles, &processor}) {
                 const Picture picture = renderer->draw(cloud, options);
-                const float difference = largest_difference(picture.beauty, expected.beauty);
+                const float difference = test::largest_difference(picture.beauty, expected.beauty);
                 EXPECT_LE(difference, 1.0f / 255.0f);
-                EXPECT_LE(largest_difference(picture.transmittance, expected.transmittance), 1.0f / 255.0f);
+                EXPECT_LE(test::largest_difference(picture.transmittance, expected.transmittance),
+                          1.0f / 255.0f);
                 worst = std::max(worst, difference);
                 for (std::size_t i = 0; i < picture.depth_m.size(); ++i)
                     if (expected.transmittance[i] < 0.5f) {
@@ -95,24 +80,24 @@ TEST(Fog, TheThreeWaysAgree) {
         }
     }
     std::printf("fog: largest difference between ways %.5f\n", double(worst));
-    for (const Renderer* each : {&reference, &tiles, &processor}) expect_no_messages(*each);
+    for (const Renderer* each : {&reference, &tiles, &processor}) test::expect_no_messages(*each);
 }
 
 TEST(Fog, PartsOfThePictureDoNotShow) {
     const std::vector<Metaball> balls = clouds(5);
     const MetaballCloud cloud{balls, 0.02, 0.7};
     for (const Splatting way : {Splatting::processor, Splatting::tiles}) {
-        Renderer whole({{}, true, 2048, way}), parts({{}, true, 16, way});
-        EXPECT_LE(
-            largest_difference(whole.draw(cloud, views()[0]).beauty, parts.draw(cloud, views()[0]).beauty),
-            2e-4f);
+        Renderer whole(test::validated(way)), parts(test::validated(way, 16));
+        EXPECT_LE(test::largest_difference(whole.draw(cloud, views()[0]).beauty,
+                                           parts.draw(cloud, views()[0]).beauty),
+                  2e-4f);
     }
 }
 
 // Without patches: the integral of an exponential along each ray, near and far, also seen from far above,
 // where exp(-height) is below the smallest number.
 TEST(Fog, TransmittanceIsThatOfTheExponentialLayer) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer(test::validated(Splatting::processor));
     for (RenderOptions options : {view({0, 0, 40}, {0, 1000, 60}), view({0, 0, 900}, {0, 1000, 60}),
                                   view({0, 0, 9000}, {0, 9000, 60})}) {
         options.fog = {0.004, 30, 60, 0, 300, {}, 1};
@@ -175,7 +160,7 @@ class Patches {
 };
 
 TEST(Fog, PatchesAreThoseOfTheNoise) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer(test::validated(Splatting::processor));
     RenderOptions options = view({100, -300, 20}, {100, 1000, 0}, 40, 64, 48);
     options.fog.patchiness = 1;
     options.fog.patch_m = 400;
@@ -220,7 +205,7 @@ TEST(Fog, PatchesAreThoseOfTheNoise) {
 // Fog that hides everything has the light of a cloud: not black, not brighter than white in the sun behind
 // the eye; darker below a cloud, and dark at night.
 TEST(Fog, IsLitAsCloudsAre) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer(test::validated(Splatting::processor));
     RenderOptions options = view({0, 0, 1}, {0, -100, 1}, 20, 8, 8);
     options.fog = {0.05, 0, 50, 0, 300, {}, 1};
     const auto green = [&](std::span<const Metaball> balls) {
@@ -241,7 +226,7 @@ TEST(Fog, IsLitAsCloudsAre) {
 
 // A walk through fog, in steps of half a metre: nothing appears at once.
 TEST(Fog, WalkingThroughItDoesNotPop) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer(test::validated(Splatting::processor));
     const std::vector<Metaball> balls = clouds(9);
     const MetaballCloud cloud{balls, 0.02, 0.7};
     std::vector<float> before;
@@ -249,7 +234,9 @@ TEST(Fog, WalkingThroughItDoesNotPop) {
         RenderOptions options = view({0, -2500 + 0.5 * step, 30}, {0, 10'000, 300});
         options.fog.patchiness = 1;
         const std::vector<float> now = renderer.draw(cloud, options).beauty;
-        if (!before.empty()) EXPECT_LE(largest_difference(now, before), 4.0f / 255.0f) << step;
+        if (!before.empty()) {
+            EXPECT_LE(test::largest_difference(now, before), 4.0f / 255.0f) << step;
+        }
         before = now;
     }
 }
@@ -259,7 +246,8 @@ TEST(Fog, BadOptionsAreErrors) {
     for (auto change :
          {+[](Fog& fog) { fog.extinction_per_m = -1; }, +[](Fog& fog) { fog.height_m = 0; },
           +[](Fog& fog) { fog.patchiness = 2; }, +[](Fog& fog) { fog.patch_m = NAN; },
-          +[](Fog& fog) { fog.velocity_m_per_s.y = INFINITY; }, +[](Fog& fog) { fog.base_m = 1e9; }}) {
+          +[](Fog& fog) { fog.velocity_m_per_s.y = INFINITY; },
+          +[](Fog& fog) { fog.velocity_m_per_s.z = NAN; }, +[](Fog& fog) { fog.base_m = 1e9; }}) {
         RenderOptions options = views()[0];
         change(options.fog);
         EXPECT_THROW(renderer.draw(MetaballCloud{}, options), Error);

@@ -8,6 +8,7 @@
 #include "render/renderer.h"
 #include "render/renderer_test_access.h"
 #include "tests/reference/with_threads.h"
+#include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
@@ -118,11 +119,7 @@ TEST_P(KeptLight, IsComputedWhenSomethingChanged) {
 
 INSTANTIATE_TEST_SUITE_P(Ways, KeptLight,
                          ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
-                         [](const auto& way) {
-                             return way.param == Splatting::processor ? "processor"
-                                    : way.param == Splatting::tiles   ? "tiles"
-                                                                      : "billboards";
-                         });
+                         test::way_name);
 
 }  // namespace
 }  // namespace nephos

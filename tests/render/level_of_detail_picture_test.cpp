@@ -10,17 +10,14 @@
 
 #include "render/renderer.h"
 #include "render/renderer_test_access.h"
+#include "tests/render/picture_checks.h"
 #include "tests/render/voxel_cloud.h"
 
 namespace nephos {
 namespace {
 
-class LevelOfDetailPicture : public ::testing::TestWithParam<Splatting> {
+class LevelOfDetailPicture : public test::EveryWay {
   protected:
-    static DeviceOptions validated(Splatting splatting) { return {{}, true, 2048, splatting}; }
-    void TearDown() override {
-        for (const std::string& message : renderer_.validation_messages()) ADD_FAILURE() << message;
-    }
     Picture draw(const RenderOptions& options, bool light = false) { return draw(renderer_, options, light); }
     Picture draw(Renderer& renderer, const RenderOptions& options, bool light = false) const {
         Splats splats;
@@ -29,7 +26,6 @@ class LevelOfDetailPicture : public ::testing::TestWithParam<Splatting> {
         return renderer.draw_splats(splats, options);
     }
     std::vector<Metaball> balls_ = test::ragged_cloud();
-    Renderer renderer_{validated(GetParam())};
 };
 
 RenderOptions from(const Vec3& eye, bool detail = true) {
@@ -79,13 +75,13 @@ TEST_P(LevelOfDetailPicture, IsCloseToFullDetail) {
 }
 
 TEST_P(LevelOfDetailPicture, AgreesWithBillboards) {
-    Renderer reference(validated(Splatting::billboards));
+    Renderer reference(test::validated(Splatting::billboards));
     for (const Vec3& eye : eyes()) {
         const Picture fast = draw(from(eye)), slow = draw(reference, from(eye));
         EXPECT_LE(difference(fast.beauty, slow.beauty).largest, 1.0 / 255);
         EXPECT_LE(difference(fast.transmittance, slow.transmittance).largest, 1.0 / 255);
     }
-    for (const std::string& message : reference.validation_messages()) ADD_FAILURE() << message;
+    test::expect_no_messages(reference);
 }
 
 // Whoever asks for the light gets that of the metaballs that he gave, and the same picture.
@@ -145,11 +141,7 @@ TEST_P(LevelOfDetailPicture, MovingEyeDoesNotPop) {
 
 INSTANTIATE_TEST_SUITE_P(Ways, LevelOfDetailPicture,
                          ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
-                         [](const auto& way) {
-                             return way.param == Splatting::processor ? "processor"
-                                    : way.param == Splatting::tiles   ? "tiles"
-                                                                      : "billboards";
-                         });
+                         test::way_name);
 
 }  // namespace
 }  // namespace nephos

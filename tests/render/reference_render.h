@@ -109,6 +109,25 @@ inline std::vector<Metaball> random_metaballs(unsigned seed, int count, double m
     return balls;
 }
 
+// Metaballs on a lattice, as the automaton gives them.
+inline std::vector<Metaball> lattice_cloud(int cells, float cell_m) {
+    std::vector<Metaball> balls;
+    for (int k = 0; k < cells; ++k)
+        for (int j = 0; j < cells; ++j)
+            for (int i = 0; i < cells; ++i) {
+                const float x = float(i) + 0.5f - 0.5f * float(cells),
+                            y = float(j) + 0.5f - 0.5f * float(cells),
+                            z = float(k) + 0.5f - 0.5f * float(cells);
+                const float density = 1.0f - (x * x + y * y + z * z) / (0.25f * float(cells * cells));
+                if (density > 0)
+                    balls.push_back({x * cell_m, y * cell_m, 1000 + z * cell_m, 2 * cell_m, density});
+            }
+    return balls;
+}
+
+// A saturated lattice of metaballs of two cells' radius has density 1 (density/metaballs.h).
+inline constexpr double kNormalisationTwoCells = 2835.0 / (736.0 * std::numbers::pi * 8.0);
+
 // How far a picture is from its twin.
 struct Difference {
     double max = 0, mean = 0;

@@ -11,19 +11,14 @@
 
 #include "automaton/error.h"
 #include "render/renderer.h"
+#include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
 namespace {
 
 RenderOptions view(Vec3 from, Vec3 to, double fov = 60, int width = 60, int height = 45) {
-    RenderOptions options;
-    options.camera.position_m = from;
-    options.camera.target_m = to;
-    options.camera.vertical_fov_deg = fov;
-    options.camera.width = width;
-    options.camera.height = height;
-    options.shadow_map_size = 128;
+    RenderOptions options = test::view(from, to, fov, width, height);
     options.air.extinction_per_m = {1e-4, 1.3e-4, 2e-4};
     options.sun.elevation_deg = 25;
     options.sun.azimuth_deg = 10;
@@ -60,20 +55,9 @@ std::vector<RenderOptions> views() {
     return all;
 }
 
-float largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
-    EXPECT_EQ(a.size(), b.size());
-    float largest = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
-    return largest;
-}
-
-void expect_no_messages(const Renderer& renderer) {
-    for (const std::string& message : renderer.validation_messages()) ADD_FAILURE() << message;
-}
-
 TEST(Shells, TheThreeWaysAgree) {
-    Renderer reference({{}, true, 2048, Splatting::billboards});
-    Renderer tiles({{}, true, 2048, Splatting::tiles}), processor({{}, true, 2048, Splatting::processor});
+    Renderer reference(test::validated(Splatting::billboards));
+    Renderer tiles(test::validated(Splatting::tiles)), processor(test::validated(Splatting::processor));
     const std::vector<Metaball> balls = broken_layer(7);
     const MetaballCloud cloud{balls, 0.02, 0.7};
     float worst = 0;
@@ -81,19 +65,19 @@ TEST(Shells, TheThreeWaysAgree) {
         const Picture expected = reference.draw(cloud, options);
         for (Renderer* renderer : {&tiles, &processor}) {
             const Picture picture = renderer->draw(cloud, options);
-            const float difference = largest_difference(picture.beauty, expected.beauty);
+            const float difference = test::largest_difference(picture.beauty, expected.beauty);
             EXPECT_LE(difference, 1.0f / 255.0f);
-            EXPECT_LE(largest_difference(picture.transmittance, expected.transmittance), 1.0f / 255.0f);
+            EXPECT_LE(test::largest_difference(picture.transmittance, expected.transmittance), 1.0f / 255.0f);
             worst = std::max(worst, difference);
         }
     }
     std::printf("shells: largest difference between ways %.5f\n", double(worst));
-    for (const Renderer* each : {&reference, &tiles, &processor}) expect_no_messages(*each);
+    for (const Renderer* each : {&reference, &tiles, &processor}) test::expect_no_messages(*each);
 }
 
 // Under the physical sky, shade takes away light that the air has: neither more than all of it, nor none.
 TEST(Shells, ShadeUnderThePhysicalSkyLeavesNoNegativeLight) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer(test::validated(Splatting::processor));
     const std::vector<Metaball> balls = broken_layer(7);
     const MetaballCloud cloud{balls, 0.02, 0.7};
     for (const double elevation : {1.0, 8.0, 40.0, 90.0}) {
@@ -121,10 +105,11 @@ TEST(Shells, PartsOfThePictureDoNotShow) {
     const MetaballCloud cloud{balls, 0.02, 0.7};
     const RenderOptions options = views()[0];
     for (const Splatting way : {Splatting::processor, Splatting::tiles, Splatting::billboards}) {
-        Renderer whole({{}, true, 2048, way}), parts({{}, true, 16, way});
-        EXPECT_LE(largest_difference(whole.draw(cloud, options).beauty, parts.draw(cloud, options).beauty),
-                  2e-4f);
-        expect_no_messages(parts);
+        Renderer whole(test::validated(way)), parts(test::validated(way, 16));
+        EXPECT_LE(
+            test::largest_difference(whole.draw(cloud, options).beauty, parts.draw(cloud, options).beauty),
+            2e-4f);
+        test::expect_no_messages(parts);
     }
 }
 
@@ -253,7 +238,7 @@ Shafts compare(Renderer& renderer, const MetaballCloud& cloud, RenderOptions opt
 
 // Under clouds so far above that no ray meets them: D's sum through the same shadow map.
 TEST(Shells, ShaftsEqualMarchedSingleScatteringThroughTheSameMap) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer(test::validated(Splatting::processor));
     std::vector<Metaball> balls = broken_layer(11, 700);
     for (Metaball& ball : balls) ball.z += 5000;
     const MetaballCloud cloud{balls, 0.02, 0.7};
@@ -276,7 +261,7 @@ TEST(Shells, ShaftsEqualMarchedSingleScatteringThroughTheSameMap) {
 // cloud is hidden by it, and shade begins at the cloud's top. Against the integral with the cloud's own
 // extinction, not the map.
 TEST(Shells, ShaftsBetweenCloudsEqualMarchedSingleScattering) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer(test::validated(Splatting::processor));
     std::vector<Metaball> balls;
     for (int i = 0; i < 48; ++i)
         balls.push_back(
@@ -316,7 +301,7 @@ TEST(Shells, ShaftsBetweenCloudsEqualMarchedSingleScattering) {
 
 // Shaded air never has less than no light, and nothing changes where nothing is shaded.
 TEST(Shells, ShaftsOnlyDarkenAndNeverBelowZero) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer(test::validated(Splatting::processor));
     const std::vector<Metaball> balls = broken_layer(5, 2000);
     const MetaballCloud cloud{balls, 0.2, 0.7};
     for (RenderOptions options : views()) {

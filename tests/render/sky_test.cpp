@@ -9,6 +9,7 @@
 
 #include "render/atmosphere.h"
 #include "render/renderer.h"
+#include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
@@ -27,16 +28,10 @@ RenderOptions under_sky(double elevation_deg, Vec3 from = {0, -4000, 800}, Vec3 
     return options;
 }
 
-float largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
-    float largest = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
-    return largest;
-}
-
 // From the side, from below, down from above, and towards the sun; some metaballs are integrated.
 TEST(Sky, IsTheSameInEveryWay) {
-    Renderer processor({{}, true, 2048, Splatting::processor}), tiles({{}, true, 2048, Splatting::tiles}),
-        billboards({{}, true, 2048, Splatting::billboards});
+    Renderer processor(test::validated(Splatting::processor)), tiles(test::validated(Splatting::tiles)),
+        billboards(test::validated(Splatting::billboards));
     const std::vector<Metaball> balls = reference::random_metaballs(7, 150, 80, 250);
     const MetaballCloud cloud{balls, 0.01, 0.7};
     float of_processor = 0, of_tiles = 0;
@@ -45,17 +40,17 @@ TEST(Sky, IsTheSameInEveryWay) {
              {under_sky(elevation), under_sky(elevation, {100, 200, 10}, {400, 900, 1200}),
               under_sky(elevation, {-800, -500, 9000}, {0, 0, 800})}) {
             const Picture expected = billboards.draw(cloud, options);
-            of_processor = std::max(
-                of_processor, largest_difference(processor.draw(cloud, options).beauty, expected.beauty));
-            of_tiles =
-                std::max(of_tiles, largest_difference(tiles.draw(cloud, options).beauty, expected.beauty));
+            of_processor =
+                std::max(of_processor,
+                         test::largest_difference(processor.draw(cloud, options).beauty, expected.beauty));
+            of_tiles = std::max(of_tiles,
+                                test::largest_difference(tiles.draw(cloud, options).beauty, expected.beauty));
             EXPECT_LE(of_processor, 1.0f / 255) << "sun at " << elevation;
             EXPECT_LE(of_tiles, 1.0f / 255) << "sun at " << elevation;
             for (const float value : expected.beauty) ASSERT_TRUE(std::isfinite(value) && value >= 0);
         }
     std::printf("against billboards: processor %.5f, tiles %.5f\n", double(of_processor), double(of_tiles));
-    for (const Renderer* renderer : {&processor, &tiles, &billboards})
-        for (const std::string& message : renderer->validation_messages()) ADD_FAILURE() << message;
+    for (const Renderer* renderer : {&processor, &tiles, &billboards}) test::expect_no_messages(*renderer);
 }
 
 // The ground melts into the sky: up a column of pixels across the horizon nothing jumps.

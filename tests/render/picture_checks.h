@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What tests of pictures share: the camera, the three ways of drawing, and comparisons of pictures.
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "render/renderer.h"
+
+namespace nephos::test {
+
+// A small picture with a small shadow map.
+inline RenderOptions view(Vec3 from, Vec3 to, double fov = 50, int width = 64, int height = 48,
+                          int shadow_map_size = 128) {
+    RenderOptions options;
+    options.camera.position_m = from;
+    options.camera.target_m = to;
+    options.camera.vertical_fov_deg = fov;
+    options.camera.width = width;
+    options.camera.height = height;
+    options.shadow_map_size = shadow_map_size;
+    return options;
+}
+
+inline void expect_no_messages(const Renderer& renderer) {
+    for (const std::string& message : renderer.validation_messages()) ADD_FAILURE() << message;
+}
+
+// With the validation layer on.
+inline DeviceOptions validated(Splatting way, int tile_size = 2048) { return {{}, true, tile_size, way}; }
+
+// Tests that draw in every way, with the validation layer on, and fail when it says anything.
+class EveryWay : public ::testing::TestWithParam<Splatting> {
+  protected:
+    void TearDown() override { expect_no_messages(renderer_); }
+    Renderer renderer_{validated(GetParam())};
+};
+
+inline std::string way_name(const ::testing::TestParamInfo<Splatting>& way) {
+    const char* const names[] = {"automatic", "processor", "tiles", "billboards"};
+    return names[std::size_t(way.param)];
+}
+
+inline float largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
+    EXPECT_EQ(a.size(), b.size());
+    float largest = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+    return largest;
+}
+
+inline void expect_same_bits(const std::vector<float>& a, const std::vector<float>& b, const char* what) {
+    ASSERT_EQ(a.size(), b.size()) << what;
+    EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(float)), 0) << what;
+}
+
+inline void expect_same_bits(const Picture& a, const Picture& b) {
+    expect_same_bits(a.beauty, b.beauty, "beauty");
+    expect_same_bits(a.transmittance, b.transmittance, "transmittance");
+    expect_same_bits(a.depth_m, b.depth_m, "depth");
+    expect_same_bits(a.shadow, b.shadow, "shadow");
+    expect_same_bits(a.light, b.light, "light");
+}
+
+}  // namespace nephos::test
