@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+// Density and states from OpenVDB files.
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <stdexcept>
 
 #include "automaton/error.h"
@@ -15,6 +14,7 @@
 #include "density/vdb_file.h"
 #include "density/vdb_foreign.h"
 #include "density/vdb_metadata.h"
+#include "density/vdb_sandbox.h"
 
 namespace nephos {
 namespace {
@@ -24,50 +24,6 @@ using openvdb::CoordBBox;
 
 // What follows in the stream of blocks.
 enum class Record : std::uint8_t { end, leaf, tile };
-
-constexpr std::size_t kMaxMetadataText = 1000;
-
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what) {
-    throw Error(ErrorCode::io, path.string() + ": " + what);
-}
-
-// What can be said about a file without OpenVDB.
-void check_file(const std::filesystem::path& path) {
-    std::error_code error;
-    const auto status = std::filesystem::status(path, error);
-    if (!std::filesystem::exists(status)) fail(path, error ? error.message() : "there is no such file");
-    if (std::filesystem::is_directory(status)) fail(path, "it is a folder, not a file");
-    if (!std::filesystem::is_regular_file(status)) fail(path, "it is not a regular file");
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) fail(path, std::string("cannot be opened: ") + std::strerror(errno));
-    std::array<char, 8> magic{};
-    stream.read(magic.data(), magic.size());
-    if (stream.gcount() == 0) fail(path, "the file is empty");
-    constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
-    if (stream.gcount() != std::streamsize(magic.size()) || magic != kMagic)
-        fail(path, "it is not an OpenVDB file");
-}
-
-// Runs the child's part on the opened archive, with stream errors put into words.
-void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
-                const std::function<void(VdbArchive&, SandboxWriter&)>& child,
-                const std::function<void(SandboxReader&)>& parent) {
-    check_file(path);
-    openvdb::initialize();  // before the fork, so that the child finds it done
-    run_sandboxed(
-        path, limits,
-        [&](SandboxWriter& writer) {
-            try {
-                VdbArchive archive(path);
-                child(archive, writer);
-            } catch (const std::ios_base::failure&) {
-                throw std::runtime_error("it is truncated or damaged");
-            } catch (const openvdb::Exception& error) {
-                throw std::runtime_error(std::string("it is damaged or not supported: ") + error.what());
-            }
-        },
-        parent);
-}
 
 template <class Grid>
 bool is(const openvdb::GridBase& grid) {
@@ -384,85 +340,6 @@ void receive_plane(SandboxReader& reader, BitPlane& plane) {
     }
 }
 
-using TextPairs = std::vector<std::pair<std::string, std::string>>;
-
-void send_texts(const openvdb::MetaMap& map, SandboxWriter& writer) {
-    writer.value(std::uint32_t(map.metaCount()));
-    for (auto entry = map.beginMeta(); entry != map.endMeta(); ++entry) {  // a std::map: ordered by name
-        writer.text(clamp_message(entry->first, kMaxMetadataText));
-        writer.text(clamp_message(entry->second->str(), kMaxMetadataText));
-    }
-}
-
-TextPairs receive_texts(SandboxReader& reader) {
-    TextPairs texts;
-    for (auto left = reader.value<std::uint32_t>(); left > 0; --left) {
-        std::string name = reader.text();
-        texts.emplace_back(std::move(name), reader.text());
-    }
-    return texts;
-}
-
-// Active bounds and count: as the file states them, else from the voxels.
-void send_size(VdbArchive& archive, std::size_t n, SandboxWriter& writer) {
-    const openvdb::GridBase& header = *archive.entries()[n].header;
-    const auto low = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MIN);
-    const auto high = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MAX);
-    const auto stated = meta_value<std::int64_t>(header, openvdb::GridBase::META_FILE_VOXEL_COUNT);
-    VoxelBox box;
-    std::uint64_t voxels = 0;
-    if (low && high && stated) {
-        box = {{(*low)[0], (*low)[1], (*low)[2]}, {(*high)[0], (*high)[1], (*high)[2]}};
-        voxels = std::uint64_t(*stated);
-    } else {
-        const auto grid = archive.read(n);
-        voxels = grid->activeVoxelCount();
-        const CoordBBox active = grid->evalActiveVoxelBoundingBox();
-        if (voxels > 0) {
-            box = {{active.min().x(), active.min().y(), active.min().z()},
-                   {active.max().x(), active.max().y(), active.max().z()}};
-        }
-    }
-    writer.value(box);
-    writer.value(voxels);
-}
-
-void send_info(VdbArchive& archive, SandboxWriter& writer) {
-    writer.text(archive.version());
-    writer.value(std::uint32_t(archive.entries().size()));
-    for (std::size_t n = 0; n < archive.entries().size(); ++n) {
-        const auto& [descriptor, header] = archive.entries()[n];
-        const bool half = descriptor.saveFloatAsHalf();
-        const std::string type = header->valueType();
-        writer.text(clamp_message(descriptor.gridName()));
-        writer.text(clamp_message(!half ? type : type == "float" ? "half" : type + " as half"));
-        writer.text(openvdb::GridBase::gridClassToString(header->getGridClass()));
-        const openvdb::Vec3d size = header->transform().voxelSize();
-        writer.value(Vec3{size.x(), size.y(), size.z()});
-        send_size(archive, n, writer);
-        send_texts(*header, writer);
-    }
-    send_texts(archive.metadata(), writer);
-}
-
-VdbInfo receive_info(SandboxReader& reader) {
-    VdbInfo info;
-    info.file_version = reader.text();
-    for (auto left = reader.value<std::uint32_t>(); left > 0; --left) {
-        VdbGridInfo grid;
-        grid.name = reader.text();
-        grid.type = reader.text();
-        grid.grid_class = reader.text();
-        grid.voxel_size = reader.value<Vec3>();
-        grid.active_box = reader.value<VoxelBox>();
-        grid.active_voxels = reader.value<std::uint64_t>();
-        grid.metadata = receive_texts(reader);
-        info.grids.push_back(std::move(grid));
-    }
-    info.metadata = receive_texts(reader);
-    return info;
-}
-
 }  // namespace
 
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options) {
@@ -492,14 +369,6 @@ Lattice read_state(const std::filesystem::path& path, Extent extent, const VdbRe
             for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) receive_plane(reader, *plane);
         });
     return lattice;
-}
-
-VdbInfo read_vdb_info(const std::filesystem::path& path, const VdbReadLimits& limits) {
-    VdbInfo info;
-    in_sandbox(
-        path, limits, [&](VdbArchive& archive, SandboxWriter& writer) { send_info(archive, writer); },
-        [&](SandboxReader& reader) { info = receive_info(reader); });
-    return info;
 }
 
 }  // namespace nephos
