@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,17 @@ inline RenderOptions view(Vec3 from, Vec3 to, double fov = 50, int width = 64, i
     options.camera.height = height;
     options.shadow_map_size = shadow_map_size;
     return options;
+}
+
+// A picture without clouds, of one radiance.
+inline Picture grey(const Camera& camera, float value = 0.2f) {
+    Picture picture;
+    picture.width = camera.width;
+    picture.height = camera.height;
+    picture.beauty.assign(3 * picture.pixels(), value);
+    picture.transmittance.assign(picture.pixels(), 1.0f);
+    picture.depth_m.assign(picture.pixels(), std::numeric_limits<float>::infinity());
+    return picture;
 }
 
 inline void expect_no_messages(const Renderer& renderer) {

@@ -17,6 +17,7 @@
 #include "render/drop_sizes.h"
 #include "render/particle_streaks.h"
 #include "render/rain_shafts.h"
+#include "tests/render/picture_checks.h"
 
 namespace nephos {
 namespace {
@@ -45,16 +46,6 @@ RenderOptions options_at(const Vec3& eye, const Vec3& target) {
     options.precipitation.enabled = true;
     options.precipitation.particles = 20'000;
     return options;
-}
-
-Picture grey(const Camera& camera, float value = 0.2f) {
-    Picture picture;
-    picture.width = camera.width;
-    picture.height = camera.height;
-    picture.beauty.assign(3 * picture.pixels(), value);
-    picture.transmittance.assign(picture.pixels(), 1.0f);
-    picture.depth_m.assign(picture.pixels(), std::numeric_limits<float>::infinity());
-    return picture;
 }
 
 Weather weather_of(const RainCurtain& curtain) {
@@ -286,7 +277,7 @@ TEST(Particles, AreAFunctionOfIndexAndTime) {
 
 double energy(const RenderOptions& options, const Weather& weather, double time_s) {
     const CameraFrame camera = camera_frame(options.camera);
-    const Picture picture = grey(options.camera);
+    const Picture picture = test::grey(options.camera);
     const PrecipitationLight light = precipitation_light(picture, options, camera, time_s);
     const StreakView view{options, camera, camera, camera, light, weather.wind_x_m_per_s, 0, time_s};
     static const Particles particles = make_particles(kRain, 3, 50'930);
@@ -343,11 +334,11 @@ TEST(Precipitation, IsDeterministic) {
         options.precipitation.kind = kind;
         std::vector<float> first;
         PrecipitationPainter kept;
-        Picture other = grey(options.camera);
+        Picture other = test::grey(options.camera);
         kept.draw(other, options, weather, 100);
         for (const std::size_t threads : {1, 2, 7}) {
             const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-            Picture picture = grey(options.camera), again = grey(options.camera);
+            Picture picture = test::grey(options.camera), again = test::grey(options.camera);
             PrecipitationPainter fresh;
             fresh.draw(picture, options, weather, 7);
             kept.draw(again, options, weather, 7);
@@ -356,12 +347,12 @@ TEST(Precipitation, IsDeterministic) {
             EXPECT_EQ(picture.beauty, first);
             EXPECT_EQ(again.beauty, first);
         }
-        EXPECT_NE(first, grey(options.camera).beauty);
+        EXPECT_NE(first, test::grey(options.camera).beauty);
         EXPECT_NE(first, other.beauty);
         options.precipitation.enabled = false;
-        Picture off = grey(options.camera);
+        Picture off = test::grey(options.camera);
         kept.draw(off, options, weather, 7);
-        EXPECT_EQ(off.beauty, grey(options.camera).beauty);
+        EXPECT_EQ(off.beauty, test::grey(options.camera).beauty);
     }
 }
 
@@ -369,21 +360,21 @@ TEST(Precipitation, IsDeterministic) {
 TEST(Precipitation, LiesBehindNearerClouds) {
     const Weather weather = weather_of(area());
     RenderOptions options = options_at({100, -2000, 2}, {100, 900, 300});
-    Picture hidden = grey(options.camera);
+    Picture hidden = test::grey(options.camera);
     std::fill(hidden.depth_m.begin(), hidden.depth_m.end(), 500.0f);
     std::fill(hidden.transmittance.begin(), hidden.transmittance.end(), 0.0f);
-    Picture open = grey(options.camera);
+    Picture open = test::grey(options.camera);
     PrecipitationPainter painter;
     painter.draw(hidden, options, weather, 0);
     painter.draw(open, options, weather, 0);
-    EXPECT_EQ(hidden.beauty, grey(options.camera).beauty);
+    EXPECT_EQ(hidden.beauty, test::grey(options.camera).beauty);
     EXPECT_NE(open.beauty, hidden.beauty);
     options = options_at({100, 800, 2}, {100, 900, 12});
-    Picture near = grey(options.camera);
+    Picture near = test::grey(options.camera);
     std::fill(near.depth_m.begin(), near.depth_m.end(), 500.0f);
     std::fill(near.transmittance.begin(), near.transmittance.end(), 0.0f);
     painter.draw(near, options, weather, 0);
-    EXPECT_NE(near.beauty, grey(options.camera).beauty);
+    EXPECT_NE(near.beauty, test::grey(options.camera).beauty);
 }
 
 TEST(Precipitation, RefusesBadOptions) {

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/reference/with_threads.h"
+#include "tests/render/picture_checks.h"
 #include "tests/render/reference_shafts.h"
 
 namespace nephos {
@@ -41,19 +42,9 @@ RenderOptions options_at(const Vec3& eye, const Vec3& target) {
     return options;
 }
 
-Picture grey(const Camera& camera, float value) {
-    Picture picture;
-    picture.width = camera.width;
-    picture.height = camera.height;
-    picture.beauty.assign(3 * picture.pixels(), value);
-    picture.transmittance.assign(picture.pixels(), 1.0f);
-    picture.depth_m.assign(picture.pixels(), std::numeric_limits<float>::infinity());
-    return picture;
-}
-
 // A picture with clouds at all distances before and behind the rain, and their shadow.
 Picture cloudy(const Camera& camera, std::mt19937& random) {
-    Picture picture = grey(camera, 0.2f);
+    Picture picture = test::grey(camera, 0.2f);
     std::uniform_real_distribution<float> share(0.0f, 1.0f);
     for (std::size_t i = 0; i < picture.pixels(); ++i) {
         if (share(random) < 0.3f) continue;
@@ -105,7 +96,7 @@ TEST(RainShafts, HaveTheirOpticalDepth) {
     p.edge = 0;
     p.shaft_texture = 0;
     options.air.extinction_per_m = {0, 0, 0};
-    Picture dark = grey(options.camera, 0.0f), bright = grey(options.camera, 0.5f);
+    Picture dark = test::grey(options.camera, 0.0f), bright = test::grey(options.camera, 0.5f);
     // The same light of the surroundings in both: only what is behind differs.
     const CameraFrame camera = camera_frame(options.camera);
     const PrecipitationLight light = precipitation_light(dark, options, camera, 0);
