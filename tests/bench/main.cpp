@@ -12,6 +12,7 @@
 #include <fmt/core.h>
 
 #include "automaton/kernels.h"
+#include "tests/bench/air_bench.h"
 #include "tests/bench/atmosphere_bench.h"
 #include "tests/bench/automaton_bench.h"
 #include "tests/bench/density_bench.h"
@@ -64,6 +65,7 @@ int main(int argc, char** argv) {
         {"ground", [] { return ground_rows(); }},
         {"rain", [] { return rain_rows(); }},
         {"atmosphere", [] { return atmosphere_rows(); }},
+        {"air", [&] { return air_rows(source); }},
         {"render", [&] { return render_rows(source, data); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {

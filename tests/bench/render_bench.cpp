@@ -24,6 +24,7 @@
 #include "density/metaballs.h"
 #include "density/vdb_file.h"
 #include "scenes/reader.h"
+#include "tests/bench/subject.h"
 
 namespace nephos::bench {
 namespace {
@@ -50,46 +51,6 @@ BaseModel rain_cloud() {
         model.seeds.push_back(seed);
     }
     return model;
-}
-
-// Metaballs and how to look at them.
-struct Subject {
-    std::string name;
-    std::vector<Metaball> balls;
-    double extinction_per_m = 0;
-    RenderOptions options;
-    double radius_cells = 2;
-    MetaballCloud cloud() const { return {balls, extinction_per_m, metaball_normalisation(radius_cells)}; }
-    // For a PNG or a film: nobody asks for depth and light.
-    Splats pixels_only() const {
-        Splats splats;
-        splats.metaballs = cloud();
-        splats.depth = splats.light = false;
-        return splats;
-    }
-    // As if the cloud were another: the renderer must not know its light from the picture before.
-    void change() { balls.front().density *= 0.999f; }
-};
-
-// The last density that a pipeline hands out.
-struct LastFrame : PipelineSink {
-    DensityGrid density;
-    void step(const StepResult&) override {}
-    void frame(const FrameResult& result) override { density = result.density; }
-};
-
-Subject last_frame_of(const std::filesystem::path& file) {
-    const Scene scene = read_scene(file);
-    const int last = full_range(scene).last_frame;
-    Pipeline pipeline(scene, range_of_frames(scene, last, last), {});
-    LastFrame frame;
-    while (!pipeline.finished()) pipeline.advance(frame);
-    const double radius = scene.density.metaball_radius_cells;
-    Subject subject{file.filename().string(), metaballs(frame.density, radius),
-                    scene.density.extinction_per_m, scene.render, radius};
-    subject.options.camera.width = 640;
-    subject.options.camera.height = 480;
-    return subject;
 }
 
 Subject volume(const DensityGrid& grid, const std::string& name, double extinction_per_m) {

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/bench/subject.h"
+
+#include "apps/pipeline.h"
+#include "scenes/reader.h"
+
+namespace nephos::bench {
+namespace {
+
+// The last density that a pipeline hands out.
+struct LastFrame : PipelineSink {
+    DensityGrid density;
+    void step(const StepResult&) override {}
+    void frame(const FrameResult& result) override { density = result.density; }
+};
+
+}  // namespace
+
+Subject last_frame_of(const std::filesystem::path& file) {
+    const Scene scene = read_scene(file);
+    const int last = full_range(scene).last_frame;
+    Pipeline pipeline(scene, range_of_frames(scene, last, last), {});
+    LastFrame frame;
+    while (!pipeline.finished()) pipeline.advance(frame);
+    const double radius = scene.density.metaball_radius_cells;
+    Subject subject{file.filename().string(), metaballs(frame.density, radius),
+                    scene.density.extinction_per_m, scene.render, radius};
+    subject.options.camera.width = 640;
+    subject.options.camera.height = 480;
+    return subject;
+}
+
+}  // namespace nephos::bench

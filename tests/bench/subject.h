@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the benchmarks of pictures draw.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "density/metaballs.h"
+#include "render/options.h"
+#include "render/splats.h"
+
+namespace nephos::bench {
+
+// Metaballs and how to look at them.
+struct Subject {
+    std::string name;
+    std::vector<Metaball> balls;
+    double extinction_per_m = 0;
+    RenderOptions options;
+    double radius_cells = 2;
+    MetaballCloud cloud() const { return {balls, extinction_per_m, metaball_normalisation(radius_cells)}; }
+    // For a PNG or a film: nobody asks for depth and light.
+    Splats pixels_only() const {
+        Splats splats;
+        splats.metaballs = cloud();
+        splats.depth = splats.light = false;
+        return splats;
+    }
+    // As if the cloud were another: the renderer must not know its light from the picture before.
+    void change() { balls.front().density *= 0.999f; }
+};
+
+// The last frame of a scene, 640x480.
+Subject last_frame_of(const std::filesystem::path& file);
+
+}  // namespace nephos::bench
