@@ -66,28 +66,32 @@ class ShadeMap {
 
     std::vector<std::uint32_t> words(const PreparedCloud& cloud, const ShadowFrame& frame, const Along& along,
                                      float& first_shade) const {
-        const std::vector<float> light = means();
-        const std::vector<std::uint32_t> range = ranges(cloud, frame, along, first_shade);
-        std::vector<std::uint32_t> words(2 * texels());
-        for (std::size_t i = 0; i < texels(); ++i) {
-            const std::size_t right = std::min(i + 1, texels() - 1);
-            words[i] = unorm16(light[i]) | unorm16(light[right]) << 16;
-            words[texels() + i] = range[i] | range[right] << 16;
-        }
+        const std::vector<std::uint32_t> light = means(), range = ranges(cloud, frame, along, first_shade);
+        std::vector<std::uint32_t> words(3 * texels());
+        const auto columns = std::size_t(columns_), last = texels() - 1;
+        tbb::parallel_for(std::size_t{0}, columns, [&](std::size_t row) {
+            for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) {
+                // Of the last column and row, nothing is looked up.
+                const std::size_t four[] = {i, std::min(i + 1, last), std::min(i + columns, last),
+                                            std::min(i + columns + 1, last)};
+                for (int n = 0; n < 4; ++n) {
+                    words[i] |= light[four[n]] << 8 * n;
+                    words[texels() + i] |= (range[four[n]] & 255u) << 8 * n;
+                    words[2 * texels() + i] |= (range[four[n]] >> 8) << 8 * n;
+                }
+            }
+        });
         return words;
     }
 
   private:
-    static std::uint32_t unorm16(float value) {
-        return std::uint32_t(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f);
-    }
     static std::uint32_t byte_of(double value) {
         return std::uint32_t(std::clamp(value, 0.0, 1.0) * 255.0 + 0.5);
     }
 
-    // Means of the shadow map, with a border of full light.
-    std::vector<float> means() const {
-        std::vector<float> light(texels(), 1.0f);
+    // Means of the shadow map, 0..255, with a border of full light.
+    std::vector<std::uint32_t> means() const {
+        std::vector<std::uint32_t> light(texels(), 255);
         tbb::parallel_for(0, inner_, [&](int row) {
             for (int column = 0; column < inner_; ++column) {
                 float sum = 0;
@@ -98,7 +102,7 @@ class ShadeMap {
                         sum += shadow_[std::size_t(y) * std::size_t(shadow_size_) + std::size_t(x)];
                 }
                 light[std::size_t(row + 1) * std::size_t(columns_) + std::size_t(column + 1)] =
-                    sum / float(count);
+                    byte_of(double(sum) / count);
             }
         });
         return light;
@@ -194,8 +198,7 @@ double shafts_strength(const RenderOptions& options) {
 // Full light everywhere.
 void set_no_shade(AirShells& shells) {
     constexpr std::size_t kTexels = 4;
-    shells.shade.assign(kTexels, ~std::uint32_t{0});
-    shells.shade.resize(2 * kTexels, 0);
+    shells.shade.assign(3 * kTexels, ~std::uint32_t{0});
     shells.data.settings.z = 2;
     shells.data.settings.w = kTexels;
 }
@@ -267,7 +270,7 @@ AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, c
         set_shade(options, cloud, frame, shadow, shadow_size, shells);
     set_ends(data, options.shells, has_fog);
     data.settings.x = float(options.shells.count + (has_fog ? 1 : 0));
-    data.settings.y = float(shafts_strength(options));
+    data.settings.y = cloud.visible.empty() ? 0.0f : float(shafts_strength(options));
     data.shade.w = float(reach_m(options.shells));
     set_fog(options.fog, options.camera.position_m, time_s, data);
     if (has_fog) {

@@ -29,9 +29,9 @@ namespace nephos {
 
 struct AirShells {
     shader::Shells data;
-    // Two planes of words, rows of settings.z of them. The first: transmittance of this texel and, in the
-    // upper half, of its right neighbour, 0..65535. The second, in bytes: where the shade of this texel
-    // begins and where it is complete, and the same of its right neighbour. With fog, the words of FogNoise.
+    // Three planes of words, rows of settings.z of them, each with four bytes: of a texel, of its right
+    // neighbour, and of the two in the next row. The planes: transmittance; where along the light the shade
+    // begins; where it is complete. Then, with fog, the words of FogNoise.
     std::vector<std::uint32_t> shade;
 
     std::size_t count() const { return std::size_t(data.settings.x); }

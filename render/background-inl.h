@@ -83,6 +83,19 @@ HWY_INLINE Floats flash_falloff(Floats squared_m) {
     return hn::Div(set(1.0e6f), hn::Max(squared_m, set(1.0e4f)));
 }
 
+// exp() to 4e-5 of it, for -80 .. 80, by 2^n times a polynomial: the air needs no more.
+HWY_INLINE Floats quick_exp(Floats x) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    const Floats binary = hn::Mul(hn::Max(x, set(-80)), set(1.44269504f)), whole = hn::Round(binary);
+    const Floats rest = hn::Sub(binary, whole);
+    Floats power = hn::MulAdd(rest, set(0.00961813f), set(0.05550411f));
+    power = hn::MulAdd(rest, power, set(0.24022651f));
+    power = hn::MulAdd(rest, power, set(0.69314718f));
+    power = hn::MulAdd(rest, power, set(1));
+    return hn::BitCast(d, hn::Add(hn::BitCast(di, power), hn::ShiftLeft<23>(hn::ConvertTo(di, whole))));
+}
+
 // sky_across(), sky_upwards(), layer_column(), molecule_phase() and particle_phase() of shaders/shared.h.
 HWY_INLINE Floats sky_across(Floats cos_azimuth) {
     return hn::Sqrt(hn::Max(hn::NegMulAdd(set(0.5f), cos_azimuth, set(0.5f)), hn::Zero(Lanes())));
@@ -148,9 +161,19 @@ HWY_INLINE Floats3 sky_scattered(const PictureFrame& frame, const Floats3& ray) 
 
 HWY_INLINE Floats3 sunlight_at(const PictureFrame& frame, Floats height) {
     if (frame.sky == nullptr) return set3(frame.sunlight);
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    constexpr int kColumns = int(shader::kSkyColumns), kTexels = kColumns * int(shader::kSkyRows);
     const Floats altitude = hn::Mul(hn::Add(set(frame.air.x), height), set(1.0f / shader::kSunlightTop));
-    const Floats zero = hn::Zero(Lanes());
-    return sky_layer(frame, hn::Max(hn::Min(altitude, set(1.0f)), zero), zero, 2);
+    const Floats x = hn::Mul(hn::Max(hn::Min(altitude, set(1.0f)), hn::Zero(d)), set(float(kColumns - 1)));
+    const Floats below = hn::Min(hn::Floor(x), set(float(kColumns - 2))), share = hn::Sub(x, below);
+    const auto index = hn::ShiftLeft<2>(hn::ConvertTo(di, below));
+    const float* texels = frame.sky + 4 * 2 * kTexels;  // the first row of the third layer
+    const auto channel = [&](const float* first) {
+        const Floats a = hn::GatherIndex(d, first, index), b = hn::GatherIndex(d, first + 4, index);
+        return hn::MulAdd(share, hn::Sub(b, a), a);
+    };
+    return {channel(texels), channel(texels + 1), channel(texels + 2)};
 }
 
 HWY_INLINE Floats3 air_transmittance(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
@@ -193,7 +216,7 @@ HWY_INLINE Floats3 gradient_sky(const PictureFrame& frame, Floats height) {
 }
 
 struct SunlitAir {
-    Floats3 most;
+    Floats3 endless, most;
     Floats molecules, particles;
 };
 
@@ -203,27 +226,27 @@ HWY_INLINE Floats3 least(const Floats3& a, const Floats3& b) {
 
 HWY_INLINE SunlitAir sunlit_air(const PictureFrame& frame, const Floats3& ray) {
     const Floats zero = hn::Zero(Lanes()), cosine = dot(set3(frame.to_sun), ray);
+    const Floats3 endless = endless_air(frame, ray);
     if (frame.sky != nullptr)
-        return {endless_air(frame, ray), hn::Mul(set(shader::kPi), molecule_phase(cosine)),
+        return {endless, endless, hn::Mul(set(shader::kPi), molecule_phase(cosine)),
                 hn::Mul(set(shader::kPi * frame.air.z), particle_phase(cosine, frame.air.y))};
     const Floats phase = particle_phase(cosine, frame.zenith.w);
     const Floats direct = hn::Mul(set(frame.horizon.w * 4.0f * shader::kPi), phase);
     const Floats share = hn::Div(direct, hn::Add(direct, set(1.0f - frame.horizon.w + 1.0e-6f)));
     const Floats3 above = gradient_sky(frame, hn::Max(ray.z, zero));
-    return {times(share, least(set3(frame.horizon), above)), zero, zero};
+    return {endless, times(share, least(endless, above)), zero, zero};
 }
 
-HWY_INLINE Floats3 sunlit_at(const PictureFrame& frame, const SunlitAir& air, const Floats3& ray,
-                             Floats distance_m) {
+HWY_INLINE Floats3 sunlit_at(const PictureFrame& frame, const SunlitAir& air, Floats height,
+                             const Floats3& sunlight) {
     if (frame.sky == nullptr) return air.most;
     const Lanes d;
-    const Floats height = hn::Mul(ray.z, distance_m);
     const Floats altitude = hn::Max(hn::Add(set(frame.air.x), height), hn::Zero(d));
-    const auto density = [&](float per_height) { return hn::Exp(d, hn::Mul(altitude, set(-per_height))); };
+    const auto density = [&](float per_height) { return quick_exp(hn::Mul(altitude, set(-per_height))); };
     const Floats3 molecules = times(density(frame.rayleigh.w), set3(frame.rayleigh)),
                   particles = times(density(frame.haze.w), set3(frame.haze));
     const Floats3 scattered = times_add(air.molecules, molecules, times(air.particles, particles));
-    const Floats3 extinct = add(molecules, particles), sunlight = sunlight_at(frame, height);
+    const Floats3 extinct = add(molecules, particles);
     const auto source = [&](Floats light, Floats part, Floats whole) {
         return hn::Div(hn::Mul(light, part), hn::Max(whole, set(1.0e-12f)));
     };

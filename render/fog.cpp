@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/fog.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "automaton/vector_math.h"
@@ -44,10 +45,12 @@ const std::vector<std::uint32_t>& FogNoise::words(std::uint64_t seed) {
 }
 
 void set_fog(const Fog& fog, const Vec3& eye_m, double time_s, shader::Shells& data) {
-    data.fog = data.fog_coarse = data.fog_fine = {};
+    data.fog = data.fog_coarse = data.fog_fine = data.fog_limits = {};
     if (!(fog.extinction_per_m > 0)) return;
     data.fog = {float(fog.extinction_per_m), float(1 / fog.height_m), float(eye_m.z - fog.base_m),
                 float(2 * fog.patchiness)};
+    constexpr double kNoFog = 1e-9;  // per metre
+    data.fog_limits.x = float(fog.height_m * std::max(0.0, std::log(fog.extinction_per_m / kNoFog)));
     // The finer look-up drifts slower, and its axes are others: patches change their shapes on the way, and
     // have no common period.
     const double per_m = 1 / (kCells * fog.patch_m);

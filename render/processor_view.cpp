@@ -108,9 +108,9 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
     Floats transmittance = hn::Load(d, sums.transmittance + at);
     if (hn::AllTrue(d, hn::Lt(transmittance, set(shader::kOpaque)))) return;
     const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
-    // Fog is everywhere, shafts only where there is shade.
-    const ShadePart part = frame.shells->has_fog() ? ShadePart{0, kNowhere} : shade_part(*frame.shells, ray);
-    const SunlitAir sunlit = sunlit_air(frame, ray);
+    const AirPart part = part_with_air(*frame.shells, ray);
+    if (part.begin >= part.end) return;
+    const RayAir of(frame, ray);
     const Floats ground = hn::Load(d, rays.ground + at), offset = hn::Load(d, rays.shell_offset + at);
     Floats3 sum{hn::Load(d, sums.red + at), hn::Load(d, sums.green + at), hn::Load(d, sums.blue + at)};
     const Floats first_m = air_begin(frame, ray);
@@ -123,12 +123,11 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
         if (end_m <= part.begin) continue;
         if (begin_m >= part.end) break;
         const Floats shell_begins = within(begin_m), shell_ends = within(end_m);
-        if (!begun) before = air_transmittance(frame, ray, shell_begins);
+        if (!begun) before = clear_air(frame, ray, shell_begins);
         begun = true;
-        const Floats3 behind = air_transmittance(frame, ray, shell_ends);
+        const Floats3 behind = clear_air(frame, ray, shell_ends);
         const Floats place = within_shell(*frame.shells, shell_begins, shell_ends, offset);
-        const AirLayer layer =
-            air_layer(frame, sunlit, ray, subtract(before, behind), shell_begins, shell_ends, place);
+        const AirLayer layer = air_layer(frame, of, before, behind, shell_begins, shell_ends, place);
         const Floats hidden = hn::Mul(transmittance, hn::Sub(set(1.0f), layer.transmittance));
         distance = hn::MulAdd(hidden, place, distance);
         add_layer(layer, sum, transmittance);

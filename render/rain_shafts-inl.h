@@ -69,19 +69,6 @@ HWY_INLINE bool may_meet(const SeenCurtain& c, const Floats3& ray, Floats level2
                          hn::Le(hn::Mul(across, across), hn::Mul(set(c.reach_m * c.reach_m), level2)));
 }
 
-// exp() to 4e-5 of it, for -80 .. 80, by 2^n times a polynomial: shafts need no more.
-HWY_INLINE Floats quick_exp(Floats x) {
-    const Lanes d;
-    const hn::RebindToSigned<Lanes> di;
-    const Floats binary = hn::Mul(hn::Max(x, set(-80)), set(1.44269504f)), whole = hn::Round(binary);
-    const Floats rest = hn::Sub(binary, whole);
-    Floats power = hn::MulAdd(rest, set(0.00961813f), set(0.05550411f));
-    power = hn::MulAdd(rest, power, set(0.24022651f));
-    power = hn::MulAdd(rest, power, set(0.69314718f));
-    power = hn::MulAdd(rest, power, set(1));
-    return hn::BitCast(d, hn::Add(hn::BitCast(di, power), hn::ShiftLeft<23>(hn::ConvertTo(di, whole))));
-}
-
 // Smooth noise 0..255 (rain_shafts.h).
 HWY_INLINE Floats noise_at(const ShaftPass& p, Floats x, Floats y) {
     const Lanes d;

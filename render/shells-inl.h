@@ -32,12 +32,26 @@ HWY_INLINE Floats along_row(const shader::vec4& row, const Floats3& point) {
     return hn::Add(dot(set3(row), point), set(row.w));
 }
 
+using Words = hn::Vec<hn::RebindToSigned<Lanes>>;
+
+HWY_INLINE Floats byte_of(Words word, int shift) {
+    const hn::RebindToSigned<Lanes> di;
+    return hn::ConvertTo(Lanes(), hn::And(hn::ShiftRightSame(word, shift), hn::Set(di, 0xFF)));
+}
+
+// Between the four bytes of words, 0..1: the upper half is the next row.
+HWY_INLINE Floats between_bytes(Words word, Floats share_u, Floats share_v) {
+    const auto mix = [](Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); };
+    const Floats left = mix(byte_of(word, 0), byte_of(word, 16), share_v),
+                 right = mix(byte_of(word, 8), byte_of(word, 24), share_v);
+    return hn::Mul(mix(left, right, share_u), set(1.0f / 255.0f));
+}
+
 // Share of the sunlight that the clouds leave at points relative to the eye: D's gamma. The shade of a cloud
 // begins at its top and is complete at its base.
 HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
-    using Words = hn::Vec<decltype(di)>;
     const shader::Shells& data = air.data;
     const auto place = [&](const shader::vec4& row, float largest) {
         return hn::Min(hn::Max(along_row(row, point), hn::Zero(d)), set(largest));
@@ -48,31 +62,12 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
     const auto columns = std::int32_t(data.settings.z), plane = std::int32_t(data.settings.w);
     const auto index = hn::Add(hn::Mul(row, hn::Set(di, columns)), column);
     const auto* words = reinterpret_cast<const std::int32_t*>(air.shade.data());
-    const auto between = [](Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); };
-    const auto half = [&](Words word, bool high) {
-        const auto bits =
-            high ? hn::BitCast(di, hn::ShiftRight<16>(hn::BitCast(hn::RebindToUnsigned<Lanes>(), word)))
-                 : hn::And(word, hn::Set(di, 0xFFFF));
-        return hn::Mul(hn::ConvertTo(d, bits), set(1.0f / 65535.0f));
+    const auto of_plane = [&](int number) {
+        return between_bytes(hn::GatherIndex(di, words + number * plane, index), share_u, share_v);
     };
-    const Words upper = hn::GatherIndex(di, words, index),
-                lower = hn::GatherIndex(di, words + columns, index);
-    const Floats left = between(half(upper, false), half(lower, false), share_v),
-                 right = between(half(upper, true), half(lower, true), share_v);
-    const Floats gamma = between(left, right, share_u), one = set(1.0f);
-    const Floats along = along_row(data.shade_along, point);
+    const Floats gamma = of_plane(0), along = along_row(data.shade_along, point), one = set(1.0f);
     if (hn::AllTrue(d, hn::Ge(along, one))) return gamma;  // below all clouds
-    const auto byte = [&](Words word, int shift) {
-        const auto bits = hn::And(hn::ShiftRightSame(word, shift), hn::Set(di, 0xFF));
-        return hn::Mul(hn::ConvertTo(d, bits), set(1.0f / 255.0f));
-    };
-    const Words above = hn::GatherIndex(di, words + plane, index),
-                below = hn::GatherIndex(di, words + plane + columns, index);
-    const auto mean = [&](int shift) {
-        return between(between(byte(above, shift), byte(below, shift), share_v),
-                       between(byte(above, shift + 16), byte(below, shift + 16), share_v), share_u);
-    };
-    const Floats begin = mean(0), length = hn::Max(hn::Sub(mean(8), begin), set(1.0f / 255.0f));
+    const Floats begin = of_plane(1), length = hn::Max(hn::Sub(of_plane(2), begin), set(1.0f / 255.0f));
     const Floats part = hn::Min(hn::Max(hn::Div(hn::Sub(along, begin), length), hn::Zero(d)), one);
     return hn::NegMulAdd(part, hn::Sub(one, gamma), one);
 }
@@ -94,19 +89,13 @@ HWY_INLINE Floats fog_noise(const AirShells& air, const Floats3& point, const sh
     const auto above = wrapped(hn::Add(level, hn::Set(di, 1)));
     const auto plane = hn::Add(hn::Mul(row, hn::Set(di, kEdge)), column);
     const auto* words =
-        reinterpret_cast<const std::int32_t*>(air.shade.data()) + 2 * std::ptrdiff_t(air.data.settings.w);
+        reinterpret_cast<const std::int32_t*>(air.shade.data()) + 3 * std::ptrdiff_t(air.data.settings.w);
     const auto at = [&](auto of) {
         return hn::GatherIndex(di, words, hn::Add(hn::Mul(of, hn::Set(di, kEdge * kEdge)), plane));
     };
-    const auto low = at(level), high = at(above);
-    const auto byte = [&](auto word, int shift) {
-        const auto bits = hn::And(hn::ShiftRightSame(word, shift), hn::Set(di, 0xFF));
-        return hn::Mul(hn::ConvertTo(d, bits), set(1.0f / 255.0f));
-    };
-    const auto between = [](Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); };
-    const Floats share_x = fraction(x), share_y = fraction(y), share_z = fraction(z);
-    const auto corner = [&](int shift) { return between(byte(low, shift), byte(high, shift), share_z); };
-    return between(between(corner(0), corner(16), share_y), between(corner(8), corner(24), share_y), share_x);
+    const Floats low = between_bytes(at(level), fraction(x), fraction(y)),
+                 high = between_bytes(at(above), fraction(x), fraction(y));
+    return hn::MulAdd(fraction(z), hn::Sub(high, low), low);
 }
 
 HWY_INLINE Floats fog_column(Floats height_of_begin, Floats slope, Floats distance, float per_height) {
@@ -115,9 +104,9 @@ HWY_INLINE Floats fog_column(Floats height_of_begin, Floats slope, Floats distan
     const Floats low = hn::MulAdd(hn::Min(slope, zero), distance, height_of_begin);
     const Floats x = hn::Mul(hn::Mul(hn::Abs(slope), distance), set(per_height));
     const Floats near = hn::NegMulAdd(x, hn::NegMulAdd(x, set(1.0f / 6.0f), set(0.5f)), one);
-    const auto is_near = hn::Lt(x, set(1.0e-2f));
-    const Floats far = hn::Div(hn::Sub(one, hn::Exp(d, hn::Neg(x))), hn::IfThenElse(is_near, one, x));
-    const Floats at_low = hn::Exp(d, hn::Min(hn::Mul(low, set(-per_height)), set(60.0f)));
+    const auto is_near = hn::Lt(x, set(1.0e-1f));
+    const Floats far = hn::Div(hn::Sub(one, quick_exp(hn::Neg(x))), hn::IfThenElse(is_near, one, x));
+    const Floats at_low = quick_exp(hn::Min(hn::Mul(low, set(-per_height)), set(60.0f)));
     return hn::Mul(hn::Mul(at_low, distance), hn::IfThenElse(is_near, near, far));
 }
 
@@ -141,38 +130,85 @@ HWY_INLINE Floats within_shell(const AirShells& air, Floats begin, Floats end, F
                       begin);
 }
 
-HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const Floats3& ray, Floats at, Floats lit) {
-    const Lanes d;
-    const shader::Shells& data = frame.shells->data;
-    const Floats height = hn::MulAdd(ray.z, at, set(data.fog.z));
-    const Floats dense = hn::Exp(d, hn::Min(hn::Mul(height, set(-data.fog.y)), set(60.0f)));
-    const Floats above = hn::Mul(set(data.fog.x / data.fog.y), dense);
-    const Floats sun_depth = hn::Mul(above, set(1.0f / std::max(frame.to_sun.z, 0.05f)));
-    const Floats once = scattered_once(frame, dot(set3(frame.to_sun), ray));
-    const Floats sun = hn::Mul(
-        lit, hn::MulAdd(hn::Exp(d, hn::Neg(sun_depth)), once, scattered_often(frame, ray, sun_depth)));
-    const Floats open = hn::Exp(d, hn::Mul(set(-0.5f), above));
-    const Floats3 ambient = mix(set3(frame.ambient_base), set3(frame.ambient_top), {open, open, open});
-    const Floats3 arriving = times_add(sun, sunlight_at(frame, hn::Mul(ray.z, at)), ambient);
-    const Floats3 beta = air_transmittance(frame, ray, at);
-    return add(each_times(beta, times(set(frame.ambient_top.w), arriving)), air_light(frame, ray, beta));
+// exp(-extinction distance) of clear air (shaders/air.glsl), to what quick_exp() is good for.
+HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floats distance) {
+    const auto decayed = [](Floats x, Floats y, Floats z) {
+        return Floats3{quick_exp(hn::Neg(x)), quick_exp(hn::Neg(y)), quick_exp(hn::Neg(z))};
+    };
+    if (frame.sky == nullptr) {
+        const Floats3 depth = times(distance, set3(frame.air_extinction));
+        return decayed(depth.x, depth.y, depth.z);
+    }
+    const auto column = [&](float per_height) {
+        const float ground = std::exp(-frame.air.x * per_height);
+        const Floats x = hn::Mul(hn::Mul(ray.z, distance), set(per_height)), one = set(1.0f);
+        const Floats near = hn::NegMulAdd(x, hn::NegMulAdd(x, set(1.0f / 6.0f), set(0.5f)), one);
+        const auto is_near = hn::Lt(hn::Abs(x), set(1.0e-1f));
+        const Floats far = hn::Div(hn::Sub(one, quick_exp(hn::Neg(hn::Max(x, set(-80.0f))))),
+                                   hn::IfThenElse(is_near, one, x));
+        return hn::Mul(hn::Mul(set(ground), distance), hn::IfThenElse(is_near, near, far));
+    };
+    const Floats3 depth = times_add(column(frame.rayleigh.w), set3(frame.rayleigh),
+                                    times(column(frame.haze.w), set3(frame.haze)));
+    return decayed(depth.x, depth.y, depth.z);
 }
 
-// `transmittance_lost`: of the air between the two distances.
-HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const SunlitAir& sunlit, const Floats3& ray,
-                              const Floats3& transmittance_lost, Floats begin, Floats end, Floats at) {
+// What is the same for all shells along rays.
+struct RayAir {
+    Floats3 ray;
+    SunlitAir sunlit;
+    Floats once;    // scattered by fog
+    Between angle;  // to the sun, in the table of what is scattered often
+
+    RayAir(const PictureFrame& frame, const Floats3& direction)
+        : ray(direction), sunlit(sunlit_air(frame, direction)) {
+        const Floats cosine = dot(set3(frame.to_sun), direction);
+        once = scattered_once(frame, cosine);
+        angle = scatter_column(cosine);
+    }
+};
+
+HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Floats height,
+                                const Floats3& sunlight, Floats lit) {
+    const shader::Shells& data = frame.shells->data;
+    const Floats above_base = hn::Add(set(data.fog.z), height);
+    const Floats dense = quick_exp(hn::Min(hn::Mul(above_base, set(-data.fog.y)), set(60.0f)));
+    const Floats above = hn::Mul(set(data.fog.x / data.fog.y), dense);
+    const Floats sun_depth = hn::Mul(above, set(1.0f / std::max(frame.to_sun.z, 0.05f)));
+    const Floats sun = hn::Mul(
+        lit, hn::MulAdd(quick_exp(hn::Neg(sun_depth)), of.once, scattered_often(frame, of.angle, sun_depth)));
+    const Floats open = quick_exp(hn::Mul(set(-0.5f), above));
+    const Floats3 ambient = mix(set3(frame.ambient_base), set3(frame.ambient_top), {open, open, open});
+    return times(set(frame.ambient_top.w), times_add(sun, sunlight, ambient));
+}
+
+// `before`, `behind`: transmittance of clear air up to the two distances.
+HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const Floats3& before,
+                              const Floats3& behind, Floats begin, Floats end, Floats at) {
     const Lanes d;
     const AirShells& air = *frame.shells;
-    const Floats one = set(1.0f), lit = sunlight_left(air, times(at, ray));
-    const Floats strength =
-        hn::IfThenElseZero(hn::Lt(begin, set(air.data.shade.w)), set(air.data.settings.y));
-    Floats3 light = times(hn::Mul(strength, hn::Sub(lit, one)),
-                          each_times(transmittance_lost, sunlit_at(frame, sunlit, ray, at)));
-    if (!air.has_fog()) return {light, one};
-    const Floats depth = fog_depth(air, ray, begin, end, at), transmittance = hn::Exp(d, hn::Neg(depth));
-    if (hn::AllTrue(d, hn::Lt(depth, set(1.0e-6f)))) return {light, transmittance};
+    const Floats one = set(1.0f), zero = hn::Zero(d);
+    const Floats depth = air.has_fog() ? fog_depth(air, of.ray, begin, end, at) : zero;
+    const bool foggy = !hn::AllTrue(d, hn::Lt(depth, set(1.0e-6f))), shaded = air.data.settings.y > 0;
+    if (!foggy && !shaded) return {{zero, zero, zero}, one};
+    const Floats height = hn::Mul(of.ray.z, within_shell(air, begin, end, set(0.5f)));
+    const Floats3 sunlight = sunlight_at(frame, height);
+    const Floats lit = sunlight_left(air, times(at, of.ray));
+    const auto inside = hn::Lt(begin, set(air.data.shade.w));
+    Floats3 light{zero, zero, zero};
+    if (shaded) {
+        const Floats strength = hn::IfThenElseZero(inside, set(air.data.settings.y));
+        light = times(hn::Mul(strength, hn::Sub(lit, one)),
+                      each_times(subtract(before, behind), sunlit_at(frame, of.sunlit, height, sunlight)));
+    }
+    if (!foggy) return {light, one};
+    const Floats transmittance = quick_exp(hn::Neg(depth));
+    const Floats half = hn::IfThenElseZero(inside, set(0.5f));
+    const Floats3 beta = mix(before, behind, {half, half, half});
+    const Floats3 veil =
+        each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)}, of.sunlit.endless);
+    const Floats3 of_fog = add(each_times(beta, fog_radiance(frame, of, height, sunlight, lit)), veil);
     light = times(hn::MulAdd(set(0.5f), transmittance, set(0.5f)), light);
-    const Floats3 of_fog = fog_radiance(frame, ray, within_shell(air, begin, end, set(0.5f)), lit);
     return {times_add(hn::Sub(one, transmittance), of_fog, light), transmittance};
 }
 
@@ -187,35 +223,53 @@ HWY_INLINE Floats air_begin(const PictureFrame& frame, const Floats3& ray) {
 HWY_INLINE AirLayer layer_in_front(const PictureFrame& frame, const Floats3& ray, Floats shell_begins,
                                    Floats distance) {
     const Floats begin = hn::Min(hn::Max(shell_begins, air_begin(frame, ray)), distance);
-    const Floats3 lost =
-        subtract(air_transmittance(frame, ray, begin), air_transmittance(frame, ray, distance));
-    return air_layer(frame, sunlit_air(frame, ray), ray, lost, begin, distance,
-                     within_shell(*frame.shells, begin, distance, set(0.5f)));
+    return air_layer(frame, RayAir(frame, ray), clear_air(frame, ray, begin), clear_air(frame, ray, distance),
+                     begin, distance, within_shell(*frame.shells, begin, distance, set(0.5f)));
 }
 
-// Distances along rays between which clouds can shade the air.
-struct ShadePart {
-    float begin, end;
+// Distances along rays between which something is drawn.
+struct AirPart {
+    float begin = kNowhere, end = 0;
+    void add(Floats from, Floats until) {
+        const Lanes d;
+        const auto some = hn::Lt(from, until);
+        if (hn::AllFalse(d, some)) return;
+        begin = std::min(begin, hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(some, from, set(kNowhere)))));
+        end = std::max(end, hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(some, until))));
+    }
 };
 
-HWY_INLINE ShadePart shade_part(const AirShells& air, const Floats3& ray) {
+// Shade of clouds, and fog.
+HWY_INLINE AirPart part_with_air(const AirShells& air, const Floats3& ray) {
     const Lanes d;
     const shader::Shells& data = air.data;
-    Floats begin = hn::Zero(d), end = set(kNowhere);
-    const auto clip = [&](const shader::vec4& row, float low, float high) {
-        const Floats slope = dot(set3(row), ray);
-        const Floats steep = hn::IfThenElse(hn::Lt(hn::Abs(slope), set(1.0e-12f)), set(1.0e-12f), slope);
-        const Floats a = hn::Div(set(low - row.w), steep), b = hn::Div(set(high - row.w), steep);
-        begin = hn::Max(begin, hn::Min(a, b));
-        end = hn::Min(end, hn::Max(a, b));
+    AirPart part;
+    const auto steep = [](Floats slope) {
+        return hn::IfThenElse(hn::Lt(hn::Abs(slope), set(1.0e-12f)), set(1.0e-12f), slope);
     };
-    clip(data.shade_u, 0, data.shade.x);
-    clip(data.shade_v, 0, data.shade.y);
-    clip(data.shade_along, data.shade.z, 1.0e12f);
-    const auto some = hn::Lt(begin, end);
-    if (hn::AllFalse(d, some)) return {kNowhere, 0};
-    return {hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(some, begin, set(kNowhere)))),
-            hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(some, end)))};
+    if (data.settings.y > 0) {
+        Floats begin = hn::Zero(d), end = set(kNowhere);
+        const auto clip = [&](const shader::vec4& row, float low, float high) {
+            const Floats slope = steep(dot(set3(row), ray));
+            const Floats a = hn::Div(set(low - row.w), slope), b = hn::Div(set(high - row.w), slope);
+            begin = hn::Max(begin, hn::Min(a, b));
+            end = hn::Min(end, hn::Max(a, b));
+        };
+        clip(data.shade_u, 0, data.shade.x);
+        clip(data.shade_v, 0, data.shade.y);
+        clip(data.shade_along, data.shade.z, 1.0e12f);
+        part.add(begin, end);
+    }
+    if (air.has_fog()) {
+        const float below_top = data.fog_limits.x - data.fog.z;
+        const Floats crossing = hn::Min(hn::Div(set(below_top), steep(ray.z)), set(kNowhere));
+        const auto up = hn::Gt(ray.z, hn::Zero(d));
+        if (below_top > 0)
+            part.add(hn::Zero(d), hn::IfThenElse(up, crossing, set(kNowhere)));
+        else
+            part.add(hn::IfThenElse(up, set(kNowhere), crossing), set(kNowhere));
+    }
+    return part;
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -54,28 +54,30 @@ vec3 gradient_sky(float height) {
     return mix(frame.zenith.rgb, frame.horizon.rgb, haze);
 }
 
-// What clouds can take away of the light of the air along a ray: sunlight, scattered once.
+// The light of the air along a ray: without end, and what clouds can take away of it: sunlight, scattered once.
 struct SunlitAir {
-    vec3 most;                   // radiance without end; no more than the air and the sky have, so that none is negative
+    vec3 endless;
+    vec3 most;                   // no more than the air and the sky have, so that none is negative
     float molecules, particles;  // with tables: pi times the phase functions, and the albedo
 };
 
 SunlitAir sunlit_air(vec3 ray) {
+    vec3 endless = endless_air(ray);
     float cosine = dot(frame.to_sun.xyz, ray);
     if (kPhysicalSky)
-        return SunlitAir(endless_air(ray), kPi * molecule_phase(cosine),
+        return SunlitAir(endless, endless, kPi * molecule_phase(cosine),
                          kPi * frame.air.z * particle_phase(cosine, frame.air.y));
     float direct = frame.horizon.w * 4.0 * kPi * particle_phase(cosine, frame.zenith.w);
     float share = direct / (direct + 1.0 - frame.horizon.w + 1.0e-6);
-    return SunlitAir(share * min(frame.horizon.rgb, gradient_sky(max(ray.z, 0.0))), 0.0, 0.0);
+    return SunlitAir(endless, share * min(endless, gradient_sky(max(ray.z, 0.0))), 0.0, 0.0);
 }
 
-// Radiance that the air would have of sunlight scattered once, were it everywhere as at that distance along the ray.
-vec3 sunlit_at(SunlitAir air, vec3 ray, float distance) {
+// Radiance that the air would have of sunlight scattered once, were it everywhere as at that height above the eye.
+// `sunlight`: sunlight_at() of it.
+vec3 sunlit_at(SunlitAir air, float height, vec3 sunlight) {
     if (!kPhysicalSky) return air.most;
-    float height = ray.z * distance;
     vec2 density = exp(-max(frame.air.x + height, 0.0) * vec2(frame.rayleigh.w, frame.haze.w));
     vec3 molecules = density.x * frame.rayleigh.rgb, particles = density.y * frame.haze.rgb;
     vec3 scattered = air.molecules * molecules + air.particles * particles;
-    return min(sunlight_at(height) * scattered / max(molecules + particles, 1.0e-12), air.most);
+    return min(sunlight * scattered / max(molecules + particles, 1.0e-12), air.most);
 }

@@ -183,6 +183,7 @@ struct Shells {
                // the eye above the base; w: how much it varies
     vec4 fog_coarse;  // xyz: where in the noise the eye is, 0..1; w: 1 / size of the noise in metres
     vec4 fog_fine;    // the same of the second look-up, for y, z, x
+    vec4 fog_limits;  // x: height above the base beyond which there is no fog worth drawing
 };
 
 // Integral over a part of a ray of fog that falls off exponentially with height: exp(-height per_height),
@@ -311,7 +312,7 @@ static_assert(sizeof(LightQuery) == 16 && sizeof(LightItem) == 16);
 static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 40);
 static_assert(sizeof(Puff) == 32 && offsetof(Puff, half_size) == 12 && offsetof(Puff, cloud) == 28);
 static_assert(sizeof(PuffCloud) == 32 && offsetof(PuffCloud, inverse_height) == 16);
-static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 9) &&
+static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 10) &&
               offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 2));
 static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
               offsetof(Frame, flash_colour) == 272 && offsetof(Frame, sun_fade) == 368);

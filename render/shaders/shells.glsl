@@ -22,6 +22,13 @@ struct AirLayer {
 float shell_end(uint k) { return shells.ends[k / 4u][k % 4u]; }
 float shell_begin(uint k) { return k == 0u ? 0.0 : shell_end(k - 1u); }
 
+// Between four texels: of a row in the lower half of the word, of the next row in the upper half.
+float between_texels(uint word, vec2 share) {
+    vec4 texels = unpackUnorm4x8(word);
+    vec2 column = mix(texels.xy, texels.zw, share.y);
+    return mix(column.x, column.y, share.x);
+}
+
 // Share of the sunlight that the clouds leave at a point relative to the eye: D's gamma. The shade of a cloud begins at
 // its top and is complete at its base.
 float sunlight_left(vec3 point) {
@@ -29,15 +36,12 @@ float sunlight_left(vec3 point) {
     place = clamp(place, vec2(0.0), shells.shade.xy);
     uvec2 texel = uvec2(place);
     vec2 share = place - vec2(texel);
-    uint columns = uint(shells.settings.z), index = texel.y * columns + texel.x;
-    vec2 upper = unpackUnorm2x16(shade[index]), lower = unpackUnorm2x16(shade[index + columns]);
-    vec2 left_right = mix(upper, lower, share.y);
-    index += uint(shells.settings.w);
-    vec4 ranges = mix(unpackUnorm4x8(shade[index]), unpackUnorm4x8(shade[index + columns]), share.y);
-    vec2 range = mix(ranges.xy, ranges.zw, share.x);
+    uint index = texel.y * uint(shells.settings.z) + texel.x, plane = uint(shells.settings.w);
+    float gamma = between_texels(shade[index], share);
+    float begin = between_texels(shade[index + plane], share), end = between_texels(shade[index + 2u * plane], share);
     float along = dot(shells.shade_along.xyz, point) + shells.shade_along.w;
-    float part = clamp((along - range.x) / max(range.y - range.x, 1.0 / 255.0), 0.0, 1.0);
-    return 1.0 - part * (1.0 - mix(left_right.x, left_right.y, share.x));
+    float part = clamp((along - begin) / max(end - begin, 1.0 / 255.0), 0.0, 1.0);
+    return 1.0 - part * (1.0 - gamma);
 }
 
 // Noise of fog at a point relative to the eye, 0..1.
@@ -45,7 +49,7 @@ float fog_noise(vec3 point, vec4 eye) {
     vec3 voxel = fract(eye.xyz + eye.w * point) * float(kFogVoxels);
     vec3 below = floor(voxel), share = voxel - below;
     uvec3 at = uvec3(below) & (kFogVoxels - 1u);
-    uint row = 2u * uint(shells.settings.w) + at.y * kFogVoxels + at.x;
+    uint row = 3u * uint(shells.settings.w) + at.y * kFogVoxels + at.x;
     uint level = kFogVoxels * kFogVoxels, above = (at.z + 1u) & (kFogVoxels - 1u);
     vec4 four = mix(unpackUnorm4x8(shade[row + at.z * level]), unpackUnorm4x8(shade[row + above * level]), share.z);
     vec2 two = mix(four.xy, four.zw, share.y);
@@ -65,29 +69,31 @@ float fog_depth(vec3 ray, float begin, float end, float at) {
 // Where a part of a ray is looked up that begins in a shell: in the last shell, which has no end, where it begins.
 float within_shell(float begin, float end, float share) { return begin < shells.shade.w ? mix(begin, end, share) : begin; }
 
-// Radiance at opacity 1 of the fog at a distance, as the eye sees it; lit as the clouds are. `lit`: share of the
-// sunlight that the clouds leave.
-vec3 fog_radiance(vec3 ray, float at, float lit) {
-    float height = shells.fog.z + ray.z * at;
-    float above = shells.fog.x * exp(min(-height * shells.fog.y, 60.0)) / shells.fog.y;  // optical depth upwards
+// Radiance at opacity 1 that fog at a height above the eye scatters towards it; lit as the clouds are. `lit`: share of
+// the sunlight that the clouds leave.
+vec3 fog_radiance(vec3 ray, float height, vec3 sunlight, float lit) {
+    float dense = exp(min(-(shells.fog.z + height) * shells.fog.y, 60.0));
+    float above = shells.fog.x * dense / shells.fog.y;  // optical depth upwards
     float sun_depth = above / max(frame.to_sun.z, 0.05), cosine = dot(frame.to_sun.xyz, ray);
     float sun = lit * (scattered_often(ray, sun_depth) + exp(-sun_depth) * scattered_once(cosine));
-    vec3 arriving = sun * sunlight_at(ray.z * at) + mix(frame.ambient_base.rgb, frame.ambient_top.rgb, exp(-0.5 * above));
-    vec3 beta = air_transmittance(ray, at);
-    return beta * frame.ambient_top.w * arriving + air_light(ray, beta);
+    vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, exp(-0.5 * above));
+    return frame.ambient_top.w * (sun * sunlight + ambient);
 }
 
-// The air of a ray between two distances, of which sunlight and fog are looked up at a third. All the light of clear air
-// is in the picture already (air_light()); what clouds shade is taken away: radiance below zero.
+// The air of a ray between two distances. All the light of clear air is in the picture already (air_light()); what clouds
+// shade is taken away: radiance below zero. Shade and patches are looked up at a third distance, `at`; light in the
+// middle: it changes with height so fast that looking it up here and there would show as grain.
 AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float at) {
-    vec3 light = sunlit_at(sunlit, ray, at) * (air_transmittance(ray, begin) - air_transmittance(ray, end));
+    vec3 beta_begin = air_transmittance(ray, begin), beta_end = air_transmittance(ray, end);
+    float height = ray.z * within_shell(begin, end, 0.5);
+    vec3 sunlight = sunlight_at(height);
     float lit = sunlight_left(at * ray), strength = begin < shells.shade.w ? shells.settings.y : 0.0;
-    light *= strength * (lit - 1.0);
+    vec3 light = (strength * (lit - 1.0)) * sunlit_at(sunlit, height, sunlight) * (beta_begin - beta_end);
     if (!kFog) return AirLayer(light, 1.0);
     float transmittance = exp(-fog_depth(ray, begin, end, at));
+    vec3 beta = within_shell(begin, end, 1.0) > begin ? 0.5 * (beta_begin + beta_end) : beta_begin;
+    vec3 of_fog = beta * fog_radiance(ray, height, sunlight, lit) + (1.0 - beta) * sunlit.endless;
     light *= 0.5 + 0.5 * transmittance;  // half of the fog is in front
-    // Its light changes with height so fast that looking it up here and there would show as grain.
-    vec3 of_fog = fog_radiance(ray, within_shell(begin, end, 0.5), lit);
     return AirLayer(light + (1.0 - transmittance) * of_fog, transmittance);
 }
 
@@ -102,14 +108,38 @@ AirLayer air_shell(uint k, SunlitAir sunlit, vec3 ray, uvec2 pixel, out float at
     return air_layer(sunlit, ray, begin, end, at);
 }
 
-// The part of a splat's own shell that lies in front of its centre.
-AirLayer layer_in_front(vec3 centre, float distance) {
-    if (!kShells) return AirLayer(vec3(0.0), 1.0);
+// Number of shells that end at a distance or before it.
+uint shells_before(float distance) {
     uint count = uint(shells.settings.x), k = 0u;
     for (uint step = kMaxShells; step > 0u; step /= 2u) {
         if (k + step <= count && shell_end(k + step - 1u) <= distance) k += step;
     }
-    if (k == count) return AirLayer(vec3(0.0), 1.0);  // beyond the last
+    return k;
+}
+
+// Distances along a ray between which there is something to draw: shade of clouds, fog.
+vec2 part_with_air(vec3 ray) {
+    vec2 part = vec2(1.0e30, 0.0);
+    if (shells.settings.y > 0.0) {
+        vec3 slope = vec3(dot(shells.shade_u.xyz, ray), dot(shells.shade_v.xyz, ray), dot(shells.shade_along.xyz, ray));
+        vec3 steep = mix(slope, vec3(1.0e-12), lessThan(abs(slope), vec3(1.0e-12)));
+        vec3 from = vec3(shells.shade_u.w, shells.shade_v.w, shells.shade_along.w);
+        vec3 a = (vec3(0.0, 0.0, shells.shade.z) - from) / steep, b = (vec3(shells.shade.xy, 1.0e12) - from) / steep;
+        vec3 first = min(a, b), last = max(a, b);
+        part = vec2(max(max(first.x, first.y), max(first.z, 0.0)), min(min(last.x, last.y), last.z));
+        if (part.x >= part.y) part = vec2(1.0e30, 0.0);
+    }
+    if (!kFog) return part;
+    float below_top = shells.fog_limits.x - shells.fog.z, crossing = below_top / (abs(ray.z) < 1.0e-9 ? 1.0e-9 : ray.z);
+    vec2 fog = below_top > 0.0 ? vec2(0.0, ray.z > 0.0 ? crossing : 1.0e30) : vec2(ray.z < 0.0 ? crossing : 1.0e30, 1.0e30);
+    return fog.x < 1.0e30 ? vec2(min(part.x, fog.x), max(part.y, fog.y)) : part;
+}
+
+// The part of a splat's own shell that lies in front of its centre.
+AirLayer layer_in_front(vec3 centre, float distance) {
+    if (!kShells) return AirLayer(vec3(0.0), 1.0);
+    uint k = shells_before(distance);
+    if (k == uint(shells.settings.x)) return AirLayer(vec3(0.0), 1.0);  // beyond the last
     vec3 ray = centre / max(distance, 1.0e-6);
     float begin = min(max(shell_begin(k), air_begin(ray)), distance);
     return air_layer(sunlit_air(ray), ray, begin, distance, within_shell(begin, distance, 0.5));

@@ -30,7 +30,10 @@ void main() {
     SunlitAir sunlit = sunlit_air(ray);
     pixel += uvec2(frame.picture.zw);
     float sum_distance = kFog && step.distances != 0u ? depth[index] : 0.0;
-    for (uint k = step.first; k < step.end; ++k) {
+    // Without these bounds masked lanes would take as long as others.
+    vec2 part = part_with_air(ray);
+    uint last = part.x < part.y ? min(step.end, shells_before(part.y) + 1u) : step.first;
+    for (uint k = max(step.first, shells_before(part.x)); k < last; ++k) {
         float at;
         AirLayer air = air_shell(k, sunlit, ray, pixel, at);
         sum_distance += sum.a * (1.0 - air.transmittance) * at;
