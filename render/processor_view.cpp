@@ -127,7 +127,8 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
         begun = true;
         const Floats3 behind = clear_air(frame, ray, shell_ends);
         const Floats place = within_shell(*frame.shells, shell_begins, shell_ends, offset);
-        const AirLayer layer = air_layer(frame, of, before, behind, shell_begins, shell_ends, place);
+        const AirLayer layer =
+            air_layer<Heights::alike>(frame, of, before, behind, shell_begins, shell_ends, place);
         const Floats hidden = hn::Mul(transmittance, hn::Sub(set(1.0f), layer.transmittance));
         distance = hn::MulAdd(hidden, place, distance);
         add_layer(layer, sum, transmittance);

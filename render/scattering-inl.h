@@ -20,6 +20,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
+using Words = hn::Vec<hn::RebindToSigned<Lanes>>;
+
 // A place between two nodes of the scattering table.
 struct Between {
     hn::Vec<hn::RebindToSigned<Lanes>> below;
@@ -60,18 +62,26 @@ HWY_INLINE Floats scattered_once(const PictureFrame& frame, Floats cosine) {
     return scattering_at(frame.scattering, hn::Zero(di), scatter_column(cosine));
 }
 
-// `angle`: scatter_column() of the cosine.
-HWY_INLINE Floats scattered_often(const PictureFrame& frame, const Between& angle, Floats sun_depth) {
+HWY_INLINE Floats scattered_often(const PictureFrame& frame, const Floats3& ray, Floats sun_depth) {
+    const hn::RebindToSigned<Lanes> di;
+    const Between column = scatter_column(dot(set3(frame.to_sun), ray)), row = scatter_row(sun_depth);
+    const auto angles = hn::Set(di, int(shader::kScatterAngles));
+    const auto first = hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles);
+    const Floats a = scattering_at(frame.scattering, first, column),
+                 b = scattering_at(frame.scattering, hn::Add(first, angles), column);
+    return hn::MulAdd(row.share, hn::Sub(b, a), a);
+}
+
+// The same at the node `angle` of the table alone: what was scattered often changes little from one to the
+// next.
+HWY_INLINE Floats scattered_often(const PictureFrame& frame, Words angle, Floats sun_depth) {
     const hn::RebindToSigned<Lanes> di;
     const Between row = scatter_row(sun_depth);
     const auto angles = hn::Set(di, int(shader::kScatterAngles));
-    const auto first = hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles);
-    const Floats a = scattering_at(frame.scattering, first, angle),
-                 b = scattering_at(frame.scattering, hn::Add(first, angles), angle);
+    const auto at = hn::Add(hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles), angle);
+    const Floats a = hn::GatherIndex(Lanes(), frame.scattering, at),
+                 b = hn::GatherIndex(Lanes(), frame.scattering, hn::Add(at, angles));
     return hn::MulAdd(row.share, hn::Sub(b, a), a);
-}
-HWY_INLINE Floats scattered_often(const PictureFrame& frame, const Floats3& ray, Floats sun_depth) {
-    return scattered_often(frame, scatter_column(dot(set3(frame.to_sun), ray)), sun_depth);
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -32,8 +32,6 @@ HWY_INLINE Floats along_row(const shader::vec4& row, const Floats3& point) {
     return hn::Add(dot(set3(row), point), set(row.w));
 }
 
-using Words = hn::Vec<hn::RebindToSigned<Lanes>>;
-
 HWY_INLINE Floats byte_of(Words word, int shift) {
     const hn::RebindToSigned<Lanes> di;
     return hn::ConvertTo(Lanes(), hn::And(hn::ShiftRightSame(word, shift), hn::Set(di, 0xFF)));
@@ -157,14 +155,16 @@ HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floa
 struct RayAir {
     Floats3 ray;
     SunlitAir sunlit;
-    Floats once;    // scattered by fog
-    Between angle;  // to the sun, in the table of what is scattered often
+    Floats once;  // scattered by fog
+    Words angle;  // to the sun: the nearest node of the table of what is scattered often
 
     RayAir(const PictureFrame& frame, const Floats3& direction)
         : ray(direction), sunlit(sunlit_air(frame, direction)) {
         const Floats cosine = dot(set3(frame.to_sun), direction);
         once = scattered_once(frame, cosine);
-        angle = scatter_column(cosine);
+        const Between column = scatter_column(cosine);
+        const hn::RebindToSigned<Lanes> di;
+        angle = hn::Add(column.below, hn::ConvertTo(di, hn::Round(column.share)));
     }
 };
 
@@ -182,7 +182,30 @@ HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Flo
     return times(set(frame.ambient_top.w), times_add(sun, sunlight, ambient));
 }
 
+// Sunlight at heights above the eye that differ little, as those of the pixels of a vector in one shell:
+// between the two nodes of the table that are nearest to the first of them.
+HWY_INLINE Floats3 sunlight_nearby(const PictureFrame& frame, Floats heights) {
+    if (frame.sky == nullptr) return set3(frame.sunlight);
+    constexpr auto kColumns = std::size_t(shader::kSkyColumns), kTexels = kColumns * shader::kSkyRows;
+    const Floats altitude = hn::Add(set(frame.air.x), heights);
+    const Floats place = hn::Mul(altitude, set(float(kColumns - 1) / shader::kSunlightTop));
+    const Floats x = hn::Min(hn::Max(place, hn::Zero(Lanes())), set(float(kColumns - 1)));
+    const auto below = std::min(std::size_t(hn::GetLane(x)), kColumns - 2);
+    const Floats share = hn::Sub(x, set(float(below)));
+    const float* const texel = frame.sky + 4 * (2 * kTexels + below);
+    const auto channel = [&](std::size_t c) {
+        return hn::MulAdd(share, set(texel[c + 4] - texel[c]), set(texel[c]));
+    };
+    return {channel(0), channel(1), channel(2)};
+}
+
+enum class Heights {
+    alike,  // pixels of a vector in one shell
+    apart,  // splats
+};
+
 // `before`, `behind`: transmittance of clear air up to the two distances.
+template <Heights kHeights>
 HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const Floats3& before,
                               const Floats3& behind, Floats begin, Floats end, Floats at) {
     const Lanes d;
@@ -192,7 +215,8 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
     const bool foggy = !hn::AllTrue(d, hn::Lt(depth, set(1.0e-6f))), shaded = air.data.settings.y > 0;
     if (!foggy && !shaded) return {{zero, zero, zero}, one};
     const Floats height = hn::Mul(of.ray.z, within_shell(air, begin, end, set(0.5f)));
-    const Floats3 sunlight = sunlight_at(frame, height);
+    const Floats3 sunlight =
+        kHeights == Heights::alike ? sunlight_nearby(frame, height) : sunlight_at(frame, height);
     const Floats lit = sunlight_left(air, times(at, of.ray));
     const auto inside = hn::Lt(begin, set(air.data.shade.w));
     Floats3 light{zero, zero, zero};
@@ -223,8 +247,9 @@ HWY_INLINE Floats air_begin(const PictureFrame& frame, const Floats3& ray) {
 HWY_INLINE AirLayer layer_in_front(const PictureFrame& frame, const Floats3& ray, Floats shell_begins,
                                    Floats distance) {
     const Floats begin = hn::Min(hn::Max(shell_begins, air_begin(frame, ray)), distance);
-    return air_layer(frame, RayAir(frame, ray), clear_air(frame, ray, begin), clear_air(frame, ray, distance),
-                     begin, distance, within_shell(*frame.shells, begin, distance, set(0.5f)));
+    return air_layer<Heights::apart>(frame, RayAir(frame, ray), clear_air(frame, ray, begin),
+                                     clear_air(frame, ray, distance), begin, distance,
+                                     within_shell(*frame.shells, begin, distance, set(0.5f)));
 }
 
 // Distances along rays between which something is drawn.
