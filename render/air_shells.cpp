@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include "automaton/vector_math.h"
 #include "render/frame_data.h"
@@ -38,14 +41,27 @@ struct Along {
     double operator()(const Vec3& p) const { return dot(row, p) + offset; }
 };
 
-Along along_light(const PreparedCloud& cloud, const Vec3& direction) {
-    double first = 1e300, last = -1e300;
-    for (const std::uint32_t i : cloud.visible) {
-        const Metaball& ball = cloud.metaballs[i];
-        const double at = dot(direction, Vec3{ball.x, ball.y, ball.z});
-        first = std::min(first, at - double(ball.radius));
-        last = std::max(last, at + double(ball.radius));
-    }
+// Where in a texel the shade begins and ends is told by height, so that all air below the clouds is known to
+// be in full shade without a look; by the way along the light where that is so flat that clouds shade each
+// other at one height.
+Vec3 shade_axis(const Vec3& light) { return light.z < -0.25 ? Vec3{0, 0, -1} : light; }
+
+Along along_axis(const PreparedCloud& cloud, const Vec3& direction) {
+    using Ends = std::pair<double, double>;
+    const auto [first, last] = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, cloud.visible.size(), 8192), Ends{1e300, -1e300},
+        [&](const auto& range, Ends ends) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                const Metaball& ball = cloud.metaballs[cloud.visible[i]];
+                const double at = dot(direction, Vec3{ball.x, ball.y, ball.z});
+                ends = {std::min(ends.first, at - double(ball.radius)),
+                        std::max(ends.second, at + double(ball.radius))};
+            }
+            return ends;
+        },
+        [](const Ends& a, const Ends& b) {
+            return Ends{std::min(a.first, b.first), std::max(a.second, b.second)};
+        });
     return {(1 / (last - first)) * direction, -first / (last - first)};
 }
 
@@ -205,7 +221,7 @@ void set_no_shade(AirShells& shells) {
 
 void set_shade(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
                std::span<const float> shadow, int shadow_size, AirShells& shells) {
-    const Along along = along_light(cloud, frame.direction);
+    const Along along = along_axis(cloud, shade_axis(frame.direction));
     const ShadeMap map(shadow, shadow_size);
     float first_shade = 0;
     shells.shade = map.words(cloud, frame, along, first_shade);

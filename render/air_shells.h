@@ -11,7 +11,8 @@
 // another.
 //
 // The light that a shell takes away is read off the shade map: the mean of the shadow map over a few texels,
-// and for each texel where along the light its shade begins and where it is complete. Above the clouds the
+// and for each texel at which height its shade begins and where it is complete (with a low
+// sun: how far along the light). Above the clouds the
 // sun shines, whatever lies below. No Vulkan here. Private to the module.
 
 #include <cstdint>
@@ -30,8 +31,8 @@ namespace nephos {
 struct AirShells {
     shader::Shells data;
     // Three planes of words, rows of settings.z of them, each with four bytes: of a texel, of its right
-    // neighbour, and of the two in the next row. The planes: transmittance; where along the light the shade
-    // begins; where it is complete. Then, with fog, the words of FogNoise.
+    // neighbour, and of the two in the next row. The planes: transmittance; where along
+    // `shade_along` the shade begins; where it is complete. Then, with fog, the words of FogNoise.
     std::vector<std::uint32_t> shade;
 
     std::size_t count() const { return std::size_t(data.settings.x); }

@@ -159,12 +159,15 @@ struct RayAir {
     Words angle;  // to the sun: the nearest node of the table of what is scattered often
 
     RayAir(const PictureFrame& frame, const Floats3& direction)
-        : ray(direction), sunlit(sunlit_air(frame, direction)) {
+        : ray(direction),
+          sunlit(sunlit_air(frame, direction)),
+          once(hn::Zero(Lanes())),
+          angle(hn::Zero(hn::RebindToSigned<Lanes>())) {
+        if (!frame.shells->has_fog()) return;
         const Floats cosine = dot(set3(frame.to_sun), direction);
-        once = scattered_once(frame, cosine);
         const Between column = scatter_column(cosine);
-        const hn::RebindToSigned<Lanes> di;
-        angle = hn::Add(column.below, hn::ConvertTo(di, hn::Round(column.share)));
+        once = scattered_once(frame, cosine);
+        angle = hn::Add(column.below, hn::ConvertTo(hn::RebindToSigned<Lanes>(), hn::Round(column.share)));
     }
 };
 

@@ -176,11 +176,11 @@ struct Shells {
                     // w: in all
     vec4 shade_u;   // shade map: column of a point p relative to the eye, dot(xyz, p) + w, texels
     vec4 shade_v;   // row
-    vec4 shade_along;  // along the light: 0 where the first cloud begins, 1 where the last one ends
-    vec4 shade;        // x, y: largest column and row; z: along the light, where the first shade begins; w:
-                       // metres from the eye at which shafts end
-    vec4 fog;  // x: extinction at the base, per metre; y: 1 / height over which it falls off; z: height of
-               // the eye above the base; w: how much it varies
+    vec4 shade_along;  // downwards, or along the light: 0 where the first cloud begins, 1 where the last ends
+    vec4 shade;  // x, y: largest column and row; z: along `shade_along`, where the first shade begins; w:
+                 // metres from the eye at which shafts end
+    vec4 fog;    // x: extinction at the base, per metre; y: 1 / height over which it falls off; z: height of
+                 // the eye above the base; w: how much it varies
     vec4 fog_coarse;  // xyz: where in the noise the eye is, 0..1; w: 1 / size of the noise in metres
     vec4 fog_fine;    // the same of the second look-up, for y, z, x
     vec4 fog_limits;  // x: height above the base beyond which there is no fog worth drawing
