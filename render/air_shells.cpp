@@ -25,14 +25,55 @@ float distance_of(const shader::Puff& puff) {
 }
 
 // Texels of the shadow map along an edge of one of the shade map. A shaft is a mean over many shadows; single
-// texels would only be noise.
-int texels_in_one(int shadow_size) { return std::clamp(shadow_size / 256, 1, 4); }
+// texels would only be noise. The shade map has 512 texels on a side at most.
+int texels_in_one(int shadow_size) {
+    return std::max(std::clamp(shadow_size / 256, 1, 4), (shadow_size + 511) / 512);
+}
 
 // What the cloud above a texel of the shade map is like, along the light: 0..1 from its first to its last
 // metaball.
 struct Span {
     double weight = 0, sum = 0, sum_squares = 0;
+    float first = 1, last = 0;  // ends of what is there
+
+    void add(const Span& other) {
+        weight += other.weight;
+        sum += other.sum;
+        sum_squares += other.sum_squares;
+        first = std::min(first, other.first);
+        last = std::max(last, other.last);
+    }
 };
+
+// A level of a pyramid of spans, each of up to four of the level below.
+struct SpanLevel {
+    std::vector<Span> spans;
+    std::size_t side = 0;
+};
+
+SpanLevel coarser(const SpanLevel& level) {
+    SpanLevel half{{}, (level.side + 1) / 2};
+    half.spans.resize(half.side * half.side);
+    for (std::size_t row = 0; row < level.side; ++row)
+        for (std::size_t column = 0; column < level.side; ++column)
+            half.spans[row / 2 * half.side + column / 2].add(level.spans[row * level.side + column]);
+    return half;
+}
+
+// Texels between metaballs that are larger than what blur() reaches over take the span of the least part of
+// the map around them that has one.
+void fill_holes(std::vector<Span>& spans, std::size_t side) {
+    std::vector<SpanLevel> levels{{spans, side}};
+    while (levels.back().side > 1) levels.push_back(coarser(levels.back()));
+    if (!(levels.back().spans[0].weight > 0)) return;
+    for (std::size_t row = 0; row < side; ++row) {
+        for (std::size_t column = 0; column < side; ++column) {
+            Span& span = spans[row * side + column];
+            for (std::size_t n = 1; !(span.weight > 0); ++n)
+                span = levels[n].spans[(row >> n) * levels[n].side + (column >> n)];
+        }
+    }
+}
 
 // A unit of `along` in metres, and where it is 0.
 struct Along {
@@ -141,9 +182,8 @@ class ShadeMap {
             Span& span = spans[std::size_t(row) * std::size_t(columns_) + std::size_t(column)];
             const double radius = ball.radius, at = along(centre), half = radius * length(along.row);
             const double weight = double(cloud.depth_scale[n]) * radius * radius;
-            span.weight += weight;
-            span.sum += weight * at;
-            span.sum_squares += weight * (at * at + 0.15 * half * half);
+            span.add({weight, weight * at, weight * (at * at + 0.15 * half * half), float(at - half),
+                      float(at + half)});
             radius_sum += radius;
         }
         const double texel_m = std::max(length(u), length(v)) / scale();
@@ -158,11 +198,8 @@ class ShadeMap {
         for (int i = 0; i < count; ++i) from[std::size_t(i)] = spans[begin + std::size_t(i) * stride];
         for (int i = 0; i < count; ++i) {
             Span sum;
-            for (int j = std::max(0, i - reach); j <= std::min(count - 1, i + reach); ++j) {
-                sum.weight += from[std::size_t(j)].weight;
-                sum.sum += from[std::size_t(j)].sum;
-                sum.sum_squares += from[std::size_t(j)].sum_squares;
-            }
+            for (int j = std::max(0, i - reach); j <= std::min(count - 1, i + reach); ++j)
+                sum.add(from[std::size_t(j)]);
             spans[begin + std::size_t(i) * stride] = sum;
         }
     }
@@ -177,6 +214,7 @@ class ShadeMap {
                           [&](std::size_t row) { blur(all, row * columns, 1, columns_, reach); });
         tbb::parallel_for(std::size_t{0}, columns,
                           [&](std::size_t column) { blur(all, column, columns, columns_, reach); });
+        fill_holes(all, columns);
         std::vector<std::uint32_t> range(texels(), 255u << 8);
         std::uint32_t first = 255;
         for (std::size_t i = 0; i < texels(); ++i) {
@@ -184,7 +222,9 @@ class ShadeMap {
             const double mean = all[i].sum / all[i].weight;
             const double variance = std::max(0.0, all[i].sum_squares / all[i].weight - mean * mean);
             const double half = std::sqrt(3 * variance);
-            range[i] = byte_of(mean - half) | byte_of(mean + half) << 8;
+            // With several layers the even cloud would be longer than all of them.
+            range[i] = byte_of(std::max(mean - half, double(all[i].first))) |
+                       byte_of(std::min(mean + half, double(all[i].last))) << 8;
             first = std::min(first, range[i] & 255u);
         }
         first_shade = float(first) / 255.0f;

@@ -126,11 +126,10 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
         if (!begun) before = clear_air(frame, ray, shell_begins);
         begun = true;
         const Floats3 behind = clear_air(frame, ray, shell_ends);
-        const Floats place = within_shell(*frame.shells, shell_begins, shell_ends, offset);
         const AirLayer layer =
-            air_layer<Heights::alike>(frame, of, before, behind, shell_begins, shell_ends, place);
+            air_layer<Heights::alike>(frame, of, before, behind, shell_begins, shell_ends, offset);
         const Floats hidden = hn::Mul(transmittance, hn::Sub(set(1.0f), layer.transmittance));
-        distance = hn::MulAdd(hidden, place, distance);
+        distance = hn::MulAdd(hidden, layer.distance, distance);
         add_layer(layer, sum, transmittance);
         before = behind;
     }

@@ -26,6 +26,7 @@ namespace nephos::HWY_NAMESPACE {
 struct AirLayer {
     Floats3 light;
     Floats transmittance;
+    Floats distance;  // where half of what the layer hides is hidden
 };
 
 HWY_INLINE Floats along_row(const shader::vec4& row, const Floats3& point) {
@@ -108,24 +109,51 @@ HWY_INLINE Floats fog_column(Floats height_of_begin, Floats slope, Floats distan
     return hn::Mul(hn::Mul(at_low, distance), hn::IfThenElse(is_near, near, far));
 }
 
-HWY_INLINE Floats fog_depth(const AirShells& air, const Floats3& ray, Floats begin, Floats end, Floats at) {
-    const Lanes d;
+struct FogPart {
+    Floats depth, low;
+};
+
+HWY_INLINE FogPart fog_part(const AirShells& air, const Floats3& ray, Floats begin, Floats end) {
     const shader::Shells& data = air.data;
-    const Floats distance = hn::Sub(end, begin), one = set(1.0f);
-    const Floats column = fog_column(hn::MulAdd(ray.z, begin, set(data.fog.z)), ray.z, distance, data.fog.y);
-    const Floats mean = hn::Mul(set(data.fog.x), column);
-    if (hn::AllTrue(d, hn::Lt(mean, set(1.0e-5f)))) return mean;
-    const Floats patches = hn::Max(hn::Mul(set(data.fog_coarse.w), distance), set(1.0e-6f));
-    const Floats varies = hn::Mul(set(data.fog.w), hn::Min(one, hn::Div(set(0.125f), patches)));
-    const Floats3 point = times(at, ray);
-    const Floats noise = hn::Add(fog_noise(air, point, data.fog_coarse),
-                                 fog_noise(air, {point.y, point.z, point.x}, data.fog_fine));
-    return hn::Mul(mean, hn::Max(hn::MulAdd(varies, hn::Sub(noise, one), one), hn::Zero(d)));
+    const Floats height = hn::MulAdd(ray.z, begin, set(data.fog.z));
+    const Floats low_end = hn::IfThenElse(hn::Lt(ray.z, hn::Zero(Lanes())), end, begin);
+    const Floats low = hn::MulAdd(ray.z, low_end, set(data.fog.z));
+    const Floats dense = quick_exp(hn::Min(hn::Mul(low, set(-data.fog.y)), set(60.0f)));
+    return {hn::Mul(set(data.fog.x), fog_column(height, ray.z, hn::Sub(end, begin), data.fog.y)),
+            hn::Mul(set(data.fog.x), dense)};
 }
 
-HWY_INLINE Floats within_shell(const AirShells& air, Floats begin, Floats end, Floats share) {
-    return hn::MulAdd(hn::IfThenElseZero(hn::Lt(begin, set(air.data.shade.w)), share), hn::Sub(end, begin),
-                      begin);
+// `transmittance`: exp(-fog.depth).
+HWY_INLINE Floats fog_middle(const AirShells& air, const FogPart& fog, Floats transmittance,
+                             const Floats3& ray, Floats begin, Floats end) {
+    const Lanes d;
+    const Floats one = set(1.0f), zero = hn::Zero(d);
+    const Floats taken = hn::Neg(hn::Log(d, hn::MulAdd(set(0.5f), transmittance, set(0.5f))));
+    const auto down = hn::Lt(ray.z, zero);
+    const Floats rest = hn::IfThenElse(down, hn::Sub(fog.depth, taken), taken);
+    const Floats per_low = hn::Div(rest, hn::Max(fog.low, set(1.0e-30f)));
+    const Floats falls = hn::Mul(hn::Abs(ray.z), set(air.data.fog.y)), x = hn::Mul(falls, per_low);
+    const Floats near = hn::MulAdd(x, hn::MulAdd(x, set(1.0f / 3.0f), set(0.5f)), one);
+    const Floats log = hn::Log(d, hn::Max(hn::Sub(one, x), set(1.0e-7f)));
+    const Floats far = hn::Div(hn::Neg(log), hn::Max(falls, set(1.0e-30f)));
+    const Floats way =
+        hn::Min(hn::Max(hn::IfThenElse(hn::Lt(x, set(1.0e-2f)), hn::Mul(per_low, near), far), zero),
+                hn::Sub(end, begin));
+    return hn::IfThenElse(down, hn::Sub(end, way), hn::Add(begin, way));
+}
+
+HWY_INLINE Floats fog_patches(const AirShells& air, const Floats3& point, Floats begin, Floats end) {
+    const Lanes d;
+    const shader::Shells& data = air.data;
+    const Floats one = set(1.0f), zero = hn::Zero(d);
+    const Floats patches = hn::Max(hn::Mul(set(data.fog_coarse.w), hn::Sub(end, begin)), set(1.0e-6f));
+    const Floats fades = hn::NegMulAdd(set(4.0f / data.shade.w), begin, set(4.0f));
+    const Floats varies = hn::Mul(hn::Mul(set(data.fog.w), hn::Min(one, hn::Div(set(0.125f), patches))),
+                                  hn::Min(hn::Max(fades, zero), one));
+    if (hn::AllTrue(d, hn::Le(varies, zero))) return one;
+    const Floats noise = hn::Add(fog_noise(air, point, data.fog_coarse),
+                                 fog_noise(air, {point.y, point.z, point.x}, data.fog_fine));
+    return hn::Max(hn::MulAdd(varies, hn::Sub(noise, one), one), zero);
 }
 
 // exp(-extinction distance) of clear air (shaders/air.glsl), to what quick_exp() is good for.
@@ -171,10 +199,10 @@ struct RayAir {
     }
 };
 
-HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Floats height,
+HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Floats at,
                                 const Floats3& sunlight, Floats lit) {
     const shader::Shells& data = frame.shells->data;
-    const Floats above_base = hn::Add(set(data.fog.z), height);
+    const Floats above_base = hn::MulAdd(of.ray.z, at, set(data.fog.z));
     const Floats dense = quick_exp(hn::Min(hn::Mul(above_base, set(-data.fog.y)), set(60.0f)));
     const Floats above = hn::Mul(set(data.fog.x / data.fog.y), dense);
     const Floats sun_depth = hn::Mul(above, set(1.0f / std::max(frame.to_sun.z, 0.05f)));
@@ -182,7 +210,13 @@ HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Flo
         lit, hn::MulAdd(quick_exp(hn::Neg(sun_depth)), of.once, scattered_often(frame, of.angle, sun_depth)));
     const Floats open = quick_exp(hn::Mul(set(-0.5f), above));
     const Floats3 ambient = mix(set3(frame.ambient_base), set3(frame.ambient_top), {open, open, open});
-    return times(set(frame.ambient_top.w), times_add(sun, sunlight, ambient));
+    Floats3 arriving = times_add(sun, sunlight, ambient);
+    if (frame.flash.w > 0) {
+        const Floats3 way = subtract(set3(frame.flash), times(at, of.ray));
+        const Floats share = hn::Mul(quick_exp(hn::Neg(above)), flash_falloff(dot(way, way)));
+        arriving = times_add(hn::Mul(set(frame.flash.w), share), set3(frame.flash_colour), arriving);
+    }
+    return times(set(frame.ambient_top.w), arriving);
 }
 
 // Sunlight at heights above the eye that differ little, as those of the pixels of a vector in one shell:
@@ -207,20 +241,43 @@ enum class Heights {
     apart,  // splats
 };
 
+// Where a part of the air is looked up.
+struct AirPlaces {
+    Floats at, middle;
+};
+
+HWY_INLINE AirPlaces air_places(const AirShells& air, const FogPart& fog, const Floats3& ray, Floats begin,
+                                Floats end, Floats share) {
+    const Lanes d;
+    const Floats distance = hn::Sub(end, begin), one = set(1.0f), half = set(0.5f), zero = hn::Zero(d);
+    const AirPlaces even{hn::MulAdd(share, distance, begin), hn::MulAdd(half, distance, begin)};
+    const auto last = hn::Ge(begin, set(air.data.shade.w));
+    const Floats transmittance = quick_exp(hn::Neg(fog.depth));
+    const Floats some = hn::Mul(hn::Sub(set(0.99f), transmittance), set(1.0f / 0.09f));
+    const Floats much = hn::IfThenElse(last, one, hn::Min(hn::Max(some, zero), one));
+    if (hn::AllTrue(d, hn::Le(much, zero))) return even;
+    const Floats seen = fog_middle(air, fog, transmittance, ray, begin, end);
+    const auto place = [&](Floats without) {
+        return hn::IfThenElse(last, seen, hn::MulAdd(much, hn::Sub(seen, without), without));
+    };
+    return {place(even.at), place(even.middle)};
+}
+
 // `before`, `behind`: transmittance of clear air up to the two distances.
 template <Heights kHeights>
 HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const Floats3& before,
-                              const Floats3& behind, Floats begin, Floats end, Floats at) {
+                              const Floats3& behind, Floats begin, Floats end, Floats share) {
     const Lanes d;
     const AirShells& air = *frame.shells;
     const Floats one = set(1.0f), zero = hn::Zero(d);
-    const Floats depth = air.has_fog() ? fog_depth(air, of.ray, begin, end, at) : zero;
-    const bool foggy = !hn::AllTrue(d, hn::Lt(depth, set(1.0e-6f))), shaded = air.data.settings.y > 0;
-    if (!foggy && !shaded) return {{zero, zero, zero}, one};
-    const Floats height = hn::Mul(of.ray.z, within_shell(air, begin, end, set(0.5f)));
+    const FogPart fog = air.has_fog() ? fog_part(air, of.ray, begin, end) : FogPart{zero, zero};
+    const bool foggy = !hn::AllTrue(d, hn::Lt(fog.depth, set(1.0e-5f))), shaded = air.data.settings.y > 0;
+    if (!foggy && !shaded) return {{zero, zero, zero}, one, begin};
+    const AirPlaces places = air_places(air, fog, of.ray, begin, end, share);
+    const Floats height = hn::Mul(of.ray.z, places.middle);
     const Floats3 sunlight =
         kHeights == Heights::alike ? sunlight_nearby(frame, height) : sunlight_at(frame, height);
-    const Floats lit = sunlight_left(air, times(at, of.ray));
+    const Floats lit = sunlight_left(air, times(places.at, of.ray));
     const auto inside = hn::Lt(begin, set(air.data.shade.w));
     Floats3 light{zero, zero, zero};
     if (shaded) {
@@ -228,15 +285,17 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
         light = times(hn::Mul(strength, hn::Sub(lit, one)),
                       each_times(subtract(before, behind), sunlit_at(frame, of.sunlit, height, sunlight)));
     }
-    if (!foggy) return {light, one};
-    const Floats transmittance = quick_exp(hn::Neg(depth));
-    const Floats half = hn::IfThenElseZero(inside, set(0.5f));
-    const Floats3 beta = mix(before, behind, {half, half, half});
+    if (!foggy) return {light, one, places.middle};
+    const Floats patches = fog_patches(air, times(places.at, of.ray), begin, end);
+    const Floats transmittance = quick_exp(hn::Neg(hn::Mul(fog.depth, patches)));
+    const Floats way = hn::Div(hn::Sub(places.middle, begin), hn::Max(hn::Sub(end, begin), set(1.0e-6f)));
+    const Floats3 beta = hn::AllTrue(d, inside) ? mix(before, behind, {way, way, way})
+                                                : clear_air(frame, of.ray, places.middle);
     const Floats3 veil =
         each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)}, of.sunlit.endless);
-    const Floats3 of_fog = add(each_times(beta, fog_radiance(frame, of, height, sunlight, lit)), veil);
+    const Floats3 of_fog = add(each_times(beta, fog_radiance(frame, of, places.middle, sunlight, lit)), veil);
     light = times(hn::MulAdd(set(0.5f), transmittance, set(0.5f)), light);
-    return {times_add(hn::Sub(one, transmittance), of_fog, light), transmittance};
+    return {times_add(hn::Sub(one, transmittance), of_fog, light), transmittance, places.middle};
 }
 
 // Where rays come out of the ground that the eye is below, as those of a mirror image do.
@@ -251,8 +310,7 @@ HWY_INLINE AirLayer layer_in_front(const PictureFrame& frame, const Floats3& ray
                                    Floats distance) {
     const Floats begin = hn::Min(hn::Max(shell_begins, air_begin(frame, ray)), distance);
     return air_layer<Heights::apart>(frame, RayAir(frame, ray), clear_air(frame, ray, begin),
-                                     clear_air(frame, ray, distance), begin, distance,
-                                     within_shell(*frame.shells, begin, distance, set(0.5f)));
+                                     clear_air(frame, ray, distance), begin, distance, set(0.5f));
 }
 
 // Distances along rays between which something is drawn.

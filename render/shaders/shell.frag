@@ -17,8 +17,7 @@ layout(location = 1) out vec4 depth;
 void main() {
     vec3 ray = pixel_ray(gl_FragCoord.xy);
     uvec2 pixel = uvec2(gl_FragCoord.xy) + uvec2(frame.picture.zw);
-    float at;
-    AirLayer air = air_shell(shell, sunlit_air(ray), ray, pixel, at);
+    AirLayer air = air_shell(shell, sunlit_air(ray), ray, pixel);
     radiance = vec4(air.light, air.transmittance);
-    depth = vec4((1.0 - air.transmittance) * at, 0.0, 0.0, air.transmittance);
+    depth = vec4((1.0 - air.transmittance) * air.distance, 0.0, 0.0, air.transmittance);
 }

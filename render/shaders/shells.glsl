@@ -17,6 +17,7 @@ layout(set = 0, binding = 14, std430) readonly buffer Shade {
 struct AirLayer {
     vec3 light;
     float transmittance;
+    float distance;  // metres from the eye where half of what the layer hides is hidden
 };
 
 float shell_end(uint k) { return shells.ends[k / 4u][k % 4u]; }
@@ -56,56 +57,88 @@ float fog_noise(vec3 point, vec4 eye) {
     return mix(two.x, two.y, share.x);
 }
 
-// Optical depth of the fog of a ray between two distances, whose noise is looked up at a third. Over more than a patch
-// the noise is its mean.
-float fog_depth(vec3 ray, float begin, float end, float at) {
-    float column = fog_column(shells.fog.z + ray.z * begin, ray.z, end - begin, shells.fog.y);
-    float varies = shells.fog.w * min(1.0, 0.125 / max(shells.fog_coarse.w * (end - begin), 1.0e-6));
-    vec3 point = at * ray;
-    float noise = fog_noise(point, shells.fog_coarse) + fog_noise(point.yzx, shells.fog_fine);
-    return shells.fog.x * column * max(1.0 + varies * (noise - 1.0), 0.0);
+// Fog of a ray between two distances, without its patches.
+struct FogPart {
+    float depth;  // optical
+    float low;    // extinction at the lower end
+};
+
+FogPart fog_part(vec3 ray, float begin, float end) {
+    float height = shells.fog.z + ray.z * begin, low = shells.fog.z + ray.z * (ray.z < 0.0 ? end : begin);
+    return FogPart(shells.fog.x * fog_column(height, ray.z, end - begin, shells.fog.y),
+                   shells.fog.x * exp(min(-low * shells.fog.y, 60.0)));
 }
 
-// Where a part of a ray is looked up that begins in a shell: in the last shell, which has no end, where it begins.
-float within_shell(float begin, float end, float share) { return begin < shells.shade.w ? mix(begin, end, share) : begin; }
+// Where this fog has taken half of all the light that it takes. Counted from the lower end, so that nothing is lost to
+// rounding where the eye is far above.
+float fog_middle(FogPart fog, vec3 ray, float begin, float end) {
+    float taken = -log(0.5 + 0.5 * exp(-fog.depth));
+    float rest = ray.z < 0.0 ? fog.depth - taken : taken, per_low = rest / max(fog.low, 1.0e-30);
+    float falls = abs(ray.z) * shells.fog.y, x = falls * per_low;
+    float way = x < 1.0e-2 ? per_low * (1.0 + x * (0.5 + x * (1.0 / 3.0))) : -log(max(1.0 - x, 1.0e-7)) / max(falls, 1.0e-30);
+    way = clamp(way, 0.0, end - begin);
+    return ray.z < 0.0 ? end - way : begin + way;
+}
 
-// Radiance at opacity 1 that fog at a height above the eye scatters towards it; lit as the clouds are. `lit`: share of
-// the sunlight that the clouds leave.
-vec3 fog_radiance(vec3 ray, float height, vec3 sunlight, float lit) {
-    float dense = exp(min(-(shells.fog.z + height) * shells.fog.y, 60.0));
+// Share of the mean that the fog of a shell has at a place. Over more than a patch it is its mean, and far away it becomes
+// that, as beyond the last shell but one.
+float fog_patches(vec3 point, float begin, float end) {
+    float reach = shells.shade.w, per_m = shells.fog_coarse.w;
+    float varies = shells.fog.w * min(1.0, 0.125 / max(per_m * (end - begin), 1.0e-6)) *
+                   clamp(4.0 - 4.0 * begin / reach, 0.0, 1.0);
+    float noise = fog_noise(point, shells.fog_coarse) + fog_noise(point.yzx, shells.fog_fine);
+    return max(1.0 + varies * (noise - 1.0), 0.0);
+}
+
+// Radiance at opacity 1 that fog at a point scatters towards the eye; lit as the clouds are. `lit`: share of the sunlight
+// that the clouds leave.
+vec3 fog_radiance(vec3 ray, float at, vec3 sunlight, float lit) {
+    float dense = exp(min(-(shells.fog.z + ray.z * at) * shells.fog.y, 60.0));
     float above = shells.fog.x * dense / shells.fog.y;  // optical depth upwards
     float sun_depth = above / max(frame.to_sun.z, 0.05), cosine = dot(frame.to_sun.xyz, ray);
     float sun = lit * (scattered_often(ray, sun_depth) + exp(-sun_depth) * scattered_once(cosine));
-    vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, exp(-0.5 * above));
-    return frame.ambient_top.w * (sun * sunlight + ambient);
+    vec3 arriving = sun * sunlight + mix(frame.ambient_base.rgb, frame.ambient_top.rgb, exp(-0.5 * above));
+    vec3 way = frame.flash.xyz - at * ray;  // lightning; adds nothing in the dark
+    arriving += frame.flash.w * flash_falloff(dot(way, way)) * exp(-above) * frame.flash_colour.rgb;
+    return frame.ambient_top.w * arriving;
 }
 
 // The air of a ray between two distances. All the light of clear air is in the picture already (air_light()); what clouds
-// shade is taken away: radiance below zero. Shade and patches are looked up at a third distance, `at`; light in the
-// middle: it changes with height so fast that looking it up here and there would show as grain.
-AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float at) {
-    vec3 beta_begin = air_transmittance(ray, begin), beta_end = air_transmittance(ray, end);
-    float height = ray.z * within_shell(begin, end, 0.5);
+// shade is taken away: radiance below zero. Shade and patches are looked up at a share, 0..1, of the way, light in the
+// middle: it changes with height so fast that looking it up here and there would show as grain. Where there is much fog,
+// both are looked up in the middle of what is seen of it.
+AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float share) {
+    float at = mix(begin, end, share), middle = mix(begin, end, 0.5);
+    bool last = begin >= shells.shade.w;  // it has no end
+    FogPart fog = FogPart(0.0, 0.0);
+    if (kFog) {
+        fog = fog_part(ray, begin, end);
+        float much = clamp((0.99 - exp(-fog.depth)) / 0.09, 0.0, 1.0);
+        float seen = fog_middle(fog, ray, begin, end);
+        at = last ? seen : mix(at, seen, much);
+        middle = last ? seen : mix(middle, seen, much);
+    }
+    float height = ray.z * middle, strength = last ? 0.0 : shells.settings.y;
     vec3 sunlight = sunlight_at(height);
-    float lit = sunlight_left(at * ray), strength = begin < shells.shade.w ? shells.settings.y : 0.0;
-    vec3 light = (strength * (lit - 1.0)) * sunlit_at(sunlit, height, sunlight) * (beta_begin - beta_end);
-    if (!kFog) return AirLayer(light, 1.0);
-    float transmittance = exp(-fog_depth(ray, begin, end, at));
-    vec3 beta = within_shell(begin, end, 1.0) > begin ? 0.5 * (beta_begin + beta_end) : beta_begin;
-    vec3 of_fog = beta * fog_radiance(ray, height, sunlight, lit) + (1.0 - beta) * sunlit.endless;
+    float lit = sunlight_left(at * ray);
+    vec3 lost = air_transmittance(ray, begin) - air_transmittance(ray, end);
+    vec3 light = (strength * (lit - 1.0)) * sunlit_at(sunlit, height, sunlight) * lost;
+    if (!kFog) return AirLayer(light, 1.0, middle);
+    float transmittance = exp(-fog.depth * fog_patches(at * ray, begin, end));
+    vec3 beta = air_transmittance(ray, middle);
+    vec3 of_fog = beta * fog_radiance(ray, middle, sunlight, lit) + (1.0 - beta) * sunlit.endless;
     light *= 0.5 + 0.5 * transmittance;  // half of the fog is in front
-    return AirLayer(light + (1.0 - transmittance) * of_fog, transmittance);
+    return AirLayer(light + (1.0 - transmittance) * of_fog, transmittance, middle);
 }
 
 // Where a ray comes out of the ground that the eye is below, as that of a mirror image is.
 float air_begin(vec3 ray) { return frame.ground.w > 0.0 ? frame.ground.w / max(ray.z, 1.0e-6) : 0.0; }
 
-// Shell k along the ray of a pixel of the picture, cut off by the ground; `at`: distance where it is looked up.
-AirLayer air_shell(uint k, SunlitAir sunlit, vec3 ray, uvec2 pixel, out float at) {
+// Shell k along the ray of a pixel of the picture, cut off by the ground.
+AirLayer air_shell(uint k, SunlitAir sunlit, vec3 ray, uvec2 pixel) {
     float first = air_begin(ray), last = ground_distance(ray);
     float begin = clamp(shell_begin(k), first, last), end = clamp(shell_end(k), first, last);
-    at = within_shell(begin, end, shell_offset(pixel.x, pixel.y));
-    return air_layer(sunlit, ray, begin, end, at);
+    return air_layer(sunlit, ray, begin, end, shell_offset(pixel.x, pixel.y));
 }
 
 // Number of shells that end at a distance or before it.
@@ -137,10 +170,10 @@ vec2 part_with_air(vec3 ray) {
 
 // The part of a splat's own shell that lies in front of its centre.
 AirLayer layer_in_front(vec3 centre, float distance) {
-    if (!kShells) return AirLayer(vec3(0.0), 1.0);
+    if (!kShells) return AirLayer(vec3(0.0), 1.0, 0.0);
     uint k = shells_before(distance);
-    if (k == uint(shells.settings.x)) return AirLayer(vec3(0.0), 1.0);  // beyond the last
+    if (k == uint(shells.settings.x)) return AirLayer(vec3(0.0), 1.0, 0.0);  // beyond the last
     vec3 ray = centre / max(distance, 1.0e-6);
     float begin = min(max(shell_begin(k), air_begin(ray)), distance);
-    return air_layer(sunlit_air(ray), ray, begin, distance, within_shell(begin, distance, 0.5));
+    return air_layer(sunlit_air(ray), ray, begin, distance, 0.5);
 }

@@ -34,9 +34,8 @@ void main() {
     vec2 part = part_with_air(ray);
     uint last = part.x < part.y ? min(step.end, shells_before(part.y) + 1u) : step.first;
     for (uint k = max(step.first, shells_before(part.x)); k < last; ++k) {
-        float at;
-        AirLayer air = air_shell(k, sunlit, ray, pixel, at);
-        sum_distance += sum.a * (1.0 - air.transmittance) * at;
+        AirLayer air = air_shell(k, sunlit, ray, pixel);
+        sum_distance += sum.a * (1.0 - air.transmittance) * air.distance;
         sum.rgb += sum.a * air.light;
         sum.a *= air.transmittance;
     }

@@ -224,6 +224,69 @@ TEST(Fog, IsLitAsCloudsAre) {
     EXPECT_LT(green({}), 0.02);
 }
 
+// Fog beyond the shells has the light, the shadows of clouds and the distance of where it is, and not of
+// where the last shell begins.
+TEST(Fog, BeyondTheShellsIsLitWhereItIs) {
+    Renderer renderer({{}, true, 2048, Splatting::processor});
+    const std::vector<Metaball> balls = clouds(3);
+    for (const Vec3& eye : {Vec3{0, -3000, 9000}, Vec3{0, -9000, 600}}) {
+        RenderOptions options = view(eye, {0, 0, 0}, 30);
+        options.fog = {0.01, 0, 60, 0, 300, {}, 1};
+        options.shells = {128, 0.01 * std::hypot(eye.x, eye.y, eye.z), 1};
+        const Picture expected = renderer.draw(MetaballCloud{balls, 0.05, 0.7}, options);
+        options.shells = {40, 10, 1.12};                   // end at 7.7 km
+        if (eye.z < 1000) options.shells = {40, 10, 1.1};  // at 4.4 km
+        const Picture picture = renderer.draw(MetaballCloud{balls, 0.05, 0.7}, options);
+        double error = 0, contrast = 0, mean = 0, far = 0;
+        for (const float value : expected.beauty) mean += double(value) / double(expected.beauty.size());
+        for (std::size_t i = 0; i < picture.beauty.size(); ++i) {
+            error += std::abs(double(picture.beauty[i]) - double(expected.beauty[i]));
+            contrast += std::abs(double(expected.beauty[i]) - mean);
+        }
+        for (std::size_t i = 0; i < picture.depth_m.size(); ++i) {
+            const double apart = std::abs(picture.depth_m[i] / expected.depth_m[i] - 1);
+            if (std::isfinite(apart)) far += apart / double(picture.depth_m.size());
+        }
+        std::printf("fog beyond the shells: mean error %.4f, contrast %.4f, distance %.4f\n",
+                    error / double(picture.beauty.size()), contrast / double(picture.beauty.size()), far);
+        EXPECT_LT(error, 0.25 * contrast);  // one look instead of a hundred
+        EXPECT_LT(far, 0.02);
+    }
+}
+
+// In shells much thicker than one sees far, distances are those of the fog, alike for neighbours.
+TEST(Fog, DistanceIsThatOfTheFogAndHasNoGrain) {
+    for (const Splatting way : {Splatting::processor, Splatting::tiles, Splatting::billboards}) {
+        Renderer renderer({{}, true, 2048, way});
+        RenderOptions options = view({0, 0, 5}, {0, -100, 15}, 20, 32, 32);
+        options.fog = {0.1, 0, 1e5, 0, 300, {}, 1};
+        options.shells = {40, 500, 1};
+        const Picture picture = renderer.draw(MetaballCloud{}, options);
+        for (const float depth : picture.depth_m) ASSERT_NEAR(depth, std::log(2.0) / 0.1, 0.5);
+    }
+}
+
+TEST(Fog, LightningLightsIt) {
+    Renderer reference({{}, true, 2048, Splatting::billboards});
+    Renderer tiles({{}, true, 2048, Splatting::tiles}), processor({{}, true, 2048, Splatting::processor});
+    RenderOptions options = view({0, 0, 20}, {0, 1000, 60});
+    options.sun.elevation_deg = -18;
+    Splats splats;
+    const Picture dark = processor.draw_splats(splats, options);
+    splats.flash = Flash{{0, 800, 300}, {1, 1, 1}, 4};
+    const Picture expected = reference.draw_splats(splats, options);
+    for (Renderer* renderer : {&tiles, &processor}) {
+        const Picture lit = renderer->draw_splats(splats, options);
+        EXPECT_LE(test::largest_difference(lit.beauty, expected.beauty), 1.0f / 255.0f);
+        double more = 0;
+        for (std::size_t i = 0; i < lit.beauty.size(); ++i) {
+            EXPECT_GE(lit.beauty[i], dark.beauty[i] - 1e-5f);
+            more += double(lit.beauty[i] - dark.beauty[i]) / double(lit.beauty.size());
+        }
+        EXPECT_GT(more, 0.05);
+    }
+}
+
 // A walk through fog, in steps of half a metre: nothing appears at once.
 TEST(Fog, WalkingThroughItDoesNotPop) {
     Renderer renderer(test::validated(Splatting::processor));

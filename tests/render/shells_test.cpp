@@ -299,6 +299,42 @@ TEST(Shells, ShaftsBetweenCloudsEqualMarchedSingleScattering) {
     EXPECT_LE(error_sum, 0.1 * expected_sum);
 }
 
+// Radiance of fog at the eye below clouds that let no light through: black, whatever the shadow map's texels,
+// the metaballs' size, and what else there is above.
+TEST(Shells, AirBelowClosedCloudsIsInFullShade) {
+    Renderer renderer({{}, true, 2048, Splatting::processor});
+    const auto layer = [](double z, double spacing, double radius, float density) {
+        std::vector<Metaball> balls;
+        for (double y = -6000; y <= 6000; y += spacing)
+            for (double x = -6000; x <= 6000; x += spacing)
+                balls.push_back({float(x), float(y), float(z), float(radius), density});
+        return balls;
+    };
+    const auto green = [&](const std::vector<Metaball>& balls, double elevation, int map) {
+        RenderOptions options = view({0, 0, 1}, {0, 100, 1.5}, 5, 4, 4);
+        options.light.ambient_base = options.light.ambient_top = {0, 0, 0};
+        options.air.extinction_per_m = {0, 0, 0};
+        options.sun.elevation_deg = elevation;
+        options.shadow_map_size = map;
+        options.fog = {0.1, 0, 1000, 0, 300, {}, 1};
+        options.shells = {40, 10, 1.1};
+        return double(renderer.draw(MetaballCloud{balls, 0.05, 1}, options).beauty[1]);
+    };
+    const double open = green({}, 60, 256);
+    ASSERT_GT(open, 0.001);
+    const std::vector<Metaball> low = layer(1500, 100, 200, 1);
+    std::vector<Metaball> both = low;
+    for (const Metaball& ball : layer(10'000, 400, 600, 0.004f)) both.push_back(ball);
+    for (const int map : {64, 256, 1024, 4096}) {
+        for (const double elevation : {60.0, 30.0}) {
+            EXPECT_LT(green(low, elevation, map), 0.03 * open) << map << ' ' << elevation;
+            EXPECT_LT(green(layer(1500, 800, 1200, 1), elevation, map), 0.03 * open)
+                << map << ' ' << elevation;
+        }
+        EXPECT_LT(green(both, 60, map), 0.03 * open) << map;
+    }
+}
+
 // Shaded air never has less than no light, and nothing changes where nothing is shaded.
 TEST(Shells, ShaftsOnlyDarkenAndNeverBelowZero) {
     Renderer renderer(test::validated(Splatting::processor));
