@@ -154,10 +154,9 @@ const Section& scene_section() {
             key<&Scene::name>("name", "", kAny,
                               "Base name of the files that are written: letters, digits, `-`, `_` and `.`."),
             "the name of the scene's file");
-        Key seed = key<&Scene::automaton, &AutomatonOptions::seed>(
-            "seed", "", kAny,
+        Key seed = seed_key<&Scene::automaton, &AutomatonOptions::seed>(
+            "seed",
             "Start of all randomness: the same seed gives the same clouds, bit for bit, on every machine.");
-        seed.kind = KeyKind::seed;
         Key climate = table<&Scene::climate>("climate", climate_section(), climate_section().effect);
         climate.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->climate == ClimateOptions{});

@@ -98,6 +98,15 @@ Key key(std::string name, std::string unit, Limits limits, std::string effect, s
     return made;
 }
 
+// All 64 bits of a std::uint64_t, where plain key() takes no more than a TOML integer holds.
+template <auto... Members>
+Key seed_key(std::string name, std::string effect) {
+    static_assert(std::is_same_v<typename Chain<Members...>::value_type, std::uint64_t>);
+    Key made = plain_key(KeyKind::seed, std::move(name), {}, {}, std::move(effect), {});
+    made.value = &value_at<Members...>;
+    return made;
+}
+
 // A number that Section::finish reads.
 inline Key derived_number(std::string name, std::string unit, Limits limits, std::string effect) {
     return plain_key(KeyKind::number, std::move(name), std::move(unit), limits, std::move(effect), {});

@@ -28,7 +28,9 @@ void finish_shells(const SectionReader& reader, void* owner) {
     const char* name = reader.find("growth") != nullptr      ? "growth"
                        : reader.find("spacing_m") != nullptr ? "spacing_m"
                                                              : "count";
-    reader.report(name, "the last shell ends at " + number_text(std::floor(reach)) + " m",
+    // Rounded up: never 1000 km.
+    const double unit = std::pow(10.0, std::floor(std::log10(reach)) - 3);
+    reader.report(name, "the last shell ends at " + number_text(std::ceil(reach / unit) * unit) + " m",
                   "expected fewer, thinner or more slowly growing shells, which end within 1000 km");
 }
 
@@ -59,7 +61,7 @@ const Section& light_shafts_section() {
     static const Section section{
         "Light shafts",
         "Air in the shadow of clouds scatters less light: what stays lit stands out as shafts, up to the "
-        "last shell.",
+        "last shell. Only clouds of voxels cast shadows on the air; T's billboards cast none.",
         {render_key<&RenderOptions::light_shafts, &LightShafts::strength>(
              "strength", "", between(0, 1),
              "Share of the light that shaded air loses; 0: no shafts, 1: all of its direct sunlight.",
@@ -71,9 +73,10 @@ const Section& light_shafts_section() {
              "D, light shafts (I_s)"),
          render_key<&RenderOptions::light_shafts, &LightShafts::g>(
              "g", "", between(-0.99, 0.99),
-             "Asymmetry of the haze's phase function: above 0, shafts are strongest towards the sun. The "
-             "physical "
-             "sky takes `atmosphere.haze_g` instead.",
+             "Asymmetry of the haze's phase function: above 0, shafts are strongest towards the sun. With a "
+             "`sun_share` of 1 it hardly acts: all of the air's light is then sunlight, in every direction. "
+             "The "
+             "physical sky takes `atmosphere.haze_g` instead.",
              "S (Cornette and Shanks)")},
         nullptr};
     return section;
@@ -91,7 +94,10 @@ const Section& fog_section() {
              "0.02 thick fog, 0.0008 mist.",
              "S, fog; Koschmieder 1924"),
          render_key<&RenderOptions::fog, &Fog::base_m>("base_m", "m", between(-1e5, 1e5),
-                                                       "World z where it has that extinction.", "S, fog"),
+                                                       "World z where it has that extinction. It is no "
+                                                       "floor: below, fog thickens by the same law, and it "
+                                                       "reaches down to the ground.",
+                                                       "S, fog"),
          render_key<&RenderOptions::fog, &Fog::height_m>(
              "height_m", "m", between(0.1, 1e5), "Height over which it thins out to 1 / e.", "S, fog"),
          render_key<&RenderOptions::fog, &Fog::patchiness>(
@@ -105,7 +111,7 @@ const Section& fog_section() {
          render_key<&RenderOptions::fog, &Fog::velocity_m_per_s>(
              "velocity_m_per_s", "m/s", between(-1000, 1000), "Velocity at which patches drift.",
              "S, inhomogeneous fog"),
-         render_key<&RenderOptions::fog, &Fog::seed>("seed", "", kAny, "Of the patches.")},
+         seed_key<&Scene::render, &RenderOptions::fog, &Fog::seed>("seed", "Of the patches.")},
         nullptr};
     return section;
 }

@@ -195,6 +195,19 @@ TEST(Options, MessagesNameTheOption) {
     EXPECT_TRUE(contains(messages_of("seed = 1", {"time.steps=99999999999999999999"}), "64 bits"));
 }
 
+// Both seeds take all 64 bits and nothing below 0, and what is written can be read again.
+TEST(Options, SeedsAre64BitsWithoutASign) {
+    for (const std::string key : {"seed", "fog.seed"}) {
+        for (const char* bad : {"-1", "-9223372036854775808", "1.5"})
+            EXPECT_TRUE(contains(messages_of("", {key + "=" + bad}), "expected an integer from 0 to 92233"));
+        for (const char* good : {"0", "9223372036854775807", "\"0xffffffffffffffff\""}) {
+            const Scene scene = scene_of("", {key + "=" + good});
+            EXPECT_EQ(read_scene_text(to_toml(scene), "again.toml"), scene) << key << " = " << good;
+        }
+    }
+    EXPECT_EQ(scene_of("", {"fog.seed=\"0xffffffffffffffff\""}).render.fog.seed, ~std::uint64_t{0});
+}
+
 TEST(Options, BadPathsAreRefused) {
     for (const char* option :
          {"", "=", "steps", "time.steps", "time..steps=1", ".steps=1", "time.=1", "wind[=1", "wind[x]=1",
