@@ -254,13 +254,15 @@ int render(const RenderArguments& a) {
 
     const double radius = radius_in_voxels(scene, loaded);
     const double extinction_per_m = extinction_of(a, scene, loaded);
-    RenderOptions options = picture_options(a, scene, grid, loaded.metadata ? loaded.metadata->time_s : 0.0);
-    options.sun = sun_at(options.sun, loaded.metadata ? loaded.metadata->time_s : 0);
+    const double time_s = loaded.metadata ? loaded.metadata->time_s : 0;
+    RenderOptions options = picture_options(a, scene, grid, time_s);
+    options.sun = sun_at(options.sun, time_s);
     Renderer renderer(DeviceOptions{.device = a.device});
     const std::vector<Metaball> balls = metaballs(grid, radius);
     Splats splats;
     splats.metaballs = {balls, extinction_per_m, metaball_normalisation(radius)};
     splats.ground_cover = initial_cover(scene);
+    splats.time_s = time_s;
     splats.light = splats.depth =
         std::ranges::any_of(a.out, [](const std::string& out) { return extension_of(out) == ".exr"; });
     const Picture picture = renderer.draw_splats(splats, options);

@@ -911,6 +911,24 @@ class Pictures(Case):
         a, b = [png_pixels(self.folder / p) for p in ("out/frames/tiny_0005.png", "again.png")]
         self.assertEqual(a, b)
 
+    def test_fog_has_drifted_as_far_in_render_as_in_run(self):
+        """Fog is a function of time, which stands in the file."""
+        drifting = ["fog.extinction_per_m=0.01", "fog.height_m=100", "fog.patchiness=1", "fog.patch_m=200",
+                    "fog.velocity_m_per_s=[40,9,0]", "shells.spacing_m=40", "time.step_s=10", "frames.time_scale=10"]
+        changes = [word for change in drifting for word in ("--set", change)]
+        self.call("run", self.scene, *changes, "--out", "out")
+        pictures = []
+        for number in (1, 6):
+            file = f"tiny_{number:04}"
+            self.call("render", f"out/density/{file}.vdb", "--scene", self.scene, *changes, "--out", f"{file}.png")
+            pictures.append(png_pixels(self.folder / f"{file}.png"))
+            self.assertEqual(pictures[-1], png_pixels(self.folder / f"out/frames/{file}.png"), file)
+        still = [word for change in drifting if "velocity" not in change for word in ("--set", change)]
+        self.call("render", "out/density/tiny_0006.vdb", "--scene", self.scene, *still, "--set", "fog.velocity_m_per_s=[0,0,0]",
+                  "--out", "still.png")
+        differences = [abs(x - y) for x, y in zip(pictures[1], png_pixels(self.folder / "still.png"))]
+        self.assertGreater(max(differences), 10, "the fog drifts")
+
     def test_refined_grids_are_drawn_with_metaballs_of_the_same_size(self):
         """The radius is in cells: a refined file looks as the run's own picture, which is of the cells."""
         changes = ["--set", "density.refine=2", "--set", "density.metaball_radius_cells=2.5", "--set", "lattice.cells=[48,32,24]"]
