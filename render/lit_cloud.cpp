@@ -74,7 +74,7 @@ LightKey light_key(const MetaballCloud& cloud, const RenderOptions& options) {
     return {balls.low64 ^ hash.low64, balls.high64 ^ hash.high64};
 }
 
-void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
+bool keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
                 const DetailView& view) {
     const LightKey key = light_key(cloud, options);
     const bool is_known = kept.shadow_size != 0 && key == kept.key;
@@ -82,7 +82,7 @@ void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions&
         if (kept.merged.empty())
             kept.cloud.metaballs = cloud.metaballs;  // the same values, perhaps elsewhere
         kept.drawn_again = true;
-        return;
+        return true;
     }
     kept.shadow_size = 0;  // nothing is kept if prepare() throws
     PreparedCloud given = prepare(cloud);
@@ -94,7 +94,7 @@ void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions&
     if (merge(kept, std::move(given), std::move(merged)) && is_known) {
         kept.drawn_again = true;
         kept.shadow_size = options.shadow_map_size;
-        return;
+        return true;
     }
     const TileGrid grid{options.shadow_map_size, options.shadow_map_size};
     kept.sun_depths.assign(kept.cloud.visible.size(), 0.0f);
@@ -104,6 +104,7 @@ void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions&
     kept.all_known = kept.cloud.visible.empty();  // the map is white
     kept.drawn_again = false;
     kept.shadow_size = options.shadow_map_size;
+    return false;
 }
 
 bool light_seen(LitCloud& kept, const std::vector<std::uint32_t>& source,

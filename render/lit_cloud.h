@@ -39,8 +39,8 @@ struct LitCloud {
 
 // Makes `kept` that of a cloud as it is drawn from a view, without its light, unless it is already. `cloud`
 // must live as long as `kept` is read. Another view keeps the light if it merges the same metaballs, as it
-// does without level of detail.
-void keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
+// does without level of detail. Returns whether the light was kept.
+bool keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
                 const DetailView& view);
 
 // Computes on the processor what is missing of the light of the balls numbered `source` whose `seen_balls` is

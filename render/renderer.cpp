@@ -117,8 +117,8 @@ struct Renderer::Impl {
     bool on_processor() const { return splatting == Splatting::processor; }
     LightTiles& light_on_device();
 
-    LitCloud lit;  // of the last picture
-    std::optional<LightKey> map_on_device;
+    LitCloud lit;                           // of the last picture
+    std::optional<LightKey> map_on_device;  // whose map it is; reset when that map changes
     std::size_t light_passes = 0;
     StageTimes times;
     int tile_size;
@@ -207,8 +207,10 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
         ++light_passes;
     } else if (on_processor()) {
         if (light_seen(lit, order.source, seen != nullptr ? &seen->balls : nullptr,
-                       seen != nullptr ? &seen->map_tiles : nullptr, &times))
+                       seen != nullptr ? &seen->map_tiles : nullptr, &times)) {
             ++light_passes;
+            map_on_device.reset();
+        }
     } else if (on_device && options.light.lighting == Lighting::light_pass) {
         pass_sunlight(lit);
         ++light_passes;
@@ -238,7 +240,8 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
     Picture picture = blank_picture(options);
     {
         const StageTimer timer(&times, DrawStage::prepare);
-        keep_cloud(lit, splats.metaballs, options, detail);
+        // The key says nothing of the view, from which others may be merged.
+        if (!keep_cloud(lit, splats.metaballs, options, detail)) map_on_device.reset();
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
     picture.shadow_frame = lit.frame;
@@ -265,8 +268,9 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
             parts.back().frame.scattering = scattering.data();
         }
     }
-    // The processor has no air between billboards.
-    const bool blended = !order.puffs.empty() && has_shells(options);
+    // The processor has no air between billboards. Shafts alone need metaballs, whose shadow they are.
+    const bool air = has_shells(options) && (!lit.cloud.visible.empty() || options.fog.extinction_per_m > 0);
+    const bool blended = !order.puffs.empty() && air;
     if (on_processor() && !blended)
         draw_on_processor(splats, options, camera, parts, order, picture);
     else

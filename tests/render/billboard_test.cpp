@@ -266,6 +266,16 @@ TEST_P(BillboardTest, AgreesWithTheBlendedPass) {
     test::expect_no_messages(reference_renderer);
 }
 
+// Shafts are the shadow of metaballs: where there are none, neither the picture nor the way in which it is
+// drawn changes.
+TEST_P(BillboardTest, LightShaftsOfNoMetaballsChangeNothing) {
+    RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
+    const std::vector<CloudBillboard> billboards = random_billboards(6, 100, 2);
+    const Picture without = renderer_.draw_splats(scene_of(kClouds, billboards), options);
+    options.light_shafts.strength = 1;
+    EXPECT_TRUE(same_bits(without, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
+}
+
 // Whoever does not ask for depth gets the same picture without it.
 TEST_P(BillboardTest, DepthIsLeftOutOnRequest) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);

@@ -10,6 +10,7 @@
 #include "tests/reference/with_threads.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
+#include "tests/render/voxel_cloud.h"
 
 namespace nephos {
 namespace {
@@ -115,6 +116,33 @@ TEST_P(KeptLight, IsComputedWhenSomethingChanged) {
     EXPECT_EQ(passes({balls_, 0.03, 0.7}, options), 1u) << "light distance";
     options.light.phase.g = 0.3;
     EXPECT_EQ(passes({balls_, 0.03, 0.7}, options), 0u) << "the phase function is the view's";
+}
+
+// From another eye level of detail merges other metaballs. Fog between billboards looks at the shadow map on
+// the device, in every way of drawing.
+TEST_P(KeptLight, OtherMergedMetaballsHaveAnotherShadow) {
+    const std::vector<Metaball> voxels = test::ragged_cloud();
+    const BillboardCloud puffs{{0, 0, 1000}, 600, 1400};
+    CloudBillboard puff;
+    puff.centre_m = {500, -300, 900};
+    puff.width_m = puff.height_m = 200;
+    Splats splats;
+    splats.metaballs = {voxels, 0.15, test::kVoxelNormalisation};
+    splats.clouds = {&puffs, 1};
+    splats.billboards = {&puff, 1};
+    splats.light = false;
+    for (const Lighting lighting : {Lighting::light_pass, Lighting::cfa}) {
+        Renderer on_its_way(device());
+        for (const double y : {-9000, -1500}) {
+            RenderOptions options = from({0, y, 900});
+            options.level_of_detail.pixels = 8;
+            options.light.lighting = lighting;
+            options.fog.extinction_per_m = 0.0005;
+            options.fog.height_m = 2000;
+            Renderer fresh(device());
+            expect_same_pixels(on_its_way.draw_splats(splats, options), fresh.draw_splats(splats, options));
+        }
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, KeptLight,
