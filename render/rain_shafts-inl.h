@@ -260,6 +260,9 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
     const Floats step = hn::Mul(hn::Sub(end, begin), set(1.0f / kShaftSteps));
     const auto at = [&](int i) { return hn::MulAdd(hn::Add(offset, set(float(i))), step, begin); };
     const bool split = !hn::AllTrue(d, hn::Le(end, cloud_m));  // whether some clouds stand in the run
+    const Floats within = hn::Min(hn::Sub(cloud_m, begin), hn::Sub(end, cloud_m));
+    const Floats parting =
+        hn::MulAdd(hn::Sub(set(0.5f), offset), hn::Min(hn::Max(within, zero), step), cloud_m);
     const auto through_air = [&](Floats way_m) {
         const auto of = [&](float per_m) { return quick_exp(hn::Mul(set(-per_m), way_m)); };
         return Floats3{of(p.air_per_m.x), of(p.air_per_m.y), of(p.air_per_m.z)};
@@ -281,10 +284,13 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
             if (p.clear_m > 0 && !hn::AllFalse(d, hn::Lt(t, set(p.clear_m))))
                 densest =
                     hn::Mul(densest, smooth_blend(clamped(hn::MulSub(set(2 / p.clear_m), t, set(1)), 0, 1)));
-            const Floats depth = hn::Mul(densest, step);
-            const Floats hidden = split ? hn::IfThenZeroElse(hn::Lt(t, cloud_m), depth) : zero;
-            in_front = hn::Add(in_front, hn::Sub(depth, hidden));
-            beyond = hn::Add(beyond, hidden);
+            Floats front_m = step;
+            if (split) {
+                const Floats start = hn::MulAdd(set(float(i)), step, begin);
+                front_m = hn::Min(hn::Max(hn::Sub(parting, start), zero), step);
+                beyond = hn::MulAdd(densest, hn::Sub(step, front_m), beyond);
+            }
+            in_front = hn::MulAdd(densest, front_m, in_front);
         }
         const bool some_beyond = split && !hn::AllFalse(d, hn::Gt(beyond, zero));
         if (!some_beyond && hn::AllFalse(d, hn::Gt(in_front, zero))) continue;

@@ -19,7 +19,9 @@
 //
 // A ray goes in kShaftSteps even steps through every stretch of curtains that touch or overlap, displaced by
 // a quarter to three quarters of a step so that no steps show (tests/render/reference_shafts.h has all of it
-// for one ray, without vectors).
+// for one ray, without vectors). A cloud in a stretch divides the step in which it stands, each step being
+// the air around its place: with o the displacement, the cloud is taken (1/2 - o) of a step farther away,
+// less near the ends of the stretch, so that neighbours see as much before it.
 
 #include <cstdint>
 #include <span>

@@ -153,6 +153,36 @@ TEST(RainShafts, AreThoseOfTheTwin) {
     }
 }
 
+// What stands in the middle of a curtain, a wall of fog here, divides the step in which it stands:
+// neighbours, whose steps are displaced against each other, see as much of the curtain before it.
+TEST(RainShafts, HaveNoGrainBeforeWhatStandsInThem) {
+    RainCurtain curtain = area();
+    curtain.rate_mm_per_h = 150;
+    RenderOptions options = options_at({0, -3000, 300}, {0, 0, 300});
+    options.camera.vertical_fov_deg = 0.5;  // the curtain itself hardly changes from pixel to pixel
+    options.precipitation.shaft_texture = 0;
+    const CameraFrame camera = camera_frame(options.camera);
+    for (const float left : {0.0f, 0.7f}) {
+        for (const float depth_m : {3600.0f, 3800.0f, 3850.0f, 4000.0f, 9000.0f}) {
+            Picture picture = test::grey(options.camera, 0.9f);
+            const PrecipitationLight light = precipitation_light(picture, options, camera, 0);
+            std::ranges::fill(picture.depth_m, depth_m);
+            std::ranges::fill(picture.transmittance, left);
+            draw_shafts(picture, options, camera, {&curtain, 1}, light, 0, 5);
+            float most = 0, darkest = 0.9f;
+            for (int y = 0; y < picture.height; ++y) {
+                const float* row = &picture.beauty[std::size_t(3 * y * picture.width)];
+                for (int x = 0; x + 1 < picture.width; ++x) {
+                    most = std::max(most, std::abs(row[3 * x + 3] - row[3 * x]));
+                    darkest = std::min(darkest, row[3 * x]);
+                }
+            }
+            EXPECT_LT(most, 1.5f / 255) << depth_m;
+            EXPECT_LT(darkest, 0.85f) << depth_m << ": the curtain is seen";
+        }
+    }
+}
+
 TEST(RainShafts, AreTheSameForAnyNumberOfThreads) {
     std::mt19937 random(7);
     const RenderOptions options = options_at({-400, -900, 20}, {100, 900, 300});

@@ -144,6 +144,10 @@ inline Rgb pixel_with_shafts(const Shafts& s, int x, int y) {
         const auto place = [&](double i) {
             return s.camera.position_m + (stretch.begin + (i + offset) * step) * ray;
         };
+        const double cloud_m = double(s.picture.depth_m[pixel]);
+        const double parting =
+            cloud_m +
+            (0.5 - offset) * std::clamp(std::min(cloud_m - stretch.begin, stretch.end - cloud_m), 0.0, step);
         for (int light = 0; light < kShaftSteps; light += kShaftStepsPerLight) {
             const double middle = light + kShaftStepsPerLight / 2;
             double in_front = 0, beyond = 0;
@@ -154,7 +158,9 @@ inline Rgb pixel_with_shafts(const Shafts& s, int x, int y) {
                                                     falls_at(s, s.curtains[n], place(middle)));
                 const double t = stretch.begin + (i + offset) * step;
                 if (clear_m > 0) densest *= smooth(std::clamp(2 * t / clear_m - 1, 0.0, 1.0));
-                (t < double(s.picture.depth_m[pixel]) ? in_front : beyond) += densest * step;
+                const double front_m = std::clamp(parting - stretch.begin - i * step, 0.0, step);
+                in_front += densest * front_m;
+                beyond += densest * (step - front_m);
             }
             const Rgb arrives = arriving(s, ray, stretch.begin + (middle + offset) * step);
             add(before, in_front, arrives);
