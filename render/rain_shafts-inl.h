@@ -251,18 +251,14 @@ HWY_INLINE bool next_run(const MetCurtains& met, Floats& begin, Floats& end) {
     return true;
 }
 
-// Steps along one run of every ray.
+// Steps along one run of every ray, or the part of it before or behind the pixels' clouds.
 HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, const Floats3& sun,
-                      Floats begin, Floats end, Floats offset, Floats cloud_m, Through& before,
-                      Through& behind) {
+                      Floats begin, Floats end, Floats offset, Through& run) {
     const Lanes d;
+    if (hn::AllFalse(d, hn::Lt(begin, end))) return;
     const Floats zero = hn::Zero(d);
     const Floats step = hn::Mul(hn::Sub(end, begin), set(1.0f / kShaftSteps));
     const auto at = [&](int i) { return hn::MulAdd(hn::Add(offset, set(float(i))), step, begin); };
-    const bool split = !hn::AllTrue(d, hn::Le(end, cloud_m));  // whether some clouds stand in the run
-    const Floats within = hn::Min(hn::Sub(cloud_m, begin), hn::Sub(end, cloud_m));
-    const Floats parting =
-        hn::MulAdd(hn::Sub(set(0.5f), offset), hn::Min(hn::Max(within, zero), step), cloud_m);
     const auto through_air = [&](Floats way_m) {
         const auto of = [&](float per_m) { return quick_exp(hn::Mul(set(-per_m), way_m)); };
         return Floats3{of(p.air_per_m.x), of(p.air_per_m.y), of(p.air_per_m.z)};
@@ -273,7 +269,7 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
         const Floats middle = at(first + kShaftStepsPerLight / 2);
         for (std::size_t m = 0; m < met.count; ++m)
             met.set_falls(m, falls_at(p, *met.curtains[m], met.way(m), ray.z, middle));
-        Floats in_front = zero, beyond = zero;
+        Floats depth = zero;
         for (int i = first; i < first + kShaftStepsPerLight; ++i) {
             const Floats t = at(i);
             Floats densest = zero;
@@ -284,19 +280,11 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
             if (p.clear_m > 0 && !hn::AllFalse(d, hn::Lt(t, set(p.clear_m))))
                 densest =
                     hn::Mul(densest, smooth_blend(clamped(hn::MulSub(set(2 / p.clear_m), t, set(1)), 0, 1)));
-            Floats front_m = step;
-            if (split) {
-                const Floats start = hn::MulAdd(set(float(i)), step, begin);
-                front_m = hn::Min(hn::Max(hn::Sub(parting, start), zero), step);
-                beyond = hn::MulAdd(densest, hn::Sub(step, front_m), beyond);
-            }
-            in_front = hn::MulAdd(densest, front_m, in_front);
+            depth = hn::MulAdd(densest, step, depth);
         }
-        const bool some_beyond = split && !hn::AllFalse(d, hn::Gt(beyond, zero));
-        if (!some_beyond && hn::AllFalse(d, hn::Gt(in_front, zero))) continue;
+        if (hn::AllFalse(d, hn::Gt(depth, zero))) continue;
         const Floats3 seen = mix(set3(p.horizon), radiance(p, ray, sun, middle), kept);
-        add(before, in_front, seen);
-        if (some_beyond) add(behind, beyond, seen);
+        add(run, depth, seen);
     }
 }
 
@@ -338,11 +326,15 @@ void draw_pixels(const ShaftPass& p, MetCurtains& met, std::size_t x, std::size_
     if (p.has_sun) sun = times(drop_phase(p.forward_g, dot(ray, set3(p.to_sun))), sun);
     const Floats zero = hn::Zero(d), one = set(1), offset = shaft_offsets(x, y);
     Through before{one, {zero, zero, zero}}, behind = before;
-    for (Floats begin = set(-1), end = begin; next_run(met, begin, end);)
-        march(p, met, ray, sun, begin, end, offset, cloud_m, before, behind);
+    const Floats seen = hn::LoadU(d, pixels.transmittance);
+    const bool see_through = !hn::AllFalse(d, hn::Gt(seen, set(kShaftLeastSeen)));
+    for (Floats begin = set(-1), end = begin; next_run(met, begin, end);) {
+        const Floats parting = hn::Min(hn::Max(cloud_m, begin), end);
+        march(p, met, ray, sun, begin, parting, offset, before);
+        if (see_through) march(p, met, ray, sun, parting, end, offset, behind);
+    }
     // The air before a curtain is in both its terms: what the curtain sends has it already, and what it lets
     // through keeps the rest.
-    const Floats seen = hn::LoadU(d, pixels.transmittance);
     const Floats lost = hn::Mul(seen, hn::Sub(behind.transmittance, one));
     const auto through = [&](Floats value, Floats nearer, Floats farther) {
         value = hn::MulAdd(seen, farther, hn::MulAdd(lost, value, value));

@@ -17,11 +17,10 @@
 // the area's centre along the lean, s is 0.6 of it at (x + o, y) and 0.4 at (4 x, 4 y + o), f is it at (x +
 // y, (height + kShaftFall time) / kShaftFallCell + o), o = id mod kShaftsOwn.
 //
-// A ray goes in kShaftSteps even steps through every stretch of curtains that touch or overlap, displaced by
-// a quarter to three quarters of a step so that no steps show (tests/render/reference_shafts.h has all of it
-// for one ray, without vectors). A cloud in a stretch divides the step in which it stands, each step being
-// the air around its place: with o the displacement, the cloud is taken (1/2 - o) of a step farther away,
-// less near the ends of the stretch, so that neighbours see as much before it.
+// A ray goes in kShaftSteps even steps through every stretch of curtains that touch or overlap, and in as
+// many each before and behind a cloud that stands in it, displaced by a quarter to three quarters of a step
+// so that no steps show (tests/render/reference_shafts.h has all of it for one ray, without vectors). What is
+// behind a cloud that lets less than kShaftLeastSeen through is left out.
 
 #include <cstdint>
 #include <span>
@@ -35,6 +34,7 @@
 namespace nephos {
 
 inline constexpr int kShaftSteps = 12;
+inline constexpr float kShaftLeastSeen = 1.0f / 4096;
 inline constexpr int kShaftStepsPerLight =
     3;  // three steps have light and falls (f) of the one in their middle
 inline constexpr float kShaftTopFade = 0.15f;    // share of the height over which a curtain begins

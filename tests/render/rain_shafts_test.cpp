@@ -153,7 +153,7 @@ TEST(RainShafts, AreThoseOfTheTwin) {
     }
 }
 
-// What stands in the middle of a curtain, a wall of fog here, divides the step in which it stands:
+// What stands in the middle of a curtain, a wall of fog here, has steps of its own before it and behind:
 // neighbours, whose steps are displaced against each other, see as much of the curtain before it.
 TEST(RainShafts, HaveNoGrainBeforeWhatStandsInThem) {
     RainCurtain curtain = area();

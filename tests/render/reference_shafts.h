@@ -132,40 +132,40 @@ inline void add(Through& run, double depth, const Rgb& light) {
     run.transmittance *= std::exp(-depth);
 }
 
+// Steps from the beginning to the end of a part of a ray.
+inline void march(const Shafts& s, const Vec3& ray, double offset, const Stretch& part, Through& run) {
+    if (!(part.begin < part.end)) return;
+    const double clear_m = s.options.precipitation.particles > 0 ? s.options.precipitation.depth_m : 0;
+    const double step = (part.end - part.begin) / kShaftSteps;
+    const auto place = [&](double i) {
+        return s.camera.position_m + (part.begin + (i + offset) * step) * ray;
+    };
+    for (int light = 0; light < kShaftSteps; light += kShaftStepsPerLight) {
+        const double middle = light + kShaftStepsPerLight / 2;
+        double depth = 0;
+        for (int i = light; i < light + kShaftStepsPerLight; ++i) {
+            double densest = 0;
+            for (std::size_t n = 0; n < s.curtains.size(); ++n)
+                densest = std::max(densest, extinction(s, s.curtains[n], s.whole_per_m[n], place(i)) *
+                                                falls_at(s, s.curtains[n], place(middle)));
+            const double t = part.begin + (i + offset) * step;
+            if (clear_m > 0) densest *= smooth(std::clamp(2 * t / clear_m - 1, 0.0, 1.0));
+            depth += densest * step;
+        }
+        add(run, depth, arriving(s, ray, part.begin + (middle + offset) * step));
+    }
+}
+
 // A pixel of the picture with the shafts over it.
 inline Rgb pixel_with_shafts(const Shafts& s, int x, int y) {
     const Vec3 ray = pixel_ray(s.camera, s.options.camera, x + 0.5, y + 0.5);
     const std::size_t pixel = std::size_t(y) * std::size_t(s.picture.width) + std::size_t(x);
     const double offset = shaft_offset(std::uint32_t(x), std::uint32_t(y));
-    const double clear_m = s.options.precipitation.particles > 0 ? s.options.precipitation.depth_m : 0;
     Through before, behind;
     for (const Stretch& stretch : stretches(s, ray)) {
-        const double step = (stretch.end - stretch.begin) / kShaftSteps;
-        const auto place = [&](double i) {
-            return s.camera.position_m + (stretch.begin + (i + offset) * step) * ray;
-        };
-        const double cloud_m = double(s.picture.depth_m[pixel]);
-        const double parting =
-            cloud_m +
-            (0.5 - offset) * std::clamp(std::min(cloud_m - stretch.begin, stretch.end - cloud_m), 0.0, step);
-        for (int light = 0; light < kShaftSteps; light += kShaftStepsPerLight) {
-            const double middle = light + kShaftStepsPerLight / 2;
-            double in_front = 0, beyond = 0;
-            for (int i = light; i < light + kShaftStepsPerLight; ++i) {
-                double densest = 0;
-                for (std::size_t n = 0; n < s.curtains.size(); ++n)
-                    densest = std::max(densest, extinction(s, s.curtains[n], s.whole_per_m[n], place(i)) *
-                                                    falls_at(s, s.curtains[n], place(middle)));
-                const double t = stretch.begin + (i + offset) * step;
-                if (clear_m > 0) densest *= smooth(std::clamp(2 * t / clear_m - 1, 0.0, 1.0));
-                const double front_m = std::clamp(parting - stretch.begin - i * step, 0.0, step);
-                in_front += densest * front_m;
-                beyond += densest * (step - front_m);
-            }
-            const Rgb arrives = arriving(s, ray, stretch.begin + (middle + offset) * step);
-            add(before, in_front, arrives);
-            add(behind, beyond, arrives);
-        }
+        const double parting = std::clamp(double(s.picture.depth_m[pixel]), stretch.begin, stretch.end);
+        march(s, ray, offset, {stretch.begin, parting}, before);
+        march(s, ray, offset, {parting, stretch.end}, behind);
     }
     Rgb seen;
     for (std::size_t c = 0; c < 3; ++c) {
