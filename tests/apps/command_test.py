@@ -416,6 +416,10 @@ class Disk(Case):
     def limited(self, size):
         return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
+    def need_device(self):
+        if shutil.which("vulkaninfo") is None and not list(pathlib.Path("/usr/share/vulkan/icd.d").glob("*")):
+            self.skipTest("no Vulkan device")
+
     def no_parts(self):
         parts = [p for p in self.folder.rglob("*") if ".part" in p.name]
         self.assertEqual(parts, [])
@@ -482,8 +486,7 @@ class Disk(Case):
         self.call("run", self.scene, *bare)
 
     def test_pictures(self):
-        if shutil.which("vulkaninfo") is None and not list(pathlib.Path("/usr/share/vulkan/icd.d").glob("*")):
-            self.skipTest("no Vulkan device")
+        self.need_device()
         small = ["--set", "lattice.cells=[16,16,8]", "--set", "density.write_state=false", "--set", "camera.width=640",
                  "--set", "camera.height=480"]
         self.refused_at(20000, "tiny_0001.png", "run", self.scene, *small, "--out", "png")
@@ -494,19 +497,49 @@ class Disk(Case):
             self.refused_at(20000, name, "render", "out/density/tiny_0005.vdb", "--out", name)
             self.assertFalse((self.folder / name).exists())
 
+    def test_pictures_that_were_finished_stay(self):
+        """The first picture that is larger than all before it fails; those before it are as in a whole run."""
+        self.need_device()
+        changes = ["--set", "density.write_state=false", "--set", "camera.width=640", "--set", "camera.height=480",
+                   "--set", "field.background.act=0.0002", "--set", "field.background.ext=0", "--set", "time.steps=20"]
+        self.call("run", self.scene, *changes, "--out", "whole")
+        names = sorted(p.name for p in (self.folder / "whole/frames").iterdir())
+        sizes = [(self.folder / "whole/frames" / name).stat().st_size for name in names]
+        failed = next(n for n in range(3, len(sizes)) if sizes[n] > max(sizes[:n]))
+        limit = max(sizes[:failed])
+        others = [p for p in (self.folder / "whole").rglob("*") if p.is_file() and p.suffix != ".png"]
+        self.assertLess(max(p.stat().st_size for p in others), limit, "a picture is the first to fail")
+        for threads in (1, 2):
+            with self.subTest(threads=threads):
+                out = self.folder / f"out{threads}"
+                self.refused_at(limit, names[failed], "run", self.scene, *changes, "--out", out, "--threads", threads)
+                self.assertEqual([frame["number"] for frame in json.loads((out / "manifest.json").read_text())["frames"]],
+                                 list(range(1, failed + 1)))
+                self.assertEqual(sorted(p.name for p in (out / "frames").iterdir()), names[:failed])
+                for name in names[:failed]:
+                    self.assertEqual((out / "frames" / name).read_bytes(), (self.folder / "whole/frames" / name).read_bytes())
+                self.call("run", self.scene, *changes, "--out", out)
+                self.same_runs("whole", out.name)
+
     def test_a_small_file_system(self):
         """No limit on files but a disk that is really full, where this machine lets us mount one."""
+        self.need_device()
         disk = self.folder / "disk"
         disk.mkdir()
         if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", disk], capture_output=True).returncode != 0:
             self.skipTest("mounting is not allowed here")
         self.addCleanup(subprocess.run, ["umount", disk], check=True)
-        many = ["--no-render", "--out", "disk/out", "--set", "time.steps=60"]
-        result = self.refused(3, "run", self.scene, *many, says="No space left on device")
-        self.assertIn("disk/out/", result.stderr)
-        self.no_parts()
-        for frame in (disk / "out/density").iterdir():
-            self.call("info", frame)
+        for kind, many in (("density", ["--no-render"]), ("frames", ["--set", "frames.png=false", "--set", "frames.exr=true"])):
+            result = self.refused(3, "run", self.scene, *many, "--out", f"disk/{kind}", "--set", "time.steps=60",
+                                  says="No space left on device")
+            self.assertIn(f"disk/{kind}/", result.stderr)
+            self.no_parts()
+            frames = json.loads((disk / kind / "manifest.json").read_text())["frames"]
+            self.assertGreater(len(frames), 1)
+            self.assertLessEqual(len(frames), len(list((disk / kind / kind).iterdir())))
+            for frame in (disk / kind / kind).iterdir():
+                self.call("info", frame)
+            shutil.rmtree(disk / kind)
 
 
 class Memory(Case):
