@@ -75,7 +75,6 @@ HWY_INLINE Floats fraction(Floats value) { return hn::Sub(value, hn::Floor(value
 
 // Noise of fog at points relative to the eye, 0..1.
 HWY_INLINE Floats fog_noise(const AirShells& air, const Floats3& point, const shader::vec4& eye) {
-    const Lanes d;
     const hn::RebindToSigned<Lanes> di;
     constexpr int kEdge = int(shader::kFogVoxels);
     const auto voxel = [&](float from, Floats along) {
