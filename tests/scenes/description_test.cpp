@@ -335,7 +335,9 @@ TEST(Description, EveryKeyIsExplained) {
             const std::string here = path + "/" + key.name;
             EXPECT_FALSE(key.effect.empty()) << here;
             EXPECT_FALSE(expected_text(key).empty()) << here;
-            if (key.kind == KeyKind::count) EXPECT_GE(key.limits.min, 0) << here << " has no sign";
+            if (key.kind == KeyKind::count) {
+                EXPECT_GE(key.limits.min, 0) << here << " has no sign";
+            }
             for (const auto& [suffix, unit] : {std::pair{"_m", "m"},
                                                {"_s", "s"},
                                                {"_deg", "deg"},
