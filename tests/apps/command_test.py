@@ -890,6 +890,47 @@ class Vulkan(Case):
         self.call("run", self.scene, "--set", "frames.png=false", env=self.NONE)
 
 
+class LostDevice(Case):
+    """A graphics card that is lost while it draws (lost_device_layer.cpp): exit status 4, and finished frames stay."""
+
+    def setUp(self):
+        super().setUp()
+        if "LAYERS" not in os.environ:
+            self.skipTest("LAYERS does not say where the layer lies")
+
+    def lost_after(self, submissions):
+        return {"VK_LAYER_PATH": os.environ["LAYERS"], "VK_INSTANCE_LAYERS": "VK_LAYER_NEPHOS_lost_device",
+                "NEPHOS_LOSE_DEVICE_AFTER": str(submissions)}
+
+    def test_a_run_keeps_its_finished_frames_and_goes_on_with_another(self):
+        never = self.lost_after(10**9)
+        self.call("run", self.scene, "--out", "whole", env=never)
+        numbers = set()
+        for submissions in (0, 1, 3, 6, 10, 14):
+            with self.subTest(submissions=submissions):
+                out = self.folder / f"out{submissions}"
+                result = self.refused(4, "run", self.scene, "--out", out, says="ErrorDeviceLost",
+                                      env=self.lost_after(submissions))
+                self.assertNotIn("unexpected", result.stderr)
+                self.assertEqual([p for p in self.folder.rglob("*") if ".part" in p.name], [])
+                frames = json.loads((out / "manifest.json").read_text())["frames"]
+                numbers.add(len(frames))
+                self.assertEqual([frame["number"] for frame in frames], list(range(1, len(frames) + 1)))
+                for picture in (out / "frames").glob("*.png"):
+                    self.assertEqual(picture.read_bytes(), (self.folder / "whole/frames" / picture.name).read_bytes())
+                self.assertEqual(len(list((out / "frames").glob("*.png"))), len(frames))
+                self.call("run", self.scene, "--out", out, env=never)
+                self.same_runs("whole", out.name)
+        self.assertGreater(len(numbers), 2, "it is lost at several frames")
+
+    def test_render_writes_nothing(self):
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        for submissions in (0, 2):
+            self.refused(4, "render", "out/density/tiny_0005.vdb", "--out", "x.png", "--scene", self.scene, says="ErrorDeviceLost",
+                         env=self.lost_after(submissions))
+            self.assertFalse((self.folder / "x.png").exists())
+
+
 class Pictures(Case):
     """With a device (lavapipe at least)."""
 
