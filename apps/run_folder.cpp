@@ -308,8 +308,8 @@ void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
         ErrorCode::usage,
         fmt::format("{}: holds an interrupted run of '{}' ({} of {} steps): give --resume to go on, or "
                     "--overwrite to start anew",
-                    folder.folder.string(), earlier.name, earlier.steps_reported,
-                    earlier.range.last_step + 1));
+                    folder.folder.string(), earlier.name,
+                    earlier.steps_reported == 0 ? 0 : earlier.steps_reported - 1, earlier.range.last_step));
 }
 
 std::string range_text(const EarlierRun& run) {
