@@ -328,6 +328,11 @@ AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, c
     data.settings.x = float(options.shells.count + (has_fog ? 1 : 0));
     data.settings.y = cloud.visible.empty() ? 0.0f : float(shafts_strength(options));
     data.shade.w = float(reach_m(options.shells));
+    for (std::size_t k = 0; k < shells.count(); ++k) {
+        std::array<float, 3>& clear = shells.clear.emplace_back();
+        for (std::size_t c = 0; c < 3; ++c)
+            clear[c] = float(std::exp(-options.air.extinction_per_m[c] * double(shell_end(data, k))));
+    }
     set_fog(options.fog, options.camera.position_m, time_s, data);
     if (has_fog) {
         const std::vector<std::uint32_t>& words = noise.words(options.fog.seed);

@@ -15,6 +15,7 @@
 // sun: how far along the light). Above the clouds the
 // sun shines, whatever lies below. No Vulkan here. Private to the module.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -34,6 +35,10 @@ struct AirShells {
     // neighbour, and of the two in the next row. The planes: transmittance; where along
     // `shade_along` the shade begins; where it is complete. Then, with fog, the words of FogNoise.
     std::vector<std::uint32_t> shade;
+
+    // Transmittance of clear air up to the end of each shell, where it depends on the distance alone
+    // (gradient).
+    std::vector<std::array<float, 3>> clear;
 
     std::size_t count() const { return std::size_t(data.settings.x); }
     bool any() const { return count() > 0; }

@@ -9,6 +9,7 @@
 #define NEPHOS_RENDER_TILE_AIR_INL_H_
 #endif
 
+#include <array>
 #include <cstddef>
 
 #include <hwy/highway.h>
@@ -99,7 +100,10 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
         const Floats shell_begins = within(begin_m), shell_ends = within(end_m);
         if (!begun) before = clear_air(frame, ray, shell_begins);
         begun = true;
-        const Floats3 behind = clear_air(frame, ray, shell_ends);
+        const bool whole = frame.sky == nullptr && hn::AllTrue(d, hn::Eq(shell_ends, set(end_m)));
+        const std::array<float, 3>& clear = frame.shells->clear[k];
+        const Floats3 behind =
+            whole ? Floats3{set(clear[0]), set(clear[1]), set(clear[2])} : clear_air(frame, ray, shell_ends);
         const AirLayer layer =
             air_layer<Heights::alike>(frame, of, before, behind, shell_begins, shell_ends, offset);
         const Floats hidden = hn::Mul(transmittance, hn::Sub(set(1.0f), layer.transmittance));
