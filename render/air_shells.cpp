@@ -310,15 +310,15 @@ std::size_t shells_before(const shader::Shells& data, float distance) {
     return first;
 }
 
-bool has_shells(const RenderOptions& options) {
-    return shafts_strength(options) > 0 || options.fog.extinction_per_m > 0;
+bool has_shells(const RenderOptions& options, const PreparedCloud& cloud) {
+    return options.fog.extinction_per_m > 0 || (shafts_strength(options) > 0 && !cloud.visible.empty());
 }
 
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
                      std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise) {
     AirShells shells;
     const bool has_fog = options.fog.extinction_per_m > 0;
-    if (!has_shells(options) || (cloud.visible.empty() && !has_fog)) return shells;
+    if (!has_shells(options, cloud)) return shells;
     shader::Shells& data = shells.data;
     if (cloud.visible.empty())
         set_no_shade(shells);

@@ -54,8 +54,9 @@ inline float shell_end(const shader::Shells& data, std::size_t k) {
 // Number of shells that end at a distance or before it.
 std::size_t shells_before(const shader::Shells& data, float distance);
 
-// Whether these options have air between the clouds. It looks at the whole shadow map.
-bool has_shells(const RenderOptions& options);
+// Whether these options have air to draw between the clouds: fog, or shafts of clouds whose shadow they are.
+// It looks at the whole shadow map.
+bool has_shells(const RenderOptions& options, const PreparedCloud& cloud);
 
 // No shells when the options ask for none or when they would draw nothing. `shadow`: the texels of the shadow
 // map; `time_s`: simulated time of the picture.

@@ -59,22 +59,12 @@ vk::PipelineColorBlendAttachmentState blend_state(Blend blend) {
     return state;
 }
 
-}  // namespace
-
-const ShaderSet& shaders() {
-    static constexpr ShaderSet kShaders{
-        spirv::light_map_comp,   spirv::light_centres_comp, spirv::view_project_comp, spirv::view_tiles_comp,
-        spirv::view_finish_comp, spirv::background_vert,    spirv::background_frag,   spirv::view_splat_vert,
-        spirv::view_splat_frag,  spirv::puff_vert,          spirv::puff_frag,         spirv::view_shells_comp,
-        spirv::shell_vert,       spirv::shell_frag};
-    return kShaders;
-}
-
-PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
+// The layout of gpu_pipeline.h, each binding at its number.
+auto layout_bindings() {
     using Type = vk::DescriptorType;
     using Stage = vk::ShaderStageFlagBits;
     const vk::ShaderStageFlags all = Stage::eVertex | Stage::eFragment | Stage::eCompute;
-    const std::array bindings{
+    return std::array{
         vk::DescriptorSetLayoutBinding(0, Type::eUniformBuffer, 1, all),
         vk::DescriptorSetLayoutBinding(1, Type::eStorageBuffer, 1, all),
         vk::DescriptorSetLayoutBinding(2, Type::eStorageBuffer, 1, all),
@@ -91,9 +81,24 @@ PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
         vk::DescriptorSetLayoutBinding(13, Type::eUniformBuffer, 1, all),
         vk::DescriptorSetLayoutBinding(14, Type::eStorageBuffer, 1, all),
     };
+}
+
+}  // namespace
+
+const ShaderSet& shaders() {
+    static constexpr ShaderSet kShaders{
+        spirv::light_map_comp,   spirv::light_centres_comp, spirv::view_project_comp, spirv::view_tiles_comp,
+        spirv::view_finish_comp, spirv::background_vert,    spirv::background_frag,   spirv::view_splat_vert,
+        spirv::view_splat_frag,  spirv::puff_vert,          spirv::puff_frag,         spirv::view_shells_comp,
+        spirv::shell_vert,       spirv::shell_frag};
+    return kShaders;
+}
+
+PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
+    const std::array bindings = layout_bindings();
     PipelineLayout result;
     result.set = vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
-    const vk::PushConstantRange constants(Stage::eCompute, 0, sizeof(shader::TileStep));
+    const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0, sizeof(shader::TileStep));
     result.layout =
         vk::raii::PipelineLayout(gpu.device, vk::PipelineLayoutCreateInfo({}, *result.set, constants));
     return result;
@@ -190,10 +195,9 @@ void compute_barrier(const vk::raii::CommandBuffer& commands) {
 }
 
 Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
-    const std::array sizes{vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, 2),
-                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, 9),
-                           vk::DescriptorPoolSize(vk::DescriptorType::eCombinedImageSampler, 3),
-                           vk::DescriptorPoolSize(vk::DescriptorType::eStorageImage, 1)};
+    std::vector<vk::DescriptorPoolSize> sizes;
+    for (const vk::DescriptorSetLayoutBinding& binding : layout_bindings())
+        sizes.emplace_back(binding.descriptorType, binding.descriptorCount);
     Bindings bindings;
     bindings.pool = vk::raii::DescriptorPool(gpu.device, vk::DescriptorPoolCreateInfo({}, 1, sizes));
     // Allocated without RAII: the set goes with its pool.
@@ -207,8 +211,7 @@ Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
 
 void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
                  const GpuBuffer& buffer) {
-    const vk::DescriptorType type = binding == 0 || binding == 13 ? vk::DescriptorType::eUniformBuffer
-                                                                  : vk::DescriptorType::eStorageBuffer;
+    const vk::DescriptorType type = layout_bindings()[binding].descriptorType;
     const vk::DescriptorBufferInfo info(*buffer.buffer, 0, VK_WHOLE_SIZE);
     gpu.device.updateDescriptorSets(vk::WriteDescriptorSet(bindings.set, binding, 0, type, {}, info), {});
 }

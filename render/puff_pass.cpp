@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/puff_pass.h"
 
-#include <algorithm>
 #include <cstring>
 
 #include "render/half_floats.h"
@@ -48,19 +47,6 @@ GpuImage upload_puffs(const GpuDevice& gpu) {
     return image;
 }
 
-// Copies into a storage buffer, which is made anew and bound when it is too small.
-template <class T>
-void fill(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
-          std::span<const T> content) {
-    if (buffer.bytes < content.size_bytes()) {
-        const std::size_t bytes = std::max(content.size_bytes(), 2 * buffer.bytes);
-        buffer = {};  // the old one goes before the new one comes
-        buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::write);
-        bind_buffer(gpu, bindings, binding, buffer);
-    }
-    if (!content.empty()) std::memcpy(buffer.mapped, content.data(), content.size_bytes());
-}
-
 }  // namespace
 
 PuffPass::PuffPass(const GpuDevice& gpu, const PipelineLayout& layout,
@@ -83,7 +69,7 @@ void PuffPass::use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::r
 }
 
 void PuffPass::use_clouds(const GpuDevice& gpu, std::span<const shader::PuffCloud> clouds) {
-    fill(gpu, bindings_, 2, clouds_, clouds);
+    upload(gpu, bindings_, 2, clouds_, std::as_bytes(clouds));
 }
 
 void PuffPass::use_puffs(const GpuDevice& gpu, std::span<const shader::Puff> puffs) {
@@ -92,7 +78,7 @@ void PuffPass::use_puffs(const GpuDevice& gpu, std::span<const shader::Puff> puf
         for (const std::uint32_t binding : {3u, 4u}) bind_image(gpu, bindings_, binding, textures_, sampler_);
         if (!physical_sky_) bind_image(gpu, bindings_, 11, textures_, sampler_);
     }
-    fill(gpu, bindings_, 1, puffs_, puffs);
+    upload(gpu, bindings_, 1, puffs_, std::as_bytes(puffs));
 }
 
 void PuffPass::draw(const vk::raii::CommandBuffer& commands, std::uint32_t first, std::uint32_t count,

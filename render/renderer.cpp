@@ -268,9 +268,8 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
             parts.back().frame.scattering = scattering.data();
         }
     }
-    // The processor has no air between billboards. Shafts alone need metaballs, whose shadow they are.
-    const bool air = has_shells(options) && (!lit.cloud.visible.empty() || options.fog.extinction_per_m > 0);
-    const bool blended = !order.puffs.empty() && air;
+    // The processor has no air between billboards.
+    const bool blended = !order.puffs.empty() && has_shells(options, lit.cloud);
     if (on_processor() && !blended)
         draw_on_processor(splats, options, camera, parts, order, picture);
     else
@@ -342,7 +341,7 @@ void Renderer::Impl::draw_on_processor(const Splats& splats, const RenderOptions
     if (!splats.light && !lit.all_known) {
         seen.emplace(order, lit.shadow_size);
         for (ProcessorView& view : views) view.look(lit.shadow_size, *seen);
-        if (has_shells(options)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
+        if (has_shells(options, lit.cloud)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
     }
     const SeenLight* const known = seen ? &*seen : nullptr;
     const std::vector<float> lightning = light_up(splats, options, order, known);

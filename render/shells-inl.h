@@ -96,16 +96,21 @@ HWY_INLINE Floats fog_noise(const AirShells& air, const Floats3& point, const sh
     return hn::MulAdd(fraction(z), hn::Sub(high, low), low);
 }
 
-HWY_INLINE Floats fog_column(Floats height_of_begin, Floats slope, Floats distance, float per_height) {
-    const Lanes d;
-    const Floats one = set(1.0f), zero = hn::Zero(d);
-    const Floats low = hn::MulAdd(hn::Min(slope, zero), distance, height_of_begin);
-    const Floats x = hn::Mul(hn::Mul(hn::Abs(slope), distance), set(per_height));
+// (1 - exp(-x)) / x for x from -80 on: the mean of an exponential over a way.
+HWY_INLINE Floats mean_decay(Floats x) {
+    const Floats one = set(1.0f);
     const Floats near = hn::NegMulAdd(x, hn::NegMulAdd(x, set(1.0f / 6.0f), set(0.5f)), one);
-    const auto is_near = hn::Lt(x, set(1.0e-1f));
-    const Floats far = hn::Div(hn::Sub(one, quick_exp(hn::Neg(x))), hn::IfThenElse(is_near, one, x));
+    const auto is_near = hn::Lt(hn::Abs(x), set(1.0e-1f));
+    const Floats far =
+        hn::Div(hn::Sub(one, quick_exp(hn::Neg(hn::Max(x, set(-80.0f))))), hn::IfThenElse(is_near, one, x));
+    return hn::IfThenElse(is_near, near, far);
+}
+
+HWY_INLINE Floats fog_column(Floats height_of_begin, Floats slope, Floats distance, float per_height) {
+    const Floats low = hn::MulAdd(hn::Min(slope, hn::Zero(Lanes())), distance, height_of_begin);
+    const Floats x = hn::Mul(hn::Mul(hn::Abs(slope), distance), set(per_height));
     const Floats at_low = quick_exp(hn::Min(hn::Mul(low, set(-per_height)), set(60.0f)));
-    return hn::Mul(hn::Mul(at_low, distance), hn::IfThenElse(is_near, near, far));
+    return hn::Mul(hn::Mul(at_low, distance), mean_decay(x));
 }
 
 struct FogPart {
@@ -166,12 +171,8 @@ HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floa
     }
     const auto column = [&](float per_height) {
         const float ground = std::exp(-frame.air.x * per_height);
-        const Floats x = hn::Mul(hn::Mul(ray.z, distance), set(per_height)), one = set(1.0f);
-        const Floats near = hn::NegMulAdd(x, hn::NegMulAdd(x, set(1.0f / 6.0f), set(0.5f)), one);
-        const auto is_near = hn::Lt(hn::Abs(x), set(1.0e-1f));
-        const Floats far = hn::Div(hn::Sub(one, quick_exp(hn::Neg(hn::Max(x, set(-80.0f))))),
-                                   hn::IfThenElse(is_near, one, x));
-        return hn::Mul(hn::Mul(set(ground), distance), hn::IfThenElse(is_near, near, far));
+        const Floats x = hn::Mul(hn::Mul(ray.z, distance), set(per_height));
+        return hn::Mul(hn::Mul(set(ground), distance), mean_decay(x));
     };
     const Floats3 depth = times_add(column(frame.rayleigh.w), set3(frame.rayleigh),
                                     times(column(frame.haze.w), set3(frame.haze)));

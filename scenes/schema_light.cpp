@@ -2,6 +2,7 @@
 // The section on light in clouds.
 
 #include "scenes/schema_build.h"
+#include "scenes/schema_render_key.h"
 #include "scenes/schema_sections.h"
 
 namespace nephos {
@@ -11,13 +12,6 @@ using namespace schema_build;
 namespace {
 
 constexpr Limits kLight = between(0, 1000);
-
-template <auto... Members>
-Key render_key(std::string name, std::string unit, Limits limits, std::string effect,
-               std::string source = {}) {
-    return key<&Scene::render, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
-                                           std::move(source));
-}
 
 const Section& octaves_section() {
     const std::string source = "Wrenninge, Kulla and Lundqvist 2013";

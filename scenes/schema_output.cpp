@@ -3,6 +3,7 @@
 
 #include "render/sun_position.h"
 #include "scenes/schema_build.h"
+#include "scenes/schema_render_key.h"
 #include "scenes/schema_sections.h"
 #include "scenes/text.h"
 
@@ -20,13 +21,6 @@ Key density_key(std::string name, std::string unit, Limits limits, std::string e
                 std::string source = {}) {
     return key<&Scene::density, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
                                             std::move(source));
-}
-
-template <auto... Members>
-Key render_key(std::string name, std::string unit, Limits limits, std::string effect,
-               std::string source = {}) {
-    return key<&Scene::render, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
-                                           std::move(source));
 }
 
 const Section& smoothing_section() {

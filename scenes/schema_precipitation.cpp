@@ -2,6 +2,7 @@
 // Rain and snow, and the camera's way.
 
 #include "scenes/schema_build.h"
+#include "scenes/schema_render_key.h"
 #include "scenes/schema_sections.h"
 #include "scenes/text.h"
 
@@ -10,12 +11,6 @@ namespace nephos {
 using namespace schema_build;
 
 namespace {
-
-template <auto... Members>
-Key rain_key(std::string name, std::string unit, Limits limits, std::string effect, std::string source = {}) {
-    return key<&Scene::render, &RenderOptions::precipitation, Members...>(
-        std::move(name), std::move(unit), limits, std::move(effect), std::move(source));
-}
 
 void finish_camera_key(const SectionReader& reader, void* owner) {
     const auto& key = *static_cast<const CameraKey*>(owner);
@@ -30,55 +25,54 @@ const Section& precipitation_section() {
     static const Section section{
         "Precipitation",
         "Rain and snow below the rain areas of the layers: particles near the eye, shafts from afar.",
-        {rain_key<&PrecipitationOptions::enabled>("enabled", "", kAny, "Draw rain or snow in the rain areas.",
-                                                  "P"),
+        {render_key<&RenderOptions::precipitation, &PrecipitationOptions::enabled>(
+             "enabled", "", kAny, "Draw rain or snow in the rain areas.", "P"),
          word<&Scene::render, &RenderOptions::precipitation, &PrecipitationOptions::kind>(
              "kind", {"rain", "snow"},
              "What falls from rain areas: drops, which are drawn as streaks and wet the ground, or flakes "
-             "that "
-             "sway and lie. Also the ground's, with or without precipitation drawn.",
+             "that sway and lie. Also the ground's, with or without precipitation drawn.",
              "P; S"),
-         rain_key<&PrecipitationOptions::particles>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::particles>(
              "particles", "", between(0, 2e6),
              "Drops or flakes in the container before the eye, always the same number; 0: shafts alone.",
              "P, level of detail"),
-         rain_key<&PrecipitationOptions::exposure_s>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::exposure_s>(
              "exposure_s", "s", between(0, 1),
              "Exposure of a picture: a streak is as long as a drop falls, and the camera moves, in this "
              "time.",
              "P, persistence"),
-         rain_key<&PrecipitationOptions::visibility>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::visibility>(
              "visibility", "", between(0, 1000),
              "Opacity of drops and flakes as a multiple of the true one; 1 is hard to see in a small "
              "picture."),
-         rain_key<&PrecipitationOptions::intensity_scale>("intensity_scale", "", between(0, 100),
-                                                          "Multiplies the rain of all areas."),
-         rain_key<&PrecipitationOptions::wind_drift>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::intensity_scale>(
+             "intensity_scale", "", between(0, 100), "Multiplies the rain of all areas."),
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::wind_drift>(
              "wind_drift", "", between(0, 10),
              "Share of the wind that carries drops, flakes and the lower end of shafts."),
-         rain_key<&PrecipitationOptions::depth_m>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::depth_m>(
              "depth_m", "m", between(1, 1000),
              "Depth of the container of particles around the eye; deeper has fewer in the same space.",
              "P, container"),
-         rain_key<&PrecipitationOptions::margin_m>("margin_m", "m", between(0, 100),
-                                                   "How far the eye moves before the container follows.",
-                                                   "P, near rain"),
-         rain_key<&PrecipitationOptions::reach_m>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::margin_m>(
+             "margin_m", "m", between(0, 100), "How far the eye moves before the container follows.",
+             "P, near rain"),
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::reach_m>(
              "reach_m", "m", between(1, 1e5),
              "Distance from an area beyond which it is drawn without particles, by its shaft alone.",
              "P, far rain"),
-         rain_key<&PrecipitationOptions::edge>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::edge>(
              "edge", "", between(0, 1),
              "Outer share of an area in which the rain falls off smoothly; 0 is a wall of rain.", "P"),
-         rain_key<&PrecipitationOptions::shafts>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::shafts>(
              "shafts", "", between(0, 100), "Opacity of rain shafts as a multiple of the true one; 0: none.",
              "Marshall and Palmer 1948, van de Hulst 1957"),
-         rain_key<&PrecipitationOptions::shaft_texture>("shaft_texture", "", between(0, 1),
-                                                        "Contrast of the streaks in rain shafts."),
-         rain_key<&PrecipitationOptions::evaporation>(
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::shaft_texture>(
+             "shaft_texture", "", between(0, 1), "Contrast of the streaks in rain shafts."),
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::evaporation>(
              "evaporation", "", between(0, 1),
-             "Virga: 0 lets rain reach the ground; above 0 it thins out and is "
-             "gone at this share of the way up to the cloud.")},
+             "Virga: 0 lets rain reach the ground; above 0 it thins out and is gone at this share of the way "
+             "up to the cloud.")},
         nullptr};
     return section;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "scenes/schema_build.h"
+#include "scenes/schema_render_key.h"
 #include "scenes/schema_sections.h"
 #include "scenes/text.h"
 
@@ -12,13 +13,6 @@ namespace nephos {
 using namespace schema_build;
 
 namespace {
-
-template <auto... Members>
-Key render_key(std::string name, std::string unit, Limits limits, std::string effect,
-               std::string source = {}) {
-    return key<&Scene::render, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
-                                           std::move(source));
-}
 
 void finish_shells(const SectionReader& reader, void* owner) {
     if (!reader.sound({"count", "spacing_m", "growth"})) return;

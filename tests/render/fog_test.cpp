@@ -28,15 +28,7 @@ RenderOptions view(const Vec3& from, const Vec3& to, double fov = 60, int width 
     return options;
 }
 
-std::vector<Metaball> clouds(unsigned seed, int count = 300) {
-    std::vector<Metaball> balls = reference::random_metaballs(seed, count, 80, 200);
-    for (Metaball& ball : balls) {
-        ball.x *= 2.5f;
-        ball.y *= 2.5f;
-        ball.z = 700 + 0.4f * (ball.z - 500);
-    }
-    return balls;
-}
+std::vector<Metaball> clouds(unsigned seed) { return reference::broken_layer(seed, 300, 900); }
 
 std::vector<RenderOptions> views() {
     std::vector<RenderOptions> all;

@@ -18,34 +18,17 @@
 #include "render/particle_streaks.h"
 #include "render/rain_shafts.h"
 #include "tests/render/picture_checks.h"
+#include "tests/render/rain_scene.h"
 
 namespace nephos {
 namespace {
 
 constexpr PrecipitationKind kRain = PrecipitationKind::rain, kSnow = PrecipitationKind::snow;
 
-RainCurtain area() {
-    RainCurtain c;
-    c.x_m = 100;
-    c.y_m = 900;
-    c.semi_a_m = 700;
-    c.semi_b_m = 400;
-    c.axis_x = std::cos(0.4);
-    c.axis_y = std::sin(0.4);
-    c.base_m = 800;
-    c.rate_mm_per_h = 20;
-    return c;
-}
+RainCurtain area() { return test::rain_area(); }
 
 RenderOptions options_at(const Vec3& eye, const Vec3& target) {
-    RenderOptions options;
-    options.camera.position_m = eye;
-    options.camera.target_m = target;
-    options.camera.width = 160;
-    options.camera.height = 120;
-    options.precipitation.enabled = true;
-    options.precipitation.particles = 20'000;
-    return options;
+    return test::rain_view(eye, target, 160, 120, 20'000);
 }
 
 Weather weather_of(const RainCurtain& curtain) {

@@ -12,34 +12,20 @@
 
 #include "tests/reference/with_threads.h"
 #include "tests/render/picture_checks.h"
+#include "tests/render/rain_scene.h"
 #include "tests/render/reference_shafts.h"
 
 namespace nephos {
 namespace {
 
 RainCurtain area() {
-    RainCurtain c;
+    RainCurtain c = test::rain_area();
     c.id = 7;
-    c.x_m = 100;
-    c.y_m = 900;
-    c.semi_a_m = 700;
-    c.semi_b_m = 400;
-    c.axis_x = std::cos(0.4);
-    c.axis_y = std::sin(0.4);
-    c.base_m = 800;
-    c.rate_mm_per_h = 20;
     return c;
 }
 
 RenderOptions options_at(const Vec3& eye, const Vec3& target) {
-    RenderOptions options;
-    options.camera.position_m = eye;
-    options.camera.target_m = target;
-    options.camera.width = 77;
-    options.camera.height = 30;
-    options.precipitation.enabled = true;
-    options.precipitation.particles = 0;
-    return options;
+    return test::rain_view(eye, target, 77, 30, 0);
 }
 
 // A picture with clouds at all distances before and behind the rain, and their shadow.

@@ -109,6 +109,17 @@ inline std::vector<Metaball> random_metaballs(unsigned seed, int count, double m
     return balls;
 }
 
+// The same, spread over 5 x 5 km in a layer 400 m thick whose middle is at `height_m`: broken, all around.
+inline std::vector<Metaball> broken_layer(unsigned seed, int count, float height_m) {
+    std::vector<Metaball> balls = random_metaballs(seed, count, 80, 200);
+    for (Metaball& ball : balls) {
+        ball.x *= 2.5f;
+        ball.y *= 2.5f;
+        ball.z = height_m - 200 + 0.4f * (ball.z - 500);
+    }
+    return balls;
+}
+
 // Metaballs on a lattice, as the automaton gives them.
 inline std::vector<Metaball> lattice_cloud(int cells, float cell_m) {
     std::vector<Metaball> balls;

@@ -27,15 +27,9 @@ RenderOptions view(Vec3 from, Vec3 to, double fov = 60, int width = 60, int heig
     return options;
 }
 
-// A broken layer from 900 to 1300 m, all around.
+// From 900 to 1300 m.
 std::vector<Metaball> broken_layer(unsigned seed, int count = 400) {
-    std::vector<Metaball> balls = reference::random_metaballs(seed, count, 80, 200);
-    for (Metaball& ball : balls) {
-        ball.x *= 2.5f;
-        ball.y *= 2.5f;
-        ball.z = 900 + 0.4f * (ball.z - 500);
-    }
-    return balls;
+    return reference::broken_layer(seed, count, 1100);
 }
 
 std::vector<RenderOptions> views() {
