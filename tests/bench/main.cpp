@@ -18,6 +18,7 @@
 #include "tests/bench/density_bench.h"
 #include "tests/bench/ground_bench.h"
 #include "tests/bench/memory_bench.h"
+#include "tests/bench/puff_bench.h"
 #include "tests/bench/rain_bench.h"
 #include "tests/bench/render_bench.h"
 #include "tests/bench/seeds_bench.h"
@@ -66,6 +67,7 @@ int main(int argc, char** argv) {
         {"rain", [] { return rain_rows(); }},
         {"atmosphere", [] { return atmosphere_rows(); }},
         {"air", [&] { return air_rows(source); }},
+        {"billboards", [] { return puff_rows(); }},
         {"render", [&] { return render_rows(source, data); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {

@@ -20,38 +20,14 @@
 
 #include "apps/framing.h"
 #include "apps/pipeline.h"
-#include "apps/sky_picture.h"
 #include "density/metaballs.h"
 #include "density/vdb_file.h"
 #include "scenes/reader.h"
+#include "tests/bench/stage_table.h"
 #include "tests/bench/subject.h"
 
 namespace nephos::bench {
 namespace {
-
-// T's Cloud 2, that of the rain clouds, with T's numbers: 9 boxes of 10 m, one root with 2 to 3 children in
-// each of 2 to 4 reproductions, 4 to 5 billboards a box of 30 to 50 m, light distance 100 m.
-BaseModel rain_cloud() {
-    BaseModel model{.name = "cloud 2", .genus = Genus::Ns, .seeds = {}, .light_distance_m = 100};
-    for (int i = 0; i < 9; ++i) {
-        Seed seed;
-        seed.size_m = {10, 10, 10};
-        seed.position_m = {10.0 * (i % 3 - 1), 10.0 * (i / 3 - 1), i == 4 ? 12.0 : 5.0};
-        seed.billboards = {4, 5};
-        seed.billboard_width_m = {30, 50};
-        seed.billboard_height_m = {30, 50};
-        seed.texture = BillboardTexture::dense;
-        if (i == 4)
-            seed.roots = {{.pitch_deg = 45,
-                           .open_pitch_deg = 90,
-                           .open_yaw_deg = 179,
-                           .seeds_start = 2,
-                           .seeds_end = 3,
-                           .reproductions = {2, 4}}};
-        model.seeds.push_back(seed);
-    }
-    return model;
-}
 
 Subject volume(const DensityGrid& grid, const std::string& name, double extinction_per_m) {
     Subject subject{fmt::format("{}, extinction {}", name, extinction_per_m),
@@ -106,91 +82,13 @@ std::vector<BenchRow> compare_ways(Subject subject, int rounds) {
     return rows;
 }
 
-BenchRow sky_row(int clouds) {
-    SkyOptions options;
-    options.world = {-2000, -2000, 2000, 2000};
-    options.base_height_m = {400, 400};
-    options.models = {rain_cloud()};
-    options.skies = {{"rain", 1, clouds, {{0, 10}}}};
-    const SkySimulation sky(options);
-    const SkyLayer layer{&sky, sky.clouds()};
-    RenderOptions picture;
-    picture.camera.position_m = {0, -4600, 100};  // the whole world is in view
-    picture.camera.target_m = {0, 0, 350};
-    picture.camera.vertical_fov_deg = 50;
-    Renderer renderer;
-    SkyPainter painter;
-    SkyBillboards counter;
-    DrawnClouds drawn;
-    counter.append(sky, sky.clouds(), picture, {}, drawn);
-    const auto [ms, empty_ms] = interleave(
-        9,
-        [&] {
-            painter.draw(renderer, {}, {&layer, 1}, picture, 0, false);
-        },
-        [&] { painter.draw(renderer, {}, {}, picture, 0, false); });
-    return {
-        fmt::format("T's {} clouds drawn directly, 640x480, {}", drawn.clouds.size(), renderer.device_name()),
-        ms, 0, "<= 16.7 ms",
-        fmt::format("{:.1f} frames/s, {} billboards; sky and ground alone {:.1f} ms", 1000 / ms,
-                    drawn.billboards.size(), empty_ms)};
-}
-
-// Bytes that both threads together copy in a nanosecond, read and written.
-double copied_bytes_per_ns() {
-    constexpr std::size_t kBytes = std::size_t{1} << 26;
-    std::vector<std::byte> from(kBytes, std::byte{1}), to(kBytes);
-    std::vector<double> times;
-    for (int round = 0; round < 7; ++round) {
-        times.push_back(time_ms([&] {
-            tbb::parallel_for(std::size_t{0}, std::size_t{64}, [&](std::size_t part) {
-                std::memcpy(&to[part * kBytes / 64], &from[part * kBytes / 64], kBytes / 64);
-            });
-        }));
-    }
-    return 2 * double(kBytes) / (1e6 * median(times));
-}
-
-// Where the time of a picture goes, and how far each stage is from what memory or vector units allow.
-void print_stages(Subject subject, int rounds) {
-    constexpr std::array<const char*, kDrawStages> kNames{"has it changed, checks",
-                                                          "order from the eye",
-                                                          "shapes and bins for the eye",
-                                                          "what is seen",
-                                                          "order from the sun",
-                                                          "bins for the light",
-                                                          "light",
-                                                          "what scatters",
-                                                          "pixels"};
+void print_stages_of(Subject subject, int rounds) {
     Renderer renderer(DeviceOptions{.device = {}, .splatting = Splatting::processor});
-    std::array<std::vector<double>, kDrawStages> wall, processor;
-    StageTimes last;
-    for (int round = -1; round < rounds; ++round) {
+    const std::string what = fmt::format("{}, {} metaballs", subject.name, subject.balls.size());
+    print_stages(what, renderer, rounds, [&] {
         subject.change();
         renderer.draw_splats(subject.pixels_only(), subject.options);
-        last = renderer.times();
-        for (std::size_t s = 0; round >= 0 && s < kDrawStages; ++s) {
-            wall[s].push_back(last.stages[s].wall_ms);
-            processor[s].push_back(last.stages[s].processor_ms);
-        }
-    }
-    const double copied = copied_bytes_per_ns();
-    fmt::print(
-        "Stages of {}, {} metaballs, 640x480; memory copies {:.1f} GB/s\n\n"
-        "| stage | wall, ms | processor, ms | MB moved | against copying them | pairs, millions | ns a pair "
-        "|\n|---|---|---|---|---|---|---|\n",
-        subject.name, subject.balls.size(), copied);
-    for (std::size_t s = 0; s < kDrawStages; ++s) {
-        const StageTime& time = last.stages[s];
-        const double ms = median(wall[s]), mega = 1e-6 * double(time.bytes),
-                     pairs = 1e-6 * double(time.pairs);
-        fmt::print("| {} | {:.2f} | {:.2f} | {} | {} | {} | {} |\n", kNames[s], ms, median(processor[s]),
-                   time.bytes != 0 ? fmt::format("{:.1f}", mega) : "",
-                   time.bytes != 0 ? fmt::format("{:.1f}x", ms * copied / mega) : "",
-                   time.pairs != 0 ? fmt::format("{:.2f}", pairs) : "",
-                   time.pairs != 0 ? fmt::format("{:.3f}", median(processor[s]) / pairs) : "");
-    }
-    fmt::print("\n");
+    });
 }
 
 // Splats of a cube of noise, as many as wanted, all in view: how the time grows with their number.
@@ -320,9 +218,9 @@ void append(std::vector<BenchRow>& rows, const std::vector<BenchRow>& more) {
 
 std::vector<BenchRow> render_rows(const std::filesystem::path& source, const std::filesystem::path& data) {
     const Subject cumulus = last_frame_of(source / "scenes/cumulus.toml");
-    print_stages(cumulus, 9);
+    print_stages_of(cumulus, 9);
     print_growth();
-    std::vector<BenchRow> rows{sky_row(202), sky_row(1010), film_row(source / "scenes/cumulus.toml", 48)};
+    std::vector<BenchRow> rows{film_row(source / "scenes/cumulus.toml", 48)};
     append(rows, compare_ways(cumulus, 5));
     const std::filesystem::path disney = data / "wdas_cloud_sixteenth.vdb";
     if (data.empty() || !std::filesystem::exists(disney)) {
