@@ -341,12 +341,14 @@ AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, c
     return shells;
 }
 
-std::vector<std::uint32_t> balls_before_shells(const AirShells& shells,
-                                               std::span<const shader::ViewBall> farthest_first) {
+std::vector<std::uint32_t> splats_before_shells(const AirShells& shells, const EyeOrder& order) {
     std::vector<std::uint32_t> before(shells.count());
-    for (std::size_t k = 0; k < before.size(); ++k)
-        before[k] =
-            std::uint32_t(farthest_first.size() - count_beyond(farthest_first, shell_end(shells.data, k)));
+    for (std::size_t k = 0; k < before.size(); ++k) {
+        const float end = shell_end(shells.data, k);
+        const std::size_t beyond =
+            count_beyond<shader::ViewBall>(order.balls, end) + count_beyond<shader::Puff>(order.puffs, end);
+        before[k] = std::uint32_t(order.balls.size() + order.puffs.size() - beyond);
+    }
     return before;
 }
 

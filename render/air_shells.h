@@ -63,9 +63,8 @@ bool has_shells(const RenderOptions& options, const PreparedCloud& cloud);
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
                      std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise);
 
-// For each shell the number of balls, nearest first, that are drawn in front of it. Rises.
-std::vector<std::uint32_t> balls_before_shells(const AirShells& shells,
-                                               std::span<const shader::ViewBall> farthest_first);
+// For each shell the number of splats, nearest first, that are drawn in front of it. Rises.
+std::vector<std::uint32_t> splats_before_shells(const AirShells& shells, const EyeOrder& order);
 
 // The runs of an order with runs of SplatKind::shell between them, one shell each: what is drawn, farthest
 // first.

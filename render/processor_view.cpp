@@ -157,8 +157,8 @@ HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileS
             if (ball.distance > 0) {
                 add_fitted<kColours>(ball, tile, layout, first, rays, sums);
             } else if (ball.distance < 0) {
-                const ScreenPuff& puff = scene.puffs[std::bit_cast<std::uint32_t>(ball.x)];
-                add_puff<kColours>(puff, of_ball, tile, layout, first, sums);
+                add_puff<kColours>(std::bit_cast<ScreenPuff>(ball), of_ball, tile, layout, first,
+                                   *scene.texels, scene.distances, sums);
             } else {
                 const ExactBall& exact = scene.exact[std::bit_cast<std::uint32_t>(ball.x)];
                 add_exact<kColours>(ball, exact, tile, layout, *scene.frame, rays, sums);
@@ -220,6 +220,7 @@ namespace nephos {
 HWY_EXPORT(shape_balls);
 HWY_EXPORT(shape_puffs);
 HWY_EXPORT(light_balls);
+HWY_EXPORT(light_puffs);
 HWY_EXPORT(add_balls);
 HWY_EXPORT(look_at_balls);
 HWY_EXPORT(mark_ground);
@@ -232,15 +233,6 @@ constexpr std::size_t kPart = 2048;  // balls that one thread prepares
 // A look pays if it saves light: it goes on only if of some tiles' lists no more than this is seen.
 constexpr double kMostSeen = 0.75;
 constexpr std::size_t kSampleStep = 16;  // tiles from one that is tried to the next
-
-constexpr std::uint32_t kPuff = 1u << 31;
-
-PixelBox puff_box(const ScreenPuff& puff) {
-    const auto to_pixel = [](float value) { return int(std::clamp(value, -1e6f, 1e6f)); };
-    const float half_width = 1 / puff.per_half_width, half_height = 1 / puff.per_half_height;
-    return {to_pixel(std::floor(puff.x - half_width)), to_pixel(std::floor(puff.y - half_height)),
-            to_pixel(std::ceil(puff.x + half_width)), to_pixel(std::ceil(puff.y + half_height))};
-}
 
 std::int16_t to_row(int y) { return std::int16_t(std::clamp(y, -32768, 32767)); }
 
@@ -275,32 +267,11 @@ ProcessorView::ProcessorView(const RenderOptions& options, const CameraFrame& ca
                              const BatchLimits& limits, StageTimes* times)
     : order_(&order), frame_(frame), part_(part), limits_(limits), times_(times) {
     const StageTimer timer(times_, DrawStage::eye_bins);
-    boxes_ = screen_boxes(order, camera, options.camera, part);
-    if (!order.puffs.empty()) add_puffs();
+    if (!order.puffs.empty()) source_ = splats_near_to_far(order);
+    boxes_ = screen_boxes(order, camera, options.camera, part, source_);
 }
 
-// Puts the billboards between the metaballs.
-void ProcessorView::add_puffs() {
-    puffs_.resize(order_->puffs.size());
-    tbb::parallel_for(std::size_t{0}, (puffs_.size() + kPart - 1) / kPart, [&](std::size_t p) {
-        const std::size_t begin = p * kPart, count = std::min(kPart, puffs_.size() - begin);
-        HWY_DYNAMIC_DISPATCH(shape_puffs)
-        (std::span(order_->puffs).subspan(begin, count), order_->clouds, frame_, &puffs_[begin]);
-    });
-    std::vector<PixelBox> boxes;
-    boxes.reserve(boxes_.size() + puffs_.size());
-    source_.reserve(boxes_.size() + puffs_.size());
-    for (const Run& run : order_->runs | std::views::reverse) {
-        const bool of_puffs = run.kind == SplatKind::billboard;
-        for (std::uint32_t i = run.end; i-- > run.begin;) {
-            source_.push_back(of_puffs ? i | kPuff : i);
-            boxes.push_back(of_puffs ? puff_box(puffs_[i]) : boxes_[order_->balls.size() - 1 - i]);
-        }
-    }
-    boxes_.swap(boxes);
-}
-
-// Of a splat, counted from the nearest: index into order_->balls, or kPuff and one into puffs_.
+// Of a splat, counted from the nearest: as splats_near_to_far().
 std::uint32_t ProcessorView::source(std::size_t splat) const {
     return source_.empty() ? std::uint32_t(boxes_.size() - 1 - splat) : source_[splat];
 }
@@ -308,24 +279,25 @@ std::uint32_t ProcessorView::source(std::size_t splat) const {
 // The shapes of splats [first, last) of a batch; its metaballs that are not fitted begin with `number`.
 void ProcessorView::shape(Batch& batch, std::size_t first, std::size_t last, std::uint32_t number) const {
     std::vector<shader::ViewBall> balls;
+    std::vector<const shader::Puff*> puffs;
+    std::vector<ScreenBall*> screen;  // of these
     for (std::size_t i = first; i < last; ++i) {
         const std::uint32_t from = source(batch.begin + i);
-        if ((from & kPuff) == 0) balls.push_back(order_->balls[from]);
+        if ((from & kPuffSplat) == 0) {
+            balls.push_back(order_->balls[from]);
+        } else {
+            puffs.push_back(&order_->puffs[from & ~kPuffSplat]);
+            screen.push_back(&batch.screen[i]);
+        }
     }
-    const bool all = balls.size() == last - first;
-    std::vector<ScreenBall> shaped(all ? 0 : balls.size());
+    std::vector<ScreenBall> shaped(puffs.empty() ? 0 : balls.size());
     HWY_DYNAMIC_DISPATCH(shape_balls)
-    (balls, frame_, all ? &batch.screen[first] : shaped.data(), batch.exact.data(), number);
+    (balls, frame_, puffs.empty() ? &batch.screen[first] : shaped.data(), batch.exact.data(), number);
+    HWY_DYNAMIC_DISPATCH(shape_puffs)(puffs, frame_, screen.data());
     std::size_t next = 0;
     for (std::size_t i = first; i < last; ++i) {
-        const std::uint32_t from = source(batch.begin + i);
         ScreenBall& splat = batch.screen[i];
-        if ((from & kPuff) != 0) {
-            splat.x = std::bit_cast<float>(from & ~kPuff);
-            splat.distance = -1;
-        } else if (!all) {
-            splat = shaped[next++];
-        }
+        if (!puffs.empty() && (source(batch.begin + i) & kPuffSplat) == 0) splat = shaped[next++];
         splat.first = to_row(boxes_[batch.begin + i].y0);
         splat.end = to_row(boxes_[batch.begin + i].y1);
     }
@@ -340,7 +312,8 @@ ProcessorView::Batch ProcessorView::prepare_batch(std::size_t begin, std::size_t
     if (!order_->all_fitted) {
         for (std::size_t i = 0; i < count; ++i) {
             const std::uint32_t from = source(begin + i);
-            const bool exact = (from & kPuff) == 0 && (order_->balls[from].flags & shader::kNotFitted) != 0;
+            const bool exact =
+                (from & kPuffSplat) == 0 && (order_->balls[from].flags & shader::kNotFitted) != 0;
             numbers[i / kPart + 1] += exact ? 1 : 0;
         }
         for (std::size_t p = 0; p < parts; ++p) numbers[p + 1] += numbers[p];
@@ -358,20 +331,30 @@ ProcessorView::Batch ProcessorView::prepare_batch(std::size_t begin, std::size_t
     return batch;
 }
 
+// Where there are no billboards, none are made.
+const PuffTexels* ProcessorView::texels() const { return source_.empty() ? nullptr : &puff_texels(); }
+
 void ProcessorView::light(Batch& batch, const SeenLight* seen) const {
     const StageTimer timer(times_, DrawStage::colour);
     const std::size_t count = batch.end - batch.begin, parts = (count + kPart - 1) / kPart;
     tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
         std::vector<shader::ViewBall> balls;
-        std::vector<ScreenBall*> screen;
+        std::vector<const shader::Puff*> puffs;
+        std::vector<ScreenBall*> screen, screen_puffs;
         for (std::size_t i = p * kPart; i < std::min(count, (p + 1) * kPart); ++i) {
             const std::uint32_t from = source(batch.begin + i);
-            if ((from & kPuff) != 0 || (seen != nullptr && seen->balls[from] == 0)) continue;
+            if ((from & kPuffSplat) != 0) {
+                puffs.push_back(&order_->puffs[from & ~kPuffSplat]);
+                screen_puffs.push_back(&batch.screen[i]);
+                continue;
+            }
+            if (seen != nullptr && seen->balls[from] == 0) continue;
             balls.push_back(order_->balls[from]);
             screen.push_back(&batch.screen[i]);
         }
         HWY_DYNAMIC_DISPATCH(light_balls)
         (balls, frame_, screen.data(), batch.exact.data());
+        HWY_DYNAMIC_DISPATCH(light_puffs)(puffs, order_->clouds, frame_, screen_puffs.data());
     });
 }
 
@@ -382,7 +365,11 @@ bool ProcessorView::look_at_tiles(std::size_t first, std::size_t step, std::vect
     const StageTimer timer(times_, DrawStage::look);
     const Batch& batch = kept_.front();
     const TileGrid grid{part_.width, part_.height};
-    const ViewScene scene{&frame_, batch.screen, batch.exact, puffs_, nullptr, shadow_size};
+    const ViewScene scene{.frame = &frame_,
+                          .balls = batch.screen,
+                          .exact = batch.exact,
+                          .shadow_size = shadow_size,
+                          .texels = texels()};
     const std::size_t count = first < grid.tiles() ? (grid.tiles() - first + step - 1) / step : 0;
     std::atomic<std::size_t> listed = 0, shown = 0, pairs = 0;
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
@@ -396,7 +383,7 @@ bool ProcessorView::look_at_tiles(std::size_t first, std::size_t step, std::vect
         shown += drawn[t];
         if (seen == nullptr) return;
         for (const std::uint32_t splat : tile.list.first(drawn[t]))
-            if (const std::uint32_t from = source(splat); (from & kPuff) == 0) mark(seen->balls[from]);
+            if (const std::uint32_t from = source(splat); (from & kPuffSplat) == 0) mark(seen->balls[from]);
         HWY_DYNAMIC_DISPATCH(mark_ground)(scene, tile, sums, seen->map_tiles.data());
     });
     if (times_ != nullptr) (*times_)[DrawStage::look].pairs += pairs;
@@ -424,7 +411,7 @@ void ProcessorView::look(int shadow_size, SeenLight& seen) {
 void ProcessorView::look_at_ground(int shadow_size, SeenLight& seen) const {
     const StageTimer timer(times_, DrawStage::look);
     const TileGrid grid{part_.width, part_.height};
-    const ViewScene scene{&frame_, {}, {}, {}, nullptr, shadow_size};
+    const ViewScene scene{.frame = &frame_, .shadow_size = shadow_size};
     const TileSums nothing;
     TileBins bins;
     bins.ranges.resize(grid.tiles());
@@ -436,7 +423,7 @@ void ProcessorView::look_at_ground(int shadow_size, SeenLight& seen) const {
 void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size, const AirShells& shells,
                          const SeenLight* seen) {
     frame_.shells = shells.any() ? &shells : nullptr;
-    const std::vector<std::uint32_t> before_shells = balls_before_shells(shells, order_->balls);
+    const std::vector<std::uint32_t> before_shells = splats_before_shells(shells, *order_);
     const TileGrid grid{part_.width, part_.height};
     std::vector<TileSums> sums_between;  // batches
     std::size_t begin = 0;
@@ -447,8 +434,15 @@ void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size,
         Batch batch = kept_.empty() ? prepare_batch(begin, end) : std::move(kept_.front());
         light(batch, seen);
         const StageTimer timer(times_, DrawStage::view);
-        const ViewScene scene{&frame_, batch.screen, batch.exact,   puffs_,
-                              shadow,  shadow_size,  before_shells, begin};
+        const ViewScene scene{.frame = &frame_,
+                              .balls = batch.screen,
+                              .exact = batch.exact,
+                              .shadow = shadow,
+                              .shadow_size = shadow_size,
+                              .before_shells = before_shells,
+                              .first_ball = begin,
+                              .texels = texels(),
+                              .distances = order_->depth};
         const bool last = end == boxes_.size();
         if (begin == 0 && !last) sums_between.resize(grid.tiles());
         std::atomic<std::size_t> pairs = 0;

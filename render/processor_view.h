@@ -15,6 +15,7 @@
 #include "render/eye_order.h"
 #include "render/frame_data.h"
 #include "render/picture.h"
+#include "render/puff_texels.h"
 #include "render/screen_ball.h"
 #include "render/stage_times.h"
 #include "render/tile_bins.h"
@@ -44,8 +45,7 @@ class ProcessorView {
     void look(int shadow_size, SeenLight& seen);
 
     // Draws splats, the air between them and what lies behind; the ground wears `shadow`, shadow_size^2
-    // texels. The light of balls that are not `seen` is not looked at; without it all are. Not for billboards
-    // and shells together.
+    // texels. The light of balls that are not `seen` is not looked at; without it all are.
     void draw(Picture& picture, const float* shadow, int shadow_size, const AirShells& shells,
               const SeenLight* seen = nullptr);
 
@@ -56,8 +56,8 @@ class ProcessorView {
         std::vector<ExactBall> exact;
         TileBins bins;  // cut off where a tile is opaque, once look() knows
     };
-    void add_puffs();
     std::uint32_t source(std::size_t splat) const;
+    const PuffTexels* texels() const;
     void shape(Batch& batch, std::size_t first, std::size_t last, std::uint32_t number) const;
     Batch prepare_batch(std::size_t begin, std::size_t end) const;
     void light(Batch& batch, const SeenLight* seen) const;
@@ -70,9 +70,8 @@ class ProcessorView {
     Tile part_;
     BatchLimits limits_;
     StageTimes* times_;
+    std::vector<std::uint32_t> source_;  // splats_near_to_far(); empty without billboards
     std::vector<PixelBox> boxes_;        // of the splats, nearest first
-    std::vector<std::uint32_t> source_;  // of the splats, see source(); empty without billboards
-    std::vector<ScreenPuff> puffs_;      // in the order of EyeOrder::puffs
     std::vector<Batch> kept_;            // one, if look() has made it
 };
 

@@ -268,9 +268,7 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
             parts.back().frame.scattering = scattering.data();
         }
     }
-    // The processor has no air between billboards.
-    const bool blended = !order.puffs.empty() && has_shells(options, lit.cloud);
-    if (on_processor() && !blended)
+    if (on_processor())
         draw_on_processor(splats, options, camera, parts, order, picture);
     else
         draw_on_device(splats, options, camera, parts, order, picture);
@@ -356,7 +354,6 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
                                     EyeOrder& order, Picture& picture) {
     const std::vector<float> lightning = light_up(splats, options, order, nullptr);
     set_light(order, {lit.sun_depths, lightning});
-    if (on_processor() && map_on_device != lit.key) put_map_on_device();
     const GpuImage& map = light_on_device().shadow_map();
     const AirShells shells =
         air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size, splats.time_s, fog_noise);

@@ -31,18 +31,24 @@ struct ExactBall {
     float direct[3];   // radiance per light that is scattered once
 };
 
-// One of T's billboards: a rectangle on the screen. With s and t from -1 to 1 across it, to the right and up,
-// its texels lie at linear functions of s and t, and its light is that of its corners, interpolated over two
-// triangles: light[0] + s light[1] + t light[2] + max(t - s, 0) light[3].
+// One of T's billboards in the place of a ScreenBall: a rectangle on the screen. With s and t from -1 to 1
+// across it, to the right and up, its light is that of its corners, interpolated over two triangles: l0 + s
+// l1 + t l2 + max(t - s, 0) l3.
 struct ScreenPuff {
     float x, y;                             // of the centre, pixels
     float per_half_width, per_half_height;  // 1 / pixels
-    float u[3], v[3];                       // column and row of texels: [0] + s [1] + t [2]
-    float light[4][3];                      // radiance of the cloud where it is opaque, times `opacity`
-    float air[3];                           // radiance of the air, times `opacity`
-    float opacity, distance;                // 0..1; metres
-    std::uint32_t texels, side;             // of its level and layer: the first of puff_texels(); on a side
+    // In steps of 2^n: three each of l0..l3, radiance of the cloud where it is opaque, times `opacity`; then
+    // three of the air, times `opacity`.
+    std::int16_t light[15];
+    std::uint16_t step;          // upper half of the bits of the float 2^n
+    float opacity;               // 0..1
+    std::uint32_t texture_bits;  // shader::Puff
+    float distance;              // metres; below 0, as that of no ball
+    std::int16_t first, end;     // rows of pixels
 };
+static_assert(sizeof(ScreenPuff) == sizeof(ScreenBall) &&
+              offsetof(ScreenPuff, distance) == offsetof(ScreenBall, distance) &&
+              offsetof(ScreenPuff, first) == offsetof(ScreenBall, first));
 
 // Rows of a tile, half-open.
 struct Rows {

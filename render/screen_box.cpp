@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 
 #include <tbb/parallel_for.h>
 
 #include "automaton/vector_math.h"
+#include "render/half_floats.h"
+#include "render/puff_textures.h"
 
 namespace nephos {
 namespace {
@@ -44,15 +47,48 @@ PixelBox screen_box(const shader::ViewBall& ball, const CameraFrame& camera, con
             to_pixel(std::ceil(half_height - y.least * per_y)) - tile.y};
 }
 
+// Middles of pixels within a rectangle whose half sizes are given. The outermost texels are clear, so nothing
+// is seen beyond the middles of the texels.
+PixelBox screen_box(const shader::Puff& puff, const CameraFrame& camera, const Camera& options,
+                    const Tile& tile) {
+    const Vec3 centre{puff.x, puff.y, puff.z};
+    const auto [reach_x, reach_y] = unpack_halves(puff.half_size);
+    const double per_depth = 1 / dot(centre, camera.forward);
+    const double half_width = 0.5 * options.width, half_height = 0.5 * options.height;
+    const double per_x = half_width / camera.half_width * per_depth,
+                 per_y = half_height / camera.half_height * per_depth;
+    const double seen = 1.0001 * (1 - 1.0 / (kPuffTexels >> (puff.texture_bits >> 12)));
+    const double x = half_width + dot(centre, camera.right) * per_x - tile.x,
+                 y = half_height - dot(centre, camera.up) * per_y - tile.y;
+    const double across = seen * double(reach_x) * per_x + 0.001,
+                 down = seen * double(reach_y) * per_y + 0.001;
+    return {to_pixel(std::ceil(x - across - 0.5)), to_pixel(std::ceil(y - down - 0.5)),
+            to_pixel(std::floor(x + across + 0.5)), to_pixel(std::floor(y + down + 0.5))};
+}
+
 }  // namespace
 
+std::vector<std::uint32_t> splats_near_to_far(const EyeOrder& order) {
+    std::vector<std::uint32_t> splats(order.balls.size() + order.puffs.size());
+    std::size_t next = 0;
+    for (const Run& run : order.runs | std::views::reverse) {
+        const std::uint32_t kind = run.kind == SplatKind::billboard ? kPuffSplat : 0;
+        for (std::uint32_t i = run.end; i-- > run.begin;) splats[next++] = i | kind;
+    }
+    return splats;
+}
+
 std::vector<PixelBox> screen_boxes(const EyeOrder& order, const CameraFrame& camera, const Camera& options,
-                                   const Tile& tile) {
-    const std::size_t count = order.balls.size();
+                                   const Tile& tile, std::span<const std::uint32_t> splats) {
+    const std::size_t count = order.balls.size() + order.puffs.size();
     std::vector<PixelBox> boxes(count);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i)
-            boxes[i] = screen_box(order.balls[count - 1 - i], camera, options, tile);
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const std::uint32_t splat = splats.empty() ? std::uint32_t(count - 1 - i) : splats[i];
+            boxes[i] = (splat & kPuffSplat) != 0
+                           ? screen_box(order.puffs[splat & ~kPuffSplat], camera, options, tile)
+                           : screen_box(order.balls[splat], camera, options, tile);
+        }
     });
     return boxes;
 }

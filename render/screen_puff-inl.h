@@ -11,7 +11,9 @@
 #endif
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <iterator>
 #include <span>
 #include <utility>
 
@@ -22,31 +24,42 @@
 #include "render/half_floats.h"
 #include "render/puff_texels.h"
 #include "render/puff_textures.h"
+#include "render/screen_ball-inl.h"
 #include "render/view_scene.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
-inline constexpr std::size_t kMostLanes = 2 * shader::kTileWidth;
+// Where a vector of billboards is, turned from rows into columns.
+struct PuffPlaces {
+    HWY_ALIGN float x[kMaxLanes], y[kMaxLanes], z[kMaxLanes], half_width[kMaxLanes], half_height[kMaxLanes];
 
-// Billboards of one vector and their clouds, turned from rows into columns.
-struct PuffColumns {
-    HWY_ALIGN float x[kMostLanes], y[kMostLanes], z[kMostLanes], half_width[kMostLanes],
-        half_height[kMostLanes], sun_absorbed[kMostLanes], flash_absorbed[kMostLanes], opacity[kMostLanes],
-        cloud_x[kMostLanes], cloud_y[kMostLanes], cloud_z[kMostLanes], base[kMostLanes],
-        inverse_height[kMostLanes];
-
-    PuffColumns(std::span<const shader::Puff> puffs, std::span<const shader::PuffCloud> clouds) {
+    explicit PuffPlaces(std::span<const shader::Puff* const> puffs) {
         const std::size_t lanes = hn::Lanes(Lanes());
         for (std::size_t lane = 0; lane < lanes; ++lane) {
-            const shader::Puff& puff = puffs[std::min(lane, puffs.size() - 1)];
-            const shader::PuffCloud& cloud = clouds[puff.cloud];
+            const shader::Puff& puff = *puffs[std::min(lane, puffs.size() - 1)];
             x[lane] = puff.x;
             y[lane] = puff.y;
             z[lane] = puff.z;
             const auto [across, up] = unpack_halves(puff.half_size);
             half_width[lane] = across;
             half_height[lane] = up;
+        }
+    }
+};
+
+// What lights them.
+struct PuffColumns : PuffPlaces {
+    HWY_ALIGN float sun_absorbed[kMaxLanes], flash_absorbed[kMaxLanes], opacity[kMaxLanes],
+        cloud_x[kMaxLanes], cloud_y[kMaxLanes], cloud_z[kMaxLanes], base[kMaxLanes],
+        inverse_height[kMaxLanes];
+
+    PuffColumns(std::span<const shader::Puff* const> puffs, std::span<const shader::PuffCloud> clouds)
+        : PuffPlaces(puffs) {
+        const std::size_t lanes = hn::Lanes(Lanes());
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            const shader::Puff& puff = *puffs[std::min(lane, puffs.size() - 1)];
+            const shader::PuffCloud& cloud = clouds[puff.cloud];
             sun_absorbed[lane] = float(puff.absorbed & 0xffffu) * (1.0f / 65535.0f);
             flash_absorbed[lane] = float(puff.absorbed >> 16) * (1.0f / 65535.0f);
             opacity[lane] = puff.opacity;
@@ -93,162 +106,268 @@ HWY_INLINE Floats3 puff_light_at(const PictureFrame& frame, const PuffColumns& p
     return times(set(frame.ambient_top.w), light);
 }
 
-// Everything of a vector of billboards that is a matter of their places and their light; columns of floats in
-// the order of ScreenPuff.
-struct PuffFields {
-    HWY_ALIGN float x[kMostLanes], y[kMostLanes], per_half_width[kMostLanes], per_half_height[kMostLanes],
-        light[12][kMostLanes], air[3][kMostLanes], distance[kMostLanes];
+// Unit vector along an axis of the picture, and 1 / the axis' length.
+struct Axis {
+    Floats3 unit;
+    Floats per;
+    explicit Axis(const shader::vec4& of)
+        : unit(set3(of)), per(hn::Div(set(1.0f), hn::Sqrt(dot(set3(of), set3(of))))) {
+        unit = times(per, unit);
+    }
 };
 
-inline void compute_puffs(const PictureFrame& frame, const PuffColumns& puff, PuffFields& out) {
+// The rectangles of some billboards: `screen` has one for each of `puffs`.
+inline void shape_puffs(std::span<const shader::Puff* const> puffs, const PictureFrame& frame,
+                        ScreenBall* const* screen) {
     const Lanes d;
-    const Floats one = set(1.0f), opacity = hn::Load(d, puff.opacity);
-    const Floats3 centre{hn::Load(d, puff.x), hn::Load(d, puff.y), hn::Load(d, puff.z)};
-    const auto axis = [&](const shader::vec4& of) {  // unit, and 1 / its length
-        const Floats per = hn::Div(one, hn::Sqrt(dot(set3(of), set3(of))));
-        return std::pair(times(per, set3(of)), per);
-    };
-    const auto [right, per_right] = axis(frame.right);
-    const auto [up, per_up] = axis(frame.up);
-    const Floats per_depth = hn::Div(one, dot(set3(frame.forward), centre));
-    const Floats half_width = set(0.5f * frame.picture.x), half_height = set(0.5f * frame.picture.y);
-    const Floats to_x = hn::Mul(hn::Mul(per_right, per_depth), half_width),
-                 to_y = hn::Mul(hn::Mul(per_up, per_depth), half_height);
-    hn::Store(hn::Sub(hn::MulAdd(dot(right, centre), to_x, half_width), set(frame.picture.z)), d, out.x);
-    hn::Store(hn::Sub(hn::NegMulAdd(dot(up, centre), to_y, half_height), set(frame.picture.w)), d, out.y);
-    const Floats reach_x = hn::Load(d, puff.half_width), reach_y = hn::Load(d, puff.half_height);
-    hn::Store(hn::Div(one, hn::Mul(reach_x, to_x)), d, out.per_half_width);
-    hn::Store(hn::Div(one, hn::Mul(reach_y, to_y)), d, out.per_half_height);
-
-    const Floats distance = hn::Sqrt(dot(centre, centre));
-    hn::Store(distance, d, out.distance);
-    const Floats3 ray = times(hn::Div(one, hn::Max(distance, set(1.0e-6f))), centre);
-    const Floats3 beta = air_transmittance(frame, ray, distance);
-    const Floats3 air = times(opacity, air_light(frame, ray, beta)), share = times(opacity, beta);
-    const auto corner = [&](float s, float t) {
-        const Floats3 place =
-            times_add(hn::Mul(set(s), reach_x), right, times_add(hn::Mul(set(t), reach_y), up, centre));
-        return each_times(share, puff_light_at(frame, puff, place));
-    };
-    const Floats3 low = corner(-1, -1), beside = corner(1, -1), high = corner(1, 1), above = corner(-1, 1);
-    const Floats half = set(0.5f);
-    const Floats3 parts[] = {times(half, add(low, high)), times(half, subtract(beside, low)),
-                             times(half, subtract(high, beside)),
-                             times(half, add(subtract(above, low), subtract(beside, high)))};
-    for (std::size_t n = 0; n < 4; ++n) {
-        hn::Store(parts[n].x, d, out.light[3 * n]);
-        hn::Store(parts[n].y, d, out.light[3 * n + 1]);
-        hn::Store(parts[n].z, d, out.light[3 * n + 2]);
-    }
-    hn::Store(air.x, d, out.air[0]);
-    hn::Store(air.y, d, out.air[1]);
-    hn::Store(air.z, d, out.air[2]);
-}
-
-// Where the texture lies: mirrored, and the axes exchanged, as the bits of `turn` say (puff.vert).
-inline void place_texture(shader::uint bits, ScreenPuff& puff) {
-    const shader::uint layer = bits & 255u, turn = bits >> 8 & 15u, level = bits >> 12;
-    puff.side = std::uint32_t(kPuffTexels) >> level;
-    puff.texels = puff_texels().first[level] + layer * (puff.side + 2) * (puff.side + 2);
-    const float half = 0.5f * float(puff.side);
-    float* const of_s = (turn & 4u) != 0 ? puff.v : puff.u;
-    float* const of_t = (turn & 4u) != 0 ? puff.u : puff.v;
-    of_s[0] = of_t[0] = half + 0.5f;  // one for the rim, half for the middle of a texel
-    of_s[1] = (turn & 1u) != 0 ? -half : half;
-    of_s[2] = 0;
-    of_t[1] = 0;
-    of_t[2] = (turn & 2u) != 0 ? half : -half;
-}
-
-inline void shape_puffs(std::span<const shader::Puff> puffs, std::span<const shader::PuffCloud> clouds,
-                        const PictureFrame& frame, ScreenPuff* out) {
-    const std::size_t lanes = hn::Lanes(Lanes());
+    const std::size_t lanes = hn::Lanes(d);
+    const Axis right(frame.right), up(frame.up);
+    const Floats one = set(1.0f), half_width = set(0.5f * frame.picture.x),
+                 half_height = set(0.5f * frame.picture.y);
     for (std::size_t begin = 0; begin < puffs.size(); begin += lanes) {
         const auto some = puffs.subspan(begin, std::min(lanes, puffs.size() - begin));
-        PuffFields fields;
-        compute_puffs(frame, PuffColumns(some, clouds), fields);
+        const PuffPlaces puff(some);
+        const Floats3 centre{hn::Load(d, puff.x), hn::Load(d, puff.y), hn::Load(d, puff.z)};
+        const Floats per_depth = hn::Div(one, dot(set3(frame.forward), centre));
+        const Floats to_x = hn::Mul(hn::Mul(right.per, per_depth), half_width),
+                     to_y = hn::Mul(hn::Mul(up.per, per_depth), half_height);
+        HWY_ALIGN float field[5][kMaxLanes];
+        const Floats fields[] = {
+            hn::Sub(hn::MulAdd(dot(right.unit, centre), to_x, half_width), set(frame.picture.z)),
+            hn::Sub(hn::NegMulAdd(dot(up.unit, centre), to_y, half_height), set(frame.picture.w)),
+            hn::Div(one, hn::Mul(hn::Load(d, puff.half_width), to_x)),
+            hn::Div(one, hn::Mul(hn::Load(d, puff.half_height), to_y)), hn::Sqrt(dot(centre, centre))};
+        for (std::size_t n = 0; n < std::size(fields); ++n) hn::Store(fields[n], d, field[n]);
         for (std::size_t i = 0; i < some.size(); ++i) {
-            ScreenPuff& to = out[begin + i];
-            to.x = fields.x[i];
-            to.y = fields.y[i];
-            to.per_half_width = fields.per_half_width[i];
-            to.per_half_height = fields.per_half_height[i];
-            for (std::size_t n = 0; n < 12; ++n) to.light[n / 3][n % 3] = fields.light[n][i];
-            for (std::size_t c = 0; c < 3; ++c) to.air[c] = fields.air[c][i];
-            to.opacity = some[i].opacity;
-            to.distance = fields.distance[i];
-            place_texture(some[i].texture_bits, to);
+            const ScreenPuff shaped{.x = field[0][i],
+                                    .y = field[1][i],
+                                    .per_half_width = field[2][i],
+                                    .per_half_height = field[3][i],
+                                    .light = {},
+                                    .step = 0,
+                                    .opacity = some[i]->opacity,
+                                    .texture_bits = some[i]->texture_bits,
+                                    .distance = -std::max(field[4][i], 1.0e-6f),
+                                    .first = 0,
+                                    .end = 0};
+            *screen[begin + i] = std::bit_cast<ScreenBall>(shaped);
         }
     }
 }
 
+// Columns of ScreenPuff::light and step.
+struct PuffLight {
+    HWY_ALIGN std::int16_t columns[15][kMaxLanes];
+    HWY_ALIGN std::int32_t steps[kMaxLanes];
+
+    PuffLight(const PictureFrame& frame, const PuffColumns& puff) {
+        const Lanes d;
+        const Floats one = set(1.0f), half = set(0.5f);
+        const Axis right(frame.right), up(frame.up);
+        const Floats3 centre{hn::Load(d, puff.x), hn::Load(d, puff.y), hn::Load(d, puff.z)};
+        const Floats reach_x = hn::Load(d, puff.half_width), reach_y = hn::Load(d, puff.half_height);
+        const Floats distance = hn::Sqrt(dot(centre, centre));
+        const Floats3 ray = times(hn::Div(one, hn::Max(distance, set(1.0e-6f))), centre);
+        Floats3 beta = air_transmittance(frame, ray, distance);
+        Floats3 air = air_light(frame, ray, beta);
+        if (frame.shells != nullptr) {
+            const AirLayer layer =
+                layer_in_front(frame, ray, shell_begins(frame.shells->data, distance), distance);
+            air = times_add(layer.transmittance, air, layer.light);
+            beta = times(layer.transmittance, beta);
+        }
+        const Floats opacity = hn::Load(d, puff.opacity);
+        const Floats3 share = times(opacity, beta);
+        const auto corner = [&](float s, float t) {
+            const Floats3 place = times_add(hn::Mul(set(s), reach_x), right.unit,
+                                            times_add(hn::Mul(set(t), reach_y), up.unit, centre));
+            return each_times(share, puff_light_at(frame, puff, place));
+        };
+        const Floats3 low = corner(-1, -1), beside = corner(1, -1), high = corner(1, 1),
+                      above = corner(-1, 1);
+        const Floats3 parts[] = {times(half, add(low, high)), times(half, subtract(beside, low)),
+                                 times(half, subtract(high, beside)),
+                                 times(half, add(subtract(above, low), subtract(beside, high))),
+                                 times(opacity, air)};
+        store({parts[0].x, parts[0].y, parts[0].z, parts[1].x, parts[1].y, parts[1].z, parts[2].x, parts[2].y,
+               parts[2].z, parts[3].x, parts[3].y, parts[3].z, parts[4].x, parts[4].y, parts[4].z});
+    }
+
+  private:
+    // The largest of a billboard's values takes 15 bits.
+    void store(const Floats (&values)[15]) {
+        const Lanes d;
+        const hn::RebindToSigned<Lanes> di;
+        const hn::Rebind<std::int16_t, Lanes> d16;
+        Floats most = set(1.0e-30f);
+        for (const Floats value : values) most = hn::Max(most, hn::Abs(value));
+        const auto exponent = hn::ShiftRight<23>(hn::BitCast(di, most));
+        hn::Store(hn::ShiftLeft<7>(hn::Sub(exponent, hn::Set(di, 14))), di, steps);
+        const Floats per_step =
+            hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(di, 2 * 127 + 14), exponent)));
+        for (std::size_t n = 0; n < std::size(values); ++n)
+            hn::Store(hn::DemoteTo(d16, hn::NearestInt(hn::Mul(values[n], per_step))), d16, columns[n]);
+    }
+};
+
+// The light of some billboards that have their shapes: `screen` has one for each of `puffs`.
+inline void light_puffs(std::span<const shader::Puff* const> puffs, std::span<const shader::PuffCloud> clouds,
+                        const PictureFrame& frame, ScreenBall* const* screen) {
+    const std::size_t lanes = hn::Lanes(Lanes());
+    for (std::size_t begin = 0; begin < puffs.size(); begin += lanes) {
+        const auto some = puffs.subspan(begin, std::min(lanes, puffs.size() - begin));
+        const PuffLight light(frame, PuffColumns(some, clouds));
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            auto lit = std::bit_cast<ScreenPuff>(*screen[begin + i]);
+            for (std::size_t n = 0; n < 15; ++n) lit.light[n] = light.columns[n][i];
+            lit.step = std::uint16_t(light.steps[i]);
+            *screen[begin + i] = std::bit_cast<ScreenBall>(lit);
+        }
+    }
+}
+
+// Sums of products of pairs of 16-bit integers.
+HWY_INLINE Words pairs_times(Words pairs, Words weights) {
+    const hn::RebindToSigned<Lanes> di;
+#if HWY_TARGET == HWY_SCALAR
+    const Words low = hn::Set(di, 0xFFFF);
+    return hn::Add(hn::Mul(hn::And(pairs, low), hn::And(weights, low)),
+                   hn::Mul(hn::ShiftRight<16>(pairs), hn::ShiftRight<16>(weights)));
+#else
+    const hn::Repartition<std::int16_t, decltype(di)> d16;
+    Words odd = hn::Zero(di);
+    const Words even = hn::ReorderWidenMulAccumulate(di, hn::BitCast(d16, pairs), hn::BitCast(d16, weights),
+                                                     hn::Zero(di), odd);
+    return hn::RearrangeToOddPlusEven(even, odd);
+#endif
+}
+
+// How a billboard's texture lies on it.
+struct PuffSampler {
+    static constexpr int kWhole = 32767;             // of a weight of two columns
+    static constexpr float kUnit = 255.0f * kWhole;  // of what sample() gives
+    const std::int32_t* texels;
+    int stride;
+    float across, up;  // texels for s, and for t
+    float middle, last;
+
+    PuffSampler(const PuffTexels& all, std::uint32_t bits) {
+        const std::uint32_t layer = bits & 255u, turn = bits >> 8 & 15u, level = bits >> 12;
+        const int side = kPuffTexels >> level;
+        const std::uint32_t exchanged = (turn & 4u) != 0 ? std::uint32_t(kPuffKinds * kPuffVariants) : 0;
+        stride = side + 2;
+        texels = reinterpret_cast<const std::int32_t*>(all.texels.data()) + all.first[level] +
+                 (layer + exchanged) * std::uint32_t(stride * stride);
+        const float half = 0.5f * float(side);
+        across = (turn & 1u) != 0 ? -half : half;
+        up = (turn & 2u) != 0 ? half : -half;
+        middle = half + 0.5f;  // one for the rim, half for the middle of a texel
+        last = float(side) + 0.999f;
+    }
+
+    HWY_INLINE Floats place(float scale, Floats of) const {
+        const Floats at = hn::MulAdd(set(scale), of, set(middle));
+        return hn::Min(hn::Max(at, hn::Zero(Lanes())), set(last));
+    }
+};
+
+// A column of points of a texture.
+struct PuffColumn {
+    Floats column;  // of texels
+    Words weights;  // of it and the next, 16 bits each
+
+    PuffColumn(const PuffSampler& sampler, Floats s) {
+        const hn::RebindToSigned<Lanes> di;
+        const Floats u = sampler.place(sampler.across, s);
+        column = hn::Floor(u);
+        const auto next = hn::ConvertTo(di, hn::Mul(hn::Sub(u, column), set(float(PuffSampler::kWhole))));
+        weights = hn::Or(hn::ShiftLeft<16>(next), hn::Sub(hn::Set(di, PuffSampler::kWhole), next));
+    }
+};
+
 struct PuffSample {
-    Floats opacity, bright;  // 0..1, as the texture has them
+    Floats opacity, bright;  // 0..PuffSampler::kUnit, as the texture has them
 };
 
 // Between the middles of four texels.
-HWY_INLINE PuffSample sample_puff(const ScreenPuff& puff, const std::uint32_t* texels, Floats s, Floats t) {
+HWY_INLINE PuffSample sample_puff(const PuffSampler& sampler, const PuffColumn& column, Floats t) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
-    const Floats zero = hn::Zero(d), most = set(float(puff.side) + 0.999f);
-    const auto place = [&](const float* of) {
-        return hn::Min(hn::Max(hn::MulAdd(set(of[1]), s, hn::MulAdd(set(of[2]), t, set(of[0]))), zero), most);
+    const Floats v = sampler.place(sampler.up, t), row = hn::Floor(v), share = hn::Sub(v, row);
+    const auto index = hn::ConvertTo(di, hn::MulAdd(row, set(float(sampler.stride)), column.column));
+    const Words upper = hn::GatherIndex(di, sampler.texels, index),
+                lower = hn::GatherIndex(di, sampler.texels + sampler.stride, index);
+    const auto between = [&](Words above, Words below) {
+        const Words bytes = hn::Set(di, 0x00FF00FF);
+        const Words a = pairs_times(hn::And(above, bytes), column.weights),
+                    b = pairs_times(hn::And(below, bytes), column.weights);
+        return hn::MulAdd(share, hn::ConvertTo(d, hn::Sub(b, a)), hn::ConvertTo(d, a));
     };
-    const Floats u = place(puff.u), v = place(puff.v);
-    const Floats column = hn::Floor(u), row = hn::Floor(v);
-    const int stride = int(puff.side) + 2;
-    const auto index =
-        hn::Add(hn::Mul(hn::ConvertTo(di, row), hn::Set(di, stride)), hn::ConvertTo(di, column));
-    const auto* const base = reinterpret_cast<const std::int32_t*>(texels) + puff.texels;
-    const auto upper = hn::GatherIndex(di, base, index),
-               lower = hn::GatherIndex(di, base, hn::Add(index, hn::Set(di, stride)));
-    const Floats share_u = hn::Sub(u, column), share_v = hn::Sub(v, row);
-    const auto channel = [&](auto words, auto next) {
-        const auto byte = hn::Set(di, 255);
-        const Floats a = hn::ConvertTo(d, hn::And(words, byte)), b = hn::ConvertTo(d, hn::And(next, byte));
-        return hn::MulAdd(share_u, hn::Sub(b, a), a);
-    };
-    const auto between = [&](Floats a, Floats b) {
-        return hn::Mul(hn::MulAdd(share_v, hn::Sub(b, a), a), set(1.0f / 255.0f));
-    };
-    return {between(channel(upper, hn::ShiftRight<16>(upper)), channel(lower, hn::ShiftRight<16>(lower))),
-            between(channel(hn::ShiftRight<8>(upper), hn::ShiftRight<24>(upper)),
-                    channel(hn::ShiftRight<8>(lower), hn::ShiftRight<24>(lower)))};
+    return {between(upper, lower), between(hn::ShiftRight<8>(upper), hn::ShiftRight<8>(lower))};
 }
+
+// ScreenPuff::light in floats.
+struct PuffColours {
+    HWY_ALIGN float light[16];
+
+    explicit PuffColours(const ScreenPuff& puff) {
+        const Lanes d;
+        const hn::RebindToSigned<Lanes> di;
+        const hn::Rebind<std::int16_t, Lanes> d16;
+        const Floats step = set(std::bit_cast<float>(std::uint32_t(puff.step) << 16));
+        HWY_ALIGN std::int16_t steps[16];
+        std::copy_n(puff.light, std::size(puff.light), steps);
+        steps[15] = 0;
+        for (std::size_t n = 0; n < std::size(light); n += hn::Lanes(d))
+            hn::Store(hn::Mul(step, hn::ConvertTo(d, hn::PromoteTo(di, hn::Load(d16, steps + n)))), d,
+                      light + n);
+    }
+    HWY_INLINE Floats operator()(std::size_t part, std::size_t channel) const {
+        return set(light[3 * part + channel]);
+    }
+};
 
 // sum += transmittance * (what the billboard adds); transmittance *= 1 - opacity
 template <bool kColours>
-void add_puff(const ScreenPuff& puff, const Rows& rows, const ViewTile& tile, const Layout& layout,
-              const FirstPixels* first, TileSums& sums) {
+HWY_INLINE void add_puff(const ScreenPuff& puff, const Rows& rows, const ViewTile& tile, const Layout& layout,
+                         const FirstPixels* first, const PuffTexels& texels, bool distances, TileSums& sums) {
     const Lanes d;
-    const std::uint32_t* const texels = puff_texels().texels.data();
+    const PuffSampler sampler(texels, puff.texture_bits);
+    const PuffColours light(puff);
+    const float down = float(layout.rows) * -puff.per_half_height;
     for (std::size_t block = 0; block < layout.blocks; ++block) {
         const Floats dx = hn::Add(hn::Load(d, first[block].x), set(float(tile.x) - puff.x));
         const Floats s = hn::Mul(dx, set(puff.per_half_width));
-        for (std::size_t row = rows.begin; row < rows.end; row += layout.rows) {
+        const PuffColumn column(sampler, s);
+        const Floats dy =
+            hn::Add(hn::Load(d, first[block].y), set(float(tile.y) + float(rows.begin) - puff.y));
+        Floats t = hn::Mul(dy, set(-puff.per_half_height));
+        Floats3 beside{};
+        if constexpr (kColours)
+            beside = {hn::MulAdd(s, light(1, 0), light(0, 0)), hn::MulAdd(s, light(1, 1), light(0, 1)),
+                      hn::MulAdd(s, light(1, 2), light(0, 2))};
+        for (std::size_t row = rows.begin; row < rows.end; row += layout.rows, t = hn::Add(t, set(down))) {
             const std::size_t at = row * shader::kTileWidth + block * layout.lanes;
             const Floats before = hn::Load(d, sums.transmittance + at);
-            const Floats dy = hn::Add(hn::Load(d, first[block].y), set(float(tile.y) + float(row) - puff.y));
-            const Floats t = hn::Mul(dy, set(-puff.per_half_height));
-            const PuffSample sample = sample_puff(puff, texels, s, t);
-            const Floats part = hn::Mul(before, hn::Mul(sample.opacity, set(puff.opacity)));
-            hn::Store(hn::Sub(before, part), d, sums.transmittance + at);
+            const PuffSample sample = sample_puff(sampler, column, t);
+            const Floats scaled = hn::Mul(before, set(1.0f / PuffSampler::kUnit));
+            const Floats part = hn::Mul(scaled, sample.opacity);
+            hn::Store(hn::NegMulAdd(part, set(puff.opacity), before), d, sums.transmittance + at);
             if constexpr (kColours) {
-                const Floats bend = hn::Max(hn::Sub(t, s), hn::Zero(d));
-                const Floats bright = hn::Mul(before, sample.bright), thin = hn::Mul(before, sample.opacity);
-                const auto channel = [&](std::size_t c, float* to) {
-                    const Floats light = hn::MulAdd(
-                        s, set(puff.light[1][c]),
-                        hn::MulAdd(t, set(puff.light[2][c]),
-                                   hn::MulAdd(bend, set(puff.light[3][c]), set(puff.light[0][c]))));
-                    const Floats sum = hn::MulAdd(bright, light, hn::Load(d, to + at));
-                    hn::Store(hn::MulAdd(thin, set(puff.air[c]), sum), d, to + at);
+                const Floats bend = hn::Max(hn::Sub(t, s), hn::Zero(d)),
+                             bright = hn::Mul(scaled, sample.bright);
+                const auto channel = [&](std::size_t c, Floats of_s, float* to) {
+                    const Floats radiance = hn::MulAdd(t, light(2, c), hn::MulAdd(bend, light(3, c), of_s));
+                    const Floats sum = hn::MulAdd(bright, radiance, hn::Load(d, to + at));
+                    hn::Store(hn::MulAdd(part, light(4, c), sum), d, to + at);
                 };
-                channel(0, sums.red);
-                channel(1, sums.green);
-                channel(2, sums.blue);
-                hn::Store(hn::MulAdd(part, set(puff.distance), hn::Load(d, sums.distance + at)), d,
-                          sums.distance + at);
+                channel(0, beside.x, sums.red);
+                channel(1, beside.y, sums.green);
+                channel(2, beside.z, sums.blue);
+                if (distances)
+                    hn::Store(
+                        hn::MulAdd(part, set(-puff.opacity * puff.distance), hn::Load(d, sums.distance + at)),
+                        d, sums.distance + at);
             }
         }
     }

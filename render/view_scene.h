@@ -10,6 +10,7 @@
 #include <span>
 
 #include "render/frame_data.h"
+#include "render/puff_texels.h"
 #include "render/screen_ball.h"
 #include "render/shaders/shared.h"
 
@@ -27,13 +28,14 @@ struct TileSums {
 // What all tiles of a part of the picture share.
 struct ViewScene {
     const PictureFrame* frame = nullptr;
-    std::span<const ScreenBall> balls;  // splats, nearest first
+    std::span<const ScreenBall> balls;  // splats, nearest first; some are ScreenPuffs
     std::span<const ExactBall> exact;
-    std::span<const ScreenPuff> puffs;
     const float* shadow = nullptr;
     int shadow_size = 0;
-    std::span<const std::uint32_t> before_shells;  // balls_before_shells() of frame->shells
+    std::span<const std::uint32_t> before_shells;  // splats_before_shells() of frame->shells
     std::size_t first_ball = 0;                    // number of balls[0], nearest first
+    const PuffTexels* texels = nullptr;            // for ScreenPuffs
+    bool distances = true;                         // whether depth is wanted
 };
 
 // Many threads may.

@@ -46,7 +46,7 @@ void ViewTiles::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const 
 
 void ViewTiles::use_shells(const GpuDevice& gpu, const AirShells& shells, const EyeOrder& order) {
     shells_.use(gpu, bindings_, shells);
-    before_shells_ = balls_before_shells(shells, order.balls);
+    before_shells_ = splats_before_shells(shells, order);
 }
 
 void ViewTiles::use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {

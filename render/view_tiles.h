@@ -51,7 +51,7 @@ class ViewTiles {
     Bindings bindings_;
     GpuBuffer frame_, balls_, splats_, ranges_, tails_, list_, radiance_, depth_;
     ShellBuffers shells_;
-    std::vector<std::uint32_t> before_shells_;  // balls_before_shells()
+    std::vector<std::uint32_t> before_shells_;  // splats_before_shells()
     std::size_t next_shell_ = 0;                // of the tile of the picture that is being drawn
 };
 

@@ -15,6 +15,7 @@
 #include "render/puff_textures.h"
 #include "render/renderer.h"
 #include "tests/render/picture_checks.h"
+#include "tests/render/random_billboards.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
@@ -165,36 +166,6 @@ TEST_P(BillboardTest, LightningHasItsOwnAbsorptionAndFallsOffWithTheSquareOfTheD
     EXPECT_LT(brightness(500, 1)[0], 1e-3);
 }
 
-Splats scene_of(const std::vector<BillboardCloud>& clouds, const std::vector<CloudBillboard>& billboards) {
-    Splats splats;
-    splats.clouds = clouds;
-    splats.billboards = billboards;
-    return splats;
-}
-
-std::vector<CloudBillboard> random_billboards(unsigned seed, int count, std::uint32_t clouds) {
-    std::mt19937 engine(seed);
-    const auto uniform = [&](double min, double max) {
-        return min + (max - min) * (engine() / 4294967296.0);
-    };
-    std::vector<CloudBillboard> result;
-    for (int i = 0; i < count; ++i) {
-        CloudBillboard billboard;
-        billboard.centre_m = {uniform(-900, 900), uniform(-900, 900), uniform(600, 1400)};
-        billboard.width_m = float(uniform(50, 300));
-        billboard.height_m = float(uniform(50, 300));
-        billboard.sun_absorbed = float(uniform(0, 1));
-        billboard.opacity = float(uniform(0.2, 1));
-        billboard.texture = PuffTexture(engine() % 3);
-        billboard.variant = std::uint32_t(engine());
-        billboard.cloud = std::uint32_t(engine()) % clouds;
-        result.push_back(billboard);
-    }
-    return result;
-}
-
-const std::vector<BillboardCloud> kClouds{{{-400, 0, 1000}, 600, 1400}, {{400, 100, 1000}, 700, 1300}};
-
 bool same_bits(const Picture& a, const Picture& b) {
     const auto same = [](const std::vector<float>& x, const std::vector<float>& y) {
         return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(float)) == 0;
@@ -204,13 +175,15 @@ bool same_bits(const Picture& a, const Picture& b) {
 
 TEST_P(BillboardTest, PicturesDependNeitherOnTheOrderGivenNorOnTiles) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
-    std::vector<CloudBillboard> billboards = random_billboards(3, 400, 2);
-    const Picture first = renderer_.draw_splats(scene_of(kClouds, billboards), options);
-    EXPECT_TRUE(same_bits(first, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
+    std::vector<CloudBillboard> billboards = test::random_billboards(3, 400, 2);
+    const Picture first = renderer_.draw_splats(test::scene_of(test::kBillboardClouds, billboards), options);
+    EXPECT_TRUE(
+        same_bits(first, renderer_.draw_splats(test::scene_of(test::kBillboardClouds, billboards), options)));
     std::shuffle(billboards.begin(), billboards.end(), std::mt19937(4));
-    EXPECT_TRUE(same_bits(first, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
+    EXPECT_TRUE(
+        same_bits(first, renderer_.draw_splats(test::scene_of(test::kBillboardClouds, billboards), options)));
     Renderer tiled(test::validated(GetParam(), 32));
-    const Picture in_tiles = tiled.draw_splats(scene_of(kClouds, billboards), options);
+    const Picture in_tiles = tiled.draw_splats(test::scene_of(test::kBillboardClouds, billboards), options);
     reference::DifferenceSum sum;
     for (std::size_t i = 0; i < first.beauty.size(); ++i)
         sum.add(double(first.beauty[i]), double(in_tiles.beauty[i]));
@@ -228,7 +201,7 @@ TEST_P(BillboardTest, BillboardsAndMetaballsHideEachOtherByDistance) {
     billboards[0].width_m = billboards[0].height_m = 800;
     billboards[0].texture = PuffTexture::dense;
     const std::vector<Metaball> balls{{0, 0, 1000, 300, 1}};
-    Splats splats = scene_of(clouds, billboards);
+    Splats splats = test::scene_of(clouds, billboards);
     splats.metaballs = {balls, 1.0, 1.0};
     const auto depth = [&](double y) {
         billboards[0].centre_m = {0, y, 1000};
@@ -238,49 +211,23 @@ TEST_P(BillboardTest, BillboardsAndMetaballsHideEachOtherByDistance) {
     EXPECT_NEAR(depth(500), 3000, 1);    // and behind it
 }
 
-// From outside, from among them, and from so far that all are widened; of large and small textures; by day
-// and by lightning; with metaballs between them.
-TEST_P(BillboardTest, AgreesWithTheBlendedPass) {
-    Renderer reference_renderer(test::validated(Splatting::billboards));
-    const std::vector<CloudBillboard> billboards = random_billboards(8, 400, 2);
-    const std::vector<Metaball> balls = reference::random_metaballs(9, 200);
-    for (const RenderOptions& options :
-         {view({0, -3000, 900}, {0, 0, 1000}, 90, 70), view({0, -600, 1000}, {0, 0, 1000}, 90, 70, 60),
-          view({20000, -30000, 4000}, {0, 0, 1000}, 61, 47, 5), view({0, -300, 3000}, {0, 0, 900}, 50, 75)}) {
-        for (const bool lightning : {false, true}) {
-            for (const bool voxels : {false, true}) {
-                Splats splats = scene_of(kClouds, billboards);
-                if (voxels) splats.metaballs = {balls, 0.01, 0.7};
-                if (lightning) splats.flash = Flash{{100, -200, 1000}, {0.7, 0.8, 1.0}, 2.0};
-                const Picture fast = renderer_.draw_splats(splats, options);
-                const Picture slow = reference_renderer.draw_splats(splats, options);
-                // Close to the lightning radiance is far above 1; there it is the share that counts.
-                const float brightest = std::max(1.0f, *std::ranges::max_element(slow.beauty));
-                EXPECT_LE(test::largest_difference(fast.beauty, slow.beauty), brightest / 255.0f);
-                EXPECT_LE(test::largest_difference(fast.transmittance, slow.transmittance), 1.0f / 255.0f);
-                splats.light = false;
-                EXPECT_EQ(renderer_.draw_splats(splats, options).beauty, fast.beauty);
-            }
-        }
-    }
-    test::expect_no_messages(reference_renderer);
-}
-
 // Shafts are the shadow of metaballs: where there are none, neither the picture nor the way in which it is
 // drawn changes.
 TEST_P(BillboardTest, LightShaftsOfNoMetaballsChangeNothing) {
     RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
-    const std::vector<CloudBillboard> billboards = random_billboards(6, 100, 2);
-    const Picture without = renderer_.draw_splats(scene_of(kClouds, billboards), options);
+    const std::vector<CloudBillboard> billboards = test::random_billboards(6, 100, 2);
+    const Picture without =
+        renderer_.draw_splats(test::scene_of(test::kBillboardClouds, billboards), options);
     options.light_shafts.strength = 1;
-    EXPECT_TRUE(same_bits(without, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
+    EXPECT_TRUE(same_bits(
+        without, renderer_.draw_splats(test::scene_of(test::kBillboardClouds, billboards), options)));
 }
 
 // Whoever does not ask for depth gets the same picture without it.
 TEST_P(BillboardTest, DepthIsLeftOutOnRequest) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
-    const std::vector<CloudBillboard> billboards = random_billboards(6, 100, 2);
-    Splats splats = scene_of(kClouds, billboards);
+    const std::vector<CloudBillboard> billboards = test::random_billboards(6, 100, 2);
+    Splats splats = test::scene_of(test::kBillboardClouds, billboards);
     const Picture with = renderer_.draw_splats(splats, options);
     splats.depth = false;
     const Picture without = renderer_.draw_splats(splats, options);
@@ -293,8 +240,8 @@ TEST_P(BillboardTest, DepthIsLeftOutOnRequest) {
 // Billboards far outside of the picture, behind the eye or without opacity change no bit.
 TEST_P(BillboardTest, WhatCannotBeSeenChangesNothing) {
     const RenderOptions options = view({0, -3000, 900}, {0, 0, 1000}, 90, 70);
-    std::vector<CloudBillboard> billboards = random_billboards(5, 100, 2);
-    const Picture with = renderer_.draw_splats(scene_of(kClouds, billboards), options);
+    std::vector<CloudBillboard> billboards = test::random_billboards(5, 100, 2);
+    const Picture with = renderer_.draw_splats(test::scene_of(test::kBillboardClouds, billboards), options);
     CloudBillboard away = billboards[0];
     for (const Vec3 place : {Vec3{0, -4000, 900}, Vec3{5000, 0, 1000}, Vec3{0, 0, 9000}, Vec3{0, 0, -300}}) {
         away.centre_m = place;
@@ -302,7 +249,8 @@ TEST_P(BillboardTest, WhatCannotBeSeenChangesNothing) {
     }
     billboards.push_back(billboards[1]);
     billboards.back().opacity = 0;
-    EXPECT_TRUE(same_bits(with, renderer_.draw_splats(scene_of(kClouds, billboards), options)));
+    EXPECT_TRUE(
+        same_bits(with, renderer_.draw_splats(test::scene_of(test::kBillboardClouds, billboards), options)));
 }
 
 // Much smaller than a pixel, a billboard takes as much light out of the picture as its area is.
@@ -316,7 +264,7 @@ TEST_P(BillboardTest, BillboardsSmallerThanAPixelKeepTheirOpacity) {
         billboards[0].width_m = billboards[0].height_m = float(size_pixels * pixel_m);
         billboards[0].texture = PuffTexture::soft;
         double sum = 0;
-        for (const float t : renderer_.draw_splats(scene_of(clouds, billboards), options).transmittance)
+        for (const float t : renderer_.draw_splats(test::scene_of(clouds, billboards), options).transmittance)
             sum += 1 - double(t);
         return sum;
     };
@@ -334,7 +282,7 @@ TEST_P(BillboardTest, BadBillboardsAreRefusedByNumber) {
         std::vector<CloudBillboard> bad = billboards;
         damage(bad[1]);
         try {
-            renderer_.draw_splats(scene_of(kClouds, bad), options);
+            renderer_.draw_splats(test::scene_of(test::kBillboardClouds, bad), options);
         } catch (const Error& error) {
             EXPECT_EQ(error.code(), ErrorCode::usage);
             return std::string(error.what());

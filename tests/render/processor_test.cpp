@@ -11,6 +11,7 @@
 #include "render/processor_light.h"
 #include "render/processor_view.h"
 #include "render/scattering_table.h"
+#include "tests/render/random_billboards.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
@@ -21,8 +22,8 @@ struct Drawn {
     std::vector<float> light;
 };
 
-Drawn draw(const MetaballCloud& cloud, const RenderOptions& options, const BatchLimits& limits) {
-    const PreparedCloud prepared = prepare(cloud);
+Drawn draw(const Splats& splats, const RenderOptions& options, const BatchLimits& limits) {
+    const PreparedCloud prepared = prepare(splats.metaballs);
     const CameraFrame camera = camera_frame(options.camera);
     Drawn drawn;
     Picture& picture = drawn.picture = blank_picture(options);
@@ -32,8 +33,6 @@ Drawn draw(const MetaballCloud& cloud, const RenderOptions& options, const Batch
     light_by_processor(sun, picture.shadow_size, {}, ordered, picture.shadow, limits);
     drawn.light.resize(ordered.size());
     for (std::size_t i = 0; i < ordered.size(); ++i) drawn.light[sun.source[i]] = ordered[i];
-    Splats splats;
-    splats.metaballs = cloud;
     EyeOrder eye =
         order_from_eye(prepared, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
     set_light(eye, {drawn.light, {}});
@@ -77,7 +76,9 @@ void expect_near(const Drawn& a, const Drawn& b, float tolerance) {
 // Batches may stop at another ball once a tile is opaque: what they leave out is below kOpaque.
 TEST(Processor, BatchesDoNotShow) {
     const std::vector<Metaball> balls = reference::random_metaballs(11, 500);
-    const MetaballCloud cloud{balls, 0.01, 0.7};
+    const std::vector<CloudBillboard> billboards = test::random_billboards(11, 50, 2);
+    Splats cloud = test::scene_of(test::kBillboardClouds, billboards);
+    cloud.metaballs = {balls, 0.01, 0.7};
     for (const RenderOptions& options : outside_and_inside()) {
         const Drawn one = draw(cloud, options, {});
         expect_near(one, draw(cloud, options, {37, 1000}), 5e-4f);
@@ -91,7 +92,9 @@ TEST(Processor, BatchesDoNotShow) {
 // Vectors of 4, 8 and 16 lanes, with and without fused multiply-add, as far as this processor has them.
 TEST(Processor, EveryTargetDrawsTheSamePicture) {
     const std::vector<Metaball> balls = reference::random_metaballs(12, 500);
-    const MetaballCloud cloud{balls, 0.01, 0.7};
+    const std::vector<CloudBillboard> billboards = test::random_billboards(12, 50, 2);
+    Splats cloud = test::scene_of(test::kBillboardClouds, billboards);
+    cloud.metaballs = {balls, 0.01, 0.7};
     const std::int64_t all = hwy::SupportedTargets();
     for (const RenderOptions& options : outside_and_inside()) {
         const Drawn expected = draw(cloud, options, {});
