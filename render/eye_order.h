@@ -64,6 +64,8 @@ class ViewPyramid {
     explicit ViewPyramid(const CameraFrame& camera);
     // False only if nothing of the sphere is inside. `offset`: of its centre from the eye.
     bool may_see(const Vec3& offset, double radius) const;
+    // Normal of one of the planes, into the pyramid.
+    const Vec3& inward(std::size_t plane) const { return inward_[plane]; }
 
   private:
     Vec3 inward_[5];

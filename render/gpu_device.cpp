@@ -231,8 +231,9 @@ GpuDevice open_device(const DeviceOptions& options) {
         gpu.device = create_device(gpu.physical, gpu.queue_family);
         gpu.queue = vk::raii::Queue(gpu.device, gpu.queue_family, 0);
         gpu.pool = vk::raii::CommandPool(
-            gpu.device,
-            vk::CommandPoolCreateInfo(vk::CommandPoolCreateFlagBits::eTransient, gpu.queue_family));
+            gpu.device, vk::CommandPoolCreateInfo(vk::CommandPoolCreateFlagBits::eTransient |
+                                                      vk::CommandPoolCreateFlagBits::eResetCommandBuffer,
+                                                  gpu.queue_family));
         return gpu;
     });
 }

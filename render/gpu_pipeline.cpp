@@ -80,6 +80,7 @@ auto layout_bindings() {
         vk::DescriptorSetLayoutBinding(12, Type::eStorageBuffer, 1, all),
         vk::DescriptorSetLayoutBinding(13, Type::eUniformBuffer, 1, all),
         vk::DescriptorSetLayoutBinding(14, Type::eStorageBuffer, 1, all),
+        vk::DescriptorSetLayoutBinding(15, Type::eStorageBuffer, 1, Stage::eCompute),
     };
 }
 

@@ -12,6 +12,7 @@
 //                                                       11  tables of the sky, to be sampled (array)
 //                                                       12  storage  scattering table
 //    13  uniform  Shells                                 14  storage  shade map of the shells
+//    15  storage  parts of a picture, see shader::TileStep::listed
 //
 // All samplers of a set must be bound before a draw, used or not: lavapipe looks at them.
 //
@@ -53,6 +54,7 @@ struct ShaderVariant {
     bool physical_sky = false;  // 5, whatever includes air.glsl
     bool shells = false;        // 6, whatever includes shells.glsl
     bool fog = false;           // 7, likewise
+    bool operator==(const ShaderVariant&) const = default;
 };
 
 // Draws triangles; viewport and scissor are dynamic. Attachments from `written` on stay as they are.

@@ -37,9 +37,12 @@ GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsage
     const std::uint32_t type =
         access == HostAccess::write
             ? memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eDeviceLocal, seen})
-            : memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eHostCached, seen});
+        : access == HostAccess::read
+            ? memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eHostCached, seen})
+            : memory_type(gpu, needs.memoryTypeBits, {Memory::eDeviceLocal, MemoryFlags{}});
     buffer.memory = vk::raii::DeviceMemory(gpu.device, vk::MemoryAllocateInfo(needs.size, type));
     buffer.buffer.bindMemory(*buffer.memory, 0);
+    if (access == HostAccess::none) return buffer;
     buffer.mapped = static_cast<std::byte*>(buffer.memory.mapMemory(0, VK_WHOLE_SIZE));
     return buffer;
 }

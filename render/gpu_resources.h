@@ -9,7 +9,7 @@
 
 namespace nephos {
 
-// A buffer in memory that the processor sees too, mapped as long as it lives.
+// A buffer. Where the processor sees its memory, it is mapped as long as it lives.
 struct GpuBuffer {
     vk::raii::DeviceMemory memory{nullptr};
     vk::raii::Buffer buffer{nullptr};
@@ -17,7 +17,11 @@ struct GpuBuffer {
     std::size_t bytes = 0;
 };
 
-enum class HostAccess { write, read };  // what the processor does with a buffer: decides the kind of memory
+enum class HostAccess {
+    write,
+    read,
+    none
+};  // what the processor does with a buffer: decides the kind of memory
 
 GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsageFlags usage,
                         HostAccess access);

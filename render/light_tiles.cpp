@@ -92,7 +92,8 @@ void LightTiles::draw_map(const GpuDevice& gpu, const TileGrid& grid, bool first
                                 .largest_radius = 0,
                                 .first = 0,
                                 .end = 0,
-                                .distances = 0};
+                                .distances = 0,
+                                .listed = 0};
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_compute(commands, *layout_, bindings_, map_pipeline_, step);
         image_barrier(commands, map_, access::sample, access::compute);
@@ -126,7 +127,8 @@ void LightTiles::ask(const GpuDevice& gpu, const SunOrder& order, const TileGrid
                                     .largest_radius = order.largest_radius,
                                     .first = 0,
                                     .end = 0,
-                                    .distances = 0};
+                                    .distances = 0,
+                                    .listed = 0};
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
             begin_compute(commands, *layout_, bindings_, centres_pipeline_, step);
             dispatch_groups(commands, items.size());

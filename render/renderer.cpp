@@ -11,17 +11,8 @@
 #include "automaton/error.h"
 #include "automaton/text.h"
 #include "render/attenuation_texture.h"
-#include "render/light_tiles.h"
-#include "render/lit_cloud.h"
-#include "render/processor_light.h"
-#include "render/processor_view.h"
-#include "render/renderer_test_access.h"
+#include "render/renderer_impl.h"
 #include "render/scattering_table.h"
-#include "render/sky_image.h"
-#include "render/sky_light.h"
-#include "render/view_pass.h"
-#include "render/view_tiles.h"
-#include "render/voxel_absorption.h"
 #include "render/wet_ground.h"
 
 namespace nephos {
@@ -89,70 +80,22 @@ CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats) {
 
 }  // namespace
 
-struct Renderer::Impl {
-    explicit Impl(const DeviceOptions& device_options);
-
-    Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail);
-    // The same, and what lies on the ground.
-    Picture draw_with_ground(const Splats& splats, const RenderOptions& options);
-    // A part of the picture that is drawn at once.
-    struct PartFrame {
-        Tile tile;
-        PictureFrame frame;
-    };
-    void pass_sunlight(LitCloud& kept);
-    void absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks, const RenderOptions& options);
-    std::vector<float> light_up(const Splats& splats, const RenderOptions& options, const EyeOrder& order,
-                                const SeenLight* seen);
-    void light_all(LitCloud& cloud, const Splats& splats, const RenderOptions& options);
-    void hand_out_light(const Splats& splats, const RenderOptions& options, Picture& picture);
-    void put_map_on_device();
-    void use_scattering(const CloudLight& light);
-    void draw_on_processor(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
-                           const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
-    void draw_on_device(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
-                        const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
-    const GpuImage& image_of(const SkyLight& sky);
-    const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
-    bool on_processor() const { return splatting == Splatting::processor; }
-    LightTiles& light_on_device();
-
-    LitCloud lit;                           // of the last picture
-    std::optional<LightKey> map_on_device;  // whose map it is; reset when that map changes
-    std::size_t light_passes = 0;
-    StageTimes times;
-    int tile_size;
-    GpuDevice gpu;
-    PipelineLayout layout;
-    vk::raii::Sampler clamped, white_beyond;
-    Splatting splatting;  // not automatic
-    const GpuImage& attenuation_on_device();
-    // Made when they are needed.
-    std::optional<GpuImage> attenuation;
-    std::vector<float> scattering;  // table of `scattering_light`
-    CloudLight scattering_light;
-    GpuBuffer scattering_buffer;  // its copy on the device
-    std::optional<LightTiles> light_tiles;
-    // Without and with the physical sky; without shells of air, with them, and with fog in them.
-    std::optional<ViewTiles> view_tiles[2][3];
-    std::optional<ViewPass> view_pass[2][3];
-    FogNoise fog_noise;
-    std::optional<SkyImage> sky_image;
-    SkyLights sky_lights;
-    const SkyLight* sky = nullptr;  // of the picture that is drawn; null: gradient
-};
-
 Renderer::Impl::Impl(const DeviceOptions& device_options)
     : tile_size(device_options.tile_size),
       gpu(open_device(device_options)),
       layout(create_pipeline_layout(gpu)),
       clamped(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
       white_beyond(create_sampler(gpu, vk::SamplerAddressMode::eClampToBorder)),
-      splatting(device_options.splatting) {
-    if (splatting == Splatting::automatic) {
-        const bool software = gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu;
-        splatting = software ? Splatting::processor : Splatting::tiles;
-    }
+      splatting(device_options.splatting),
+      lists(device_options.lists) {
+    const bool software = gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu;
+    if (splatting == Splatting::automatic) splatting = software ? Splatting::processor : Splatting::tiles;
+    const std::string missing = missing_for_lists(gpu);
+    if (lists == TileLists::device && !missing.empty())
+        throw Error(ErrorCode::usage,
+                    "the Vulkan device cannot make the lists of tiles: it lacks " + missing);
+    if (lists == TileLists::automatic)
+        lists = software || !missing.empty() ? TileLists::host : TileLists::device;
     tile_size = std::min(tile_size, int(std::min(gpu.properties.limits.maxImageDimension2D,
                                                  gpu.properties.limits.maxFramebufferWidth)));
 }
@@ -241,21 +184,14 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
     {
         const StageTimer timer(&times, DrawStage::prepare);
         // The key says nothing of the view, from which others may be merged.
-        if (!keep_cloud(lit, splats.metaballs, options, detail)) map_on_device.reset();
+        if (!keep_cloud(lit, splats.metaballs, options, detail)) {
+            map_on_device.reset();
+            cloud_on_device = false;
+        }
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
     picture.shadow_frame = lit.frame;
-    EyeOrder order;
-    {
-        const StageTimer timer(&times, DrawStage::eye_order);
-        order = order_from_eye(lit.cloud, splats, camera, pixels_per_unit(options.camera, camera),
-                               options.ground);
-    }
     use_scattering(options.light);
-    // Balls are read twice; keys move through memory three times, and back and forth.
-    times[DrawStage::eye_order].bytes =
-        splats.metaballs.metaballs.size_bytes() +
-        order.balls.size() * (sizeof(Metaball) + 7 * 8 + sizeof(shader::ViewBall));
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     sky = sky_of(splats, options);
     if (sky != nullptr) picture.air = air_of(*sky);
@@ -268,12 +204,29 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
             parts.back().frame.scattering = scattering.data();
         }
     }
+    if (!uses_lists(splats, camera) || !draw_listed(splats, options, camera, parts, picture))
+        draw_ordered(splats, options, camera, parts, picture);
+    if (splats.light) hand_out_light(splats, options, picture);
+    return picture;
+}
+
+void Renderer::Impl::draw_ordered(const Splats& splats, const RenderOptions& options,
+                                  const CameraFrame& camera, const std::vector<PartFrame>& parts,
+                                  Picture& picture) {
+    EyeOrder order;
+    {
+        const StageTimer timer(&times, DrawStage::eye_order);
+        order = order_from_eye(lit.cloud, splats, camera, pixels_per_unit(options.camera, camera),
+                               options.ground);
+    }
+    // Balls are read twice; keys move through memory three times, and back and forth.
+    times[DrawStage::eye_order].bytes =
+        splats.metaballs.metaballs.size_bytes() +
+        order.balls.size() * (sizeof(Metaball) + 7 * 8 + sizeof(shader::ViewBall));
     if (on_processor())
         draw_on_processor(splats, options, camera, parts, order, picture);
     else
         draw_on_device(splats, options, camera, parts, order, picture);
-    if (splats.light) hand_out_light(splats, options, picture);
-    return picture;
 }
 
 // At full detail: the light of each metaball is that of its own centre.
@@ -429,24 +382,6 @@ std::vector<std::string> Renderer::validation_messages() const {
     if (log == nullptr) return {};
     const std::scoped_lock lock(log->mutex);
     return log->messages;
-}
-
-std::size_t RendererTestAccess::light_passes(const Renderer& renderer) {
-    return renderer.impl_->light_passes;
-}
-
-// Two copies into the same buffer with no barrier between them.
-void RendererTestAccess::provoke_hazard(Renderer& renderer) {
-    const GpuDevice& gpu = renderer.impl_->gpu;
-    with_gpu_errors("provoking a hazard", [&] {
-        using Usage = vk::BufferUsageFlagBits;
-        const GpuBuffer from = create_buffer(gpu, 64, Usage::eTransferSrc, HostAccess::write);
-        const GpuBuffer to = create_buffer(gpu, 64, Usage::eTransferDst, HostAccess::read);
-        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-            for (int i = 0; i < 2; ++i)
-                commands.copyBuffer(*from.buffer, *to.buffer, vk::BufferCopy(0, 0, 64));
-        });
-    });
 }
 
 }  // namespace nephos

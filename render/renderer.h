@@ -37,6 +37,15 @@ enum class Splatting {
                  // and on a graphics card what draws pictures that hold T's billboards
 };
 
+// Where Splatting::tiles has the order of the metaballs and the lists of the tiles made; the picture is the
+// same within 1/255, as bounds on the screen are rounded differently. Pictures with billboards, and what is
+// too much for the device at once, take the host's.
+enum class TileLists {
+    automatic,  // host on a device of type CPU, else device
+    host,       // sorted by the processor and uploaded for each picture
+    device,     // sorted by compute shaders from metaballs that stay on the device
+};
+
 struct DeviceOptions {
     // Part of a device's name ("llvmpipe") or its number in device_names(). Empty: the environment variable
     // NEPHOS_DEVICE in the same form; without it a discrete card, then an integrated, a virtual and a
@@ -49,6 +58,7 @@ struct DeviceOptions {
     // the picture; memory on the device is about 24 bytes * tile_size^2.
     int tile_size = 2048;
     Splatting splatting = Splatting::automatic;
+    TileLists lists = TileLists::automatic;
 };
 
 class Renderer {

@@ -3,7 +3,13 @@
 
 // What only the tests may do to a Renderer (not installed).
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
 #include "render/renderer.h"
+#include "render/shaders/shared.h"
 
 namespace nephos {
 
@@ -12,6 +18,24 @@ struct RendererTestAccess {
     static std::size_t light_passes(const Renderer& renderer);
     // Submits a deliberate write-after-write hazard, which the synchronization validation must report.
     static void provoke_hazard(Renderer& renderer);
+
+    // Indices of keys, sorted by the passes of device_sort.h over so many bits of them.
+    static std::vector<std::uint32_t> sorted(Renderer& renderer, std::span<const std::uint32_t> keys,
+                                             std::uint32_t bits);
+    // Sums of the numbers before each, and of all at the end.
+    static std::vector<std::uint32_t> prefix_sums(Renderer& renderer, std::span<const std::uint32_t> numbers);
+
+    // What the device listed for the last tile of the picture before (listed_view.h).
+    struct Lists {
+        std::vector<shader::ViewBall> balls;  // nearest first
+        std::vector<shader::TileRange> ranges;
+        std::vector<std::uint32_t> list;
+    };
+    static Lists lists(Renderer& renderer, int tile_width, int tile_height);
+    // Less than the device could take.
+    static void limit_lists(Renderer& renderer, std::size_t balls, std::size_t entries);
+    // Pictures, or tiles of them, that were drawn from the device's lists.
+    static std::size_t listed(const Renderer& renderer);
 };
 
 }  // namespace nephos

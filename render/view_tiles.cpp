@@ -31,8 +31,11 @@ ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const G
       bindings_(create_bindings(gpu, layout)),
       frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
+      no_parts_(create_buffer(gpu, sizeof(shader::uint), vk::BufferUsageFlagBits::eStorageBuffer,
+                              HostAccess::none)),
       shells_(gpu, bindings_) {
     bind_buffer(gpu, bindings_, 0, frame_);
+    bind_buffer(gpu, bindings_, 15, no_parts_);
     for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
 }
 
@@ -101,7 +104,8 @@ void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const Eye
                           .largest_radius = 0,
                           .first = 0,
                           .end = 0,
-                          .distances = order.depth};
+                          .distances = order.depth,
+                          .listed = 0};
     const vk::raii::Pipeline& tiles = tiles_for(gpu, order);
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_compute(commands, *layout_, bindings_, project_, step);
@@ -142,8 +146,8 @@ void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, co
         balls.assign(order.balls.rbegin() + std::ptrdiff_t(begin),
                      order.balls.rbegin() + std::ptrdiff_t(end));
         upload(gpu, bindings_, 1, balls_, std::as_bytes(std::span(balls)));
-        reserve(gpu, bindings_, 2, splats_, sizeof(shader::ViewSplat) * balls.size(), HostAccess::write);
-        reserve(gpu, bindings_, 7, tails_, sizeof(shader::uint) * balls.size(), HostAccess::write);
+        reserve(gpu, bindings_, 2, splats_, sizeof(shader::ViewSplat) * balls.size(), HostAccess::none);
+        reserve(gpu, bindings_, 7, tails_, sizeof(shader::uint) * balls.size(), HostAccess::none);
         const TileBins bins = bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid);
         upload(gpu, bindings_, 5, ranges_, std::as_bytes(std::span(bins.ranges)));
         upload(gpu, bindings_, 6, list_, std::as_bytes(std::span(bins.list)));

@@ -50,6 +50,7 @@ class ViewTiles {
     vk::raii::Pipeline tiles_[2][2] = {{nullptr, nullptr}, {nullptr, nullptr}};
     Bindings bindings_;
     GpuBuffer frame_, balls_, splats_, ranges_, tails_, list_, radiance_, depth_;
+    GpuBuffer no_parts_;  // binding 15 must be bound, used or not
     ShellBuffers shells_;
     std::vector<std::uint32_t> before_shells_;  // splats_before_shells()
     std::size_t next_shell_ = 0;                // of the tile of the picture that is being drawn

@@ -138,6 +138,7 @@ struct TileStep {
     float largest_radius;          // light: metres, of any splat
     uint first, end;               // view: the splats, or shells, that are drawn
     uint distances;                // view: boolean, whether depth is wanted
+    uint listed;  // view: boolean, first is the number of a ViewPart (order.h) that has the splats and shells
 };
 
 // Everything about one picture (or tile of it) that shaders need.
@@ -309,7 +310,7 @@ static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&
               offsetof(ViewBall, flags) == 28);
 static_assert(sizeof(ViewSplat) == 16 && sizeof(LightSplat) == 16 && sizeof(LightPlace) == 8);
 static_assert(sizeof(LightQuery) == 16 && sizeof(LightItem) == 16);
-static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 40);
+static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 44);
 static_assert(sizeof(Puff) == 32 && offsetof(Puff, half_size) == 12 && offsetof(Puff, cloud) == 28);
 static_assert(sizeof(PuffCloud) == 32 && offsetof(PuffCloud, inverse_height) == 16);
 static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 10) &&

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "shared.h"
+#include "order.h"
 // Tiles, between the splats: shells of air, front to back.
 #include "frame.glsl"
 #include "ray.glsl"
@@ -19,6 +19,7 @@ layout(set = 0, binding = 9, std430) buffer Depth {
 layout(push_constant) uniform Step {
     TileStep step;
 };
+#include "parts.glsl"
 
 void main() {
     uint index = gl_GlobalInvocationID.y * (32768u * kComputeGroup) + gl_GlobalInvocationID.x;
@@ -32,8 +33,9 @@ void main() {
     float sum_distance = kFog && step.distances != 0u ? depth[index] : 0.0;
     // Without these bounds masked lanes would take as long as others.
     vec2 part = part_with_air(ray);
-    uint last = part.x < part.y ? min(step.end, shells_before(part.y) + 1u) : step.first;
-    for (uint k = max(step.first, shells_before(part.x)); k < last; ++k) {
+    uvec2 drawn = drawn_shells();
+    uint last = part.x < part.y ? min(drawn.y, shells_before(part.y) + 1u) : drawn.x;
+    for (uint k = max(drawn.x, shells_before(part.x)); k < last; ++k) {
         AirLayer air = air_shell(k, sunlit, ray, pixel);
         sum_distance += sum.a * (1.0 - air.transmittance) * air.distance;
         sum.rgb += sum.a * air.light;

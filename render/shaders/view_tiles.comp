@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "shared.h"
+#include "order.h"
 // Tiles, second: the splats of a tile, front to back, until it is opaque:
 //
 //     sum += transmittance * opacity * radiance          transmittance *= 1 - opacity
@@ -13,6 +13,7 @@
 #include "shells.glsl"
 #include "lighting.glsl"
 #include "tiles.glsl"
+#include "parts.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Balls {
     ViewBall balls[];
@@ -179,7 +180,8 @@ void main() {
     if (tile >= step.tile_count) return;
     TileRange range = ranges[tile];
     if (kShells) {  // only those between two shells
-        range = TileRange(entry_of(step.first, range), entry_of(step.end, range));
+        uvec2 drawn = drawn_splats();
+        range = TileRange(entry_of(drawn.x, range), entry_of(drawn.y, range));
         if (range.begin == range.end && step.first_batch == 0u) return;
     }
     uvec2 first = first_pixel(tile);

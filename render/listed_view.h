@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Step 2 of D in compute shaders from lists that the device makes itself (device_lists.h): of a picture
+// nothing but the camera and what else has changed goes to the device. Metaballs only; the same picture as
+// that of view_tiles.h. Private to the module.
+//
+// Pictures, or tiles of one, are on their way two at a time: each has a set of descriptors, frame data,
+// commands and buffers to read back of its own; what the passes hand to each other is shared, as the device
+// takes one after the other.
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "render/device_lists.h"
+#include "render/gpu_pipeline.h"
+#include "render/picture.h"
+#include "render/shell_buffers.h"
+
+namespace nephos {
+
+// What all tiles of a picture share. Images and buffers must stay as they are until the picture is finished.
+struct ListedPicture {
+    ShaderVariant variant;
+    shader::OrderFrame order;
+    const GpuImage* shadow_map = nullptr;
+    const GpuImage* sky = nullptr;           // null: gradient
+    const GpuBuffer* scattering = nullptr;   // scattering_table.h
+    const shader::Shells* shells = nullptr;  // null: none
+    std::size_t shell_count = 0;
+    bool depth = true;
+};
+
+class ListedView {
+  public:
+    // `clamped` and `white_beyond` as in view_tiles.h; `attenuation` is not read there either.
+    ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+               const vk::raii::Sampler& clamped, const vk::raii::Sampler& white_beyond);
+    ~ListedView();
+    ListedView(const ListedView&) = delete;
+    ListedView& operator=(const ListedView&) = delete;
+
+    // What is drawn from now on; what is on its way is waited for.
+    void use_cloud(std::span<const shader::CloudBall> balls);
+    // Share of the lightning at each metaball, 0..65535.
+    void use_flash(std::span<const shader::uint> shares);
+    // Shade map of the shells and noise of the fog (air_shells.h).
+    void use_shade(std::span<const std::uint32_t> words);
+
+    // Begins to draw a tile into `picture`, which must stay where it is until it is finished.
+    void begin_tile(const ListedPicture& what, const shader::Frame& frame, const Tile& tile,
+                    Picture& picture);
+    // Waits for the tiles of a picture and stores their pixels. False if one of them has more entries than
+    // the lists may have: nothing of that tile is drawn.
+    bool finish(const Picture& picture);
+    // Waits for the tiles of a picture that nobody wants any more.
+    void abandon(const Picture& picture) noexcept;
+    // Waits for everything that is on its way; its pixels are stored by finish().
+    void wait();
+
+    // Balls and entries that there may be; less for tests.
+    ListLimits limits;
+    std::size_t drawn = 0;  // tiles that were begun
+
+    // What the device has listed for the last tile that was drawn: for tests.
+    struct Lists {
+        std::vector<shader::ViewBall> balls;  // nearest first
+        std::vector<shader::TileRange> ranges;
+        std::vector<shader::uint> list;
+    };
+    Lists read_lists(const Tile& tile);
+
+  private:
+    struct Pipelines;
+    struct Slot;
+    void reserve(const Tile& tile, Slot& slot);
+    void complete(Slot& slot);
+    void submit(Slot& slot);
+    void record(const vk::raii::CommandBuffer& commands, Slot& slot);
+    void record_view(const vk::raii::CommandBuffer& commands, Slot& slot);
+    void bind(Slot& slot);
+    Pipelines& pipelines_for(const ShaderVariant& variant);
+    void upload(const GpuBuffer& to, std::span<const std::byte> bytes);
+    void download(const GpuBuffer& from, std::span<std::byte> bytes);
+
+    const GpuDevice& gpu_;
+    const PipelineLayout& layout_;
+    const GpuImage& attenuation_;
+    const vk::raii::Sampler &clamped_, &white_beyond_;
+    DeviceLists lists_;
+    OrderSets sets_;
+    std::size_t balls_ = 0;
+    GpuBuffer shade_, radiance_, depth_;
+    std::vector<std::unique_ptr<Pipelines>> pipelines_;
+    std::vector<std::unique_ptr<Slot>> slots_;
+    std::size_t next_ = 0;
+    const Picture* ordered_ = nullptr;      // whose order is on the device; null: it may be another's
+    std::vector<const Picture*> too_many_;  // not drawn: too many entries
+};
+
+}  // namespace nephos

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What a Renderer consists of. Private to the module.
+
+#include <optional>
+#include <vector>
+
+#include "render/light_tiles.h"
+#include "render/listed_view.h"
+#include "render/lit_cloud.h"
+#include "render/processor_light.h"
+#include "render/processor_view.h"
+#include "render/renderer.h"
+#include "render/sky_image.h"
+#include "render/sky_light.h"
+#include "render/view_pass.h"
+#include "render/view_tiles.h"
+#include "render/voxel_absorption.h"
+
+namespace nephos {
+
+struct Renderer::Impl {
+    explicit Impl(const DeviceOptions& device_options);
+
+    Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail);
+    // The same, and what lies on the ground.
+    Picture draw_with_ground(const Splats& splats, const RenderOptions& options);
+    // A part of the picture that is drawn at once.
+    struct PartFrame {
+        Tile tile;
+        PictureFrame frame;
+    };
+    void pass_sunlight(LitCloud& kept);
+    void absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks, const RenderOptions& options);
+    std::vector<float> light_up(const Splats& splats, const RenderOptions& options, const EyeOrder& order,
+                                const SeenLight* seen);
+    void light_all(LitCloud& cloud, const Splats& splats, const RenderOptions& options);
+    void hand_out_light(const Splats& splats, const RenderOptions& options, Picture& picture);
+    void put_map_on_device();
+    void use_scattering(const CloudLight& light);
+    void draw_on_processor(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
+                           const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
+    // From the order that the host makes.
+    void draw_ordered(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
+                      const std::vector<PartFrame>& parts, Picture& picture);
+    // From lists that the device makes, unless it has not enough room for them: then false.
+    bool draw_listed(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
+                     const std::vector<PartFrame>& parts, Picture& picture);
+    bool uses_lists(const Splats& splats, const CameraFrame& camera);
+    ListedView& lists_on_device();
+    void draw_on_device(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
+                        const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
+    const GpuImage& image_of(const SkyLight& sky);
+    const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
+    bool on_processor() const { return splatting == Splatting::processor; }
+    LightTiles& light_on_device();
+
+    LitCloud lit;                           // of the last picture
+    std::optional<LightKey> map_on_device;  // whose map it is; reset when that map changes
+    std::size_t light_passes = 0;
+    StageTimes times;
+    int tile_size;
+    GpuDevice gpu;
+    PipelineLayout layout;
+    vk::raii::Sampler clamped, white_beyond;
+    Splatting splatting;  // not automatic
+    TileLists lists;      // likewise
+    const GpuImage& attenuation_on_device();
+    // Made when they are needed.
+    std::optional<GpuImage> attenuation;
+    std::vector<float> scattering;  // table of `scattering_light`
+    CloudLight scattering_light;
+    GpuBuffer scattering_buffer;  // its copy on the device
+    std::optional<LightTiles> light_tiles;
+    // Without and with the physical sky; without shells of air, with them, and with fog in them.
+    std::optional<ViewTiles> view_tiles[2][3];
+    std::optional<ViewPass> view_pass[2][3];
+    std::optional<ListedView> listed_view;
+    bool cloud_on_device = false;  // in listed_view, with its light
+    FogNoise fog_noise;
+    std::optional<SkyImage> sky_image;
+    SkyLights sky_lights;
+    const SkyLight* sky = nullptr;  // of the picture that is drawn; null: gradient
+};
+
+}  // namespace nephos

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures from lists that the device makes (listed_view.h).
+
+#include <algorithm>
+
+#include "render/half_floats.h"
+#include "render/renderer_impl.h"
+
+namespace nephos {
+namespace {
+
+shader::uint share_of(float value) { return shader::uint(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f); }
+
+}  // namespace
+
+ListedView& Renderer::Impl::lists_on_device() {
+    if (!listed_view) listed_view.emplace(gpu, layout, attenuation_on_device(), clamped, white_beyond);
+    return *listed_view;
+}
+
+bool Renderer::Impl::uses_lists(const Splats& splats, const CameraFrame& camera) {
+    return splatting == Splatting::tiles && lists == TileLists::device && splats.billboards.empty() &&
+           !lit.cloud.visible.empty() && lit.cloud.visible.size() <= lists_on_device().limits.balls &&
+           is_near_enough(lit.cloud, camera);
+}
+
+bool Renderer::Impl::draw_listed(const Splats& splats, const RenderOptions& options,
+                                 const CameraFrame& camera, const std::vector<PartFrame>& parts,
+                                 Picture& picture) {
+    ListedView& view = lists_on_device();
+    const std::size_t passes = light_passes;
+    const std::vector<float> lightning = light_up(splats, options, {}, nullptr);
+    if (!cloud_on_device || light_passes != passes) view.use_cloud(cloud_balls(lit.cloud, lit.sun_depths));
+    cloud_on_device = true;
+    if (!lightning.empty()) {
+        std::vector<shader::uint> shares(lightning.size());
+        std::ranges::transform(lightning, shares.begin(), share_of);
+        view.use_flash(shares);
+    }
+    const AirShells shells =
+        air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size, splats.time_s, fog_noise);
+    if (shells.any()) view.use_shade(shells.shade);
+    const ListedPicture what{
+        .variant = {.physical_sky = sky != nullptr, .shells = shells.any(), .fog = shells.has_fog()},
+        .order = order_frame(camera, options.camera, options.ground, !lightning.empty()),
+        .shadow_map = &light_on_device().shadow_map(),
+        .sky = sky != nullptr ? &image_of(*sky) : nullptr,
+        .scattering = &scattering_buffer,
+        .shells = shells.any() ? &shells.data : nullptr,
+        .shell_count = shells.count(),
+        .depth = splats.depth};
+    try {
+        for (const PartFrame& part : parts) view.begin_tile(what, part.frame, part.tile, picture);
+        return view.finish(picture);
+    } catch (...) {
+        view.abandon(picture);
+        throw;
+    }
+}
+
+}  // namespace nephos

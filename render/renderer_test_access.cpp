@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/renderer_test_access.h"
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+
+#include "render/renderer_impl.h"
+
+namespace nephos {
+namespace {
+
+GpuBuffer storage(const GpuDevice& gpu, std::size_t bytes, std::span<const std::byte> content = {},
+                  vk::BufferUsageFlags more = {}) {
+    GpuBuffer buffer = create_buffer(gpu, std::max<std::size_t>(bytes, 4),
+                                     vk::BufferUsageFlagBits::eStorageBuffer | more, HostAccess::read);
+    std::ranges::copy(content, buffer.mapped);
+    return buffer;
+}
+
+std::vector<std::uint32_t> words_of(const GpuBuffer& buffer, std::size_t count) {
+    std::vector<std::uint32_t> words(count);
+    if (count > 0) std::memcpy(words.data(), buffer.mapped, 4 * count);
+    return words;
+}
+
+// The passes with nothing but what sums and sorts need.
+struct SortBench {
+    const GpuDevice& gpu;
+    OrderPipelines pipelines = create_order_pipelines(gpu);
+    OrderSets sets = create_order_sets(gpu, pipelines, 2);
+    GpuBuffer counts, table, sums, unused;
+    SortBuffers buffers;
+
+    SortBench(const GpuDevice& device, std::span<const std::uint32_t> words, std::size_t table_size)
+        : gpu(device) {
+        const shader::OrderCounts known = counts_for(words.size(), 0);
+        counts = storage(gpu, sizeof known, std::as_bytes(std::span(&known, 1)),
+                         vk::BufferUsageFlagBits::eIndirectBuffer);
+        table = storage(gpu, 4 * table_size);
+        sums = storage(gpu, 4 * blocks_of(table_size));
+        unused = storage(gpu, sizeof(shader::Shells), {}, vk::BufferUsageFlagBits::eUniformBuffer);
+        std::vector<std::uint32_t> indices(words.size());
+        std::iota(indices.begin(), indices.end(), 0u);
+        for (const std::size_t n : {0u, 1u}) {
+            buffers.keys[n] = storage(gpu, words.size_bytes(), std::as_bytes(words));
+            buffers.values[n] = storage(gpu, words.size_bytes(), std::as_bytes(std::span(indices)));
+        }
+        for (const std::size_t n : {0u, 1u}) {
+            for (std::uint32_t binding = 0; binding < kOrderBindings; ++binding)
+                bind_order_buffer(gpu, sets.sets[n], binding, unused);
+            bind_order_buffer(gpu, sets.sets[n], 1, counts);
+            bind_sort_buffers(gpu, sets.sets[n], buffers, n);
+            bind_order_buffer(gpu, sets.sets[n], 9, table);
+            bind_order_buffer(gpu, sets.sets[n], 10, sums);
+        }
+    }
+
+    template <class Record>
+    void run(const Record& record) const {
+        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+            record(OrderRecorder(commands, pipelines, counts));
+            full_barrier(commands);
+            for (const GpuBuffer* each : {&counts, &table, &buffers.values[0], &buffers.values[1]})
+                buffer_barrier(commands, *each, access::compute, access::host);
+        });
+    }
+};
+
+}  // namespace
+
+std::size_t RendererTestAccess::light_passes(const Renderer& renderer) {
+    return renderer.impl_->light_passes;
+}
+
+// Two copies into the same buffer with no barrier between them.
+void RendererTestAccess::provoke_hazard(Renderer& renderer) {
+    const GpuDevice& gpu = renderer.impl_->gpu;
+    with_gpu_errors("provoking a hazard", [&] {
+        using Usage = vk::BufferUsageFlagBits;
+        const GpuBuffer from = create_buffer(gpu, 64, Usage::eTransferSrc, HostAccess::write);
+        const GpuBuffer to = create_buffer(gpu, 64, Usage::eTransferDst, HostAccess::read);
+        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+            for (int i = 0; i < 2; ++i)
+                commands.copyBuffer(*from.buffer, *to.buffer, vk::BufferCopy(0, 0, 64));
+        });
+    });
+}
+
+std::vector<std::uint32_t> RendererTestAccess::sorted(Renderer& renderer, std::span<const std::uint32_t> keys,
+                                                      std::uint32_t bits) {
+    const SortBench bench(renderer.impl_->gpu, keys, digits_in_table(keys.size()));
+    bench.run([&](const OrderRecorder& recorder) {
+        recorder.sort({bench.sets.sets[0], bench.sets.sets[1]}, shader::kSeenDigits, bits);
+    });
+    return words_of(bench.buffers.values[OrderRecorder::passes(bits) % 2], keys.size());
+}
+
+std::vector<std::uint32_t> RendererTestAccess::prefix_sums(Renderer& renderer,
+                                                           std::span<const std::uint32_t> numbers) {
+    const SortBench bench(renderer.impl_->gpu, numbers, numbers.size());
+    std::ranges::copy(std::as_bytes(numbers), bench.table.mapped);
+    bench.run([&](const OrderRecorder& recorder) {
+        shader::OrderStep step{};
+        step.table = shader::kSeenBalls;
+        recorder.scan(bench.sets.sets[0], step);
+    });
+    std::vector<std::uint32_t> sums = words_of(bench.table, numbers.size());
+    sums.push_back(reinterpret_cast<const shader::OrderCounts*>(bench.counts.mapped)->total);
+    return sums;
+}
+
+RendererTestAccess::Lists RendererTestAccess::lists(Renderer& renderer, int tile_width, int tile_height) {
+    ListedView::Lists lists = renderer.impl_->lists_on_device().read_lists({0, 0, tile_width, tile_height});
+    return {std::move(lists.balls), std::move(lists.ranges), std::move(lists.list)};
+}
+
+void RendererTestAccess::limit_lists(Renderer& renderer, std::size_t balls, std::size_t entries) {
+    renderer.impl_->lists_on_device().limits = {balls, entries};
+}
+
+std::size_t RendererTestAccess::listed(const Renderer& renderer) {
+    return renderer.impl_->listed_view ? renderer.impl_->listed_view->drawn : 0;
+}
+
+}  // namespace nephos

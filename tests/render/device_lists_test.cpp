@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: Apache-2.0
+// Orders and lists that the device makes, against those of the host.
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "automaton/vector_math.h"
+#include "render/camera.h"
+#include "render/cloud_preparation.h"
+#include "render/eye_order.h"
+#include "render/renderer.h"
+#include "render/renderer_test_access.h"
+#include "render/screen_box.h"
+#include "render/tile_bins.h"
+#include "tests/render/picture_checks.h"
+#include "tests/render/reference_render.h"
+#include "tests/render/renderer_views.h"
+
+namespace nephos {
+namespace {
+
+DeviceOptions with_lists(TileLists lists, int tile_size = 2048) {
+    return {{}, true, tile_size, Splatting::tiles, lists};
+}
+
+class DeviceSort : public ::testing::Test {
+  protected:
+    void TearDown() override { test::expect_no_messages(renderer_); }
+
+    void expect_sorted(const std::vector<std::uint32_t>& keys, std::uint32_t bits) {
+        std::vector<std::uint32_t> expected(keys.size());
+        std::iota(expected.begin(), expected.end(), 0u);
+        const std::uint32_t mask = bits < 32 ? (1u << bits) - 1 : ~0u;
+        std::ranges::stable_sort(expected, {}, [&](std::uint32_t i) { return keys[i] & mask; });
+        EXPECT_EQ(RendererTestAccess::sorted(renderer_, keys, bits), expected) << keys.size() << " keys";
+    }
+
+    Renderer renderer_{with_lists(TileLists::device)};
+};
+
+// None, one, around a work group and a block of it, and so many that the sums have several blocks; random
+// keys, few different ones, equal ones, in order and the other way round.
+TEST_F(DeviceSort, EqualsStableSort) {
+    std::mt19937 random(11);
+    for (const std::size_t count : {0, 1, 2, 255, 256, 257, 2047, 2048, 2049, 100003}) {
+        std::vector<std::uint32_t> keys(count);
+        std::ranges::generate(keys, std::ref(random));
+        expect_sorted(keys, 32);
+        std::ranges::sort(keys);
+        expect_sorted(keys, 32);
+        std::ranges::reverse(keys);
+        expect_sorted(keys, 32);
+        std::ranges::fill(keys, 0x3f8012abu);
+        expect_sorted(keys, 32);
+        for (std::uint32_t& key : keys) key = random() % 5 * 0x01010101u;
+        expect_sorted(keys, 32);
+    }
+}
+
+// Digits beyond the bits that count have zeros, as the numbers of tiles have.
+TEST_F(DeviceSort, TakesNoMorePassesThanNeeded) {
+    std::mt19937 random(12);
+    for (const std::uint32_t bits : {1u, 8u, 9u, 14u, 21u}) {
+        std::vector<std::uint32_t> keys(5000);
+        for (std::uint32_t& key : keys) key = random() & ((1u << bits) - 1);
+        expect_sorted(keys, bits);
+    }
+}
+
+TEST_F(DeviceSort, PrefixSums) {
+    std::mt19937 random(13);
+    for (const std::size_t count : {0, 1, 2, 255, 256, 257, 2047, 2048, 2049, 100003, 600000}) {
+        std::vector<std::uint32_t> numbers(count), expected(count + 1, 0);
+        for (std::uint32_t& number : numbers) number = random() % 1000;
+        std::partial_sum(numbers.begin(), numbers.end(), expected.begin() + 1);
+        EXPECT_EQ(RendererTestAccess::prefix_sums(renderer_, numbers), expected) << count;
+    }
+}
+
+// Lists that are far too long must not look short.
+TEST_F(DeviceSort, PrefixSumsEndAtTheLargestNumber) {
+    for (const std::size_t count : {2u, 2000u, 9000u}) {
+        const std::vector<std::uint32_t> numbers(count, 0xf0000000u);
+        const std::vector<std::uint32_t> sums = RendererTestAccess::prefix_sums(renderer_, numbers);
+        EXPECT_EQ(sums[0], 0u);
+        EXPECT_EQ(sums[1], 0xf0000000u);
+        EXPECT_EQ(sums.back(), 0xffffffffu) << count;
+    }
+}
+
+struct HostLists {
+    EyeOrder order;
+    std::vector<PixelBox> boxes;
+    TileBins bins;
+    TileGrid grid;
+};
+
+HostLists host_lists(const MetaballCloud& cloud, const RenderOptions& options) {
+    const CameraFrame camera = camera_frame(options.camera);
+    Splats splats;
+    splats.metaballs = cloud;
+    HostLists lists;
+    lists.order = order_from_eye(prepare(cloud), splats, camera, pixels_per_unit(options.camera, camera),
+                                 options.ground);
+    const Tile whole{0, 0, options.camera.width, options.camera.height};
+    lists.grid = {whole.width, whole.height};
+    lists.boxes = screen_boxes(lists.order, camera, options.camera, whole);
+    lists.bins = bin_into_tiles(lists.boxes, lists.grid);
+    return lists;
+}
+
+// Whether a box grown by a pixel touches a tile and one that is a pixel smaller does not: there rounding
+// decides.
+bool at_the_edge(const PixelBox& box, std::size_t tile, const TileGrid& grid) {
+    const auto touches = [&](int more) {
+        const PixelBox tiles = tiles_of({box.x0 - more, box.y0 - more, box.x1 + more, box.y1 + more}, grid);
+        const int x = int(tile) % grid.columns(), y = int(tile) / grid.columns();
+        return x >= tiles.x0 && x < tiles.x1 && y >= tiles.y0 && y < tiles.y1;
+    };
+    return touches(1) && !touches(-1);
+}
+
+// The same metaballs in the same order; in each tile the same splats, but for those whose box ends on the
+// edge of a tile, of which there may be one in 1000.
+TEST(DeviceLists, EqualThoseOfTheHost) {
+    Renderer renderer(with_lists(TileLists::device));
+    std::size_t entries = 0, others = 0;
+    for (const test::View& view : test::views()) {
+        const double radius = test::smallest_radius_m(view.options.camera);
+        const std::vector<Metaball> balls =
+            reference::random_metaballs(31, 3000, radius, std::max(200.0, 1.5 * radius));
+        const MetaballCloud cloud{balls, 0.02, 0.7};
+        renderer.draw(cloud, view.options);
+        const HostLists expected = host_lists(cloud, view.options);
+        const auto lists =
+            RendererTestAccess::lists(renderer, view.options.camera.width, view.options.camera.height);
+        ASSERT_EQ(lists.balls.size(), expected.order.balls.size()) << view.name;
+        for (std::size_t i = 0; i < lists.balls.size(); ++i) {
+            const shader::ViewBall& mine = lists.balls[i];
+            const shader::ViewBall& host = expected.order.balls[lists.balls.size() - 1 - i];
+            ASSERT_EQ(mine.x, host.x) << view.name << " " << i;
+            ASSERT_EQ(mine.y, host.y) << view.name << " " << i;
+            ASSERT_EQ(mine.z, host.z) << view.name << " " << i;
+            ASSERT_EQ(mine.radius, host.radius) << view.name << " " << i;
+            ASSERT_EQ(mine.depth_scale, host.depth_scale) << view.name << " " << i;
+            ASSERT_EQ(mine.height, host.height) << view.name << " " << i;
+            ASSERT_EQ(mine.flags, host.flags) << view.name << " " << i;
+        }
+        ASSERT_EQ(lists.ranges.size(), expected.bins.ranges.size());
+        for (std::size_t tile = 0; tile < lists.ranges.size(); ++tile) {
+            const auto [begin, end] = lists.ranges[tile];
+            const auto [host_begin, host_end] = expected.bins.ranges[tile];
+            ASSERT_LE(begin, end);
+            const std::vector mine(lists.list.begin() + begin, lists.list.begin() + end);
+            const std::vector host(expected.bins.list.begin() + host_begin,
+                                   expected.bins.list.begin() + host_end);
+            EXPECT_TRUE(std::ranges::is_sorted(mine)) << "nearest first";
+            std::vector<std::uint32_t> different;
+            std::ranges::set_symmetric_difference(mine, host, std::back_inserter(different));
+            for (const std::uint32_t splat : different)
+                EXPECT_TRUE(at_the_edge(expected.boxes[splat], tile, expected.grid)) << view.name;
+            entries += host.size();
+            others += different.size();
+        }
+    }
+    std::printf("%zu of %zu entries differ\n", others, entries);
+    EXPECT_LE(others, entries / 1000);
+    test::expect_no_messages(renderer);
+}
+
+class ListedPictures : public ::testing::Test {
+  protected:
+    void TearDown() override {
+        for (const Renderer* each : {&listed_, &reference_}) test::expect_no_messages(*each);
+    }
+
+    // How far the two are from each other, relative where radiances are above 1.
+    float difference(const Splats& splats, const RenderOptions& options) {
+        const std::size_t before = RendererTestAccess::listed(listed_);
+        const Picture mine = listed_.draw_splats(splats, options);
+        EXPECT_GT(RendererTestAccess::listed(listed_), before) << "drawn from the host's lists";
+        return difference(mine, reference_.draw_splats(splats, options));
+    }
+
+    static float difference(const Picture& mine, const Picture& other) {
+        float worst = test::largest_difference(mine.transmittance, other.transmittance);
+        for (std::size_t i = 0; i < mine.beauty.size(); ++i)
+            worst =
+                std::max(worst, std::abs(mine.beauty[i] - other.beauty[i]) / std::max(1.0f, other.beauty[i]));
+        for (std::size_t i = 0; i < mine.depth_m.size(); ++i) {
+            if (mine.transmittance[i] > 0.99f || other.transmittance[i] > 0.99f) continue;
+            if (mine.depth_m[i] == other.depth_m[i]) continue;  // or both infinite
+            EXPECT_NEAR(mine.depth_m[i] / other.depth_m[i], 1.0f, 1e-3f);
+        }
+        EXPECT_EQ(mine.light, other.light);
+        EXPECT_EQ(mine.shadow, other.shadow);
+        return worst;
+    }
+
+    static Splats splats_of(std::span<const Metaball> balls, double extinction) {
+        Splats splats;
+        splats.metaballs = {balls, extinction, 0.7};
+        return splats;
+    }
+
+    static constexpr float kClose = 0.25f / 255;
+    Renderer listed_{with_lists(TileLists::device)}, reference_{with_lists(TileLists::host)};
+};
+
+// From everywhere, also from within and with metaballs around the eye, that touch the ground, that are denser
+// than the fit takes.
+TEST_F(ListedPictures, AreThoseFromTheHostsLists) {
+    for (const test::View& view : test::views()) {
+        const double radius = test::smallest_radius_m(view.options.camera);
+        const std::vector<Metaball> balls =
+            reference::random_metaballs(7, 600, radius, std::max(200.0, 1.5 * radius));
+        for (const double extinction : {0.0005, 0.02, 0.3}) {
+            Splats splats = splats_of(balls, extinction);
+            EXPECT_LE(difference(splats, view.options), kClose) << view.name << ", extinction " << extinction;
+            splats.depth = splats.light = false;
+            EXPECT_LE(difference(splats, view.options), kClose) << view.name << " without depth";
+        }
+    }
+}
+
+TEST_F(ListedPictures, WithAirBetweenTheSplats) {
+    const std::vector<Metaball> balls = reference::random_metaballs(8, 700);
+    for (const test::View& view : test::views()) {
+        RenderOptions options = view.options;
+        options.light_shafts.strength = 1;
+        for (const double fog : {0.0, 0.0004}) {
+            options.fog.extinction_per_m = fog;
+            options.fog.height_m = 1500;
+            EXPECT_LE(difference(splats_of(balls, 0.02), options), kClose) << view.name << ", fog " << fog;
+        }
+        options.atmosphere.model = AirModel::physical;
+        EXPECT_LE(difference(splats_of(balls, 0.02), options), kClose) << view.name << ", physical sky";
+    }
+}
+
+TEST_F(ListedPictures, WithLightning) {
+    const std::vector<Metaball> balls = reference::random_metaballs(9, 300);
+    Splats splats = splats_of(balls, 0.01);
+    const RenderOptions options = test::view({0, -4000, 800}, {0, 0, 1000}, 40, 90, 60);
+    for (int n = 0; n < 2; ++n) {  // and in the dark after it
+        splats.flash.reset();
+        EXPECT_LE(difference(splats, options), kClose);
+        splats.flash = Flash{{300, 200, 1200}, {0.75, 0.8, 1.0}, 0.5 + n};
+        EXPECT_LE(difference(splats, options), kClose);
+    }
+}
+
+// Far out in the world single places are all that is left of floats; distances must still be right.
+TEST_F(ListedPictures, FarFromTheOrigin) {
+    std::vector<Metaball> balls = reference::random_metaballs(10, 400);
+    for (Metaball& ball : balls) {
+        ball.x += 300000;
+        ball.y -= 700000;
+    }
+    const RenderOptions options = test::view({300000.3, -703000.7, 800.1}, {300000, -700000, 1000});
+    EXPECT_LE(difference(splats_of(balls, 0.02), options), kClose);
+}
+
+// One cloud after the other, larger and smaller, and none.
+TEST_F(ListedPictures, OfAnotherCloud) {
+    const RenderOptions options = test::view({0, -4000, 800}, {0, 0, 1000}, 40, 90, 60);
+    for (const int count : {1, 5000, 300, 2, 20000}) {
+        const std::vector<Metaball> balls = reference::random_metaballs(unsigned(count), count);
+        EXPECT_LE(difference(splats_of(balls, 0.01), options), kClose) << count;
+    }
+    EXPECT_EQ(difference(listed_.draw_splats({}, options), reference_.draw_splats({}, options)), 0.0f);
+    const std::vector<Metaball> behind{{0, -9000, 800, 300, 1}};  // nothing is seen
+    EXPECT_LE(difference(splats_of(behind, 0.01), options), kClose);
+}
+
+// Metaballs that fill the picture have far more entries than the lists begin with.
+TEST_F(ListedPictures, ListsGrow) {
+    std::vector<Metaball> balls = reference::random_metaballs(12, 60);
+    for (Metaball& ball : balls) ball.radius *= 3;
+    RenderOptions options = test::view({100, 200, 1000}, {700, 300, 1100}, 60, 640, 480);
+    EXPECT_LE(difference(splats_of(balls, 0.001), options), kClose);
+    options.camera.position_m = {0, -4000, 800};
+    EXPECT_LE(difference(splats_of(balls, 0.001), options), kClose);
+}
+
+// Beyond the limits of the device the host makes the lists.
+TEST_F(ListedPictures, TooMuchForTheDevice) {
+    const std::vector<Metaball> balls = reference::random_metaballs(13, 500);
+    const RenderOptions options = test::view({100, 200, 1000}, {700, 300, 1100}, 60, 160, 120);
+    const Splats splats = splats_of(balls, 0.001);
+    const Picture expected = reference_.draw_splats(splats, options);
+    RendererTestAccess::limit_lists(listed_, 499, 1 << 24);
+    EXPECT_EQ(difference(listed_.draw_splats(splats, options), expected), 0.0f);
+    EXPECT_EQ(RendererTestAccess::listed(listed_), 0u);
+    RendererTestAccess::limit_lists(listed_, 500, 4096);
+    EXPECT_EQ(difference(listed_.draw_splats(splats, options), expected), 0.0f);
+    EXPECT_EQ(RendererTestAccess::listed(listed_), 1u) << "it was tried";
+    RendererTestAccess::limit_lists(listed_, 500, 1 << 24);
+    EXPECT_LE(difference(splats, options), kClose);
+}
+
+// In tiles of 16 pixels and as a whole, twice.
+TEST_F(ListedPictures, TilesOfThePictureHaveTheSameBits) {
+    Renderer tiled(with_lists(TileLists::device, 16));
+    const std::vector<Metaball> balls = reference::random_metaballs(14, 500);
+    RenderOptions options = test::view({50, 60, 1000}, {700, 300, 1100}, 60, 75, 50);
+    options.light_shafts.strength = 1;
+    const Splats splats = splats_of(balls, 0.02);
+    const Picture whole = listed_.draw_splats(splats, options);
+    test::expect_same_bits(listed_.draw_splats(splats, options), whole);
+    const Picture tiles = tiled.draw_splats(splats, options);
+    EXPECT_LE(difference(tiles, whole), 2e-4f);
+    test::expect_no_messages(tiled);
+}
+
+}  // namespace
+}  // namespace nephos
