@@ -252,32 +252,53 @@ double shafts_strength(const RenderOptions& options) {
 }
 
 // Full light everywhere.
-void set_no_shade(AirShells& shells) {
-    constexpr std::size_t kTexels = 4;
-    shells.shade.assign(3 * kTexels, ~std::uint32_t{0});
-    shells.data.settings.z = 2;
-    shells.data.settings.w = kTexels;
+void make_shade(const PreparedCloud& cloud, const ShadowFrame& frame, std::span<const float> shadow,
+                int shadow_size, KeptShade& kept) {
+    if (cloud.visible.empty()) {  // full light
+        kept.columns = 2;
+        kept.words.assign(std::size_t{3} * 4, ~std::uint32_t{0});
+    } else {
+        const Along along = along_axis(cloud, shade_axis(frame.direction));
+        const ShadeMap map(shadow, shadow_size);
+        kept.words = map.words(cloud, frame, along, kept.first_shade);
+        kept.columns = map.columns();
+        kept.texels_per_map = map.scale();
+        kept.along = along.row;
+        kept.along_offset = along.offset;
+    }
+    kept.shade_words = kept.words.size();
+    kept.fog_seed.reset();
+    kept.known = true;
+    ++kept.serial;
 }
 
-void set_shade(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
-               std::span<const float> shadow, int shadow_size, AirShells& shells) {
-    const Along along = along_axis(cloud, shade_axis(frame.direction));
-    const ShadeMap map(shadow, shadow_size);
-    float first_shade = 0;
-    shells.shade = map.words(cloud, frame, along, first_shade);
+// Behind the shade map; without fog nothing looks there.
+void add_fog_noise(const Fog& fog, FogNoise& noise, KeptShade& kept) {
+    if (!(fog.extinction_per_m > 0) || kept.fog_seed == fog.seed) return;
+    const std::vector<std::uint32_t>& words = noise.words(fog.seed);
+    kept.words.resize(kept.shade_words);
+    kept.words.insert(kept.words.end(), words.begin(), words.end());
+    kept.fog_seed = fog.seed;
+    ++kept.serial;
+}
+
+void use_shade(const KeptShade& kept, const PreparedCloud& cloud, const ShadowFrame& frame, const Vec3& eye,
+               AirShells& shells) {
     shader::Shells& data = shells.data;
-    const Vec3& eye = options.camera.position_m;
+    shells.shade = kept.words;
+    shells.serial = kept.serial;
+    data.settings.z = float(kept.columns);
+    data.settings.w = float(kept.columns * kept.columns);
+    if (cloud.visible.empty()) return;
     const auto row = [&](const Vec3& axis) {
-        const Vec3 per_m = (map.scale() / dot(axis, axis)) * axis;
+        const Vec3 per_m = (kept.texels_per_map / dot(axis, axis)) * axis;
         return to_vec4(per_m, dot(per_m, eye - frame.origin_m) + ShadeMap::shift());
     };
-    data.settings.z = float(map.columns());
-    data.settings.w = float(map.texels());
     data.shade_u = row(frame.u_axis_m);
     data.shade_v = row(frame.v_axis_m);
-    data.shade_along = to_vec4(along.row, along(eye));
-    const float largest = float(map.columns()) - 1.001f;
-    data.shade = {largest, largest, first_shade, 0};
+    data.shade_along = to_vec4(kept.along, dot(kept.along, eye) + kept.along_offset);
+    const float largest = float(kept.columns) - 1.001f;
+    data.shade = {largest, largest, kept.first_shade, 0};
 }
 
 // Number of splats, in falling order of distance, that are at `end` or beyond.
@@ -315,15 +336,15 @@ bool has_shells(const RenderOptions& options, const PreparedCloud& cloud) {
 }
 
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
-                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise) {
+                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise,
+                     KeptShade& kept) {
     AirShells shells;
     const bool has_fog = options.fog.extinction_per_m > 0;
     if (!has_shells(options, cloud)) return shells;
     shader::Shells& data = shells.data;
-    if (cloud.visible.empty())
-        set_no_shade(shells);
-    else
-        set_shade(options, cloud, frame, shadow, shadow_size, shells);
+    if (!kept.known) make_shade(cloud, frame, shadow, shadow_size, kept);
+    add_fog_noise(options.fog, noise, kept);
+    use_shade(kept, cloud, frame, options.camera.position_m, shells);
     set_ends(data, options.shells, has_fog);
     data.settings.x = float(options.shells.count + (has_fog ? 1 : 0));
     data.settings.y = cloud.visible.empty() ? 0.0f : float(shafts_strength(options));
@@ -334,10 +355,6 @@ AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, c
             clear[c] = float(std::exp(-options.air.extinction_per_m[c] * double(shell_end(data, k))));
     }
     set_fog(options.fog, options.camera.position_m, time_s, data);
-    if (has_fog) {
-        const std::vector<std::uint32_t>& words = noise.words(options.fog.seed);
-        shells.shade.insert(shells.shade.end(), words.begin(), words.end());
-    }
     return shells;
 }
 

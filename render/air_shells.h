@@ -17,6 +17,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,12 +30,28 @@
 
 namespace nephos {
 
+// The shade map and what shaders read behind it: kept until the light of the cloud changes.
+struct KeptShade {
+    bool known = false;        // false: the light has changed
+    std::uint64_t serial = 0;  // changes when the words do
+    std::vector<std::uint32_t> words;
+    std::size_t shade_words = 0;            // of them; the others are noise of fog
+    std::optional<std::uint64_t> fog_seed;  // of that; none: no noise
+    int columns = 0;
+    double texels_per_map = 0;  // texels across the whole shadow map
+    Vec3 along;                 // AirShells::data.shade_along in the world: dot(along, point) + along_offset
+    double along_offset = 0;
+    float first_shade = 0;
+};
+
 struct AirShells {
     shader::Shells data;
     // Three planes of words, rows of settings.z of them, each with four bytes: of a texel, of its right
     // neighbour, and of the two in the next row. The planes: transmittance; where along
     // `shade_along` the shade begins; where it is complete. Then, with fog, the words of FogNoise.
-    std::vector<std::uint32_t> shade;
+    // They are KeptShade's.
+    std::span<const std::uint32_t> shade;
+    std::uint64_t serial = 0;  // changes when they do; 0: none
 
     // Transmittance of clear air up to the end of each shell, where it depends on the distance alone
     // (gradient).
@@ -59,9 +76,11 @@ std::size_t shells_before(const shader::Shells& data, float distance);
 bool has_shells(const RenderOptions& options, const PreparedCloud& cloud);
 
 // No shells when the options ask for none or when they would draw nothing. `shadow`: the texels of the shadow
-// map; `time_s`: simulated time of the picture.
+// map; `time_s`: simulated time of the picture. Whoever calls says with `kept.known` whether cloud, frame and
+// shadow are those of the call before; what is returned lives as long as `kept` is not given to another call.
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
-                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise);
+                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise,
+                     KeptShade& kept);
 
 // For each shell the number of splats, nearest first, that are drawn in front of it. Rises.
 std::vector<std::uint32_t> splats_before_shells(const AirShells& shells, const EyeOrder& order);

@@ -236,7 +236,7 @@ void reserve(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t bindi
 void upload(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
             std::span<const std::byte> bytes) {
     reserve(gpu, bindings, binding, buffer, bytes.size(), HostAccess::write);
-    std::ranges::copy(bytes, buffer.mapped);
+    write(gpu, buffer, bytes);
 }
 
 void bind_storage_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/gpu_resources.h"
 
+#include <algorithm>
 #include <initializer_list>
 
 #include "automaton/error.h"
@@ -45,6 +46,11 @@ GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsage
     if (access == HostAccess::none) return buffer;
     buffer.mapped = static_cast<std::byte*>(buffer.memory.mapMemory(0, VK_WHOLE_SIZE));
     return buffer;
+}
+
+void write(const GpuDevice& gpu, const GpuBuffer& buffer, std::span<const std::byte> bytes) {
+    std::ranges::copy(bytes, buffer.mapped);
+    gpu.uploaded_bytes += bytes.size();
 }
 
 GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t height, std::uint32_t layers,

@@ -4,6 +4,7 @@
 // Buffers, images and the three barriers. Plain structs that own their handles. Private to the module.
 
 #include <cstddef>
+#include <span>
 
 #include "render/gpu_device.h"
 
@@ -25,6 +26,13 @@ enum class HostAccess {
 
 GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsageFlags usage,
                         HostAccess access);
+
+// Copies into a mapped buffer that is as large at least.
+void write(const GpuDevice& gpu, const GpuBuffer& buffer, std::span<const std::byte> bytes);
+template <class T>
+void write(const GpuDevice& gpu, const GpuBuffer& buffer, const T& value) {
+    write(gpu, buffer, std::as_bytes(std::span(&value, 1)));
+}
 
 // A 2D image (or array of them) in device memory, always in the layout GENERAL once it was cleared: images
 // here are in turn drawn to, sampled and copied from, and GENERAL serves all of it.

@@ -67,7 +67,7 @@ void LightTiles::use(const GpuDevice& gpu, std::span<const float> shadow, int sh
     resize_map(gpu, shadow_size);
     const GpuBuffer staging =
         create_buffer(gpu, shadow.size_bytes(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    std::memcpy(staging.mapped, shadow.data(), shadow.size_bytes());
+    write(gpu, staging, std::as_bytes(shadow));
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         image_barrier(commands, map_, access::sample, access::copy_to);
         const vk::BufferImageCopy region(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, 0, 0},

@@ -121,7 +121,7 @@ ListedView::ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const
         slot.commands = std::move(vk::raii::CommandBuffers(gpu.device, info).front());
         slot.fence = vk::raii::Fence(gpu.device, vk::FenceCreateInfo());
     }
-    use_shade({});  // must be bound, used or not
+    use_shade({}, 0);  // must be bound, used or not
 }
 
 ListedView::~ListedView() {
@@ -152,7 +152,7 @@ void ListedView::upload(const GpuBuffer& to, std::span<const std::byte> bytes) {
     if (bytes.empty()) return;
     const GpuBuffer staging =
         create_buffer(gpu_, bytes.size(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    std::ranges::copy(bytes, staging.mapped);
+    write(gpu_, staging, bytes);
     submit_and_wait(gpu_, [&](const vk::raii::CommandBuffer& commands) {
         full_barrier(commands);
         copy(commands, staging, to, bytes.size());
@@ -172,7 +172,8 @@ void ListedView::use_flash(std::span<const shader::uint> shares) {
     upload(lists_.flash(), std::as_bytes(shares));
 }
 
-void ListedView::use_shade(std::span<const std::uint32_t> words) {
+void ListedView::use_shade(std::span<const std::uint32_t> words, std::uint64_t serial) {
+    if (shade_.bytes != 0 && serial == shade_serial_) return;
     for (const std::unique_ptr<Slot>& slot : slots_) complete(*slot);
     const std::size_t bytes = std::max<std::size_t>(words.size_bytes(), 4);
     if (shade_.bytes < bytes) {
@@ -182,6 +183,7 @@ void ListedView::use_shade(std::span<const std::uint32_t> words) {
             HostAccess::none);
     }
     upload(shade_, std::as_bytes(words));
+    shade_serial_ = serial;
 }
 
 void ListedView::bind(Slot& slot) {
@@ -349,9 +351,9 @@ void ListedView::begin_tile(const ListedPicture& what, const shader::Frame& fram
     pipelines_for(what.variant).prepare(gpu_, layout_, what.depth);
     slot.what = what;
     slot.tile = tile;
-    std::memcpy(slot.frame.mapped, &frame, sizeof frame);
-    std::memcpy(slot.order_frame.mapped, &what.order, sizeof what.order);
-    if (what.shells != nullptr) std::memcpy(slot.shells.mapped, what.shells, sizeof *what.shells);
+    write(gpu_, slot.frame, frame);
+    write(gpu_, slot.order_frame, what.order);
+    if (what.shells != nullptr) write(gpu_, slot.shells, *what.shells);
     slot.what.shells = nullptr;  // it is there
     slot.with_order = ordered_ != &picture;
     submit(slot);

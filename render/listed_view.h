@@ -45,8 +45,8 @@ class ListedView {
     void use_cloud(std::span<const shader::CloudBall> balls);
     // Share of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> shares);
-    // Shade map of the shells and noise of the fog (air_shells.h).
-    void use_shade(std::span<const std::uint32_t> words);
+    // Shade map of the shells and noise of the fog (air_shells.h), unless these are there already.
+    void use_shade(std::span<const std::uint32_t> words, std::uint64_t serial);
 
     // Begins to draw a tile into `picture`, which must stay where it is until it is finished.
     void begin_tile(const ListedPicture& what, const shader::Frame& frame, const Tile& tile,
@@ -92,6 +92,7 @@ class ListedView {
     OrderSets sets_;
     std::size_t balls_ = 0;
     GpuBuffer shade_, radiance_, depth_;
+    std::uint64_t shade_serial_ = 0;
     std::vector<std::unique_ptr<Pipelines>> pipelines_;
     std::vector<std::unique_ptr<Slot>> slots_;
     std::size_t next_ = 0;

@@ -49,7 +49,7 @@ GpuImage upload_attenuation(const GpuDevice& gpu) {
                                   vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst);
     const GpuBuffer staging =
         create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    std::memcpy(staging.mapped, texels.data(), bytes);
+    write(gpu, staging, std::as_bytes(std::span(texels)));
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_image(commands, image, access::copy_to);
         const vk::BufferImageCopy region(0, 0, 0,
@@ -145,6 +145,7 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
             lit.merged.empty() ? lit.cloud : prepare(splats.metaballs),  // cubes of the voxels' size
             splats.metaballs.extinction_per_m);
     const bool on_device = !on_processor() && (!lit.all_known || map_on_device != lit.key);
+    const std::size_t passes = light_passes;
     if (blocks && absorbs) {
         absorb_sunlight(lit, *blocks, options);
         ++light_passes;
@@ -158,6 +159,7 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
         pass_sunlight(lit);
         ++light_passes;
     }
+    if (light_passes != passes) light_changed();
     if (!on_processor() && map_on_device != lit.key) put_map_on_device();
     if (flash == nullptr || !blocks) return {};
     return flash_by_absorption(lit.cloud, *blocks, flash->position_m, options.light.light_distance_m);
@@ -175,7 +177,7 @@ void Renderer::Impl::use_scattering(const CloudLight& light) {
     scattering_light = light;
     const std::size_t bytes = scattering.size() * sizeof(float);
     scattering_buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::write);
-    std::memcpy(scattering_buffer.mapped, scattering.data(), bytes);
+    write(gpu, scattering_buffer, std::as_bytes(std::span(scattering)));
 }
 
 Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail) {
@@ -186,7 +188,7 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
         // The key says nothing of the view, from which others may be merged.
         if (!keep_cloud(lit, splats.metaballs, options, detail)) {
             map_on_device.reset();
-            cloud_on_device = false;
+            light_changed();
         }
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
@@ -297,8 +299,8 @@ void Renderer::Impl::draw_on_processor(const Splats& splats, const RenderOptions
     const SeenLight* const known = seen ? &*seen : nullptr;
     const std::vector<float> lightning = light_up(splats, options, order, known);
     set_light(order, {lit.sun_depths, lightning});
-    const AirShells shells =
-        air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size, splats.time_s, fog_noise);
+    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
+                                        splats.time_s, fog_noise, kept_shade);
     for (ProcessorView& view : views) view.draw(picture, lit.shadow.data(), lit.shadow_size, shells, known);
 }
 
@@ -308,8 +310,8 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
     const std::vector<float> lightning = light_up(splats, options, order, nullptr);
     set_light(order, {lit.sun_depths, lightning});
     const GpuImage& map = light_on_device().shadow_map();
-    const AirShells shells =
-        air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size, splats.time_s, fog_noise);
+    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
+                                        splats.time_s, fog_noise, kept_shade);
     const auto prepared = [&](auto& passes) -> auto& {
         const ShaderVariant variant{
             .physical_sky = sky != nullptr, .shells = shells.any(), .fog = shells.has_fog()};

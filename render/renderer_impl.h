@@ -55,6 +55,8 @@ struct Renderer::Impl {
     const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
     bool on_processor() const { return splatting == Splatting::processor; }
     LightTiles& light_on_device();
+    // What was made from the light before is of no use any more.
+    void light_changed() { cloud_on_device = kept_shade.known = false; }
 
     LitCloud lit;                           // of the last picture
     std::optional<LightKey> map_on_device;  // whose map it is; reset when that map changes
@@ -79,6 +81,7 @@ struct Renderer::Impl {
     std::optional<ListedView> listed_view;
     bool cloud_on_device = false;  // in listed_view, with its light
     FogNoise fog_noise;
+    KeptShade kept_shade;
     std::optional<SkyImage> sky_image;
     SkyLights sky_lights;
     const SkyLight* sky = nullptr;  // of the picture that is drawn; null: gradient

@@ -28,18 +28,17 @@ bool Renderer::Impl::draw_listed(const Splats& splats, const RenderOptions& opti
                                  const CameraFrame& camera, const std::vector<PartFrame>& parts,
                                  Picture& picture) {
     ListedView& view = lists_on_device();
-    const std::size_t passes = light_passes;
     const std::vector<float> lightning = light_up(splats, options, {}, nullptr);
-    if (!cloud_on_device || light_passes != passes) view.use_cloud(cloud_balls(lit.cloud, lit.sun_depths));
+    if (!cloud_on_device) view.use_cloud(cloud_balls(lit.cloud, lit.sun_depths));
     cloud_on_device = true;
     if (!lightning.empty()) {
         std::vector<shader::uint> shares(lightning.size());
         std::ranges::transform(lightning, shares.begin(), share_of);
         view.use_flash(shares);
     }
-    const AirShells shells =
-        air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size, splats.time_s, fog_noise);
-    if (shells.any()) view.use_shade(shells.shade);
+    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
+                                        splats.time_s, fog_noise, kept_shade);
+    if (shells.any()) view.use_shade(shells.shade, shells.serial);
     const ListedPicture what{
         .variant = {.physical_sky = sky != nullptr, .shells = shells.any(), .fog = shells.has_fog()},
         .order = order_frame(camera, options.camera, options.ground, !lightning.empty()),

@@ -73,6 +73,10 @@ std::size_t RendererTestAccess::light_passes(const Renderer& renderer) {
     return renderer.impl_->light_passes;
 }
 
+std::uint64_t RendererTestAccess::uploaded_bytes(const Renderer& renderer) {
+    return renderer.impl_->gpu.uploaded_bytes;
+}
+
 // Two copies into the same buffer with no barrier between them.
 void RendererTestAccess::provoke_hazard(Renderer& renderer) {
     const GpuDevice& gpu = renderer.impl_->gpu;

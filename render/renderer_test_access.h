@@ -16,6 +16,8 @@ namespace nephos {
 struct RendererTestAccess {
     // How often light was computed so far.
     static std::size_t light_passes(const Renderer& renderer);
+    // What was copied to the device so far.
+    static std::uint64_t uploaded_bytes(const Renderer& renderer);
     // Submits a deliberate write-after-write hazard, which the synchronization validation must report.
     static void provoke_hazard(Renderer& renderer);
 

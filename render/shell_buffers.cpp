@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/shell_buffers.h"
 
-#include <cstring>
-
 namespace nephos {
 
 ShellBuffers::ShellBuffers(const GpuDevice& gpu, const Bindings& bindings)
@@ -13,8 +11,10 @@ ShellBuffers::ShellBuffers(const GpuDevice& gpu, const Bindings& bindings)
 }
 
 void ShellBuffers::use(const GpuDevice& gpu, const Bindings& bindings, const AirShells& shells) {
-    std::memcpy(shells_.mapped, &shells.data, sizeof shells.data);
-    upload(gpu, bindings, 14, shade_, std::as_bytes(std::span(shells.shade)));
+    write(gpu, shells_, shells.data);
+    if (shade_.bytes != 0 && shells.serial == serial_) return;
+    serial_ = shells.serial;
+    upload(gpu, bindings, 14, shade_, std::as_bytes(shells.shade));
 }
 
 }  // namespace nephos

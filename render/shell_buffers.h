@@ -18,6 +18,7 @@ class ShellBuffers {
 
   private:
     GpuBuffer shells_, shade_;
+    std::uint64_t serial_ = 0;  // of what is in shade_
 };
 
 }  // namespace nephos

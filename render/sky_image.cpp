@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/sky_image.h"
 
-#include <cstring>
-
 #include "render/shaders/shared.h"
 
 namespace nephos {
@@ -21,7 +19,7 @@ SkyImage::SkyImage(const GpuDevice& gpu)
 
 void SkyImage::use(const GpuDevice& gpu, const SkyLight& light) {
     if (serial_ == light.serial) return;
-    std::memcpy(staging_.mapped, light.texels.data(), kBytes);
+    write(gpu, staging_, std::as_bytes(std::span(light.texels).first(kBytes / sizeof(float))));
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_image(commands, image_, access::copy_to);
         const vk::BufferImageCopy region(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, shader::kSkyLayers},

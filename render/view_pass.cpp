@@ -131,7 +131,8 @@ void ViewPass::draw_batch(const GpuDevice& gpu, vk::Extent2D area, const EyeOrde
     }
     if (balls.begin < balls.end) {
         const std::size_t bytes = (balls.end - balls.begin) * sizeof(shader::ViewBall);
-        std::memcpy(balls_.mapped, order.balls.data() + balls.begin, bytes);
+        write(gpu, balls_,
+              std::as_bytes(std::span(order.balls)).subspan(balls.begin * sizeof(shader::ViewBall), bytes));
     }
     puffs_.use_puffs(gpu, std::span(order.puffs).subspan(puffs.begin, puffs.end - puffs.begin));
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
@@ -172,7 +173,7 @@ void ViewPass::read_back(const GpuDevice& gpu, vk::Extent2D area) const {
 void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
                          const EyeOrder& order, Picture& picture) {
     resize_targets(gpu, tile);
-    std::memcpy(frame_.mapped, &frame, sizeof frame);
+    write(gpu, frame_, frame);
     const vk::Extent2D area{std::uint32_t(tile.width), std::uint32_t(tile.height)};
     draw_background(gpu, area);
     draw_splats(gpu, area, order);

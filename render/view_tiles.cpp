@@ -131,7 +131,7 @@ void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const Eye
 void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, const CameraFrame& camera,
                           const shader::Frame& frame, const Tile& tile, const EyeOrder& order,
                           Picture& picture) {
-    std::memcpy(frame_.mapped, &frame, sizeof frame);
+    write(gpu, frame_, frame);
     const TileGrid grid{tile.width, tile.height};
     const std::size_t pixels = std::size_t(tile.width) * std::size_t(tile.height);
     reserve(gpu, bindings_, 8, radiance_, 4 * sizeof(float) * pixels, HostAccess::read);

@@ -320,5 +320,51 @@ TEST_F(ListedPictures, TilesOfThePictureHaveTheSameBits) {
     test::expect_no_messages(tiled);
 }
 
+// What a picture sends to the device when nothing has changed but the camera: the camera.
+TEST_F(ListedPictures, NothingElseIsSentWhenTheCameraMoves) {
+    const std::vector<Metaball> balls = reference::random_metaballs(15, 2000);
+    const Splats splats = splats_of(balls, 0.02);
+    const auto sent = [&](const RenderOptions& options) {
+        const std::uint64_t before = RendererTestAccess::uploaded_bytes(listed_);
+        EXPECT_LE(difference(splats, options), kClose);
+        return RendererTestAccess::uploaded_bytes(listed_) - before;
+    };
+    constexpr std::size_t kCamera = sizeof(shader::Frame) + 11 * sizeof(shader::vec4);
+    RenderOptions options = test::view({0, -4000, 800}, {0, 0, 1000});
+    EXPECT_GE(sent(options), balls.size() * 32);
+    options.camera.position_m = {2000, -3000, 500};
+    EXPECT_EQ(sent(options), kCamera);
+    options.light_shafts.strength = 1;
+    options.fog.extinction_per_m = 0.0004;
+    options.atmosphere.model = AirModel::physical;
+    EXPECT_GT(sent(options), kCamera + sizeof(shader::Shells)) << "shade, fog and sky";
+    options.camera.position_m = {-2000, -3000, 500};  // at the same height: the sky looks the same
+    EXPECT_EQ(sent(options), kCamera + sizeof(shader::Shells));
+    options.fog.seed = 2;
+    EXPECT_GT(sent(options), kCamera + sizeof(shader::Shells)) << "other fog";
+    options.light.phase.g = 0.3;
+    EXPECT_GT(sent(options), kCamera + sizeof(shader::Shells)) << "another table of scattering";
+    EXPECT_EQ(sent(options), kCamera + sizeof(shader::Shells));
+    options.sun.elevation_deg += 5;
+    EXPECT_GE(sent(options), balls.size() * 32) << "other light";
+    EXPECT_EQ(sent(options), kCamera + sizeof(shader::Shells));
+}
+
+// The shade of shells is kept with the light; another cloud has another.
+TEST_F(ListedPictures, ShadeIsThatOfTheCloud) {
+    Renderer processor{DeviceOptions{.device = {}, .splatting = Splatting::processor}};
+    RenderOptions options = test::view({0, -4000, 800}, {0, 0, 1000});
+    options.light_shafts.strength = 1;
+    for (const unsigned seed : {16u, 17u, 16u}) {
+        const std::vector<Metaball> balls = reference::random_metaballs(seed, 400);
+        for (const Splatting way : {Splatting::processor, Splatting::tiles}) {
+            Renderer& kept = way == Splatting::processor ? processor : listed_;
+            Renderer fresh{DeviceOptions{.device = {}, .splatting = way, .lists = TileLists::device}};
+            const Splats splats = splats_of(balls, 0.02);
+            test::expect_same_bits(kept.draw_splats(splats, options), fresh.draw_splats(splats, options));
+        }
+    }
+}
+
 }  // namespace
 }  // namespace nephos
