@@ -16,6 +16,7 @@
 #include "apps/arguments.h"
 #include "apps/commands.h"
 #include "apps/help.h"
+#include "apps/kept_memory.h"
 #include "apps/signals.h"
 #include "apps/terminal.h"
 #include "automaton/error.h"
@@ -137,6 +138,7 @@ int guarded(int argc, char** argv) {
 }  // namespace nephos
 
 int main(int argc, char** argv) {
+    nephos::keep_freed_memory();
     nephos::install_signal_handlers();
     return nephos::guarded(argc, argv);
 }

@@ -12,336 +12,275 @@
 
 #include "automaton/smoothstep.h"
 #include "automaton/vector_math.h"
+#include "render/block_cover.h"
+#include "render/voxel_blocks.h"
 
 namespace nephos {
 namespace {
 
-constexpr double kEdge = 0.15;   // share of a block's mean depth that counts as contrast
-constexpr double kFull = 0.85;   // share of the threshold below which a block is merged wholly
+constexpr float kEdge = 0.15f;   // share of a block's mean depth that counts as contrast
+constexpr float kFull = 0.85f;   // share of the threshold below which a block is merged wholly
 constexpr double kLevel = 0.25;  // a block's threshold relative to its children's
-constexpr double kSpread = 1.5;  // of the second moment that a block adds to its metaball
-constexpr int kSide = 8;         // voxels of the largest block
-constexpr std::size_t kMostLattices = 16;
-constexpr double kFarthest = 1 << 22;  // voxels from the origin
-constexpr std::size_t kPart = 8192;    // metaballs that one thread looks at
+constexpr float kSpread = 1.5f;  // of the second moment that a block adds to its metaball
+// Optical depths around an octant from which on it begins to be merged for being hidden, and is wholly; and
+// the most that one of those around it counts, so that there are two of them at least.
+constexpr float kVeiled = 4.5f, kHidden = 6.5f, kMostOfOctant = 3.25f;
 
 // Second moment of the metaball's field along an axis, in units of its radius squared: a third of the
 // integral of r^4 f over that of r^2 f.
 constexpr double kMoment =
     (1.0 / 5 - 22.0 / 63 + 17.0 / 81 - 4.0 / 99) / (3 * (1.0 / 3 - 22.0 / 45 + 17.0 / 63 - 4.0 / 81));
 
-// Voxels of one size; a metaball at x lies in voxel floor(x per_edge - phase).
-struct VoxelLattice {
-    float radius = 0;  // of its metaballs, metres
-    double edge_m = 1, per_edge = 1;
-    double phase[3] = {};
-};
-
-double coordinate(const Metaball& ball, int axis) { return axis == 0 ? ball.x : axis == 1 ? ball.y : ball.z; }
-
-// Of a lattice's first metaball, whose centre is that of a voxel. In steps of 1/64, so that rounding of
-// coordinates moves no voxel into another block.
-double phase_of(double coordinate_in_voxels) {
-    const double steps = std::floor((coordinate_in_voxels - std::floor(coordinate_in_voxels)) * 64 + 0.5);
-    return (steps >= 64 ? 0 : steps / 64) - 0.5;
-}
-
-// Consecutive metaballs in one block of 8 x 8 x 8 voxels.
-struct Run {
-    std::uint64_t block = 0;  // its place and lattice
-    std::uint32_t begin = 0, end = 0;
-};
-
-constexpr int kPlaceBits = 20;  // of a block on each axis, counted from -kFarthest
-
-std::array<int, 3> place_of(std::uint64_t block) {
-    const auto part = [&](int axis) {
-        return int(block >> axis * kPlaceBits & ((1u << kPlaceBits) - 1)) - int(kFarthest) / kSide;
-    };
-    return {part(0), part(1), part(2)};
-}
-
-// The lattices of a cloud, at most kMostLattices; none if there are more.
-std::vector<VoxelLattice> lattices_of(const PreparedCloud& cloud, double radius_voxels) {
-    std::vector<VoxelLattice> lattices;
-    float last = -1;
-    for (const std::uint32_t index : cloud.visible) {
-        const Metaball& ball = cloud.metaballs[index];
-        if (ball.radius == last) continue;
-        last = ball.radius;
-        if (std::ranges::any_of(lattices, [&](const VoxelLattice& each) { return each.radius == last; }))
-            continue;
-        if (lattices.size() == kMostLattices) return {};
-        VoxelLattice lattice;
-        lattice.radius = last;
-        lattice.edge_m = last / radius_voxels;
-        lattice.per_edge = radius_voxels / last;
-        for (int axis = 0; axis < 3; ++axis)
-            lattice.phase[axis] = phase_of(coordinate(ball, axis) * lattice.per_edge);
-        lattices.push_back(lattice);
-    }
-    return lattices;
-}
-
-struct RunPart {
-    std::vector<Run> runs;
-    bool inside = true;  // no ball is too far away
-};
-
-RunPart runs_of_part(const PreparedCloud& cloud, std::span<const VoxelLattice> lattices, std::size_t begin,
-                     std::size_t end) {
-    RunPart part;
-    std::size_t lattice = 0;
-    for (std::size_t i = begin; i < end; ++i) {
-        const Metaball& ball = cloud.metaballs[cloud.visible[i]];
-        while (lattices[lattice].radius != ball.radius) lattice = (lattice + 1) % lattices.size();
-        const VoxelLattice& of = lattices[lattice];
-        std::uint64_t number = lattice;
-        for (const int axis : {2, 1, 0}) {
-            const double voxel = coordinate(ball, axis) * of.per_edge - of.phase[axis];
-            part.inside = part.inside && std::abs(voxel) < kFarthest;
-            if (!part.inside) return part;
-            number = number << kPlaceBits | std::uint64_t(voxel + kFarthest) / kSide;
-        }
-        if (part.runs.empty() || part.runs.back().block != number)
-            part.runs.push_back({number, std::uint32_t(i), std::uint32_t(i)});
-        part.runs.back().end = std::uint32_t(i) + 1;
-    }
-    return part;
-}
-
-// Those of one block behind each other; empty where there are no voxels.
-std::vector<Run> runs_by_block(const PreparedCloud& cloud, std::span<const VoxelLattice> lattices) {
-    const std::size_t count = cloud.visible.size(), parts = (count + kPart - 1) / kPart;
-    std::vector<RunPart> found(parts);
-    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
-        found[p] = runs_of_part(cloud, lattices, p * kPart, std::min(count, (p + 1) * kPart));
-    });
-    std::vector<Run> runs;
-    for (const RunPart& part : found) {
-        if (!part.inside) return {};
-        runs.insert(runs.end(), part.runs.begin(), part.runs.end());
-    }
-    if (runs.size() > count / 2 + kPart) return {};
-    std::ranges::sort(runs, [](const Run& a, const Run& b) {
-        return a.block != b.block ? a.block < b.block : a.begin < b.begin;
-    });
-    return runs;
-}
-
-// A block's sums over what is in it; lengths in voxels from the corner of the block of 8 x 8 x 8.
+// Sums over what is in each block of one size, kSide x kSide x kSide of them in a block of 8 x 8 x 8 voxels,
+// x fastest; lengths in voxels from its corner.
+template <std::size_t kSide>
 struct Sums {
-    float mass = 0;                     // of optical depths of metaballs of the lattice's radius
-    float x = 0, y = 0, z = 0;          // mass times place
-    float square = 0;                   // mass times place squared
-    float depth = 0, depth_square = 0;  // of the optical depths through the children's centres
-    std::uint32_t balls = 0;
+    static constexpr std::size_t kCount = kSide * kSide * kSide;
+    using Values = std::array<float, kCount>;
+    Values mass{};                   // of optical depths of metaballs of the lattice's radius
+    Values x{}, y{}, z{};            // mass times place
+    Values square{};                 // mass times place squared
+    Values depth{}, depth_square{};  // of the optical depths through the children's centres
+    Values balls{};
     // Of the metaball that stands for it.
-    float radius = 0, own_depth = 0;  // voxels; optical depth scale
-    float share = 0;                  // of what larger blocks leave
+    Values radius{}, own_depth{};  // voxels; optical depth scale
+    Values share{};                // of what larger blocks leave
 
-    void add(const Sums& part, float part_depth) {
-        mass += part.mass;
-        x += part.x;
-        y += part.y;
-        z += part.z;
-        square += part.square;
-        depth += part_depth;
-        depth_square += part_depth * part_depth;
-        balls += part.balls;
+    template <std::size_t kChildren>
+    void add(std::size_t n, const Sums<kChildren>& part, std::size_t child) {
+        mass[n] += part.mass[child];
+        x[n] += part.x[child];
+        y[n] += part.y[child];
+        z[n] += part.z[child];
+        square[n] += part.square[child];
+        depth[n] += part.own_depth[child];
+        depth_square[n] += part.own_depth[child] * part.own_depth[child];
+        balls[n] += part.balls[child];
     }
 };
 
 // What all blocks of a cloud share.
 struct Merging {
     const PreparedCloud& cloud;
-    std::span<const VoxelLattice> lattices;
+    const VoxelBlocks& blocks;
     Vec3 eye_m;
     double radius_voxels = 1;
-    double per_density = 1;  // optical depth scale per density and metre
+    double per_density = 1;       // optical depth scale per density and metre
+    double per_octant_depth = 1;  // from the sum of depth scales to the depth through 4 x 4 x 4 voxels
     struct Level {
-        double side_voxels = 2;
-        double threshold = 1;   // of contrast ...
+        float threshold = 1;    // of contrast ...
         double far_voxels = 0;  // ... at this distance
     };
     Level levels[3];
 
-    Merging(const PreparedCloud& given, const MetaballCloud& as, std::span<const VoxelLattice> of,
+    Merging(const PreparedCloud& given, const MetaballCloud& as, const VoxelBlocks& of,
             const DetailView& view, const LevelOfDetailOptions& options, double radius)
         : cloud(given),
-          lattices(of),
+          blocks(of),
           eye_m(view.eye_m),
           radius_voxels(radius),
-          per_density(as.extinction_per_m * as.normalisation) {
+          per_density(as.extinction_per_m * as.normalisation),
+          per_octant_depth(1 / (16 * as.normalisation * radius)) {
         double threshold = 1, child = 1;  // voxels on the side of a child
         for (Level& level : levels) {
             // A full block's, whose second moment is that of its voxels' centres.
             const double child_radius = std::sqrt(radius * radius + (child * child - 1) / (12 * kMoment));
-            level = {2 * child, threshold, child_radius * view.pixels_per_unit / options.pixels};
+            level = {float(threshold), child_radius * view.pixels_per_unit / options.pixels};
             threshold *= kLevel;
             child *= 2;
         }
     }
 };
 
-// From 1 at kFull of the threshold to 0.
-float falling_step(double contrast, double threshold) {
-    return float(smoothstep(0, (1 - kFull) * threshold, threshold - contrast));
-}
+// Of a block of 2 x 2 x 2 voxels: the octant that it is in.
+std::size_t octant_of(std::size_t n) { return (n >> 5 & 1) << 2 | (n >> 3 & 1) << 1 | (n >> 1 & 1); }
 
-// The blocks of one block of 8 x 8 x 8 voxels.
-class BlockTree {
-  public:
-    BlockTree(const Merging& merging, std::span<const Run> runs)
-        : merging_(merging), runs_(runs), lattice_(merging.lattices[runs.front().block >> 3 * kPlaceBits]) {
+// The metaballs of a block of 8 x 8 x 8 voxels, and where it lies.
+struct BlockBalls {
+    const Merging& merging;
+    std::span<const BlockRun> runs;
+    const VoxelLattice& lattice;
+    double corner[3];  // voxels
+
+    BlockBalls(const Merging& of, std::size_t number)
+        : merging(of),
+          runs(of.blocks.of_block(number)),
+          lattice(of.blocks.lattices[lattice_of(runs.front().block)]) {
         const std::array<int, 3> place = place_of(runs.front().block);
         for (std::size_t axis = 0; axis < 3; ++axis)
-            corner_[axis] = kSide * place[axis] + lattice_.phase[axis];
-        for (const Run& run : runs)
-            for (std::uint32_t i = run.begin; i < run.end; ++i) add_ball(i);
-        merge_small();
-        merge_middle();
-        merge_whole();
+            corner[axis] = kBlockSide * place[axis] + lattice.phase[axis];
+    }
+
+    // work(index in PreparedCloud::visible) for all.
+    template <class Work>
+    void for_each(const Work& work) const {
+        for (const BlockRun& run : runs)
+            for (std::uint32_t i = run.begin; i < run.end; ++i) work(i);
+    }
+    const VoxelPlace& place(std::uint32_t i) const { return merging.blocks.places[i]; }
+    float depth_scale(std::uint32_t i) const { return merging.cloud.depth_scale[i]; }
+
+    // Optical depths through its octants, each at most kMostOfOctant.
+    OfOctants octant_depths() const {
+        std::array<float, 64> sums{};
+        for_each([&](std::uint32_t i) { sums[place(i).pair] += depth_scale(i); });
+        OfOctants depths{};
+        for (std::size_t n = 0; n < 64; ++n) depths[octant_of(n)] += sums[n];
+        for (float& depth : depths) depth = std::min(float(depth * merging.per_octant_depth), kMostOfOctant);
+        return depths;
+    }
+};
+
+// The blocks of one block of 8 x 8 x 8 voxels: of 2 voxels on a side, of 4, and the whole.
+class BlockTree {
+  public:
+    // `hidden`: how far each octant is to be merged whatever its contrast, 0..1.
+    BlockTree(const BlockBalls& balls, const OfOctants& hidden) : balls_(balls) {
+        balls.for_each([&](std::uint32_t i) { add_ball(balls.place(i), balls.depth_scale(i)); });
+        merge_small(hidden);
+        merge_middle(hidden);
+        merge_whole(hidden);
     }
 
     // Whether any metaball stands for several.
     bool merges() const {
-        const auto merges_some = [](const Sums& block) { return block.balls > 1 && block.share > 0; };
-        return std::ranges::any_of(small_, merges_some) || std::ranges::any_of(middle_, merges_some);
+        const auto merges_some = [](const auto& sums) {
+            for (std::size_t n = 0; n < sums.kCount; ++n)
+                if (sums.balls[n] > 1 && sums.share[n] > 0) return true;
+            return false;
+        };
+        return merges_some(small_) || merges_some(middle_);
     }
 
     void emit(MergedCloud& to) const {
-        emit_block(whole_, whole_.share, to);
-        for (const Sums& block : middle_) emit_block(block, (1 - whole_.share) * block.share, to);
-        for (int n = 0; n < 64; ++n)
-            if (small_[n].balls > 1) emit_block(small_[n], left_by_larger(n) * small_[n].share, to);
-        if (whole_.share >= 1) return;
-        for (const Run& run : runs_)
-            for (std::uint32_t i = run.begin; i < run.end; ++i) emit_ball(i, to);
+        emit_block(whole_, 0, whole_.share[0], to);
+        const float left = 1 - whole_.share[0];
+        if (!(left > 0)) return;
+        for (std::size_t n = 0; n < 8; ++n) emit_block(middle_, n, left * middle_.share[n], to);
+        std::array<float, 64> own;  // share of each metaball in a small block
+        float most = 0;
+        for (std::size_t n = 0; n < 64; ++n) {
+            const float of_small = left * (1 - middle_.share[octant_of(n)]);
+            const bool alone = small_.balls[n] <= 1;  // it is its block
+            if (!alone) emit_block(small_, n, of_small * small_.share[n], to);
+            own[n] = alone ? of_small : of_small * (1 - small_.share[n]);
+            most = std::max(most, small_.balls[n] > 0 ? own[n] : 0.0f);
+        }
+        if (!(most > 0)) return;
+        const PreparedCloud& cloud = balls_.merging.cloud;
+        balls_.for_each([&](std::uint32_t i) {
+            const float share = own[balls_.place(i).pair];
+            if (!(share > 0)) return;
+            to.metaballs.push_back(cloud.metaballs[cloud.visible[i]]);
+            to.metaballs.back().density *= share;
+            to.depth_scale.push_back(share * cloud.depth_scale[i]);
+        });
     }
 
   private:
-    struct Place {
-        float x, y, z;  // voxels from the corner
-        int small;      // number of its block of 2 x 2 x 2
-    };
-
-    Place place_in_block(const Metaball& ball) const {
-        const auto x = float(ball.x * lattice_.per_edge - corner_[0]),
-                   y = float(ball.y * lattice_.per_edge - corner_[1]),
-                   z = float(ball.z * lattice_.per_edge - corner_[2]);
-        const auto half = [](float at) { return std::clamp(int(at) >> 1, 0, 3); };
-        return {x, y, z, half(z) * 16 + half(y) * 4 + half(x)};
+    void add_ball(const VoxelPlace& at, float depth) {
+        const std::size_t n = at.pair;
+        small_.mass[n] += depth;
+        small_.x[n] += depth * at.x;
+        small_.y[n] += depth * at.y;
+        small_.z[n] += depth * at.z;
+        small_.square[n] += depth * (at.x * at.x + at.y * at.y + at.z * at.z);
+        small_.depth[n] += depth;
+        small_.depth_square[n] += depth * depth;
+        small_.balls[n] += 1;
     }
 
-    const Metaball& ball_at(std::uint32_t i) const {
-        return merging_.cloud.metaballs[merging_.cloud.visible[i]];
+    void merge_small(const OfOctants& hidden) {
+        std::array<float, 64> least, of_octant;
+        least.fill(1);
+        for (std::size_t n = 0; n < 64; ++n) of_octant[n] = hidden[octant_of(n)];
+        finish(small_, balls_.merging.levels[0], least, of_octant);
     }
 
-    void add_ball(std::uint32_t i) {
-        const Place at = place_in_block(ball_at(i));
-        const float depth = merging_.cloud.depth_scale[i];
-        const Sums ball{.mass = depth,
-                        .x = depth * at.x,
-                        .y = depth * at.y,
-                        .z = depth * at.z,
-                        .square = depth * (at.x * at.x + at.y * at.y + at.z * at.z),
-                        .balls = 1};
-        small_[at.small].add(ball, depth);
-    }
-
-    void merge_small() {
-        for (int n = 0; n < 64; ++n)
-            if (small_[n].balls > 0) finish(small_[n], 0, n & 3, n >> 2 & 3, n >> 4, 1);
-    }
-
-    void merge_middle() {
-        float least[8] = {1, 1, 1, 1, 1, 1, 1, 1};
-        for (int n = 0; n < 64; ++n) {
-            if (small_[n].balls == 0) continue;
-            const int m = middle_of(n);
-            middle_[m].add(small_[n], small_[n].own_depth);
-            least[m] = std::min(least[m], small_[n].share);
+    void merge_middle(const OfOctants& hidden) {
+        std::array<float, 8> least;
+        least.fill(1);
+        for (std::size_t n = 0; n < 64; ++n) {
+            const std::size_t m = octant_of(n);
+            middle_.add(m, small_, n);
+            if (small_.balls[n] > 0) least[m] = std::min(least[m], small_.share[n]);
         }
-        for (int n = 0; n < 8; ++n)
-            if (middle_[n].balls > 0 && least[n] > 0)
-                finish(middle_[n], 1, n & 1, n >> 1 & 1, n >> 2, least[n]);
+        finish(middle_, balls_.merging.levels[1], least, hidden);
     }
 
-    void merge_whole() {
-        float least = 1;
-        for (const Sums& block : middle_) {
-            if (block.balls == 0) continue;
-            whole_.add(block, block.own_depth);
-            least = std::min(least, block.share);
+    void merge_whole(const OfOctants& hidden) {
+        float least = 1, least_hidden = 1;
+        for (std::size_t n = 0; n < 8; ++n) {
+            whole_.add(0, middle_, n);
+            if (!(middle_.balls[n] > 0)) continue;
+            least = std::min(least, middle_.share[n]);
+            least_hidden = std::min(least_hidden, hidden[n]);
         }
-        if (least > 0) finish(whole_, 2, 0, 0, 0, least);
+        finish(whole_, balls_.merging.levels[2], {least}, {least_hidden});
     }
 
-    static int middle_of(int n) { return (n >> 5 & 1) << 2 | (n >> 3 & 1) << 1 | (n >> 1 & 1); }
-    float left_by_larger(int n) const { return (1 - whole_.share) * (1 - middle_[middle_of(n)].share); }
-
-    // The metaball that stands for a block at some place among those of its level, and how far it does: its
-    // children do as far as `least`.
-    void finish(Sums& sums, int number, int x, int y, int z, float least) const {
-        const float per_mass = 1 / sums.mass;
-        const float mx = per_mass * sums.x, my = per_mass * sums.y, mz = per_mass * sums.z;
-        const float moment = std::max(0.0f, per_mass * sums.square - (mx * mx + my * my + mz * mz)) / 3;
-        const double square = merging_.radius_voxels * merging_.radius_voxels,
-                     larger = square + kSpread * moment / kMoment;
-        sums.radius = float(std::sqrt(larger));
-        sums.own_depth = float(sums.mass * square / larger);
-
-        const double mean = sums.depth / 8, variance = std::max(0.0, sums.depth_square / 8 - mean * mean);
-        const double contrast = std::sqrt(variance + kEdge * kEdge * mean * mean);
-        const Merging::Level& level = merging_.levels[number];
-        const auto middle = [&](std::size_t axis, int at) {
-            return (corner_[axis] + level.side_voxels * (at + 0.5)) * lattice_.edge_m;
-        };
-        const Vec3 way = Vec3{middle(0, x), middle(1, y), middle(2, z)} - merging_.eye_m;
-        const double far_m = level.far_voxels * lattice_.edge_m;
-        const double rise = std::clamp(dot(way, way) / (far_m * far_m), 1e-12, 1e12);
-        sums.share = least * falling_step(contrast, level.threshold * rise);
+    // Squares of the distances along an axis from the eye to the middles of blocks, voxels.
+    template <std::size_t kSide>
+    std::array<float, kSide> squared_way(std::size_t axis) const {
+        const double eye[3] = {balls_.merging.eye_m.x, balls_.merging.eye_m.y, balls_.merging.eye_m.z};
+        std::array<float, kSide> squares;
+        for (std::size_t n = 0; n < kSide; ++n) {
+            const double middle = (double(n) + 0.5) * (kBlockSide / double(kSide));
+            const double way = balls_.corner[axis] + middle - eye[axis] * balls_.lattice.per_edge;
+            squares[n] = float(way * way);
+        }
+        return squares;
     }
 
-    void emit_block(const Sums& sums, float share, MergedCloud& to) const {
-        if (!(share > 0)) return;
-        const double radius_m = sums.radius * lattice_.edge_m;
-        const float depth = share * sums.own_depth;
+    // The metaball that stands for each block, and how far it does: its children do as far as `least`. Means
+    // nothing where there are no metaballs. Written for vector units: no branches.
+    template <std::size_t kSide>
+    void finish(Sums<kSide>& sums, const Merging::Level& level, const typename Sums<kSide>::Values& least,
+                const typename Sums<kSide>::Values& hidden) const {
+        const std::array<float, kSide> wx = squared_way<kSide>(0), wy = squared_way<kSide>(1),
+                                       wz = squared_way<kSide>(2);
+        const auto square = float(balls_.merging.radius_voxels * balls_.merging.radius_voxels);
+        const auto per_far_square = float(1 / (level.far_voxels * level.far_voxels));
+        const float threshold = level.threshold;
+        std::array<float, Sums<kSide>::kCount> way;
+        for (std::size_t n = 0; n < way.size(); ++n)
+            way[n] = wx[n % kSide] + wy[n / kSide % kSide] + wz[n / (kSide * kSide)];
+        for (std::size_t n = 0; n < way.size(); ++n) {
+            const float mass = std::max(sums.mass[n], 1e-30f), per_mass = 1 / mass;
+            const float x = per_mass * sums.x[n], y = per_mass * sums.y[n], z = per_mass * sums.z[n];
+            const float moment = std::max(per_mass * sums.square[n] - (x * x + y * y + z * z), 0.0f);
+            const float larger = square + (kSpread / float(3 * kMoment)) * moment;
+            sums.radius[n] = std::sqrt(larger);
+            sums.own_depth[n] = sums.mass[n] * square / larger;
+
+            const float mean = 0.125f * sums.depth[n];
+            const float variance = std::max(0.125f * sums.depth_square[n] - mean * mean, 0.0f);
+            const float contrast = std::sqrt(variance + kEdge * kEdge * mean * mean);
+            const float limit = threshold * std::min(std::max(way[n] * per_far_square, 1e-12f), 1e12f);
+            // From 1 at kFull of the limit to 0.
+            const float t = std::min(std::max((limit - contrast) / ((1 - kFull) * limit), 0.0f), 1.0f);
+            sums.share[n] = least[n] * std::max(t * t * (3 - 2 * t), hidden[n]);
+        }
+    }
+
+    template <std::size_t kSide>
+    void emit_block(const Sums<kSide>& sums, std::size_t n, float share, MergedCloud& to) const {
+        if (!(share > 0) || !(sums.balls[n] > 0)) return;
+        const double radius_m = sums.radius[n] * balls_.lattice.edge_m;
+        const float depth = share * sums.own_depth[n];
         const auto world = [&](float sum, std::size_t axis) {
-            return float((corner_[axis] + double(sum) / sums.mass) * lattice_.edge_m);
+            return float((balls_.corner[axis] + double(sum) / sums.mass[n]) * balls_.lattice.edge_m);
         };
-        to.metaballs.push_back({world(sums.x, 0), world(sums.y, 1), world(sums.z, 2), float(radius_m),
-                                float(depth / (merging_.per_density * radius_m))});
+        to.metaballs.push_back({world(sums.x[n], 0), world(sums.y[n], 1), world(sums.z[n], 2),
+                                float(radius_m), float(depth / (balls_.merging.per_density * radius_m))});
         to.depth_scale.push_back(depth);
     }
 
-    void emit_ball(std::uint32_t i, MergedCloud& to) const {
-        Metaball ball = ball_at(i);
-        const int n = place_in_block(ball).small;
-        const float own = small_[n].balls > 1 ? 1 - small_[n].share : 1;  // alone it is its block
-        const float share = left_by_larger(n) * own;
-        if (!(share > 0)) return;
-        ball.density *= share;
-        to.metaballs.push_back(ball);
-        to.depth_scale.push_back(share * merging_.cloud.depth_scale[i]);
-    }
-
-    const Merging& merging_;
-    std::span<const Run> runs_;
-    const VoxelLattice& lattice_;
-    double corner_[3];                    // of the block, voxels
-    Sums small_[64], middle_[8], whole_;  // x fastest
+    const BlockBalls& balls_;
+    Sums<4> small_;
+    Sums<2> middle_;
+    Sums<1> whole_;
 };
-
-// Where each block's runs begin, and their end.
-std::vector<std::size_t> first_runs(std::span<const Run> runs) {
-    std::vector<std::size_t> first;
-    for (std::size_t i = 0; i < runs.size(); ++i)
-        if (i == 0 || runs[i].block != runs[i - 1].block) first.push_back(i);
-    first.push_back(runs.size());
-    return first;
-}
 
 // What some blocks become.
 struct MergedPart {
@@ -362,6 +301,24 @@ MergedCloud joined(const std::vector<MergedPart>& parts) {
     return all;
 }
 
+// How far the octants of each block are hidden behind others, 0..1.
+std::vector<OfOctants> hidden_octants(const Merging& merging) {
+    const std::size_t count = merging.blocks.size();
+    std::vector<std::uint64_t> numbers(count);
+    std::vector<OfOctants> depths(count);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 16), [&](const auto& range) {
+        for (std::size_t b = range.begin(); b != range.end(); ++b) {
+            const BlockBalls balls(merging, b);
+            numbers[b] = balls.runs.front().block;
+            depths[b] = balls.octant_depths();
+        }
+    });
+    std::vector<OfOctants> hidden = cover_of_octants(numbers, depths, kHidden);
+    for (OfOctants& of_block : hidden)
+        for (float& cover : of_block) cover = smoothstep(kVeiled, kHidden, cover);
+    return hidden;
+}
+
 }  // namespace
 
 std::optional<MergedCloud> merge_voxels(const PreparedCloud& given, const MetaballCloud& cloud,
@@ -371,18 +328,16 @@ std::optional<MergedCloud> merge_voxels(const PreparedCloud& given, const Metaba
     const double radius_voxels =
         std::clamp(std::cbrt(2835.0 / (736.0 * std::numbers::pi * cloud.normalisation)), kMinMetaballRadius,
                    kMaxMetaballRadius);
-    const std::vector<VoxelLattice> lattices = lattices_of(given, radius_voxels);
-    if (lattices.empty()) return std::nullopt;
-    const std::vector<Run> runs = runs_by_block(given, lattices);
-    if (runs.empty()) return std::nullopt;
-    const Merging merging(given, cloud, lattices, view, options, radius_voxels);
-    const std::vector<std::size_t> first = first_runs(runs);
+    const std::optional<VoxelBlocks> blocks = voxel_blocks(given, radius_voxels);
+    if (!blocks) return std::nullopt;
+    const Merging merging(given, cloud, *blocks, view, options, radius_voxels);
+    const std::vector<OfOctants> hidden = hidden_octants(merging);
     constexpr std::size_t kAtOnce = 16;  // blocks of 8 x 8 x 8 that one thread looks at
-    const std::size_t blocks = first.size() - 1;
-    std::vector<MergedPart> parts((blocks + kAtOnce - 1) / kAtOnce);
+    std::vector<MergedPart> parts((blocks->size() + kAtOnce - 1) / kAtOnce);
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
-        for (std::size_t b = p * kAtOnce; b < std::min(blocks, (p + 1) * kAtOnce); ++b) {
-            const BlockTree tree(merging, std::span(runs).subspan(first[b], first[b + 1] - first[b]));
+        for (std::size_t b = p * kAtOnce; b < std::min(blocks->size(), (p + 1) * kAtOnce); ++b) {
+            const BlockBalls balls(merging, b);
+            const BlockTree tree(balls, hidden[b]);
             tree.emit(parts[p].cloud);
             parts[p].merges = parts[p].merges || tree.merges();
         }

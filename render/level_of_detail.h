@@ -25,6 +25,11 @@
 // the density: all optical depths are continuous in the eye's place and in the voxels' densities, and nothing
 // pops. A larger block is merged at most as far as all of its children are.
 //
+// What cannot be seen from anywhere may lose all its contrast: 4 x 4 x 4 voxels are merged, as far as they go
+// also with their neighbours to 8 x 8 x 8, where the least optical depth between them and the outside
+// (block_cover.h) is kHidden, or in part from kVeiled on. At an extinction at which every voxel is opaque that is
+// four tenths of Disney's cloud; ragged clouds have no such voxels.
+//
 // Measured and dropped: a threshold that does not depend on r (three times the difference for as many
 // metaballs; the light of an unchanged cloud would outlive a step of the eye, but computing it for the fewer
 // metaballs costs less than drawing all of them), the largest or the sum of the depths instead of their

@@ -11,6 +11,7 @@
 
 #include <fmt/core.h>
 
+#include "apps/kept_memory.h"
 #include "automaton/kernels.h"
 #include "tests/bench/air_bench.h"
 #include "tests/bench/atmosphere_bench.h"
@@ -53,6 +54,7 @@ void print(const std::vector<nephos::bench::BenchRow>& rows) {
 
 int main(int argc, char** argv) {
     using namespace nephos::bench;
+    nephos::keep_freed_memory();  // as the command does
     const std::filesystem::path source = NEPHOS_SOURCE_DIR;
     const std::filesystem::path programs = std::filesystem::canonical("/proc/self/exe").parent_path();
     const char* const data_variable = std::getenv("NEPHOS_TEST_DATA");

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <random>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -147,6 +148,44 @@ TEST(LevelOfDetail, GrowingDoesNotPop) {
         coarse.push_back(drawn(test::ragged_cloud(box, 1, 0.02 * step + 0.1), kNear));
     for (int step = 0; step <= 400; ++step)
         fine.push_back(drawn(test::ragged_cloud(box, 1, 0.002 * step + 0.1), kNear));
+    const double of_coarse = largest_jump(coarse), of_fine = largest_jump(fine);
+    std::printf("largest change of a ray's optical depth: %.4f, %.4f in tenths of the steps\n", of_coarse,
+                of_fine);
+    EXPECT_LT(of_fine, 0.2 * of_coarse);
+}
+
+// A solid cube that hides its inside; so close that nothing is merged for being small.
+std::vector<Metaball> solid_cube(double density) {
+    return test::voxel_metaballs({.origin_m = {-480, -480, 640}, .x = 40, .y = 40, .z = 40},
+                                 [&](int, int, int) { return density; });
+}
+constexpr LevelOfDetailOptions kHardlyAny{.pixels = 0.05};
+
+TEST(LevelOfDetail, HiddenVoxelsAreMerged) {
+    const std::vector<Metaball> balls = solid_cube(1), merged = drawn(balls, kNear, kHardlyAny);
+    const Moments before = moments_of(balls), after = moments_of(merged);
+    EXPECT_NEAR(after.mass / before.mass, 1, 1e-5);
+    EXPECT_LT(length(after.centre - before.centre), 0.01);
+    // Within 8 voxels of the outside all stay as they were; of the rest, 24^3, one stands for 4^3 at least.
+    EXPECT_LE(merged.size(), 40u * 40 * 40 - 24 * 24 * 24 + 6 * 6 * 6);
+    const auto is_near_outside = [](const Metaball& ball) {
+        return std::max({std::abs(ball.x - 320), std::abs(ball.y - 320), std::abs(ball.z - 1440)}) > 12 * 40;
+    };
+    const auto outer = [&](std::vector<Metaball> some) {
+        std::erase_if(some, [&](const Metaball& ball) { return !is_near_outside(ball); });
+        std::ranges::sort(some, {}, [](const Metaball& b) { return std::tuple(b.x, b.y, b.z); });
+        return some;
+    };
+    EXPECT_EQ(outer(merged), outer(balls));
+}
+
+TEST(LevelOfDetail, GrowingOpaqueDoesNotPop) {
+    std::vector<std::vector<Metaball>> coarse, fine;
+    for (int step = 0; step <= 20; ++step)
+        coarse.push_back(drawn(solid_cube(0.05 * step), kNear, kHardlyAny));
+    for (int step = 0; step <= 200; ++step)
+        fine.push_back(drawn(solid_cube(0.005 * step), kNear, kHardlyAny));
+    ASSERT_LT(fine.back().size(), 40u * 40 * 40);
     const double of_coarse = largest_jump(coarse), of_fine = largest_jump(fine);
     std::printf("largest change of a ray's optical depth: %.4f, %.4f in tenths of the steps\n", of_coarse,
                 of_fine);
