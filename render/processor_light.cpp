@@ -168,14 +168,15 @@ std::size_t add_to_centres(const LightTile& tile, const LightCentres& centres) {
     return pairs;
 }
 
-// exp(-depth) of some optical depths, in place; those beyond `dark` count as that.
+// exp(-depth) of the optical depths in a row of a tile, in place; those beyond `dark` count as that.
 void to_transmittance(float* depths, std::size_t count, float dark) {
-    const Lanes d;
-    const std::size_t lanes = hn::Lanes(d);
+    const hn::CappedTag<float, shader::kTileWidth> d;
+    const auto most = hn::Set(d, dark);
     std::size_t i = 0;
-    for (; i + lanes <= count; i += lanes)
-        hn::StoreU(hn::Exp(d, hn::Neg(hn::Min(hn::LoadU(d, depths + i), set(dark)))), d, depths + i);
-    for (; i < count; ++i) depths[i] = hn::GetLane(hn::Exp(d, set(-std::min(depths[i], dark))));
+    for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d))
+        hn::StoreU(hn::Exp(d, hn::Neg(hn::Min(hn::LoadU(d, depths + i), most))), d, depths + i);
+    for (; i < count; ++i)
+        depths[i] = hn::GetLane(hn::Exp(d, hn::Neg(hn::Min(hn::Set(d, depths[i]), most))));
 }
 
 }  // namespace nephos::HWY_NAMESPACE
