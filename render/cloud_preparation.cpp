@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include <hwy/cache_control.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
@@ -48,6 +49,7 @@ struct Interval {
 };
 
 constexpr std::size_t kPart = 8192;  // metaballs that one thread looks at
+constexpr std::size_t kAhead = 12;   // from a metaball of an order to that which is fetched meanwhile
 
 // What one part of the metaballs adds to a PreparedCloud.
 struct VisiblePart {
@@ -179,6 +181,10 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
     order.splats.resize(count);
     order.places.resize(count);
     order.source.resize(count);
+    const auto prefetch = [&](std::uint32_t source) {
+        hwy::Prefetch(&cloud.metaballs[cloud.visible[source]]);
+        hwy::Prefetch(&cloud.depth_scale[source]);
+    };
     const auto fill = [&](std::size_t i) {
         const std::uint32_t source = by_distance[i];
         const Metaball& ball = cloud.metaballs[cloud.visible[source]];
@@ -199,6 +205,7 @@ SunOrder order_from_sun(const PreparedCloud& cloud, const ShadowFrame& frame, in
         tbb::blocked_range<std::size_t>(0, count, kPart), 0.0f,
         [&](const auto& range, float largest) {
             for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                prefetch(by_distance[std::min(i + kAhead, count - 1)]);
                 fill(i);
                 largest = std::max(largest, cloud.metaballs[cloud.visible[order.source[i]]].radius);
             }

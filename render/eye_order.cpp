@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include <hwy/cache_control.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -117,6 +118,7 @@ class Collector {
 
   private:
     static constexpr std::size_t kPart = 4096;  // splats that one thread looks at
+    static constexpr std::size_t kAhead = 12;   // from a splat to that which is fetched meanwhile
 
     // Where the splats of each part go: the part's share of balls and puffs, from the farthest on.
     void place_splats(EyeOrder& order) {
@@ -135,11 +137,20 @@ class Collector {
     bool is_ball(std::uint32_t index) const { return index < cloud_.visible.size(); }
     std::uint32_t from_far(std::size_t i) const { return by_distance_[by_distance_.size() - 1 - i]; }
 
+    // Splats of an order lie anywhere in memory.
+    void prefetch(std::uint32_t source) const {
+        if (!is_ball(source)) return;
+        hwy::Prefetch(&cloud_.metaballs[cloud_.visible[source]]);
+        hwy::Prefetch(&cloud_.depth_scale[source]);
+    }
+
     // False if a metaball of the part is not fitted.
     bool fill_part(EyeOrder& order, std::size_t part, std::vector<std::uint8_t>& kinds) const {
         bool fitted = true;
         std::size_t ball = first_ball_[part], puff = part * kPart - ball;
-        for (std::size_t i = part * kPart; i < std::min(by_distance_.size(), (part + 1) * kPart); ++i) {
+        const std::size_t end = std::min(by_distance_.size(), (part + 1) * kPart);
+        for (std::size_t i = part * kPart; i < end; ++i) {
+            prefetch(from_far(std::min(i + kAhead, end - 1)));
             const std::uint32_t source = from_far(i);
             SplatKind kind = SplatKind::billboard;
             if (is_ball(source)) {
@@ -208,8 +219,8 @@ class Collector {
 
     // Whether the tiles can draw it as an ellipse with a polynomial. Beside or behind the eye the outline is
     // no ellipse; halves, which hold the radius in pixels, end at 65504.
-    bool is_fitted(const Vec3& offset, double ball_radius, float depth_scale) const {
-        const double least = double(shader::kMinRadiusPixels) * length(offset) / pixels_per_unit_;
+    bool is_fitted(const Vec3& offset, double distance, double ball_radius, float depth_scale) const {
+        const double least = double(shader::kMinRadiusPixels) * distance / pixels_per_unit_;
         const double radius = std::max(ball_radius, least), depth = dot(offset, camera_.forward);
         return depth_scale <= shader::kMaxFittedDepth && depth >= 1.01 * radius &&
                radius * pixels_per_unit_ <= 60000.0 * depth;
@@ -219,12 +230,13 @@ class Collector {
     shader::ViewBall view_ball(std::uint32_t source) const {
         const Metaball& ball = cloud_.metaballs[cloud_.visible[source]];
         const Vec3 offset = Vec3{ball.x, ball.y, ball.z} - eye_;
+        const double distance = length(offset);
         shader::uint flags = 0;
-        if (length(offset) < double(shader::kNearDistance) * ball.radius)
+        if (distance < double(shader::kNearDistance) * ball.radius)
             flags |= shader::kAround | shader::kIntegrate;
         if (above_ground_ && ball.z - ball.radius < ground_m_) flags |= shader::kIntegrate;
         if (cloud_.depth_scale[source] > shader::kMaxDepthScale) flags |= shader::kIntegrate;
-        if (flags != 0 || !is_fitted(offset, ball.radius, cloud_.depth_scale[source]))
+        if (flags != 0 || !is_fitted(offset, distance, ball.radius, cloud_.depth_scale[source]))
             flags |= shader::kNotFitted;
         const double scale = cloud_.top_m > cloud_.base_m ? 1.0 / (cloud_.top_m - cloud_.base_m) : 0.0;
         return {float(offset.x),

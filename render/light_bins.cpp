@@ -2,11 +2,11 @@
 #include "render/light_bins.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <tbb/parallel_for.h>
 
 #include "render/half_floats.h"
+#include "render/pixel_rounding.h"
 
 namespace nephos {
 
@@ -16,8 +16,8 @@ std::vector<PixelBox> light_boxes(std::span<const shader::LightSplat> splats) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
             const shader::LightSplat& s = splats[i];
             const auto [rx, ry] = unpack_halves(s.radii);
-            boxes[i] = {int(std::floor(s.x - rx)), int(std::floor(s.y - ry)), int(std::ceil(s.x + rx)),
-                        int(std::ceil(s.y + ry))};
+            boxes[i] = {floor_to_pixel(s.x - rx), floor_to_pixel(s.y - ry), ceil_to_pixel(s.x + rx),
+                        ceil_to_pixel(s.y + ry)};
         }
     });
     return boxes;

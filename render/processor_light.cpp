@@ -175,8 +175,7 @@ void to_transmittance(float* depths, std::size_t count, float dark) {
     std::size_t i = 0;
     for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d))
         hn::StoreU(hn::Exp(d, hn::Neg(hn::Min(hn::LoadU(d, depths + i), most))), d, depths + i);
-    for (; i < count; ++i)
-        depths[i] = hn::GetLane(hn::Exp(d, hn::Neg(hn::Min(hn::Set(d, depths[i]), most))));
+    for (; i < count; ++i) depths[i] = hn::GetLane(hn::Exp(d, hn::Neg(hn::Min(hn::Set(d, depths[i]), most))));
 }
 
 }  // namespace nephos::HWY_NAMESPACE

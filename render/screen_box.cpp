@@ -9,6 +9,7 @@
 
 #include "automaton/vector_math.h"
 #include "render/half_floats.h"
+#include "render/pixel_rounding.h"
 #include "render/puff_textures.h"
 
 namespace nephos {
@@ -26,44 +27,52 @@ Tangents tangents(double across, double depth, double radius) {
     return {(across * depth - root) * scale, (across * depth + root) * scale};
 }
 
-// Far beyond any picture, and far from the limits of int.
-int to_pixel(double value) { return int(std::clamp(value, -1e6, 1e6)); }
+// What all boxes share.
+struct Screen {
+    const CameraFrame& camera;
+    const Tile& tile;
+    double half_width, half_height;  // of the picture, pixels
+    double per_x, per_y;             // pixels per unit of a tangent
+    double least_radius;             // of a splat at distance 1
 
-PixelBox screen_box(const shader::ViewBall& ball, const CameraFrame& camera, const Camera& options,
-                    const Tile& tile) {
-    const PixelBox everything{0, 0, tile.width, tile.height};
+    Screen(const CameraFrame& frame, const Camera& options, const Tile& part)
+        : camera(frame),
+          tile(part),
+          half_width(0.5 * options.width),
+          half_height(0.5 * options.height),
+          per_x(half_width / frame.half_width),
+          per_y(half_height / frame.half_height),
+          least_radius(double(shader::kMinRadiusPixels) / pixels_per_unit(options, frame)) {}
+};
+
+PixelBox screen_box(const shader::ViewBall& ball, const Screen& screen) {
     const Vec3 centre{ball.x, ball.y, ball.z};
-    const double depth = dot(centre, camera.forward);
-    const double least = double(shader::kMinRadiusPixels) * length(centre) / pixels_per_unit(options, camera);
-    const double radius = 1.0001 * std::max(double(ball.radius), least);
-    if ((ball.flags & shader::kAround) != 0 || depth <= 1.001 * radius) return everything;
-    const Tangents x = tangents(dot(centre, camera.right), depth, radius);
-    const Tangents y = tangents(dot(centre, camera.up), depth, radius);
-    const double half_width = 0.5 * options.width, half_height = 0.5 * options.height;
-    const double per_x = half_width / camera.half_width, per_y = half_height / camera.half_height;
-    return {to_pixel(std::floor(half_width + x.least * per_x)) - tile.x,
-            to_pixel(std::floor(half_height - y.largest * per_y)) - tile.y,
-            to_pixel(std::ceil(half_width + x.largest * per_x)) - tile.x,
-            to_pixel(std::ceil(half_height - y.least * per_y)) - tile.y};
+    const double depth = dot(centre, screen.camera.forward);
+    const double radius = 1.0001 * std::max(double(ball.radius), screen.least_radius * length(centre));
+    if ((ball.flags & shader::kAround) != 0 || depth <= 1.001 * radius)
+        return {0, 0, screen.tile.width, screen.tile.height};
+    const Tangents x = tangents(dot(centre, screen.camera.right), depth, radius);
+    const Tangents y = tangents(dot(centre, screen.camera.up), depth, radius);
+    return {floor_to_pixel(screen.half_width + x.least * screen.per_x) - screen.tile.x,
+            floor_to_pixel(screen.half_height - y.largest * screen.per_y) - screen.tile.y,
+            ceil_to_pixel(screen.half_width + x.largest * screen.per_x) - screen.tile.x,
+            ceil_to_pixel(screen.half_height - y.least * screen.per_y) - screen.tile.y};
 }
 
 // Middles of pixels within a rectangle whose half sizes are given. The outermost texels are clear, so nothing
 // is seen beyond the middles of the texels.
-PixelBox screen_box(const shader::Puff& puff, const CameraFrame& camera, const Camera& options,
-                    const Tile& tile) {
+PixelBox screen_box(const shader::Puff& puff, const Screen& screen) {
     const Vec3 centre{puff.x, puff.y, puff.z};
     const auto [reach_x, reach_y] = unpack_halves(puff.half_size);
-    const double per_depth = 1 / dot(centre, camera.forward);
-    const double half_width = 0.5 * options.width, half_height = 0.5 * options.height;
-    const double per_x = half_width / camera.half_width * per_depth,
-                 per_y = half_height / camera.half_height * per_depth;
+    const double per_depth = 1 / dot(centre, screen.camera.forward);
+    const double per_x = screen.per_x * per_depth, per_y = screen.per_y * per_depth;
     const double seen = 1.0001 * (1 - 1.0 / (kPuffTexels >> (puff.texture_bits >> 12)));
-    const double x = half_width + dot(centre, camera.right) * per_x - tile.x,
-                 y = half_height - dot(centre, camera.up) * per_y - tile.y;
+    const double x = screen.half_width + dot(centre, screen.camera.right) * per_x - screen.tile.x,
+                 y = screen.half_height - dot(centre, screen.camera.up) * per_y - screen.tile.y;
     const double across = seen * double(reach_x) * per_x + 0.001,
                  down = seen * double(reach_y) * per_y + 0.001;
-    return {to_pixel(std::ceil(x - across - 0.5)), to_pixel(std::ceil(y - down - 0.5)),
-            to_pixel(std::floor(x + across + 0.5)), to_pixel(std::floor(y + down + 0.5))};
+    return {ceil_to_pixel(x - across - 0.5), ceil_to_pixel(y - down - 0.5), floor_to_pixel(x + across + 0.5),
+            floor_to_pixel(y + down + 0.5)};
 }
 
 }  // namespace
@@ -81,13 +90,13 @@ std::vector<std::uint32_t> splats_near_to_far(const EyeOrder& order) {
 std::vector<PixelBox> screen_boxes(const EyeOrder& order, const CameraFrame& camera, const Camera& options,
                                    const Tile& tile, std::span<const std::uint32_t> splats) {
     const std::size_t count = order.balls.size() + order.puffs.size();
+    const Screen screen(camera, options, tile);
     std::vector<PixelBox> boxes(count);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
             const std::uint32_t splat = splats.empty() ? std::uint32_t(count - 1 - i) : splats[i];
-            boxes[i] = (splat & kPuffSplat) != 0
-                           ? screen_box(order.puffs[splat & ~kPuffSplat], camera, options, tile)
-                           : screen_box(order.balls[splat], camera, options, tile);
+            boxes[i] = (splat & kPuffSplat) != 0 ? screen_box(order.puffs[splat & ~kPuffSplat], screen)
+                                                 : screen_box(order.balls[splat], screen);
         }
     });
     return boxes;

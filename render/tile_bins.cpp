@@ -2,6 +2,8 @@
 #include "render/tile_bins.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -12,17 +14,57 @@ std::size_t area(const PixelBox& box) {
     return std::size_t(std::max(0, box.x1 - box.x0)) * std::size_t(std::max(0, box.y1 - box.y0));
 }
 
-template <class Work>
-void for_each_tile(const PixelBox& box, const TileGrid& grid, std::span<const std::uint8_t> wanted,
+// A box in tiles, half-open.
+struct TileBox {
+    std::uint16_t x0, y0, x1, y1;
+};
+
+// Calls work(number) for the tiles of a box; only for those wanted, if any are named.
+template <bool kAll, class Work>
+void for_each_tile(const TileBox& box, std::size_t columns, std::span<const std::uint8_t> wanted,
                    const Work& work) {
-    const PixelBox tiles = tiles_of(box, grid);
+    for (std::size_t y = box.y0; y < box.y1; ++y)
+        for (std::size_t tile = y * columns + box.x0; tile < y * columns + box.x1; ++tile)
+            if (kAll || wanted[tile] != 0) work(tile);
+}
+
+// A counting sort by tile. Each part of the boxes counts for itself; its entries of a tile follow those of
+// the parts before it.
+template <bool kAll>
+TileBins bin(std::span<const PixelBox> boxes, const TileGrid& grid, std::span<const std::uint8_t> wanted) {
+    constexpr std::size_t kPart = 16384;
+    const std::size_t parts = std::max<std::size_t>(1, std::min<std::size_t>(16, boxes.size() / kPart));
     const auto columns = std::size_t(grid.columns());
-    for (int y = tiles.y0; y < tiles.y1; ++y) {
-        for (int x = tiles.x0; x < tiles.x1; ++x) {
-            const std::size_t tile = std::size_t(y) * columns + std::size_t(x);
-            if (wanted.empty() || wanted[tile] != 0) work(tile);
+    std::vector<TileBox> tiles(boxes.size());
+    std::vector<std::vector<std::uint32_t>> next(parts);
+    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
+        std::vector<std::uint32_t>& count = next[p];
+        count.assign(grid.tiles(), 0);
+        for (std::size_t i = boxes.size() * p / parts; i < boxes.size() * (p + 1) / parts; ++i) {
+            const PixelBox box = tiles_of(boxes[i], grid);
+            tiles[i] = {std::uint16_t(box.x0), std::uint16_t(box.y0), std::uint16_t(box.x1),
+                        std::uint16_t(box.y1)};
+            for_each_tile<kAll>(tiles[i], columns, wanted, [&](std::size_t tile) { ++count[tile]; });
         }
+    });
+
+    TileBins bins;
+    bins.ranges.resize(grid.tiles());
+    std::uint32_t sum = 0;
+    for (std::size_t tile = 0; tile < grid.tiles(); ++tile) {
+        bins.ranges[tile].begin = sum;
+        for (std::size_t p = 0; p < parts; ++p) sum += std::exchange(next[p][tile], sum);
+        bins.ranges[tile].end = sum;
     }
+    bins.list.resize(sum);
+    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
+        std::uint32_t* const place = next[p].data();
+        std::uint32_t* const list = bins.list.data();
+        for (std::size_t i = boxes.size() * p / parts; i < boxes.size() * (p + 1) / parts; ++i)
+            for_each_tile<kAll>(tiles[i], columns, wanted,
+                                [&](std::size_t tile) { list[place[tile]++] = std::uint32_t(i); });
+    });
+    return bins;
 }
 
 }  // namespace
@@ -46,44 +88,9 @@ std::size_t end_of_batch(std::span<const PixelBox> boxes, std::size_t begin, con
     return end;
 }
 
-// A counting sort by tile. Each part of the boxes counts for itself; its entries of a tile follow those of
-// the parts before it.
 TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid,
                         std::span<const std::uint8_t> wanted) {
-    constexpr std::size_t kPart = 16384;
-    const std::size_t parts = std::max<std::size_t>(1, std::min<std::size_t>(16, boxes.size() / kPart));
-    const auto part = [&](std::size_t p) {
-        const std::size_t begin = boxes.size() * p / parts, end = boxes.size() * (p + 1) / parts;
-        return std::pair(begin, end);
-    };
-    std::vector<std::vector<std::uint32_t>> next(parts);
-    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
-        next[p].assign(grid.tiles(), 0);
-        const auto [begin, end] = part(p);
-        for (std::size_t i = begin; i < end; ++i)
-            for_each_tile(boxes[i], grid, wanted, [&](std::size_t tile) { ++next[p][tile]; });
-    });
-
-    TileBins bins;
-    bins.ranges.resize(grid.tiles());
-    std::uint32_t sum = 0;
-    for (std::size_t tile = 0; tile < grid.tiles(); ++tile) {
-        bins.ranges[tile].begin = sum;
-        for (std::size_t p = 0; p < parts; ++p) {
-            const std::uint32_t count = next[p][tile];
-            next[p][tile] = sum;
-            sum += count;
-        }
-        bins.ranges[tile].end = sum;
-    }
-    bins.list.resize(sum);
-    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
-        const auto [begin, end] = part(p);
-        for (std::size_t i = begin; i < end; ++i)
-            for_each_tile(boxes[i], grid, wanted,
-                          [&](std::size_t tile) { bins.list[next[p][tile]++] = std::uint32_t(i); });
-    });
-    return bins;
+    return wanted.empty() ? bin<true>(boxes, grid, wanted) : bin<false>(boxes, grid, wanted);
 }
 
 }  // namespace nephos

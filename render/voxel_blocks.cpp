@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -98,6 +100,32 @@ std::vector<VoxelLattice> voxel_lattices(const PreparedCloud& cloud, double radi
     return lattices;
 }
 
+// Puts the runs of one block behind each other, blocks by number, in the order in which they come.
+void group_by_block(const std::vector<RunPart>& parts, VoxelBlocks& blocks) {
+    std::unordered_map<std::uint64_t, std::size_t> found;  // and how many runs it has; later, where they go
+    std::uint64_t last = 0;
+    std::size_t* count = nullptr;
+    for (const RunPart& part : parts) {
+        for (const BlockRun& run : part.runs) {
+            if (count == nullptr || run.block != last) count = &found[last = run.block];
+            ++*count;
+        }
+    }
+    std::vector<std::uint64_t> numbers;
+    for (const auto& [number, runs] : found) numbers.push_back(number);
+    std::ranges::sort(numbers);
+    std::size_t sum = 0;
+    for (const std::uint64_t number : numbers) {
+        blocks.first.push_back(sum);
+        std::size_t& place = found[number];
+        sum += std::exchange(place, sum);
+    }
+    blocks.first.push_back(sum);
+    blocks.runs.resize(sum);
+    for (const RunPart& part : parts)
+        for (const BlockRun& run : part.runs) blocks.runs[found[run.block]++] = run;
+}
+
 }  // namespace
 
 std::array<int, 3> place_of(std::uint64_t block) {
@@ -114,21 +142,16 @@ std::optional<VoxelBlocks> voxel_blocks(const PreparedCloud& cloud, double radiu
     blocks.places.resize(count);
     std::vector<RunPart> found(parts);
     tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
-        found[p] =
-            runs_of_part(cloud, blocks.lattices, p * kPart, std::min(count, (p + 1) * kPart), blocks.places);
+        found[p] = runs_of_part(cloud, blocks.lattices, p * kPart, std::min(count, (p + 1) * kPart),
+                                blocks.places);
     });
-    std::vector<BlockRun>& runs = blocks.runs;
+    std::size_t runs = 0;
     for (const RunPart& part : found) {
         if (!part.inside) return std::nullopt;
-        runs.insert(runs.end(), part.runs.begin(), part.runs.end());
+        runs += part.runs.size();
     }
-    if (runs.size() > count / 2 + kPart) return std::nullopt;
-    std::ranges::sort(runs, [](const BlockRun& a, const BlockRun& b) {
-        return a.block != b.block ? a.block < b.block : a.begin < b.begin;
-    });
-    for (std::size_t i = 0; i < runs.size(); ++i)
-        if (i == 0 || runs[i].block != runs[i - 1].block) blocks.first.push_back(i);
-    blocks.first.push_back(runs.size());
+    if (runs > count / 2 + kPart) return std::nullopt;
+    group_by_block(found, blocks);
     return blocks;
 }
 
