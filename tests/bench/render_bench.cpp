@@ -234,6 +234,7 @@ std::vector<BenchRow> render_rows(const std::filesystem::path& source, const std
     const DensityGrid grid = read_density(disney, reading);
     for (const double extinction : {0.02, 1.0}) {
         const Subject subject = volume(grid, "Disney cloud", extinction);
+        print_stages_of(subject, 9);
         append(rows, compare_ways(subject, 5));
         append(rows, against_vdb_render(disney, subject));
     }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <vector>
 
 #include <fmt/core.h>
@@ -45,8 +46,14 @@ double copied_bytes_per_ns() {
 void print_stages(const std::string& what, const Renderer& renderer, int rounds,
                   const std::function<void()>& draw) {
     std::array<std::vector<double>, kDrawStages> wall, processor;
+    std::vector<double> whole_wall, whole_processor;
     for (int round = -1; round < rounds; ++round) {
-        draw();
+        const std::clock_t start = std::clock();
+        const double ms = time_ms(draw);
+        if (round >= 0) {
+            whole_wall.push_back(ms);
+            whole_processor.push_back(1000.0 * double(std::clock() - start) / CLOCKS_PER_SEC);
+        }
         for (std::size_t s = 0; round >= 0 && s < kDrawStages; ++s) {
             wall[s].push_back(renderer.times().stages[s].wall_ms);
             processor[s].push_back(renderer.times().stages[s].processor_ms);
@@ -69,7 +76,8 @@ void print_stages(const std::string& what, const Renderer& renderer, int rounds,
                    time.pairs != 0 ? fmt::format("{:.2f}", pairs) : "",
                    time.pairs != 0 ? fmt::format("{:.3f}", median(processor[s]) / pairs) : "");
     }
-    fmt::print("\n");
+    fmt::print("| whole picture | {:.2f} | {:.2f} | | | | |\n\n", median(whole_wall),
+               median(whole_processor));
     std::fflush(stdout);
 }
 
