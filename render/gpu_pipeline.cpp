@@ -33,14 +33,15 @@ vk::raii::ShaderModule create_module(const GpuDevice& gpu, ShaderCode code) {
 
 // A variant as specialization constants; constants that a shader does not have are ignored.
 struct VariantConstants {
-    std::array<vk::Bool32, 4> values;
-    std::array<vk::SpecializationMapEntry, 4> entries{vk::SpecializationMapEntry(0, 0, sizeof(vk::Bool32)),
+    std::array<vk::Bool32, 5> values;
+    std::array<vk::SpecializationMapEntry, 5> entries{vk::SpecializationMapEntry(0, 0, sizeof(vk::Bool32)),
                                                       vk::SpecializationMapEntry(5, 4, sizeof(vk::Bool32)),
                                                       vk::SpecializationMapEntry(6, 8, sizeof(vk::Bool32)),
-                                                      vk::SpecializationMapEntry(7, 12, sizeof(vk::Bool32))};
+                                                      vk::SpecializationMapEntry(7, 12, sizeof(vk::Bool32)),
+                                                      vk::SpecializationMapEntry(8, 16, sizeof(vk::Bool32))};
     explicit VariantConstants(const ShaderVariant& variant)
         : values{vk::Bool32(variant.exact), vk::Bool32(variant.physical_sky), vk::Bool32(variant.shells),
-                 vk::Bool32(variant.fog)} {}
+                 vk::Bool32(variant.fog), vk::Bool32(variant.puffs)} {}
     vk::SpecializationInfo info() const {
         return {std::uint32_t(entries.size()), entries.data(), sizeof values, values.data()};
     }
@@ -154,16 +155,17 @@ vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineL
 vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
                                         std::array<bool, 2> switches, ShaderVariant variant) {
     const vk::raii::ShaderModule module = create_module(gpu, code);
-    // Lanes, rows of a lane, whether lanes hand splats round, the switches, sky and shells.
+    // Lanes, rows of a lane, whether lanes hand splats round, the switches, sky, shells and billboards.
     const std::uint32_t lanes = gpu.tile_lanes;
-    const std::array<std::uint32_t, 8> values{lanes,
+    const std::array<std::uint32_t, 9> values{lanes,
                                               shader::kTileWidth * shader::kTileHeight / lanes,
                                               std::uint32_t(gpu.tiles_are_subgroups),
                                               std::uint32_t(switches[0]),
                                               std::uint32_t(switches[1]),
                                               std::uint32_t(variant.physical_sky),
                                               std::uint32_t(variant.shells),
-                                              std::uint32_t(variant.fog)};
+                                              std::uint32_t(variant.fog),
+                                              std::uint32_t(variant.puffs)};
     std::array<vk::SpecializationMapEntry, values.size()> entries;
     for (std::uint32_t i = 0; i < entries.size(); ++i) entries[i] = vk::SpecializationMapEntry(i, 4 * i, 4);
     const vk::SpecializationInfo constants(entries.size(), entries.data(), sizeof values, values.data());

@@ -54,6 +54,7 @@ struct ShaderVariant {
     bool physical_sky = false;  // 5, whatever includes air.glsl
     bool shells = false;        // 6, whatever includes shells.glsl
     bool fog = false;           // 7, likewise
+    bool puffs = false;         // 8, compute shaders that draw splats: some are T's billboards
     bool operator==(const ShaderVariant&) const = default;
 };
 

@@ -7,11 +7,10 @@
 #include "render/puff_textures.h"
 
 namespace nephos {
-namespace {
 
 // As 16-bit floats: software devices filter bytes to bytes, which adds up where many billboards lie behind
 // each other.
-GpuImage upload_puffs(const GpuDevice& gpu) {
+GpuImage upload_puff_textures(const GpuDevice& gpu) {
     const std::vector<PuffLevel>& levels = puff_textures();
     constexpr std::uint32_t kLayers = kPuffKinds * kPuffVariants;
     GpuImage image = create_image(gpu, kPuffTexels, kPuffTexels, kLayers, vk::Format::eR16G16Sfloat,
@@ -47,8 +46,6 @@ GpuImage upload_puffs(const GpuDevice& gpu) {
     return image;
 }
 
-}  // namespace
-
 PuffPass::PuffPass(const GpuDevice& gpu, const PipelineLayout& layout,
                    std::span<const vk::Format> attachments, const GpuBuffer& frame,
                    const ShaderVariant& variant)
@@ -74,7 +71,7 @@ void PuffPass::use_clouds(const GpuDevice& gpu, std::span<const shader::PuffClou
 
 void PuffPass::use_puffs(const GpuDevice& gpu, std::span<const shader::Puff> puffs) {
     if (!puffs.empty() && textures_.width == 0) {
-        textures_ = upload_puffs(gpu);
+        textures_ = upload_puff_textures(gpu);
         for (const std::uint32_t binding : {3u, 4u}) bind_image(gpu, bindings_, binding, textures_, sampler_);
         if (!physical_sky_) bind_image(gpu, bindings_, 11, textures_, sampler_);
     }

@@ -12,6 +12,9 @@
 
 namespace nephos {
 
+// The pictures of puff_textures.h; all levels, readable by shaders.
+GpuImage upload_puff_textures(const GpuDevice& gpu);
+
 class PuffPass {
   public:
     // `attachments` are those of the view pass, `frame` its buffer of shader::Frame.

@@ -312,9 +312,12 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
     const GpuImage& map = light_on_device().shadow_map();
     const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
                                         splats.time_s, fog_noise, kept_shade);
+    const bool tiles = splatting == Splatting::tiles;
     const auto prepared = [&](auto& passes) -> auto& {
-        const ShaderVariant variant{
-            .physical_sky = sky != nullptr, .shells = shells.any(), .fog = shells.has_fog()};
+        const ShaderVariant variant{.physical_sky = sky != nullptr,
+                                    .shells = shells.any(),
+                                    .fog = shells.has_fog(),
+                                    .puffs = tiles && !order.puffs.empty()};
         auto& pass = passes[variant.physical_sky ? 1 : 0][shells.has_fog() ? 2 : shells.any() ? 1 : 0];
         if (!pass) pass.emplace(gpu, layout, attenuation_on_device(), clamped, variant);
         if (sky != nullptr) pass->use_sky(gpu, image_of(*sky), clamped);
@@ -323,8 +326,8 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
         if (shells.any()) pass->use_shells(gpu, shells, order);
         return *pass;
     };
-    if (order.puffs.empty() && splatting == Splatting::tiles) {
-        ViewTiles& pass = prepared(view_tiles);
+    if (tiles) {
+        ViewTiles& pass = prepared(view_tiles[order.puffs.empty() ? 0 : 1]);
         for (const PartFrame& part : parts)
             pass.draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
         return;

@@ -33,8 +33,7 @@ enum class Splatting {
     automatic,   // processor on a device of type CPU, else tiles
     processor,   // vectors on the processor, tile by tile, front to back
     tiles,       // compute shaders, tile by tile, front to back: fast
-    billboards,  // blended billboards with attenuation textures, back to front, as D has it: the reference,
-                 // and on a graphics card what draws pictures that hold T's billboards
+    billboards,  // blended billboards with attenuation textures, back to front, as D has it: the reference
 };
 
 // Where Splatting::tiles has the order of the metaballs and the lists of the tiles made; the picture is the

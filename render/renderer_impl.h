@@ -76,7 +76,7 @@ struct Renderer::Impl {
     GpuBuffer scattering_buffer;  // its copy on the device
     std::optional<LightTiles> light_tiles;
     // Without and with the physical sky; without shells of air, with them, and with fog in them.
-    std::optional<ViewTiles> view_tiles[2][3];
+    std::optional<ViewTiles> view_tiles[2][2][3];  // the first index: without and with billboards
     std::optional<ViewPass> view_pass[2][3];
     std::optional<ListedView> listed_view;
     bool cloud_on_device = false;  // in listed_view, with its light

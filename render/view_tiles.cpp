@@ -2,9 +2,11 @@
 #include "render/view_tiles.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <span>
 
+#include "render/puff_pass.h"
 #include "render/screen_box.h"
 #include "render/view_pass.h"
 
@@ -13,6 +15,10 @@ namespace {
 
 constexpr std::size_t kMaxBalls = std::size_t{1} << 20;    // on the device at once: 52 MiB with their splats
 constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of the tiles' lists: 64 MiB
+
+// lavapipe (Mesa 22.3) leaves all loops of a shader after 65,535 turns in all. Where there are billboards, a
+// splat takes up to three.
+constexpr std::size_t kMaxInLoops = 20'000;
 
 std::size_t groups(std::size_t invocations) {
     return (invocations + shader::kComputeGroup - 1) / shader::kComputeGroup;
@@ -37,6 +43,9 @@ ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const G
     bind_buffer(gpu, bindings_, 0, frame_);
     bind_buffer(gpu, bindings_, 15, no_parts_);
     for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
+    if (!variant.puffs) return;
+    puff_textures_ = upload_puff_textures(gpu);
+    bind_image(gpu, bindings_, 3, puff_textures_, sampler);
 }
 
 void ViewTiles::use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler) {
@@ -57,10 +66,11 @@ void ViewTiles::use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
 }
 
 const vk::raii::Pipeline& ViewTiles::tiles_for(const GpuDevice& gpu, const EyeOrder& order) {
-    vk::raii::Pipeline& pipeline = tiles_[order.all_fitted ? 0 : 1][order.depth ? 1 : 0];
+    const bool mixed = !order.all_fitted || variant_.puffs;
+    vk::raii::Pipeline& pipeline = tiles_[mixed ? 1 : 0][order.depth ? 1 : 0];
     if (!*pipeline)
-        pipeline = create_tile_pipeline(gpu, *layout_, shaders().view_tiles_comp,
-                                        {!order.all_fitted, order.depth}, variant_);
+        pipeline =
+            create_tile_pipeline(gpu, *layout_, shaders().view_tiles_comp, {mixed, order.depth}, variant_);
     return pipeline;
 }
 
@@ -94,7 +104,7 @@ void ViewTiles::draw_between_shells(const vk::raii::CommandBuffer& commands, con
 
 void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order,
                            std::size_t begin, std::size_t end) {
-    const bool last = end == order.balls.size();
+    const bool last = end == order.balls.size() + order.puffs.size();
     shader::TileStep step{.width = shader::uint(grid.width),
                           .height = shader::uint(grid.height),
                           .tiles_x = shader::uint(grid.columns()),
@@ -128,6 +138,27 @@ void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const Eye
     });
 }
 
+void ViewTiles::upload_splats(const GpuDevice& gpu, const EyeOrder& order,
+                              std::span<const std::uint32_t> splats) {
+    static_assert(sizeof(shader::Puff) == sizeof(shader::ViewBall) &&
+                  sizeof(shader::PuffCloud) == sizeof(shader::ViewBall));
+    std::vector<shader::ViewBall> all;
+    all.reserve(splats.size() + (variant_.puffs ? order.clouds.size() : 0));
+    for (const std::uint32_t splat : splats) {
+        if ((splat & kPuffSplat) == 0) {
+            all.push_back(order.balls[splat]);
+        } else {
+            shader::Puff puff = order.puffs[splat & ~kPuffSplat];
+            puff.cloud = puff.cloud << 4 | shader::kPuffFlag;
+            all.push_back(std::bit_cast<shader::ViewBall>(puff));
+        }
+    }
+    if (variant_.puffs)
+        for (const shader::PuffCloud& cloud : order.clouds)
+            all.push_back(std::bit_cast<shader::ViewBall>(cloud));
+    upload(gpu, bindings_, 1, balls_, std::as_bytes(std::span(all)));
+}
+
 void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, const CameraFrame& camera,
                           const shader::Frame& frame, const Tile& tile, const EyeOrder& order,
                           Picture& picture) {
@@ -137,17 +168,19 @@ void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, co
     reserve(gpu, bindings_, 8, radiance_, 4 * sizeof(float) * pixels, HostAccess::read);
     reserve(gpu, bindings_, 9, depth_, sizeof(float) * pixels, HostAccess::read);
 
-    const std::vector<PixelBox> boxes = screen_boxes(order, camera, options.camera, tile);
-    std::vector<shader::ViewBall> balls;
+    const std::vector<std::uint32_t> splats = splats_near_to_far(order);
+    const std::vector<PixelBox> boxes = screen_boxes(order, camera, options.camera, tile, splats);
+    const bool software = gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu;
+    const std::size_t most = variant_.puffs && software ? kMaxInLoops : kMaxBalls;
     std::size_t begin = 0;
     next_shell_ = 0;
     do {  // once even without any ball, for the background
-        const std::size_t end = end_of_batch(boxes, begin, grid, kMaxBalls, kMaxEntries);
-        balls.assign(order.balls.rbegin() + std::ptrdiff_t(begin),
-                     order.balls.rbegin() + std::ptrdiff_t(end));
-        upload(gpu, bindings_, 1, balls_, std::as_bytes(std::span(balls)));
-        reserve(gpu, bindings_, 2, splats_, sizeof(shader::ViewSplat) * balls.size(), HostAccess::none);
-        reserve(gpu, bindings_, 7, tails_, sizeof(shader::uint) * balls.size(), HostAccess::none);
+        const std::size_t end = end_of_batch(boxes, begin, grid, most, kMaxEntries);
+        const std::size_t count = end - begin;
+        upload_splats(gpu, order, std::span(splats).subspan(begin, count));
+        reserve(gpu, bindings_, 2, splats_, sizeof(shader::ViewSplat) * count * (variant_.puffs ? 5 : 1),
+                HostAccess::none);
+        reserve(gpu, bindings_, 7, tails_, sizeof(shader::uint) * count, HostAccess::none);
         const TileBins bins = bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid);
         upload(gpu, bindings_, 5, ranges_, std::as_bytes(std::span(bins.ranges)));
         upload(gpu, bindings_, 6, list_, std::as_bytes(std::span(bins.list)));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Step 2 of D in compute shaders: the fast path. Metaballs are binned into tiles of 8x16 pixels and added up
-// front to back, with a polynomial instead of a texture for their attenuation, until a tile is opaque. The
-// same picture as that of the blended billboards (view_pass.h), which remain as the reference. Private to the
-// module.
+// Step 2 of D in compute shaders: the fast path. Metaballs, and T's billboards, are binned into tiles of 8x16
+// pixels and added up front to back, with a polynomial instead of a texture for their attenuation, until a
+// tile is opaque. The same picture as that of the blended billboards (view_pass.h), which remain as the
+// reference. Private to the module.
 
 #include "render/camera.h"
 #include "render/eye_order.h"
@@ -17,7 +17,8 @@ namespace nephos {
 
 class ViewTiles {
   public:
-    // `attenuation` is not read, but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
+    // For orders with billboards if `variant` has puffs, else for those without. `attenuation` is not read,
+    // but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
     ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
               const vk::raii::Sampler& sampler, const ShaderVariant& variant);
 
@@ -37,9 +38,11 @@ class ViewTiles {
 
   private:
     const vk::raii::Pipeline& tiles_for(const GpuDevice& gpu, const EyeOrder& order);
-    // `begin`, `end`: metaballs, nearest first.
+    // `begin`, `end`: splats, nearest first.
     void draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order, std::size_t begin,
                     std::size_t end);
+    // Metaballs and billboards of a batch, and the clouds of the latter, in one buffer.
+    void upload_splats(const GpuDevice& gpu, const EyeOrder& order, std::span<const std::uint32_t> splats);
     void draw_between_shells(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& tiles,
                              const shader::TileStep& step, std::size_t begin, std::size_t end, bool last);
 
@@ -49,6 +52,7 @@ class ViewTiles {
     // [some are not fitted][with distances]; made when they are needed.
     vk::raii::Pipeline tiles_[2][2] = {{nullptr, nullptr}, {nullptr, nullptr}};
     Bindings bindings_;
+    GpuImage puff_textures_;  // empty without puffs
     GpuBuffer frame_, balls_, splats_, ranges_, tails_, list_, radiance_, depth_;
     GpuBuffer no_parts_;  // binding 15 must be bound, used or not
     ShellBuffers shells_;

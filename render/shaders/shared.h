@@ -42,6 +42,7 @@ NEPHOS_CONST float kMaxFittedDepth = 6.0f;    // depth scale; denser metaballs a
 NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance at which what lies behind is left out
 NEPHOS_CONST uint kIntegrate = 1u;    // flag: evaluate the integral along the ray, do not use the textures
 NEPHOS_CONST uint kNotFitted = 4u;    // flag: the tiles evaluate the integral, whatever the billboards do
+NEPHOS_CONST uint kPuffFlag = 8u;    // flag, of no metaball: a Puff, see project_puff.glsl
 NEPHOS_CONST uint kAround = 2u;       // flag: around or close to the eye, covers the whole picture
 NEPHOS_CONST uint kSkyColumns = 64u;  // of the tables of the sky (atmosphere.h)
 NEPHOS_CONST uint kSkyRows = 96u;

@@ -23,11 +23,17 @@ layout(set = 0, binding = 7, std430) writeonly buffer Tails {
 layout(push_constant) uniform Step {
     TileStep step;
 };
+layout(constant_id = 8) const bool kPuffs = false;  // some splats are T's billboards
+#include "project_puff.glsl"
 
 void main() {
     uint index = gl_GlobalInvocationID.y * (32768u * kComputeGroup) + gl_GlobalInvocationID.x;
     if (index >= step.tile_count) return;
     ViewBall ball = balls[index];
+    if (kPuffs && (ball.flags & kPuffFlag) != 0u) {
+        project_puff(index);
+        return;
+    }
     vec3 centre = vec3(ball.x, ball.y, ball.z);
     float distance = length(centre);
     float radius = drawn_radius(ball, distance);

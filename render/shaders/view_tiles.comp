@@ -36,6 +36,7 @@ layout(set = 0, binding = 9, std430) buffer Depth {
 // with a mask on every value that the loop changes.
 layout(constant_id = 3) const bool kMixed = false;
 layout(constant_id = 4) const bool kDistances = true;
+layout(constant_id = 8) const bool kPuffs = false;  // some splats are T's billboards
 
 float red[kRows], green[kRows], blue[kRows], mean_distance[kRows], transmittance[kRows];
 float per_square[kRows];  // 1 / |direction|^2 of each pixel
@@ -161,6 +162,8 @@ void add_all(TileRange range, vec2 pixel) {
     }
 }
 
+#include "add_puff.glsl"
+
 // The first entry from `begin` on whose splat is not nearer than the one with this number.
 uint entry_of(uint splat, TileRange range) {
     uint begin = range.begin, end = range.end;
@@ -202,7 +205,11 @@ void main() {
         vec3 direction = pixel_direction(pixel + vec2(0.0, float(row)));
         per_square[row] = 1.0 / dot(direction, direction);
     }
-    add_all(range, pixel);
+    if (kPuffs) {
+        add_all_and_puffs(range, pixel);
+    } else {
+        add_all(range, pixel);
+    }
     [[unroll]] for (uint row = 0u; row < kRows; ++row) {
         uint y = first.y + row;
         if (first.x < step.width && y < step.height) {

@@ -21,7 +21,6 @@
 namespace nephos {
 namespace {
 
-// In the ways that have billboards.
 class BillboardTest : public test::EveryWay {};
 
 RenderOptions view(Vec3 from, Vec3 to, int width = 65, int height = 65, double fov = 40) {
@@ -301,7 +300,8 @@ TEST_P(BillboardTest, BadBillboardsAreRefusedByNumber) {
     EXPECT_EQ(message([&](CloudBillboard& b) { b.cloud = 2; }), "billboard 1: expected the index of a cloud");
 }
 
-INSTANTIATE_TEST_SUITE_P(Ways, BillboardTest, ::testing::Values(Splatting::processor, Splatting::billboards),
+INSTANTIATE_TEST_SUITE_P(Ways, BillboardTest,
+                         ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
                          test::way_name);
 
 // Every level is dark in its outermost texels, hides as much as the finest, and is no brighter than opaque.
