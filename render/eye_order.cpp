@@ -2,11 +2,13 @@
 #include "render/eye_order.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <string>
 
+#include <hwy/base.h>
 #include <hwy/cache_control.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -29,19 +31,17 @@ constexpr float kLargestBillboard_m = 60000;  // half of it is a 16-bit float
 bool finite(const Vec3& v) { return std::isfinite(v.x + v.y + v.z); }
 bool within(float value, float min, float max) { return value >= min && value <= max; }
 
-void check(const CloudBillboard& billboard, std::size_t index, std::size_t clouds) {
-    const auto require = [&](bool good, const char* expected) {
-        if (!good) fail("billboard", index, expected);
-    };
-    require(finite(billboard.centre_m), "a finite centre");
-    require(billboard.width_m > 0 && billboard.height_m > 0 && billboard.width_m <= kLargestBillboard_m &&
-                billboard.height_m <= kLargestBillboard_m,
-            "sizes above 0 and at most 60000 m");
-    require(within(billboard.sun_absorbed, 0, 1) && within(billboard.flash_absorbed, 0, 1),
-            "absorbed light from 0 to 1");
-    require(within(billboard.opacity, 0, 1), "an opacity from 0 to 1");
-    require(std::size_t(billboard.texture) < kPuffKinds, "a texture of PuffTexture");
-    require(billboard.cloud < clouds, "the index of a cloud");
+// What a billboard lacks; null if it is as splats.h wants it.
+const char* wanted(const CloudBillboard& billboard, std::size_t clouds) {
+    if (!finite(billboard.centre_m)) return "a finite centre";
+    if (!(billboard.width_m > 0 && billboard.height_m > 0 && billboard.width_m <= kLargestBillboard_m &&
+          billboard.height_m <= kLargestBillboard_m))
+        return "sizes above 0 and at most 60000 m";
+    if (!within(billboard.sun_absorbed, 0, 1) || !within(billboard.flash_absorbed, 0, 1))
+        return "absorbed light from 0 to 1";
+    if (!within(billboard.opacity, 0, 1)) return "an opacity from 0 to 1";
+    if (std::size_t(billboard.texture) >= kPuffKinds) return "a texture of PuffTexture";
+    return billboard.cloud < clouds ? nullptr : "the index of a cloud";
 }
 
 std::uint32_t unorm16(float value) { return std::uint32_t(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f); }
@@ -88,16 +88,23 @@ class Collector {
 
     void add_billboards() {
         const auto first = std::uint32_t(cloud_.visible.size());
-        for (std::size_t i = 0; i < splats_.billboards.size(); ++i)
-            check(splats_.billboards[i], i, splats_.clouds.size());
+        std::atomic<std::size_t> first_bad = splats_.billboards.size();
         by_distance_.add_all(
-            first, splats_.billboards.size(), [this, first](std::uint32_t i, float& distance) {
+            first, splats_.billboards.size(), [this, first, &first_bad](std::uint32_t i, float& distance) {
                 const CloudBillboard& billboard = splats_.billboards[i - first];
+                if (wanted(billboard, splats_.clouds.size()) != nullptr) {
+                    std::size_t known = first_bad;
+                    while (i - first < known && !first_bad.compare_exchange_weak(known, i - first)) {
+                    }
+                    return false;
+                }
                 if (above_ground_ && billboard.centre_m.z < ground_m_) return false;
                 if (!(drawn(billboard).opacity > 0)) return false;
                 return sees(billboard.centre_m, 0.5 * std::max(billboard.width_m, billboard.height_m), 1.4143,
                             double(shader::kMinPuffPixels), distance);
             });
+        if (first_bad < splats_.billboards.size())
+            fail("billboard", first_bad, wanted(splats_.billboards[first_bad], splats_.clouds.size()));
     }
 
     EyeOrder order() {
@@ -137,11 +144,16 @@ class Collector {
     bool is_ball(std::uint32_t index) const { return index < cloud_.visible.size(); }
     std::uint32_t from_far(std::size_t i) const { return by_distance_[by_distance_.size() - 1 - i]; }
 
-    // Splats of an order lie anywhere in memory.
-    void prefetch(std::uint32_t source) const {
-        if (!is_ball(source)) return;
-        hwy::Prefetch(&cloud_.metaballs[cloud_.visible[source]]);
-        hwy::Prefetch(&cloud_.depth_scale[source]);
+    // Splats of an order lie anywhere in memory. Inline: GCC drops calls of functions that only prefetch.
+    HWY_INLINE void prefetch(std::uint32_t source) const {
+        if (is_ball(source)) {
+            hwy::Prefetch(&cloud_.metaballs[cloud_.visible[source]]);
+            hwy::Prefetch(&cloud_.depth_scale[source]);
+        } else {
+            const CloudBillboard& billboard = splats_.billboards[source - cloud_.visible.size()];
+            hwy::Prefetch(&billboard);
+            hwy::Prefetch(&billboard.cloud);
+        }
     }
 
     // False if a metaball of the part is not fitted.
