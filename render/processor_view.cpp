@@ -140,6 +140,8 @@ HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileS
     constexpr std::size_t kAtOnce = 8;  // between two looks at the sums
     const Layout layout;
     if (tile.list.empty() || is_opaque(sums, layout.lanes)) return {};
+    for (const std::uint32_t splat : tile.list.first(std::min(kAtOnce, tile.list.size())))
+        hwy::Prefetch(&scene.balls[splat]);
     const bool shells = kColours && !scene.before_shells.empty();
     TileRays rays(*scene.frame, tile, shells || !scene.exact.empty());
     if (shells) set_shell_offsets(*scene.frame, tile, rays);
