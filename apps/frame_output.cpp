@@ -33,12 +33,10 @@ FrameOutput::FrameOutput(const RunSettings& settings, std::function<void(const F
     : settings_(settings),
       folder_{settings.folder, settings.scene.name},
       done_(std::move(done)),
-      renderer_(settings.render ? std::make_unique<Renderer>() : nullptr),
+      renderer_(settings.render ? std::make_unique<Renderer>(settings.device) : nullptr),
       writing_(kWriting, several_threads(), [this](Drawn& drawn) { write(drawn); }),
-      drawing_(kDrawing, several_threads() && settings.render, [this](FrameResult& frame) {
-          Picture picture = draw(frame);
-          writing_.add({std::move(frame), std::move(picture)});
-      }) {}
+      drawing_(kDrawing, several_threads() && settings.render,
+               [this](FrameResult& frame) { draw_next(frame); }) {}
 
 std::string FrameOutput::device_name() const { return renderer_ ? renderer_->device_name() : ""; }
 
@@ -160,10 +158,10 @@ std::vector<Metaball> FrameOutput::metaballs_of(const FrameResult& frame) const 
     return balls;
 }
 
-Picture FrameOutput::draw(const FrameResult& frame) {
+FrameOutput::Begun FrameOutput::begin(FrameResult& frame) {
     const Scene& scene = settings_.scene;
     const double radius = scene.density.metaball_radius_cells;
-    const std::vector<Metaball> balls = metaballs_of(frame);
+    std::vector<Metaball> balls = metaballs_of(frame);
     const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
     std::vector<SkyLayer> layers;
     for (const LayerFrame& layer : frame.layers) {
@@ -171,10 +169,33 @@ Picture FrameOutput::draw(const FrameResult& frame) {
     }
     std::optional<GroundCoverView> ground;
     if (frame.ground) ground = view_of(*frame.ground);
-    Picture picture = painter_.draw(*renderer_, cloud, layers, scene.render, frame.time_s, scene.frames.exr,
-                                    ground, weather_of(scene, frame.layers, frame.time_s));
+    PendingSkyPicture picture =
+        painter_.begin(*renderer_, cloud, layers, scene.render, frame.time_s, scene.frames.exr, ground,
+                       weather_of(scene, frame.layers, frame.time_s));
+    return {std::move(frame), std::move(balls), std::move(picture)};
+}
+
+// Hands on the picture before once this one is begun, and this one, too, unless the next frame is there.
+void FrameOutput::draw_next(FrameResult& frame) {
+    std::optional<Begun> next;
+    try {
+        next.emplace(begin(frame));
+    } catch (...) {
+        finish_begun();
+        throw;
+    }
+    finish_begun();
+    begun_ = std::move(next);
+    if (!begun_->picture.picture.on_its_way() || !drawing_.is_awaited()) finish_begun();
+}
+
+void FrameOutput::finish_begun() {
+    if (!begun_) return;
+    Begun begun = std::move(*begun_);
+    begun_.reset();
+    Picture picture = painter_.finish(*renderer_, std::move(begun.picture));
     picture.light = {};  // no file has it
-    return picture;
+    writing_.add({std::move(begun.frame), std::move(picture)});
 }
 
 void FrameOutput::write_picture(const Drawn& drawn) const {

@@ -8,12 +8,14 @@
 // Drawing and writing have a thread each, so that the next step is simulated and the next picture drawn while
 // files are compressed and flushed to the device. Frames keep their order. At most kDrawing + kWriting frames
 // are under way (kWriting without pictures); scenes/memory.h reckons with them. Where oneTBB is limited to
-// one thread, everything happens in add().
+// one thread, everything happens in add(). While a graphics card draws a picture the next is prepared, if its
+// frame is there; that is one frame more.
 //
 // When a frame fails, those before it are still drawn to their end and written, those after it are dropped.
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,7 +55,16 @@ class FrameOutput {
         Picture picture;  // empty without pictures
     };
 
-    Picture draw(const FrameResult& frame);
+    // A frame whose picture was begun.
+    struct Begun {
+        FrameResult frame;
+        std::vector<Metaball> balls;
+        PendingSkyPicture picture;
+    };
+
+    void draw_next(FrameResult& frame);
+    Begun begin(FrameResult& frame);
+    void finish_begun();
     std::vector<Metaball> metaballs_of(const FrameResult& frame) const;
     void write(const Drawn& drawn) const;
     void write_density(const FrameResult& frame) const;
@@ -67,6 +78,7 @@ class FrameOutput {
     std::function<void(const FrameResult&)> done_;
     std::unique_ptr<Renderer> renderer_;
     SkyPainter painter_;
+    std::optional<Begun> begun_;  // of the thread that draws
     Stage<Drawn> writing_;
     Stage<FrameResult> drawing_;  // after writing_: ends before it
 };

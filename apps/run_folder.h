@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "apps/pipeline.h"
+#include "render/renderer.h"
 #include "scenes/scene.h"
 
 namespace nephos {
@@ -52,7 +53,8 @@ struct RunSettings {
     std::string scene_hash;          // of everything in the scene
     std::string simulation_hash;     // of what decides the automaton's bits
     PipelineRange range;
-    bool render = true;  // pictures too; needs a Vulkan device
+    bool render = true;      // pictures too; needs a Vulkan device
+    DeviceOptions device{};  // that draws them
     std::filesystem::path folder;
     bool resume = false;             // go on from the folder's checkpoint
     bool overwrite = false;          // start anew although the folder holds what would be lost

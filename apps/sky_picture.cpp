@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "apps/debug_view.h"
 #include "apps/simulation.h"
@@ -146,14 +147,21 @@ void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> c
 Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                          const RenderOptions& moving, double time_s, bool depth,
                          const std::optional<GroundCoverView>& ground_cover, const Weather& weather) {
+    return finish(renderer, begin(renderer, voxels, layers, moving, time_s, depth, ground_cover, weather));
+}
+
+PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& voxels,
+                                    std::span<const SkyLayer> layers, const RenderOptions& moving,
+                                    double time_s, bool depth,
+                                    const std::optional<GroundCoverView>& ground_cover,
+                                    const Weather& weather) {
     check(moving);
     RenderOptions options = moving;
     options.camera = camera_at(moving.camera, time_s);
     options.sun = sun_at(moving.sun, time_s);
     const bool rain = options.precipitation.enabled && !weather.curtains.empty();
     layers_.resize(layers.size());
-    drawn_.clouds.clear();
-    drawn_.billboards.clear();
+    DrawnClouds drawn;
     const std::optional<Flash> flash = flash_at(options.lightning, time_s);
     std::optional<Camera> mirrored;
     if (ground_cover && shows_reflections(options, *ground_cover)) {
@@ -162,20 +170,26 @@ Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::s
     }
     for (std::size_t i = 0; i < layers.size(); ++i) {
         const SkyLayer& layer = layers[i];
-        if (layer.direct) layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn_, true, mirrored);
+        if (layer.direct) layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn, true, mirrored);
     }
+    std::vector<std::vector<WorldLine>> lines;
+    for (const SkyLayer& layer : layers)
+        lines.push_back(debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun)));
     // Rain wants the depth of the clouds and their shadow.
     const bool all = depth || rain;
-    Picture picture = renderer.draw_splats(
-        {drawn_.clouds, drawn_.billboards, voxels, flash, time_s, all, all, ground_cover}, options);
+    PendingPicture picture = renderer.begin(
+        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all, all, ground_cover}, options);
     RenderOptions raining = moving;  // knows the camera's path itself
     raining.sun = options.sun;
-    precipitation_.draw(picture, raining, weather, time_s);
-    for (const SkyLayer& layer : layers) {
-        const std::vector<WorldLine> lines =
-            debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun));
-        draw_lines(picture, options.camera, lines);
-    }
+    return {std::move(picture), std::move(options), std::move(raining), weather, time_s,
+            std::move(lines),   std::move(drawn)};
+}
+
+Picture SkyPainter::finish(Renderer& renderer, PendingSkyPicture&& pending) {
+    Picture picture = renderer.finish(std::move(pending.picture));
+    precipitation_.draw(picture, pending.raining, pending.weather, pending.time_s);
+    for (const std::vector<WorldLine>& lines : pending.lines)
+        draw_lines(picture, pending.options.camera, lines);
     return picture;
 }
 

@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include "render/line_overlay.h"
 #include "render/options.h"
 #include "render/precipitation.h"
 #include "render/renderer.h"
@@ -69,6 +70,16 @@ struct SkyLayer {
     bool direct = true;  // draw them; false: only the debug view shows them
 };
 
+// A picture that was begun, and what is drawn over it.
+struct PendingSkyPicture {
+    PendingPicture picture;
+    RenderOptions options, raining;
+    Weather weather;
+    double time_s = 0;
+    std::vector<std::vector<WorldLine>> lines;  // of each layer
+    DrawnClouds drawn;                          // what `picture` refers to
+};
+
 // Draws pictures of skies, one after the other: keeps what they have in common. Not thread-safe.
 class SkyPainter {
   public:
@@ -80,9 +91,16 @@ class SkyPainter {
                  const RenderOptions& options, double time_s, bool depth = true,
                  const std::optional<GroundCoverView>& ground_cover = {}, const Weather& weather = {});
 
+    // The same in two steps, as Renderer::begin() and finish(): voxels and ground cover must stay as they are
+    // until the second. Pictures are finished in the order in which they were begun.
+    PendingSkyPicture begin(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
+                            const RenderOptions& options, double time_s, bool depth = true,
+                            const std::optional<GroundCoverView>& ground_cover = {},
+                            const Weather& weather = {});
+    Picture finish(Renderer& renderer, PendingSkyPicture&& pending);
+
   private:
     std::vector<SkyBillboards> layers_;
-    DrawnClouds drawn_;
     PrecipitationPainter precipitation_;
 };
 

@@ -50,13 +50,23 @@ class Stage {
     // Hands over a job; waits while the stage is full. Throws what the work threw, also for an earlier job.
     void add(Job job) {
         std::unique_lock lock(mutex_);
+        ++adding_;
         changed_.wait(lock, [this] { return failure_ || in_stage_ < bound_; });
+        --adding_;
         rethrow();
         if (!thread_.joinable()) return do_here(job);
         waiting_.push_back(std::move(job));
         ++in_stage_;
         lock.unlock();
         changed_.notify_all();
+    }
+
+    // Whether a job waits to be done, or for a place in the stage: for the work, which may leave something
+    // undone that the next job does with less effort.
+    bool is_awaited() {
+        if (!thread_.joinable()) return false;  // add() does the job
+        const std::scoped_lock lock(mutex_);
+        return !failure_ && (adding_ > 0 || !waiting_.empty());
     }
 
     // Throws what the work threw, if it did; does not wait.
@@ -119,6 +129,7 @@ class Stage {
     std::condition_variable changed_;
     std::deque<Job> waiting_;
     std::size_t in_stage_ = 0;  // waiting and being done
+    std::size_t adding_ = 0;    // that wait for a place
     bool ended_ = false;
     std::exception_ptr failure_;
     std::thread thread_;  // none when the jobs are done by add()

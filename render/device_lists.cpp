@@ -95,11 +95,13 @@ shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options,
 }
 
 bool DeviceLists::has_room(std::size_t balls, std::size_t tiles, std::size_t entries) const {
-    return balls <= ball_capacity_ && tiles <= tile_capacity_ && entries <= entry_capacity_;
+    return sums_.bytes != 0 && balls <= ball_capacity_ && tiles <= tile_capacity_ &&
+           entries <= entry_capacity_;
 }
 
 void DeviceLists::reserve_balls(const GpuDevice& gpu, std::size_t count) {
     constexpr std::size_t kWord = sizeof(shader::uint);
+    ball_capacity_ = 0;  // until all of them are there
     make(gpu, cloud_, count * sizeof(shader::CloudBall));
     make(gpu, flash_, count * kWord);
     make(gpu, balls_, count * sizeof(shader::ViewBall));
@@ -113,15 +115,16 @@ void DeviceLists::reserve_balls(const GpuDevice& gpu, std::size_t count) {
 
 void DeviceLists::reserve_entries(const GpuDevice& gpu, std::size_t count) {
     constexpr std::size_t kWord = sizeof(shader::uint);
+    entry_capacity_ = 0;
     for (GpuBuffer* each : {&entries_.keys[0], &entries_.keys[1], &entries_.values[0], &entries_.values[1]})
         make(gpu, *each, count * kWord);
     entry_capacity_ = count;
 }
 
 bool DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t tiles, std::size_t entries) {
-    if (counts_.bytes != 0 && has_room(balls, tiles, entries)) return false;
+    if (has_room(balls, tiles, entries)) return false;
     constexpr std::size_t kWord = sizeof(shader::uint);
-    if (counts_.bytes == 0) {
+    if (parts_.bytes == 0) {
         make(gpu, counts_, sizeof(shader::OrderCounts), vk::BufferUsageFlagBits::eIndirectBuffer);
         make(gpu, parts_, sizeof(shader::ViewPart) * (shader::kMaxShells + 1),
              vk::BufferUsageFlagBits::eIndirectBuffer);
@@ -132,11 +135,13 @@ bool DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t t
     if (balls > ball_capacity_) reserve_balls(gpu, whole_blocks(balls));
     if (entries > entry_capacity_) reserve_entries(gpu, whole_blocks(entries));
     if (tiles > tile_capacity_) {
+        tile_capacity_ = 0;
         make(gpu, ranges_, tiles * sizeof(shader::TileRange));
         tile_capacity_ = tiles;
     }
     const std::size_t numbers = std::max(ball_capacity_, digits_in_table(entry_capacity_));
-    if (numbers * kWord > table_.bytes) {
+    if (numbers * kWord > table_.bytes || sums_.bytes == 0) {
+        sums_ = {};
         make(gpu, table_, numbers * kWord);
         make(gpu, sums_, blocks_of(numbers) * kWord);
     }

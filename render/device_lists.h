@@ -54,7 +54,6 @@ class DeviceLists {
     // Makes room; true if buffers are others than before, and sets must be bound anew. Nothing may use the
     // old ones any more.
     bool reserve(const GpuDevice& gpu, std::size_t balls, std::size_t tiles, std::size_t entries);
-    // Room for less is not enough.
     bool has_room(std::size_t balls, std::size_t tiles, std::size_t entries) const;
 
     // Four sets for each picture that is on its way.

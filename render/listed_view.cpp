@@ -135,7 +135,7 @@ void ListedView::abandon(const Picture& picture) noexcept {
         slot->wait_quietly(gpu_);
     }
     std::erase(too_many_, &picture);
-    ordered_ = nullptr;
+    std::erase_if(failures_, [&](const Failure& each) { return each.picture == &picture; });
 }
 
 ListedView::Pipelines& ListedView::pipelines_for(const ShaderVariant& variant) {
@@ -161,20 +161,20 @@ void ListedView::upload(const GpuBuffer& to, std::span<const std::byte> bytes) {
 }
 
 void ListedView::use_cloud(std::span<const shader::CloudBall> balls) {
-    for (const std::unique_ptr<Slot>& slot : slots_) complete(*slot);
+    settle();
     balls_ = balls.size();
     lists_.reserve(gpu_, balls_, 1, std::min(4 * balls_, limits.entries));
     upload(lists_.cloud(), std::as_bytes(balls));
 }
 
 void ListedView::use_flash(std::span<const shader::uint> shares) {
-    for (const std::unique_ptr<Slot>& slot : slots_) complete(*slot);
+    settle();
     upload(lists_.flash(), std::as_bytes(shares));
 }
 
 void ListedView::use_shade(std::span<const std::uint32_t> words, std::uint64_t serial) {
     if (shade_.bytes != 0 && serial == shade_serial_) return;
-    for (const std::unique_ptr<Slot>& slot : slots_) complete(*slot);
+    settle();
     const std::size_t bytes = std::max<std::size_t>(words.size_bytes(), 4);
     if (shade_.bytes < bytes) {
         shade_ = {};
@@ -318,10 +318,28 @@ ListedView::Lists ListedView::read_lists(const Tile& tile) {
     return lists;
 }
 
+void ListedView::settle(Slot& slot) noexcept {
+    const Picture* const picture = slot.picture;
+    try {
+        complete(slot);
+    } catch (...) {
+        failures_.push_back({picture, std::current_exception()});
+    }
+}
+
+void ListedView::settle() noexcept {
+    for (const std::unique_ptr<Slot>& slot : slots_) settle(*slot);
+}
+
 bool ListedView::finish(const Picture& picture) {
     for (const std::unique_ptr<Slot>& slot : slots_)
-        if (slot->picture == &picture) complete(*slot);
-    ordered_ = nullptr;
+        if (slot->picture == &picture) settle(*slot);
+    const auto failed = std::ranges::find(failures_, &picture, &Failure::picture);
+    if (failed != failures_.end()) {
+        const std::exception_ptr what = failed->what;
+        abandon(picture);
+        std::rethrow_exception(what);
+    }
     return std::erase(too_many_, &picture) == 0;
 }
 
@@ -343,10 +361,10 @@ void ListedView::reserve(const Tile& tile, Slot& slot) {
 }
 
 void ListedView::begin_tile(const ListedPicture& what, const shader::Frame& frame, const Tile& tile,
-                            Picture& picture) {
+                            Picture& picture, bool first) {
     Slot& slot = *slots_[next_];
     next_ = (next_ + 1) % slots_.size();
-    complete(slot);
+    settle(slot);
     reserve(tile, slot);
     pipelines_for(what.variant).prepare(gpu_, layout_, what.depth);
     slot.what = what;
@@ -355,7 +373,7 @@ void ListedView::begin_tile(const ListedPicture& what, const shader::Frame& fram
     write(gpu_, slot.order_frame, what.order);
     if (what.shells != nullptr) write(gpu_, slot.shells, *what.shells);
     slot.what.shells = nullptr;  // it is there
-    slot.with_order = ordered_ != &picture;
+    slot.with_order = first || ordered_ != &picture;
     submit(slot);
     slot.picture = &picture;
     ordered_ = &picture;

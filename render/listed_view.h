@@ -9,6 +9,7 @@
 // commands and buffers to read back of its own; what the passes hand to each other is shared, as the device
 // takes one after the other.
 
+#include <exception>
 #include <memory>
 #include <span>
 #include <vector>
@@ -41,19 +42,22 @@ class ListedView {
     ListedView(const ListedView&) = delete;
     ListedView& operator=(const ListedView&) = delete;
 
-    // What is drawn from now on; what is on its way is waited for.
+    // What is drawn from now on; what is on its way is settled first.
     void use_cloud(std::span<const shader::CloudBall> balls);
     // Share of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> shares);
     // Shade map of the shells and noise of the fog (air_shells.h), unless these are there already.
     void use_shade(std::span<const std::uint32_t> words, std::uint64_t serial);
 
-    // Begins to draw a tile into `picture`, which must stay where it is until it is finished.
-    void begin_tile(const ListedPicture& what, const shader::Frame& frame, const Tile& tile,
-                    Picture& picture);
+    // Begins to draw a tile into `picture`, which must stay where it is until it is finished. `first`: of it.
+    void begin_tile(const ListedPicture& what, const shader::Frame& frame, const Tile& tile, Picture& picture,
+                    bool first);
     // Waits for the tiles of a picture and stores their pixels. False if one of them has more entries than
-    // the lists may have: nothing of that tile is drawn.
+    // the lists may have: nothing of that tile is drawn. Throws what failed while the picture was on its way.
     bool finish(const Picture& picture);
+    // Does so for all tiles that are on their way; what fails is kept for finish(). Before anything changes
+    // that they look at.
+    void settle() noexcept;
     // Waits for the tiles of a picture that nobody wants any more.
     void abandon(const Picture& picture) noexcept;
     // Waits for everything that is on its way; its pixels are stored by finish().
@@ -76,6 +80,7 @@ class ListedView {
     struct Slot;
     void reserve(const Tile& tile, Slot& slot);
     void complete(Slot& slot);
+    void settle(Slot& slot) noexcept;
     void submit(Slot& slot);
     void record(const vk::raii::CommandBuffer& commands, Slot& slot);
     void record_view(const vk::raii::CommandBuffer& commands, Slot& slot);
@@ -98,6 +103,11 @@ class ListedView {
     std::size_t next_ = 0;
     const Picture* ordered_ = nullptr;      // whose order is on the device; null: it may be another's
     std::vector<const Picture*> too_many_;  // not drawn: too many entries
+    struct Failure {
+        const Picture* picture;
+        std::exception_ptr what;
+    };
+    std::vector<Failure> failures_;
 };
 
 }  // namespace nephos

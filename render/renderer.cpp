@@ -6,6 +6,7 @@
 #include <cstring>
 #include <new>
 #include <optional>
+#include <utility>
 
 #include "automaton/available_memory.h"
 #include "automaton/error.h"
@@ -68,6 +69,15 @@ PictureAir air_of(const SkyLight& sky) {
     return air;
 }
 
+template <class Work>
+decltype(auto) with_drawing_errors(Work&& work) {
+    try {
+        return with_gpu_errors("drawing", std::forward<Work>(work));
+    } catch (const std::bad_alloc&) {
+        throw Error(ErrorCode::usage, "not enough memory for a picture of this size");
+    }
+}
+
 CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats) {
     CloudHeights heights{cloud.base_m, cloud.top_m};
     bool some = !cloud.visible.empty();
@@ -113,6 +123,7 @@ LightTiles& Renderer::Impl::light_on_device() {
 
 // D, step 1, in compute shaders.
 void Renderer::Impl::pass_sunlight(LitCloud& kept) {
+    settle();
     const SunOrder order = order_from_sun(kept.cloud, kept.frame, kept.shadow_size);
     if (kept.cloud.visible.empty()) {  // on the device the smallest map will do
         std::vector<float> small;
@@ -167,6 +178,7 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
 }
 
 void Renderer::Impl::put_map_on_device() {
+    settle();
     light_on_device().use(gpu, lit.shadow, lit.shadow_size);
     map_on_device = lit.key;
 }
@@ -174,6 +186,7 @@ void Renderer::Impl::put_map_on_device() {
 // Makes the table anew when the light is another one.
 void Renderer::Impl::use_scattering(const CloudLight& light) {
     if (!scattering.empty() && light == scattering_light) return;
+    settle();
     scattering = scattering_table(light);
     scattering_light = light;
     const std::size_t bytes = scattering.size() * sizeof(float);
@@ -181,13 +194,15 @@ void Renderer::Impl::use_scattering(const CloudLight& light) {
     write(gpu, scattering_buffer, std::as_bytes(std::span(scattering)));
 }
 
-Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail) {
+void Renderer::Impl::begin(Drawing& drawing) {
+    const Splats& splats = drawing.splats;
+    const RenderOptions& options = drawing.options;
     const CameraFrame camera = camera_frame(options.camera);
-    Picture picture = blank_picture(options);
+    Picture& picture = drawing.picture = blank_picture(options);
     {
         const StageTimer timer(&times, DrawStage::prepare);
         // The key says nothing of the view, from which others may be merged.
-        if (!keep_cloud(lit, splats.metaballs, options, detail)) {
+        if (!keep_cloud(lit, splats.metaballs, options, drawing.detail)) {
             map_on_device.reset();
             light_changed();
         }
@@ -207,10 +222,26 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
             parts.back().frame.scattering = scattering.data();
         }
     }
-    if (!uses_lists(splats, camera) || !draw_listed(splats, options, camera, parts, picture))
+    if (uses_lists(drawing, camera))
+        begin_listed(drawing, camera, parts);
+    else
         draw_ordered(splats, options, camera, parts, picture);
     if (splats.light) hand_out_light(splats, options, picture);
-    return picture;
+}
+
+void Renderer::Impl::finish(Drawing& drawing) {
+    if (drawing.view == nullptr) return;
+    if (std::exchange(drawing.view, nullptr)->finish(drawing.picture)) return;
+    drawing.too_much = true;
+    begin(drawing);
+}
+
+Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail) {
+    Drawing drawing(splats, options);
+    drawing.detail = detail;
+    begin(drawing);
+    finish(drawing);
+    return std::move(drawing.picture);
 }
 
 void Renderer::Impl::draw_ordered(const Splats& splats, const RenderOptions& options,
@@ -261,11 +292,9 @@ void Renderer::Impl::light_all(LitCloud& cloud, const Splats& splats, const Rend
 }
 
 Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptions& options) {
-    times = {};
     const CameraFrame camera = camera_frame(options.camera);
     const DetailView detail{camera.position_m, pixels_per_unit(options.camera, camera)};
     Picture picture = draw(splats, options, detail);
-    if (!splats.ground_cover || !shows_wet_ground(options, *splats.ground_cover)) return picture;
     WetGround ground{options, *splats.ground_cover, splats.flash ? &*splats.flash : nullptr, splats.time_s};
     std::optional<MirrorView> mirror;
     if (shows_reflections(options, *splats.ground_cover)) {
@@ -345,7 +374,10 @@ const SkyLight* Renderer::Impl::sky_of(const Splats& splats, const RenderOptions
 
 const GpuImage& Renderer::Impl::image_of(const SkyLight& light) {
     if (!sky_image) sky_image.emplace(gpu);
-    sky_image->use(gpu, light);
+    if (!sky_image->has(light)) {
+        settle();
+        sky_image->use(gpu, light);
+    }
     return sky_image->image();
 }
 
@@ -366,18 +398,42 @@ Picture Renderer::draw(const MetaballCloud& cloud, const RenderOptions& options)
 }
 
 Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options) {
+    return finish(begin(splats, options));
+}
+
+PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& options) {
     check(options);
     const std::uint32_t limit = impl_->gpu.properties.limits.maxImageDimension2D;
     if (std::uint32_t(options.shadow_map_size) > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
     if (splats.ground_cover) check(*splats.ground_cover);
     check_memory(splats, options, impl_->tile_size);
-    try {
-        return with_gpu_errors("drawing", [&] { return impl_->draw_with_ground(splats, options); });
-    } catch (const std::bad_alloc&) {
-        throw Error(ErrorCode::usage, "not enough memory for a picture of this size");
-    }
+    const auto work = [&] {
+        auto state = std::make_unique<PendingPicture::State>(splats, options);
+        impl_->times = {};
+        if (splats.ground_cover && shows_wet_ground(options, *splats.ground_cover)) {
+            state->picture = impl_->draw_with_ground(splats, options);
+        } else {
+            const CameraFrame camera = camera_frame(options.camera);
+            state->detail = {camera.position_m, pixels_per_unit(options.camera, camera)};
+            impl_->begin(*state);
+        }
+        return PendingPicture(std::move(state));
+    };
+    return with_drawing_errors(work);
 }
+
+Picture Renderer::finish(PendingPicture&& pending) {
+    const std::unique_ptr<PendingPicture::State> state = std::move(pending.state_);
+    with_drawing_errors([&] { impl_->finish(*state); });
+    return std::move(state->picture);
+}
+
+PendingPicture::PendingPicture(std::unique_ptr<State> state) : state_(std::move(state)) {}
+PendingPicture::PendingPicture(PendingPicture&&) noexcept = default;
+PendingPicture& PendingPicture::operator=(PendingPicture&&) noexcept = default;
+PendingPicture::~PendingPicture() = default;
+bool PendingPicture::on_its_way() const { return state_ && state_->view != nullptr; }
 
 const StageTimes& Renderer::times() const { return impl_->times; }
 

@@ -60,6 +60,23 @@ struct DeviceOptions {
     TileLists lists = TileLists::automatic;
 };
 
+// A picture that was begun and is not finished. Dropped without finish(), it is waited for and thrown away.
+// Must not outlive its Renderer.
+class PendingPicture {
+  public:
+    PendingPicture(PendingPicture&&) noexcept;
+    PendingPicture& operator=(PendingPicture&&) noexcept;
+    ~PendingPicture();
+    // Whether a device is still drawing it, as far as is known; false: finish() does not wait.
+    bool on_its_way() const;
+
+  private:
+    friend class Renderer;
+    struct State;
+    explicit PendingPicture(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
 class Renderer {
   public:
     // Opens a device and builds all that does not depend on a picture. Throws Error(gpu) when there is no
@@ -84,6 +101,19 @@ class Renderer {
     // extinction, sun or size of the shadow map have changed, which their contents tell.
     Picture draw_splats(const Splats& splats, const RenderOptions& options);
     Picture draw(const MetaballCloud& cloud, const RenderOptions& options);
+
+    // The same in two steps, so that a graphics card draws one picture while the next is prepared:
+    //
+    //     PendingPicture next = renderer.begin(splats, options);
+    //     Picture before = renderer.finish(std::move(pending));
+    //
+    // What `splats` refers to must stay as it is until the picture is finished. Pictures have the same bits
+    // as those of draw_splats(), in whatever order they are finished. Two are on their way to the device at
+    // most: a third waits for the first, and one of another cloud, or under another sky, for both. What the
+    // processor draws is drawn by begin(), as are pictures with wet ground, and those with billboards. Each
+    // throws as draw_splats(); what fails while a picture is on its way is thrown by its own finish().
+    PendingPicture begin(const Splats& splats, const RenderOptions& options);
+    Picture finish(PendingPicture&& pending);
 
     std::string device_name() const;
 

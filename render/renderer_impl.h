@@ -20,9 +20,30 @@
 
 namespace nephos {
 
+// Tiles of the picture hold its address.
+struct PendingPicture::State {
+    State(const Splats& what, const RenderOptions& how) : splats(what), options(how) {}
+    ~State() {
+        if (view != nullptr) view->abandon(picture);
+    }
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
+
+    Splats splats;
+    RenderOptions options;
+    DetailView detail;
+    Picture picture;
+    ListedView* view = nullptr;  // that draws it; null: it is finished
+    bool too_much = false;       // for the lists of the device
+};
+
 struct Renderer::Impl {
     explicit Impl(const DeviceOptions& device_options);
 
+    using Drawing = PendingPicture::State;
+    void begin(Drawing& drawing);
+    void finish(Drawing& drawing);
+    // Both at once.
     Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail);
     // The same, and what lies on the ground.
     Picture draw_with_ground(const Splats& splats, const RenderOptions& options);
@@ -44,11 +65,14 @@ struct Renderer::Impl {
     // From the order that the host makes.
     void draw_ordered(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
                       const std::vector<PartFrame>& parts, Picture& picture);
-    // From lists that the device makes, unless it has not enough room for them: then false.
-    bool draw_listed(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
-                     const std::vector<PartFrame>& parts, Picture& picture);
-    bool uses_lists(const Splats& splats, const CameraFrame& camera);
+    // From lists that the device makes: begins to.
+    void begin_listed(Drawing& drawing, const CameraFrame& camera, const std::vector<PartFrame>& parts);
+    bool uses_lists(const Drawing& drawing, const CameraFrame& camera);
     ListedView& lists_on_device();
+    // Before what pictures on their way look at changes.
+    void settle() {
+        if (listed_view) listed_view->settle();
+    }
     void draw_on_device(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
                         const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
     const GpuImage& image_of(const SkyLight& sky);

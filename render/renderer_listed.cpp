@@ -18,15 +18,16 @@ ListedView& Renderer::Impl::lists_on_device() {
     return *listed_view;
 }
 
-bool Renderer::Impl::uses_lists(const Splats& splats, const CameraFrame& camera) {
-    return splatting == Splatting::tiles && lists == TileLists::device && splats.billboards.empty() &&
-           !lit.cloud.visible.empty() && lit.cloud.visible.size() <= lists_on_device().limits.balls &&
-           is_near_enough(lit.cloud, camera);
+bool Renderer::Impl::uses_lists(const Drawing& drawing, const CameraFrame& camera) {
+    return splatting == Splatting::tiles && lists == TileLists::device && !drawing.too_much &&
+           drawing.splats.billboards.empty() && !lit.cloud.visible.empty() &&
+           lit.cloud.visible.size() <= lists_on_device().limits.balls && is_near_enough(lit.cloud, camera);
 }
 
-bool Renderer::Impl::draw_listed(const Splats& splats, const RenderOptions& options,
-                                 const CameraFrame& camera, const std::vector<PartFrame>& parts,
-                                 Picture& picture) {
+void Renderer::Impl::begin_listed(Drawing& drawing, const CameraFrame& camera,
+                                  const std::vector<PartFrame>& parts) {
+    const Splats& splats = drawing.splats;
+    const RenderOptions& options = drawing.options;
     ListedView& view = lists_on_device();
     const std::vector<float> lightning = light_up(splats, options, {}, nullptr);
     if (!cloud_on_device) view.use_cloud(cloud_balls(lit.cloud, lit.sun_depths));
@@ -48,13 +49,9 @@ bool Renderer::Impl::draw_listed(const Splats& splats, const RenderOptions& opti
         .shells = shells.any() ? &shells.data : nullptr,
         .shell_count = shells.count(),
         .depth = splats.depth};
-    try {
-        for (const PartFrame& part : parts) view.begin_tile(what, part.frame, part.tile, picture);
-        return view.finish(picture);
-    } catch (...) {
-        view.abandon(picture);
-        throw;
-    }
+    drawing.view = &view;  // from here on the device may write into the picture
+    for (const PartFrame& part : parts)
+        view.begin_tile(what, part.frame, part.tile, drawing.picture, &part == &parts.front());
 }
 
 }  // namespace nephos

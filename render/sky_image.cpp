@@ -18,7 +18,7 @@ SkyImage::SkyImage(const GpuDevice& gpu)
       staging_(create_buffer(gpu, kBytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write)) {}
 
 void SkyImage::use(const GpuDevice& gpu, const SkyLight& light) {
-    if (serial_ == light.serial) return;
+    if (has(light)) return;
     write(gpu, staging_, std::as_bytes(std::span(light.texels).first(kBytes / sizeof(float))));
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_image(commands, image_, access::copy_to);

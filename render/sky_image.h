@@ -11,6 +11,7 @@ namespace nephos {
 class SkyImage {
   public:
     explicit SkyImage(const GpuDevice& gpu);
+    bool has(const SkyLight& light) const { return serial_ == light.serial; }
     // Copies the tables unless they are there already.
     void use(const GpuDevice& gpu, const SkyLight& light);
     const GpuImage& image() const { return image_; }  // readable by shaders

@@ -19,14 +19,14 @@ constexpr double kCheckpointCopies = 3;
 constexpr std::size_t kProgram = std::size_t(64) << 20;
 constexpr double kGrids = 3;  // two steps and the frame between them
 // Frames under way in apps/frame_output.h: one that is written and one that waits for it; before them, with
-// pictures, one that is drawn.
+// pictures, one that a graphics card draws and one that is prepared for it.
 constexpr double kFramesWritten = 2;
-constexpr double kFramesDrawn = 1;
+constexpr double kFramesDrawn = 2;
 constexpr double kBytesPerVoxel = 4.5;    // a float, and the masks and nodes of the tree above it
 constexpr double kBytesPerVelocity = 13;  // three floats and the same
 constexpr double kBytesPerBits = 1;       // hum, act and cld with their masks and nodes
 constexpr double kPlannedCover = 0.5;     // share of voxels that are metaballs
-constexpr double kBytesPerMetaball = 64;  // itself, its colour, its keys while sorting, on the device too
+constexpr double kBytesPerMetaball = 84;  // itself twice, its colour, its keys while sorting, on the device too
 constexpr double kBytesPerPixel = 96;     // layers of the picture on both sides, and the files being written
 constexpr double kBytesPerShadowTexel = 16;
 constexpr double kBytesPerPictureWritten = 20;  // a pixel of Picture: colour, transmittance, depth

@@ -9,9 +9,11 @@
 #include <chrono>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -55,6 +57,29 @@ TEST_P(StageTest, HasNoMoreJobsThanItsBound) {
     stage.finish();
     EXPECT_EQ(done, 100);
     EXPECT_LE(most, 2);
+}
+
+// Work that waits for a next job until there is none to come never waits for nothing.
+TEST_P(StageTest, KnowsWhetherTheNextJobIsThere) {
+    std::vector<int> done;
+    std::optional<int> kept;
+    std::size_t kept_for_the_next = 0;
+    Stage<int>* own = nullptr;
+    Stage<int> stage(1, GetParam(), [&](int& job) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));  // time for the next to come
+        if (kept) done.push_back(*kept);
+        kept = job;
+        if (own->is_awaited()) {
+            ++kept_for_the_next;
+            return;
+        }
+        done.push_back(*std::exchange(kept, std::nullopt));
+    });
+    own = &stage;
+    for (const int n : numbers(50)) stage.add(n);
+    stage.finish();
+    EXPECT_EQ(done, numbers(50));
+    EXPECT_EQ(kept_for_the_next > 0, GetParam());
 }
 
 TEST_P(StageTest, AFailureReachesWhoeverHandsOutAndStopsTheRest) {
