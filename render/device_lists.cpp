@@ -50,11 +50,13 @@ ListLimits limits_of(const GpuDevice& gpu) {
             std::min(most.entries, range / sizeof(shader::uint) / shader::kSortBlock * shader::kSortBlock)};
 }
 
-bool is_near_enough(const PreparedCloud& cloud, const CameraFrame& camera) {
-    const Vec3& eye = camera.position_m;
-    return within_reach(eye.x) && within_reach(eye.y) && within_reach(eye.z) &&
-           std::ranges::all_of(cloud.visible,
+bool is_near_enough(const PreparedCloud& cloud) {
+    return std::ranges::all_of(cloud.visible,
                                [&](std::uint32_t i) { return within_reach(cloud.metaballs[i]); });
+}
+
+bool is_near_enough(const Vec3& eye) {
+    return within_reach(eye.x) && within_reach(eye.y) && within_reach(eye.z);
 }
 
 std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span<const float> sun_depths) {

@@ -38,7 +38,8 @@ struct ListLimits {
 ListLimits limits_of(const GpuDevice& gpu);
 
 // Whether places are near enough for sums of two floats.
-bool is_near_enough(const PreparedCloud& cloud, const CameraFrame& camera);
+bool is_near_enough(const PreparedCloud& cloud);
+bool is_near_enough(const Vec3& eye);
 
 // A cloud as it stays on the device.
 std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span<const float> sun_depths);

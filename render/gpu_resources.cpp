@@ -2,6 +2,7 @@
 #include "render/gpu_resources.h"
 
 #include <algorithm>
+#include <exception>
 #include <initializer_list>
 
 #include "automaton/error.h"
@@ -12,14 +13,35 @@ namespace {
 using MemoryFlags = vk::MemoryPropertyFlags;
 using Memory = vk::MemoryPropertyFlagBits;
 
-// The first kind of memory that has one of `wishes`, the most wanted first.
-std::uint32_t memory_type(const GpuDevice& gpu, std::uint32_t allowed,
-                          std::initializer_list<MemoryFlags> wishes) {
-    for (const MemoryFlags wish : wishes)
-        for (std::uint32_t i = 0; i < gpu.memory.memoryTypeCount; ++i)
-            if ((allowed >> i & 1u) != 0 && (gpu.memory.memoryTypes[i].propertyFlags & wish) == wish)
-                return i;
+// From the first kind of memory that has one of `wishes`, the most wanted first, and is not full: what the
+// processor sees of a card's own memory may be small.
+vk::raii::DeviceMemory allocate(const GpuDevice& gpu, const vk::MemoryRequirements& needs,
+                                std::initializer_list<MemoryFlags> wishes) {
+    std::exception_ptr full;
+    for (const MemoryFlags wish : wishes) {
+        for (std::uint32_t i = 0; i < gpu.memory.memoryTypeCount; ++i) {
+            if ((needs.memoryTypeBits >> i & 1u) == 0 ||
+                (gpu.memory.memoryTypes[i].propertyFlags & wish) != wish)
+                continue;
+            try {
+                return {gpu.device, vk::MemoryAllocateInfo(needs.size, i)};
+            } catch (const vk::OutOfDeviceMemoryError&) {
+                full = std::current_exception();
+            }
+        }
+    }
+    if (full) std::rethrow_exception(full);
     throw Error(ErrorCode::gpu, "the Vulkan device has no memory of the kind that is needed");
+}
+
+// What is only copied from need not lie on the card.
+std::initializer_list<MemoryFlags> wishes_for(HostAccess access, vk::BufferUsageFlags usage) {
+    static constexpr MemoryFlags kSeen = Memory::eHostVisible | Memory::eHostCoherent;
+    static constexpr std::initializer_list<MemoryFlags> kWrite{kSeen | Memory::eDeviceLocal, kSeen},
+        kStage{kSeen}, kRead{kSeen | Memory::eHostCached, kSeen}, kNone{Memory::eDeviceLocal, MemoryFlags{}};
+    if (access == HostAccess::read) return kRead;
+    if (access == HostAccess::none) return kNone;
+    return usage == vk::BufferUsageFlagBits::eTransferSrc ? kStage : kWrite;
 }
 
 vk::ImageSubresourceRange all_of(const GpuImage& image) {
@@ -34,14 +56,7 @@ GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsage
     buffer.bytes = bytes;
     buffer.buffer = vk::raii::Buffer(gpu.device, vk::BufferCreateInfo({}, bytes, usage));
     const vk::MemoryRequirements needs = buffer.buffer.getMemoryRequirements();
-    const MemoryFlags seen = Memory::eHostVisible | Memory::eHostCoherent;
-    const std::uint32_t type =
-        access == HostAccess::write
-            ? memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eDeviceLocal, seen})
-        : access == HostAccess::read
-            ? memory_type(gpu, needs.memoryTypeBits, {seen | Memory::eHostCached, seen})
-            : memory_type(gpu, needs.memoryTypeBits, {Memory::eDeviceLocal, MemoryFlags{}});
-    buffer.memory = vk::raii::DeviceMemory(gpu.device, vk::MemoryAllocateInfo(needs.size, type));
+    buffer.memory = allocate(gpu, needs, wishes_for(access, usage));
     buffer.buffer.bindMemory(*buffer.memory, 0);
     if (access == HostAccess::none) return buffer;
     buffer.mapped = static_cast<std::byte*>(buffer.memory.mapMemory(0, VK_WHOLE_SIZE));
@@ -66,8 +81,7 @@ GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t h
         vk::ImageCreateInfo({}, vk::ImageType::e2D, format, vk::Extent3D(width, height, 1), levels, layers,
                             vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal, usage));
     const vk::MemoryRequirements needs = image.image.getMemoryRequirements();
-    const std::uint32_t type = memory_type(gpu, needs.memoryTypeBits, {Memory::eDeviceLocal, MemoryFlags{}});
-    image.memory = vk::raii::DeviceMemory(gpu.device, vk::MemoryAllocateInfo(needs.size, type));
+    image.memory = allocate(gpu, needs, {Memory::eDeviceLocal, MemoryFlags{}});
     image.image.bindMemory(*image.memory, 0);
     const vk::ImageViewType kind = layers > 1 ? vk::ImageViewType::e2DArray : vk::ImageViewType::e2D;
     image.view = vk::raii::ImageView(

@@ -205,6 +205,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
         if (!keep_cloud(lit, splats.metaballs, options, drawing.detail)) {
             map_on_device.reset();
             light_changed();
+            cloud_is_near = lists == TileLists::device && is_near_enough(lit.cloud);
         }
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();

@@ -104,6 +104,7 @@ struct Renderer::Impl {
     std::optional<ViewPass> view_pass[2][3];
     std::optional<ListedView> listed_view;
     bool cloud_on_device = false;  // in listed_view, with its light
+    bool cloud_is_near = false;    // is_near_enough(lit.cloud)
     FogNoise fog_noise;
     KeptShade kept_shade;
     std::optional<SkyImage> sky_image;

@@ -21,7 +21,8 @@ ListedView& Renderer::Impl::lists_on_device() {
 bool Renderer::Impl::uses_lists(const Drawing& drawing, const CameraFrame& camera) {
     return splatting == Splatting::tiles && lists == TileLists::device && !drawing.too_much &&
            drawing.splats.billboards.empty() && !lit.cloud.visible.empty() &&
-           lit.cloud.visible.size() <= lists_on_device().limits.balls && is_near_enough(lit.cloud, camera);
+           lit.cloud.visible.size() <= lists_on_device().limits.balls && cloud_is_near &&
+           is_near_enough(camera.position_m);
 }
 
 void Renderer::Impl::begin_listed(Drawing& drawing, const CameraFrame& camera,
