@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <optional>
+#include <span>
 
 #include "automaton/error.h"
 
@@ -210,6 +211,14 @@ void choose_tile_lanes(GpuDevice& gpu) {
     gpu.tile_lanes = gpu.tiles_are_subgroups ? size : 8;
 }
 
+bool has_unified_memory(const vk::PhysicalDeviceMemoryProperties& memory) {
+    using Memory = vk::MemoryPropertyFlagBits;
+    const vk::MemoryPropertyFlags all =
+        Memory::eDeviceLocal | Memory::eHostVisible | Memory::eHostCoherent | Memory::eHostCached;
+    return std::ranges::any_of(std::span(memory.memoryTypes.data(), memory.memoryTypeCount),
+                               [&](const vk::MemoryType& type) { return (type.propertyFlags & all) == all; });
+}
+
 }  // namespace
 
 void fail_gpu(const std::string& what, vk::Result result) {
@@ -226,6 +235,7 @@ GpuDevice open_device(const DeviceOptions& options) {
         gpu.physical = choose_device(physical_devices(gpu.instance), options.device);
         gpu.properties = gpu.physical.getProperties();
         gpu.memory = gpu.physical.getMemoryProperties();
+        gpu.unified_memory = has_unified_memory(gpu.memory);
         gpu.queue_family = find_queue_family(gpu.physical).value();
         choose_tile_lanes(gpu);
         gpu.device = create_device(gpu.physical, gpu.queue_family);

@@ -41,7 +41,9 @@ struct GpuDevice {
     // 128.
     std::uint32_t tile_lanes = 8;
     bool tiles_are_subgroups = false;
-    bool subgroup_size_varies = false;         // and must be asked for
+    bool subgroup_size_varies = false;  // and must be asked for
+    // The processor reads the device's own memory as fast as any: nothing has to be copied from there.
+    bool unified_memory = false;
     mutable std::uint64_t uploaded_bytes = 0;  // so far, with write() of gpu_resources.h
     vk::raii::Queue queue{nullptr};
     vk::raii::CommandPool pool{nullptr};

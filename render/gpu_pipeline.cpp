@@ -231,7 +231,9 @@ void reserve(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t bindi
              std::size_t bytes, HostAccess access) {
     if (buffer.bytes >= std::max<std::size_t>(bytes, 1)) return;
     buffer = {};  // the old one goes before the new one comes
-    buffer = create_buffer(gpu, bytes + bytes / 4 + 256, vk::BufferUsageFlagBits::eStorageBuffer, access);
+    buffer = create_buffer(gpu, bytes + bytes / 4 + 256,
+                           vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc,
+                           access);
     bind_buffer(gpu, bindings, binding, buffer);
 }
 

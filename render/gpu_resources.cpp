@@ -68,6 +68,21 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, std::span<const std::b
     gpu.uploaded_bytes += bytes.size();
 }
 
+const std::byte* read_back(const GpuDevice& gpu, const GpuBuffer& buffer, std::size_t bytes,
+                           GpuBuffer& copy) {
+    if (buffer.mapped != nullptr) return buffer.mapped;
+    if (copy.bytes < bytes) {
+        copy = {};
+        copy = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
+    }
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        buffer_barrier(commands, buffer, access::compute, access::copy_from);
+        commands.copyBuffer(*buffer.buffer, *copy.buffer, vk::BufferCopy(0, 0, bytes));
+        buffer_barrier(commands, copy, access::copy_to, access::host);
+    });
+    return copy.mapped;
+}
+
 GpuImage create_image(const GpuDevice& gpu, std::uint32_t width, std::uint32_t height, std::uint32_t layers,
                       vk::Format format, vk::ImageUsageFlags usage, std::uint32_t levels) {
     GpuImage image;

@@ -34,6 +34,10 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, const T& value) {
     write(gpu, buffer, std::as_bytes(std::span(&value, 1)));
 }
 
+// The first bytes of a buffer that the device has written: itself where it is mapped, else `copy`, which
+// grows.
+const std::byte* read_back(const GpuDevice& gpu, const GpuBuffer& buffer, std::size_t bytes, GpuBuffer& copy);
+
 // A 2D image (or array of them) in device memory, always in the layout GENERAL once it was cleared: images
 // here are in turn drawn to, sampled and copied from, and GENERAL serves all of it.
 struct GpuImage {

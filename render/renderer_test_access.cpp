@@ -77,6 +77,8 @@ std::uint64_t RendererTestAccess::uploaded_bytes(const Renderer& renderer) {
     return renderer.impl_->gpu.uploaded_bytes;
 }
 
+void RendererTestAccess::divide_memory(Renderer& renderer) { renderer.impl_->gpu.unified_memory = false; }
+
 // Two copies into the same buffer with no barrier between them.
 void RendererTestAccess::provoke_hazard(Renderer& renderer) {
     const GpuDevice& gpu = renderer.impl_->gpu;

@@ -18,6 +18,8 @@ struct RendererTestAccess {
     static std::size_t light_passes(const Renderer& renderer);
     // What was copied to the device so far.
     static std::uint64_t uploaded_bytes(const Renderer& renderer);
+    // From now on as with a card whose memory the processor reads slowly; before the first picture.
+    static void divide_memory(Renderer& renderer);
     // Submits a deliberate write-after-write hazard, which the synchronization validation must report.
     static void provoke_hazard(Renderer& renderer);
 

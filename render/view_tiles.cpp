@@ -165,8 +165,11 @@ void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, co
     write(gpu, frame_, frame);
     const TileGrid grid{tile.width, tile.height};
     const std::size_t pixels = std::size_t(tile.width) * std::size_t(tile.height);
-    reserve(gpu, bindings_, 8, radiance_, 4 * sizeof(float) * pixels, HostAccess::read);
-    reserve(gpu, bindings_, 9, depth_, sizeof(float) * pixels, HostAccess::read);
+    // Shells of air read them again and again.
+    const HostAccess sums = gpu.unified_memory ? HostAccess::read : HostAccess::none;
+    const std::size_t depth_bytes = sizeof(float) * pixels, radiance_bytes = 4 * depth_bytes;
+    reserve(gpu, bindings_, 8, radiance_, radiance_bytes, sums);
+    reserve(gpu, bindings_, 9, depth_, depth_bytes, sums);
 
     const std::vector<std::uint32_t> splats = splats_near_to_far(order);
     const std::vector<PixelBox> boxes = screen_boxes(order, camera, options.camera, tile, splats);
@@ -187,8 +190,10 @@ void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, co
         draw_batch(gpu, grid, order, begin, end);
         begin = end;
     } while (begin < boxes.size());
-    store_tile(reinterpret_cast<const float*>(radiance_.mapped),
-               order.depth ? reinterpret_cast<const float*>(depth_.mapped) : nullptr, tile, picture);
+    const std::byte* const radiance = read_back(gpu, radiance_, radiance_bytes, radiance_copy_);
+    const std::byte* const depth = order.depth ? read_back(gpu, depth_, depth_bytes, depth_copy_) : nullptr;
+    store_tile(reinterpret_cast<const float*>(radiance), reinterpret_cast<const float*>(depth), tile,
+               picture);
 }
 
 }  // namespace nephos

@@ -54,7 +54,8 @@ class ViewTiles {
     Bindings bindings_;
     GpuImage puff_textures_;  // empty without puffs
     GpuBuffer frame_, balls_, splats_, ranges_, tails_, list_, radiance_, depth_;
-    GpuBuffer no_parts_;  // binding 15 must be bound, used or not
+    GpuBuffer radiance_copy_, depth_copy_;  // where the processor does not see the device's memory
+    GpuBuffer no_parts_;                    // binding 15 must be bound, used or not
     ShellBuffers shells_;
     std::vector<std::uint32_t> before_shells_;  // splats_before_shells()
     std::size_t next_shell_ = 0;                // of the tile of the picture that is being drawn

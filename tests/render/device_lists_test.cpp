@@ -321,6 +321,21 @@ TEST_F(ListedPictures, TilesOfThePictureHaveTheSameBits) {
     test::expect_no_messages(tiled);
 }
 
+// Pictures from the host's lists on a card with memory of its own.
+TEST_F(ListedPictures, OfACardWithItsOwnMemory) {
+    Renderer divided(with_lists(TileLists::host));
+    RendererTestAccess::divide_memory(divided);
+    const std::vector<Metaball> balls = reference::random_metaballs(23, 500);
+    for (const int width : {75, 40, 120}) {
+        RenderOptions options = test::view({50, 60, 1000}, {700, 300, 1100}, 60, width, 50);
+        options.light_shafts.strength = 1;
+        Splats splats = splats_of(balls, 0.02);
+        splats.depth = width != 40;
+        test::expect_same_bits(divided.draw_splats(splats, options), reference_.draw_splats(splats, options));
+    }
+    test::expect_no_messages(divided);
+}
+
 // What a picture sends to the device when nothing has changed but the camera: the camera.
 TEST_F(ListedPictures, NothingElseIsSentWhenTheCameraMoves) {
     const std::vector<Metaball> balls = reference::random_metaballs(15, 2000);
