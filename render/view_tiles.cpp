@@ -16,9 +16,24 @@ namespace {
 constexpr std::size_t kMaxBalls = std::size_t{1} << 20;    // on the device at once: 52 MiB with their splats
 constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of the tiles' lists: 64 MiB
 
-// lavapipe (Mesa 22.3) leaves all loops of a shader after 65,535 turns in all. Where there are billboards, a
-// splat takes up to three.
-constexpr std::size_t kMaxInLoops = 20'000;
+// Entries that a tile's list may have at once. lavapipe (Mesa 22.3) leaves all loops of a shader after 65,535
+// turns in all: eight fitted metaballs take one, of others each takes more than one, and where there are
+// billboards up to three.
+std::size_t longest_list(const GpuDevice& gpu, const EyeOrder& order) {
+    if (gpu.properties.deviceType != vk::PhysicalDeviceType::eCpu) return kMaxEntries;
+    if (!order.puffs.empty()) return 20'000;
+    return order.all_fitted ? 500'000 : 50'000;
+}
+
+// Lists for some of the boxes, from `begin` on; no list has more than `longest` entries.
+TileBins lists_of_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size_t& end,
+                        const TileGrid& grid, std::size_t longest) {
+    for (;; end = begin + (end - begin + 1) / 2) {
+        TileBins bins = bin_into_tiles(boxes.subspan(begin, end - begin), grid);
+        const auto fits = [&](const shader::TileRange& range) { return range.end - range.begin <= longest; };
+        if (std::ranges::all_of(bins.ranges, fits)) return bins;
+    }
+}
 
 std::size_t groups(std::size_t invocations) {
     return (invocations + shader::kComputeGroup - 1) / shader::kComputeGroup;
@@ -173,18 +188,16 @@ void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, co
 
     const std::vector<std::uint32_t> splats = splats_near_to_far(order);
     const std::vector<PixelBox> boxes = screen_boxes(order, camera, options.camera, tile, splats);
-    const bool software = gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu;
-    const std::size_t most = variant_.puffs && software ? kMaxInLoops : kMaxBalls;
     std::size_t begin = 0;
     next_shell_ = 0;
     do {  // once even without any ball, for the background
-        const std::size_t end = end_of_batch(boxes, begin, grid, most, kMaxEntries);
+        std::size_t end = end_of_batch(boxes, begin, grid, kMaxBalls, kMaxEntries);
+        const TileBins bins = lists_of_batch(boxes, begin, end, grid, longest_list(gpu, order));
         const std::size_t count = end - begin;
         upload_splats(gpu, order, std::span(splats).subspan(begin, count));
         reserve(gpu, bindings_, 2, splats_, sizeof(shader::ViewSplat) * count * (variant_.puffs ? 5 : 1),
                 HostAccess::none);
         reserve(gpu, bindings_, 7, tails_, sizeof(shader::uint) * count, HostAccess::none);
-        const TileBins bins = bin_into_tiles(std::span(boxes).subspan(begin, end - begin), grid);
         upload(gpu, bindings_, 5, ranges_, std::as_bytes(std::span(bins.ranges)));
         upload(gpu, bindings_, 6, list_, std::as_bytes(std::span(bins.list)));
         draw_batch(gpu, grid, order, begin, end);

@@ -182,6 +182,27 @@ TEST(SkyPainter, DrawsTheSameTwiceAndLightningInItsTime) {
     EXPECT_TRUE(renderer.validation_messages().empty());
 }
 
+// T's sky in fog, in every way of drawing.
+TEST(SkyPainter, TheThreeWaysAgree) {
+    SkySimulation sky(sky_of(60));
+    for (int step = 0; step < 7; ++step) sky.step();
+    const SkyLayer layer{&sky, sky.clouds()};
+    for (const double fog : {0.0, 2e-4}) {
+        RenderOptions options = from_the_edge();
+        options.fog.extinction_per_m = fog;
+        options.fog.height_m = 800;
+        std::vector<Picture> pictures;
+        for (const Splatting way : {Splatting::billboards, Splatting::processor, Splatting::tiles}) {
+            Renderer renderer(DeviceOptions{.splatting = way});
+            pictures.push_back(SkyPainter().draw(renderer, {}, {&layer, 1}, options, 0));
+        }
+        EXPECT_LT(*std::ranges::min_element(pictures[0].transmittance), 0.1f);
+        for (const Picture& picture : pictures)
+            for (std::size_t i = 0; i < picture.beauty.size(); ++i)
+                ASSERT_NEAR(picture.beauty[i], pictures[0].beauty[i], 1.0f / 255.0f) << i;
+    }
+}
+
 // A sun with a date moves with the time of the picture, and with it the physical sky and its light on
 // billboards; one that does not move stays.
 TEST(SkyPainter, MovesTheSunWithTime) {

@@ -105,7 +105,7 @@ TEST_P(BillboardWays, BatchesDoNotShow) {
     Splats splats = test::scene_of(test::kBillboardClouds, billboards);
     splats.metaballs = {balls, 1e-4, 0.7};
     splats.depth = splats.light = false;
-    const RenderOptions options = view({0, -30000, 900}, {0, 0, 1000}, 40, 30, 4);
+    const RenderOptions options = view({0, -30000, 900}, {0, 0, 1000}, 8, 8, 4);
     const Picture fast = renderer_.draw_splats(splats, options),
                   slow = reference_.draw_splats(splats, options);
     EXPECT_LE(test::largest_difference(fast.beauty, slow.beauty), 1.0f / 255.0f);
