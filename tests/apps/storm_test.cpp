@@ -5,17 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "apps/pipeline.h"
-#include "apps/sky_picture.h"
-#include "apps/weather.h"
-#include "density/metaballs.h"
 #include "scenes/reader.h"
+#include "tests/apps/drawn_frame.h"
 #include "tests/reference/with_threads.h"
 
 namespace nephos {
@@ -38,19 +35,7 @@ Scene coarse_storm() {
 
 std::vector<float> drawn(const Scene& scene, const FrameResult& frame, Renderer& renderer,
                          SkyPainter& painter) {
-    const double radius = scene.density.metaball_radius_cells;
-    std::vector<Metaball> balls;
-    std::vector<SkyLayer> layers;
-    for (const LayerFrame& layer : frame.layers) {
-        const std::vector<Metaball> more = metaballs(layer.density, radius);
-        balls.insert(balls.end(), more.begin(), more.end());
-        layers.push_back({layer.sky, layer.clouds, layer.direct});
-    }
-    const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
-    return painter
-        .draw(renderer, cloud, layers, scene.render, frame.time_s, true, view_of(*frame.ground),
-              weather_of(scene, frame.layers, frame.time_s))
-        .beauty;
+    return test::drawn_frame(scene, frame, renderer, painter, true).beauty;
 }
 
 struct Comparison : PipelineSink {

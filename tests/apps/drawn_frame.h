@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A frame of a pipeline as a run draws it, for tests.
+
+#include <optional>
+#include <vector>
+
+#include "apps/pipeline.h"
+#include "apps/sky_picture.h"
+#include "apps/weather.h"
+#include "density/metaballs.h"
+#include "scenes/scene.h"
+
+namespace nephos::test {
+
+// `all`: with depth, light and shadow map, as for EXR files.
+inline Picture drawn_frame(const Scene& scene, const FrameResult& frame, Renderer& renderer,
+                           SkyPainter& painter, bool all) {
+    const double radius = scene.density.metaball_radius_cells;
+    std::vector<Metaball> balls;
+    std::vector<SkyLayer> layers;
+    if (frame.layers.empty()) balls = metaballs(frame.density, radius);
+    for (const LayerFrame& layer : frame.layers) {
+        if (!layer.direct) {
+            const std::vector<Metaball> more = metaballs(layer.density, radius);
+            balls.insert(balls.end(), more.begin(), more.end());
+        }
+        if (layer.sky != nullptr) layers.push_back({layer.sky, layer.clouds, layer.direct});
+    }
+    const MetaballCloud cloud{balls, scene.density.extinction_per_m, metaball_normalisation(radius)};
+    return painter.draw(renderer, cloud, layers, scene.render, frame.time_s, all,
+                        frame.ground ? std::optional(view_of(*frame.ground)) : std::nullopt,
+                        weather_of(scene, frame.layers, frame.time_s));
+}
+
+}  // namespace nephos::test
