@@ -344,6 +344,7 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
     const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
                                         splats.time_s, fog_noise, kept_shade);
     const bool tiles = splatting == Splatting::tiles;
+    const StageTimer timer(&times, DrawStage::view);
     const auto prepared = [&](auto& passes) -> auto& {
         const ShaderVariant variant{.physical_sky = sky != nullptr,
                                     .shells = shells.any(),

@@ -20,7 +20,7 @@ enum class DrawStage {
     sun_bins,   // boxes on the shadow map, lists of its tiles
     light,      // the shadow map, and the light at the centres
     colour,     // what the balls scatter towards the eye
-    view,       // front to back over the pixels, and the background
+    view,  // front to back over the pixels, and the background; on a device all from the sorted splats on
 };
 inline constexpr std::size_t kDrawStages = 9;
 
