@@ -306,6 +306,8 @@ EyeOrder order_from_eye(const PreparedCloud& cloud, const Splats& splats, const 
                         double pixels_per_unit, const Ground& ground) {
     if (splats.billboards.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
         throw Error(ErrorCode::usage, "more than 2^31 billboards");
+    if (splats.clouds.size() >> 28 != 0)  // a shader::Puff has 28 bits for its cloud
+        throw Error(ErrorCode::usage, "more than 2^28 clouds of billboards");
     Collector collector(cloud, splats, camera, pixels_per_unit, ground);
     collector.add_metaballs();
     collector.add_billboards();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // view_project.comp for T's billboards, where a picture has some. They stand between the metaballs in the same buffers:
-// in the place of a ViewBall a Puff with kPuffFlag in `cloud`, whose upper bits are the cloud's number; behind the last splat the clouds.
+// in the place of a ViewBall a Puff with kPuffFlag in `cloud`, whose upper bits are the cloud's number; behind the last
+// splat the clouds.
 // As a splat a billboard has the number of four further words of vec4 behind the last splat:
 //
 //     centre, pixels; 1 / half size, pixels
