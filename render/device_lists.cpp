@@ -44,7 +44,10 @@ std::uint32_t bits_of(std::size_t tiles) { return std::uint32_t(std::bit_width(t
 
 ListLimits limits_of(const GpuDevice& gpu) {
     const std::size_t range = gpu.properties.limits.maxStorageBufferRange;
-    const ListLimits most;
+    ListLimits most;
+    // lavapipe (Mesa 22.3) leaves all loops of a shader after 65,535 turns in all; a metaball that is not
+    // fitted takes more than one in the loop over a tile's list (view_tiles.cpp).
+    if (gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu) most.balls = 50'000;
     // The table of digits is smaller than either.
     return {std::min(most.balls, range / sizeof(shader::CloudBall) / shader::kSortBlock * shader::kSortBlock),
             std::min(most.entries, range / sizeof(shader::uint) / shader::kSortBlock * shader::kSortBlock)};
@@ -141,7 +144,8 @@ bool DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t t
         make(gpu, ranges_, tiles * sizeof(shader::TileRange));
         tile_capacity_ = tiles;
     }
-    const std::size_t numbers = std::max(ball_capacity_, digits_in_table(entry_capacity_));
+    // Marks or tiles of balls, digits of entries, items of the tiles of a shadow map.
+    const std::size_t numbers = std::max({ball_capacity_, digits_in_table(entry_capacity_), tile_capacity_});
     if (numbers * kWord > table_.bytes || sums_.bytes == 0) {
         sums_ = {};
         make(gpu, table_, numbers * kWord);
@@ -187,29 +191,39 @@ void DeviceLists::record_order(const vk::raii::CommandBuffer& commands, const Se
     recorder.run_indirect(OrderPass::view, sets[0], step, offsetof(shader::OrderCounts, visible_each));
 }
 
-void DeviceLists::record_bins(const vk::raii::CommandBuffer& commands, const Sets& sets, const Tile& tile,
-                              std::size_t shells) const {
-    const OrderRecorder recorder(commands, pipelines_, counts_);
+shader::OrderStep DeviceLists::step_of(const Tile& tile, std::size_t shells) const {
     const TileGrid grid{tile.width, tile.height};
-    const shader::OrderStep step{.count = 0,
-                                 .table = shader::kSeenBalls,
-                                 .shift = 0,
-                                 .x = shader::uint(tile.x),
-                                 .y = shader::uint(tile.y),
-                                 .width = shader::uint(tile.width),
-                                 .height = shader::uint(tile.height),
-                                 .columns = shader::uint(grid.columns()),
-                                 .tiles = shader::uint(grid.tiles()),
-                                 .capacity = shader::uint(entry_capacity_),
-                                 .shells = shader::uint(shells)};
-    const std::uint32_t bits = bits_of(grid.tiles());
-    recorder.run_indirect(OrderPass::boxes, sets[0], step, offsetof(shader::OrderCounts, visible_each));
+    return {.count = 0,
+            .table = shader::kSeenBalls,
+            .shift = 0,
+            .x = shader::uint(tile.x),
+            .y = shader::uint(tile.y),
+            .width = shader::uint(tile.width),
+            .height = shader::uint(tile.height),
+            .columns = shader::uint(grid.columns()),
+            .tiles = shader::uint(grid.tiles()),
+            .capacity = shader::uint(entry_capacity_),
+            .shells = shader::uint(shells),
+            .per_item = 0};
+}
+
+void DeviceLists::record_lists(const OrderRecorder& recorder, const Sets& sets,
+                               const shader::OrderStep& step) const {
+    const std::uint32_t bits = bits_of(step.tiles);
     recorder.scan(sets[0], step);
     recorder.run(OrderPass::bins_plan, sets[0], step, 1);
     recorder.run_indirect(OrderPass::emit, sets[3], step, offsetof(shader::OrderCounts, entries_each));
     recorder.sort({sets[2], sets[3]}, shader::kListDigits, bits);
     recorder.run(OrderPass::ranges, sets[2 + OrderRecorder::passes(bits) % 2], step,
-                 (grid.tiles() + shader::kSortGroup - 1) / shader::kSortGroup);
+                 (step.tiles + shader::kSortGroup - 1) / shader::kSortGroup);
+}
+
+void DeviceLists::record_bins(const vk::raii::CommandBuffer& commands, const Sets& sets, const Tile& tile,
+                              std::size_t shells) const {
+    const OrderRecorder own = recorder(commands);
+    const shader::OrderStep step = step_of(tile, shells);
+    own.run_indirect(OrderPass::boxes, sets[0], step, offsetof(shader::OrderCounts, visible_each));
+    record_lists(own, sets, step);
     pass_barrier(commands);
 }
 

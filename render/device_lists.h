@@ -34,7 +34,8 @@ struct ListLimits {
     std::size_t entries = std::size_t{1} << 24;
 };
 
-// The limits of a device: no storage buffer is larger than it allows.
+// The limits of a device: no storage buffer is larger than it allows, and no list longer than what the loops
+// of a device of type CPU go through.
 ListLimits limits_of(const GpuDevice& gpu);
 
 // Whether places are near enough for sums of two floats.
@@ -60,8 +61,8 @@ class DeviceLists {
     // Four sets for each picture that is on its way.
     using Sets = std::array<vk::DescriptorSet, 4>;
     static constexpr std::uint32_t kSets = 4;
-    OrderSets create_sets(const GpuDevice& gpu, std::uint32_t pictures) const {
-        return create_order_sets(gpu, pipelines_, kSets * pictures);
+    OrderSets create_sets(const GpuDevice& gpu, std::uint32_t count) const {
+        return create_order_sets(gpu, pipelines_, count);
     }
     void bind(const GpuDevice& gpu, const Sets& sets, const GpuBuffer& frame, const GpuBuffer& shells) const;
 
@@ -72,6 +73,14 @@ class DeviceLists {
     void record_bins(const vk::raii::CommandBuffer& commands, const Sets& sets, const Tile& tile,
                      std::size_t shells) const;
 
+    // What both consist of, for other orders (device_sun.h).
+    OrderRecorder recorder(const vk::raii::CommandBuffer& commands) const {
+        return {commands, pipelines_, counts_};
+    }
+    shader::OrderStep step_of(const Tile& tile, std::size_t shells) const;
+    // From boxes and their sizes in the table on.
+    void record_lists(const OrderRecorder& recorder, const Sets& sets, const shader::OrderStep& step) const;
+
     const GpuBuffer& list(std::size_t tiles) const;
     const GpuBuffer& cloud() const { return cloud_; }
     const GpuBuffer& flash() const { return flash_; }
@@ -81,6 +90,7 @@ class DeviceLists {
     const GpuBuffer& ranges() const { return ranges_; }
     const GpuBuffer& parts() const { return parts_; }
     const GpuBuffer& counts() const { return counts_; }
+    const GpuBuffer& table() const { return table_; }
     const SortBuffers& order() const { return order_; }
     std::size_t ball_capacity() const { return ball_capacity_; }
     std::size_t entry_capacity() const { return entry_capacity_; }

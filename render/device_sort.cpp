@@ -23,15 +23,21 @@ namespace spirv {
 #include "scan_sums_comp.h"
 #include "sort_count_comp.h"
 #include "sort_scatter_comp.h"
+#include "sun_items_comp.h"
+#include "sun_keys_comp.h"
+#include "sun_queries_comp.h"
+#include "sun_store_comp.h"
+#include "sun_view_comp.h"
 }  // namespace spirv
 
 // In the order of OrderPass.
 std::array<ShaderCode, kOrderPasses> codes() {
-    return {spirv::scan_reduce_comp,   spirv::scan_sums_comp,    spirv::scan_blocks_comp,
-            spirv::sort_count_comp,    spirv::sort_scatter_comp, spirv::order_cull_comp,
-            spirv::order_compact_comp, spirv::order_plan_comp,   spirv::order_view_comp,
-            spirv::bins_boxes_comp,    spirv::bins_plan_comp,    spirv::bins_emit_comp,
-            spirv::bins_ranges_comp};
+    return {
+        spirv::scan_reduce_comp,  spirv::scan_sums_comp,   spirv::scan_blocks_comp,   spirv::sort_count_comp,
+        spirv::sort_scatter_comp, spirv::order_cull_comp,  spirv::order_compact_comp, spirv::order_plan_comp,
+        spirv::order_view_comp,   spirv::bins_boxes_comp,  spirv::bins_plan_comp,     spirv::bins_emit_comp,
+        spirv::bins_ranges_comp,  spirv::sun_keys_comp,    spirv::sun_view_comp,      spirv::sun_items_comp,
+        spirv::sun_items_comp,    spirv::sun_queries_comp, spirv::sun_store_comp};
 }
 
 vk::DescriptorType type_of(std::uint32_t binding) {
@@ -54,10 +60,7 @@ std::string missing_for_lists(const GpuDevice& gpu) {
 }
 
 OrderPipelines create_order_pipelines(const GpuDevice& gpu) {
-    OrderPipelines result{{nullptr},
-                          {nullptr},
-                          {nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr,
-                           nullptr, nullptr, nullptr, nullptr}};
+    OrderPipelines result;
     std::vector<vk::DescriptorSetLayoutBinding> bindings;
     for (std::uint32_t i = 0; i < kOrderBindings; ++i)
         bindings.emplace_back(i, type_of(i), 1, vk::ShaderStageFlagBits::eCompute);
@@ -68,11 +71,15 @@ OrderPipelines create_order_pipelines(const GpuDevice& gpu) {
         vk::raii::PipelineLayout(gpu.device, vk::PipelineLayoutCreateInfo({}, *result.set_layout, constants));
     const std::array code = codes();
     for (std::size_t i = 0; i < kOrderPasses; ++i) {
+        const vk::Bool32 writes = i == std::size_t(OrderPass::sun_items);  // constant 0 of that shader
+        const vk::SpecializationMapEntry entry(0, 0, sizeof writes);
+        const vk::SpecializationInfo constants_of(1, &entry, sizeof writes, &writes);
         const vk::raii::ShaderModule module(
             gpu.device, vk::ShaderModuleCreateInfo({}, code[i].size_bytes(), code[i].data()));
-        const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main");
-        result.passes[i] =
-            vk::raii::Pipeline(gpu.device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *result.layout));
+        const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main",
+                                                      &constants_of);
+        result.passes.emplace_back(gpu.device, nullptr,
+                                   vk::ComputePipelineCreateInfo({}, stage, *result.layout));
     }
     return result;
 }
@@ -129,7 +136,8 @@ shader::OrderCounts counts_for(std::size_t visible, std::size_t entries) {
             .entries_each = groups_for(entries, kEach),
             .entries_blocks = groups_for(entries, kBlock),
             .entries_digits = groups_for(digits_in_table(entries), kBlock),
-            .splats = groups_for(visible, shader::kComputeGroup)};
+            .splats = groups_for(visible, shader::kComputeGroup),
+            .items = {}};
 }
 
 void OrderRecorder::bind(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step) const {
@@ -158,6 +166,8 @@ void OrderRecorder::scan(vk::DescriptorSet set, const shader::OrderStep& step) c
         switch (step.table) {
             case shader::kAllBalls:
                 return run(pass, set, step, blocks_of(step.count));
+            case shader::kMapTiles:
+                return run(pass, set, step, blocks_of(step.tiles));
             case shader::kSeenBalls:
                 return run_indirect(pass, set, step, offsetof(shader::OrderCounts, visible_blocks));
             case shader::kSeenDigits:

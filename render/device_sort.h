@@ -13,6 +13,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "render/gpu_resources.h"
 #include "render/shaders/order.h"
@@ -33,8 +34,14 @@ enum class OrderPass {
     bins_plan,
     emit,
     ranges,
+    sun_keys,
+    sun_view,
+    sun_count_items,
+    sun_items,
+    sun_queries,
+    sun_store,
 };
-inline constexpr std::size_t kOrderPasses = 13;
+inline constexpr std::size_t kOrderPasses = 19;
 inline constexpr std::uint32_t kOrderBindings = 15;  // 0 and 14 are uniform buffers, the others storage
 
 // Storage buffers that sort passes read and write.
@@ -45,7 +52,7 @@ struct SortBuffers {
 struct OrderPipelines {
     vk::raii::DescriptorSetLayout set_layout{nullptr};
     vk::raii::PipelineLayout layout{nullptr};
-    std::array<vk::raii::Pipeline, kOrderPasses> passes;
+    std::vector<vk::raii::Pipeline> passes;  // as OrderPass numbers them
 };
 
 // Why this device cannot make orders and lists; empty if it can.

@@ -43,8 +43,10 @@ LightTiles::LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const
       sampler_(&sampler),
       map_pipeline_(create_tile_pipeline(gpu, layout, shaders().light_map_comp)),
       centres_pipeline_(create_tile_pipeline(gpu, layout, shaders().light_centres_comp)),
-      bindings_(create_bindings(gpu, layout)) {
-    for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
+      bindings_(create_bindings(gpu, layout)),
+      listed_(create_bindings(gpu, layout)) {
+    for (const Bindings* each : {&bindings_, &listed_})
+        for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, *each, binding, attenuation, sampler);
 }
 
 void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
@@ -54,11 +56,13 @@ void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
     map_ = create_image(gpu, size, size, 1, vk::Format::eR32Sfloat,
                         vk::ImageUsageFlagBits::eStorage | vk::ImageUsageFlagBits::eSampled |
                             vk::ImageUsageFlagBits::eTransferDst);
-    bind_image(gpu, bindings_, 4, map_, *sampler_);
-    bind_storage_image(gpu, bindings_, 10, map_);
     depths_ = create_buffer(gpu, std::size_t{size} * size * sizeof(float),
                             vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::read);
-    bind_buffer(gpu, bindings_, 8, depths_);
+    for (const Bindings* each : {&bindings_, &listed_}) {
+        bind_image(gpu, *each, 4, map_, *sampler_);
+        bind_storage_image(gpu, *each, 10, map_);
+        bind_buffer(gpu, *each, 8, depths_);
+    }
     submit_and_wait(
         gpu, [&](const vk::raii::CommandBuffer& commands) { begin_image(commands, map_, access::compute); });
 }
@@ -138,6 +142,43 @@ void LightTiles::ask(const GpuDevice& gpu, const SunOrder& order, const TileGrid
     }
 }
 
+void LightTiles::use_lists(const GpuDevice& gpu, int shadow_size, const Lists& lists) {
+    resize_map(gpu, shadow_size);
+    const std::pair<std::uint32_t, const GpuBuffer*> buffers[] = {{1, lists.queries}, {2, lists.splats},
+                                                                  {5, lists.ranges},  {6, lists.list},
+                                                                  {7, lists.items},   {9, lists.places}};
+    for (const auto& [binding, buffer] : buffers) bind_buffer(gpu, listed_, binding, *buffer);
+}
+
+void LightTiles::record_lists(const vk::raii::CommandBuffer& commands, const TileGrid& grid,
+                              float largest_radius, std::size_t items, const GpuBuffer& arguments,
+                              std::size_t offset) const {
+    shader::TileStep step{.width = shader::uint(grid.width),
+                          .height = shader::uint(grid.height),
+                          .tiles_x = shader::uint(grid.columns()),
+                          .tile_count = shader::uint(grid.tiles()),
+                          .first_batch = 1,
+                          .last_batch = 1,
+                          .largest_radius = largest_radius,
+                          .first = 0,
+                          .end = 0,
+                          .distances = 0,
+                          .listed = 0};
+    begin_compute(commands, *layout_, listed_, map_pipeline_, step);
+    image_barrier(commands, map_, access::sample, access::compute);
+    dispatch_groups(commands, grid.tiles());
+    buffer_barrier(commands, depths_, access::compute, access::host);
+    image_barrier(commands, map_, access::compute, access::sample);
+    step.tile_count = shader::uint(items);
+    begin_compute(commands, *layout_, listed_, centres_pipeline_, step);
+    commands.dispatchIndirect(*arguments.buffer, offset);
+}
+
+void LightTiles::read_map(std::vector<float>& shadow) const {
+    shadow.resize(std::size_t(map_.width) * map_.height);
+    std::memcpy(shadow.data(), depths_.mapped, shadow.size() * sizeof(float));
+}
+
 std::vector<float> LightTiles::run(const GpuDevice& gpu, const SunOrder& order, int shadow_size,
                                    std::vector<float>& shadow) {
     resize_map(gpu, shadow_size);
@@ -157,8 +198,7 @@ std::vector<float> LightTiles::run(const GpuDevice& gpu, const SunOrder& order, 
         begin = end;
     } while (begin < boxes.size());
 
-    shadow.resize(std::size_t(shadow_size) * std::size_t(shadow_size));
-    std::memcpy(shadow.data(), depths_.mapped, shadow.size() * sizeof(float));
+    read_map(shadow);
     std::vector<float> depths(order.splats.size());
     for (std::size_t i = 0; i < depths.size(); ++i) depths[queries.source[i]] = queries.queries[i].depth;
     return depths;

@@ -32,6 +32,18 @@ class LightTiles {
     std::vector<float> run(const GpuDevice& gpu, const SunOrder& order, int shadow_size,
                            std::vector<float>& shadow);
 
+    // The same from lists on the device (device_sun.h): buffers as bindings 1, 2, 5, 6, 7 and 9 want them.
+    struct Lists {
+        const GpuBuffer *queries, *splats, *ranges, *list, *items, *places;
+    };
+    void use_lists(const GpuDevice& gpu, int shadow_size, const Lists& lists);
+    // Map and light at the centres; at most `items`, as many as the arguments of the dispatch at `offset`
+    // say.
+    void record_lists(const vk::raii::CommandBuffer& commands, const TileGrid& grid, float largest_radius,
+                      std::size_t items, const GpuBuffer& arguments, std::size_t offset) const;
+    // The texels, once these commands are done.
+    void read_map(std::vector<float>& shadow) const;
+
     // Takes a shadow map that was made elsewhere: shadow_size^2 texels.
     void use(const GpuDevice& gpu, std::span<const float> shadow, int shadow_size);
 
@@ -49,6 +61,7 @@ class LightTiles {
     const vk::raii::Sampler* sampler_;
     vk::raii::Pipeline map_pipeline_, centres_pipeline_;
     Bindings bindings_;
+    Bindings listed_;  // of lists on the device
     GpuBuffer queries_, splats_, places_, ranges_, list_, items_, depths_;
     GpuImage map_;
 };

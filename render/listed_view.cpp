@@ -107,7 +107,7 @@ ListedView::ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const
       clamped_(clamped),
       white_beyond_(white_beyond),
       lists_(gpu),
-      sets_(lists_.create_sets(gpu, kOnTheirWay)) {
+      sets_(lists_.create_sets(gpu, kOnTheirWay * DeviceLists::kSets)) {
     for (std::size_t n = 0; n < kOnTheirWay; ++n) {
         Slot& slot = *slots_.emplace_back(std::make_unique<Slot>());
         slot.bindings = create_bindings(gpu, layout);
@@ -165,6 +165,13 @@ void ListedView::use_cloud(std::span<const shader::CloudBall> balls) {
     balls_ = balls.size();
     lists_.reserve(gpu_, balls_, 1, std::min(4 * balls_, limits.entries));
     upload(lists_.cloud(), std::as_bytes(balls));
+}
+
+bool ListedView::light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles,
+                       std::vector<float>& depths, std::vector<float>& shadow) {
+    settle();
+    if (!sun_) sun_.emplace(gpu_, lists_);
+    return sun_->run(gpu_, lists_, limits, balls_, frame, shadow_size, largest_radius, tiles, depths, shadow);
 }
 
 void ListedView::use_flash(std::span<const shader::uint> shares) {

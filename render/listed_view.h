@@ -11,10 +11,12 @@
 
 #include <exception>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "render/device_lists.h"
+#include "render/device_sun.h"
 #include "render/gpu_pipeline.h"
 #include "render/picture.h"
 #include "render/shell_buffers.h"
@@ -44,6 +46,10 @@ class ListedView {
 
     // What is drawn from now on; what is on its way is settled first.
     void use_cloud(std::span<const shader::CloudBall> balls);
+    // Gives the metaballs their light, and makes the shadow map (device_sun.h). False if there is too much of
+    // it.
+    bool light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles,
+               std::vector<float>& depths, std::vector<float>& shadow);
     // Share of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> shares);
     // Shade map of the shells and noise of the fog (air_shells.h), unless these are there already.
@@ -95,6 +101,7 @@ class ListedView {
     const vk::raii::Sampler &clamped_, &white_beyond_;
     DeviceLists lists_;
     OrderSets sets_;
+    std::optional<DeviceSun> sun_;  // made when it is needed
     std::size_t balls_ = 0;
     GpuBuffer shade_, radiance_, depth_;
     std::uint64_t shade_serial_ = 0;

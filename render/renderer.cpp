@@ -158,6 +158,7 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
             splats.metaballs.extinction_per_m);
     const bool on_device = !on_processor() && (!lit.all_known || map_on_device != lit.key);
     const std::size_t passes = light_passes;
+    bool listed = false;  // the light is with the cloud on the device
     if (blocks && absorbs) {
         absorb_sunlight(lit, *blocks, options);
         ++light_passes;
@@ -168,10 +169,15 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
             map_on_device.reset();
         }
     } else if (on_device && options.light.lighting == Lighting::light_pass) {
-        pass_sunlight(lit);
+        settle();
+        listed = light_listed();
+        if (!listed) pass_sunlight(lit);
         ++light_passes;
     }
-    if (light_passes != passes) light_changed();
+    if (light_passes != passes) {
+        light_changed();
+        cloud_on_device = listed;
+    }
     if (!on_processor() && map_on_device != lit.key) put_map_on_device();
     if (flash == nullptr || !blocks) return {};
     return flash_by_absorption(lit.cloud, *blocks, flash->position_m, options.light.light_distance_m);

@@ -66,6 +66,8 @@ struct Renderer::Impl {
     void draw_ordered(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
                       const std::vector<PartFrame>& parts, Picture& picture);
     // From lists that the device makes: begins to.
+    // Light of `lit` from lists of the device, and the cloud itself; false if that is too much.
+    bool light_listed();
     void begin_listed(Drawing& drawing, const CameraFrame& camera, const std::vector<PartFrame>& parts);
     bool uses_lists(const Drawing& drawing, const CameraFrame& camera);
     ListedView& lists_on_device();
@@ -104,7 +106,8 @@ struct Renderer::Impl {
     std::optional<ViewPass> view_pass[2][3];
     std::optional<ListedView> listed_view;
     bool cloud_on_device = false;  // in listed_view, with its light
-    bool cloud_is_near = false;    // is_near_enough(lit.cloud)
+    bool uses_device_lists() const { return splatting == Splatting::tiles && lists == TileLists::device; }
+    bool cloud_is_near = false;  // is_near_enough(lit.cloud)
     FogNoise fog_noise;
     KeptShade kept_shade;
     std::optional<SkyImage> sky_image;

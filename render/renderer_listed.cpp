@@ -19,10 +19,25 @@ ListedView& Renderer::Impl::lists_on_device() {
 }
 
 bool Renderer::Impl::uses_lists(const Drawing& drawing, const CameraFrame& camera) {
-    return splatting == Splatting::tiles && lists == TileLists::device && !drawing.too_much &&
-           drawing.splats.billboards.empty() && !lit.cloud.visible.empty() &&
-           lit.cloud.visible.size() <= lists_on_device().limits.balls && cloud_is_near &&
-           is_near_enough(camera.position_m);
+    return uses_device_lists() && !drawing.too_much && drawing.splats.billboards.empty() &&
+           !lit.cloud.visible.empty() && lit.cloud.visible.size() <= lists_on_device().limits.balls &&
+           cloud_is_near && is_near_enough(camera.position_m);
+}
+
+bool Renderer::Impl::light_listed() {
+    if (!uses_device_lists() || !cloud_is_near || lit.cloud.visible.empty() ||
+        lit.cloud.visible.size() > lists_on_device().limits.balls)
+        return false;
+    ListedView& view = lists_on_device();
+    view.use_cloud(cloud_balls(lit.cloud, lit.sun_depths));
+    float largest = 0;
+    for (const std::uint32_t i : lit.cloud.visible)
+        largest = std::max(largest, lit.cloud.metaballs[i].radius);
+    if (!view.light(lit.frame, lit.shadow_size, largest, light_on_device(), lit.sun_depths, lit.shadow))
+        return false;
+    lit.all_known = true;
+    map_on_device = lit.key;
+    return true;
 }
 
 void Renderer::Impl::begin_listed(Drawing& drawing, const CameraFrame& camera,

@@ -8,7 +8,7 @@ layout(set = 0, binding = 0) uniform OrderFrameBlock {
 layout(set = 0, binding = 1, std430) buffer Counts {
     OrderCounts counts;
 };
-layout(set = 0, binding = 2, std430) readonly buffer Cloud {
+layout(set = 0, binding = 2, std430) buffer Cloud {
     CloudBall cloud[];
 };
 layout(set = 0, binding = 3, std430) readonly buffer Flash {
@@ -58,5 +58,6 @@ uint sorted_elements() { return step.table == kListDigits ? counts.entries : cou
 uint table_size() {
     if (step.table == kAllBalls) return step.count;
     if (step.table == kSeenBalls) return counts.visible;
+    if (step.table == kMapTiles) return step.tiles;
     return kSortGroup * groups_of(sorted_elements(), kSortBlock);
 }

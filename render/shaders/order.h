@@ -24,6 +24,7 @@ NEPHOS_CONST uint kAllBalls = 0u;    // OrderStep::count
 NEPHOS_CONST uint kSeenBalls = 1u;   // OrderCounts::visible
 NEPHOS_CONST uint kSeenDigits = 2u;  // digits of their keys, for each block
 NEPHOS_CONST uint kListDigits = 3u;  // digits of the entries' keys, for each block
+NEPHOS_CONST uint kMapTiles = 4u;    // items of work in the tiles of the shadow map: OrderStep::tiles
 
 // A metaball as it stays on the device; 32 bytes.
 struct CloudBall {
@@ -47,6 +48,14 @@ struct OrderFrame {
     vec4 middle;     // xy: of the picture, pixels; z: 1 = the eye is above the ground; w: 1 = lightning
 };
 
+// The shadow map, for the order from the sun.
+struct SunFrame {
+    vec4 corner_high;  // xyz: of texel (0, 0), world
+    vec4 corner_low;   // what rounding left of it
+    vec4 direction;    // xyz: unit; the way the light travels
+    vec4 u, v;         // xyz: from metres to texels along the map's axes; w: metres a texel
+};
+
 // Push constants.
 struct OrderStep {
     uint count;           // metaballs of the cloud
@@ -57,6 +66,7 @@ struct OrderStep {
     uint columns, tiles;  // tiles of pixels in it: in a row, in all
     uint capacity;        // entries that the lists have room for
     uint shells;
+    uint per_item;  // centres in an item of work
 };
 
 // VkDispatchIndirectCommand
@@ -75,6 +85,7 @@ struct OrderCounts {
         visible_digits;  // work groups: of an element each, of blocks, of the
     Groups entries_each, entries_blocks, entries_digits;  // blocks of the table of their digits
     Groups splats;                                        // of kComputeGroup
+    Groups items;                                         // of LightItem
 };
 
 // The splats between two shells of air, and the shells behind them that no splat separates.
@@ -98,9 +109,9 @@ NEPHOS_FUNCTION Groups dispatch_of(uint groups) {
 }
 
 #ifdef __cplusplus
-static_assert(sizeof(CloudBall) == 32 && sizeof(OrderFrame) == 11 * 16 && sizeof(OrderStep) == 44);
+static_assert(sizeof(CloudBall) == 32 && sizeof(OrderFrame) == 11 * 16 && sizeof(OrderStep) == 48);
 static_assert(sizeof(Groups) == 12 && offsetof(OrderCounts, visible_each) == 20 &&
-              sizeof(OrderCounts) == 104);
+              sizeof(OrderCounts) == 116);
 static_assert(sizeof(ViewPart) == 52 && offsetof(ViewPart, first) == 36);
 
 }  // namespace nephos::shader

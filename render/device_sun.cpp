@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/device_sun.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "automaton/vector_math.h"
+
+namespace nephos {
+namespace {
+
+// Sets: four as of DeviceLists, and two for the centres.
+constexpr std::uint32_t kSets = 6;
+constexpr std::size_t kCentres = 4;
+
+shader::vec4 vector4(const Vec3& v, double w) { return {float(v.x), float(v.y), float(v.z), float(w)}; }
+
+void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
+    if (buffer.bytes >= bytes) return;
+    buffer = {};
+    buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::none);
+}
+
+void make_copy(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
+    if (buffer.bytes >= bytes) return;
+    buffer = {};
+    buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
+}
+
+}  // namespace
+
+shader::SunFrame sun_frame(const ShadowFrame& frame, int shadow_size) {
+    const Vec3& corner = frame.origin_m;
+    const double width = length(frame.u_axis_m), height = length(frame.v_axis_m);
+    const Vec3 high{double(float(corner.x)), double(float(corner.y)), double(float(corner.z))};
+    return {.corner_high = vector4(high, 0),
+            .corner_low = vector4(corner - high, 0),
+            .direction = vector4(frame.direction, 0),
+            .u = vector4((shadow_size / (width * width)) * frame.u_axis_m, width / shadow_size),
+            .v = vector4((shadow_size / (height * height)) * frame.v_axis_m, height / shadow_size)};
+}
+
+DeviceSun::DeviceSun(const GpuDevice& gpu, const DeviceLists& lists)
+    : sets_(lists.create_sets(gpu, kSets)),
+      frame_(create_buffer(gpu, sizeof(shader::SunFrame), vk::BufferUsageFlagBits::eUniformBuffer,
+                           HostAccess::write)),
+      no_shells_(create_buffer(gpu, sizeof(shader::Shells), vk::BufferUsageFlagBits::eUniformBuffer,
+                               HostAccess::write)) {
+    write(gpu, no_shells_, shader::Shells{});
+    make_copy(gpu, counts_, sizeof(shader::OrderCounts));
+}
+
+void DeviceSun::bind(const GpuDevice& gpu, const DeviceLists& lists) {
+    const auto& sets = sets_.sets;
+    lists.bind(gpu, {sets[kCentres], sets[kCentres + 1], sets[2], sets[3]}, frame_, no_shells_);
+    lists.bind(gpu, {sets[0], sets[1], sets[2], sets[3]}, frame_, no_shells_);
+    for (const std::size_t n : {std::size_t{0}, std::size_t{1}, kCentres, kCentres + 1}) {
+        bind_order_buffer(gpu, sets[n], 3, lists.tails());  // sources
+        bind_order_buffer(gpu, sets[n], 4, lists.splats());
+        bind_order_buffer(gpu, sets[n], 12, places_);
+        if (n < kCentres) continue;
+        bind_order_buffer(gpu, sets[n], 11, queries_);
+        bind_order_buffer(gpu, sets[n], 13, items_);
+    }
+}
+
+void DeviceSun::record(const vk::raii::CommandBuffer& commands, const DeviceLists& lists, std::size_t count,
+                       const TileGrid& grid, std::uint32_t per_item) const {
+    const auto& sets = sets_.sets;
+    const OrderRecorder recorder = lists.recorder(commands);
+    shader::OrderStep step = lists.step_of({0, 0, grid.width, grid.height}, 0);
+    step.count = shader::uint(count);
+    step.per_item = per_item;
+    const auto each = [&](OrderPass pass, vk::DescriptorSet set) {
+        recorder.run_indirect(pass, set, step, offsetof(shader::OrderCounts, visible_each));
+    };
+    const std::size_t tile_groups = (grid.tiles() + shader::kSortGroup - 1) / shader::kSortGroup;
+    recorder.run(OrderPass::sun_keys, sets[1], step, (count + shader::kSortGroup - 1) / shader::kSortGroup);
+    recorder.run(OrderPass::plan, sets[0], step, 1);
+    recorder.sort({sets[0], sets[1]}, shader::kSeenDigits, 32);
+    each(OrderPass::sun_view, sets[0]);
+    lists.record_lists(recorder, {sets[0], sets[1], sets[2], sets[3]}, step);
+
+    // Tiles of the centres are in buffers 1.
+    const auto bits = std::uint32_t(std::bit_width(grid.tiles() - 1));
+    recorder.sort({sets[1], sets[0]}, shader::kSeenDigits, bits);
+    const vk::DescriptorSet centres = sets[kCentres + (1 + OrderRecorder::passes(bits)) % 2];
+    step.table = shader::kMapTiles;
+    recorder.run(OrderPass::sun_count_items, centres, step, tile_groups);
+    recorder.scan(centres, step);
+    recorder.run(OrderPass::sun_items, centres, step, tile_groups);
+    each(OrderPass::sun_queries, centres);
+}
+
+bool DeviceSun::run(const GpuDevice& gpu, DeviceLists& lists, const ListLimits& limits, std::size_t count,
+                    const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles,
+                    std::vector<float>& depths, std::vector<float>& shadow) {
+    const TileGrid grid{shadow_size, shadow_size};
+    const std::uint32_t per_item = shader::kQueriesPerLane * gpu.tile_lanes;
+    const std::size_t items = grid.tiles() + count / per_item;
+    if (items > shader::kGroupRow) return false;  // so that exactly as many work groups run
+    write(gpu, frame_, sun_frame(frame, shadow_size));
+    make(gpu, places_, count * sizeof(shader::LightPlace));
+    make(gpu, queries_, count * sizeof(shader::LightQuery));
+    make(gpu, items_, items * sizeof(shader::LightItem));
+    make_copy(gpu, depths_, count * sizeof(float));
+    std::size_t entries = std::min(4 * count, limits.entries), wanted = entries;
+    do {
+        entries = wanted;
+        lists.reserve(gpu, count, grid.tiles(), entries);
+        bind(gpu, lists);
+        tiles.use_lists(
+            gpu, shadow_size,
+            {&queries_, &lists.splats(), &lists.ranges(), &lists.list(grid.tiles()), &items_, &places_});
+        entries = lists.entry_capacity();
+        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+            full_barrier(commands);
+            record(commands, lists, count, grid, per_item);
+            pass_barrier(commands);
+            tiles.record_lists(commands, grid, largest_radius, items, lists.counts(),
+                               offsetof(shader::OrderCounts, items));
+            const auto bits = std::uint32_t(std::bit_width(grid.tiles() - 1));
+            lists.recorder(commands).run_indirect(
+                OrderPass::sun_store, sets_.sets[kCentres + (1 + OrderRecorder::passes(bits)) % 2], {},
+                offsetof(shader::OrderCounts, visible_each));
+            full_barrier(commands);
+            commands.copyBuffer(*lists.table().buffer, *depths_.buffer,
+                                vk::BufferCopy(0, 0, count * sizeof(float)));
+            commands.copyBuffer(*lists.counts().buffer, *counts_.buffer,
+                                vk::BufferCopy(0, 0, sizeof(shader::OrderCounts)));
+            buffer_barrier(commands, depths_, access::copy_to, access::host);
+            buffer_barrier(commands, counts_, access::copy_to, access::host);
+        });
+        wanted = reinterpret_cast<const shader::OrderCounts*>(counts_.mapped)->wanted;
+        if (wanted > limits.entries) return false;
+    } while (wanted > entries);
+    depths.resize(count);
+    std::memcpy(depths.data(), depths_.mapped, count * sizeof(float));
+    tiles.read_map(shadow);
+    return true;
+}
+
+}  // namespace nephos
