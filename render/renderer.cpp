@@ -238,7 +238,10 @@ void Renderer::Impl::begin(Drawing& drawing) {
 
 void Renderer::Impl::finish(Drawing& drawing) {
     if (drawing.view == nullptr) return;
-    if (std::exchange(drawing.view, nullptr)->finish(drawing.picture)) return;
+    {
+        const StageTimer timer(&times, DrawStage::view);
+        if (std::exchange(drawing.view, nullptr)->finish(drawing.picture)) return;
+    }
     drawing.too_much = true;
     begin(drawing);
 }

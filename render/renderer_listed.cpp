@@ -56,6 +56,7 @@ void Renderer::Impl::begin_listed(Drawing& drawing, const CameraFrame& camera,
     const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
                                         splats.time_s, fog_noise, kept_shade);
     if (shells.any()) view.use_shade(shells.shade, shells.serial);
+    const StageTimer timer(&times, DrawStage::view);
     const ListedPicture what{
         .variant = {.physical_sky = sky != nullptr, .shells = shells.any(), .fog = shells.has_fog()},
         .order = order_frame(camera, options.camera, options.ground, !lightning.empty()),
