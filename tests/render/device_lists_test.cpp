@@ -2,6 +2,7 @@
 // Orders and lists that the device makes, against those of the host.
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -22,6 +23,7 @@
 #include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 #include "tests/render/renderer_views.h"
+#include "tests/render/voxel_cloud.h"
 
 namespace nephos {
 namespace {
@@ -175,6 +177,34 @@ TEST(DeviceLists, EqualThoseOfTheHost) {
     test::expect_no_messages(renderer);
 }
 
+// Of equal distances the metaball that is given first comes first; a lattice seen along its axis has four to
+// eight of each.
+TEST(DeviceLists, EqualDistancesStayInTheGivenOrder) {
+    std::vector<Metaball> balls;
+    for (int n = 0; n < 12 * 12 * 12; ++n)
+        balls.push_back({float(n % 12) * 100 - 550, float(n / 12 % 12) * 100 - 550,
+                         float(n / 144) * 100 + 450, 80, float(n + 1) / 2000});
+    const MetaballCloud cloud{balls, 0.002, 0.7};
+    RenderOptions options = test::view({0, -4000, 1000}, {0, 0, 1000});
+    options.level_of_detail.pixels = 0;
+    Renderer renderer(with_lists(TileLists::device));
+    renderer.draw(cloud, options);
+    const HostLists expected = host_lists(cloud, options);
+    const auto lists = RendererTestAccess::lists(renderer, options.camera.width, options.camera.height);
+    ASSERT_EQ(lists.balls.size(), balls.size());
+    std::size_t equal = 0;
+    for (std::size_t i = 0; i < balls.size(); ++i) {
+        const shader::ViewBall& mine = lists.balls[i];
+        const shader::ViewBall& host = expected.order.balls[balls.size() - 1 - i];
+        ASSERT_EQ(mine.depth_scale, host.depth_scale) << i;  // each has its own
+        if (i > 0 && std::hypot(mine.x, mine.y, mine.z) ==
+                         std::hypot(lists.balls[i - 1].x, lists.balls[i - 1].y, lists.balls[i - 1].z))
+            ++equal;
+    }
+    EXPECT_GT(equal, balls.size() / 2);
+    test::expect_no_messages(renderer);
+}
+
 class ListedPictures : public ::testing::Test {
   protected:
     void TearDown() override {
@@ -306,6 +336,23 @@ TEST_F(ListedPictures, OfAnotherCloud) {
     EXPECT_EQ(difference(listed_.draw_splats({}, options), reference_.draw_splats({}, options)), 0.0f);
     const std::vector<Metaball> behind{{0, -9000, 800, 300, 1}};  // nothing is seen
     EXPECT_LE(difference(splats_of(behind, 0.01), options), kClose);
+}
+
+// From another eye level of detail merges other metaballs, which have other light.
+TEST_F(ListedPictures, OfMergedMetaballs) {
+    const std::vector<Metaball> voxels = test::ragged_cloud();
+    Splats splats;
+    splats.metaballs = {voxels, 0.15, test::kVoxelNormalisation};
+    for (const bool light : {false, true}) {
+        splats.light = light;
+        for (const double y : {-9000, -1500, -9000}) {
+            RenderOptions options = test::view({0, y, 900}, {0, 0, 800});
+            options.level_of_detail.pixels = 8;
+            EXPECT_LE(difference(splats, options), kClose) << y;
+            Renderer fresh(with_lists(TileLists::device));
+            test::expect_same_bits(listed_.draw_splats(splats, options), fresh.draw_splats(splats, options));
+        }
+    }
 }
 
 // Metaballs that fill the picture have far more entries than the lists begin with.
