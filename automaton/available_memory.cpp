@@ -8,6 +8,9 @@
 #include <optional>
 #include <string_view>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -101,6 +104,15 @@ std::optional<std::size_t> left_of_address_space(const std::filesystem::path& ro
     return std::size_t(limit.rlim_cur) - std::min(taken, std::size_t(limit.rlim_cur));
 }
 
+// What was freed and will be handed out again.
+std::size_t kept_by_malloc() {
+#ifdef __GLIBC__
+    return mallinfo2().fordblks;
+#else
+    return 0;
+#endif
+}
+
 }  // namespace
 
 AvailableMemory available_memory(const std::filesystem::path& root) {
@@ -110,6 +122,7 @@ AvailableMemory available_memory(const std::filesystem::path& root) {
     }
     tighten_by_own_groups(available, root);
     tighten(available, left_of_address_space(root), "address space limit of the process (ulimit -v)");
+    if (root == "/" && available.bytes != kUnlimited) available.bytes += kept_by_malloc();
     return available;
 }
 

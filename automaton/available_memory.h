@@ -16,8 +16,9 @@ struct AvailableMemory {
 };
 
 // Reads MemAvailable, the limits of the control groups that the process is in (version 2 and 1, what can be
-// reclaimed counts as free) and RLIMIT_AS. `root` is where the file system starts, for tests. What cannot be
-// read does not limit; with nothing to read, bytes is the largest std::size_t. Thread-safe.
+// reclaimed counts as free) and RLIMIT_AS; what malloc keeps of freed memory counts as free. `root` is where
+// the file system starts, for tests. What cannot be read does not limit; with nothing to read, bytes is the
+// largest std::size_t. Thread-safe.
 AvailableMemory available_memory(const std::filesystem::path& root = "/");
 
 }  // namespace nephos

@@ -251,7 +251,7 @@ double shafts_strength(const RenderOptions& options) {
     return options.light_shafts.strength * daylight(options.sun.elevation_deg).sun;
 }
 
-// Full light everywhere.
+// The shade map of a cloud: where along the light each of its columns begins and ends to be in shadow.
 void make_shade(const PreparedCloud& cloud, const ShadowFrame& frame, std::span<const float> shadow,
                 int shadow_size, KeptShade& kept) {
     if (cloud.visible.empty()) {  // full light

@@ -73,11 +73,11 @@ class Sweeps {
     Sweeps(std::span<const std::uint64_t> blocks, std::span<const OfOctants> depths, float most)
         : neighbours_(neighbours_of(blocks)), depths_(depths), cover_(blocks.size()), due_(blocks.size(), 1) {
         for (std::size_t b = 0; b < blocks.size(); ++b)
-            for (std::size_t o = 0; o < 8; ++o) cover_[b][o] = depths[b][o] > 0 ? most : 0.0f;
+            for (std::size_t o = 0; o < 8; ++o) cover_[b][o] = std::min(most, 2 * depths[b][o]);
     }
 
-    // To and fro until nothing changes: values only fall, from `most` to the largest that agree with their
-    // neighbours, whatever the order of the sweeps.
+    // To and fro until nothing changes: values only fall, from the most that they may be to the largest that
+    // agree with their neighbours, whatever the order of the sweeps.
     std::vector<OfOctants> run() {
         for (bool changed = true; changed;) {
             changed = false;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 #include <span>
 
@@ -66,7 +67,7 @@ struct Merging {
     Vec3 eye_m;
     double radius_voxels = 1;
     double per_density = 1;       // optical depth scale per density and metre
-    double per_octant_depth = 1;  // from the sum of depth scales to the depth through 4 x 4 x 4 voxels
+    double per_octant_depth = 1;  // from the depth scale of a voxel to the depth through four of them
     struct Level {
         float threshold = 1;    // of contrast ...
         double far_voxels = 0;  // ... at this distance
@@ -80,7 +81,7 @@ struct Merging {
           eye_m(view.eye_m),
           radius_voxels(radius),
           per_density(as.extinction_per_m * as.normalisation),
-          per_octant_depth(1 / (16 * as.normalisation * radius)) {
+          per_octant_depth(4 / (as.normalisation * radius)) {
         double threshold = 1, child = 1;  // voxels on the side of a child
         for (Level& level : levels) {
             // A full block's, whose second moment is that of its voxels' centres.
@@ -120,13 +121,23 @@ struct BlockBalls {
     const VoxelPlace& place(std::uint32_t i) const { return merging.blocks.places[i]; }
     float depth_scale(std::uint32_t i) const { return merging.cloud.depth_scale[i]; }
 
-    // Optical depths through its octants, each at most kMostOfOctant.
+    // The least optical depths through its octants, each at most kMostOfOctant: those of four of the thinnest
+    // voxel; 0 if a voxel is missing, for then one may see through.
     OfOctants octant_depths() const {
-        std::array<float, 64> sums{};
-        for_each([&](std::uint32_t i) { sums[place(i).pair] += depth_scale(i); });
+        std::array<std::uint64_t, 8> filled{};
+        OfOctants least;
+        least.fill(std::numeric_limits<float>::max());
+        for_each([&](std::uint32_t i) {
+            const VoxelPlace& at = place(i);
+            const std::size_t octant = octant_of(at.pair);
+            const auto voxel = [](float along) { return unsigned(along) & 3; };
+            filled[octant] |= std::uint64_t{1} << (16 * voxel(at.z) + 4 * voxel(at.y) + voxel(at.x));
+            least[octant] = std::min(least[octant], depth_scale(i));
+        });
         OfOctants depths{};
-        for (std::size_t n = 0; n < 64; ++n) depths[octant_of(n)] += sums[n];
-        for (float& depth : depths) depth = std::min(float(depth * merging.per_octant_depth), kMostOfOctant);
+        for (std::size_t n = 0; n < 8; ++n)
+            if (~filled[n] == 0)
+                depths[n] = std::min(float(least[n] * merging.per_octant_depth), kMostOfOctant);
         return depths;
     }
 };
@@ -313,6 +324,10 @@ std::vector<OfOctants> hidden_octants(const Merging& merging) {
             depths[b] = balls.octant_depths();
         }
     });
+    const bool some = std::ranges::any_of(depths, [](const OfOctants& of_block) {
+        return std::ranges::any_of(of_block, [](float depth) { return 2 * depth > kVeiled; });
+    });
+    if (!some) return std::vector<OfOctants>(count);  // covered at most by that
     std::vector<OfOctants> hidden = cover_of_octants(numbers, depths, kHidden);
     for (OfOctants& of_block : hidden)
         for (float& cover : of_block) cover = smoothstep(kVeiled, kHidden, cover);

@@ -27,8 +27,9 @@
 //
 // What cannot be seen from anywhere may lose all its contrast: 4 x 4 x 4 voxels are merged, as far as they go
 // also with their neighbours to 8 x 8 x 8, where the least optical depth between them and the outside
-// (block_cover.h) is kHidden, or in part from kVeiled on. At an extinction at which every voxel is opaque that is
-// four tenths of Disney's cloud; ragged clouds have no such voxels.
+// (block_cover.h) is kHidden, or in part from kVeiled on. An octant covers others by its thinnest voxel, and
+// not at all if one is missing: nothing that one may look through is closed. Of Disney's cloud where every
+// voxel is opaque that is a twelfth; ragged clouds have hardly any such voxels.
 //
 // Measured and dropped: a threshold that does not depend on r (three times the difference for as many
 // metaballs; the light of an unchanged cloud would outlive a step of the eye, but computing it for the fewer

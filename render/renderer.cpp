@@ -265,7 +265,7 @@ void Renderer::Impl::draw_ordered(const Splats& splats, const RenderOptions& opt
     }
     // Balls are read twice; keys move through memory three times, and back and forth.
     times[DrawStage::eye_order].bytes =
-        splats.metaballs.metaballs.size_bytes() +
+        lit.cloud.metaballs.size_bytes() +
         order.balls.size() * (sizeof(Metaball) + 7 * 8 + sizeof(shader::ViewBall));
     if (on_processor())
         draw_on_processor(splats, options, camera, parts, order, picture);

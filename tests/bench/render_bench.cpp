@@ -84,16 +84,21 @@ std::vector<BenchRow> compare_ways(Subject subject, int rounds) {
     }
     std::vector<BenchRow> rows;
     for (std::size_t w = 1; w < kWays.size(); ++w) {
-        rows.push_back({fmt::format("{}, the same sorted splats, without light: {} against {}", subject.name,
-                                    kWays[0].name, kWays[w].name),
-                        median(splatting[0]), median(splatting[w]),
-                        w == 1 ? ">= 0.67x faster" : ">= 20x faster",
-                        "time of the processor, not of the wall"});
-        rows.push_back(
-            {fmt::format("{}, full frame 640x480: {} against {} on {}", subject.name, kWays[0].name,
-                         kWays[w].name, renderers[w].device_name()),
-             median(times[0]), median(times[w]), w == 1 ? ">= 0.67x faster" : ">= 20x faster",
-             fmt::format("{} metaballs; time of the processor, not of the wall", subject.balls.size())});
+        // Against the tiles it is their time that has a target.
+        const auto add = [&](const std::string& what, double ours, double other, const std::string& note) {
+            if (w == 1)
+                rows.push_back({fmt::format("{}, {}: {} on {} against {}", subject.name, what, kWays[w].name,
+                                            renderers[w].device_name(), kWays[0].name),
+                                other, ours, "<= 1.5x", note});
+            else
+                rows.push_back({fmt::format("{}, {}: {} against {} on {}", subject.name, what, kWays[0].name,
+                                            kWays[w].name, renderers[w].device_name()),
+                                ours, other, ">= 20x faster", note});
+        };
+        add("the same sorted splats, without light", median(splatting[0]), median(splatting[w]),
+            "time of the processor, not of the wall");
+        add("full frame 640x480", median(times[0]), median(times[w]),
+            fmt::format("{} metaballs; time of the processor, not of the wall", subject.balls.size()));
     }
     return rows;
 }
@@ -145,8 +150,8 @@ BenchRow film_row(const std::filesystem::path& file, int frames) {
     struct Film : PipelineSink {
         const Scene* scene = nullptr;
         Renderer renderer;
-        std::vector<double> times;
-        std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
+        std::size_t drawn = 0, frames = 0;
+        std::chrono::steady_clock::time_point first, last;  // ends of the first and the last frame
         void step(const StepResult&) override {}
         void frame(const FrameResult& result) override {
             const double radius = scene->density.metaball_radius_cells;
@@ -158,18 +163,23 @@ BenchRow film_row(const std::filesystem::path& file, int frames) {
             options.camera.width = 640;
             options.camera.height = 480;
             renderer.draw_splats(splats, options);
-            const auto now = std::chrono::steady_clock::now();
-            times.push_back(std::chrono::duration<double, std::milli>(now - last).count());
-            last = now;
+            last = std::chrono::steady_clock::now();
+            if (++frames == 1) first = last;
+            drawn += balls.size();
         }
     } film;
     film.scene = &scene;
     Pipeline pipeline(scene, range_of_frames(scene, 1, frames), {});
     while (!pipeline.finished()) pipeline.advance(film);
-    const double ms = median(film.times);
+    const std::chrono::duration<double, std::milli> all = film.last - film.first;
+    const double ms = all.count() / double(film.frames - 1);
     return {fmt::format("{}: simulate, density, light and view, 640x480, {}", file.filename().string(),
                         film.renderer.device_name()),
-            ms, 0, "<= 33.3 ms", fmt::format("{:.1f} frames/s, one after the other, 2 threads", 1000 / ms)};
+            ms, 0, "<= 33.3 ms",
+            fmt::format(
+                "{:.1f} frames/s, one after the other, 2 threads; mean of {} frames of {} metaballs in the "
+                "mean; one frame in four has a new step",
+                1000 / ms, film.frames, film.drawn / film.frames)};
 }
 
 double children_ms() {

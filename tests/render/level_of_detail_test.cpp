@@ -179,6 +179,50 @@ TEST(LevelOfDetail, HiddenVoxelsAreMerged) {
     EXPECT_EQ(outer(merged), outer(balls));
 }
 
+// Tubes through a solid cube stay open, whatever their width and place.
+TEST(LevelOfDetail, OpeningsStayOpen) {
+    const test::VoxelBox box{.origin_m = {-1280, -480, 640}, .x = 64, .y = 24, .z = 64};
+    for (const int width : {1, 2, 3, 4, 6}) {
+        for (const int from : {28, 30, 31}) {
+            const auto is_tube = [&](int at) { return at >= from && at < from + width; };
+            const std::vector<Metaball> balls = test::voxel_metaballs(
+                box, [&](int x, int, int z) { return is_tube(x) && is_tube(z) ? 0.0 : 1.0; });
+            const std::vector<Metaball> merged = drawn(balls, kNear, kHardlyAny);
+            ASSERT_LT(merged.size(), balls.size());
+            const double middle = (from + 0.5 * width) * 40;
+            const reference::Ray ray{{-1280 + middle, -6000, 640 + middle}, {0, 1, 0}};
+            const double full = -std::log(reference::transmittance(cloud_of(balls), ray)),
+                         less = -std::log(reference::transmittance(cloud_of(merged), ray));
+            EXPECT_NEAR(less, full, 0.02 + 0.02 * full) << width << " voxels from " << from;
+        }
+    }
+}
+
+double extinction_at(const std::vector<Metaball>& balls, const Vec3& at) {
+    double sum = 0;
+    for (const Metaball& ball : balls)
+        sum += ball.density * reference::field(length(Vec3{ball.x, ball.y, ball.z} - at) / ball.radius);
+    return kExtinction * test::kVoxelNormalisation * sum;
+}
+
+// What is in a hollow within a solid cube stays as it is while it fills: an eye may be there.
+TEST(LevelOfDetail, HollowsStayAsTheyAre) {
+    const test::VoxelBox box{.origin_m = {-1280, -1280, 640}, .x = 64, .y = 64, .z = 64};
+    const auto is_hollow = [](int at) { return at >= 26 && at < 38; };
+    for (const double density : {0.0, 1e-7, 1e-3, 0.02, 0.05}) {
+        const std::vector<Metaball> balls = test::voxel_metaballs(box, [&](int x, int y, int z) {
+            return is_hollow(x) && is_hollow(y) && is_hollow(z) ? density : 1.0;
+        });
+        const std::vector<Metaball> merged = drawn(balls, {{0, 0, 1920}, 515}, kHardlyAny);
+        ASSERT_LT(merged.size(), balls.size());
+        for (double x = -230; x < 230; x += 20) {
+            const double full = extinction_at(balls, {x, 0, 1920});
+            EXPECT_NEAR(extinction_at(merged, {x, 0, 1920}), full, 1e-9 + 1e-4 * full)
+                << density << " at " << x;
+        }
+    }
+}
+
 TEST(LevelOfDetail, GrowingOpaqueDoesNotPop) {
     std::vector<std::vector<Metaball>> coarse, fine;
     for (int step = 0; step <= 20; ++step)
