@@ -31,7 +31,7 @@ struct RenderArguments {
     std::vector<std::string> out;
     VdbReadOptions read;
     SceneArguments scene;
-    View view = View::side;
+    std::optional<View> view;
     std::optional<Vec3> camera_m, target_m;
     std::optional<double> fov_deg, exposure_ev, extinction_per_m, albedo, g;
     std::optional<std::pair<double, double>> sun_deg;
@@ -66,7 +66,8 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
     add_value(command, "--size", "WxH", "Width and height in pixels (default: 1280x720)",
               [&](const std::string& text) { a.size = parse_size(text); })
         ->group(group);
-    add_value(command, "--view", "VIEW", "Where to look from: side, below or above (default: side)",
+    add_value(command, "--view", "VIEW",
+              "Where to look from: side, below or above (default: side, or the scene's camera)",
               [&](const std::string& text) {
                   if (text != "side" && text != "below" && text != "above") {
                       throw Error(ErrorCode::usage,
@@ -75,7 +76,7 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
                   a.view = text == "side" ? View::side : text == "below" ? View::below : View::above;
               })
         ->group(group);
-    add_value(command, "--camera", "X,Y,Z", "Position of the eye in metres, instead of --view",
+    add_value(command, "--camera", "X,Y,Z", "Position of the eye in metres, instead of that of --view",
               [&](const std::string& text) { a.camera_m = parse_point(text, -kFar_m, kFar_m); })
         ->group(group);
     add_value(command, "--target", "X,Y,Z", "Point to look at in metres (default: middle of the cloud)",
@@ -154,7 +155,7 @@ RenderOptions picture_options(const RenderArguments& a, const std::optional<Scen
     }
     if (a.albedo) options.light.albedo = *a.albedo;
     if (a.g) options.light.phase.g = *a.g;
-    if (!scene) frame(options.camera, box, a.view, options.ground.height_m);
+    if (a.view || !scene) frame(options.camera, box, a.view.value_or(View::side), options.ground.height_m);
     if (a.camera_m) options.camera.position_m = *a.camera_m;
     if (a.target_m) options.camera.target_m = *a.target_m;
     if (options.camera.position_m == options.camera.target_m) {

@@ -2,6 +2,8 @@
 #include "apps/signals.h"
 
 #include <atomic>
+#include <cstdint>
+#include <ctime>
 
 #include <signal.h>
 #include <unistd.h>
@@ -9,14 +11,30 @@
 namespace nephos {
 namespace {
 
-// A signal handler can reach nothing but statics; these two are the only ones of the command.
+// One key may arrive twice: from the terminal, and from a program between that passes it on (timeout, make).
+constexpr std::int64_t kSameKey_ms = 300;
+
+// A signal handler can reach nothing but statics; these are the only ones of the command.
 std::atomic<int> pending{0};
+std::atomic<std::int64_t> pending_since_ms{0};
 std::atomic<bool> deferred{false};
-static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free &&
+              std::atomic<std::int64_t>::is_always_lock_free);
+
+std::int64_t now_ms() {
+    timespec now{};
+    ::clock_gettime(CLOCK_MONOTONIC, &now);  // async-signal-safe
+    return std::int64_t(now.tv_sec) * 1000 + now.tv_nsec / 1'000'000;
+}
 
 void on_stop(int signal) {
-    int none = 0;
-    if (deferred.load() && pending.compare_exchange_strong(none, signal)) return;
+    if (deferred.load()) {
+        int none = 0;
+        std::int64_t never = 0;
+        pending_since_ms.compare_exchange_strong(never, now_ms());
+        if (pending.compare_exchange_strong(none, signal)) return;
+        if (now_ms() - pending_since_ms.load() < kSameKey_ms) return;
+    }
     // Nothing half-written can carry a final name (automaton/atomic_file.h), so ending here is safe.
     ::_exit(128 + signal);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Ctrl-C and SIGTERM: the first asks for an orderly end (finish the step, leave a checkpoint), the second
-// ends the process at once. Also makes failed writes visible as errors where the default is a silent death.
+// Ctrl-C and SIGTERM: the first asks for an orderly end (finish the step, leave a checkpoint), the second,
+// unless it comes within 0.3 s, ends the process at once. Also makes failed writes visible as errors where the default is a silent death.
 
 namespace nephos {
 

@@ -219,7 +219,8 @@ World space is in metres: x east, y north, z up. Colours are linear RGB. A key o
 scene's folder, on the command line to the current folder. Unknown keys are errors.
 
 Sources: D = Dobashi, Kaneda, Yamashita, Okita, Nishita, "A Simple, Efficient Method for Realistic Animation of Clouds",
-SIGGRAPH 2000; S = Sapronov's procedural atmosphere. No source: nephos' own.
+SIGGRAPH 2000; T = Torchelsen's dissertation on skies of seeds and roots, 2005; S = Sapronov's procedural atmosphere of a flight
+simulator; P = Puig-Centelles, Ripolles, Chover on areas of rain, 2008. No source: nephos' own.
 
 ## The top of the file
 

@@ -823,12 +823,23 @@ class Signals(Case):
         process = self.start("run", slow, "--no-render", "--out", "slow", "--threads", "1")
         self.wait_for("slow/manifest.json")
         process.send_signal(signal.SIGINT)
-        time.sleep(0.05)
+        time.sleep(0.4)
         begin = time.monotonic()
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=60)
         self.assertEqual(process.returncode, 130)
         self.assertLess(time.monotonic() - begin, 1.0)
+
+    def test_a_signal_that_comes_twice_is_one(self):
+        # As from the terminal and from a program between, like timeout.
+        process = self.start("run", self.long, "--no-render", "--out", "stopped")
+        self.wait_for("stopped/density/long_0002.vdb")
+        for _ in range(3):
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.02)
+        process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130)
+        self.assertTrue((self.folder / "stopped/checkpoint.nephos").exists())
 
     def test_two_runs_do_not_share_a_folder(self):
         process = self.start("run", self.long, "--no-render", "--out", "stopped")
@@ -978,6 +989,9 @@ class Pictures(Case):
         below = json.loads(self.call("render", volume, "--out", "c.png", "--view", "below", "--size", "32x32",
                                      "--camera", "-10,-200,5", "--json").stdout)
         self.assertEqual(below["camera_m"], [-10, -200, 5])
+        views = [self.call("render", volume, "--out", "d.png", "--scene", self.scene, *words, "--json").stdout
+                 for words in ([], ["--view", "side"], ["--view", "above"])]
+        self.assertEqual(len({str(json.loads(view)["camera_m"]) for view in views}), 3)
 
     def test_pictures_of_run_and_render_agree(self):
         self.call("run", self.scene, "--out", "out")

@@ -2,6 +2,7 @@
 
 // ./bench: prints the tables of the README. Nothing here passes or fails: figures are for people to judge.
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -80,6 +81,12 @@ int main(int argc, char** argv) {
         for (const auto& group : groups) fmt::print(" {}", group.first);
         fmt::print(". Without a name, all.\n");
         return 0;
+    }
+    for (int i = 1; i < argc; ++i) {
+        const auto is_named = [&](const auto& group) { return std::strcmp(argv[i], group.first) == 0; };
+        if (std::ranges::any_of(groups, is_named)) continue;
+        fmt::print(stderr, "error: no group `{}`: `./bench --help` lists them\n", argv[i]);
+        return 2;
     }
     try {
         fmt::print("{}, kernels for {}; one thread unless said; medians of runs in turn\n\n", processor(),
