@@ -8,13 +8,12 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
 #include "automaton/smoothstep.h"
 #include "automaton/vector_math.h"
-#include "render/block_cover.h"
-#include "render/voxel_blocks.h"
 
 namespace nephos {
 namespace {
@@ -62,26 +61,20 @@ struct Sums {
 
 // What all blocks of a cloud share.
 struct Merging {
-    const PreparedCloud& cloud;
-    const VoxelBlocks& blocks;
     Vec3 eye_m;
     double radius_voxels = 1;
-    double per_density = 1;       // optical depth scale per density and metre
-    double per_octant_depth = 1;  // from the depth scale of a voxel to the depth through four of them
+    double per_density = 1;  // optical depth scale per density and metre
     struct Level {
         float threshold = 1;    // of contrast ...
         double far_voxels = 0;  // ... at this distance
     };
     Level levels[3];
 
-    Merging(const PreparedCloud& given, const MetaballCloud& as, const VoxelBlocks& of,
-            const DetailView& view, const LevelOfDetailOptions& options, double radius)
-        : cloud(given),
-          blocks(of),
-          eye_m(view.eye_m),
+    Merging(const MetaballCloud& cloud, double radius, const DetailView& view,
+            const LevelOfDetailOptions& options)
+        : eye_m(view.eye_m),
           radius_voxels(radius),
-          per_density(as.extinction_per_m * as.normalisation),
-          per_octant_depth(4 / (as.normalisation * radius)) {
+          per_density(cloud.extinction_per_m * cloud.normalisation) {
         double threshold = 1, child = 1;  // voxels on the side of a child
         for (Level& level : levels) {
             // A full block's, whose second moment is that of its voxels' centres.
@@ -98,15 +91,17 @@ std::size_t octant_of(std::size_t n) { return (n >> 5 & 1) << 2 | (n >> 3 & 1) <
 
 // The metaballs of a block of 8 x 8 x 8 voxels, and where it lies.
 struct BlockBalls {
-    const Merging& merging;
+    const PreparedCloud& cloud;
+    const VoxelBlocks& blocks;
     std::span<const BlockRun> runs;
     const VoxelLattice& lattice;
     double corner[3];  // voxels
 
-    BlockBalls(const Merging& of, std::size_t number)
-        : merging(of),
-          runs(of.blocks.of_block(number)),
-          lattice(of.blocks.lattices[lattice_of(runs.front().block)]) {
+    BlockBalls(const PreparedCloud& given, const VoxelBlocks& all, std::size_t number)
+        : cloud(given),
+          blocks(all),
+          runs(all.of_block(number)),
+          lattice(all.lattices[lattice_of(runs.front().block)]) {
         const std::array<int, 3> place = place_of(runs.front().block);
         for (std::size_t axis = 0; axis < 3; ++axis)
             corner[axis] = kBlockSide * place[axis] + lattice.phase[axis];
@@ -118,12 +113,13 @@ struct BlockBalls {
         for (const BlockRun& run : runs)
             for (std::uint32_t i = run.begin; i < run.end; ++i) work(i);
     }
-    const VoxelPlace& place(std::uint32_t i) const { return merging.blocks.places[i]; }
-    float depth_scale(std::uint32_t i) const { return merging.cloud.depth_scale[i]; }
+    const VoxelPlace& place(std::uint32_t i) const { return blocks.places[i]; }
+    float depth_scale(std::uint32_t i) const { return cloud.depth_scale[i]; }
 
     // The least optical depths through its octants, each at most kMostOfOctant: those of four of the thinnest
-    // voxel; 0 if a voxel is missing, for then one may see through.
-    OfOctants octant_depths() const {
+    // voxel; 0 if a voxel is missing, for then one may see through. `per_scale`: from the depth scale of a
+    // voxel to the depth through four of them.
+    OfOctants octant_depths(double per_scale) const {
         std::array<std::uint64_t, 8> filled{};
         OfOctants least;
         least.fill(std::numeric_limits<float>::max());
@@ -136,8 +132,7 @@ struct BlockBalls {
         });
         OfOctants depths{};
         for (std::size_t n = 0; n < 8; ++n)
-            if (~filled[n] == 0)
-                depths[n] = std::min(float(least[n] * merging.per_octant_depth), kMostOfOctant);
+            if (~filled[n] == 0) depths[n] = std::min(float(least[n] * per_scale), kMostOfOctant);
         return depths;
     }
 };
@@ -146,7 +141,8 @@ struct BlockBalls {
 class BlockTree {
   public:
     // `hidden`: how far each octant is to be merged whatever its contrast, 0..1.
-    BlockTree(const BlockBalls& balls, const OfOctants& hidden) : balls_(balls) {
+    BlockTree(const Merging& merging, const BlockBalls& balls, const OfOctants& hidden)
+        : merging_(merging), balls_(balls) {
         balls.for_each([&](std::uint32_t i) { add_ball(balls.place(i), balls.depth_scale(i)); });
         merge_small(hidden);
         merge_middle(hidden);
@@ -178,7 +174,7 @@ class BlockTree {
             most = std::max(most, small_.balls[n] > 0 ? own[n] : 0.0f);
         }
         if (!(most > 0)) return;
-        const PreparedCloud& cloud = balls_.merging.cloud;
+        const PreparedCloud& cloud = balls_.cloud;
         balls_.for_each([&](std::uint32_t i) {
             const float share = own[balls_.place(i).pair];
             if (!(share > 0)) return;
@@ -205,7 +201,7 @@ class BlockTree {
         std::array<float, 64> least, of_octant;
         least.fill(1);
         for (std::size_t n = 0; n < 64; ++n) of_octant[n] = hidden[octant_of(n)];
-        finish(small_, balls_.merging.levels[0], least, of_octant);
+        finish(small_, merging_.levels[0], least, of_octant);
     }
 
     void merge_middle(const OfOctants& hidden) {
@@ -216,7 +212,7 @@ class BlockTree {
             middle_.add(m, small_, n);
             if (small_.balls[n] > 0) least[m] = std::min(least[m], small_.share[n]);
         }
-        finish(middle_, balls_.merging.levels[1], least, hidden);
+        finish(middle_, merging_.levels[1], least, hidden);
     }
 
     void merge_whole(const OfOctants& hidden) {
@@ -227,13 +223,13 @@ class BlockTree {
             least = std::min(least, middle_.share[n]);
             least_hidden = std::min(least_hidden, hidden[n]);
         }
-        finish(whole_, balls_.merging.levels[2], {least}, {least_hidden});
+        finish(whole_, merging_.levels[2], {least}, {least_hidden});
     }
 
     // Squares of the distances along an axis from the eye to the middles of blocks, voxels.
     template <std::size_t kSide>
     std::array<float, kSide> squared_way(std::size_t axis) const {
-        const double eye[3] = {balls_.merging.eye_m.x, balls_.merging.eye_m.y, balls_.merging.eye_m.z};
+        const double eye[3] = {merging_.eye_m.x, merging_.eye_m.y, merging_.eye_m.z};
         std::array<float, kSide> squares;
         for (std::size_t n = 0; n < kSide; ++n) {
             const double middle = (double(n) + 0.5) * (kBlockSide / double(kSide));
@@ -250,7 +246,7 @@ class BlockTree {
                 const typename Sums<kSide>::Values& hidden) const {
         const std::array<float, kSide> wx = squared_way<kSide>(0), wy = squared_way<kSide>(1),
                                        wz = squared_way<kSide>(2);
-        const auto square = float(balls_.merging.radius_voxels * balls_.merging.radius_voxels);
+        const auto square = float(merging_.radius_voxels * merging_.radius_voxels);
         const auto per_far_square = float(1 / (level.far_voxels * level.far_voxels));
         const float threshold = level.threshold;
         std::array<float, Sums<kSide>::kCount> way;
@@ -283,10 +279,11 @@ class BlockTree {
             return float((balls_.corner[axis] + double(sum) / sums.mass[n]) * balls_.lattice.edge_m);
         };
         to.metaballs.push_back({world(sums.x[n], 0), world(sums.y[n], 1), world(sums.z[n], 2),
-                                float(radius_m), float(depth / (balls_.merging.per_density * radius_m))});
+                                float(radius_m), float(depth / (merging_.per_density * radius_m))});
         to.depth_scale.push_back(depth);
     }
 
+    const Merging& merging_;
     const BlockBalls& balls_;
     Sums<4> small_;
     Sums<2> middle_;
@@ -313,15 +310,16 @@ MergedCloud joined(const std::vector<MergedPart>& parts) {
 }
 
 // How far the octants of each block are hidden behind others, 0..1.
-std::vector<OfOctants> hidden_octants(const Merging& merging) {
-    const std::size_t count = merging.blocks.size();
+std::vector<OfOctants> hidden_octants(const PreparedCloud& cloud, const VoxelBlocks& blocks,
+                                      double per_scale) {
+    const std::size_t count = blocks.size();
     std::vector<std::uint64_t> numbers(count);
     std::vector<OfOctants> depths(count);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 16), [&](const auto& range) {
         for (std::size_t b = range.begin(); b != range.end(); ++b) {
-            const BlockBalls balls(merging, b);
+            const BlockBalls balls(cloud, blocks, b);
             numbers[b] = balls.runs.front().block;
-            depths[b] = balls.octant_depths();
+            depths[b] = balls.octant_depths(per_scale);
         }
     });
     const bool some = std::ranges::any_of(depths, [](const OfOctants& of_block) {
@@ -336,23 +334,31 @@ std::vector<OfOctants> hidden_octants(const Merging& merging) {
 
 }  // namespace
 
-std::optional<MergedCloud> merge_voxels(const PreparedCloud& given, const MetaballCloud& cloud,
-                                        const DetailView& view, const LevelOfDetailOptions& options) {
-    if (given.visible.empty() || !(options.pixels > 0)) return std::nullopt;
+std::optional<DetailBlocks> detail_blocks(const PreparedCloud& given, const MetaballCloud& cloud) {
+    if (given.visible.empty()) return std::nullopt;
     // The inverse of metaball_normalisation().
     const double radius_voxels =
         std::clamp(std::cbrt(2835.0 / (736.0 * std::numbers::pi * cloud.normalisation)), kMinMetaballRadius,
                    kMaxMetaballRadius);
-    const std::optional<VoxelBlocks> blocks = voxel_blocks(given, radius_voxels);
-    if (!blocks) return std::nullopt;
-    const Merging merging(given, cloud, *blocks, view, options, radius_voxels);
-    const std::vector<OfOctants> hidden = hidden_octants(merging);
+    std::optional<VoxelBlocks> voxels = voxel_blocks(given, radius_voxels);
+    if (!voxels) return std::nullopt;
+    DetailBlocks blocks{radius_voxels, std::move(*voxels), {}};
+    blocks.hidden = hidden_octants(given, blocks.voxels, 4 / (cloud.normalisation * radius_voxels));
+    return blocks;
+}
+
+std::optional<MergedCloud> merge_voxels(const PreparedCloud& given, const MetaballCloud& cloud,
+                                        const DetailBlocks& blocks, const DetailView& view,
+                                        const LevelOfDetailOptions& options) {
+    if (!(options.pixels > 0)) return std::nullopt;
+    const Merging merging(cloud, blocks.radius_voxels, view, options);
     constexpr std::size_t kAtOnce = 16;  // blocks of 8 x 8 x 8 that one thread looks at
-    std::vector<MergedPart> parts((blocks->size() + kAtOnce - 1) / kAtOnce);
+    const std::size_t count = blocks.voxels.size();
+    std::vector<MergedPart> parts((count + kAtOnce - 1) / kAtOnce);
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
-        for (std::size_t b = p * kAtOnce; b < std::min(blocks->size(), (p + 1) * kAtOnce); ++b) {
-            const BlockBalls balls(merging, b);
-            const BlockTree tree(balls, hidden[b]);
+        for (std::size_t b = p * kAtOnce; b < std::min(count, (p + 1) * kAtOnce); ++b) {
+            const BlockBalls balls(given, blocks.voxels, b);
+            const BlockTree tree(merging, balls, blocks.hidden[b]);
             tree.emit(parts[p].cloud);
             parts[p].merges = parts[p].merges || tree.merges();
         }

@@ -41,11 +41,11 @@ void take_missing(std::vector<std::uint8_t>& wanted, std::vector<std::uint8_t>& 
 }
 
 // Puts what is drawn in the place of the given metaballs. True if that is what `kept` has already.
-bool merge(LitCloud& kept, PreparedCloud given, std::optional<MergedCloud> merged) {
+bool draw_merged(LitCloud& kept, std::optional<MergedCloud> merged) {
     const bool same = merged ? merged->metaballs == kept.merged : kept.merged.empty();
-    kept.cloud = std::move(given);
     if (!merged) {
         kept.merged.clear();
+        kept.cloud = kept.given;
         return same;
     }
     kept.merged = std::move(merged->metaballs);
@@ -53,6 +53,8 @@ bool merge(LitCloud& kept, PreparedCloud given, std::optional<MergedCloud> merge
     kept.cloud.depth_scale = std::move(merged->depth_scale);
     kept.cloud.visible.resize(kept.merged.size());
     std::iota(kept.cloud.visible.begin(), kept.cloud.visible.end(), 0u);
+    kept.cloud.base_m = kept.given.base_m;
+    kept.cloud.top_m = kept.given.top_m;
     return same;
 }
 
@@ -78,20 +80,25 @@ bool keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions&
                 const DetailView& view) {
     const LightKey key = light_key(cloud, options);
     const bool is_known = kept.shadow_size != 0 && key == kept.key;
-    if (is_known && (view == kept.view || !(options.level_of_detail.pixels > 0))) {
-        if (kept.merged.empty())
-            kept.cloud.metaballs = cloud.metaballs;  // the same values, perhaps elsewhere
+    if (is_known) kept.given.metaballs = cloud.metaballs;  // the same values, perhaps elsewhere
+    if (is_known && (view == kept.view || !kept.blocks)) {
+        if (kept.merged.empty()) kept.cloud.metaballs = cloud.metaballs;
         kept.drawn_again = true;
         return true;
     }
     kept.shadow_size = 0;  // nothing is kept if prepare() throws
-    PreparedCloud given = prepare(cloud);
-    std::optional<MergedCloud> merged = merge_voxels(given, cloud, view, options.level_of_detail);
-    // The frame is that of the given metaballs, as are base and top: level of detail does not move it.
-    kept.frame = shadow_frame(given, direction_to_sun(options.sun), options.shadow_map_size);
+    if (!is_known) {
+        kept.given = prepare(cloud);
+        kept.blocks.reset();
+        if (options.level_of_detail.pixels > 0) kept.blocks = detail_blocks(kept.given, cloud);
+        // The frame is that of the given metaballs, as are base and top: level of detail does not move it.
+        kept.frame = shadow_frame(kept.given, direction_to_sun(options.sun), options.shadow_map_size);
+    }
+    std::optional<MergedCloud> merged;
+    if (kept.blocks) merged = merge_voxels(kept.given, cloud, *kept.blocks, view, options.level_of_detail);
     kept.view = view;
     kept.key = key;
-    if (merge(kept, std::move(given), std::move(merged)) && is_known) {
+    if (draw_merged(kept, std::move(merged)) && is_known) {
         kept.drawn_again = true;
         kept.shadow_size = options.shadow_map_size;
         return true;

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "render/cloud_preparation.h"
@@ -24,9 +25,11 @@ LightKey light_key(const MetaballCloud& cloud, const RenderOptions& options);
 
 struct LitCloud {
     LightKey key{};
-    std::vector<Metaball> merged;  // what is drawn instead of the given metaballs; empty: those
-    DetailView view;               // from which they were merged
-    PreparedCloud cloud;           // what is drawn: `merged` or the given metaballs
+    PreparedCloud given;
+    std::optional<DetailBlocks> blocks;  // of `given`; none where nothing is merged
+    std::vector<Metaball> merged;        // what is drawn instead of the given metaballs; empty: those
+    DetailView view;                     // from which they were merged
+    PreparedCloud cloud;                 // what is drawn: `merged` or the given metaballs
     ShadowFrame frame;
     int shadow_size = 0;
     std::vector<float> sun_depths;          // optical depth to the sun, one for each of cloud.visible

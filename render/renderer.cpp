@@ -26,7 +26,7 @@ std::size_t memory_needed(const Splats& splats, const RenderOptions& options, in
     const std::size_t pixels = std::size_t(options.camera.width) * std::size_t(options.camera.height);
     const std::size_t tile = std::min(pixels, square(std::size_t(tile_size)));
     // Orders, sort keys, light, box and splat of a metaball, and what is kept of it.
-    constexpr std::size_t kPerMetaball = 36 + 16 + 4 * 5 + 16 + 64 + 16 + 24,
+    constexpr std::size_t kPerMetaball = 36 + 16 + 4 * 5 + 16 + 64 + 16 + 24 + 24,
                           kPerBillboard = 32 + 16 + 4 * 5 + 16 + 64;
     return 20 * pixels + 40 * tile + 12 * square(std::size_t(options.shadow_map_size)) +
            kPerMetaball * splats.metaballs.metaballs.size() + kPerBillboard * splats.billboards.size() +

@@ -29,11 +29,18 @@ MetaballCloud cloud_of(const std::vector<Metaball>& balls) {
     return {balls, kExtinction, test::kVoxelNormalisation};
 }
 
+std::optional<MergedCloud> merge(const MetaballCloud& cloud, const DetailView& view,
+                                 const LevelOfDetailOptions& options) {
+    const PreparedCloud given = prepare(cloud);
+    const std::optional<DetailBlocks> blocks = detail_blocks(given, cloud);
+    return blocks ? merge_voxels(given, cloud, *blocks, view, options) : std::nullopt;
+}
+
 // The metaballs that are drawn: the given ones if none are merged.
 std::vector<Metaball> drawn(const std::vector<Metaball>& balls, const DetailView& view,
                             const LevelOfDetailOptions& options = {}) {
     const MetaballCloud cloud = cloud_of(balls);
-    const std::optional<MergedCloud> merged = merge_voxels(prepare(cloud), cloud, view, options);
+    const std::optional<MergedCloud> merged = merge(cloud, view, options);
     return merged ? merged->metaballs : balls;
 }
 
@@ -259,7 +266,7 @@ TEST(LevelOfDetail, BlocksStayWhereTheyAre) {
 TEST(LevelOfDetail, IsOffForNoPixelsAndWithoutVoxels) {
     const auto merges = [](const std::vector<Metaball>& balls, const LevelOfDetailOptions& options) {
         const MetaballCloud cloud = cloud_of(balls);
-        return merge_voxels(prepare(cloud), cloud, {{0, -1e5, 800}, 515}, options).has_value();
+        return merge(cloud, {{0, -1e5, 800}, 515}, options).has_value();
     };
     const std::vector<Metaball> balls = test::ragged_cloud();
     EXPECT_TRUE(merges(balls, {}));

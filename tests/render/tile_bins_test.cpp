@@ -64,6 +64,25 @@ TEST(TileBins, PartsKeepTheOrder) {
     EXPECT_EQ(entries, expected);
 }
 
+TEST(TileBins, TilesThatAreNotWantedStayEmptyAndTheOthersAsTheyAre) {
+    const TileGrid grid{131, 70};
+    const std::vector<PixelBox> boxes = random_boxes(40000, grid);
+    std::vector<std::uint8_t> wanted(grid.tiles());
+    for (std::size_t t = 0; t < wanted.size(); ++t) wanted[t] = t % 3 == 1 ? 1 : 0;
+    const TileBins all = bin_into_tiles(boxes, grid), some = bin_into_tiles(boxes, grid, wanted);
+    ASSERT_EQ(some.ranges.size(), grid.tiles());
+    std::size_t entries = 0;
+    for (std::size_t t = 0; t < grid.tiles(); ++t) {
+        const auto list_of = [&](const TileBins& bins) {
+            return std::vector(bins.list.begin() + bins.ranges[t].begin,
+                               bins.list.begin() + bins.ranges[t].end);
+        };
+        EXPECT_EQ(list_of(some), wanted[t] != 0 ? list_of(all) : std::vector<std::uint32_t>()) << t;
+        entries += list_of(some).size();
+    }
+    EXPECT_EQ(some.list.size(), entries);
+}
+
 TEST(TileBins, BatchesRespectBothLimits) {
     const TileGrid grid{64, 64};
     const std::vector<PixelBox> boxes(10, PixelBox{0, 0, 16, 16});  // two entries each
