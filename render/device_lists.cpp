@@ -126,12 +126,13 @@ void DeviceLists::reserve_entries(const GpuDevice& gpu, std::size_t count) {
     entry_capacity_ = count;
 }
 
-bool DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t tiles, std::size_t entries) {
-    if (has_room(balls, tiles, entries)) return false;
+void DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t tiles, std::size_t entries) {
+    if (has_room(balls, tiles, entries)) return;
     constexpr std::size_t kWord = sizeof(shader::uint);
     if (parts_.bytes == 0) {
         make(gpu, counts_, sizeof(shader::OrderCounts), vk::BufferUsageFlagBits::eIndirectBuffer);
-        make(gpu, parts_, sizeof(shader::ViewPart) * (shader::kMaxShells + 1),
+        // Between shells, before the first and behind the last; fog has one shell more.
+        make(gpu, parts_, sizeof(shader::ViewPart) * (shader::kMaxShells + 2),
              vk::BufferUsageFlagBits::eIndirectBuffer);
     }
     const auto whole_blocks = [](std::size_t count) {
@@ -151,7 +152,6 @@ bool DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t t
         make(gpu, table_, numbers * kWord);
         make(gpu, sums_, blocks_of(numbers) * kWord);
     }
-    return true;
 }
 
 const GpuBuffer& DeviceLists::list(std::size_t tiles) const {

@@ -53,9 +53,9 @@ class DeviceLists {
   public:
     explicit DeviceLists(const GpuDevice& gpu) : pipelines_(create_order_pipelines(gpu)) {}
 
-    // Makes room; true if buffers are others than before, and sets must be bound anew. Nothing may use the
+    // Makes room; then buffers may be others than before, and sets must be bound anew. Nothing may use the
     // old ones any more.
-    bool reserve(const GpuDevice& gpu, std::size_t balls, std::size_t tiles, std::size_t entries);
+    void reserve(const GpuDevice& gpu, std::size_t balls, std::size_t tiles, std::size_t entries);
     bool has_room(std::size_t balls, std::size_t tiles, std::size_t entries) const;
 
     // Four sets for each picture that is on its way.
@@ -66,7 +66,7 @@ class DeviceLists {
     }
     void bind(const GpuDevice& gpu, const Sets& sets, const GpuBuffer& frame, const GpuBuffer& shells) const;
 
-    // Records the passes up to `view`, for `count` metaballs in cloud_buffer().
+    // Records the passes up to `view`, for `count` metaballs in cloud().
     void record_order(const vk::raii::CommandBuffer& commands, const Sets& sets, std::size_t count) const;
     // Records the others for a tile of the picture, and the parts between `shells` shells of air. The list is
     // then in list(tiles).
@@ -91,7 +91,6 @@ class DeviceLists {
     const GpuBuffer& parts() const { return parts_; }
     const GpuBuffer& counts() const { return counts_; }
     const GpuBuffer& table() const { return table_; }
-    const SortBuffers& order() const { return order_; }
     std::size_t ball_capacity() const { return ball_capacity_; }
     std::size_t entry_capacity() const { return entry_capacity_; }
 

@@ -19,7 +19,9 @@ shader::vec4 vector4(const Vec3& v, double w) { return {float(v.x), float(v.y), 
 void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
     if (buffer.bytes >= bytes) return;
     buffer = {};
-    buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::none);
+    buffer = create_buffer(gpu, bytes,
+                           vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferDst,
+                           HostAccess::none);
 }
 
 void make_copy(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
@@ -99,7 +101,6 @@ bool DeviceSun::run(const GpuDevice& gpu, DeviceLists& lists, const ListLimits& 
     const TileGrid grid{shadow_size, shadow_size};
     const std::uint32_t per_item = shader::kQueriesPerLane * gpu.tile_lanes;
     const std::size_t items = grid.tiles() + count / per_item;
-    if (items > shader::kGroupRow) return false;  // so that exactly as many work groups run
     write(gpu, frame_, sun_frame(frame, shadow_size));
     make(gpu, places_, count * sizeof(shader::LightPlace));
     make(gpu, queries_, count * sizeof(shader::LightQuery));
@@ -115,6 +116,9 @@ bool DeviceSun::run(const GpuDevice& gpu, DeviceLists& lists, const ListLimits& 
             {&queries_, &lists.splats(), &lists.ranges(), &lists.list(grid.tiles()), &items_, &places_});
         entries = lists.entry_capacity();
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+            full_barrier(commands);
+            // Beyond one row, more work groups run than there are items: the others find empty ones.
+            commands.fillBuffer(*items_.buffer, 0, VK_WHOLE_SIZE, 0);
             full_barrier(commands);
             record(commands, lists, count, grid, per_item);
             pass_barrier(commands);

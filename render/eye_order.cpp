@@ -44,8 +44,6 @@ const char* wanted(const CloudBillboard& billboard, std::size_t clouds) {
     return billboard.cloud < clouds ? nullptr : "the index of a cloud";
 }
 
-std::uint32_t unorm16(float value) { return std::uint32_t(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f); }
-
 shader::PuffCloud puff_cloud(const BillboardCloud& cloud, std::size_t index, const Vec3& eye) {
     if (!finite(cloud.centre_m) || !(cloud.base_m < cloud.top_m) ||
         !std::isfinite(cloud.top_m - cloud.base_m))

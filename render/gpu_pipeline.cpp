@@ -186,7 +186,7 @@ void begin_compute(const vk::raii::CommandBuffer& commands, const PipelineLayout
 }
 
 void dispatch_groups(const vk::raii::CommandBuffer& commands, std::size_t groups) {
-    constexpr std::size_t kRow = 32768;
+    constexpr std::size_t kRow = shader::kGroupRow;
     if (groups == 0) return;
     commands.dispatch(std::uint32_t(std::min(groups, kRow)), std::uint32_t((groups + kRow - 1) / kRow), 1);
 }
@@ -215,7 +215,12 @@ Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
 void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
                  const GpuBuffer& buffer) {
     const vk::DescriptorType type = layout_bindings()[binding].descriptorType;
-    const vk::DescriptorBufferInfo info(*buffer.buffer, 0, VK_WHOLE_SIZE);
+    // Buffers are made larger than what is asked for, perhaps larger than a shader may see.
+    const vk::DeviceSize seen =
+        type == vk::DescriptorType::eStorageBuffer
+            ? std::min<vk::DeviceSize>(buffer.bytes, gpu.properties.limits.maxStorageBufferRange)
+            : VK_WHOLE_SIZE;
+    const vk::DescriptorBufferInfo info(*buffer.buffer, 0, seen);
     gpu.device.updateDescriptorSets(vk::WriteDescriptorSet(bindings.set, binding, 0, type, {}, info), {});
 }
 

@@ -13,17 +13,21 @@ namespace {
 using MemoryFlags = vk::MemoryPropertyFlags;
 using Memory = vk::MemoryPropertyFlagBits;
 
+// Kinds that want a feature of the device that nobody has switched on.
+constexpr MemoryFlags kForbidden = Memory::eDeviceCoherentAMD | Memory::eDeviceUncachedAMD;
+
 // From the first kind of memory that has one of `wishes`, the most wanted first, and is not full: what the
 // processor sees of a card's own memory may be small.
 vk::raii::DeviceMemory allocate(const GpuDevice& gpu, const vk::MemoryRequirements& needs,
-                                std::initializer_list<MemoryFlags> wishes) {
+                                std::initializer_list<MemoryFlags> wishes, bool* cached = nullptr) {
     std::exception_ptr full;
     for (const MemoryFlags wish : wishes) {
         for (std::uint32_t i = 0; i < gpu.memory.memoryTypeCount; ++i) {
-            if ((needs.memoryTypeBits >> i & 1u) == 0 ||
-                (gpu.memory.memoryTypes[i].propertyFlags & wish) != wish)
+            const MemoryFlags kind = gpu.memory.memoryTypes[i].propertyFlags;
+            if ((needs.memoryTypeBits >> i & 1u) == 0 || (kind & wish) != wish || (kind & kForbidden))
                 continue;
             try {
+                if (cached != nullptr) *cached = bool(kind & Memory::eHostCached);
                 return {gpu.device, vk::MemoryAllocateInfo(needs.size, i)};
             } catch (const vk::OutOfDeviceMemoryError&) {
                 full = std::current_exception();
@@ -56,9 +60,12 @@ GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsage
     buffer.bytes = bytes;
     buffer.buffer = vk::raii::Buffer(gpu.device, vk::BufferCreateInfo({}, bytes, usage));
     const vk::MemoryRequirements needs = buffer.buffer.getMemoryRequirements();
-    buffer.memory = allocate(gpu, needs, wishes_for(access, usage));
+    bool cached = false;
+    buffer.memory = allocate(gpu, needs, wishes_for(access, usage), &cached);
     buffer.buffer.bindMemory(*buffer.memory, 0);
     if (access == HostAccess::none) return buffer;
+    // What is for writing may lie in a card's memory, which the processor reads without a cache.
+    buffer.readable = access == HostAccess::read || (gpu.unified_memory && cached);
     buffer.mapped = static_cast<std::byte*>(buffer.memory.mapMemory(0, VK_WHOLE_SIZE));
     return buffer;
 }
@@ -70,7 +77,7 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, std::span<const std::b
 
 const std::byte* read_back(const GpuDevice& gpu, const GpuBuffer& buffer, std::size_t bytes,
                            GpuBuffer& copy) {
-    if (buffer.mapped != nullptr) return buffer.mapped;
+    if (buffer.readable) return buffer.mapped;
     if (copy.bytes < bytes) {
         copy = {};
         copy = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);

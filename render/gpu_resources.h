@@ -15,6 +15,7 @@ struct GpuBuffer {
     vk::raii::DeviceMemory memory{nullptr};
     vk::raii::Buffer buffer{nullptr};
     std::byte* mapped = nullptr;
+    bool readable = false;  // mapped, and the processor reads it as fast as any memory
     std::size_t bytes = 0;
 };
 
@@ -34,8 +35,8 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, const T& value) {
     write(gpu, buffer, std::as_bytes(std::span(&value, 1)));
 }
 
-// The first bytes of a buffer that the device has written: itself where it is mapped, else `copy`, which
-// grows.
+// The first bytes of a buffer that the device has written: itself where it is readable, else `copy`, which
+// grows; then the buffer must allow to be copied from.
 const std::byte* read_back(const GpuDevice& gpu, const GpuBuffer& buffer, std::size_t bytes, GpuBuffer& copy);
 
 // A 2D image (or array of them) in device memory, always in the layout GENERAL once it was cleared: images

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Pairs of 16-bit floats as shaders unpack them (unpackHalf2x16). Private to the module.
+// 16-bit numbers as shaders unpack them (unpackHalf2x16, unpackUnorm2x16). Private to the module.
+
+#include <algorithm>
 
 #include <Imath/half.h>
 
@@ -12,6 +14,11 @@ namespace nephos {
 // The first in the low bits; rounds to nearest.
 inline shader::uint pack_halves(float low, float high) {
     return shader::uint(Imath::half(low).bits()) | shader::uint(Imath::half(high).bits()) << 16;
+}
+
+// 0..1 as 0..65535; rounds to nearest.
+inline shader::uint unorm16(float value) {
+    return shader::uint(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f);
 }
 
 struct Halves {

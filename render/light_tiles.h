@@ -63,6 +63,7 @@ class LightTiles {
     Bindings bindings_;
     Bindings listed_;  // of lists on the device
     GpuBuffer queries_, splats_, places_, ranges_, list_, items_, depths_;
+    GpuBuffer queries_copy_;  // where the processor reads the device's memory slowly
     GpuImage map_;
 };
 

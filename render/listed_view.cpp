@@ -76,7 +76,7 @@ struct ListedView::Slot {
     GpuBuffer radiance, depth, counts;     // read back
     vk::raii::CommandBuffer commands{nullptr};
     vk::raii::Fence fence{nullptr};
-    bool submitted = false;      // and the fence was not waited for
+    bool submitted = false;      // and not known to be done: also after a wait that failed
     Picture* picture = nullptr;  // whose pixels are not stored yet
     ListedPicture what;
     Tile tile;
@@ -85,9 +85,9 @@ struct ListedView::Slot {
 
     void wait(const GpuDevice& gpu) {
         if (!submitted) return;
-        submitted = false;
         const vk::Result result = gpu.device.waitForFences(*fence, VK_TRUE, UINT64_MAX);
         if (result != vk::Result::eSuccess) fail_gpu("waiting for the device", result);
+        submitted = false;
     }
     void wait_quietly(const GpuDevice& gpu) noexcept {
         try {
@@ -171,7 +171,10 @@ bool ListedView::light(const ShadowFrame& frame, int shadow_size, float largest_
                        std::vector<float>& depths, std::vector<float>& shadow) {
     settle();
     if (!sun_) sun_.emplace(gpu_, lists_);
-    return sun_->run(gpu_, lists_, limits, balls_, frame, shadow_size, largest_radius, tiles, depths, shadow);
+    if (!sun_->run(gpu_, lists_, limits, balls_, frame, shadow_size, largest_radius, tiles, depths, shadow))
+        return false;
+    ++lit;
+    return true;
 }
 
 void ListedView::use_flash(std::span<const shader::uint> shares) {
@@ -284,6 +287,7 @@ void ListedView::complete(Slot& slot) {
     while (slot.wanted() > slot.capacity) {
         if (slot.wanted() > limits.entries) {
             too_many_.push_back(&picture);
+            ++too_long;
             return;
         }
         wait();
@@ -372,6 +376,9 @@ void ListedView::begin_tile(const ListedPicture& what, const shader::Frame& fram
     Slot& slot = *slots_[next_];
     next_ = (next_ + 1) % slots_.size();
     settle(slot);
+    slot.wait(gpu_);  // of a picture that nobody wants
+    too_many_.reserve(too_many_.size() + slots_.size());
+    failures_.reserve(failures_.size() + slots_.size());  // settle() may not throw
     reserve(tile, slot);
     pipelines_for(what.variant).prepare(gpu_, layout_, what.depth);
     slot.what = what;

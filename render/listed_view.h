@@ -37,7 +37,9 @@ struct ListedPicture {
 
 class ListedView {
   public:
-    // `clamped` and `white_beyond` as in view_tiles.h; `attenuation` is not read there either.
+    // Samplers for tables of the sky, whose edge goes on, and for the shadow map, beyond which there is
+    // light; they and the rest must outlive this. `attenuation` is not read, but lavapipe (Mesa 22.3) wants
+    // every sampler of a set to be bound.
     ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
                const vk::raii::Sampler& clamped, const vk::raii::Sampler& white_beyond);
     ~ListedView();
@@ -46,8 +48,10 @@ class ListedView {
 
     // What is drawn from now on; what is on its way is settled first.
     void use_cloud(std::span<const shader::CloudBall> balls);
-    // Gives the metaballs their light, and makes the shadow map (device_sun.h). False if there is too much of
-    // it.
+    // Gives the metaballs of use_cloud() their light, and makes the shadow map (device_sun.h): in `depths`
+    // the optical depth between the centre of each and the sun, in `shadow` the transmittance of
+    // shadow_size^2 texels. `largest_radius`: of any metaball, metres. False if the lists would be too long:
+    // then the light on the device is not to be used.
     bool light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles,
                std::vector<float>& depths, std::vector<float>& shadow);
     // Share of the lightning at each metaball, 0..65535.
@@ -66,12 +70,11 @@ class ListedView {
     void settle() noexcept;
     // Waits for the tiles of a picture that nobody wants any more.
     void abandon(const Picture& picture) noexcept;
-    // Waits for everything that is on its way; its pixels are stored by finish().
-    void wait();
 
     // Balls and entries that there may be; less for tests.
     ListLimits limits;
-    std::size_t drawn = 0;  // tiles that were begun
+    // For tests: tiles that were begun, and of those the ones with too many entries; passes of light.
+    std::size_t drawn = 0, too_long = 0, lit = 0;
 
     // What the device has listed for the last tile that was drawn: for tests.
     struct Lists {
@@ -84,6 +87,9 @@ class ListedView {
   private:
     struct Pipelines;
     struct Slot;
+    // Waits for everything that is on its way; its pixels are stored by finish(). Throws when a wait fails:
+    // what was waited for then fails in its own finish(), too.
+    void wait();
     void reserve(const Tile& tile, Slot& slot);
     void complete(Slot& slot);
     void settle(Slot& slot) noexcept;

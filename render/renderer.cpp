@@ -2,6 +2,7 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <new>
@@ -20,6 +21,11 @@ namespace nephos {
 namespace {
 
 std::size_t square(std::size_t side) { return side * side; }
+
+// Longest side of a square of elements that a shader may see as one buffer.
+int largest_square(const GpuDevice& gpu, std::size_t element_bytes) {
+    return int(std::sqrt(double(gpu.properties.limits.maxStorageBufferRange / element_bytes)));
+}
 
 // Bytes in main memory while a picture is drawn, on a device that shares it.
 std::size_t memory_needed(const Splats& splats, const RenderOptions& options, int tile_size) {
@@ -109,6 +115,7 @@ Renderer::Impl::Impl(const DeviceOptions& device_options)
         lists = software || !missing.empty() ? TileLists::host : TileLists::device;
     tile_size = std::min(tile_size, int(std::min(gpu.properties.limits.maxImageDimension2D,
                                                  gpu.properties.limits.maxFramebufferWidth)));
+    tile_size = std::min(tile_size, largest_square(gpu, 4 * sizeof(float)));  // ViewTiles has its radiance
 }
 
 const GpuImage& Renderer::Impl::attenuation_on_device() {
@@ -156,7 +163,9 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
         blocks.emplace(
             lit.merged.empty() ? lit.cloud : prepare(splats.metaballs),  // cubes of the voxels' size
             splats.metaballs.extinction_per_m);
-    const bool on_device = !on_processor() && (!lit.all_known || map_on_device != lit.key);
+    // A map that is known but is not on the device goes there below; of no cloud at all it is made there.
+    const bool on_device =
+        !on_processor() && (!lit.all_known || (lit.cloud.visible.empty() && map_on_device != lit.key));
     const std::size_t passes = light_passes;
     bool listed = false;  // the light is with the cloud on the device
     if (blocks && absorbs) {
@@ -170,7 +179,7 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
         }
     } else if (on_device && options.light.lighting == Lighting::light_pass) {
         settle();
-        listed = light_listed();
+        listed = light_listed(splats.metaballs);
         if (!listed) pass_sunlight(lit);
         ++light_passes;
     }
@@ -414,8 +423,9 @@ Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options
 
 PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& options) {
     check(options);
-    const std::uint32_t limit = impl_->gpu.properties.limits.maxImageDimension2D;
-    if (std::uint32_t(options.shadow_map_size) > limit)
+    int limit = int(impl_->gpu.properties.limits.maxImageDimension2D);
+    if (!impl_->on_processor()) limit = std::min(limit, largest_square(impl_->gpu, sizeof(float)));
+    if (options.shadow_map_size > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
     if (splats.ground_cover) check(*splats.ground_cover);
     check_memory(splats, options, impl_->tile_size);
@@ -436,6 +446,8 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
 
 Picture Renderer::finish(PendingPicture&& pending) {
     const std::unique_ptr<PendingPicture::State> state = std::move(pending.state_);
+    assert(state != nullptr &&
+           (state->view == nullptr || (impl_->listed_view && state->view == &*impl_->listed_view)));
     with_drawing_errors([&] { impl_->finish(*state); });
     return std::move(state->picture);
 }

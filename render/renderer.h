@@ -54,7 +54,8 @@ struct DeviceOptions {
     // tests.
     bool validation = false;
     // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
-    // the picture; memory on the device is about 24 bytes * tile_size^2.
+    // the picture; memory on the device is about 24 bytes * tile_size^2, and 40 bytes more to read back two
+    // pictures from lists of the device. Less where the device allows no such buffers or images.
     int tile_size = 2048;
     Splatting splatting = Splatting::automatic;
     TileLists lists = TileLists::automatic;
@@ -111,13 +112,15 @@ class Renderer {
     // as those of draw_splats(), in whatever order they are finished. Two are on their way to the device at
     // most: a third waits for the first, and one of another cloud, or under another sky, for both. What the
     // processor draws is drawn by begin(), as are pictures with wet ground, and those with billboards. Each
-    // throws as draw_splats(); what fails while a picture is on its way is thrown by its own finish().
+    // throws as draw_splats(); what fails while a picture is on its way is thrown by its own finish(). Only
+    // the Renderer that began a picture may finish it, and only once.
     PendingPicture begin(const Splats& splats, const RenderOptions& options);
     Picture finish(PendingPicture&& pending);
 
     std::string device_name() const;
 
-    // Where the time of the last picture went.
+    // Where the time went since the last begin() or draw_splats(): also that of finish() for a picture
+    // before.
     const StageTimes& times() const;
 
     // What the validation layer has said so far; empty without DeviceOptions::validation.

@@ -65,9 +65,12 @@ struct Renderer::Impl {
     // From the order that the host makes.
     void draw_ordered(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
                       const std::vector<PartFrame>& parts, Picture& picture);
-    // From lists that the device makes: begins to.
-    // Light of `lit` from lists of the device, and the cloud itself; false if that is too much.
-    bool light_listed();
+    // Light of `lit` from lists of the device, and the cloud itself; false if that is too much. `given`: the
+    // cloud before level of detail.
+    bool light_listed(const MetaballCloud& given);
+    // Sends what is drawn, with the light that is known, unless that light comes and the rest is there.
+    void send_cloud(const MetaballCloud& given, bool light_follows);
+    // Begins to draw from lists that the device makes.
     void begin_listed(Drawing& drawing, const CameraFrame& camera, const std::vector<PartFrame>& parts);
     bool uses_lists(const Drawing& drawing, const CameraFrame& camera);
     ListedView& lists_on_device();
@@ -79,6 +82,7 @@ struct Renderer::Impl {
                         const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
     const GpuImage& image_of(const SkyLight& sky);
     const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
+    bool uses_device_lists() const { return splatting == Splatting::tiles && lists == TileLists::device; }
     bool on_processor() const { return splatting == Splatting::processor; }
     LightTiles& light_on_device();
     // What was made from the light before is of no use any more.
@@ -104,15 +108,17 @@ struct Renderer::Impl {
     // Without and with the physical sky; without shells of air, with them, and with fog in them.
     std::optional<ViewTiles> view_tiles[2][2][3];  // the first index: without and with billboards
     std::optional<ViewPass> view_pass[2][3];
-    std::optional<ListedView> listed_view;
+    bool cloud_is_near = false;    // is_near_enough(lit.cloud)
     bool cloud_on_device = false;  // in listed_view, with its light
-    bool uses_device_lists() const { return splatting == Splatting::tiles && lists == TileLists::device; }
-    bool cloud_is_near = false;  // is_near_enough(lit.cloud)
+    // Whose metaballs are there, with whatever light: a key as of one and the same sun; none: unknown.
+    std::optional<LightKey> metaballs_on_device;
     FogNoise fog_noise;
     KeptShade kept_shade;
     std::optional<SkyImage> sky_image;
     SkyLights sky_lights;
     const SkyLight* sky = nullptr;  // of the picture that is drawn; null: gradient
+    // Last, and so the first to go: it waits for pictures that look at the others.
+    std::optional<ListedView> listed_view;
 };
 
 }  // namespace nephos

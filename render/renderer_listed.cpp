@@ -7,12 +7,6 @@
 #include "render/renderer_impl.h"
 
 namespace nephos {
-namespace {
-
-shader::uint share_of(float value) { return shader::uint(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f); }
-
-}  // namespace
-
 ListedView& Renderer::Impl::lists_on_device() {
     if (!listed_view) listed_view.emplace(gpu, layout, attenuation_on_device(), clamped, white_beyond);
     return *listed_view;
@@ -24,12 +18,21 @@ bool Renderer::Impl::uses_lists(const Drawing& drawing, const CameraFrame& camer
            cloud_is_near && is_near_enough(camera.position_m);
 }
 
-bool Renderer::Impl::light_listed() {
+void Renderer::Impl::send_cloud(const MetaballCloud& given, bool light_follows) {
+    std::optional<LightKey> key;
+    if (lit.merged.empty()) key = light_key(given, {});
+    if (light_follows && key && key == metaballs_on_device) return;
+    metaballs_on_device.reset();  // until all of it is there
+    lists_on_device().use_cloud(cloud_balls(lit.cloud, lit.sun_depths));
+    metaballs_on_device = key;
+}
+
+bool Renderer::Impl::light_listed(const MetaballCloud& given) {
     if (!uses_device_lists() || !cloud_is_near || lit.cloud.visible.empty() ||
         lit.cloud.visible.size() > lists_on_device().limits.balls)
         return false;
     ListedView& view = lists_on_device();
-    view.use_cloud(cloud_balls(lit.cloud, lit.sun_depths));
+    send_cloud(given, true);
     float largest = 0;
     for (const std::uint32_t i : lit.cloud.visible)
         largest = std::max(largest, lit.cloud.metaballs[i].radius);
@@ -46,11 +49,11 @@ void Renderer::Impl::begin_listed(Drawing& drawing, const CameraFrame& camera,
     const RenderOptions& options = drawing.options;
     ListedView& view = lists_on_device();
     const std::vector<float> lightning = light_up(splats, options, {}, nullptr);
-    if (!cloud_on_device) view.use_cloud(cloud_balls(lit.cloud, lit.sun_depths));
+    if (!cloud_on_device) send_cloud(splats.metaballs, false);
     cloud_on_device = true;
     if (!lightning.empty()) {
         std::vector<shader::uint> shares(lightning.size());
-        std::ranges::transform(lightning, shares.begin(), share_of);
+        std::ranges::transform(lightning, shares.begin(), unorm16);
         view.use_flash(shares);
     }
     const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,

@@ -129,4 +129,16 @@ std::size_t RendererTestAccess::listed(const Renderer& renderer) {
     return renderer.impl_->listed_view ? renderer.impl_->listed_view->drawn : 0;
 }
 
+std::size_t RendererTestAccess::too_long(const Renderer& renderer) {
+    return renderer.impl_->listed_view ? renderer.impl_->listed_view->too_long : 0;
+}
+
+std::size_t RendererTestAccess::listed_light(const Renderer& renderer) {
+    return renderer.impl_->listed_view ? renderer.impl_->listed_view->lit : 0;
+}
+
+void RendererTestAccess::limit_storage(Renderer& renderer, std::uint32_t bytes) {
+    renderer.impl_->gpu.properties.limits.maxStorageBufferRange = bytes;
+}
+
 }  // namespace nephos

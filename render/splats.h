@@ -2,8 +2,8 @@
 #pragma once
 
 // What one picture shows: voxel clouds as metaballs (D) and clouds drawn directly as billboards (T), in one
-// set and in one picture, back to front among each other. Plain data in world metres; spans are read during
-// the call that they are given to.
+// set and in one picture, back to front among each other. Plain data in world metres; what spans refer to
+// must stay as it is until the picture is finished (Renderer::finish(); draw_splats() finishes it itself).
 
 #include <cstdint>
 #include <optional>

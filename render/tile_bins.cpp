@@ -93,4 +93,13 @@ TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid,
     return wanted.empty() ? bin<true>(boxes, grid, wanted) : bin<false>(boxes, grid, wanted);
 }
 
+TileBins bin_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size_t& end, const TileGrid& grid,
+                   std::size_t longest) {
+    for (;; end = begin + (end - begin + 1) / 2) {
+        TileBins bins = bin_into_tiles(boxes.subspan(begin, end - begin), grid);
+        const auto fits = [&](const shader::TileRange& range) { return range.end - range.begin <= longest; };
+        if (std::ranges::all_of(bins.ranges, fits)) return bins;
+    }
+}
+
 }  // namespace nephos

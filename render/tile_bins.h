@@ -47,4 +47,9 @@ struct BatchLimits {
 std::size_t end_of_batch(std::span<const PixelBox> boxes, std::size_t begin, const TileGrid& grid,
                          std::size_t max_boxes, std::size_t max_entries);
 
+// Lists for the boxes from `begin` to `end`; less of them, and then a smaller `end`, where a tile's list
+// would have more than `longest` >= 1 entries.
+TileBins bin_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size_t& end, const TileGrid& grid,
+                   std::size_t longest);
+
 }  // namespace nephos

@@ -17,22 +17,12 @@ constexpr std::size_t kMaxBalls = std::size_t{1} << 20;    // on the device at o
 constexpr std::size_t kMaxEntries = std::size_t{1} << 24;  // of the tiles' lists: 64 MiB
 
 // Entries that a tile's list may have at once. lavapipe (Mesa 22.3) leaves all loops of a shader after 65,535
-// turns in all: eight fitted metaballs take one, of others each takes more than one, and where there are
-// billboards up to three.
+// turns in all: eight fitted metaballs take one where lanes hand them round (kShared), else nine; of others
+// each takes more than one, and where there are billboards up to three.
 std::size_t longest_list(const GpuDevice& gpu, const EyeOrder& order) {
     if (gpu.properties.deviceType != vk::PhysicalDeviceType::eCpu) return kMaxEntries;
     if (!order.puffs.empty()) return 20'000;
-    return order.all_fitted ? 500'000 : 50'000;
-}
-
-// Lists for some of the boxes, from `begin` on; no list has more than `longest` entries.
-TileBins lists_of_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size_t& end,
-                        const TileGrid& grid, std::size_t longest) {
-    for (;; end = begin + (end - begin + 1) / 2) {
-        TileBins bins = bin_into_tiles(boxes.subspan(begin, end - begin), grid);
-        const auto fits = [&](const shader::TileRange& range) { return range.end - range.begin <= longest; };
-        if (std::ranges::all_of(bins.ranges, fits)) return bins;
-    }
+    return order.all_fitted && gpu.tiles_are_subgroups ? 500'000 : 50'000;
 }
 
 std::size_t groups(std::size_t invocations) {
@@ -192,7 +182,7 @@ void ViewTiles::draw_tile(const GpuDevice& gpu, const RenderOptions& options, co
     next_shell_ = 0;
     do {  // once even without any ball, for the background
         std::size_t end = end_of_batch(boxes, begin, grid, kMaxBalls, kMaxEntries);
-        const TileBins bins = lists_of_batch(boxes, begin, end, grid, longest_list(gpu, order));
+        const TileBins bins = bin_batch(boxes, begin, end, grid, longest_list(gpu, order));
         const std::size_t count = end - begin;
         upload_splats(gpu, order, std::span(splats).subspan(begin, count));
         reserve(gpu, bindings_, 2, splats_, sizeof(shader::ViewSplat) * count * (variant_.puffs ? 5 : 1),

@@ -7,7 +7,7 @@
 #include "order.glsl"
 
 layout(local_size_x = kSortGroup) in;
-shared uint in_front[kMaxShells];  // of each shell: splats, nearest first
+shared uint in_front[kMaxShells + 1u];  // of each shell, and the last of fog: splats, nearest first
 
 float shell_end(uint k) { return shells.ends[k / 4u][k % 4u]; }
 

@@ -37,6 +37,7 @@ void main() {
     uint number = work_group();
     if (number >= step.tile_count) return;
     LightItem item = items[number];
+    if (item.count == 0u) return;  // the device's own lists of items end with such
     uint lanes = gl_WorkGroupSize.x;
     [[unroll]] for (uint n = 0u; n < kQueriesPerLane; ++n) {
         centres[n] = queries[item.first + min(n * lanes + gl_LocalInvocationID.x, item.count - 1u)].xyz;

@@ -14,7 +14,6 @@ namespace nephos::shader {
 
 NEPHOS_CONST uint kSortGroup = 256u;      // invocations of a work group, and values of a digit
 NEPHOS_CONST uint kSortBlock = 2048u;     // elements that a work group sorts or sums
-NEPHOS_CONST uint kGroupRow = 32768u;     // work groups in a row: devices allow 65535 on an axis
 NEPHOS_CONST uint kCulled = 0xffffffffu;  // the key of what is not seen; no distance has these bits
 NEPHOS_CONST float kFarthest_m = 1.0e9f;  // places beyond are left to the host
 NEPHOS_CONST float kCullReach = 1.5f;     // radii that a metaball covers at most, as in eye_order.cpp

@@ -22,8 +22,7 @@ layout(push_constant) uniform Step {
     TileStep step;
 };
 
-// Work groups lie in rows of at most 2^15: devices allow 2^16 - 1 on an axis.
-uint work_group() { return gl_WorkGroupID.y * 32768u + gl_WorkGroupID.x; }
+uint work_group() { return gl_WorkGroupID.y * kGroupRow + gl_WorkGroupID.x; }
 
 // First of this invocation's pixels; the others lie below it.
 uvec2 first_pixel(uint tile) {

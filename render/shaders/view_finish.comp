@@ -17,7 +17,7 @@ layout(push_constant) uniform Step {
 };
 
 void main() {
-    uint index = gl_GlobalInvocationID.y * (32768u * kComputeGroup) + gl_GlobalInvocationID.x;
+    uint index = gl_GlobalInvocationID.y * (kGroupRow * kComputeGroup) + gl_GlobalInvocationID.x;
     if (index >= step.width * step.height) return;
     vec2 pixel = vec2(index % step.width, index / step.width) + 0.5;
     vec4 clouds = radiance[index];

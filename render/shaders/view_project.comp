@@ -27,7 +27,7 @@ layout(constant_id = 8) const bool kPuffs = false;  // some splats are T's billb
 #include "project_puff.glsl"
 
 void main() {
-    uint index = gl_GlobalInvocationID.y * (32768u * kComputeGroup) + gl_GlobalInvocationID.x;
+    uint index = gl_GlobalInvocationID.y * (kGroupRow * kComputeGroup) + gl_GlobalInvocationID.x;
     if (index >= step.tile_count) return;
     ViewBall ball = balls[index];
     if (kPuffs && (ball.flags & kPuffFlag) != 0u) {

@@ -22,7 +22,7 @@ layout(push_constant) uniform Step {
 #include "parts.glsl"
 
 void main() {
-    uint index = gl_GlobalInvocationID.y * (32768u * kComputeGroup) + gl_GlobalInvocationID.x;
+    uint index = gl_GlobalInvocationID.y * (kGroupRow * kComputeGroup) + gl_GlobalInvocationID.x;
     if (index >= step.width * step.height) return;
     vec4 sum = radiance[index];
     if (sum.a < kOpaque) return;

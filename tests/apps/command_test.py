@@ -909,19 +909,19 @@ class LostDevice(Case):
         if "LAYERS" not in os.environ:
             self.skipTest("LAYERS does not say where the layer lies")
 
-    def lost_after(self, submissions):
+    def lost_after(self, submissions=10**9, waits=10**9):
         return {"VK_LAYER_PATH": os.environ["LAYERS"], "VK_INSTANCE_LAYERS": "VK_LAYER_NEPHOS_lost_device",
-                "NEPHOS_LOSE_DEVICE_AFTER": str(submissions)}
+                "NEPHOS_LOSE_DEVICE_AFTER": str(submissions), "NEPHOS_LOSE_WAIT_AFTER": str(waits)}
 
     def test_a_run_keeps_its_finished_frames_and_goes_on_with_another(self):
-        never = self.lost_after(10**9)
+        never = self.lost_after()
         self.call("run", self.scene, "--out", "whole", env=never)
         numbers = set()
-        for submissions in (0, 1, 3, 6, 10, 14):
-            with self.subTest(submissions=submissions):
-                out = self.folder / f"out{submissions}"
+        for what, count in [("submissions", n) for n in (0, 1, 3, 6, 10, 14)] + [("waits", n) for n in (0, 3, 6, 10)]:
+            with self.subTest(what, count=count):
+                out = self.folder / f"{what}{count}"
                 result = self.refused(4, "run", self.scene, "--out", out, says="ErrorDeviceLost",
-                                      env=self.lost_after(submissions))
+                                      env=self.lost_after(**{what: count}))
                 self.assertNotIn("unexpected", result.stderr)
                 self.assertEqual([p for p in self.folder.rglob("*") if ".part" in p.name], [])
                 frames = json.loads((out / "manifest.json").read_text())["frames"]

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A Vulkan layer for tests: a graphics card that is lost. It calls every device a virtual graphics card, so
 // that pictures are drawn by shaders, and after NEPHOS_LOSE_DEVICE_AFTER submissions (all of the process)
-// each further one fails with VK_ERROR_DEVICE_LOST. For one instance and one device in one thread at a time.
+// each further one fails with VK_ERROR_DEVICE_LOST. So do waits for fences after NEPHOS_LOSE_WAIT_AFTER of
+// them, counted while that variable is there; what they wait for is done all the same. For one instance and
+// one device in one thread at a time.
 
 #include <atomic>
 #include <cstdlib>
@@ -16,7 +18,8 @@ PFN_vkGetInstanceProcAddr next_of_instance = nullptr;
 PFN_vkGetDeviceProcAddr next_of_device = nullptr;
 PFN_vkGetPhysicalDeviceProperties next_properties = nullptr;
 PFN_vkQueueSubmit2 next_submit = nullptr;
-std::atomic<long> submissions{0};
+PFN_vkWaitForFences next_wait = nullptr;
+std::atomic<long> submissions{0}, waits{0};
 
 // What the loader hands to a layer in the chain of a create info.
 template <typename Link, typename CreateInfo>
@@ -38,6 +41,14 @@ VKAPI_ATTR VkResult VKAPI_CALL submit(VkQueue queue, std::uint32_t count, const 
     const char* after = std::getenv("NEPHOS_LOSE_DEVICE_AFTER");
     if (after != nullptr && submissions++ >= std::atol(after)) return VK_ERROR_DEVICE_LOST;
     return next_submit(queue, count, infos, fence);
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice device, std::uint32_t count, const VkFence* fences, VkBool32 all,
+                                    std::uint64_t timeout) {
+    const VkResult result = next_wait(device, count, fences, all, timeout);
+    const char* after = std::getenv("NEPHOS_LOSE_WAIT_AFTER");
+    if (after == nullptr) waits = 0;
+    return after != nullptr && waits++ >= std::atol(after) ? VK_ERROR_DEVICE_LOST : result;
 }
 
 VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo* info,
@@ -63,8 +74,9 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const Vk
     link->u.pLayerInfo = link->u.pLayerInfo->pNext;
     const auto create = reinterpret_cast<PFN_vkCreateDevice>(next(nullptr, "vkCreateDevice"));
     const VkResult result = create(physical, info, allocator, device);
-    if (result == VK_SUCCESS)
-        next_submit = reinterpret_cast<PFN_vkQueueSubmit2>(next_of_device(*device, "vkQueueSubmit2"));
+    if (result != VK_SUCCESS) return result;
+    next_submit = reinterpret_cast<PFN_vkQueueSubmit2>(next_of_device(*device, "vkQueueSubmit2"));
+    next_wait = reinterpret_cast<PFN_vkWaitForFences>(next_of_device(*device, "vkWaitForFences"));
     return result;
 }
 
@@ -72,6 +84,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_function(VkDevice device, const 
     if (std::strcmp(name, "vkGetDeviceProcAddr") == 0)
         return reinterpret_cast<PFN_vkVoidFunction>(&device_function);
     if (std::strcmp(name, "vkQueueSubmit2") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&submit);
+    if (std::strcmp(name, "vkWaitForFences") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&wait);
     return next_of_device(device, name);
 }
 

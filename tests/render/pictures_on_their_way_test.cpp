@@ -71,7 +71,7 @@ TEST(PicturesOnTheirWay, HaveTheBitsOfThoseDrawnOneByOne) {
 
 // Lists that grow, and pictures that do not fit, while others are on their way.
 TEST(PicturesOnTheirWay, MayNotFit) {
-    Renderer renderer(with_lists(TileLists::device)), reference(with_lists(TileLists::host));
+    Renderer reference(with_lists(TileLists::host));
     const std::vector<Metaball> balls = reference::random_metaballs(20, 500);
     Splats splats;
     splats.metaballs = {balls, 0.002, 0.7};
@@ -79,7 +79,8 @@ TEST(PicturesOnTheirWay, MayNotFit) {
                         near = test::view({100, 200, 1000}, {700, 300, 1100}, 60, 160, 120);
     const Picture expected_far = reference.draw_splats(splats, far),
                   expected_near = reference.draw_splats(splats, near);
-    for (const std::size_t entries : {std::size_t{1} << 24, std::size_t{4096}}) {
+    for (const std::size_t entries : {std::size_t{1} << 24, std::size_t{2048}}) {
+        Renderer renderer(with_lists(TileLists::device));  // whose lists have not grown yet
         RendererTestAccess::limit_lists(renderer, 500, entries);
         PendingPicture a = renderer.begin(splats, far), b = renderer.begin(splats, near),
                        c = renderer.begin(splats, near), d = renderer.begin(splats, far);
@@ -91,11 +92,13 @@ TEST(PicturesOnTheirWay, MayNotFit) {
         close(renderer.finish(std::move(a)), expected_far);
         close(renderer.finish(std::move(c)), expected_near);
         close(renderer.finish(std::move(d)), expected_far);
+        EXPECT_EQ(RendererTestAccess::listed(renderer), 4u) << "all are tried";
+        EXPECT_EQ(RendererTestAccess::too_long(renderer), entries == 2048 ? 2u : 0u);
+        test::expect_no_messages(renderer);
     }
-    test::expect_no_messages(renderer);
 }
 
-// Pictures that nobody finishes, and a renderer that ends while they are drawn.
+// Pictures that nobody finishes.
 TEST(PicturesOnTheirWay, MayBeDropped) {
     const std::vector<Metaball> balls = reference::random_metaballs(21, 500);
     Splats splats;
