@@ -38,9 +38,9 @@ void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes, vk::Buffer
     buffer = create_buffer(gpu, bytes, usage | more, HostAccess::none);
 }
 
-std::uint32_t bits_of(std::size_t tiles) { return std::uint32_t(std::bit_width(tiles - 1)); }
-
 }  // namespace
+
+std::uint32_t bits_of(std::size_t tiles) { return std::uint32_t(std::bit_width(tiles - 1)); }
 
 ListLimits limits_of(const GpuDevice& gpu) {
     const std::size_t range = gpu.properties.limits.maxStorageBufferRange;

@@ -38,6 +38,9 @@ struct ListLimits {
 // of a device of type CPU go through.
 ListLimits limits_of(const GpuDevice& gpu);
 
+// Bits that the numbers of tiles take: 0 to `tiles` - 1. `tiles`: 1 at least.
+std::uint32_t bits_of(std::size_t tiles);
+
 // Whether places are near enough for sums of two floats.
 bool is_near_enough(const PreparedCloud& cloud);
 bool is_near_enough(const Vec3& eye);

@@ -2,7 +2,6 @@
 #include "render/device_sun.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 
 #include "automaton/vector_math.h"
@@ -67,6 +66,10 @@ void DeviceSun::bind(const GpuDevice& gpu, const DeviceLists& lists) {
     }
 }
 
+vk::DescriptorSet DeviceSun::centres_of(const TileGrid& grid) const {
+    return sets_.sets[kCentres + (1 + OrderRecorder::passes(bits_of(grid.tiles()))) % 2];
+}
+
 void DeviceSun::record(const vk::raii::CommandBuffer& commands, const DeviceLists& lists, std::size_t count,
                        const TileGrid& grid, std::uint32_t per_item) const {
     const auto& sets = sets_.sets;
@@ -85,9 +88,8 @@ void DeviceSun::record(const vk::raii::CommandBuffer& commands, const DeviceList
     lists.record_lists(recorder, {sets[0], sets[1], sets[2], sets[3]}, step);
 
     // Tiles of the centres are in buffers 1.
-    const auto bits = std::uint32_t(std::bit_width(grid.tiles() - 1));
-    recorder.sort({sets[1], sets[0]}, shader::kSeenDigits, bits);
-    const vk::DescriptorSet centres = sets[kCentres + (1 + OrderRecorder::passes(bits)) % 2];
+    recorder.sort({sets[1], sets[0]}, shader::kSeenDigits, bits_of(grid.tiles()));
+    const vk::DescriptorSet centres = centres_of(grid);
     step.table = shader::kMapTiles;
     recorder.run(OrderPass::sun_count_items, centres, step, tile_groups);
     recorder.scan(centres, step);
@@ -124,10 +126,8 @@ bool DeviceSun::run(const GpuDevice& gpu, DeviceLists& lists, const ListLimits& 
             pass_barrier(commands);
             tiles.record_lists(commands, grid, largest_radius, items, lists.counts(),
                                offsetof(shader::OrderCounts, items));
-            const auto bits = std::uint32_t(std::bit_width(grid.tiles() - 1));
-            lists.recorder(commands).run_indirect(
-                OrderPass::sun_store, sets_.sets[kCentres + (1 + OrderRecorder::passes(bits)) % 2], {},
-                offsetof(shader::OrderCounts, visible_each));
+            lists.recorder(commands).run_indirect(OrderPass::sun_store, centres_of(grid), {},
+                                                  offsetof(shader::OrderCounts, visible_each));
             full_barrier(commands);
             commands.copyBuffer(*lists.table().buffer, *depths_.buffer,
                                 vk::BufferCopy(0, 0, count * sizeof(float)));

@@ -38,10 +38,9 @@ struct RendererTestAccess {
     static Lists lists(Renderer& renderer, int tile_width, int tile_height);
     // Less than the device could take.
     static void limit_lists(Renderer& renderer, std::size_t balls, std::size_t entries);
-    // Pictures, or tiles of them, that were drawn from the device's lists; those of them with too many
-    // entries are not counted less.
+    // Pictures, or tiles of them, that were begun from the device's lists.
     static std::size_t listed(const Renderer& renderer);
-    // How many of them had too many, and what light was made from such lists.
+    // Those of them that had too many entries, and how often light was made from such lists.
     static std::size_t too_long(const Renderer& renderer);
     static std::size_t listed_light(const Renderer& renderer);
     // As with a device whose shaders see less of a buffer.
