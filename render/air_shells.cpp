@@ -15,8 +15,6 @@
 namespace nephos {
 namespace {
 
-shader::vec4 to_vec4(const Vec3& v, double w) { return {float(v.x), float(v.y), float(v.z), float(w)}; }
-
 float distance_of(const shader::ViewBall& ball) {
     return std::sqrt(ball.x * ball.x + ball.y * ball.y + ball.z * ball.z);
 }

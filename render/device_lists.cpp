@@ -10,6 +10,7 @@
 
 #include "automaton/vector_math.h"
 #include "render/eye_order.h"
+#include "render/frame_data.h"
 
 namespace nephos {
 namespace {
@@ -22,8 +23,6 @@ HighLow high_low(double value) {
     const auto high = float(value);
     return {high, float(value - double(high))};
 }
-
-shader::vec4 vector4(const Vec3& v, double w) { return {float(v.x), float(v.y), float(v.z), float(w)}; }
 
 bool within_reach(double value) { return std::abs(value) < double(shader::kFarthest_m); }
 bool within_reach(const Metaball& ball) {
@@ -90,10 +89,10 @@ shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options,
     shader::OrderFrame frame;
     frame.eye_high = {x.high, y.high, z.high, height.high};
     frame.eye_low = {x.low, y.low, z.low, height.low};
-    for (std::size_t n = 0; n < 5; ++n) frame.inward[n] = vector4(pyramid.inward(n), 0);
-    frame.right = vector4(camera.right, half_width / camera.half_width);
-    frame.up = vector4(camera.up, half_height / camera.half_height);
-    frame.forward = vector4(camera.forward, pixels_per_unit(options, camera));
+    for (std::size_t n = 0; n < 5; ++n) frame.inward[n] = to_vec4(pyramid.inward(n), 0);
+    frame.right = to_vec4(camera.right, half_width / camera.half_width);
+    frame.up = to_vec4(camera.up, half_height / camera.half_height);
+    frame.forward = to_vec4(camera.forward, pixels_per_unit(options, camera));
     frame.middle = {float(half_width), float(half_height),
                     camera.position_m.z > ground.height_m ? 1.0f : 0.0f, has_flash ? 1.0f : 0.0f};
     return frame;

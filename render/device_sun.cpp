@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "automaton/vector_math.h"
+#include "render/frame_data.h"
 
 namespace nephos {
 namespace {
@@ -12,8 +13,6 @@ namespace {
 // Sets: four as of DeviceLists, and two for the centres.
 constexpr std::uint32_t kSets = 6;
 constexpr std::size_t kCentres = 4;
-
-shader::vec4 vector4(const Vec3& v, double w) { return {float(v.x), float(v.y), float(v.z), float(w)}; }
 
 void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
     if (buffer.bytes >= bytes) return;
@@ -23,23 +22,17 @@ void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
                            HostAccess::none);
 }
 
-void make_copy(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
-    if (buffer.bytes >= bytes) return;
-    buffer = {};
-    buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
-}
-
 }  // namespace
 
 shader::SunFrame sun_frame(const ShadowFrame& frame, int shadow_size) {
     const Vec3& corner = frame.origin_m;
     const double width = length(frame.u_axis_m), height = length(frame.v_axis_m);
     const Vec3 high{double(float(corner.x)), double(float(corner.y)), double(float(corner.z))};
-    return {.corner_high = vector4(high, 0),
-            .corner_low = vector4(corner - high, 0),
-            .direction = vector4(frame.direction, 0),
-            .u = vector4((shadow_size / (width * width)) * frame.u_axis_m, width / shadow_size),
-            .v = vector4((shadow_size / (height * height)) * frame.v_axis_m, height / shadow_size)};
+    return {.corner_high = to_vec4(high, 0),
+            .corner_low = to_vec4(corner - high, 0),
+            .direction = to_vec4(frame.direction, 0),
+            .u = to_vec4((shadow_size / (width * width)) * frame.u_axis_m, width / shadow_size),
+            .v = to_vec4((shadow_size / (height * height)) * frame.v_axis_m, height / shadow_size)};
 }
 
 DeviceSun::DeviceSun(const GpuDevice& gpu, const DeviceLists& lists)
@@ -49,7 +42,7 @@ DeviceSun::DeviceSun(const GpuDevice& gpu, const DeviceLists& lists)
       no_shells_(create_buffer(gpu, sizeof(shader::Shells), vk::BufferUsageFlagBits::eUniformBuffer,
                                HostAccess::write)) {
     write(gpu, no_shells_, shader::Shells{});
-    make_copy(gpu, counts_, sizeof(shader::OrderCounts));
+    reserve_copy(gpu, counts_, sizeof(shader::OrderCounts));
 }
 
 void DeviceSun::bind(const GpuDevice& gpu, const DeviceLists& lists) {
@@ -97,24 +90,25 @@ void DeviceSun::record(const vk::raii::CommandBuffer& commands, const DeviceList
     each(OrderPass::sun_queries, centres);
 }
 
-bool DeviceSun::run(const GpuDevice& gpu, DeviceLists& lists, const ListLimits& limits, std::size_t count,
-                    const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles,
-                    std::vector<float>& depths, std::vector<float>& shadow) {
-    const TileGrid grid{shadow_size, shadow_size};
+bool DeviceSun::run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists,
+                    const ListLimits& limits, LightTiles& tiles, std::vector<float>& depths,
+                    std::vector<float>& shadow) {
+    const std::size_t count = request.metaballs;
+    const TileGrid grid{request.shadow_size, request.shadow_size};
     const std::uint32_t per_item = shader::kQueriesPerLane * gpu.tile_lanes;
     const std::size_t items = grid.tiles() + count / per_item;
-    write(gpu, frame_, sun_frame(frame, shadow_size));
+    write(gpu, frame_, sun_frame(request.frame, request.shadow_size));
     make(gpu, places_, count * sizeof(shader::LightPlace));
     make(gpu, queries_, count * sizeof(shader::LightQuery));
     make(gpu, items_, items * sizeof(shader::LightItem));
-    make_copy(gpu, depths_, count * sizeof(float));
+    reserve_copy(gpu, depths_, count * sizeof(float));
     std::size_t entries = std::min(4 * count, limits.entries), wanted = entries;
     do {
         entries = wanted;
         lists.reserve(gpu, count, grid.tiles(), entries);
         bind(gpu, lists);
         tiles.use_lists(
-            gpu, shadow_size,
+            gpu, request.shadow_size,
             {&queries_, &lists.splats(), &lists.ranges(), &lists.list(grid.tiles()), &items_, &places_});
         entries = lists.entry_capacity();
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
@@ -124,7 +118,7 @@ bool DeviceSun::run(const GpuDevice& gpu, DeviceLists& lists, const ListLimits& 
             full_barrier(commands);
             record(commands, lists, count, grid, per_item);
             pass_barrier(commands);
-            tiles.record_lists(commands, grid, largest_radius, items, lists.counts(),
+            tiles.record_lists(commands, grid, request.largest_radius, items, lists.counts(),
                                offsetof(shader::OrderCounts, items));
             lists.recorder(commands).run_indirect(OrderPass::sun_store, centres_of(grid), {},
                                                   offsetof(shader::OrderCounts, visible_each));

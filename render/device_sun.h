@@ -23,16 +23,23 @@ namespace nephos {
 
 shader::SunFrame sun_frame(const ShadowFrame& frame, int shadow_size);
 
+// What is to be lit by which sun.
+struct SunRequest {
+    std::size_t metaballs = 0;  // the first of lists.cloud()
+    ShadowFrame frame;
+    int shadow_size = 0;       // texels on a side of the map
+    float largest_radius = 0;  // metres, of any metaball
+};
+
 class DeviceSun {
   public:
     DeviceSun(const GpuDevice& gpu, const DeviceLists& lists);
 
-    // Lights the first `count` metaballs of lists.cloud(), on the device and in `depths`, and makes the
-    // shadow map, in `tiles` and in `shadow`. False if the lists would be larger than `limits`: then the
-    // light is not there. Nothing else may be on its way. `largest_radius`: metres, of any metaball.
-    bool run(const GpuDevice& gpu, DeviceLists& lists, const ListLimits& limits, std::size_t count,
-             const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles,
-             std::vector<float>& depths, std::vector<float>& shadow);
+    // Lights metaballs, on the device and in `depths`, and makes the shadow map, in `tiles` and in `shadow`.
+    // False if the lists would be larger than `limits`: then the light is not there. Nothing else may be on
+    // its way.
+    bool run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists, const ListLimits& limits,
+             LightTiles& tiles, std::vector<float>& depths, std::vector<float>& shadow);
 
   private:
     void bind(const GpuDevice& gpu, const DeviceLists& lists);

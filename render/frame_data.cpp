@@ -11,7 +11,6 @@
 namespace nephos {
 namespace {
 
-shader::vec4 to_vec4(const Vec3& v, double w) { return {float(v.x), float(v.y), float(v.z), float(w)}; }
 shader::vec4 to_vec4(const Rgb& c, double scale, double w) {
     return {float(scale * c[0]), float(scale * c[1]), float(scale * c[2]), float(w)};
 }

@@ -45,6 +45,11 @@ PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera,
 // A picture with room for its pixels, without its shadow map.
 Picture blank_picture(const RenderOptions& options);
 
+// xyz and w as shaders take them.
+inline shader::vec4 to_vec4(const Vec3& v, double w) {
+    return {float(v.x), float(v.y), float(v.z), float(w)};
+}
+
 // Size in pixels of a unit at distance 1.
 double pixels_per_unit(const Camera& camera, const CameraFrame& frame);
 

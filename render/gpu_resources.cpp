@@ -75,13 +75,16 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, std::span<const std::b
     gpu.uploaded_bytes += bytes.size();
 }
 
+void reserve_copy(const GpuDevice& gpu, GpuBuffer& copy, std::size_t bytes) {
+    if (copy.bytes >= bytes) return;
+    copy = {};
+    copy = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
+}
+
 const std::byte* read_back(const GpuDevice& gpu, const GpuBuffer& buffer, std::size_t bytes,
                            GpuBuffer& copy) {
     if (buffer.readable) return buffer.mapped;
-    if (copy.bytes < bytes) {
-        copy = {};
-        copy = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
-    }
+    reserve_copy(gpu, copy, bytes);
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         buffer_barrier(commands, buffer, access::compute, access::copy_from);
         commands.copyBuffer(*buffer.buffer, *copy.buffer, vk::BufferCopy(0, 0, bytes));

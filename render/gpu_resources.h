@@ -35,6 +35,10 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, const T& value) {
     write(gpu, buffer, std::as_bytes(std::span(&value, 1)));
 }
 
+// Makes a buffer at least so large that is copied into on the device and read by the processor; its content
+// is lost when it grows.
+void reserve_copy(const GpuDevice& gpu, GpuBuffer& copy, std::size_t bytes);
+
 // The first bytes of a buffer that the device has written: itself where it is readable, else `copy`, which
 // grows; then the buffer must allow to be copied from.
 const std::byte* read_back(const GpuDevice& gpu, const GpuBuffer& buffer, std::size_t bytes, GpuBuffer& copy);

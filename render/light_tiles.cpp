@@ -94,17 +94,9 @@ void LightTiles::upload_bins(const GpuDevice& gpu, const TileBins& bins) {
 }
 
 void LightTiles::draw_map(const GpuDevice& gpu, const TileGrid& grid, bool first, bool last) {
-    const shader::TileStep step{.width = shader::uint(grid.width),
-                                .height = shader::uint(grid.height),
-                                .tiles_x = shader::uint(grid.columns()),
-                                .tile_count = shader::uint(grid.tiles()),
-                                .first_batch = first,
-                                .last_batch = last,
-                                .largest_radius = 0,
-                                .first = 0,
-                                .end = 0,
-                                .distances = 0,
-                                .listed = 0};
+    shader::TileStep step = step_over(grid);
+    step.first_batch = first;
+    step.last_batch = last;
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         compute_barrier(commands);  // the batch before left its sums
         begin_compute(commands, *layout_, bindings_, map_pipeline_, step);
@@ -130,17 +122,10 @@ void LightTiles::ask(const GpuDevice& gpu, const SunOrder& order, const TileGrid
         const std::span asked = std::span(queries.queries).subspan(first, end - first);
         upload(gpu, bindings_, 1, queries_, std::as_bytes(asked));
         upload(gpu, bindings_, 7, items_, std::as_bytes(std::span(items)));
-        const shader::TileStep step{.width = shader::uint(grid.width),
-                                    .height = shader::uint(grid.height),
-                                    .tiles_x = shader::uint(grid.columns()),
-                                    .tile_count = shader::uint(items.size()),
-                                    .first_batch = 0,
-                                    .last_batch = 0,
-                                    .largest_radius = order.largest_radius,
-                                    .first = 0,
-                                    .end = 0,
-                                    .distances = 0,
-                                    .listed = 0};
+        shader::TileStep step = step_over(grid);
+        step.tile_count = shader::uint(items.size());
+        step.first_batch = step.last_batch = 0;
+        step.largest_radius = order.largest_radius;
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
             begin_compute(commands, *layout_, bindings_, centres_pipeline_, step);
             dispatch_groups(commands, items.size());
@@ -162,17 +147,8 @@ void LightTiles::use_lists(const GpuDevice& gpu, int shadow_size, const Lists& l
 void LightTiles::record_lists(const vk::raii::CommandBuffer& commands, const TileGrid& grid,
                               float largest_radius, std::size_t items, const GpuBuffer& arguments,
                               std::size_t offset) const {
-    shader::TileStep step{.width = shader::uint(grid.width),
-                          .height = shader::uint(grid.height),
-                          .tiles_x = shader::uint(grid.columns()),
-                          .tile_count = shader::uint(grid.tiles()),
-                          .first_batch = 1,
-                          .last_batch = 1,
-                          .largest_radius = largest_radius,
-                          .first = 0,
-                          .end = 0,
-                          .distances = 0,
-                          .listed = 0};
+    shader::TileStep step = step_over(grid);
+    step.largest_radius = largest_radius;
     begin_compute(commands, *layout_, listed_, map_pipeline_, step);
     image_barrier(commands, map_, access::sample, access::compute);
     dispatch_groups(commands, grid.tiles());

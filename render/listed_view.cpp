@@ -16,12 +16,6 @@ GpuBuffer uniform_buffer(const GpuDevice& gpu) {
     return create_buffer(gpu, sizeof(T), vk::BufferUsageFlagBits::eUniformBuffer, HostAccess::write);
 }
 
-void reserve_read(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
-    if (buffer.bytes >= bytes) return;
-    buffer = {};
-    buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
-}
-
 void copy(const vk::raii::CommandBuffer& commands, const GpuBuffer& from, const GpuBuffer& to,
           std::size_t bytes) {
     if (bytes > 0) commands.copyBuffer(*from.buffer, *to.buffer, vk::BufferCopy(0, 0, bytes));
@@ -116,7 +110,7 @@ ListedView::ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const
         slot.frame = uniform_buffer<shader::Frame>(gpu);
         slot.order_frame = uniform_buffer<shader::OrderFrame>(gpu);
         slot.shells = uniform_buffer<shader::Shells>(gpu);
-        reserve_read(gpu, slot.counts, sizeof(shader::OrderCounts));
+        reserve_copy(gpu, slot.counts, sizeof(shader::OrderCounts));
         const vk::CommandBufferAllocateInfo info(*gpu.pool, vk::CommandBufferLevel::ePrimary, 1);
         slot.commands = std::move(vk::raii::CommandBuffers(gpu.device, info).front());
         slot.fence = vk::raii::Fence(gpu.device, vk::FenceCreateInfo());
@@ -171,7 +165,7 @@ bool ListedView::light(const ShadowFrame& frame, int shadow_size, float largest_
                        std::vector<float>& depths, std::vector<float>& shadow) {
     settle();
     if (!sun_) sun_.emplace(gpu_, lists_);
-    if (!sun_->run(gpu_, lists_, limits, balls_, frame, shadow_size, largest_radius, tiles, depths, shadow))
+    if (!sun_->run(gpu_, {balls_, frame, shadow_size, largest_radius}, lists_, limits, tiles, depths, shadow))
         return false;
     ++lit;
     return true;
@@ -215,17 +209,10 @@ void ListedView::bind(Slot& slot) {
 void ListedView::record_view(const vk::raii::CommandBuffer& commands, Slot& slot) {
     const Pipelines& pipelines = pipelines_for(slot.what.variant);
     const TileGrid grid{slot.tile.width, slot.tile.height};
-    shader::TileStep step{.width = shader::uint(grid.width),
-                          .height = shader::uint(grid.height),
-                          .tiles_x = shader::uint(grid.columns()),
-                          .tile_count = shader::uint(lists_.ball_capacity()),
-                          .first_batch = 1,
-                          .last_batch = 1,
-                          .largest_radius = 0,
-                          .first = 0,
-                          .end = 0,
-                          .distances = slot.what.depth,
-                          .listed = 1};
+    shader::TileStep step = step_over(grid);
+    step.tile_count = shader::uint(lists_.ball_capacity());
+    step.distances = slot.what.depth;
+    step.listed = 1;
     begin_compute(commands, layout_, slot.bindings, pipelines.project, step);
     commands.dispatchIndirect(*lists_.counts().buffer, offsetof(shader::OrderCounts, splats));
     step.tile_count = shader::uint(grid.tiles());
@@ -367,8 +354,8 @@ void ListedView::reserve(const Tile& tile, Slot& slot) {
         radiance_ = create_buffer(gpu_, 4 * sizeof(float) * pixels, usage, HostAccess::none);
         depth_ = create_buffer(gpu_, sizeof(float) * pixels, usage, HostAccess::none);
     }
-    reserve_read(gpu_, slot.radiance, 4 * sizeof(float) * pixels);
-    reserve_read(gpu_, slot.depth, sizeof(float) * pixels);
+    reserve_copy(gpu_, slot.radiance, 4 * sizeof(float) * pixels);
+    reserve_copy(gpu_, slot.depth, sizeof(float) * pixels);
 }
 
 void ListedView::begin_tile(const ListedPicture& what, const shader::Frame& frame, const Tile& tile,

@@ -160,9 +160,7 @@ std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOp
     const bool absorbs = options.light.lighting == Lighting::cfa && !lit.all_known;
     std::optional<DensityBlocks> blocks;
     if (!lit.cloud.visible.empty() && (flash != nullptr || absorbs))
-        blocks.emplace(
-            lit.merged.empty() ? lit.cloud : prepare(splats.metaballs),  // cubes of the voxels' size
-            splats.metaballs.extinction_per_m);
+        blocks.emplace(lit.given, splats.metaballs.extinction_per_m);  // cubes of the voxels' size
     // A map that is known but is not on the device goes there below; of no cloud at all it is made there.
     const bool on_device =
         !on_processor() && (!lit.all_known || (lit.cloud.visible.empty() && map_on_device != lit.key));

@@ -69,6 +69,20 @@ TileBins bin(std::span<const PixelBox> boxes, const TileGrid& grid, std::span<co
 
 }  // namespace
 
+shader::TileStep step_over(const TileGrid& grid) {
+    return {.width = shader::uint(grid.width),
+            .height = shader::uint(grid.height),
+            .tiles_x = shader::uint(grid.columns()),
+            .tile_count = shader::uint(grid.tiles()),
+            .first_batch = 1,
+            .last_batch = 1,
+            .largest_radius = 0,
+            .first = 0,
+            .end = 0,
+            .distances = 0,
+            .listed = 0};
+}
+
 PixelBox tiles_of(const PixelBox& box, const TileGrid& grid) {
     constexpr int kWidth = shader::kTileWidth, kHeight = shader::kTileHeight;
     const int x0 = std::max(0, box.x0), y0 = std::max(0, box.y0);

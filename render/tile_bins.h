@@ -23,6 +23,9 @@ struct TileGrid {
     std::size_t tiles() const { return std::size_t(columns()) * std::size_t(rows()); }
 };
 
+// Push constants of a compute pass over all tiles of a picture or map that is drawn in one batch.
+shader::TileStep step_over(const TileGrid& grid);
+
 // The tiles that a box touches, half-open; empty when it lies outside.
 PixelBox tiles_of(const PixelBox& box, const TileGrid& grid);
 

@@ -110,17 +110,11 @@ void ViewTiles::draw_between_shells(const vk::raii::CommandBuffer& commands, con
 void ViewTiles::draw_batch(const GpuDevice& gpu, const TileGrid& grid, const EyeOrder& order,
                            std::size_t begin, std::size_t end) {
     const bool last = end == order.balls.size() + order.puffs.size();
-    shader::TileStep step{.width = shader::uint(grid.width),
-                          .height = shader::uint(grid.height),
-                          .tiles_x = shader::uint(grid.columns()),
-                          .tile_count = shader::uint(end - begin),
-                          .first_batch = begin == 0,
-                          .last_batch = last,
-                          .largest_radius = 0,
-                          .first = 0,
-                          .end = 0,
-                          .distances = order.depth,
-                          .listed = 0};
+    shader::TileStep step = step_over(grid);
+    step.tile_count = shader::uint(end - begin);
+    step.first_batch = begin == 0;
+    step.last_batch = last;
+    step.distances = order.depth;
     const vk::raii::Pipeline& tiles = tiles_for(gpu, order);
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_compute(commands, *layout_, bindings_, project_, step);

@@ -3,6 +3,8 @@
 
 // A frame of a pipeline as a run draws it, for tests.
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -32,6 +34,17 @@ inline Picture drawn_frame(const Scene& scene, const FrameResult& frame, Rendere
     return painter.draw(renderer, cloud, layers, scene.render, frame.time_s, all,
                         frame.ground ? std::optional(view_of(*frame.ground)) : std::nullopt,
                         weather_of(scene, frame.layers, frame.time_s));
+}
+
+// The largest difference, of what is brighter than 1 relative to it; not a number if any is not.
+inline float apart_by(const std::vector<float>& expected, const std::vector<float>& other) {
+    float apart = 0;
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+        const float difference = std::abs(other[i] - expected[i]) / std::max(1.0f, expected[i]);
+        if (std::isnan(difference)) return difference;
+        apart = std::max(apart, difference);
+    }
+    return apart;
 }
 
 }  // namespace nephos::test

@@ -6,13 +6,12 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "apps/run_folder.h"
 #include "apps/simulation.h"
 #include "automaton/error.h"
-#include "scenes/writer.h"
 #include "tests/apps/file_content.h"
+#include "tests/apps/small_run.h"
 #include "tests/reference/with_threads.h"
 
 namespace nephos {
@@ -20,38 +19,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class FramesOnTheirWay : public testing::Test {
+class FramesOnTheirWay : public test::SmallRun {
   protected:
     static constexpr int kFrames = 8;
 
-    void SetUp() override {
-        const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-        base_ = fs::temp_directory_path() /
-                ("nephos frames " + std::string(info->name()) + " " + std::to_string(::getpid()));
-        fs::create_directories(base_);
-    }
-    void TearDown() override { fs::remove_all(base_); }
-
     RunSettings settings(const std::string& folder) const {
-        RunSettings s;
-        s.scene.name = "small";
-        s.scene.automaton.extent = {32, 24, 12};
-        s.scene.automaton.field.background = {0.15, 0.01, 0.05};
-        s.scene.steps = kFrames - 1;
-        s.scene.frames.per_second = 1;
-        s.scene.frames.time_scale = s.scene.automaton.time_step_s;  // a frame a step
-        s.scene.frames.png = true;
-        s.scene.render.camera.width = 120;
-        s.scene.render.camera.height = 90;
-        s.scene.render.shadow_map_size = 64;
-        s.scene_file = "small.toml";
-        s.scene_text = to_toml(s.scene);
-        s.scene_hash = scene_hash(s.scene);
-        s.simulation_hash = simulation_hash(s.scene);
-        s.range = full_range(s.scene);
+        Scene scene = small_scene(kFrames - 1);
+        scene.frames.png = true;
+        scene.render.camera.width = 120;
+        scene.render.camera.height = 90;
+        scene.render.shadow_map_size = 64;
+        RunSettings s = settings_of(scene, folder);
         s.device.splatting = Splatting::tiles;
         s.device.lists = TileLists::device;
-        s.folder = base_ / folder;
         return s;
     }
 
@@ -62,8 +42,6 @@ class FramesOnTheirWay : public testing::Test {
         for (int frame = 1; frame <= kFrames; ++frame)
             EXPECT_EQ(content(picture(a, frame)), content(picture(b, frame))) << frame;
     }
-
-    fs::path base_;
 };
 
 TEST_F(FramesOnTheirWay, HaveTheSameFiles) {

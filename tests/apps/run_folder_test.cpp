@@ -21,42 +21,23 @@
 #include "density/vdb_file.h"
 #include "scenes/writer.h"
 #include "tests/apps/file_content.h"
+#include "tests/apps/small_run.h"
 
 namespace nephos {
 namespace {
 
 namespace fs = std::filesystem;
 
-class RunFolderTest : public testing::Test {
+class RunFolderTest : public test::SmallRun {
   protected:
-    void SetUp() override {
-        const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-        base_ = fs::temp_directory_path() /
-                ("nephos run " + std::string(info->name()) + " " + std::to_string(::getpid()));
-        fs::create_directories(base_);
-    }
-    void TearDown() override { fs::remove_all(base_); }
-
     RunSettings settings(const std::string& folder) const {
-        RunSettings s;
-        s.scene.name = "small";
-        s.scene.automaton.extent = {32, 24, 12};
-        s.scene.automaton.field.background = {0.15, 0.01, 0.05};
-        s.scene.steps = 6;
-        s.scene.frames.per_second = 1;
-        s.scene.frames.time_scale = 15;
-        s.scene.density.write_state = true;
-        s.scene_file = "small.toml";
-        s.scene_text = to_toml(s.scene);
-        s.scene_hash = scene_hash(s.scene);
-        s.simulation_hash = simulation_hash(s.scene);
-        s.range = full_range(s.scene);
+        Scene scene = small_scene(6);
+        scene.frames.time_scale = 15;
+        scene.density.write_state = true;
+        RunSettings s = settings_of(scene, folder);
         s.render = false;
-        s.folder = base_ / folder;
         return s;
     }
-
-    fs::path base_;
 };
 
 // Everything but wall time; of a VDB file its voxels and metadata.

@@ -40,17 +40,6 @@ Scene small_pictures_of(const std::string& file) {
     return scene;
 }
 
-// The largest difference, of what is brighter than 1 relative to it; not a number if any is not.
-float apart_by(const std::vector<float>& expected, const std::vector<float>& other) {
-    float apart = 0;
-    for (std::size_t i = 0; i < expected.size(); ++i) {
-        const float difference = std::abs(other[i] - expected[i]) / std::max(1.0f, expected[i]);
-        if (std::isnan(difference)) return difference;
-        apart = std::max(apart, difference);
-    }
-    return apart;
-}
-
 std::size_t metaball_count(const FrameResult& frame) {
     std::size_t count = frame.layers.empty() ? frame.density.active_voxels() : 0;
     for (const LayerFrame& layer : frame.layers) count += layer.direct ? 0 : layer.density.active_voxels();
@@ -66,9 +55,10 @@ struct Comparison : PipelineSink {
         clearest = *std::ranges::min_element(expected.transmittance);
         for (std::size_t way = 1; way < std::size(renderers); ++way) {
             const Picture other = test::drawn_frame(scene, frame, renderers[way], painters[way], false);
-            apart[way] = std::max(apart_by(expected.beauty, other.beauty),
-                                  apart_by(expected.transmittance, other.transmittance));
-            ASSERT_FALSE(std::isnan(apart[way]));
+            const float beauty = test::apart_by(expected.beauty, other.beauty),
+                        transmittance = test::apart_by(expected.transmittance, other.transmittance);
+            ASSERT_FALSE(std::isnan(beauty) || std::isnan(transmittance)) << "way " << way;
+            apart[way] = std::max(beauty, transmittance);
         }
     }
 

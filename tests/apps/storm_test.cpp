@@ -48,9 +48,7 @@ struct Comparison : PipelineSink {
         EXPECT_GT(most, 2 * least) << "nothing to see";
         for (std::size_t way = 1; way < 3; ++way) {
             const std::vector<float> other = drawn(scene, frame, renderers[way], painters[way]);
-            float apart = 0;
-            for (std::size_t i = 0; i < expected.size(); ++i)
-                apart = std::max(apart, std::abs(other[i] - expected[i]) / std::max(1.0f, expected[i]));
+            const float apart = test::apart_by(expected, other);
             // Tiles end at a transmittance of 1/4096, some a few balls sooner: what stands by a flash behind
             // them may have a radiance of 30.
             const bool flashes = flash_at(scene.render.lightning, frame.time_s).has_value();
