@@ -15,6 +15,8 @@
 #define NEPHOS_GROWTH_INL_H_
 #endif
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 
 #include <hwy/cache_control.h>
@@ -64,6 +66,20 @@ inline void wrap_row(const std::uint64_t* act, const std::uint64_t* hum_next, st
     }
 }
 
+// The first `count` lanes from p, at least one and not all; the others are 0 and their memory is not read,
+// since another thread may write it. p has the alignment of a word: hn::MaskedLoad() asks for that of a
+// vector wherever the instruction set has no masked load.
+template <class D>
+HWY_INLINE hn::Vec<D> load_first(D d, std::size_t count, const std::uint64_t* p) {
+#if HWY_TARGET <= HWY_AVX2
+    return hn::MaskedLoad(hn::FirstN(d, count), d, p);
+#else
+    HWY_ALIGN std::uint64_t words[hn::MaxLanes(d)] = {};
+    std::copy_n(p, count, words);
+    return hn::Load(d, words);
+#endif
+}
+
 // kEnds: the vector holds the row's first or last word, so that bits of other rows must be kept out.
 template <bool kEnds, bool kStream, class D>
 HWY_INLINE void grow_vector(D d, const ActRows& rows, std::size_t w, std::size_t words, std::uint64_t* hum,
@@ -87,9 +103,9 @@ HWY_INLINE void grow_vector(D d, const ActRows& rows, std::size_t w, std::size_t
     const auto f_act = hn::Or(hn::Or(hn::Or(west12, east12), hn::Or(y1, y2)), hn::Or(z1, z2));
     if (kEnds && w + lanes > words) {
         const auto valid = hn::FirstN(d, words - w);
-        const auto hum_next = hn::AndNot(act, hn::MaskedLoad(valid, d, hum + w));
+        const auto hum_next = hn::AndNot(act, load_first(d, words - w, hum + w));
         hn::BlendedStore(hum_next, valid, d, hum + w);
-        hn::BlendedStore(hn::Or(hn::MaskedLoad(valid, d, cld + w), act), valid, d, cld + w);
+        hn::BlendedStore(hn::Or(load_first(d, words - w, cld + w), act), valid, d, cld + w);
         hn::BlendedStore(hn::And(hum_next, f_act), valid, d, act_next + w);
         return;
     }

@@ -68,4 +68,20 @@ inline float sparse_rate(float p) {
     return (z + z) * (1.0f + z2 * (1.0f / 3.0f + z2 * (0.2f + z2 * (1.0f / 7.0f))));
 }
 
+// The draw of a sparse event (docs/adr/0002) by the two words of the event, the rate of its level and the
+// rates of its cell, 0 for draws that are not made: kHum, kAct, kExt, or above for none. v has 53 bits, so a
+// draw of 2^-30 of the level's rate keeps a relative precision of 2^-23.
+inline int sparse_draw(std::uint32_t first, std::uint32_t second, double level,
+                       const std::array<float, 3>& rates) {
+    const auto bits = std::int64_t{second >> 1} << 22 | first >> 10;
+    const double v = double(bits) * (level * 0x1p-53);
+    double sum = 0;
+    int draw = 0;
+    for (; draw < 3; ++draw) {
+        sum += double(rates[std::size_t(draw)]);
+        if (v < sum) break;
+    }
+    return draw;
+}
+
 }  // namespace nephos

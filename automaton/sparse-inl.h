@@ -41,9 +41,27 @@ HWY_INLINE std::uint32_t bits_of(DF d, M mask) {
     return std::uint32_t(bytes[0]) | std::uint32_t(bytes[1]) << 8;
 }
 
-// Runs one sparse job whose words are ready: the first word of an event holds its cell, the second is v,
-// uniform in 0..rate of the level. v below the cell's rate of hum is a birth of hum, below that plus the rate
-// of act one of act, below the sum of all three an extinction.
+// Marks the events of the lanes in `close`, whose v is too near a threshold for float32: sparse_draw()
+// decides. `words` are those of lane 0; rates are 0 for draws that the job does not make.
+template <class DF, class V = hn::Vec<DF>>
+HWY_NOINLINE void run_close(DF d, const SparseJob& job, std::uint32_t close, const std::uint32_t* words,
+                            const V& hum, const V& act, const V& ext, BirthScratch& s) {
+    HWY_ALIGN float rates[3][hn::MaxLanes(d)];
+    hn::Store(hum, d, rates[kHum]);
+    hn::Store(act, d, rates[kAct]);
+    hn::Store(ext, d, rates[kExt]);
+    for (; close != 0; close &= close - 1) {
+        const int lane = std::countr_zero(close);
+        const std::uint32_t first = words[2 * lane], second = words[2 * lane + 1];
+        const int draw = sparse_draw(first, second, double(job.rate_unit) * 0x1p31,
+                                     {rates[kHum][lane], rates[kAct][lane], rates[kExt][lane]});
+        if (draw <= kExt) mark(event_bytes(s, draw, job.block), first & 511u);
+    }
+}
+
+// Runs one sparse job whose words are ready. Makes the choice of sparse_draw() in float32, whose v and sums
+// of rates are right to 2^-22 of the level's rate, and leaves events to run_close() whose v lies within
+// 2^-21 of a sum: three in a million.
 inline void run_sparse(const Segment& g, const SparseJob& job, BirthScratch& s) {
     const hn::ScalableTag<float> d;
     const hn::RebindToUnsigned<decltype(d)> du;
@@ -53,6 +71,7 @@ inline void run_sparse(const Segment& g, const SparseJob& job, BirthScratch& s) 
     const BlockPlan& plan = s.plans[std::size_t(job.block)];
     const auto& background = g.random.field->background();
     const auto seven = hn::Set(du, 7);
+    const auto slack = hn::Set(d, job.rate_unit * 0x1p10f);
     const auto to_float = [&](auto v) HWY_ATTR { return hn::ConvertTo(d, hn::BitCast(di, v)); };
     for (int e = 0; e < job.events; e += lanes) {
         hn::Vec<decltype(du)> cell, second;
@@ -68,15 +87,23 @@ inline void run_sparse(const Segment& g, const SparseJob& job, BirthScratch& s) 
             act = combine(d, ellipsoid, kAct, at, act);
             ext = combine(d, ellipsoid, kExt, at, ext);
         }
+        const auto zero = hn::Zero(d);
+        hum = (job.draws & 1u << kHum) != 0 ? rate_of(d, hum) : zero;
+        act = (job.draws & 1u << kAct) != 0 ? rate_of(d, act) : zero;
+        ext = (job.draws & 1u << kExt) != 0 ? rate_of(d, ext) : zero;
         const auto v = hn::Mul(to_float(hn::ShiftRight<1>(second)), hn::Set(d, job.rate_unit));
-        auto sum = hn::Zero(d);
-        if ((job.draws & 1u << kHum) != 0) sum = rate_of(d, hum);
-        const std::uint32_t up_to_hum = bits_of(d, hn::Lt(v, sum));
-        if ((job.draws & 1u << kAct) != 0) sum = hn::Add(sum, rate_of(d, act));
-        const std::uint32_t up_to_act = bits_of(d, hn::Lt(v, sum));
-        if ((job.draws & 1u << kExt) != 0) sum = hn::Add(sum, rate_of(d, ext));
-        std::uint32_t accepted = bits_of(d, hn::Lt(v, sum));
-        if (job.events - e < lanes) accepted &= (1u << (job.events - e)) - 1;
+        const auto two = hn::Add(hum, act), three = hn::Add(two, ext);
+        const auto distance =
+            hn::Min(hn::AbsDiff(v, hum), hn::Min(hn::AbsDiff(v, two), hn::AbsDiff(v, three)));
+        const std::uint32_t used = job.events - e < lanes ? (1u << (job.events - e)) - 1 : 0xFFFFFFFFu;
+        const std::uint32_t up_to_hum = bits_of(d, hn::Lt(v, hum)), up_to_act = bits_of(d, hn::Lt(v, two));
+        std::uint32_t accepted = bits_of(d, hn::Lt(v, three)) & used;
+        const auto close = hn::Lt(distance, slack);
+        if (HWY_UNLIKELY(!hn::AllFalse(d, close))) {
+            const std::uint32_t lanes_close = bits_of(d, close);
+            run_close(d, job, lanes_close & used, words + 2 * e, hum, act, ext, s);
+            accepted &= ~lanes_close;
+        }
         for (; accepted != 0; accepted &= accepted - 1) {
             const int lane = std::countr_zero(accepted);
             const int draw = 2 - int(up_to_hum >> lane & 1) - int(up_to_act >> lane & 1);

@@ -64,13 +64,13 @@ void sparse_events(const BlockDraws& b, unsigned draws, const PoissonLadder& lad
     std::uint32_t count = 0;
     for (std::uint32_t threshold : level.thresholds) count += threshold <= uniform ? 1 : 0;
     for (std::uint32_t e = 0; e < count; ++e) {
-        const int cell = int(b.word(4, e / 2, e % 2 * 2) % 512);
-        const float v =
-            float(std::int32_t(b.word(4, e / 2, e % 2 * 2 + 1) / 2)) * (float(level.rate) * 0x1p-31f);
-        float sum = 0;
+        const std::uint32_t first = b.word(4, e / 2, e % 2 * 2), second = b.word(4, e / 2, e % 2 * 2 + 1);
+        const int cell = int(first % 512);
+        const double v = (double(second / 2) + double(first / 1024) / 4194304) / 2147483648 * level.rate;
+        double sum = 0;
         for (int draw = 0; draw < 3; ++draw) {
             if ((draws >> draw & 1) == 0) continue;
-            sum += sparse_rate(b.p(draw, cell));
+            sum += double(sparse_rate(b.p(draw, cell)));
             if (v < sum) {
                 events[std::size_t(draw)][std::size_t(cell)] = true;
                 break;
