@@ -33,7 +33,7 @@ inline constexpr double kForever = std::numeric_limits<double>::infinity();
 
 // One parcel of air.
 struct Ellipsoid {
-    Vec3 centre_m;                    // at its birth
+    Vec3 centre_m;                    // at its birth, or at time 0 if that is later
     Vec3 semi_axes_m{500, 500, 300};  // > 0, before the turn by yaw
     double yaw_deg = 0;               // turn about the vertical, counter-clockwise seen from above
     Probabilities centre{0.1, 0.001, 0.1};

@@ -222,6 +222,8 @@ Sources: D = Dobashi, Kaneda, Yamashita, Okita, Nishita, "A Simple, Efficient Me
 SIGGRAPH 2000; T = Torchelsen's dissertation on skies of seeds and roots, 2005; S = Sapronov's procedural atmosphere of a flight
 simulator; P = Puig-Centelles, Ripolles, Chover on areas of rain, 2008. No source: nephos' own.
 
+What the automaton and the density make of these numbers, exactly: [model.md](model.md).
+
 ## The top of the file
 
 )";

@@ -81,7 +81,7 @@ struct LayerOptions {
     Extent extent{256, 128, 20};
     Placement placement;
     Boundaries boundaries;
-    Probabilities background{0, 0, 0.1};  // of the field outside all clouds
+    Probabilities background{0, 0, 0.1};  // of the field, everywhere (field.h)
 
     Range base_height_m{1000, 1000};   // world z of clouds' bases, drawn for each cloud
     Wind wind;                         // no keyframe: the scene's wind

@@ -54,18 +54,21 @@ void finish_scatter(const SectionReader& reader, void* owner) {
 
 const char* const kCentreEffect =
     "Probabilities at the centre, as `[field.background]`; towards the rim they change smoothly.";
-const char* const kRimEffect = "Probabilities at the rim, as `[field.background]`.";
+const char* const kRimEffect =
+    "Probabilities at the rim, as `[field.background]`. They take effect where they exceed the background's "
+    "`hum` "
+    "and `act` or stay below its `ext`: with a higher `ext`, the background's holds from inside the rim on.";
 const char* const kCarriedEffect =
     "Whether it moves with the wind at its centre's height; otherwise it stands still.";
 
 const Section& ellipsoid_section() {
     static const Section section{
         "An ellipsoid placed by hand",
-        "Parcels of humid air, placed by hand: inside, clouds are born and live longer. Where several "
-        "overlap, the "
-        "larger `hum` and `act` and the smaller `ext` count.",
+        "Parcels of humid air, placed by hand: inside, clouds are born and live longer. Of all that "
+        "overlap, and of the background, the larger `hum` and `act` and the smaller `ext` count.",
         {required(key<&Ellipsoid::centre_m>("centre_m", "m", between(-kFarthest_m, kFarthest_m),
-                                            "Centre at its birth: east, north, height.",
+                                            "Centre at its birth, or at time 0 if `birth_s` is below 0: "
+                                            "east, north, height.",
                                             "D, control of motion")),
          key<&Ellipsoid::semi_axes_m>("semi_axes_m", "m", above(0, kFarthest_m),
                                       "Half of its length, width and height, before the turn by `yaw_deg`."),
@@ -230,7 +233,10 @@ const Section& field_section() {
         "How likely vapour, activation and extinction are: the same everywhere, plus ellipsoids of humid "
         "air.",
         {table<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::background>(
-             "background", probabilities_section(), "Probabilities outside every ellipsoid."),
+             "background", probabilities_section(),
+             "Probabilities everywhere. Inside ellipsoids the background counts as well: the larger `hum` "
+             "and "
+             "`act` and the smaller `ext` of both."),
          tables<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::ellipsoids>(
              "ellipsoids", ellipsoid_section(), 0, 100'000),
          tables<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::scatters>(

@@ -19,7 +19,10 @@ constexpr double kLongest_s = 1e9;
 constexpr Limits kIntensity = between(0, 500);
 
 const char* const kCentreEffect = "Probabilities at the centre, as `[field.background]`.";
-const char* const kRimEffect = "Probabilities at the rim, as `[field.background]`.";
+const char* const kRimEffect =
+    "Probabilities at the rim, as `[field.background]`. They take effect where they exceed the background's "
+    "`hum` "
+    "and `act` or stay below its `ext`: with a higher `ext`, the background's holds from inside the rim on.";
 
 const Section& point_section() {
     static const Section section{
@@ -326,8 +329,8 @@ const Section& layer_section() {
              group("lattice", layer_lattice_section()),
              default_is(table<&LayerOptions::background>(
                             "background", probabilities_section(),
-                            "Probabilities outside all clouds; keys that are missing are "
-                            "those of `[field.background]`."),
+                            "Probabilities everywhere, inside clouds' ellipsoids as well; keys that "
+                            "are missing are those of `[field.background]`."),
                         "that of `[field.background]`"),
              default_is(key<&LayerOptions::base_height_m>("base_height_m", "m", between(-1e5, 1e5),
                                                           "Height of clouds' bases, drawn for each.", "T, 2"),
