@@ -171,7 +171,8 @@ FrameOutput::Begun FrameOutput::begin(FrameResult& frame) {
     if (frame.ground) ground = view_of(*frame.ground);
     PendingSkyPicture picture =
         painter_.begin(*renderer_, cloud, layers, scene.render, frame.time_s, scene.frames.exr, ground,
-                       weather_of(scene, frame.layers, frame.time_s));
+                       weather_of(scene, frame.layers, frame.time_s),
+                       FilmFrame{frame.number - 1, scene.frames, scene.render.sun});
     return {std::move(frame), std::move(balls), std::move(picture)};
 }
 

@@ -126,7 +126,7 @@ StateHash LayerSimulation::hash() const {
         writer.put(steps_);
         return hash_of_bytes(writer.bytes());
     }
-    return automaton_ ? automaton_->hash() : hash_of_bytes(sky_->save());
+    return automaton_ ? automaton_->hash() : sky_->hash();
 }
 
 std::vector<std::byte> LayerSimulation::save() const {

@@ -33,8 +33,6 @@ BitPlane copy_of(const BitPlaneView& view) {
     return plane;
 }
 
-std::uint64_t steps_up_to(const Moment& moment) { return moment.step + (moment.fraction > 0 ? 1 : 0); }
-
 // Cells of a box in all, and the volume that they fill.
 double volume_m3(const GridBox& box) {
     const double edge = box.placement.cell_size_m;
@@ -82,15 +80,6 @@ CloudStatistics no_automaton() {
 
 }  // namespace
 
-Moment moment_of(double time_s, double time_step_s) {
-    const double steps = time_s / time_step_s;
-    const double nearest = std::round(steps);
-    constexpr double kTolerance = 4 * std::numeric_limits<double>::epsilon();
-    if (std::abs(steps - nearest) <= kTolerance * nearest) return {std::uint64_t(nearest), 0};
-    const double whole = std::floor(steps);
-    return {std::uint64_t(whole), steps - whole};
-}
-
 PipelineRange full_range(const Scene& scene) { return {scene.steps, 1, frame_count(scene)}; }
 
 PipelineRange range_of_frames(const Scene& scene, int first, int last) {
@@ -102,8 +91,7 @@ PipelineRange range_of_frames(const Scene& scene, int first, int last) {
                         ? fmt::format("the scene '{}' has no frames", scene.name)
                         : fmt::format("no such frame: the scene '{}' has frames 1 to {}", scene.name, count));
     }
-    const double end_s = frame_time_s(scene.frames, last - 1);
-    return {steps_up_to(moment_of(end_s, scene.automaton.time_step_s)), first, last};
+    return {steps_up_to(moment_of_frame(scene, last - 1)), first, last};
 }
 
 Pipeline::Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
@@ -115,7 +103,7 @@ Pipeline::Pipeline(const Scene& scene, const PipelineRange& range, std::string s
       ground_(dry_or_covered(scene)),
       next_frame_(range.first_frame) {
     if (range_.last_frame >= range_.first_frame &&
-        steps_up_to(moment_of_frame(range_.last_frame)) > range_.last_step) {
+        steps_up_to(moment_of_number(range_.last_frame)) > range_.last_step) {
         throw Error(ErrorCode::usage,
                     fmt::format("frame {} shows {:g} s, but the simulation ends at {:g} s", range_.last_frame,
                                 frame_time_s(scene_.frames, range_.last_frame - 1),
@@ -147,9 +135,7 @@ std::uint64_t Pipeline::steps_in_all() const {
 
 bool Pipeline::finished() const { return next_step_ > range_.last_step && next_frame_ > range_.last_frame; }
 
-Moment Pipeline::moment_of_frame(int number) const {
-    return moment_of(frame_time_s(scene_.frames, number - 1), scene_.automaton.time_step_s);
-}
+Moment Pipeline::moment_of_number(int number) const { return moment_of_frame(scene_, number - 1); }
 
 bool Pipeline::density_is_due(std::uint64_t step) const {
     return steps_taken() >= step + std::uint64_t(scene_.density.smoothing.t0);
@@ -158,14 +144,14 @@ bool Pipeline::density_is_due(std::uint64_t step) const {
 // The lowest step whose density a result still needs.
 std::uint64_t Pipeline::lowest_needed() const {
     std::uint64_t lowest = next_step_ <= range_.last_step ? next_step_ : steps_taken();
-    if (next_frame_ <= range_.last_frame) lowest = std::min(lowest, moment_of_frame(next_frame_).step);
+    if (next_frame_ <= range_.last_frame) lowest = std::min(lowest, moment_of_number(next_frame_).step);
     return lowest;
 }
 
 void Pipeline::advance(PipelineSink& sink) {
     assert(!finished());
     const bool frames_left = next_frame_ <= range_.last_frame;
-    const std::uint64_t frame_needs = frames_left ? steps_up_to(moment_of_frame(next_frame_)) : 0;
+    const std::uint64_t frame_needs = frames_left ? steps_up_to(moment_of_number(next_frame_)) : 0;
     if (frames_left && frame_needs < next_step_ && density_is_due(frame_needs)) {
         report_frame(sink);
     } else if (next_step_ <= range_.last_step && density_is_due(next_step_)) {
@@ -256,7 +242,7 @@ std::shared_ptr<const GroundCoverMap> Pipeline::ground_at(const Moment& moment) 
 }
 
 void Pipeline::report_frame(PipelineSink& sink) {
-    const Moment moment = moment_of_frame(next_frame_);
+    const Moment moment = moment_of_number(next_frame_);
     FrameResult result;
     result.number = next_frame_;
     result.time_s = frame_time_s(scene_.frames, next_frame_ - 1);

@@ -112,16 +112,6 @@ inline constexpr int kLastFrame = std::numeric_limits<int>::max();
 PipelineRange full_range(const Scene& scene);
 PipelineRange range_of_frames(const Scene& scene, int first, int last);
 
-// A moment in steps: `step` <= moment < step + 1, `fraction` the rest. A quotient within four units in the
-// last place of a whole number is that number: products and quotients of decimal fractions (0.3 s by steps of
-// 0.1 s) seldom meet it exactly, and the seven roundings up to here (three factors and the step that are no
-// binary fractions, product, quotient and sum of frame_time_s(), and this quotient) are half a unit each.
-struct Moment {
-    std::uint64_t step = 0;
-    double fraction = 0;
-};
-Moment moment_of(double time_s, double time_step_s);
-
 class Pipeline {
   public:
     // At step 0: from the scene's own initial state, or from `initial`. Throws as Automaton.
@@ -185,7 +175,7 @@ class Pipeline {
     void report_frame(PipelineSink& sink);
     LayerFrame layer_frame(std::size_t layer, const Moment& moment);
     std::shared_ptr<const GroundCoverMap> ground_at(const Moment& moment) const;
-    Moment moment_of_frame(int number) const;
+    Moment moment_of_number(int number) const;
     std::uint64_t lowest_needed() const;
     void restore_layers(const Checkpoint& checkpoint);
     void restore_history(const Checkpoint& checkpoint);

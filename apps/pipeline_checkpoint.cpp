@@ -16,7 +16,7 @@
 namespace nephos {
 namespace {
 
-constexpr std::uint32_t kHistoryVersion = 2;
+constexpr std::uint32_t kHistoryVersion = 3;
 
 // What decides whether a saved history fits: the range, and what the history holds of each state.
 void put_settings(ByteWriter& writer, const Scene& scene, const PipelineRange& range) {
@@ -41,7 +41,7 @@ std::array<const BitPlane*, 3> saved_planes(const Lattice& planes) {
 void put_clouds(ByteWriter& writer, const std::vector<SkyCloud>& clouds) {
     writer.put(std::uint64_t(clouds.size()));
     for (const SkyCloud& c : clouds) {
-        writer.put(std::array{c.serial, c.shape, c.sky, std::uint32_t(c.dissolving)});
+        writer.put(std::array{c.serial, c.shape, c.sky, std::uint32_t(c.dissolving), c.slot});
         writer.put(std::array{c.place.x, c.place.y});
         writer.put(std::array{c.base_m, c.phase});
     }
@@ -50,7 +50,7 @@ void put_clouds(ByteWriter& writer, const std::vector<SkyCloud>& clouds) {
 std::vector<SkyCloud> get_clouds(ByteReader& reader, const SkySimulation* sky) {
     std::vector<SkyCloud> clouds;
     for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
-        const auto numbers = reader.get<std::array<std::uint32_t, 4>>();
+        const auto numbers = reader.get<std::array<std::uint32_t, 5>>();
         const auto place = reader.get<std::array<std::int64_t, 2>>();
         const auto values = reader.get<std::array<double, 2>>();
         if (sky == nullptr || numbers[1] >= sky->shapes().size() ||
@@ -63,7 +63,8 @@ std::vector<SkyCloud> get_clouds(ByteReader& reader, const SkySimulation* sky) {
                           {place[0], place[1]},
                           values[0],
                           values[1],
-                          numbers[3] != 0});
+                          numbers[3] != 0,
+                          numbers[4]});
     }
     return clouds;
 }
@@ -154,6 +155,9 @@ Checkpoint Pipeline::save() {
 
 // The layers' states one after the other, each with its length before it.
 void Pipeline::restore_layers(const Checkpoint& checkpoint) {
+    if (ByteReader(checkpoint.history).get<std::uint32_t>() != kHistoryVersion) {
+        throw Error(ErrorCode::io, "the checkpoint was written by another version of nephos");
+    }
     if (scene_.layers.empty()) {
         layers_.front().restore(checkpoint.automaton);
         return;
@@ -182,9 +186,7 @@ void Pipeline::restore_ground(ByteReader& reader) {
 
 void Pipeline::restore_history(const Checkpoint& checkpoint) {
     ByteReader reader(checkpoint.history);
-    if (reader.get<std::uint32_t>() != kHistoryVersion) {
-        throw Error(ErrorCode::io, "the checkpoint was written by another version of nephos");
-    }
+    reader.skip(sizeof kHistoryVersion);  // read by restore_layers()
     ByteWriter expected;
     put_settings(expected, scene_, range_);
     const std::vector<std::byte> settings = expected.take();

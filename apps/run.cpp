@@ -34,7 +34,7 @@ struct RunArguments {
 
 Scene scene_of(const RunArguments& a) {
     Scene scene = load_scene(a.scene);
-    if (!a.needs) note_unused_models(scene);
+    if (!a.needs && !a.work.quiet) note_unused_models(scene);
     if (a.video) scene.frames.video = true;
     return scene;
 }

@@ -78,8 +78,8 @@ class Recorder : public PipelineSink {
         const auto record_frames_of = [&](std::uint64_t step, std::string_view, const StateHash& hash) {
             state_.state_hash = hash.hex();
             for (; number < pipeline.next_frame(); ++number) {
+                if (moment_of_frame(settings_.scene, number - 1).step != step) return;
                 const double time_s = frame_time_s(settings_.scene.frames, number - 1);
-                if (moment_of(time_s, settings_.scene.automaton.time_step_s).step != step) return;
                 state_.frames.push_back({number, time_s, step, hash});
             }
         };

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
+#include <unordered_map>
 #include <utility>
 
 #include "apps/debug_view.h"
@@ -12,6 +12,7 @@
 #include "automaton/vector_math.h"
 #include "render/camera.h"
 #include "render/wet_ground.h"
+#include "seeds/light_schedule.h"
 
 namespace nephos {
 namespace {
@@ -69,17 +70,22 @@ const SkyBillboards::Strewn& SkyBillboards::strewn(const SkySimulation& sky, con
     return *result;
 }
 
-void SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
-                                 const RenderOptions& options) {
+std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                                        const RenderOptions& options, const std::optional<FilmFrame>& film) {
+    const LightSchedule schedule(sky.options(), film ? options.light.cfa_clouds_per_frame : 0);
+    const Light present = light_of(options.sun);
+    std::unordered_map<int, Light> earlier;  // by frame
+    const auto light_for = [&](const SkyCloud& cloud) -> const Light& {
+        if (schedule.period() == 1) return present;
+        const int frame = schedule.frame_of_light(cloud.slot, film->index);
+        const auto [found, added] = earlier.try_emplace(frame);
+        if (added) found->second = light_of(sun_at(film->sun, frame_time_s(film->frames, frame)));
+        return found->second;
+    };
     std::vector<CloudToLight> lit;
-    std::size_t unlit = 0;
-    for (const SkyCloud& cloud : clouds) {
-        lit.push_back({cloud.serial, &sky.shape(cloud), sky.position_m(cloud)});
-        if (sun_.absorbed(cloud.serial).empty()) ++unlit;
-    }
-    const int bound = options.light.cfa_clouds_per_frame;
-    sun_.update(lit, light_of(options.sun),
-                bound == 0 ? std::numeric_limits<std::size_t>::max() : unlit + std::size_t(bound));
+    for (const SkyCloud& cloud : clouds)
+        lit.push_back({cloud.serial, &sky.shape(cloud), sky.position_m(cloud), light_for(cloud)});
+    return sun_.update(lit);
 }
 
 void SkyBillboards::light_by_flash(const SkySimulation& sky, const Flash& flash,
@@ -90,9 +96,9 @@ void SkyBillboards::light_by_flash(const SkySimulation& sky, const Flash& flash,
         const double nearest = std::max(
             length(sphere.centre_m - flash.position_m) - sphere.radius_m - strewn(sky, *cloud).reach_m, 1.0);
         if (flash.intensity * 1e6 / (nearest * nearest) < kLeastFlash) continue;
-        lit.push_back({cloud->serial, &sky.shape(*cloud), sky.position_m(*cloud)});
+        lit.push_back({cloud->serial, &sky.shape(*cloud), sky.position_m(*cloud), light_of(flash)});
     }
-    flash_.update(lit, light_of(flash));
+    flash_.update(lit);
 }
 
 void SkyBillboards::list(const SkySimulation& sky, const SkyCloud& cloud, bool flash, DrawnClouds& out) {
@@ -122,10 +128,11 @@ void SkyBillboards::list(const SkySimulation& sky, const SkyCloud& cloud, bool f
     }
 }
 
-void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
-                           const RenderOptions& options, const std::optional<Flash>& flash, DrawnClouds& out,
-                           bool cull, const std::optional<Camera>& mirrored) {
-    light_by_sun(sky, clouds, options);
+std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                                  const RenderOptions& options, const std::optional<Flash>& flash,
+                                  DrawnClouds& out, bool cull, const std::optional<Camera>& mirrored,
+                                  const std::optional<FilmFrame>& film) {
+    const std::size_t computed = light_by_sun(sky, clouds, options, film);
     const Frustum frustum = frustum_of(options.camera);
     const Frustum below = frustum_of(mirrored.value_or(options.camera));
     std::vector<const SkyCloud*> seen;
@@ -142,19 +149,22 @@ void SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> c
                    "the billboards of " + std::to_string(seen.size()) + " clouds");
     out.billboards.reserve(billboards);
     for (const SkyCloud* cloud : seen) list(sky, *cloud, flash.has_value(), out);
+    return computed;
 }
 
 Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                          const RenderOptions& moving, double time_s, bool depth,
-                         const std::optional<GroundCoverView>& ground_cover, const Weather& weather) {
-    return finish(renderer, begin(renderer, voxels, layers, moving, time_s, depth, ground_cover, weather));
+                         const std::optional<GroundCoverView>& ground_cover, const Weather& weather,
+                         const std::optional<FilmFrame>& film) {
+    return finish(renderer,
+                  begin(renderer, voxels, layers, moving, time_s, depth, ground_cover, weather, film));
 }
 
 PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& voxels,
                                     std::span<const SkyLayer> layers, const RenderOptions& moving,
                                     double time_s, bool depth,
                                     const std::optional<GroundCoverView>& ground_cover,
-                                    const Weather& weather) {
+                                    const Weather& weather, const std::optional<FilmFrame>& film) {
     check(moving);
     RenderOptions options = moving;
     options.camera = camera_at(moving.camera, time_s);
@@ -170,7 +180,8 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     }
     for (std::size_t i = 0; i < layers.size(); ++i) {
         const SkyLayer& layer = layers[i];
-        if (layer.direct) layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn, true, mirrored);
+        if (layer.direct)
+            layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn, true, mirrored, film);
     }
     std::vector<std::vector<WorldLine>> lines;
     for (const SkyLayer& layer : layers)

@@ -18,6 +18,7 @@
 #include "render/precipitation.h"
 #include "render/renderer.h"
 #include "render/splats.h"
+#include "scenes/scene.h"
 #include "seeds/billboards.h"
 #include "seeds/ground_cover.h"
 #include "seeds/light_absorption.h"
@@ -31,16 +32,26 @@ struct DrawnClouds {
     std::vector<CloudBillboard> billboards;
 };
 
+// A frame of a film. With options.light.cfa_clouds_per_frame, clouds keep the sun of earlier frames in turn
+// (seeds/light_schedule.h), and these are the frames.
+struct FilmFrame {
+    int index = 0;  // from 0
+    FrameOptions frames;
+    Sun sun;  // before sun_at()
+};
+
 class SkyBillboards {
   public:
     // Lists what the camera can see of `clouds`, which have shapes of `sky`. Light first: the sun's
-    // absorption of all clouds of the layer, of which at most options.light.cfa_clouds_per_frame are computed
-    // anew (0: all; clouds never lit before always are), and the lightning's of those that it reaches. So
-    // with a bound a picture depends on those drawn before it. `cull` false lists also what the camera cannot
-    // see: the picture is the same. `mirrored`: another camera whose clouds are listed as well.
-    void append(const SkySimulation& sky, std::span<const SkyCloud> clouds, const RenderOptions& options,
-                const std::optional<Flash>& flash, DrawnClouds& out, bool cull = true,
-                const std::optional<Camera>& mirrored = {});
+    // absorption of all clouds of the layer, with options.sun or, in a film with a bound on the clouds that
+    // are computed in a frame, the sun of the frame whose turn it was; and the lightning's of those that it
+    // reaches. What is listed never depends on earlier calls. `cull` false lists also what the camera cannot
+    // see: the picture is the same. `mirrored`: another camera whose clouds are listed as well. Returns of
+    // how many clouds the sun's absorption was computed anew.
+    std::size_t append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                       const RenderOptions& options, const std::optional<Flash>& flash, DrawnClouds& out,
+                       bool cull = true, const std::optional<Camera>& mirrored = {},
+                       const std::optional<FilmFrame>& film = {});
 
     // Absorbed sunlight of a cloud's boxes as it was used last; empty before the first append().
     std::span<const double> sun_absorbed(const SkyCloud& cloud) const { return sun_.absorbed(cloud.serial); }
@@ -53,8 +64,8 @@ class SkyBillboards {
         double low_m = 0, high_m = 1;  // of all billboards, model space
     };
     const Strewn& strewn(const SkySimulation& sky, const SkyCloud& cloud);
-    void light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
-                      const RenderOptions& options);
+    std::size_t light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                             const RenderOptions& options, const std::optional<FilmFrame>& film);
     void light_by_flash(const SkySimulation& sky, const Flash& flash,
                         const std::vector<const SkyCloud*>& seen);
     void list(const SkySimulation& sky, const SkyCloud& cloud, bool flash, DrawnClouds& out);
@@ -86,17 +97,20 @@ class SkyPainter {
     // Voxel clouds, the billboards of layers, the lightning of options.lightning that burns at `time_s`, what
     // lies on the ground, and the debug view over it, as the camera is at that time; over all of it the rain
     // of `weather`, where options.precipitation is enabled. Every call has the same layers in the same order.
+    // A picture depends on these arguments alone; one that is no frame of a `film` has all its clouds in the
+    // light of its own time.
     // Throws as Renderer::draw_splats().
     Picture draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                  const RenderOptions& options, double time_s, bool depth = true,
-                 const std::optional<GroundCoverView>& ground_cover = {}, const Weather& weather = {});
+                 const std::optional<GroundCoverView>& ground_cover = {}, const Weather& weather = {},
+                 const std::optional<FilmFrame>& film = {});
 
     // The same in two steps, as Renderer::begin() and finish(): voxels and ground cover must stay as they are
     // until the second. Pictures are finished in the order in which they were begun.
     PendingSkyPicture begin(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                             const RenderOptions& options, double time_s, bool depth = true,
                             const std::optional<GroundCoverView>& ground_cover = {},
-                            const Weather& weather = {});
+                            const Weather& weather = {}, const std::optional<FilmFrame>& film = {});
     Picture finish(Renderer& renderer, PendingSkyPicture&& pending);
 
   private:

@@ -82,9 +82,9 @@ struct CloudLight {
     // pass (the area below 1 - x / distance is that below exp(-extinction x)). Clouds drawn as billboards
     // have that of their model.
     double light_distance_m = 100.0;
-    // Clouds drawn as billboards whose absorption is computed anew in one frame because the light moved (T:
-    // 1);
-    // >= 0, 0: all of them. Clouds that are new are always computed.
+    // Clouds of a layer drawn as billboards whose absorption is computed anew in one frame of a film because
+    // the sun moved (T: 1), >= 0; 0: all of them. Each keeps the sun of the frame whose turn it was, and a
+    // frame's number decides whose turn it is (seeds/light_schedule.h); clouds that are new come on top.
     int cfa_clouds_per_frame = 0;
     bool operator==(const CloudLight&) const = default;
 };

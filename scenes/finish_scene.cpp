@@ -93,7 +93,7 @@ void check_frames(const SectionReader& reader, const Scene& scene) {
     const std::string simulated =
         number_text(end_s) + " s that `time.steps` = " + std::to_string(scene.steps) +
         " and `time.step_s` = " + number_text(scene.automaton.time_step_s) + " simulate";
-    if (scene.frames.start_s > end_s) {
+    if (steps_up_to(moment_of_frame(scene, 0)) > scene.steps) {
         frames.report(
             "start_s",
             "`frames.start_s` is " + number_text(scene.frames.start_s) + " s, after the " + simulated,
@@ -109,13 +109,13 @@ void check_frames(const SectionReader& reader, const Scene& scene) {
                   "expected a larger `frames.time_scale`, fewer `time.steps`, or a `frames.count`");
         return;
     }
-    const double last_s = frame_time_s(scene.frames, scene.frames.count - 1);
-    if (last_s <= end_s) return;
+    const int last = scene.frames.count - 1;
+    if (steps_up_to(moment_of_frame(scene, last)) <= scene.steps) return;
     Scene all = scene;
     all.frames.count = 0;
     frames.report("count",
                   "the last of the " + std::to_string(scene.frames.count) + " frames shows " +
-                      number_text(last_s) + " s, after the " + simulated,
+                      number_text(frame_time_s(scene.frames, last)) + " s, after the " + simulated,
                   "expected `frames.count` up to " + std::to_string(frame_count(all)) + ", or more steps");
 }
 

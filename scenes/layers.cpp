@@ -136,13 +136,12 @@ SkiesAtTime skies_at(const Scene& scene, double time_s) {
                     "no sky at " + number_text(time_s) + " s, expected a time of 0 s or later");
     }
     const double step_s = scene.automaton.time_step_s;
-    // A product of decimal fractions seldom meets a step exactly.
-    const double steps = std::floor(time_s / step_s * (1 + 1e-12) + 1e-9);
-    SkiesAtTime result{{}, std::max(0.0, time_s - steps * step_s)};
+    const Moment moment = moment_of(time_s, step_s);
+    SkiesAtTime result{{}, moment.fraction * step_s};
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         if (scene.layers[n].is_veil) continue;
         SkySimulation& sky = result.skies.emplace_back(sky_options(scene, n));
-        while (double(sky.steps()) < steps) sky.step();
+        while (sky.steps() < moment.step) sky.step();
     }
     return result;
 }

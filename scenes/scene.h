@@ -55,11 +55,36 @@ struct Scene {
 // Simulated time from the first to the last step, in seconds.
 double simulated_time_s(const Scene& scene);
 
-// Simulated time of frame `index`, in seconds; index counts from 0.
+// Simulated time of frame `index`, in seconds; index counts from 0. Correct to 2 units in the last place:
+// where a frame lies between the steps, and whether it lies beyond the last, is asked of moment_of_frame()
+// alone.
 double frame_time_s(const FrameOptions& frames, int index);
 
-// Number of frames of the scene: frames.count, or with 0 as many as lie within the simulated time (both ends
-// included), at most kMaxFrames.
+// A moment in steps: `step` <= moment < step + 1, `fraction` the rest. A quotient within four units in the
+// last place (2^-52 of the number) of a whole number is that number. So a frame whose decimal inputs put it
+// exactly on a step is on it: the seven roundings up to the quotient (start, time_scale, per_second and step
+// as doubles, of which a frame's time takes three and the quotient one; product, quotient and sum of
+// frame_time_s(); the quotient by the step; all numbers are >= 0, so errors do not grow in the sum) are at
+// most half a unit each, 3.5 in all. And a frame that they put between steps stays there if their digits are
+// few: with the moment as a fraction p / q of whole numbers, q times per_second and step_s in units of their
+// last decimal, it is at least 1 / q away from any step, more than the 7.5 units for p < 2^49. Only beyond
+// that, about 14 digits, is it moved onto a step, by 2 parts in 10^15 at most.
+struct Moment {
+    std::uint64_t step = 0;
+    double fraction = 0;
+};
+
+// Both times in seconds, time_s >= 0, time_step_s > 0. After 2^63 steps the moment is step 2^63.
+Moment moment_of(double time_s, double time_step_s);
+
+// That of frame `index`, which counts from 0: the one place that decides between which steps a frame lies.
+Moment moment_of_frame(const Scene& scene, int index);
+
+// Steps that a moment needs: the first that is not before it.
+std::uint64_t steps_up_to(const Moment& moment);
+
+// Number of frames of the scene: frames.count, or with 0 as many as need no more than its steps (so that one
+// on the last step counts), at most kMaxFrames.
 int frame_count(const Scene& scene);
 
 inline constexpr int kMaxFrames = 1'000'000;

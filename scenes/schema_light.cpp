@@ -87,9 +87,9 @@ const Section& light_section() {
              "T, CFA"),
          render_key<&RenderOptions::light, &CloudLight::cfa_clouds_per_frame>(
              "cfa_clouds_per_frame", "", between(0, 1e6),
-             "Clouds drawn as billboards whose absorption is computed anew in a frame because the sun moved; "
-             "0: "
-             "all.",
+             "Clouds of a layer drawn as billboards whose absorption follows a moving sun in a frame, in "
+             "turn "
+             "by the frame's number; 0: all.",
              "T, CFA")},
         nullptr};
     return section;

@@ -112,7 +112,8 @@ const Section& frames_section() {
              "Simulated time of the first frame: skips the growing of the clouds."),
          key<&Scene::frames, &FrameOptions::count>(
              "count", "", between(0, kMaxFrames),
-             "Number of frames; 0: as many as the simulated time holds."),
+             "Number of frames; 0: as many as the simulated time holds (for none at all: `nephos run "
+             "--statistics-only`)."),
          key<&Scene::frames, &FrameOptions::png>("png", "", kAny,
                                                  "Write a tone-mapped picture of each frame."),
          key<&Scene::frames, &FrameOptions::exr>("exr", "", kAny,

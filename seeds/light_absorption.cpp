@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "seeds/checks.h"
 
@@ -109,34 +110,24 @@ std::vector<double> absorbed_light(const Cloud& cloud, const Vec3& position_m, c
     return result;
 }
 
-std::size_t LightAbsorption::update(std::span<const CloudToLight> clouds, const Light& light,
-                                    std::size_t max_clouds) {
-    check_light(light);
+std::size_t LightAbsorption::update(std::span<const CloudToLight> clouds) {
+    for (const CloudToLight& lit : clouds) check_light(lit.light);
     ++calls_;
-    struct Stale {
-        std::uint64_t computed;
-        std::size_t index;
-    };
-    std::vector<Stale> stale;
-    for (std::size_t i = 0; i < clouds.size(); ++i) {
-        Entry& entry = entries_[clouds[i].id];
+    std::size_t computed = 0;
+    for (const CloudToLight& lit : clouds) {
+        Entry& entry = entries_[lit.id];
         if (entry.listed == calls_) continue;  // named twice
+        const bool known = entry.listed != 0;
         entry.listed = calls_;
-        const bool moved = entry.computed == 0 || entry.seen != relative(light, clouds[i].position_m);
-        if (moved) stale.push_back({entry.computed, i});
+        const Light seen = relative(lit.light, lit.position_m);
+        if (known && entry.seen == seen) continue;
+        entry.absorbed.resize(lit.cloud->boxes.size());
+        absorb_light(*lit.cloud, lit.position_m, lit.light, entry.absorbed);
+        entry.seen = seen;
+        ++computed;
     }
     std::erase_if(entries_, [&](const auto& item) { return item.second.listed != calls_; });
-    std::ranges::stable_sort(stale, {}, &Stale::computed);
-    if (stale.size() > max_clouds) stale.resize(max_clouds);
-    for (const Stale& s : stale) {
-        const CloudToLight& lit = clouds[s.index];
-        Entry& entry = entries_[lit.id];
-        entry.absorbed.resize(lit.cloud->boxes.size());
-        absorb_light(*lit.cloud, lit.position_m, light, entry.absorbed);
-        entry.seen = relative(light, lit.position_m);
-        entry.computed = calls_;
-    }
-    return stale.size();
+    return computed;
 }
 
 std::span<const double> LightAbsorption::absorbed(std::uint64_t id) const {

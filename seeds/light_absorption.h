@@ -17,7 +17,6 @@
 // not depend on the width of the vectors.
 
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -48,27 +47,26 @@ struct CloudToLight {
     std::uint64_t id = 0;          // the same cloud has the same id in every call
     const Cloud* cloud = nullptr;  // not null; shape of an id never changes
     Vec3 position_m;
+    Light light;
 };
 
-// Keeps the absorption of many clouds up to date, a bounded number a call (T: one cloud a frame, and only
-// when the light moved). A moved light means: seen from the cloud; so a drifting cloud is recomputed for
-// lightning, but never for the sun. Not thread-safe.
+// Keeps the absorption of many clouds up to date, and computes it only where the light moved: seen from the
+// cloud; so a drifting cloud is recomputed for lightning, but never for the sun. What absorbed() returns is
+// that of the light last given, whatever was before; LightSchedule bounds how many lights move in a frame.
+// Not thread-safe.
 class LightAbsorption {
   public:
-    // Recomputes at most `max_clouds` of the clouds whose light moved: those never computed first, in the
-    // order given, then those computed longest ago. Forgets clouds that are not in the list. Returns how many
-    // it did.
-    std::size_t update(std::span<const CloudToLight> clouds, const Light& light,
-                       std::size_t max_clouds = std::numeric_limits<std::size_t>::max());
+    // Computes new clouds and those whose light moved; of a cloud that is named twice, the first counts.
+    // Forgets clouds that are not in the list. Returns how many it computed.
+    std::size_t update(std::span<const CloudToLight> clouds);
 
-    // As computed last; empty for a cloud that was never computed.
+    // As computed last; empty for a cloud that was not in the last list.
     std::span<const double> absorbed(std::uint64_t id) const;
 
   private:
     struct Entry {
-        Light seen;                  // as it was, relative to the cloud
-        std::uint64_t computed = 0;  // call in which it was computed, from 1
-        std::uint64_t listed = 0;    // last call that named it
+        Light seen;                // as it was, relative to the cloud
+        std::uint64_t listed = 0;  // last call that named it, from 1
         std::vector<double> absorbed;
     };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <unordered_set>
 
 #include "automaton/bytes.h"
 #include "seeds/checks.h"
@@ -41,6 +42,7 @@ SkySimulation::SkySimulation(const SkyOptions& options) : options_(options) {
         place_inside(cloud);
         clouds_.push_back(cloud);
     }
+    assign_slots(0);
 }
 
 void SkySimulation::make_shapes() {
@@ -163,6 +165,7 @@ void SkySimulation::adjust_number(std::size_t left) {
     const std::size_t target = std::size_t(clouds_at(options_.skies, state()));
     std::size_t present = count();
     if (present > target) return dissolve(present - target);
+    const std::size_t first_new = clouds_.size();
     for (; present < target; ++present) {
         const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::cloud, born_);
         SkyCloud cloud = new_cloud(draw_sky(words[0]));
@@ -173,6 +176,21 @@ void SkySimulation::adjust_number(std::size_t left) {
             place_inside(cloud);
         }
         clouds_.push_back(cloud);
+    }
+    assign_slots(first_new);
+}
+
+// To the clouds from index `first_new` on, in their order.
+void SkySimulation::assign_slots(std::size_t first_new) {
+    if (first_new == clouds_.size()) return;
+    std::vector<bool> taken(clouds_.size());  // a lower slot is always free
+    for (std::size_t i = 0; i < first_new; ++i) {
+        if (clouds_[i].slot < taken.size()) taken[clouds_[i].slot] = true;
+    }
+    std::uint32_t free = 0;
+    for (std::size_t i = first_new; i < clouds_.size(); ++i, ++free) {
+        while (taken[free]) ++free;
+        clouds_[i].slot = free;
     }
 }
 
@@ -251,7 +269,16 @@ bool SkySimulation::place_upwind(SkyCloud& cloud) const {
     return true;
 }
 
+StateHash SkySimulation::hash() const { return hash_of_bytes(bytes_without_slots()); }
+
 std::vector<std::byte> SkySimulation::save() const {
+    ByteWriter out;
+    out.put_bytes(bytes_without_slots());
+    for (const SkyCloud& c : clouds_) out.put(c.slot);
+    return out.take();
+}
+
+std::vector<std::byte> SkySimulation::bytes_without_slots() const {
     ByteWriter out;
     const std::uint64_t drawn = std::uint64_t{dissolved_} << 32 | born_;
     out.put(std::array<std::uint64_t, 7>{kStateMark, shapes_.size(), steps_, drawn, std::uint64_t(carried_.x),
@@ -296,6 +323,11 @@ void SkySimulation::restore(std::span<const std::byte> bytes) {
         }
         c.dissolving = dissolving != 0;
         clouds.push_back(c);
+    }
+    std::unordered_set<std::uint32_t> slots;
+    for (SkyCloud& c : clouds) {
+        c.slot = in.get<std::uint32_t>();
+        if (c.slot >= born || !slots.insert(c.slot).second) bad("a cloud of it is impossible");
     }
     if (!in.rest().empty()) bad("more bytes than expected");
     clouds_ = std::move(clouds);

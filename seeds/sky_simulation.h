@@ -26,6 +26,7 @@
 #include <span>
 #include <vector>
 
+#include "automaton/checkpoint.h"
 #include "automaton/wind.h"
 #include "seeds/cloud.h"
 #include "seeds/sky.h"
@@ -48,6 +49,9 @@ struct SkyCloud {
     double base_m = 0;         // world z of the model's origin
     double phase = 1;          // 0 nothing .. 1 the whole cloud (cloud.h, phase_weight)
     bool dissolving = false;   // no longer one of the sky's number
+    // The lowest number that no other cloud had at its birth: spreads recurring work over frames
+    // (light_schedule.h), and decides nothing else.
+    std::uint32_t slot = 0;
     bool operator==(const SkyCloud&) const = default;
 };
 
@@ -82,6 +86,9 @@ class SkySimulation {
     // around).
     const Displacement& carried() const { return carried_; }
 
+    // What the clouds to come depend on: the complete state but the slots.
+    StateHash hash() const;
+
     // The complete state; `restore` throws Error(io) on bytes that no simulation with these options wrote,
     // and then leaves the simulation as it was.
     std::vector<std::byte> save() const;
@@ -94,6 +101,8 @@ class SkySimulation {
     void adjust_number(std::size_t left);
     void dissolve(std::size_t number);
     SkyCloud new_cloud(std::size_t sky);
+    void assign_slots(std::size_t first_new);
+    std::vector<std::byte> bytes_without_slots() const;
     std::size_t draw_sky(std::uint32_t word) const;
     void place_inside(SkyCloud& cloud) const;
     bool place_upwind(SkyCloud& cloud) const;

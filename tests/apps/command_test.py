@@ -230,6 +230,14 @@ step_s = -1
         self.assertIn("no [[layer]]", self.call("validate", lonely).stderr)
         self.assertEqual(self.call("validate", SOURCE / "scenes/genera/Cb.toml").stderr, "")
 
+    def test_quiet_runs_say_nothing(self):
+        lonely = self.write("lonely.toml", f'name = "lonely"\nmodels = ["{SOURCE}/scenes/genera/Cb.toml"]\n')
+        for scene in self.scene, lonely:
+            command = ["run", scene, "--no-render", "--set", "time.steps=2", "--set", "lattice.cells=[16,16,8]"]
+            self.assertNotEqual(self.call(*command, "--overwrite", "--out", "loud").stdout, "")
+            quiet = self.call(*command, "--overwrite", "--out", "quiet", "--quiet")
+            self.assertEqual((quiet.stdout, quiet.stderr), ("", ""))
+
     def test_a_lattice_beyond_memory_is_refused(self):
         result = self.call("run", self.scene, "--no-render", "--set", "lattice.cells=[65536,65536,65536]", status=2)
         self.assertIn("TiB", result.stderr)

@@ -121,43 +121,51 @@ TEST(SkyBillboards, CullingChangesNoBitOfAPicture) {
     EXPECT_TRUE(renderer.validation_messages().empty());
 }
 
-// With a bound, a moved sun changes that many clouds a frame, and all of them in the end; new clouds are lit
-// at once.
+// In a film with a bound, a moving sun changes at most that many clouds a frame, and each cloud in its turn;
+// a frame that is listed alone has the bits that it has after all those before it.
 TEST(SkyBillboards, ABoundedNumberOfCloudsIsLitAnewInAFrame) {
     const SkySimulation sky(sky_of(10));
     RenderOptions options = from_the_edge();
     options.light.cfa_clouds_per_frame = 4;
-    SkyBillboards billboards;
-    const auto absorption = [&] {
+    FilmFrame film{0, {.per_second = 1, .time_scale = 120}, options.sun};
+    film.sun.date = "2026-06-21";
+    film.sun.time = "16:00";
+    film.sun.latitude_deg = 50;
+    film.sun.moves = true;
+    const auto absorption = [&](SkyBillboards& billboards, int frame, std::size_t* computed = nullptr) {
+        film.index = frame;
+        options.sun = sun_at(film.sun, frame_time_s(film.frames, frame));
+        DrawnClouds drawn;
+        const std::size_t anew = billboards.append(sky, sky.clouds(), options, {}, drawn, false, {}, film);
+        if (computed != nullptr) *computed = anew;
         std::vector<float> result;
-        for (const CloudBillboard& billboard : listed(billboards, sky, options, {}, false).billboards)
-            result.push_back(billboard.sun_absorbed);
+        for (const CloudBillboard& billboard : drawn.billboards) result.push_back(billboard.sun_absorbed);
         return result;
     };
-    const auto changed_clouds = [&](const std::vector<double>& before) {
-        int changed = 0;
-        for (std::size_t c = 0; c < sky.clouds().size(); ++c)
-            changed += billboards.sun_absorbed(sky.clouds()[c])[0] != before[c];
-        return changed;
-    };
-    absorption();
-    std::vector<double> first;
-    for (const SkyCloud& cloud : sky.clouds()) {
-        ASSERT_FALSE(billboards.sun_absorbed(cloud).empty());
-        first.push_back(billboards.sun_absorbed(cloud)[0]);
+    SkyBillboards billboards;
+    std::size_t computed = 0, turns = 0;
+    std::vector<float> before;
+    for (int frame = 0; frame < 12; ++frame) {
+        const std::vector<float> in_order = absorption(billboards, frame, &computed);
+        if (frame == 0) {
+            EXPECT_EQ(computed, 10u);
+        } else {
+            EXPECT_LE(computed, 4u);
+            EXPECT_EQ(computed > 0, in_order != before) << frame;
+            turns += computed;
+        }
+        SkyBillboards fresh;
+        EXPECT_EQ(absorption(fresh, frame), in_order) << "frame " << frame << " alone";
+        EXPECT_EQ(absorption(billboards, frame, &computed), in_order);
+        EXPECT_EQ(computed, 0u) << "the same frame again";
+        before = in_order;
     }
-    options.sun = {-5, 300, {1, 0.6, 0.4}};  // below the horizon
-    for (const int expected : {4, 8, 10, 10}) {
-        absorption();
-        EXPECT_EQ(changed_clouds(first), expected);
-    }
-    SkyBillboards fresh;
+    EXPECT_GE(turns, 20u);
+    // Without a bound all clouds have the present sun.
     options.light.cfa_clouds_per_frame = 0;
-    const std::vector<float> settled = absorption();
-    std::vector<float> direct;
-    for (const CloudBillboard& billboard : listed(fresh, sky, options, {}, false).billboards)
-        direct.push_back(billboard.sun_absorbed);
-    EXPECT_EQ(settled, direct);
+    SkyBillboards fresh;
+    EXPECT_NE(absorption(fresh, 11, &computed), before);
+    EXPECT_EQ(absorption(billboards, 11), absorption(fresh, 11));
 }
 
 // The same sky gives the same picture, whatever was drawn before; lightning at its time only.

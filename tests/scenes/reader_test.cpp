@@ -3,8 +3,12 @@
 
 #include "scenes/reader.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -257,10 +261,70 @@ TEST(Frames, LieWhereTheirNumberSays) {
         scene.frames = {.per_second = 30.0 / n, .time_scale = 7.0 / 3, .start_s = n * 0.1};
         const int count = frame_count(scene);
         if (count > 0) {
-            EXPECT_LE(frame_time_s(scene.frames, count - 1), 300.0);
+            EXPECT_LE(steps_up_to(moment_of_frame(scene, count - 1)), scene.steps);
         }
-        EXPECT_GT(frame_time_s(scene.frames, count), 300.0);
+        EXPECT_GT(steps_up_to(moment_of_frame(scene, count)), scene.steps);
     }
+}
+
+// 147 / 30 s and 7 * 0.7 s are both 4.9 s, although the quotient and the product of the doubles differ.
+TEST(Frames, TheLastIsNotLostToRounding) {
+    const Scene scene =
+        scene_of("[time]\nstep_s = 0.7\nsteps = 7\n[frames]\nper_second = 30\ntime_scale = 1\n");
+    EXPECT_EQ(frame_count(scene), 148);
+    Scene counted =
+        scene_of("[time]\nstep_s = 0.7\nsteps = 7\n[frames]\nper_second = 30\ntime_scale = 1\ncount = 148\n");
+    EXPECT_EQ(frame_count(counted), 148);
+    const std::string errors = messages_of(
+        "[time]\nstep_s = 0.7\nsteps = 7\n[frames]\nper_second = 30\ntime_scale = 1\ncount = 149\n");
+    EXPECT_TRUE(contains(errors, "expected `frames.count` up to 148")) << errors;
+}
+
+// A start so late that its quotient by the step is no 64-bit integer is refused like any other.
+TEST(Frames, AStartBeyondAnyStepIsRefused) {
+    const std::string errors =
+        messages_of("[time]\nstep_s = 1e-9\nsteps = 7\n[frames]\nstart_s = 1e15\ncount = 1\n");
+    EXPECT_TRUE(contains(errors, "`frames.start_s` is 1e+15 s, after the")) << errors;
+}
+
+// Number, steps and fractions of the frames of random scenes, against quotients of integers: everything in
+// thousandths, frame n lies at (start * per_second + n * time_scale) / (per_second * step) steps.
+TEST(Frames, AreThoseOfExactRationalArithmetic) {
+    std::mt19937_64 random(20240717);
+    const auto thousandths = [&](std::int64_t most) {  // with 0 to 3 decimals
+        const std::int64_t unit = std::array<std::int64_t, 4>{1000, 100, 10, 1}[random() % 4];
+        return unit * std::int64_t(1 + random() % std::uint64_t(most * 1000 / unit));
+    };
+    int at_the_end = 0;
+    for (int n = 0; n < 20'000; ++n) {
+        const std::int64_t rate = thousandths(120), scale = thousandths(n % 2 == 0 ? 2 : 60),
+                           step = thousandths(n % 3 == 0 ? 1 : 20), start = n % 4 == 0 ? thousandths(50) : 0;
+        Scene scene;
+        scene.steps = 1 + random() % 40;
+        scene.automaton.time_step_s = double(step) / 1000;
+        scene.frames = {.per_second = double(rate) / 1000,
+                        .time_scale = double(scale) / 1000,
+                        .start_s = double(start) / 1000};
+        const std::string shown = "rate " + std::to_string(rate) + " scale " + std::to_string(scale) +
+                                  " step " + std::to_string(step) + " start " + std::to_string(start) +
+                                  " steps " + std::to_string(scene.steps);
+        const std::int64_t divisor = rate * step;
+        const auto dividend = [&](std::int64_t index) { return start * rate + 1000 * index * scale; };
+        const std::int64_t room = std::int64_t(scene.steps) * divisor - start * rate;
+        const std::int64_t count =
+            room < 0 ? 0 : std::min<std::int64_t>(room / (1000 * scale) + 1, kMaxFrames);
+        ASSERT_EQ(frame_count(scene), count) << shown;
+        at_the_end += count > 1 && room % (1000 * scale) == 0;
+        for (std::int64_t index : {std::int64_t(0), count / 3, count / 2, count - 2, count - 1, count}) {
+            if (index < 0) continue;
+            const Moment moment = moment_of_frame(scene, int(index));
+            ASSERT_EQ(std::int64_t(moment.step), dividend(index) / divisor) << shown << " frame " << index;
+            const double fraction = double(dividend(index) % divisor) / double(divisor);
+            ASSERT_NEAR(moment.fraction, fraction, 1e-12) << shown << " frame " << index;
+            ASSERT_EQ(moment.fraction == 0, fraction == 0) << shown << " frame " << index;
+        }
+    }
+    EXPECT_GT(at_the_end, 500) << "too few scenes whose last frame lies on the last step";
 }
 
 TEST(ClosestWord, FindsSlipsOnly) {
