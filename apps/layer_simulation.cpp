@@ -88,6 +88,10 @@ GridBox LayerSimulation::box() const {
     return {automaton_->options().extent, automaton_->options().placement};
 }
 
+Boundaries LayerSimulation::boundaries() const {
+    return automaton_ ? automaton_->options().boundaries : Boundaries{};
+}
+
 void LayerSimulation::step() {
     if (is_veil()) {
         ++steps_;

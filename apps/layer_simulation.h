@@ -48,6 +48,8 @@ class LayerSimulation {
     GridBox box() const;
     // Rain areas now: placed, attached, found.
     std::vector<RainArea> rain() const;
+    // What lies beyond the box of its density; a veil ends at its sides.
+    Boundaries boundaries() const;
     // Of the automaton's planes; without automaton of the sky's saved state; of a veil, XXH3-128 of what
     // decides its density: the layer as canonical scene text with its seed, and the step.
     StateHash hash() const;
