@@ -16,7 +16,8 @@ namespace nephos {
 // How the lattice starts when no state is given.
 enum class InitialState {
     empty,  // all bits 0
-    field,  // hum and act drawn with the field's probabilities at time 0, cld empty (D)
+    field,  // hum and act drawn with the field's probabilities at time 0, external ellipsoids included; cld
+            // empty (D)
 };
 
 struct AutomatonOptions {

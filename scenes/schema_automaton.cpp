@@ -261,8 +261,8 @@ const Section& lattice_section() {
          replaced(word<&Scene::automaton, &AutomatonOptions::initial>(
                       "initial", {"empty", "field"},
                       "How the box starts: without any vapour or cloud, or with vapour and activation drawn "
-                      "from the "
-                      "field.",
+                      "from the field at time 0; in a layer that field is its background and its clouds and "
+                      "rain.",
                       "D"),
                   "initial_state"),
          default_is(
