@@ -58,6 +58,12 @@ const char* const kRimEffect = "Probabilities at the rim, as `[field.background]
 const char* const kCarriedEffect =
     "Whether it moves with the wind at its centre's height; otherwise it stands still.";
 
+// The effect of a size of ellipsoids, with the limit that periodic axes set.
+std::string with_periodic_reach(const char* effect) {
+    return effect + (" Along a periodic axis of the lattice an ellipsoid reaches at most " +
+                     number_text(kMaxPeriodicReach) + " times the length of that axis from its centre.");
+}
+
 const Section& ellipsoid_section() {
     static const Section section{
         "An ellipsoid placed by hand",
@@ -68,7 +74,8 @@ const Section& ellipsoid_section() {
                                             "Centre at its birth: east, north, height.",
                                             "D, control of motion")),
          key<&Ellipsoid::semi_axes_m>("semi_axes_m", "m", above(0, kFarthest_m),
-                                      "Half of its length, width and height, before the turn by `yaw_deg`."),
+                                      with_periodic_reach("Half of its length, width and height, before the "
+                                                          "turn by `yaw_deg`.")),
          key<&Ellipsoid::yaw_deg>("yaw_deg", "deg", between(-360, 360),
                                   "Turn about the vertical, counter-clockwise seen from above."),
          table<&Ellipsoid::centre>("centre", probabilities_section(), kCentreEffect),
@@ -104,12 +111,13 @@ const Section& scatter_section() {
          default_is(key<&EllipsoidScatter::z_m>("z_m", "m", between(-kFarthest_m, kFarthest_m),
                                                 "Where centres are drawn, height."),
                     "the whole lattice"),
-         key<&EllipsoidScatter::semi_axis_x_m>("semi_axis_x_m", "m", above(0, kFarthest_m),
-                                               "Half of the length, before the turn by `yaw_deg`."),
+         key<&EllipsoidScatter::semi_axis_x_m>(
+             "semi_axis_x_m", "m", above(0, kFarthest_m),
+             with_periodic_reach("Half of the length, before the turn by `yaw_deg`.")),
          key<&EllipsoidScatter::semi_axis_y_m>("semi_axis_y_m", "m", above(0, kFarthest_m),
-                                               "Half of the width."),
+                                               with_periodic_reach("Half of the width.")),
          key<&EllipsoidScatter::semi_axis_z_m>("semi_axis_z_m", "m", above(0, kFarthest_m),
-                                               "Half of the height."),
+                                               with_periodic_reach("Half of the height.")),
          key<&EllipsoidScatter::yaw_deg>("yaw_deg", "deg", between(-360, 360),
                                          "Turn about the vertical, counter-clockwise seen from above."),
          table<&EllipsoidScatter::centre>("centre", probabilities_section(), kCentreEffect),
