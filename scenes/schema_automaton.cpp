@@ -281,7 +281,8 @@ const Section& lattice_section() {
              key<&Scene::initial_state_file>(
                  "initial_state", "", kAny,
                  "A VDB file whose bool grids `hum`, `act` and `cld` are the start, instead of `initial`; "
-                 "relative to the scene's folder."),
+                 "relative to the scene's folder. Its cells, their size and its place are those of the "
+                 "lattice."),
              "none")},
         nullptr};
     return section;
