@@ -75,9 +75,10 @@ void FrameOutput::write(const Drawn& drawn) const {
     done_(drawn.frame);
 }
 
-DensityGrid FrameOutput::refined(const DensityGrid& density) const {
+DensityGrid FrameOutput::refined(const DensityGrid& density, const Boundaries& boundaries) const {
     const DensityOptions& options = settings_.scene.density;
-    return options.refine > 1 ? resample(density, options.refine, options.metaball_radius_cells) : density;
+    if (options.refine == 1) return density;
+    return resample(density, options.refine, options.metaball_radius_cells, boundaries);
 }
 
 VdbMetadata FrameOutput::metadata_of(const FrameResult& frame, const StateHash& hash) const {
@@ -102,7 +103,7 @@ void FrameOutput::write_density(const FrameResult& frame) const {
         return;
     }
     const Scene& scene = settings_.scene;
-    const DensityGrid written = refined(frame.density);
+    const DensityGrid written = refined(frame.density, scene.automaton.boundaries);
     VdbContent content;
     content.density = &written;
     content.half = scene.density.half;
@@ -118,10 +119,12 @@ void FrameOutput::write_density(const FrameResult& frame) const {
 void FrameOutput::write_layers(const FrameResult& frame) const {
     const Scene& scene = settings_.scene;
     std::vector<DensityGrid> grids;
+    std::vector<Boundaries> boundaries;
     for (std::size_t n = 0; n < frame.layers.size(); ++n) {
         const LayerFrame& layer = frame.layers[n];
         if (layer.direct) continue;
-        grids.push_back(refined(layer.density));
+        grids.push_back(refined(layer.density, layer.boundaries));
+        boundaries.push_back(layer.boundaries);
         VdbContent content;
         content.density = &grids.back();
         content.half = scene.density.half;
@@ -133,7 +136,7 @@ void FrameOutput::write_layers(const FrameResult& frame) const {
         write_vdb(folder_.density(frame.number, layer.name), content, metadata_of(frame, layer.hash));
     }
     if (grids.empty()) return;
-    const DensityGrid whole = scene.density.refine > 1 ? combine(grids) : frame.density;
+    const DensityGrid whole = scene.density.refine > 1 ? combine(grids, boundaries) : frame.density;
     VdbContent content;
     content.density = &whole;
     content.half = scene.density.half;

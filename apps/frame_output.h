@@ -70,7 +70,7 @@ class FrameOutput {
     void write_density(const FrameResult& frame) const;
     void write_layers(const FrameResult& frame) const;
     void write_picture(const Drawn& drawn) const;
-    DensityGrid refined(const DensityGrid& density) const;
+    DensityGrid refined(const DensityGrid& density, const Boundaries& boundaries) const;
     VdbMetadata metadata_of(const FrameResult& frame, const StateHash& hash) const;
 
     const RunSettings& settings_;

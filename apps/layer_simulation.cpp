@@ -67,7 +67,7 @@ LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::opt
     if (initial) {
         automaton_.emplace(lattice, std::move(*initial));
     } else {
-        automaton_.emplace(lattice);
+        automaton_.emplace(lattice, field_of_clouds());
     }
     if (options_.rain.find) {
         finder_.emplace(options_.rain.finder, lattice.extent, lattice.placement, lattice.boundaries, number_);
@@ -88,16 +88,16 @@ GridBox LayerSimulation::box() const {
     return {automaton_->options().extent, automaton_->options().placement};
 }
 
+Boundaries LayerSimulation::boundaries() const {
+    return automaton_ ? automaton_->options().boundaries : Boundaries{};
+}
+
 void LayerSimulation::step() {
     if (is_veil()) {
         ++steps_;
         return;
     }
-    if (sky_ && automaton_) {
-        std::vector<ActiveEllipsoid> ellipsoids = ellipsoids_of(*sky_, options_.coupling);
-        append_columns(ellipsoids, rain(), options_.rain.column);
-        automaton_->set_external_ellipsoids(std::move(ellipsoids));
-    }
+    if (sky_ && automaton_) automaton_->set_external_ellipsoids(field_of_clouds());
     if (automaton_) automaton_->step();
     if (!sky_) return;
     const Displacement before = sky_->carried();
@@ -105,6 +105,13 @@ void LayerSimulation::step() {
     if (!finder_) return;
     const Displacement& after = sky_->carried();
     finder_->update(automaton_->cld(), time_step_s_, metres(after.x, before.x), metres(after.y, before.y));
+}
+
+std::vector<ActiveEllipsoid> LayerSimulation::field_of_clouds() const {
+    if (!sky_) return {};
+    std::vector<ActiveEllipsoid> ellipsoids = ellipsoids_of(*sky_, options_.coupling);
+    append_columns(ellipsoids, rain(), options_.rain.column);
+    return ellipsoids;
 }
 
 std::vector<RainArea> LayerSimulation::rain() const {

@@ -8,6 +8,8 @@
 //     3. the sky's clouds move, enter and leave
 //     4. rain is looked for in the automaton at n + 1
 //
+// A state at 0 that is drawn from the field is drawn with the ellipsoids and columns of 1.
+//
 // so that sky and automaton are carried by the same wind over the same way. A layer without automaton has a
 // sky alone; a scene without layers is one nameless layer with an automaton alone; a veil has none of these,
 // only the number of its steps.
@@ -46,6 +48,8 @@ class LayerSimulation {
     // Whether there is a density, and the box that it fills.
     bool has_density() const { return automaton_ || options_.is_veil; }
     GridBox box() const;
+    // What lies beyond the box of its density; a veil ends at its sides.
+    Boundaries boundaries() const;
     // Rain areas now: placed, attached, found.
     std::vector<RainArea> rain() const;
     // Of the automaton's planes; without automaton of the sky's saved state; of a veil, XXH3-128 of what
@@ -57,6 +61,8 @@ class LayerSimulation {
     void restore(std::span<const std::byte> bytes);
 
   private:
+    std::vector<ActiveEllipsoid> field_of_clouds() const;  // ellipsoids of boxes, then columns of rain, now
+
     LayerOptions options_;  // its defaults in a scene without layers
     std::uint32_t number_ = 0;
     double time_step_s_ = 10;

@@ -213,6 +213,7 @@ LayerFrame Pipeline::layer_frame(std::size_t layer, const Moment& moment) {
     LayerFrame frame;
     frame.name = layers_[layer].name();
     frame.density = density_at(layer, moment);
+    frame.boundaries = layers_[layer].boundaries();
     const PastLayer& state = past(moment.step).layers[layer];
     frame.hash = state.hash;
     frame.direct = !layers_[layer].has_density();
@@ -249,11 +250,14 @@ void Pipeline::report_frame(PipelineSink& sink) {
     result.step = moment.step;
     result.hash = past(moment.step).hash;
     std::vector<DensityGrid> densities;
+    std::vector<Boundaries> boundaries;
     for (std::size_t n = 0; n < layers_.size(); ++n) {
         result.layers.push_back(layer_frame(n, moment));
-        if (layers_[n].has_density()) densities.push_back(result.layers.back().density);
+        if (!layers_[n].has_density()) continue;
+        densities.push_back(result.layers.back().density);
+        boundaries.push_back(result.layers.back().boundaries);
     }
-    if (!densities.empty()) result.density = combine(densities);
+    if (!densities.empty()) result.density = combine(densities, boundaries);
     result.ground = ground_at(moment);
     if (scene_.layers.empty()) {
         result.hum = result.layers.front().hum;

@@ -62,7 +62,8 @@ struct StepResult {
 // One layer in a frame.
 struct LayerFrame {
     std::string name;
-    DensityGrid density;  // one voxel a cell; without automaton there are no voxels
+    DensityGrid density;    // one voxel a cell; without automaton there are no voxels
+    Boundaries boundaries;  // of the density's box
     StateHash hash;
     std::optional<BitPlaneView> hum, act, cld;  // as in FrameResult
     std::shared_ptr<const Lattice> planes;      // what they look at

@@ -27,8 +27,11 @@ void note_unused_models(const Scene& scene) {
 }
 
 std::optional<Lattice> initial_state(const Scene& scene, const std::string& from) {
-    if (!from.empty()) return read_state(from, scene.automaton.extent);
-    if (scene.initial_state_file) return read_state(*scene.initial_state_file, scene.automaton.extent);
+    const AutomatonOptions& lattice = scene.automaton;
+    if (!from.empty()) return read_state(from, lattice.extent, lattice.placement);
+    if (scene.initial_state_file) {
+        return read_state(*scene.initial_state_file, lattice.extent, lattice.placement);
+    }
     return {};
 }
 

@@ -161,9 +161,10 @@ void Automaton::Impl::advect() {
         });
 }
 
-Automaton::Automaton(const AutomatonOptions& options) {
+Automaton::Automaton(const AutomatonOptions& options, std::vector<ActiveEllipsoid> external) {
     check(options);
     impl_ = std::make_unique<Impl>(options, empty_lattice(options.extent));
+    set_external_ellipsoids(std::move(external));
     if (options.initial == InitialState::field) impl_->draw_initial_state();
 }
 

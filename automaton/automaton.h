@@ -39,8 +39,9 @@ struct ActiveEllipsoid {
 
 class Automaton {
   public:
-    // Starts from options.initial. Throws Error(usage) on bad options (see check()).
-    explicit Automaton(const AutomatonOptions& options);
+    // Starts from options.initial; a state that is drawn from the field takes in `external`, which are set as
+    // by set_external_ellipsoids(). Throws Error(usage) on bad options (see check()) or ellipsoids.
+    explicit Automaton(const AutomatonOptions& options, std::vector<ActiveEllipsoid> external = {});
     // Starts from a given state; throws Error(usage) when its extent is not options.extent.
     Automaton(const AutomatonOptions& options, Lattice initial);
     ~Automaton();

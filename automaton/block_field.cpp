@@ -95,11 +95,11 @@ void BlockField::add_with_images(const AutomatonOptions& options, const ActiveEl
     const double y = place((e.centre_m.y - origin.y) / cell, sides.y, extent.y);
     const double z = place((e.centre_m.z - origin.z) / cell, sides.z, extent.z);
     const double a = e.semi_axes_m.x / cell, b = e.semi_axes_m.y / cell, c = e.semi_axes_m.z / cell;
-    const int nx = images(std::max(a, b), sides.x, extent.x), ny = images(std::max(a, b), sides.y, extent.y),
-              nz = images(c, sides.z, extent.z);
     const SinCos turn = sin_cos_deg(e.yaw_deg);
     const double half_x = std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin);
     const double half_y = std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos);
+    const int nx = images(half_x, sides.x, extent.x), ny = images(half_y, sides.y, extent.y),
+              nz = images(c, sides.z, extent.z);
 
     FieldEllipsoid f =
         field_ellipsoid(options, active, {turn.cos / a, turn.sin / a, -turn.sin / b, turn.cos / b, 1 / c});

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "automaton/air_parcels.h"
 #include "automaton/error.h"
 #include "automaton/text.h"
 
@@ -61,12 +62,26 @@ void check_life(double birth_s, double life_s, double fade_in_s, double fade_out
     fade(fade_out_s, ".fade_out_s");
 }
 
-// The images of an ellipsoid that a periodic axis repeats are all visited, so they must stay few.
-void check_semi_axis(double semi_axis_m, double box_m, bool periodic, const Name& name) {
+void check_semi_axis(double semi_axis_m, const Name& name) {
     if (!(semi_axis_m > 0 && std::isfinite(semi_axis_m)))
         refuse(name, " = " + number(semi_axis_m) + ": expected a finite number > 0 m");
-    if (periodic && !(semi_axis_m <= 16 * box_m))
-        refuse(name, " = " + number(semi_axis_m) + ": at most 16 times the length of a periodic axis");
+}
+
+bool any_periodic(const Boundaries& b) {
+    return b.x == Boundary::periodic || b.y == Boundary::periodic || b.z == Boundary::periodic;
+}
+
+void check_periodic_reach(const Vec3& reach, const AutomatonOptions& o, const Name& name) {
+    const auto along = [&](double reach_m, int cells, Boundary boundary, const char* axis) {
+        const double most_m = kMaxPeriodicReach * cells * o.placement.cell_size_m;
+        if (boundary == Boundary::open || reach_m <= most_m) return;
+        refuse(name, " reaches " + number(reach_m) + " m from its centre along the periodic axis " + axis +
+                         ": expected at most " + number(most_m) + " m, " + number(kMaxPeriodicReach) +
+                         " times that axis");
+    };
+    along(reach.x, o.extent.x, o.boundaries.x, "x");
+    along(reach.y, o.extent.y, o.boundaries.y, "y");
+    along(reach.z, o.extent.z, o.boundaries.z, "z");
 }
 
 void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::string& name) {
@@ -96,6 +111,7 @@ void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::stri
                       .fade_out_s = s.fade_out_s},
             o, name);
     }
+    if (any_periodic(o.boundaries)) check_periodic_reach(reach_m(s), o, name);
 }
 
 void check(const Wind& wind, const AutomatonOptions& o) {
@@ -120,30 +136,42 @@ void check(const Wind& wind, const AutomatonOptions& o) {
 }
 
 // Images of one ellipsoid around the periodic axes, itself included (BlockField visits as many).
-double images_of(const Vec3& semi_axes_m, const AutomatonOptions& o) {
+double images_of(const Vec3& reach_m, const AutomatonOptions& o) {
     const double cell = o.placement.cell_size_m;
     const auto along = [](Boundary boundary, double half_size_cells, int extent) {
         return boundary == Boundary::periodic ? 2 * std::ceil(half_size_cells / extent) + 1 : 1;
     };
-    const double half_xy = std::max(semi_axes_m.x, semi_axes_m.y) / cell;
-    return along(o.boundaries.x, half_xy, o.extent.x) * along(o.boundaries.y, half_xy, o.extent.y) *
-           along(o.boundaries.z, semi_axes_m.z / cell, o.extent.z);
+    return along(o.boundaries.x, reach_m.x / cell, o.extent.x) *
+           along(o.boundaries.y, reach_m.y / cell, o.extent.y) *
+           along(o.boundaries.z, reach_m.z / cell, o.extent.z);
 }
 
 }  // namespace
+
+Vec3 reach_m(const Ellipsoid& e) {
+    const SinCos turn = sin_cos_deg(e.yaw_deg);
+    const double a = e.semi_axes_m.x, b = e.semi_axes_m.y;
+    return {std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin),
+            std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos), e.semi_axes_m.z};
+}
+
+Vec3 reach_m(const EllipsoidScatter& s) {
+    const Vec3 largest{s.semi_axis_x_m.max, s.semi_axis_y_m.max, s.semi_axis_z_m.max};
+    if (s.yaw_deg.min == s.yaw_deg.max)
+        return reach_m(Ellipsoid{.semi_axes_m = largest, .yaw_deg = s.yaw_deg.min});
+    const double horizontal = std::max(largest.x, largest.y);  // at some turn, along either axis
+    return {horizontal, horizontal, largest.z};
+}
 
 void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& name) {
     require_finite(e.centre_m.x, {name, ".centre_m.x"});
     require_finite(e.centre_m.y, {name, ".centre_m.y"});
     require_finite(e.centre_m.z, {name, ".centre_m.z"});
-    const double cell = o.placement.cell_size_m;
-    const bool periodic_xy = o.boundaries.x == Boundary::periodic || o.boundaries.y == Boundary::periodic;
-    const double shorter = std::min(o.extent.x, o.extent.y) * cell;
-    check_semi_axis(e.semi_axes_m.x, shorter, periodic_xy, {name, ".semi_axes_m.x"});
-    check_semi_axis(e.semi_axes_m.y, shorter, periodic_xy, {name, ".semi_axes_m.y"});
-    check_semi_axis(e.semi_axes_m.z, o.extent.z * cell, o.boundaries.z == Boundary::periodic,
-                    {name, ".semi_axes_m.z"});
+    check_semi_axis(e.semi_axes_m.x, {name, ".semi_axes_m.x"});
+    check_semi_axis(e.semi_axes_m.y, {name, ".semi_axes_m.y"});
+    check_semi_axis(e.semi_axes_m.z, {name, ".semi_axes_m.z"});
     require_finite(e.yaw_deg, {name, ".yaw_deg"});
+    if (any_periodic(o.boundaries)) check_periodic_reach(reach_m(e), o, {name, ".semi_axes_m"});
     check(e.centre, {name, ".centre"});
     check(e.rim, {name, ".rim"});
     check_life(e.birth_s, e.life_s, e.fade_in_s, e.fade_out_s, name);
@@ -151,9 +179,9 @@ void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& nam
 
 std::uint64_t ellipsoid_count(const AutomatonOptions& o) {
     double count = 0;
-    for (const Ellipsoid& e : o.field.ellipsoids) count += images_of(e.semi_axes_m, o);
+    for (const Ellipsoid& e : o.field.ellipsoids) count += images_of(reach_m(e), o);
     for (const EllipsoidScatter& s : o.field.scatters) {
-        count += s.count * images_of({s.semi_axis_x_m.max, s.semi_axis_y_m.max, s.semi_axis_z_m.max}, o);
+        count += s.count * images_of(reach_m(s), o);
     }
     return std::uint64_t(std::min(count, 1e18));
 }

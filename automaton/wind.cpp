@@ -33,7 +33,8 @@ std::int64_t to_fixed(double cells) {
         throw Error(ErrorCode::usage, "wind moves the air by " + number_text(cells, 6) +
                                           " cells in one step; at most 2^30 cells are possible");
     }
-    return std::llround(cells * 0x1p32);
+    const double units = cells * 0x1p32;
+    return std::abs(units) < 0.5 ? 0 : std::int64_t(std::ceil(units));
 }
 
 }  // namespace

@@ -4,7 +4,11 @@
 // Wind: a horizontal velocity that depends on height and time, piecewise linear in both (D: advection; D
 // names vector fields as the improvement). Motion is accumulated as integers, so nothing drifts: after n
 // steps of a constant wind the displacement is floor(n * d) cells exactly, whatever the speed, with d the
-// displacement of one step rounded to 2^-32 cell.
+// displacement of one step, velocity * step / cell, rounded up to a multiple of 2^-32 cell. Up, because few
+// decimal fractions are such multiples: n * d then never falls short of the whole number that the exact
+// product reaches. So 0.2 cells a step are 1 cell after 5 steps, and -0.3 are -3 cells after 10. Where the
+// exact displacement of a step is a multiple of 1/q cell, floor(n * d) is the floor of the exact product for
+// all n < 2^32 / q.
 
 #include <cstdint>
 #include <vector>
@@ -50,8 +54,9 @@ struct Displacement {
     bool operator==(const Displacement&) const = default;
 };
 
-// The displacement of one step of `time_step_s`, rounded to 2^-32 cell.
-// Throws Error(usage) when it exceeds 2^30 cells: more than any lattice is wide.
+// The displacement of one step of `time_step_s`, rounded up (towards east and north) to a multiple of 2^-32
+// cell; 0 where it is less than half of that either way, which is calm air. Throws Error(usage) when it
+// exceeds 2^30 cells: more than any lattice is wide.
 Displacement displacement_of_step(const Velocity& velocity, double time_step_s, double cell_size_m);
 
 }  // namespace nephos

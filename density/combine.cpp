@@ -48,23 +48,47 @@ Mapping mapping_of(const GridBox& common, const Placement& source) {
     return map;
 }
 
-// Origins of the blocks of the common box that a grid's blocks reach into, each once, in order.
-std::vector<Coord> reached_blocks(const DensityGrid& grid, const Mapping& map, const Extent& extent) {
-    std::vector<Coord> origins;
-    const auto range = [&](int block, double offset, int n) {
-        // Interpolation reaches one source voxel beyond the block on both sides.
-        const double low = (block - 1 - offset) / map.scale, high = (block + kBlock - offset) / map.scale;
-        return std::pair{std::max(0, int(std::ceil(low - kWhole))) / kBlock,
-                         std::min(n - 1, int(std::floor(high + kWhole))) / kBlock};
+// One axis of a grid in the common box.
+struct Axis {
+    double scale, offset;  // as in Mapping
+    int voxels;            // of the grid
+    int common;            // voxels of the common box
+    Boundary boundary;
+};
+
+// Origins along an axis of the common blocks that the grid's block at `block` reaches into; on a periodic
+// axis an origin may come twice.
+std::vector<int> reached_along(const Axis& axis, int block) {
+    std::vector<int> origins;
+    const auto add = [&](int first, int last) {  // voxels of the grid
+        const double low = (first - axis.offset) / axis.scale, high = (last - axis.offset) / axis.scale;
+        const int begin = std::max(0, int(std::ceil(low - kWhole))) / kBlock;
+        const int end = std::min(axis.common - 1, int(std::floor(high + kWhole))) / kBlock;
+        for (int n = begin; n <= end; ++n) origins.push_back(n * kBlock);
     };
+    add(block - 1, block + kBlock);  // interpolation reaches one voxel beyond the block on both sides
+    if (axis.boundary == Boundary::open) return origins;
+    if (block == 0) add(axis.voxels - 1, axis.voxels);
+    if (block + kBlock >= axis.voxels) add(-1, 0);
+    return origins;
+}
+
+// Origins of the blocks of the common box that a grid's blocks reach into, each once, in order.
+std::vector<Coord> reached_blocks(const DensityGrid& grid, const Mapping& map, const Boundaries& boundaries,
+                                  const Extent& extent) {
+    const Extent own = grid.extent();
+    const Axis x_axis{map.scale, map.offset.x, own.x, extent.x, boundaries.x},
+        y_axis{map.scale, map.offset.y, own.y, extent.y, boundaries.y},
+        z_axis{map.scale, map.offset.z, own.z, extent.z, boundaries.z};
+    std::vector<Coord> origins;
     for (const Block& block : blocks_of(grid)) {
         if (block.positive_count() == 0) continue;
-        const auto [x0, x1] = range(block.origin.x(), map.offset.x, extent.x);
-        const auto [y0, y1] = range(block.origin.y(), map.offset.y, extent.y);
-        const auto [z0, z1] = range(block.origin.z(), map.offset.z, extent.z);
-        for (int z = z0; z <= z1; ++z) {
-            for (int y = y0; y <= y1; ++y) {
-                for (int x = x0; x <= x1; ++x) origins.emplace_back(x * kBlock, y * kBlock, z * kBlock);
+        const auto along_x = reached_along(x_axis, block.origin.x()),
+                   along_y = reached_along(y_axis, block.origin.y()),
+                   along_z = reached_along(z_axis, block.origin.z());
+        for (const int z : along_z) {
+            for (const int y : along_y) {
+                for (const int x : along_x) origins.emplace_back(x, y, z);
             }
         }
     }
@@ -77,8 +101,11 @@ std::vector<Coord> reached_blocks(const DensityGrid& grid, const Mapping& map, c
 // Reads one grid in the common box.
 class Sampler {
   public:
-    Sampler(const DensityGrid& grid, const Mapping& map)
-        : map_(map), accessor_(OpenvdbAccess::grid(grid).getConstAccessor()) {}
+    Sampler(const DensityGrid& grid, const Mapping& map, const Boundaries& boundaries)
+        : map_(map),
+          extent_(grid.extent()),
+          boundaries_(boundaries),
+          accessor_(OpenvdbAccess::grid(grid).getConstAccessor()) {}
 
     float at(int x, int y, int z) {
         if (map_.exact) return accessor_.getValue(Coord(x, y, z) - map_.shift);
@@ -87,27 +114,45 @@ class Sampler {
     }
 
   private:
+    // The two voxels around a place on an axis and their shares; of a periodic axis none beyond its sides.
+    struct Neighbours {
+        int index[2];
+        double weight[2];
+
+        Neighbours(double p, int voxels, Boundary boundary) {
+            const double below = std::floor(p);
+            const bool inside = p >= -0.5 - kWhole && p < voxels - 0.5 - kWhole;
+            const bool nothing = boundary == Boundary::periodic && !inside;
+            index[0] = repeated(int(below), voxels, boundary);
+            index[1] = repeated(int(below) + 1, voxels, boundary);
+            weight[0] = nothing ? 0 : 1 - (p - below);
+            weight[1] = nothing ? 0 : p - below;
+        }
+    };
+
     float between(const Vec3& p) {
-        const double fx = std::floor(p.x), fy = std::floor(p.y), fz = std::floor(p.z);
-        const Coord at{int(fx), int(fy), int(fz)};
-        const double wx = p.x - fx, wy = p.y - fy, wz = p.z - fz;
+        const Neighbours x(p.x, extent_.x, boundaries_.x), y(p.y, extent_.y, boundaries_.y),
+            z(p.z, extent_.z, boundaries_.z);
         double sum = 0;
         for (int n = 0; n < 8; ++n) {
             const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
-            const double weight = (dx ? wx : 1 - wx) * (dy ? wy : 1 - wy) * (dz ? wz : 1 - wz);
-            if (weight > 0) sum += weight * double(accessor_.getValue(at.offsetBy(dx, dy, dz)));
+            const double weight = x.weight[dx] * y.weight[dy] * z.weight[dz];
+            if (weight > 0)
+                sum += weight * double(accessor_.getValue({x.index[dx], y.index[dy], z.index[dz]}));
         }
         return float(sum);
     }
 
     const Mapping& map_;
+    const Extent extent_;
+    const Boundaries boundaries_;
     openvdb::FloatGrid::ConstAccessor accessor_;
 };
 
 // Adds one grid to the values of a block of the common box.
-void add_to_block(float* values, const DensityGrid& grid, const Mapping& map, const Coord& origin,
-                  const Extent& extent) {
-    Sampler sampler(grid, map);
+void add_to_block(float* values, const DensityGrid& grid, const Mapping& map, const Boundaries& boundaries,
+                  const Coord& origin, const Extent& extent) {
+    Sampler sampler(grid, map, boundaries);
     for (int n = 0; n < kBlockVoxels; ++n) {
         const int x = origin.x() + (n >> 6), y = origin.y() + (n >> 3 & 7), z = origin.z() + (n & 7);
         if (x >= extent.x || y >= extent.y || z >= extent.z) continue;
@@ -149,17 +194,24 @@ GridBox common_box(std::span<const GridBox> boxes) {
             {{origin.x + x * size, origin.y + y * size, origin.z + z * size}, size}};
 }
 
-DensityGrid combine(std::span<const DensityGrid> grids) {
+DensityGrid combine(std::span<const DensityGrid> grids, std::span<const Boundaries> boundaries) {
+    if (!boundaries.empty() && boundaries.size() != grids.size()) {
+        throw Error(ErrorCode::usage, std::to_string(boundaries.size()) + " boundaries for " +
+                                          std::to_string(grids.size()) + " grids: expected one for each");
+    }
     if (grids.size() == 1) return grids.front();
     std::vector<GridBox> boxes;
     for (const DensityGrid& grid : grids) boxes.push_back({grid.extent(), grid.placement()});
     const GridBox common = common_box(boxes);
+    const auto boundaries_of = [&](std::size_t g) {
+        return boundaries.empty() ? Boundaries{} : boundaries[g];
+    };
     std::vector<Mapping> maps;
     std::vector<std::vector<Coord>> reached;
     std::vector<Coord> origins;
-    for (const DensityGrid& grid : grids) {
-        maps.push_back(mapping_of(common, grid.placement()));
-        reached.push_back(reached_blocks(grid, maps.back(), common.extent));
+    for (std::size_t g = 0; g < grids.size(); ++g) {
+        maps.push_back(mapping_of(common, grids[g].placement()));
+        reached.push_back(reached_blocks(grids[g], maps.back(), boundaries_of(g), common.extent));
         origins.insert(origins.end(), reached.back().begin(), reached.back().end());
     }
     const auto before = [](const Coord& a, const Coord& b) { return block_order(a) < block_order(b); };
@@ -173,7 +225,7 @@ DensityGrid combine(std::span<const DensityGrid> grids) {
         std::fill_n(values, kBlockVoxels, 0.0f);
         for (std::size_t g = 0; g < grids.size(); ++g) {
             if (!std::binary_search(reached[g].begin(), reached[g].end(), origins[n], before)) continue;
-            add_to_block(values, grids[g], maps[g], origins[n], common.extent);
+            add_to_block(values, grids[g], maps[g], boundaries_of(g), origins[n], common.extent);
         }
         blocks[n] = NewBlock::from(std::move(leaf));
     });

@@ -56,8 +56,10 @@ double sum_of_fields(const std::vector<Tap>& taps) {
 // serve all voxels.
 class Resampler {
   public:
-    Resampler(const DensityGrid& grid, int refine, double radius)
+    Resampler(const DensityGrid& grid, int refine, double radius, const Boundaries& boundaries)
         : grid_(OpenvdbAccess::grid(grid)),
+          cells_(grid.extent()),
+          boundaries_(boundaries),
           refine_(refine),
           reach_(int(std::ceil(radius))),
           side_((kBlock - 1) / refine + 2 + 2 * reach_) {
@@ -70,17 +72,16 @@ class Resampler {
     }
 
     // Fine blocks that a cloud cell may reach, in block order.
-    std::vector<openvdb::Coord> blocks(const DensityGrid& grid, Extent fine) const {
+    std::vector<openvdb::Coord> blocks(const DensityGrid& grid) const {
         std::vector<openvdb::Coord> result;
         for (const Block& block : blocks_of(grid)) {
             if (block.positive_count() == 0) continue;
-            const auto low = [&](int o) { return std::max(0, (o - reach_) * refine_) & ~(kBlock - 1); };
-            const auto end = [&](int o, int size) { return std::min(size, (o + kBlock + reach_) * refine_); };
-            const openvdb::Coord o = block.origin;
-            for (int z = low(o.z()); z < end(o.z(), fine.z); z += kBlock) {
-                for (int y = low(o.y()); y < end(o.y(), fine.y); y += kBlock) {
-                    for (int x = low(o.x()); x < end(o.x(), fine.x); x += kBlock)
-                        result.emplace_back(x, y, z);
+            const auto along_x = reached(block.origin.x(), cells_.x, boundaries_.x),
+                       along_y = reached(block.origin.y(), cells_.y, boundaries_.y),
+                       along_z = reached(block.origin.z(), cells_.z, boundaries_.z);
+            for (const int z : along_z) {
+                for (const int y : along_y) {
+                    for (const int x : along_x) result.emplace_back(x, y, z);
                 }
             }
         }
@@ -110,6 +111,23 @@ class Resampler {
         double sum = 0;
     };
 
+    // Origins along one axis of the fine blocks that the cells of the block at `origin` reach; on a periodic
+    // axis an origin may come twice.
+    std::vector<int> reached(int origin, int cells, Boundary boundary) const {
+        std::vector<int> origins;
+        const auto add = [&](int first, int end) {  // cells first .. end - 1
+            const int low = std::max(first, 0) * refine_ & ~(kBlock - 1);
+            for (int v = low; v < std::min(end, cells) * refine_; v += kBlock) origins.push_back(v);
+        };
+        const int first = origin - reach_, end = std::min(origin + kBlock, cells) + reach_;
+        const bool whole = boundary == Boundary::periodic && end - first >= cells;
+        add(whole ? 0 : first, whole ? cells : end);
+        if (boundary == Boundary::open || whole) return origins;
+        if (first < 0) add(first + cells, cells);
+        if (end > cells) add(0, end - cells);
+        return origins;
+    }
+
     void add_phase(const Vec3& point, double radius) {
         const auto taps = taps_around(point, radius);
         Phase phase;
@@ -131,9 +149,11 @@ class Resampler {
         bool any = false;
         float* out = cells.data();
         for (int z = 0; z < side_; ++z) {
+            const int k = repeated(corner.z() + z, cells_.z, boundaries_.z);
             for (int y = 0; y < side_; ++y) {
+                const int j = repeated(corner.y() + y, cells_.y, boundaries_.y);
                 for (int x = 0; x < side_; ++x) {
-                    *out = voxels.getValue(corner + openvdb::Coord(x, y, z));
+                    *out = voxels.getValue({repeated(corner.x() + x, cells_.x, boundaries_.x), j, k});
                     any = any || *out > 0;
                     ++out;
                 }
@@ -156,6 +176,8 @@ class Resampler {
     }
 
     const openvdb::FloatGrid& grid_;
+    const Extent cells_;
+    const Boundaries boundaries_;
     const int refine_;
     const int reach_;  // cells that a tap may lie away
     const int side_;   // of the cube of cells that one fine block needs
@@ -207,14 +229,19 @@ std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells) {
     return balls;
 }
 
-double density_at(const DensityGrid& grid, const Vec3& position_m, double radius_cells) {
+double density_at(const DensityGrid& grid, const Vec3& position_m, double radius_cells,
+                  const Boundaries& boundaries) {
     check_radius(radius_cells);
     const Placement& placement = grid.placement();
-    const Vec3 point{(position_m.x - placement.origin_m.x) / placement.cell_size_m,
-                     (position_m.y - placement.origin_m.y) / placement.cell_size_m,
-                     (position_m.z - placement.origin_m.z) / placement.cell_size_m};
-    // Also catches NaN, and keeps the conversion to integers in range.
     const Extent extent = grid.extent();
+    const auto in_cells = [&](double at_m, double origin_m, int cells, Boundary boundary) {
+        const double at = (at_m - origin_m) / placement.cell_size_m;
+        return boundary == Boundary::periodic ? at - std::floor(at / cells) * cells : at;
+    };
+    const Vec3 point{in_cells(position_m.x, placement.origin_m.x, extent.x, boundaries.x),
+                     in_cells(position_m.y, placement.origin_m.y, extent.y, boundaries.y),
+                     in_cells(position_m.z, placement.origin_m.z, extent.z, boundaries.z)};
+    // Also catches NaN, and keeps the conversion to integers in range.
     const double reach = radius_cells + 1;
     const bool near = point.x > -reach && point.x < extent.x + reach && point.y > -reach &&
                       point.y < extent.y + reach && point.z > -reach && point.z < extent.z + reach;
@@ -222,11 +249,16 @@ double density_at(const DensityGrid& grid, const Vec3& position_m, double radius
     const auto taps = taps_around(point, radius_cells);
     openvdb::FloatGrid::ConstAccessor voxels = OpenvdbAccess::grid(grid).getConstAccessor();
     double sum = 0;
-    for (const Tap& tap : taps) sum += double(voxels.getValue({tap.i, tap.j, tap.k})) * tap.field;
+    for (const Tap& tap : taps) {
+        const openvdb::Coord cell(repeated(tap.i, extent.x, boundaries.x),
+                                  repeated(tap.j, extent.y, boundaries.y),
+                                  repeated(tap.k, extent.z, boundaries.z));
+        sum += double(voxels.getValue(cell)) * tap.field;
+    }
     return sum / sum_of_fields(taps);
 }
 
-DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells) {
+DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells, const Boundaries& boundaries) {
     check_radius(radius_cells);
     if (refine < 1 || refine > kMaxRefine) {
         throw Error(ErrorCode::usage,
@@ -239,8 +271,8 @@ DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells) {
                     "a refinement of " + std::to_string(refine) + " gives too many voxels on an axis");
     }
     const Extent fine{coarse.x * refine, coarse.y * refine, coarse.z * refine};
-    const Resampler resampler(grid, refine, radius_cells);
-    const auto origins = resampler.blocks(grid, fine);
+    const Resampler resampler(grid, refine, radius_cells, boundaries);
+    const auto origins = resampler.blocks(grid);
     std::vector<NewBlock> blocks(origins.size());
     tbb::parallel_for(std::size_t{0}, origins.size(),
                       [&](std::size_t n) { blocks[n] = resampler.sample(origins[n], fine); });

@@ -11,8 +11,12 @@
 //   D(x) = sum q f / sum f. Both sums run in the same order, so a saturated neighbourhood gives 1 exactly,
 //   everywhere.
 // - a renderer that adds up metaballs has no such sum at hand. It scales every metaball by
-//   metaball_normalisation(R): then sum q f has the mean q in a uniform region, with a ripple around it that is at
-//   most 2.2 % at R = 2 voxel edges, 0.5 % at 3 (and -59 % .. +23 % at 1, where metaballs hardly overlap).
+//   metaball_normalisation(R): then sum q f has the mean q in a uniform region, with a ripple around it that
+//   is at most 2.2 % at R = 2 voxel edges, 0.5 % at 3 (and -59 % .. +23 % at 1, where metaballs hardly
+//   overlap).
+//
+// A periodic axis repeats the grid, as in smoothing: the same q near both of its faces, the same D at both.
+// Beyond the faces of an open axis q is 0, and D falls towards them.
 //
 // Functions are pure and thread-safe.
 
@@ -53,12 +57,15 @@ double metaball_normalisation(double radius_cells);
 // Throws Error(usage) when the radius is out of range.
 std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells);
 
-// D at any point of the world; 0 far from all cloud. Throws as metaballs().
-double density_at(const DensityGrid& grid, const Vec3& position_m, double radius_cells);
+// D at any point of the world, images of the grid along periodic axes included; 0 far from all cloud. Throws
+// as metaballs().
+double density_at(const DensityGrid& grid, const Vec3& position_m, double radius_cells,
+                  const Boundaries& boundaries = {});
 
 // D sampled at the centres of voxels `refine` times smaller than the grid's. Throws Error(usage) when
 // refine is outside 1..8, the radius is out of range, or the result would have more than 2^31 - 1 voxels on
 // an axis.
-DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells);
+DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells,
+                     const Boundaries& boundaries = {});
 
 }  // namespace nephos

@@ -78,4 +78,12 @@ struct NewBlock {
 // A leaf at `origin` whose values are not yet set and whose voxels are all inactive.
 std::unique_ptr<FloatLeaf> uninitialised_leaf(const openvdb::Coord& origin);
 
+// Index of the voxel that stands at index i of an axis of n voxels: of a periodic one the voxel in 0..n-1
+// that it repeats there, of an open one i.
+inline int repeated(int i, int n, Boundary boundary) {
+    if (boundary == Boundary::open || (i >= 0 && i < n)) return i;
+    const int rest = i % n;
+    return rest < 0 ? rest + n : rest;
+}
+
 }  // namespace nephos

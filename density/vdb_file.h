@@ -123,10 +123,13 @@ struct LoadedDensity {
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 
-// Reads the bool (or mask) grids hum, act and cld as a state of this extent; the transform is ignored.
-// Throws Error(io) as above, and when one of them is missing, is of another extent by its nephos_bbox_max, or
-// (without one) has a voxel outside the extent.
-Lattice read_state(const std::filesystem::path& path, Extent extent, const VdbReadLimits& limits = {});
+// Reads the bool (or mask) grids hum, act and cld as a state of this extent at this place. Throws Error(io)
+// as above, and when one of them is missing, is of another extent by its nephos_bbox_max, (without one) has a
+// voxel outside the extent, or stands elsewhere by its transform: a corner of its box of cells farther than a
+// hundredth of a cell from that of the lattice. The identity, which OpenVDB gives to grids of which nothing
+// else was said, stands nowhere in grids that nephos did not write, and fits every place.
+Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
+                   const VdbReadLimits& limits = {});
 
 // One grid as `nephos info` lists it.
 struct VdbGridInfo {

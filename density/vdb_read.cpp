@@ -292,7 +292,49 @@ void check_state_extent(const openvdb::GridBase& header, int refine, const Exten
                              " cells, but the scene has " + text(extent.x, extent.y, extent.z));
 }
 
-void send_state(VdbArchive& archive, Extent extent, SandboxWriter& writer) {
+std::string point_text(const openvdb::Vec3d& p) {
+    return "(" + number_text(p.x(), 9) + ", " + number_text(p.y(), 9) + ", " + number_text(p.z(), 9) + ") m";
+}
+
+// Compares where the grid puts the corners of the box of cells with where the scene has them.
+void check_state_placement(const openvdb::GridBase& header, const std::string& name, int refine,
+                           const Extent& extent, const Placement& placement) {
+    const openvdb::math::Transform& transform = header.transform();
+    const bool own = meta_value<openvdb::Vec3i>(header, kMetaBoxMax).has_value();
+    if (!own && transform.isIdentity()) return;
+    const double cell = placement.cell_size_m, tolerance_m = cell / 100;
+    const Vec3& origin = placement.origin_m;
+    const openvdb::Vec3d size = transform.voxelSize() * refine;
+    const double cells[3] = {double(extent.x), double(extent.y), double(extent.z)};
+    for (int axis = 0; axis < 3; ++axis) {
+        if (std::abs(size[axis] - cell) * cells[axis] <= tolerance_m) continue;
+        throw std::runtime_error("grid `" + name + "` has cells of " + number_text(size[axis], 9) +
+                                 " m, but the scene's lattice has cells of " + number_text(cell, 9) + " m");
+    }
+    // An index is a voxel's centre, so the lowest corner of the box has the indices -1/2.
+    const auto corner = [&](double x, double y, double z) {
+        return transform.indexToWorld(openvdb::Vec3d(x, y, z) * refine - openvdb::Vec3d(0.5));
+    };
+    const openvdb::Vec3d low = corner(0, 0, 0), expected(origin.x, origin.y, origin.z);
+    const auto agree = [&](const openvdb::Vec3d& a, const openvdb::Vec3d& b) {
+        return (a - b).length() <= tolerance_m;
+    };
+    if (!agree(low, expected)) {
+        throw std::runtime_error("grid `" + name + "` starts at " + point_text(low) +
+                                 ", but the scene's lattice at " + point_text(expected));
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        openvdb::Vec3d end(0.0);
+        end[axis] = cells[axis];
+        const openvdb::Vec3d found = corner(end.x(), end.y(), end.z());
+        if (agree(found, expected + end * cell)) continue;
+        throw std::runtime_error("the axes of grid `" + name + "` are turned: its corner at " +
+                                 point_text(found) + " stands at " + point_text(expected + end * cell) +
+                                 " in the scene");
+    }
+}
+
+void send_state(VdbArchive& archive, Extent extent, const Placement& placement, SandboxWriter& writer) {
     for (const char* name : kStateGrids) {
         const auto& entries = archive.entries();
         const auto entry =
@@ -303,6 +345,7 @@ void send_state(VdbArchive& archive, Extent extent, SandboxWriter& writer) {
         }
         const int refine = refine_of(*entry->header);
         check_state_extent(*entry->header, refine, extent);
+        check_state_placement(*entry->header, name, refine, extent, placement);
         writer.value(refine);
         const Coord last(extent.x * refine - 1, extent.y * refine - 1, extent.z * refine - 1);
         const auto grid = archive.read(std::size_t(entry - entries.begin()));
@@ -359,11 +402,12 @@ DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions
     return load_density(path, options).density;
 }
 
-Lattice read_state(const std::filesystem::path& path, Extent extent, const VdbReadLimits& limits) {
+Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
+                   const VdbReadLimits& limits) {
     Lattice lattice;
     in_sandbox(
         path, limits,
-        [&](VdbArchive& archive, SandboxWriter& writer) { send_state(archive, extent, writer); },
+        [&](VdbArchive& archive, SandboxWriter& writer) { send_state(archive, extent, placement, writer); },
         [&](SandboxReader& reader) {
             lattice = {BitPlane(extent), BitPlane(extent), BitPlane(extent)};
             for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) receive_plane(reader, *plane);

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include "scenes/schema_sections.h"
 #include "scenes/text.h"
@@ -49,40 +52,57 @@ void check_wind_speed(const SectionReader& reader, const Scene& scene) {
                       " cells: a shorter `time.step_s`, a larger `lattice.cell_size_m` or less wind");
 }
 
-// A periodic axis repeats an ellipsoid, and every image that reaches the box costs time.
+// The axis of a lattice along which an ellipsoid reaches too far, and how far.
+struct TooFar {
+    const char* axis;
+    double reach_m, most_m;
+};
+
+std::optional<TooFar> too_far(const char* axis, double reach_m, int cells, double cell_m, Boundary boundary) {
+    const double most_m = kMaxPeriodicReach * cells * cell_m;
+    if (boundary == Boundary::open || reach_m <= most_m) return {};
+    return TooFar{axis, reach_m, most_m};
+}
+
+// A periodic axis repeats an ellipsoid, and every image that reaches the box costs time. `horizontal` and
+// `vertical` are the keys that decide how far it reaches; each is reported once.
+void check_periodic_reach(const SectionReader& item, const AutomatonOptions& o, const Vec3& reach,
+                          std::string_view horizontal, std::string_view vertical) {
+    const double cell_m = o.placement.cell_size_m;
+    const auto x = too_far("x (east)", reach.x, o.extent.x, cell_m, o.boundaries.x),
+               y = too_far("y (north)", reach.y, o.extent.y, cell_m, o.boundaries.y),
+               z = too_far("z (up)", reach.z, o.extent.z, cell_m, o.boundaries.z);
+    const auto report = [&](std::string_view key, const TooFar& found) {
+        item.report(key,
+                    item.quoted(key) + " reaches " + number_text(found.reach_m) +
+                        " m from the centre along the periodic axis " + found.axis,
+                    "expected at most " + number_text(found.most_m) + " m, " +
+                        number_text(kMaxPeriodicReach) +
+                        " times the lattice along that axis, or an open boundary there");
+    };
+    if (x || y) report(horizontal, x ? *x : *y);
+    if (z && (vertical != horizontal || !(x || y))) report(vertical, *z);
+}
+
 void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
     if (!reader.sound({"lattice", "field"})) return;
-    constexpr double kMostBoxes = 16;
     const AutomatonOptions& o = scene.automaton;
-    const double cell_m = o.placement.cell_size_m;
-    const bool horizontal = o.boundaries.x == Boundary::periodic || o.boundaries.y == Boundary::periodic;
-    const double unlimited = std::numeric_limits<double>::infinity();
-    const double most_xy_m = horizontal ? kMostBoxes * cell_m * std::min(o.extent.x, o.extent.y) : unlimited;
-    const double most_z_m =
-        o.boundaries.z == Boundary::periodic ? kMostBoxes * cell_m * o.extent.z : unlimited;
-    const auto check_items = [&](const char* name, const char* x, const char* y, const char* z,
-                                 auto sizes_of) {
+    const auto check_items = [&](const char* name, const auto& check_item) {
         const Entry* items = below(reader, "field").find(name);
         for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n) {
-            const Vec3 sizes = sizes_of(n);
-            const SectionReader item{
-                reader.document, items->value.items[n], indexed(std::string("field.") + name, n), {}};
-            const auto check_one = [&](const char* key, double size_m, double most_m) {
-                if (size_m <= most_m) return;
-                item.report(key,
-                            item.quoted(key) + " reaches " + number_text(size_m) + " m along a periodic axis",
-                            "expected at most " + number_text(most_m) + " m, 16 times the lattice");
-            };
-            check_one(x, sizes.x, most_xy_m);
-            check_one(y, sizes.y, most_xy_m);
-            check_one(z, sizes.z, most_z_m);
+            check_item(
+                n, SectionReader{
+                       reader.document, items->value.items[n], indexed(std::string("field.") + name, n), {}});
         }
     };
-    check_items("ellipsoids", "semi_axes_m", "semi_axes_m", "semi_axes_m",
-                [&](std::size_t n) { return o.field.ellipsoids[n].semi_axes_m; });
-    check_items("scatters", "semi_axis_x_m", "semi_axis_y_m", "semi_axis_z_m", [&](std::size_t n) {
-        const EllipsoidScatter& scatter = o.field.scatters[n];
-        return Vec3{scatter.semi_axis_x_m.max, scatter.semi_axis_y_m.max, scatter.semi_axis_z_m.max};
+    check_items("ellipsoids", [&](std::size_t n, const SectionReader& item) {
+        check_periodic_reach(item, o, reach_m(o.field.ellipsoids[n]), "semi_axes_m", "semi_axes_m");
+    });
+    check_items("scatters", [&](std::size_t n, const SectionReader& item) {
+        const EllipsoidScatter& s = o.field.scatters[n];
+        const bool longer = s.semi_axis_x_m.max >= s.semi_axis_y_m.max;
+        check_periodic_reach(item, o, reach_m(s), longer ? "semi_axis_x_m" : "semi_axis_y_m",
+                             "semi_axis_z_m");
     });
 }
 

@@ -61,6 +61,12 @@ const char* const kRimEffect =
 const char* const kCarriedEffect =
     "Whether it moves with the wind at its centre's height; otherwise it stands still.";
 
+// The effect of a size of ellipsoids, with the limit that periodic axes set.
+std::string with_periodic_reach(const char* effect) {
+    return effect + (" Along a periodic axis of the lattice an ellipsoid reaches at most " +
+                     number_text(kMaxPeriodicReach) + " times the length of that axis from its centre.");
+}
+
 const Section& ellipsoid_section() {
     static const Section section{
         "An ellipsoid placed by hand",
@@ -71,7 +77,8 @@ const Section& ellipsoid_section() {
                                             "east, north, height.",
                                             "D, control of motion")),
          key<&Ellipsoid::semi_axes_m>("semi_axes_m", "m", above(0, kFarthest_m),
-                                      "Half of its length, width and height, before the turn by `yaw_deg`."),
+                                      with_periodic_reach("Half of its length, width and height, before the "
+                                                          "turn by `yaw_deg`.")),
          key<&Ellipsoid::yaw_deg>("yaw_deg", "deg", between(-360, 360),
                                   "Turn about the vertical, counter-clockwise seen from above."),
          table<&Ellipsoid::centre>("centre", probabilities_section(), kCentreEffect),
@@ -107,12 +114,13 @@ const Section& scatter_section() {
          default_is(key<&EllipsoidScatter::z_m>("z_m", "m", between(-kFarthest_m, kFarthest_m),
                                                 "Where centres are drawn, height."),
                     "the whole lattice"),
-         key<&EllipsoidScatter::semi_axis_x_m>("semi_axis_x_m", "m", above(0, kFarthest_m),
-                                               "Half of the length, before the turn by `yaw_deg`."),
+         key<&EllipsoidScatter::semi_axis_x_m>(
+             "semi_axis_x_m", "m", above(0, kFarthest_m),
+             with_periodic_reach("Half of the length, before the turn by `yaw_deg`.")),
          key<&EllipsoidScatter::semi_axis_y_m>("semi_axis_y_m", "m", above(0, kFarthest_m),
-                                               "Half of the width."),
+                                               with_periodic_reach("Half of the width.")),
          key<&EllipsoidScatter::semi_axis_z_m>("semi_axis_z_m", "m", above(0, kFarthest_m),
-                                               "Half of the height."),
+                                               with_periodic_reach("Half of the height.")),
          key<&EllipsoidScatter::yaw_deg>("yaw_deg", "deg", between(-360, 360),
                                          "Turn about the vertical, counter-clockwise seen from above."),
          table<&EllipsoidScatter::centre>("centre", probabilities_section(), kCentreEffect),
@@ -219,7 +227,11 @@ const Section& wind_section() {
         "Wind",
         "The wind, at one or several times: each `[[wind]]` is a profile over height. Between their times "
         "profiles "
-        "are mixed linearly. Without any, the air is calm.",
+        "are mixed linearly. Without any, the air is calm. Cells move by whole cells: after n steps of a "
+        "constant wind a layer has moved floor(n * d) cells, d = velocity * `time.step_s` / "
+        "`lattice.cell_size_m` (0.3 cells a step: 2 after 9 steps, 3 after 10; -0.3: -3 after 9 and after "
+        "10). "
+        "d is rounded up to a multiple of 2^-32 cells, so that decimal fractions arrive in time.",
         {key<&WindKeyframe::time_s>("time_s", "s", between(-kLongest_s, kLongest_s),
                                     "Simulated time of this profile; times rise."),
          required(tables<&WindKeyframe::levels>("levels", level_section(), 1, 1000))},
@@ -267,15 +279,16 @@ const Section& lattice_section() {
          replaced(word<&Scene::automaton, &AutomatonOptions::initial>(
                       "initial", {"empty", "field"},
                       "How the box starts: without any vapour or cloud, or with vapour and activation drawn "
-                      "from the "
-                      "field.",
+                      "from the field at time 0; in a layer that field is its background and its clouds and "
+                      "rain.",
                       "D"),
                   "initial_state"),
          default_is(
              key<&Scene::initial_state_file>(
                  "initial_state", "", kAny,
                  "A VDB file whose bool grids `hum`, `act` and `cld` are the start, instead of `initial`; "
-                 "relative to the scene's folder."),
+                 "relative to the scene's folder. Its cells, their size and its place are those of the "
+                 "lattice."),
              "none")},
         nullptr};
     return section;

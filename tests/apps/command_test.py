@@ -617,6 +617,18 @@ class Results(Case):
                                   says="state.vdb")
             self.assertIn("32 x 24 x 12", result.stderr)
 
+    def test_a_state_of_another_place_is_refused(self):
+        self.call("state", self.scene, "--steps", "2", "--out", "state.vdb")
+        scene = self.write("from.toml", SCENE.replace("[time]", 'initial_state = "state.vdb"\n[time]'))
+        for setting, says in (("lattice.cell_size_m=25", "cells of 50 m, but the scene's lattice has cells of 25 m"),
+                              ("lattice.origin_m=[10,0,1000]", "but the scene's lattice at (10, 0, 1000) m")):
+            for command in (["hash", self.scene, "--from", "state.vdb"],
+                            ["state", self.scene, "--from", "state.vdb", "--out", "next.vdb"],
+                            ["run", scene, "--no-render", "--out", "out"]):
+                with self.subTest(setting=setting, command=command):
+                    result = self.refused(3, *command, "--set", setting, says="state.vdb")
+                    self.assertIn(says, result.stderr)
+
     def test_a_run_starts_from_a_state(self):
         self.call("state", self.scene, "--steps", "4", "--out", "state.vdb")
         scene = self.write("from.toml", SCENE.replace("[time]", 'initial_state = "state.vdb"\n[time]'))

@@ -32,8 +32,30 @@ TEST(Wind, RefusesWhatNoLatticeCanHold) {
     EXPECT_EQ(displacement_of_step({-0.25, 3}, 1, 1).whole_x(), -1);
 }
 
-// After n steps a layer has moved floor(n * speed) cells: 0.3 cells a step for 1000 steps is 300 cells, or
-// 299 where 0.3 rounds down to a multiple of 2^-32, and never anything else.
+// After n steps of a decimal speed the air has moved floor(n * speed) cells in exact arithmetic, towards east
+// and towards west: 0.2 cells a step are 1 cell after 5 steps, -0.3 are -3 after 10.
+TEST(Wind, DecimalSpeedsMoveByTheFloorOfTheExactProduct) {
+    for (const int thousandths : {1, 7, 100, 200, 250, 300, 333, 500, 700, 999, 1000, 1100, 12345}) {
+        for (const int sign : {1, -1}) {
+            const std::int64_t speed = sign * thousandths;
+            // 10 s and 10 m, 2 s and 50 m: the same cells a step by other roundings.
+            const Displacement d = displacement_of_step({double(speed) / 1000, double(speed) / 40}, 10, 10);
+            const Displacement e = displacement_of_step({double(speed) / 40, 0}, 2, 50);
+            Displacement sum, other;
+            for (std::int64_t n = 1; n <= 20000; ++n) {
+                sum = {sum.x + d.x, sum.y + d.y};
+                other.x += e.x;
+                const std::int64_t exact = n * speed;
+                ASSERT_EQ(sum.whole_x(), (exact - (exact % 1000 + 1000) % 1000) / 1000) << speed << " " << n;
+                ASSERT_EQ(sum.whole_y(), (exact - (exact % 40 + 40) % 40) / 40) << speed << " " << n;
+                ASSERT_EQ(other.whole_x(), sum.whole_x()) << speed << " " << n;
+            }
+        }
+    }
+    EXPECT_EQ(displacement_of_step({1e-17, -1e-17}, 10, 1), Displacement{}) << "calm";
+}
+
+// After n steps a layer has moved floor(n * speed) cells: 0.3 cells a step for 1000 steps is 300 cells.
 TEST(Advection, NeverDrifts) {
     AutomatonOptions o{.extent = {400, 3, 1}};
     o.placement.cell_size_m = 1;
@@ -43,10 +65,25 @@ TEST(Advection, NeverDrifts) {
     Lattice start{BitPlane(o.extent), BitPlane(o.extent), BitPlane(o.extent)};
     start.cld.set(5, 1, 0, true);
     Automaton automaton(o, std::move(start));
-    const std::int64_t step = std::llround(0.3 * 0x1p32);
     for (std::int64_t n = 1; n <= 1000; ++n) {
         automaton.step();
-        ASSERT_TRUE(automaton.cld().get(5 + int((n * step) >> 32), 1, 0)) << "step " << n;
+        ASSERT_TRUE(automaton.cld().get(5 + int(n * 3 / 10), 1, 0)) << "step " << n;
+    }
+}
+
+// The same towards the west: -3 cells after 10 steps of -0.3.
+TEST(Advection, NeverDriftsTowardsTheWest) {
+    AutomatonOptions o{.extent = {400, 3, 1}};
+    o.placement.cell_size_m = 1;
+    o.time_step_s = 1;
+    o.field.background = {0, 0, 0};
+    o.wind.keyframes = {{0, {{0, {-0.3, 0}}}}};
+    Lattice start{BitPlane(o.extent), BitPlane(o.extent), BitPlane(o.extent)};
+    start.cld.set(395, 1, 0, true);
+    Automaton automaton(o, std::move(start));
+    for (std::int64_t n = 1; n <= 1000; ++n) {
+        automaton.step();
+        ASSERT_TRUE(automaton.cld().get(395 - int((n * 3 + 9) / 10), 1, 0)) << "step " << n;
     }
 }
 

@@ -115,6 +115,47 @@ TEST(Combine, InterpolatesCoarserGrids) {
     EXPECT_GT(largest, 0.5) << "an empty sky proves nothing";
 }
 
+// A coarse grid with periodic sides lies in the common box as the middle one of its copies would, and ends at
+// its sides.
+TEST(Combine, InterpolatesAcrossPeriodicSides) {
+    const Extent extent{12, 5, 9};
+    const Placement placement{{30, -60, 150}, 70};
+    const DensityGrid fine = DensityGrid::from_dense(std::vector<float>(1), {1, 1, 1}, {{0, 0, 0}, 20});
+    const DensityGrid coarse = random_grid(extent, placement, 6, 0.5);
+    const Extent many{extent.x * 3, extent.y * 3, extent.z};
+    std::vector<float> copies(many.cells());
+    for (int k = 0; k < many.z; ++k) {
+        for (int j = 0; j < many.y; ++j) {
+            for (int i = 0; i < many.x; ++i)
+                copies[linear_index(many, i, j, k)] = coarse.value(i % extent.x, j % extent.y, k);
+        }
+    }
+    const Placement west_south{{30 - extent.x * 70.0, -60 - extent.y * 70.0, 150}, 70};
+    const std::vector<DensityGrid> grids{fine, coarse},
+        twins{fine, DensityGrid::from_dense(copies, many, west_south)};
+    const std::vector<Boundaries> boundaries{{}, {Boundary::periodic, Boundary::periodic, Boundary::open}};
+    const DensityGrid both = combine(grids, boundaries), twin = combine(twins);
+    const Vec3 from = both.placement().origin_m, twin_from = twin.placement().origin_m;
+    const auto offset = [](double a, double b) { return int(std::lround((a - b) / 20)); };
+    const int dx = offset(from.x, twin_from.x), dy = offset(from.y, twin_from.y),
+              dz = offset(from.z, twin_from.z);
+    const Extent e = both.extent();
+    float at_sides = 0;
+    for (int k = 0; k < e.z; ++k) {
+        for (int j = 0; j < e.y; ++j) {
+            for (int i = 0; i < e.x; ++i) {
+                const double x = from.x + (i + 0.5) * 20 - 30, y = from.y + (j + 0.5) * 20 + 60;
+                const bool inside = x >= 0 && x < extent.x * 70 && y >= 0 && y < extent.y * 70;
+                const float expected = inside ? twin.value(i + dx, j + dy, k + dz) : 0.0f;
+                ASSERT_NEAR(both.value(i, j, k), expected, 1e-6) << i << " " << j << " " << k;
+                if (x < 35) at_sides = std::max(at_sides, both.value(i, j, k));
+            }
+        }
+    }
+    EXPECT_GT(at_sides, 0.3f) << "empty sides prove nothing";
+    EXPECT_THROW(combine(grids, std::vector<Boundaries>(3)), Error);
+}
+
 TEST(Scaled, MultipliesEveryValue) {
     const DensityGrid a = random_grid({17, 9, 20}, {{0, 0, 0}, 10}, 5, 0.5);
     const std::vector<float> before = a.to_dense(), after = scaled(a, 0.25).to_dense();

@@ -178,6 +178,72 @@ TEST(Metaballs, ResampledVoxelsAreTheFieldAtTheirCentres) {
     }
 }
 
+// Where all is cloud a periodic axis has no faces: 1 up to the last voxel of it, and less at the faces of
+// open axes.
+TEST(Metaballs, SaturatedIsOneUpToPeriodicFaces) {
+    const DensityGrid grid = uniform_grid({8, 8, 8}, 1.0f);
+    const Boundary open = Boundary::open, periodic = Boundary::periodic;
+    for (double radius : {1.0, 1.5, 2.0, 8.0}) {
+        const DensityGrid all = resample(grid, 2, radius, {periodic, periodic, periodic});
+        for (const float value : all.to_dense()) ASSERT_EQ(value, 1.0f) << radius;
+    }
+    const DensityGrid layers = resample(grid, 2, 2.0, {periodic, periodic, open});
+    const DensityGrid box = resample(grid, 2, 2.0);
+    for (int j = 0; j < 16; ++j) {
+        for (int i = 0; i < 16; ++i) {
+            ASSERT_EQ(layers.value(i, j, 8), 1.0f);
+            ASSERT_EQ(layers.value(i, j, 0), box.value(8, 8, 0));
+            ASSERT_LT(layers.value(i, j, 15), 0.9f);
+        }
+    }
+    EXPECT_LT(box.value(0, 8, 8), 0.9f);
+    EXPECT_EQ(density_at(grid, {0, 0, 4 * 50.0}, 2, {periodic, periodic, open}), 1.0);
+    EXPECT_EQ(density_at(grid, {-1234567, 7654321, 4 * 50.0}, 2, {periodic, periodic, open}), 1.0);
+    EXPECT_EQ(density_at(grid, {1e300, 0, 0}, 2, {open, periodic, periodic}), 0.0);
+}
+
+// The twin of periodic axes: the grid written out again and again along them, open all around. Also where a
+// metaball is wider than the grid, and where little of it is cloud.
+TEST(Metaballs, PeriodicAxesAreCopiesOfTheGrid) {
+    const Extent extent{13, 4, 9};
+    constexpr int kCopies = 5;  // 2 x 4 voxels to either side: as far as the largest radius reaches
+    for (int axes = 1; axes < 8; ++axes) {
+        for (const auto& [refine, radius] : {std::pair{2, 2.0}, std::pair{3, 8.0}}) {
+            DensityGrid grid = random_grid(extent, 31, {{50, 60, 70}, 8});
+            if (refine == 2) {
+                std::vector<float> few(extent.cells());
+                few[linear_index(extent, 12, 0, 8)] = few[linear_index(extent, 3, 3, 0)] = 0.5f;
+                grid = DensityGrid::from_dense(few, extent, {{50, 60, 70}, 8});
+            }
+            const int cx = axes & 1 ? kCopies : 1, cy = axes & 2 ? kCopies : 1, cz = axes & 4 ? kCopies : 1;
+            const Extent many{extent.x * cx, extent.y * cy, extent.z * cz};
+            std::vector<float> copies(many.cells());
+            for (int k = 0; k < many.z; ++k) {
+                for (int j = 0; j < many.y; ++j) {
+                    for (int i = 0; i < many.x; ++i) {
+                        copies[linear_index(many, i, j, k)] =
+                            grid.value(i % extent.x, j % extent.y, k % extent.z);
+                    }
+                }
+            }
+            const auto boundary = [](int copied) { return copied > 1 ? Boundary::periodic : Boundary::open; };
+            const DensityGrid fine =
+                resample(grid, refine, radius, {boundary(cx), boundary(cy), boundary(cz)});
+            const DensityGrid twin = resample(DensityGrid::from_dense(copies, many, {}), refine, radius);
+            const Extent e = fine.extent();
+            const int x0 = cx / 2 * e.x, y0 = cy / 2 * e.y, z0 = cz / 2 * e.z;
+            for (int k = 0; k < e.z; ++k) {
+                for (int j = 0; j < e.y; ++j) {
+                    for (int i = 0; i < e.x; ++i) {
+                        ASSERT_EQ(fine.value(i, j, k), twin.value(i + x0, j + y0, k + z0))
+                            << axes << " " << refine << ": " << i << " " << j << " " << k;
+                    }
+                }
+            }
+        }
+    }
+}
+
 TEST(Metaballs, OnePerVoxelInDocumentedOrder) {
     const Extent extent{19, 10, 9};
     const Placement placement{{1000, -500, 250}, 20};

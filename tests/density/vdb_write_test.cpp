@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
-
 #include <fstream>
 #include <iterator>
 
@@ -34,7 +33,8 @@ struct Scene {
     Lattice state{test::random_plane(extent, 0.5, 1), test::random_plane(extent, 0.02, 2), BitPlane(extent)};
     DensityGrid density;
     Wind wind;
-    VdbMetadata metadata{0.05, 120.5, 10, 25, 60, 18446744073709551615u, "scene-hash", "state-hash", "0.1.0", 1};
+    VdbMetadata metadata{0.05,         120.5,        10,      25, 60, 18446744073709551615u,
+                         "scene-hash", "state-hash", "0.1.0", 1};
 
     Scene() {
         for (int k = 2; k < 19; ++k) {
@@ -231,7 +231,7 @@ TEST(VdbWrite, RefinedGridsShareOneTransform) {
     }
     expect_voxels(*file.get<openvdb::FloatGrid>("density"), fine, 0);
     expect_plane(*file.get<openvdb::BoolGrid>("cld"), scene.state.cld, 2);
-    const Lattice back = read_state(folder / "fine.vdb", scene.extent);
+    const Lattice back = read_state(folder / "fine.vdb", scene.extent, scene.placement);
     EXPECT_TRUE(back.hum == scene.state.hum && back.act == scene.state.act && back.cld == scene.state.cld);
 }
 

@@ -46,6 +46,30 @@ TEST(Reader, MissingKeysHaveTheDefaultsOfTheStructs) {
     EXPECT_EQ(scene_of("seed = 1").name, "test-scene");
 }
 
+// Only a periodic axis limits how far an ellipsoid reaches along it.
+TEST(Reader, OpenAxesOfALatticeTakeAnyEllipsoid) {
+    const std::string field = R"(
+[[field.ellipsoids]]
+centre_m = [0, 0, 32]
+semi_axes_m = [20, 20, 20]
+[[field.ellipsoids]]
+centre_m = [0, 0, 32]
+semi_axes_m = [9000, 10, 1e6]
+[[field.scatters]]
+count = 2
+semi_axis_x_m = 20
+semi_axis_y_m = 20
+semi_axis_z_m = 5000
+)";
+    const std::string lattice = "[lattice]\ncell_size_m = 1\ncells = [1, 512, 64]\nboundaries = ";
+    const Scene scene = scene_of(lattice + "['open', 'periodic', 'open']" + field);
+    EXPECT_EQ(scene.automaton.field.ellipsoids.size(), 2u);
+    EXPECT_NO_THROW(check(scene.automaton));
+    EXPECT_NO_THROW(scene_of(lattice + "'open'" + field));
+    const std::string messages = messages_of(lattice + "['periodic', 'open', 'open']" + field);
+    EXPECT_TRUE(contains(messages, "3 errors")) << messages;
+}
+
 TEST(Reader, TenLinesMakeAScene) {
     const Scene scene = scene_of(R"(
 name = "ten-lines"

@@ -390,7 +390,7 @@ TEST(SkySimulation, DeterministicAndSeparate) {
     };
     const auto first = run(options);
     EXPECT_EQ(first, run(options));
-    EXPECT_EQ(first, 0xa7739bd1279072c1ull);
+    EXPECT_EQ(first, 0xe3de50555ff0e671ull);
     SkyOptions other = options;
     other.layer = 1;
     EXPECT_NE(first, run(other));
