@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "automaton/random.h"
+#include "core/random.h"
 
 namespace nephos {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "automaton/automaton.h"
-#include "automaton/bytes.h"
 #include "automaton/options.h"
+#include "core/bytes.h"
 
 namespace nephos {
 

@@ -12,11 +12,11 @@
 #include "automaton/advection.h"
 #include "automaton/air_parcels.h"
 #include "automaton/block_field.h"
-#include "automaton/bytes.h"
-#include "automaton/error.h"
 #include "automaton/kernels.h"
-#include "automaton/random.h"
-#include "automaton/text.h"
+#include "core/bytes.h"
+#include "core/error.h"
+#include "core/random.h"
+#include "core/text.h"
 
 namespace nephos {
 namespace {

@@ -6,13 +6,13 @@
 
 #include <xxhash.h>
 
-#include "automaton/atomic_file.h"
-#include "automaton/available_memory.h"
-#include "automaton/bytes.h"
-#include "automaton/descriptor.h"
-#include "automaton/error.h"
-#include "automaton/random.h"
-#include "automaton/text.h"
+#include "core/atomic_file.h"
+#include "core/available_memory.h"
+#include "core/bytes.h"
+#include "core/descriptor.h"
+#include "core/error.h"
+#include "core/random.h"
+#include "core/text.h"
 
 namespace nephos {
 namespace {

@@ -17,7 +17,8 @@
 #include <limits>
 #include <vector>
 
-#include "automaton/lattice.h"
+#include "core/range.h"
+#include "core/vec.h"
 
 namespace nephos {
 
@@ -33,7 +34,7 @@ inline constexpr double kForever = std::numeric_limits<double>::infinity();
 
 // One parcel of air.
 struct Ellipsoid {
-    Vec3 centre_m;                    // at its birth, or at time 0 if that is later
+    Vec3 centre_m{};                  // at its birth, or at time 0 if that is later
     Vec3 semi_axes_m{500, 500, 300};  // > 0, before the turn by yaw
     double yaw_deg = 0;               // turn about the vertical, counter-clockwise seen from above
     Probabilities centre{0.1, 0.001, 0.1};
@@ -44,12 +45,6 @@ struct Ellipsoid {
     double fade_out_s = 0;     // linear; ends at birth_s + life_s
     bool carried = true;       // moves with the wind at its centre's height; otherwise fixed
     bool operator==(const Ellipsoid&) const = default;
-};
-
-// A closed range from which a uniform number is drawn; min <= max.
-struct Range {
-    double min = 0, max = 0;
-    bool operator==(const Range&) const = default;
 };
 
 // Ellipsoids drawn at random from the scene's seed.

@@ -5,7 +5,7 @@
 #include <bit>
 #include <numeric>
 
-#include "automaton/error.h"
+#include "core/error.h"
 
 namespace nephos {
 namespace {

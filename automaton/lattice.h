@@ -20,13 +20,9 @@
 #include <span>
 #include <vector>
 
-namespace nephos {
+#include "core/vec.h"
 
-// A point or vector in world space (metres unless said otherwise): x east, y north, z up, right-handed.
-struct Vec3 {
-    double x = 0, y = 0, z = 0;
-    bool operator==(const Vec3&) const = default;
-};
+namespace nephos {
 
 // Number of cells along each axis; each 1..65536.
 struct Extent {
@@ -113,7 +109,7 @@ struct Lattice {
 
 // How cells lie in the world. The centre of cell (i, j, k) is origin_m + (i+0.5, j+0.5, k+0.5) * cell_size_m.
 struct Placement {
-    Vec3 origin_m;  // world position of the lower corner of cell (0, 0, 0); z = height above ground
+    Vec3 origin_m{};  // world position of the lower corner of cell (0, 0, 0); z = height above ground
     double cell_size_m = 50.0;  // edge of a cubic cell, > 0
     bool operator==(const Placement&) const = default;
 };

@@ -7,8 +7,8 @@
 #include <string_view>
 
 #include "automaton/air_parcels.h"
-#include "automaton/error.h"
-#include "automaton/text.h"
+#include "core/error.h"
+#include "core/text.h"
 
 namespace nephos {
 namespace {

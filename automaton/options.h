@@ -9,7 +9,7 @@
 
 #include "automaton/field.h"
 #include "automaton/lattice.h"
-#include "automaton/wind.h"
+#include "core/wind.h"
 
 namespace nephos {
 

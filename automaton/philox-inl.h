@@ -17,7 +17,7 @@
 
 #include <hwy/highway.h>
 
-#include "automaton/random.h"
+#include "core/random.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {

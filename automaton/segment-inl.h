@@ -18,7 +18,7 @@
 
 #include "automaton/kernels.h"
 #include "automaton/philox-inl.h"
-#include "automaton/random.h"
+#include "core/random.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -74,8 +74,8 @@ struct BirthScratch {
     // segments.
     std::uint64_t events[3][64][kSegmentWords] = {};
     alignas(64) CellBits
-        dense_events[3][kSegmentBlocks] = {};          // those of the dense draws; 0 between segments
-    alignas(64) CellBits cloud[kSegmentBlocks];        // cells that are cld, see cloud_of_block()
+        dense_events[3][kSegmentBlocks] = {};            // those of the dense draws; 0 between segments
+    alignas(64) CellBits cloud[kSegmentBlocks];          // cells that are cld, see cloud_of_block()
     std::uint64_t counters[kMaxCounters + kMaxLanes64];  // packed, see philox-inl.h
     std::uint32_t
         words[4 * (kMaxCounters + kMaxLanes64) + 32];  // 32 more: the last vector of events reads beyond

@@ -8,8 +8,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include "automaton/error.h"
-#include "automaton/text.h"
+#include "core/error.h"
+#include "core/text.h"
 #include "density/openvdb_access.h"
 
 namespace nephos {
@@ -24,7 +24,7 @@ constexpr double kWhole = 1e-6;
 // From the common box's voxels to those of one grid: source = scale * common + offset, both at voxel centres.
 struct Mapping {
     double scale = 1;
-    Vec3 offset;
+    Vec3 offset{};
     bool exact = false;  // source and common voxels are the same ones, moved by `shift`
     Coord shift;         // common = source + shift
 };

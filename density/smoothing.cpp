@@ -8,8 +8,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include "automaton/error.h"
-#include "automaton/text.h"
+#include "core/error.h"
+#include "core/text.h"
 #include "density/openvdb_access.h"
 #include "density/smoothing_kernel.h"
 

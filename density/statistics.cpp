@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
-#include "automaton/error.h"
-#include "density/bit_count.h"
+#include "core/bit_count.h"
+#include "core/error.h"
 #include "density/openvdb_access.h"
 
 namespace nephos {

@@ -8,10 +8,10 @@
 
 #include <tbb/parallel_for.h>
 
-#include "automaton/error.h"
-#include "automaton/smoothstep.h"
-#include "automaton/trigonometry.h"
-#include "density/noise_hash.h"
+#include "core/error.h"
+#include "core/noise_hash.h"
+#include "core/smoothstep.h"
+#include "core/trigonometry.h"
 #include "density/openvdb_access.h"
 #include "density/veil_kernel.h"
 
@@ -274,7 +274,7 @@ Vec3 wind_displacement_m(const Wind& wind, double height_m, double time_s) {
         if (key.time_s > times.front() && key.time_s < std::max(0.0, time_s)) times.push_back(key.time_s);
     }
     std::ranges::sort(times);
-    Vec3 way;
+    Vec3 way{};
     for (std::size_t n = 1; n < times.size(); ++n) {
         const Velocity from = wind_at(wind, height_m, times[n - 1]), to = wind_at(wind, height_m, times[n]);
         const double half = (times[n] - times[n - 1]) / 2;

@@ -10,7 +10,7 @@
 //     X_k     = b_k N((p_k - v_k t) / a_k) + c_k
 //     p_0     = p,  p_k = p_{k-1} + N_{k-1} s_k        with displacement (cirrus, cirrostratus), else p_k = p
 //
-// N is the gradient noise of density/noise.h, another one for each octave. S multiplies by a frequency; here
+// N is the gradient noise of core/noise.h, another one for each octave. S multiplies by a frequency; here
 // a_k is the wavelength, for each direction its own, so that cirrus has fibres along the wind.
 //
 // The frame of the noise. p is counted along and across the fibres and up, from a point that the wind at the
@@ -26,13 +26,13 @@
 // top_m, 1 between the soft ends) and by the fade towards the sides of the lattice. Densities below 2^-10 are
 // 0.
 //
-// The same bits on every machine, for any number of threads and with any vector width: see density/noise.h.
+// The same bits on every machine, for any number of threads and with any vector width: see core/noise.h.
 // All functions are pure and thread-safe.
 
 #include <cstdint>
 #include <vector>
 
-#include "automaton/wind.h"
+#include "core/wind.h"
 #include "density/density_grid.h"
 
 namespace nephos {
@@ -43,8 +43,8 @@ enum class VeilForm { cumulus, stratus, cirrus, cirrostratus };
 struct VeilOctave {
     Vec3 wavelength_m{4000, 4000, 4000};  // size of a lattice cell of the noise [1/a], > 0
     double weight = 1;                    // [w]; S: falls from octave to octave
-    Vec3 velocity_m_per_s;            // relative to the wind [v]: octaves that slide over each other evolve
-    Vec3 displacement_m;              // of this octave's point per value of the octave before [s]
+    Vec3 velocity_m_per_s{};          // relative to the wind [v]: octaves that slide over each other evolve
+    Vec3 displacement_m{};            // of this octave's point per value of the octave before [s]
     double gain = 1.5, offset = 0.5;  // [b], [c]: X lies about 0..1
     double ridge = 0.5, crest = 0.5;  // [r], [o]: of the ridged form alone
     bool operator==(const VeilOctave&) const = default;

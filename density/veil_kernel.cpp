@@ -14,7 +14,7 @@
 //
 #include <hwy/highway.h>
 
-#include "density/noise_vectors-inl.h"
+#include "core/noise_vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <string>
 
-#include "automaton/error.h"
-#include "automaton/text.h"
+#include "core/error.h"
+#include "core/text.h"
 #include "density/veil.h"
 
 namespace nephos {

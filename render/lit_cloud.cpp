@@ -10,7 +10,7 @@
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
 
-#include "render/processor_light.h"
+#include "render/cpu/processor_light.h"
 
 namespace nephos {
 namespace {
@@ -76,8 +76,8 @@ LightKey light_key(const MetaballCloud& cloud, const RenderOptions& options) {
     return {balls.low64 ^ hash.low64, balls.high64 ^ hash.high64};
 }
 
-bool keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
-                const DetailView& view) {
+bool cache_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
+                 const DetailView& view) {
     const LightKey key = light_key(cloud, options);
     const bool is_known = kept.shadow_size != 0 && key == kept.key;
     if (is_known) kept.given.metaballs = cloud.metaballs;  // the same values, perhaps elsewhere
@@ -134,10 +134,10 @@ bool light_seen(LitCloud& kept, const std::vector<std::uint32_t>& source,
     kept.all_known =
         std::ranges::count(kept.known_light, 0) == 0 && std::ranges::count(kept.known_tiles, 0) == 0;
 
-    SunOrder order;
+    LightSortedSplats order;
     {
         const StageTimer timer(times, DrawStage::sun_order);
-        order = order_from_sun(kept.cloud, kept.frame, kept.shadow_size);
+        order = sort_for_light(kept.cloud, kept.frame, kept.shadow_size);
     }
     if (times != nullptr)  // as for the order from the eye
         (*times)[DrawStage::sun_order].bytes = order.splats.size() * (2 * sizeof(Metaball) + 7 * 8 + 28);

@@ -9,11 +9,11 @@
 #include <optional>
 #include <vector>
 
-#include "render/cloud_preparation.h"
-#include "render/level_of_detail.h"
-#include "render/options.h"
-#include "render/picture.h"
-#include "render/stage_times.h"
+#include "render/cloud/cloud_preparation.h"
+#include "render/cloud/level_of_detail.h"
+#include "render/cloud/stage_times.h"
+#include "render/image/picture.h"
+#include "render/options/options.h"
 
 namespace nephos {
 
@@ -43,8 +43,8 @@ struct LitCloud {
 // Makes `kept` that of a cloud as it is drawn from a view, without its light, unless it is already. `cloud`
 // must live as long as `kept` is read. Another view keeps the light if it merges the same metaballs, as it
 // does without level of detail. Returns whether the light was kept.
-bool keep_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
-                const DetailView& view);
+bool cache_cloud(LitCloud& kept, const MetaballCloud& cloud, const RenderOptions& options,
+                 const DetailView& view);
 
 // Computes on the processor what is missing of the light of the balls numbered `source` whose `seen_balls` is
 // not 0, and of the map's tiles whose `seen_tiles` is not 0; of all of it if `seen_balls` is null or if

@@ -9,13 +9,13 @@
 #include <optional>
 #include <utility>
 
-#include "automaton/available_memory.h"
-#include "automaton/error.h"
-#include "automaton/text.h"
-#include "render/attenuation_texture.h"
+#include "core/available_memory.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "render/blended/attenuation_texture.h"
+#include "render/frame/scattering_table.h"
+#include "render/ground/wet_ground.h"
 #include "render/renderer_impl.h"
-#include "render/scattering_table.h"
-#include "render/wet_ground.h"
 
 namespace nephos {
 namespace {
@@ -131,7 +131,7 @@ LightTiles& Renderer::Impl::light_on_device() {
 // D, step 1, in compute shaders.
 void Renderer::Impl::pass_sunlight(LitCloud& kept) {
     settle();
-    const SunOrder order = order_from_sun(kept.cloud, kept.frame, kept.shadow_size);
+    const LightSortedSplats order = sort_for_light(kept.cloud, kept.frame, kept.shadow_size);
     if (kept.cloud.visible.empty()) {  // on the device the smallest map will do
         std::vector<float> small;
         light_on_device().run(gpu, order, 16, small);
@@ -155,7 +155,7 @@ void Renderer::Impl::absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks
 
 // What is missing of the light that the picture needs, and the lightning.
 std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOptions& options,
-                                            const EyeOrder& order, const SeenLight* seen) {
+                                            const ViewSortedSplats& order, const VisibleSet* seen) {
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     const bool absorbs = options.light.lighting == Lighting::cfa && !lit.all_known;
     std::optional<DensityBlocks> blocks;
@@ -215,7 +215,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
     {
         const StageTimer timer(&times, DrawStage::prepare);
         // The key says nothing of the view, from which others may be merged.
-        if (!keep_cloud(lit, splats.metaballs, options, drawing.detail)) {
+        if (!cache_cloud(lit, splats.metaballs, options, drawing.detail)) {
             map_on_device.reset();
             light_changed();
             cloud_is_near = lists == TileLists::device && is_near_enough(lit.cloud);
@@ -264,14 +264,14 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
 void Renderer::Impl::draw_ordered(const Splats& splats, const RenderOptions& options,
                                   const CameraFrame& camera, const std::vector<PartFrame>& parts,
                                   Picture& picture) {
-    EyeOrder order;
+    ViewSortedSplats order;
     {
-        const StageTimer timer(&times, DrawStage::eye_order);
-        order = order_from_eye(lit.cloud, splats, camera, pixels_per_unit(options.camera, camera),
-                               options.ground);
+        const StageTimer timer(&times, DrawStage::view_sorting);
+        order =
+            sort_for_view(lit.cloud, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
     }
     // Balls are read twice; keys move through memory three times, and back and forth.
-    times[DrawStage::eye_order].bytes =
+    times[DrawStage::view_sorting].bytes =
         lit.cloud.metaballs.size_bytes() +
         order.balls.size() * (sizeof(Metaball) + 7 * 8 + sizeof(shader::ViewBall));
     if (on_processor())
@@ -287,7 +287,7 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
     if (!lit.merged.empty()) {
         RenderOptions given = options;
         given.level_of_detail.pixels = 0;
-        keep_cloud(whole, splats.metaballs, given, {});
+        cache_cloud(whole, splats.metaballs, given, {});
         light_all(whole, splats, given);
         known = &whole;
     }
@@ -333,39 +333,39 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
 
 void Renderer::Impl::draw_on_processor(const Splats& splats, const RenderOptions& options,
                                        const CameraFrame& camera, const std::vector<PartFrame>& parts,
-                                       EyeOrder& order, Picture& picture) {
+                                       ViewSortedSplats& order, Picture& picture) {
     std::vector<ProcessorView> views;
     for (const PartFrame& part : parts)
         views.emplace_back(options, camera, part.frame, part.tile, order, BatchLimits{}, &times);
-    std::optional<SeenLight> seen;
+    std::optional<VisibleSet> seen;
     if (!splats.light && !lit.all_known) {
         seen.emplace(order, lit.shadow_size);
-        for (ProcessorView& view : views) view.look(lit.shadow_size, *seen);
+        for (ProcessorView& view : views) view.find_visible(lit.shadow_size, *seen);
         if (has_shells(options, lit.cloud)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
     }
-    const SeenLight* const known = seen ? &*seen : nullptr;
+    const VisibleSet* const known = seen ? &*seen : nullptr;
     const std::vector<float> lightning = light_up(splats, options, order, known);
     set_light(order, {lit.sun_depths, lightning});
     const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
-                                        splats.time_s, fog_noise, kept_shade);
+                                        splats.time_s, fog_noise, shade_cache);
     for (ProcessorView& view : views) view.draw(picture, lit.shadow.data(), lit.shadow_size, shells, known);
 }
 
 void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& options,
                                     const CameraFrame& camera, const std::vector<PartFrame>& parts,
-                                    EyeOrder& order, Picture& picture) {
+                                    ViewSortedSplats& order, Picture& picture) {
     const std::vector<float> lightning = light_up(splats, options, order, nullptr);
     set_light(order, {lit.sun_depths, lightning});
     const GpuImage& map = light_on_device().shadow_map();
     const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
-                                        splats.time_s, fog_noise, kept_shade);
+                                        splats.time_s, fog_noise, shade_cache);
     const bool tiles = splatting == Splatting::tiles;
     const StageTimer timer(&times, DrawStage::view);
     const auto prepared = [&](auto& passes) -> auto& {
         const ShaderVariant variant{.physical_sky = sky != nullptr,
                                     .shells = shells.any(),
                                     .fog = shells.has_fog(),
-                                    .puffs = tiles && !order.puffs.empty()};
+                                    .billboards = tiles && !order.billboards.empty()};
         auto& pass = passes[variant.physical_sky ? 1 : 0][shells.has_fog() ? 2 : shells.any() ? 1 : 0];
         if (!pass) pass.emplace(gpu, layout, attenuation_on_device(), clamped, variant);
         if (sky != nullptr) pass->use_sky(gpu, image_of(*sky), clamped);
@@ -375,7 +375,7 @@ void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& o
         return *pass;
     };
     if (tiles) {
-        ViewTiles& pass = prepared(view_tiles[order.puffs.empty() ? 0 : 1]);
+        ViewTiles& pass = prepared(view_tiles[order.billboards.empty() ? 0 : 1]);
         for (const PartFrame& part : parts)
             pass.draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
         return;
@@ -454,7 +454,7 @@ PendingPicture::PendingPicture(std::unique_ptr<State> state) : state_(std::move(
 PendingPicture::PendingPicture(PendingPicture&&) noexcept = default;
 PendingPicture& PendingPicture::operator=(PendingPicture&&) noexcept = default;
 PendingPicture::~PendingPicture() = default;
-bool PendingPicture::on_its_way() const { return state_ && state_->view != nullptr; }
+bool PendingPicture::is_pending() const { return state_ && state_->view != nullptr; }
 
 const StageTimes& Renderer::times() const { return impl_->times; }
 

@@ -6,17 +6,17 @@
 #include <optional>
 #include <vector>
 
-#include "render/light_tiles.h"
-#include "render/listed_view.h"
+#include "render/atmosphere/sky_light.h"
+#include "render/blended/view_pass.h"
+#include "render/cloud/voxel_absorption.h"
+#include "render/cpu/processor_light.h"
+#include "render/cpu/processor_view.h"
+#include "render/gpu/sky_image.h"
 #include "render/lit_cloud.h"
-#include "render/processor_light.h"
-#include "render/processor_view.h"
 #include "render/renderer.h"
-#include "render/sky_image.h"
-#include "render/sky_light.h"
-#include "render/view_pass.h"
-#include "render/view_tiles.h"
-#include "render/voxel_absorption.h"
+#include "render/vulkan/light_tiles.h"
+#include "render/vulkan/listed_view.h"
+#include "render/vulkan/view_tiles.h"
 
 namespace nephos {
 
@@ -54,14 +54,14 @@ struct Renderer::Impl {
     };
     void pass_sunlight(LitCloud& kept);
     void absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks, const RenderOptions& options);
-    std::vector<float> light_up(const Splats& splats, const RenderOptions& options, const EyeOrder& order,
-                                const SeenLight* seen);
+    std::vector<float> light_up(const Splats& splats, const RenderOptions& options,
+                                const ViewSortedSplats& order, const VisibleSet* seen);
     void light_all(LitCloud& cloud, const Splats& splats, const RenderOptions& options);
     void hand_out_light(const Splats& splats, const RenderOptions& options, Picture& picture);
     void put_map_on_device();
     void use_scattering(const CloudLight& light);
     void draw_on_processor(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
-                           const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
+                           const std::vector<PartFrame>& parts, ViewSortedSplats& order, Picture& picture);
     // From the order that the host makes.
     void draw_ordered(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
                       const std::vector<PartFrame>& parts, Picture& picture);
@@ -74,19 +74,19 @@ struct Renderer::Impl {
     void begin_listed(Drawing& drawing, const CameraFrame& camera, const std::vector<PartFrame>& parts);
     bool uses_lists(const Drawing& drawing, const CameraFrame& camera);
     ListedView& lists_on_device();
-    // Before what pictures on their way look at changes.
+    // Before what frames in flight look at changes.
     void settle() {
         if (listed_view) listed_view->settle();
     }
     void draw_on_device(const Splats& splats, const RenderOptions& options, const CameraFrame& camera,
-                        const std::vector<PartFrame>& parts, EyeOrder& order, Picture& picture);
+                        const std::vector<PartFrame>& parts, ViewSortedSplats& order, Picture& picture);
     const GpuImage& image_of(const SkyLight& sky);
     const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
     bool uses_device_lists() const { return splatting == Splatting::tiles && lists == TileLists::device; }
     bool on_processor() const { return splatting == Splatting::processor; }
     LightTiles& light_on_device();
     // What was made from the light before is of no use any more.
-    void light_changed() { cloud_on_device = kept_shade.known = false; }
+    void light_changed() { cloud_on_device = shade_cache.known = false; }
 
     LitCloud lit;                           // of the last picture
     std::optional<LightKey> map_on_device;  // whose map it is; reset when that map changes
@@ -113,7 +113,7 @@ struct Renderer::Impl {
     // Whose metaballs are there, with whatever light: a key as of one and the same sun; none: unknown.
     std::optional<LightKey> metaballs_on_device;
     FogNoise fog_noise;
-    KeptShade kept_shade;
+    ShadeCache shade_cache;
     std::optional<SkyImage> sky_image;
     SkyLights sky_lights;
     const SkyLight* sky = nullptr;  // of the picture that is drawn; null: gradient

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "render/half_floats.h"
 #include "render/renderer_impl.h"
+#include "render/shared/half_floats.h"
 
 namespace nephos {
 ListedView& Renderer::Impl::lists_on_device() {
@@ -57,7 +57,7 @@ void Renderer::Impl::begin_listed(Drawing& drawing, const CameraFrame& camera,
         view.use_flash(shares);
     }
     const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
-                                        splats.time_s, fog_noise, kept_shade);
+                                        splats.time_s, fog_noise, shade_cache);
     if (shells.any()) view.use_shade(shells.shade, shells.serial);
     const StageTimer timer(&times, DrawStage::view);
     const ListedPicture what{

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "render/renderer.h"
-#include "render/shaders/shared.h"
+#include "render/shared/shared.h"
 
 namespace nephos {
 

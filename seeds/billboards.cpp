@@ -5,8 +5,9 @@
 
 namespace nephos {
 
-std::vector<Billboard> strew_billboards(const BaseModel& model, const Cloud& cloud, std::uint64_t scene_seed,
-                                        std::uint32_t model_index, std::uint32_t number) {
+std::vector<Billboard> scatter_billboards(const BaseModel& model, const Cloud& cloud,
+                                          std::uint64_t scene_seed, std::uint32_t model_index,
+                                          std::uint32_t number) {
     std::size_t total = 0;
     for (const SeedBox& box : cloud.boxes) total += std::size_t(box.billboards);
     std::vector<Billboard> result;

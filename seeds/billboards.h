@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// T's billboards: strewn in the boxes of a cloud, for pictures of clouds without an automaton.
+// T's billboards: scattered in the boxes of a cloud, for pictures of clouds without an automaton.
 
 #include <cstdint>
 #include <vector>
@@ -12,7 +12,7 @@
 namespace nephos {
 
 struct Billboard {
-    Vec3 centre_m;  // model space; uniform in its box
+    Vec3 centre_m{};  // model space; uniform in its box
     double width_m = 0, height_m = 0;
     std::uint32_t box = 0;  // index in Cloud::boxes: its absorbed light, its phase
     BillboardTexture texture = BillboardTexture::soft;
@@ -21,7 +21,8 @@ struct Billboard {
 };
 
 // All billboards of the cloud that reproduce() made from the same arguments, box by box; a pure function.
-std::vector<Billboard> strew_billboards(const BaseModel& model, const Cloud& cloud, std::uint64_t scene_seed,
-                                        std::uint32_t model_index, std::uint32_t number);
+std::vector<Billboard> scatter_billboards(const BaseModel& model, const Cloud& cloud,
+                                          std::uint64_t scene_seed, std::uint32_t model_index,
+                                          std::uint32_t number);
 
 }  // namespace nephos

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <string>
 
-#include "automaton/error.h"
 #include "automaton/field.h"
-#include "automaton/text.h"
+#include "core/error.h"
+#include "core/text.h"
 
 namespace nephos {
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "automaton/vector_math.h"
+#include "core/trigonometry.h"
+#include "core/vec.h"
 #include "seeds/checks.h"
-#include "automaton/trigonometry.h"
 
 namespace nephos {
 namespace {

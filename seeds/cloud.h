@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A cloud of T: boxes (seeds) in which billboards are strewn, its centre and its radius; how it forms and
+// A cloud of T: boxes (seeds) in which billboards are scattered, its centre and its radius; how it forms and
 // dissolves; and which clouds a camera can see.
 //
 // Model space: metres, axes as in the world, origin where the base model has it; z = 0 is the height of the
@@ -12,14 +12,14 @@
 #include <span>
 #include <vector>
 
-#include "automaton/lattice.h"
+#include "core/vec.h"
 
 namespace nephos {
 
 // One box, axis-parallel in the world as well: T never turns boxes, which is what its slab test rests on.
 struct SeedBox {
-    Vec3 centre_m;           // model space
-    Vec3 size_m;             // edges, > 0
+    Vec3 centre_m{};         // model space
+    Vec3 size_m{};           // edges, > 0
     std::uint32_t seed = 0;  // index in BaseModel::seeds whose texture, sizes and strength it has
     int level = 0;           // 0: the artist's own seed; n: made in reproduction n
     int billboards = 0;      // drawn for this box
@@ -49,13 +49,13 @@ inline double phase_weight(double distance, double phase, double softness) {
 }
 
 struct Sphere {
-    Vec3 centre_m;
+    Vec3 centre_m{};
     double radius_m = 0;
 };
 
 // Points p with dot(normal, p) + offset >= 0 are inside; |normal| = 1.
 struct Plane {
-    Vec3 normal;
+    Vec3 normal{};
     double offset_m = 0;
 };
 
@@ -67,7 +67,7 @@ struct Frustum {
 };
 
 struct FrustumView {
-    Vec3 eye_m;
+    Vec3 eye_m{};
     Vec3 forward{0, 1, 0};              // any length > 0
     Vec3 up{0, 0, 1};                   // not parallel to forward
     double fov_y_deg = 60;              // full vertical angle, 0 < fov < 180

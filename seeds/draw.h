@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Randomness of clouds and skies: Philox counters of the domains `seeds` and `skies` (automaton/random.h),
+// Randomness of clouds and skies: Philox counters of the domains `seeds` and `skies` (core/random.h),
 // each a pure function of what is drawn, so that cloud 7 of a base model is the same whoever asks and in any
 // order.
 //
@@ -15,7 +15,7 @@
 #include <cstdint>
 
 #include "automaton/field.h"
-#include "automaton/random.h"
+#include "core/random.h"
 
 namespace nephos {
 

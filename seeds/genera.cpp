@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "automaton/error.h"
+#include "core/error.h"
 
 namespace nephos {
 namespace {

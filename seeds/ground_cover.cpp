@@ -86,18 +86,18 @@ GroundCoverMap mix(const GroundCoverMap& from, const GroundCoverMap& to, double 
     return map;
 }
 
-Drift drift_m(const Wind& wind, double time_s, double base_m, double ground_m, double fall_speed_m_per_s) {
+Vec2 drift_m(const Wind& wind, double time_s, double base_m, double ground_m, double fall_speed_m_per_s) {
     constexpr int kSlices = 32;
     const double slice_m = (base_m - ground_m) / kSlices;
     if (!(slice_m > 0) || std::isinf(fall_speed_m_per_s)) return {};
-    Drift drift;
+    Vec2 drift{};
     for (int n = 0; n < kSlices; ++n) {
         const Velocity velocity = wind_at(wind, ground_m + (n + 0.5) * slice_m, time_s);
-        drift.x_m += velocity.east_m_per_s;
-        drift.y_m += velocity.north_m_per_s;
+        drift.x += velocity.east_m_per_s;
+        drift.y += velocity.north_m_per_s;
     }
     const double seconds = slice_m / fall_speed_m_per_s;
-    return {drift.x_m * seconds, drift.y_m * seconds};
+    return {drift.x * seconds, drift.y * seconds};
 }
 
 GroundCover::GroundCover(const GroundCoverOptions& options, PrecipitationKind kind,
@@ -125,22 +125,22 @@ void GroundCover::expose(std::span<const FallingRain> falling) {
 }
 
 // The texels in the rectangle around the ellipse.
-void GroundCover::rain_on(const RainArea& area, const Drift& drift) {
+void GroundCover::rain_on(const RainArea& area, const Vec2& drift) {
     const double a = area.semi_a_m, b = area.semi_b_m;
     const double reach_x = std::sqrt(a * a * area.axis_x * area.axis_x + b * b * area.axis_y * area.axis_y),
                  reach_y = std::sqrt(a * a * area.axis_y * area.axis_y + b * b * area.axis_x * area.axis_x);
     const auto texel = [](double from_corner_m, double size_m, int count) {
         return int(std::clamp(std::floor(from_corner_m / size_m), 0.0, double(count)));
     };
-    const double x = area.x_m + drift.x_m - map_.x_m, y = area.y_m + drift.y_m - map_.y_m;
+    const double x = area.x_m + drift.x - map_.x_m, y = area.y_m + drift.y - map_.y_m;
     const int first_column = texel(x - reach_x, map_.texel_x_m, map_.columns),
               end_column = texel(x + reach_x + map_.texel_x_m, map_.texel_x_m, map_.columns),
               first_row = texel(y - reach_y, map_.texel_y_m, map_.rows),
               end_row = texel(y + reach_y + map_.texel_y_m, map_.texel_y_m, map_.rows);
     for (int row = first_row; row < end_row; ++row) {
-        const double from_y = map_.y_m + (row + 0.5) * map_.texel_y_m - drift.y_m;
+        const double from_y = map_.y_m + (row + 0.5) * map_.texel_y_m - drift.y;
         for (int column = first_column; column < end_column; ++column) {
-            const double from_x = map_.x_m + (column + 0.5) * map_.texel_x_m - drift.x_m;
+            const double from_x = map_.x_m + (column + 0.5) * map_.texel_x_m - drift.x;
             float& rain =
                 map_.rain_mm_per_h[std::size_t(row) * std::size_t(map_.columns) + std::size_t(column)];
             rain = std::max(rain, float(rain_at(area, from_x, from_y, options_.edge)));

@@ -25,8 +25,8 @@
 #include <span>
 #include <vector>
 
-#include "automaton/precipitation_kind.h"
-#include "automaton/wind.h"
+#include "core/weather.h"
+#include "core/wind.h"
 #include "seeds/rain_area.h"
 #include "seeds/sky.h"
 
@@ -81,15 +81,12 @@ GroundCoverMap mix(const GroundCoverMap& from, const GroundCoverMap& to, double 
 //     the integral of wind(z) / fall speed from ground_m to base_m, of 32 slices
 //
 // Drops are as fast as the air at every height. Zero when the base is not above the ground. Pure.
-struct Drift {
-    double x_m = 0, y_m = 0;
-};
-Drift drift_m(const Wind& wind, double time_s, double base_m, double ground_m, double fall_speed_m_per_s);
+Vec2 drift_m(const Wind& wind, double time_s, double base_m, double ground_m, double fall_speed_m_per_s);
 
 // Rain areas whose drops drift alike: those of one layer.
 struct FallingRain {
     std::span<const RainArea> areas;
-    Drift drift;
+    Vec2 drift{};  // metres
 };
 
 class GroundCover {
@@ -108,7 +105,7 @@ class GroundCover {
     void restore(GroundCoverMap map);
 
   private:
-    void rain_on(const RainArea& area, const Drift& drift);
+    void rain_on(const RainArea& area, const Vec2& drift);
 
     GroundCoverOptions options_;
     PrecipitationKind kind_;

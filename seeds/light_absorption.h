@@ -46,7 +46,7 @@ std::vector<double> absorbed_light(const Cloud& cloud, const Vec3& position_m, c
 struct CloudToLight {
     std::uint64_t id = 0;          // the same cloud has the same id in every call
     const Cloud* cloud = nullptr;  // not null; shape of an id never changes
-    Vec3 position_m;
+    Vec3 position_m{};
     Light light;
 };
 

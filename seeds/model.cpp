@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/trigonometry.h"
 #include "seeds/checks.h"
 #include "seeds/draw.h"
-#include "automaton/trigonometry.h"
 
 namespace nephos {
 namespace {

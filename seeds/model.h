@@ -23,7 +23,8 @@
 #include <vector>
 
 #include "automaton/field.h"
-#include "automaton/lattice.h"
+#include "core/vec.h"
+#include "core/weather.h"
 #include "seeds/cloud.h"
 #include "seeds/genera.h"
 
@@ -34,9 +35,6 @@ struct CountRange {
     int min = 0, max = 0;
     bool operator==(const CountRange&) const = default;
 };
-
-// Procedural texture of a billboard.
-enum class BillboardTexture { soft, wispy, dense };
 
 // How far one reproduction level reaches.
 enum class RootRadius {
@@ -57,9 +55,9 @@ struct Root {
 };
 
 struct Seed {
-    Vec3 position_m;                   // of the box's centre, model space
+    Vec3 position_m{};                 // of the box's centre, model space
     Vec3 size_m{100, 100, 100};        // width (x), depth (y), height (z), each > 0
-    CountRange billboards{1, 1};       // strewn in each box of this seed, 0..10000
+    CountRange billboards{1, 1};       // scattered in each box of this seed, 0..10000
     Range billboard_width_m{30, 50};   // > 0
     Range billboard_height_m{30, 50};  // > 0
     BillboardTexture texture = BillboardTexture::soft;
@@ -88,7 +86,7 @@ void check(const BaseModel& model);
 
 // The directions of a root, orthonormal: ahead, towards growing yaw, and towards growing pitch. Pure.
 struct RootAxes {
-    Vec3 ahead, side, up;
+    Vec3 ahead{}, side{}, up{};
 };
 RootAxes axes_of(const Root& root);
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <map>
 
+#include "core/smoothstep.h"
+#include "core/trigonometry.h"
 #include "seeds/checks.h"
-#include "automaton/smoothstep.h"
-#include "automaton/trigonometry.h"
 
 namespace nephos {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "automaton/bytes.h"
+#include "core/bytes.h"
 #include "seeds/checks.h"
 
 namespace nephos {

@@ -23,7 +23,7 @@
 #include <span>
 #include <vector>
 
-#include "automaton/lattice.h"
+#include "core/vec.h"
 #include "seeds/rain_area.h"
 
 namespace nephos {

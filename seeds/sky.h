@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "automaton/wind.h"
+#include "core/wind.h"
 #include "seeds/model.h"
 
 namespace nephos {

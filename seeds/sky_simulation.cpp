@@ -6,7 +6,7 @@
 #include <cmath>
 #include <unordered_set>
 
-#include "automaton/bytes.h"
+#include "core/bytes.h"
 #include "seeds/checks.h"
 #include "seeds/climate.h"
 #include "seeds/draw.h"

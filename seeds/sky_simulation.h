@@ -5,7 +5,7 @@
 // enter it on the opposite side; those that enter now come from the skies that bracket the state of the
 // atmosphere, so that a change of weather comes over the horizon, while the clouds that are there stay.
 //
-//     SkySimulation sky(options);       // strewn at random, from the sky nearest to the initial state
+//     SkySimulation sky(options);       // scattered at random, from the sky nearest to the initial state
 //     sky.step();                       // together with the automaton's step
 //     for (const SkyCloud& cloud : sky.clouds()) ... sky.shape(cloud), sky.position_m(cloud), cloud.phase ...
 //
@@ -17,7 +17,7 @@
 // Wind that crosses the world in one step leaves none for longer than two steps. A sky without base models
 // lets no cloud enter: the other bracketing sky then has all of them.
 //
-// Positions are fixed-point sums of whole displacements (automaton/wind.h): nothing drifts, and the state can
+// Positions are fixed-point sums of whole displacements (core/wind.h): nothing drifts, and the state can
 // be saved and restored exactly. One object is one simulation; while a thread steps, others may call what
 // depends on the options alone: options(), shapes(), shape(), model(), position_m(), sphere() and ahead().
 
@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "automaton/checkpoint.h"
-#include "automaton/wind.h"
+#include "core/wind.h"
 #include "seeds/cloud.h"
 #include "seeds/sky.h"
 
@@ -115,7 +115,7 @@ class SkySimulation {
         first_shape_;  // [sky][entry of its models]: index of its number 0
     std::vector<SkyCloud> clouds_;
     std::uint64_t steps_ = 0;
-    std::uint32_t born_ = 0;       // clouds made so far, those entering, forming and strewn
+    std::uint32_t born_ = 0;       // clouds made so far, those entering, forming and scattered
     std::uint32_t dissolved_ = 0;  // clouds drawn to dissolve so far
     Displacement carried_;
 };

@@ -1,49 +1,117 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fails when a folder includes what it may not, a public header drags a heavy one along, or a source file lacks its
-licence line. The rules are the table below; the root of the source tree is the argument."""
+"""Fails when a folder includes what it may not, a header of another module is private, a public header drags a heavy
+one along, or a source file lacks its licence line. The rules are the tables below; the root of the source tree is the
+argument. With --self-test the checker itself is tested: it must see each kind of offence."""
 
 import functools
 import pathlib
 import re
 import sys
+import tempfile
 
-# Folder: the other folders that it may include.
+# Module: the modules that it may include. A module is a folder with a CMakeLists.txt of its own.
 MAY_USE = {
-    "automaton": set(),
-    "seeds": {"automaton"},
-    "density": {"automaton"},
-    "render": {"automaton", "density"},
-    "scenes": {"automaton", "seeds", "density", "render"},
-    "apps": {"automaton", "seeds", "density", "render", "scenes"},
+    "core": set(),
+    "automaton": {"core"},
+    "seeds": {"core", "automaton"},
+    "density": {"core", "automaton"},
+    "render/options": {"core"},
+    "render": {"core", "automaton", "density", "render/options"},
+    "scenes/format": {"core", "automaton", "seeds", "density", "render/options"},
+    "simulation": {"core", "automaton", "seeds", "density", "render", "render/options", "scenes/format"},
+    "apps/nephos": {"core", "automaton", "seeds", "density", "render", "render/options", "scenes/format", "simulation"},
 }
-# Start of a system header's name: the folders that may include it.
+# Folders of render/ from the lowest to the highest: each may include those of the rows above its own. The renderer's
+# own files, at the root of render/, may include all of them, and none of them may include these.
+RENDER_LAYERS = (
+    {"shared"},
+    {"options"},
+    {"image"},
+    {"atmosphere"},
+    {"cloud"},
+    {"frame"},
+    {"shading"},
+    {"gpu"},
+    {"vulkan", "cpu", "blended"},
+    {"rain", "ground"},
+)
+# render/shared/ is a leaf of plain structs that C++ and GLSL both read.
+LEAF = "render/shared/"
+# Start of a system header's name: the modules that may include it.
 LIBRARIES = {
     "openvdb/": {"density"},
     "vulkan/": {"render"},
     "OpenEXR/": {"render"},
     "Imf": {"render"},
     "png.h": {"render"},
-    "CLI/": {"apps"},
-    "toml++/": {"scenes"},
-    "Random123/": {"automaton", "seeds"},
-    "xxhash.h": {"automaton", "render", "scenes"},
+    "CLI/": {"apps/nephos"},
+    "toml++/": {"scenes/format"},
+    "Random123/": {"core", "automaton", "seeds"},
+    "xxhash.h": {"automaton", "render", "scenes/format"},
 }
-# Seconds and hundreds of megabytes each: never in a public header (those that the module's CMakeLists.txt lists).
+# Seconds and hundreds of megabytes each: never in a public header.
 HEAVY = ("openvdb/", "vulkan/")
 SOURCES = {".h", ".cpp", ".vert", ".frag", ".comp", ".glsl", ".py", ".sh"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
+def module_of(path):
+    """The module that a path from the root belongs to: the longest that matches; None outside of all."""
+    found = [module for module in MAY_USE if path.startswith(module + "/")]
+    return max(found, key=len, default=None)
+
+
 @functools.cache
-def public_headers(folder):
-    match = re.search(r"\bHEADERS\b([^)]*)\)", (folder / "CMakeLists.txt").read_text(encoding="utf-8"))
-    return set(match.group(1).split()) if match else set()
+def listed_headers(root, module, keyword):
+    """Paths from the root of the headers that a module's CMakeLists.txt lists after HEADERS or INTERNAL."""
+    text = (root / module / "CMakeLists.txt").read_text(encoding="utf-8")
+    call = re.search(r"nephos_module\(([^)]*)\)", text)
+    if not call:
+        return frozenset()
+    words = call.group(1).split()
+    current, found = None, set()
+    for word in words:
+        if word in ("SOURCES", "HEADERS", "INTERNAL"):
+            current = word
+        elif current == keyword:
+            found.add(f"{module}/{word}")
+    return frozenset(found)
+
+
+def render_layer(path):
+    """The row of RENDER_LAYERS of a path; one beyond the last for the renderer's own files."""
+    parts = path.split("/")
+    if len(parts) == 2:
+        return len(RENDER_LAYERS)
+    return next((row for row, folders in enumerate(RENDER_LAYERS) if parts[1] in folders), None)
+
+
+def include_problem(root, path, name):
+    """What is wrong with the file at `path` including the project's header `name`; None if nothing is."""
+    module, other = module_of(path), module_of(name)
+    if other is None:
+        return None
+    if path.startswith("render/") and name.startswith("render/"):
+        here, there = render_layer(path), render_layer(name)
+        if here is None or there is None:
+            return f"{path if here is None else name} stands in no folder of RENDER_LAYERS"
+        same_folder = pathlib.PurePath(path).parent == pathlib.PurePath(name).parent
+        if there > here or (there == here and not same_folder):
+            return f"{'/'.join(path.split('/')[:2])} may not include {name}, which stands above or beside it"
+    if name.startswith(LEAF) or module == other:
+        return None
+    if other not in MAY_USE[module]:
+        return f"{module}/ may not include {name}"
+    if name not in listed_headers(root, other, "HEADERS") | listed_headers(root, other, "INTERNAL"):
+        return f"{name} is private to {other}/"
+    return None
 
 
 def problems_of(root, file):
-    folder = file.relative_to(root).parts[0]
-    public = file.name in public_headers(root / folder)
+    path = file.relative_to(root).as_posix()
+    module = module_of(path)
+    public = path in listed_headers(root, module, "HEADERS")
     text = file.read_text(encoding="utf-8")
     if "SPDX-License-Identifier: Apache-2.0" not in "\n".join(text.splitlines()[:3]):
         yield "lacks the line SPDX-License-Identifier: Apache-2.0"
@@ -52,22 +120,68 @@ def problems_of(root, file):
         if not match:
             continue
         quoted, name = match.group(1) == '"', match.group(2)
-        other = name.split("/")[0]
-        if quoted and other in MAY_USE and other != folder and other not in MAY_USE[folder]:
-            yield f"line {number}: {folder}/ may not include {name}"
-        for library, folders in LIBRARIES.items():
-            if name.startswith(library) and folder not in folders:
-                yield f"line {number}: {folder}/ may not use {name}; {', '.join(sorted(folders))} may"
+        if quoted:
+            problem = include_problem(root, path, name)
+            if problem:
+                yield f"line {number}: {problem}"
+            if public and module_of(name) and not name.startswith(LEAF) and \
+                    name not in listed_headers(root, module_of(name), "HEADERS"):
+                yield f"line {number}: a public header includes {name}, which is not installed"
+        for library, modules in LIBRARIES.items():
+            if name.startswith(library) and module not in modules:
+                yield f"line {number}: {module}/ may not use {name}; {', '.join(sorted(modules))} may"
         if public and name.startswith(HEAVY):
             yield f"line {number}: {name} is too heavy for a public header"
 
 
+def problems(root):
+    files = sorted({file for module in MAY_USE for file in (root / module).rglob("*") if file.suffix in SOURCES})
+    return files, [f"{file.relative_to(root)}: {problem}" for file in files for problem in problems_of(root, file)]
+
+
+def self_test():
+    """A tree with one offence of each kind: every one must be seen, and what is allowed must not be."""
+    licence = "// SPDX-License-Identifier: Apache-2.0\n"
+    tree = {
+        "core/CMakeLists.txt": "nephos_module(core SOURCES a.cpp HEADERS error.h INTERNAL bytes.h)",
+        "automaton/CMakeLists.txt": "nephos_module(automaton HEADERS automaton.h heavy.h)",
+        "render/CMakeLists.txt": "nephos_module(render HEADERS renderer.h)",
+        "core/error.h": licence,
+        "core/bytes.h": licence,
+        "core/private.h": licence,
+        "core/up.h": licence + '#include "automaton/automaton.h"\n',
+        "automaton/automaton.h": licence + '#include "core/bytes.h"\n',
+        "automaton/heavy.h": licence + "#include <openvdb/openvdb.h>\n",
+        "automaton/step.cpp": licence + '#include "core/private.h"\n',
+        "automaton/fine.cpp": licence + '#include "core/bytes.h"\n#include "core/error.h"\n',
+        "render/renderer.h": licence,
+        "render/cloud/splats.h": licence + '#include "render/renderer.h"\n',
+        "render/cpu/view.h": licence + '#include "render/vulkan/lists.h"\n',
+        "render/vulkan/lists.h": licence + '#include "render/cloud/splats.h"\n',
+        "render/bare.cpp": "int x;\n",
+    }
+    expected = {"core/up.h", "automaton/automaton.h", "automaton/heavy.h", "automaton/step.cpp",
+                "render/cloud/splats.h", "render/cpu/view.h", "render/bare.cpp"}
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        for module in MAY_USE:
+            (root / module).mkdir(parents=True, exist_ok=True)
+        for path, text in tree.items():
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(text, encoding="utf-8")
+        found = {problem.split(":")[0] for problem in problems(root)[1]}
+    if found != expected:
+        sys.exit(f"seen {sorted(found)}, not {sorted(expected)}")
+    print(f"{len(expected)} offences seen")
+
+
 def main():
+    if sys.argv[1:] == ["--self-test"]:
+        return self_test()
     root = pathlib.Path(sys.argv[1])
-    files = [f for folder in MAY_USE for f in sorted((root / folder).rglob("*")) if f.suffix in SOURCES]
-    if len(files) < 50:
+    files, found = problems(root)
+    if len(files) < 300:
         sys.exit(f"only {len(files)} source files found below {root}: wrong folder?")
-    found = [f"{file.relative_to(root)}: {problem}" for file in files for problem in problems_of(root, file)]
     print("\n".join(found) or f"{len(files)} files keep the boundaries")
     sys.exit(1 if found else 0)
 

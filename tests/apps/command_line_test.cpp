@@ -7,13 +7,13 @@
 
 #include <gtest/gtest.h>
 
-#include "apps/arguments.h"
-#include "apps/commands.h"
-#include "apps/completion.h"
-#include "apps/framing.h"
-#include "apps/help.h"
-#include "apps/terminal.h"
-#include "automaton/error.h"
+#include "apps/nephos/arguments.h"
+#include "apps/nephos/commands.h"
+#include "apps/nephos/completion.h"
+#include "apps/nephos/help.h"
+#include "apps/nephos/terminal.h"
+#include "core/error.h"
+#include "simulation/framing.h"
 
 namespace nephos {
 namespace {

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives the `nephos` command as a user would. NEPHOS names the binary, SOURCE the source tree.
 
-    NEPHOS=build/release/apps/nephos SOURCE=. /usr/bin/python3 tests/apps/command_test.py [Class[.test]]
+    NEPHOS=build/release/bin/nephos SOURCE=. /usr/bin/python3 tests/apps/command_test.py [Class[.test]]
 """
 
 import csv
@@ -1191,7 +1191,7 @@ class SetUp(Case):
         self.write("CMakePresets.json", "")
         self.write("build/release/CMakeCache.txt", f"CMAKE_HOME_DIRECTORY:INTERNAL={self.folder}\n")
         self.write("build/release/build.ninja", "")
-        nephos = pathlib.Path(self.write("build/release/apps/nephos", f"""#!/bin/bash
+        nephos = pathlib.Path(self.write("build/release/bin/nephos", f"""#!/bin/bash
             case "$*" in *--needs*) exec '{NEPHOS}' "$@" ;; esac
             printf '<%s>' "$@"
         """))

@@ -23,7 +23,7 @@ endfunction()
 
 run("install" "${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${prefix}")
 foreach(file bin/nephos include/nephos/automaton/automaton.h include/nephos/density/smoothing.h
-        include/nephos/render/renderer.h include/nephos/scenes/reader.h share/nephos/scenes/cumulus.toml
+        include/nephos/render/renderer.h include/nephos/scenes/format/reader.h share/nephos/scenes/cumulus.toml
         share/nephos/scenes/nephos.schema.json share/bash-completion/completions/nephos
         share/zsh/site-functions/_nephos share/fish/vendor_completions.d/nephos.fish share/doc/nephos/LICENSE)
     expect_file("${file}")

@@ -12,9 +12,9 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-#include "automaton/atomic_file.h"
 #include "automaton/automaton.h"
-#include "automaton/error.h"
+#include "core/atomic_file.h"
+#include "core/error.h"
 
 namespace nephos {
 namespace {

@@ -3,7 +3,7 @@
 // The random stream: known answers of Philox, counters that are never used twice, and probabilities that are
 // what they claim to be, for the sparse and the dense draw.
 
-#include "automaton/random.h"
+#include "core/random.h"
 
 #include <cmath>
 #include <set>

@@ -10,7 +10,7 @@
 #include "automaton/advection.h"
 #include "automaton/air_parcels.h"
 #include "automaton/automaton.h"
-#include "automaton/error.h"
+#include "core/error.h"
 #include "tests/reference/reference_automaton.h"
 
 namespace nephos {

@@ -7,7 +7,7 @@
 #include <tbb/global_control.h>
 
 #include "render/renderer.h"
-#include "scenes/reader.h"
+#include "scenes/format/reader.h"
 #include "tests/bench/subject.h"
 
 namespace nephos::bench {

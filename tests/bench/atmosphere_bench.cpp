@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/bench/atmosphere_bench.h"
 
-#include "render/atmosphere.h"
+#include "render/atmosphere/atmosphere.h"
 #include "render/renderer.h"
 
 namespace nephos::bench {

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "automaton/automaton.h"
-#include "scenes/reader.h"
+#include "scenes/format/reader.h"
 #include "tests/bench/bench_scenes.h"
 
 namespace nephos::bench {

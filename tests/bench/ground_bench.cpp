@@ -4,10 +4,10 @@
 #include <cmath>
 #include <cstring>
 
-#include "render/camera.h"
-#include "render/frame_data.h"
-#include "render/ripples.h"
-#include "render/wet_ground.h"
+#include "render/frame/frame_data.h"
+#include "render/ground/ripples.h"
+#include "render/ground/wet_ground.h"
+#include "render/options/camera.h"
 #include "seeds/ground_cover.h"
 
 namespace nephos::bench {

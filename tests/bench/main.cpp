@@ -12,15 +12,15 @@
 
 #include <fmt/core.h>
 
-#include "apps/kept_memory.h"
 #include "automaton/kernels.h"
+#include "core/freed_memory.h"
 #include "tests/bench/air_bench.h"
 #include "tests/bench/atmosphere_bench.h"
 #include "tests/bench/automaton_bench.h"
+#include "tests/bench/billboard_bench.h"
 #include "tests/bench/density_bench.h"
 #include "tests/bench/ground_bench.h"
 #include "tests/bench/memory_bench.h"
-#include "tests/bench/puff_bench.h"
 #include "tests/bench/rain_bench.h"
 #include "tests/bench/render_bench.h"
 #include "tests/bench/seeds_bench.h"
@@ -63,14 +63,14 @@ int main(int argc, char** argv) {
     const std::pair<const char*, std::function<std::vector<BenchRow>()>> groups[] = {
         {"automaton", [&] { return automaton_rows(source, programs); }},
         {"density", [] { return density_bench_rows(); }},
-        {"memory", [&] { return memory_rows(source, programs / "../../apps/nephos"); }},
+        {"memory", [&] { return memory_rows(source, programs / "../../bin/nephos"); }},
         {"veil", [] { return veil_bench_rows(); }},
         {"seeds", [] { return seeds_rows(); }},
         {"ground", [] { return ground_rows(); }},
         {"rain", [] { return rain_rows(); }},
         {"atmosphere", [] { return atmosphere_rows(); }},
         {"air", [&] { return air_rows(source); }},
-        {"billboards", [] { return puff_rows(); }},
+        {"billboards", [] { return billboard_rows(); }},
         {"render", [&] { return render_rows(source, data); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {

@@ -10,8 +10,8 @@
 #include <unistd.h>
 
 #include "automaton/lattice.h"
-#include "density/vdb_file.h"
-#include "scenes/reader.h"
+#include "density/vdb/vdb_file.h"
+#include "scenes/format/reader.h"
 
 namespace nephos::bench {
 namespace {

@@ -7,8 +7,8 @@
 #include <fmt/core.h>
 #include <tbb/global_control.h>
 
-#include "render/particles.h"
-#include "render/precipitation.h"
+#include "render/rain/particles.h"
+#include "render/rain/precipitation.h"
 
 namespace nephos::bench {
 namespace {

@@ -18,11 +18,11 @@
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
-#include "apps/framing.h"
-#include "apps/pipeline.h"
 #include "density/metaballs.h"
-#include "density/vdb_file.h"
-#include "scenes/reader.h"
+#include "density/vdb/vdb_file.h"
+#include "scenes/format/reader.h"
+#include "simulation/framing.h"
+#include "simulation/pipeline.h"
 #include "tests/bench/stage_table.h"
 #include "tests/bench/subject.h"
 
@@ -67,7 +67,7 @@ double splatting_ms(const Renderer& renderer) {
 }
 
 // The same picture in all ways, in turn: medians of the processor's time.
-std::vector<BenchRow> compare_ways(Subject subject, int rounds) {
+std::vector<BenchRow> compare_backends(Subject subject, int rounds) {
     std::vector<Renderer> renderers;
     for (const Way& way : kWays)
         renderers.emplace_back(DeviceOptions{.device = {}, .splatting = way.splatting});
@@ -247,7 +247,7 @@ std::vector<BenchRow> render_rows(const std::filesystem::path& source, const std
     print_stages_of(cumulus, 9);
     print_growth();
     std::vector<BenchRow> rows{film_row(source / "scenes/cumulus.toml", 48)};
-    append(rows, compare_ways(cumulus, 5));
+    append(rows, compare_backends(cumulus, 5));
     const std::filesystem::path disney = data / "wdas_cloud_sixteenth.vdb";
     if (data.empty() || !std::filesystem::exists(disney)) {
         fmt::print(
@@ -261,7 +261,7 @@ std::vector<BenchRow> render_rows(const std::filesystem::path& source, const std
     for (const double extinction : {0.02, 1.0}) {
         const Subject subject = volume(grid, "Disney cloud", extinction);
         print_stages_of(subject, 9);
-        append(rows, compare_ways(subject, 5));
+        append(rows, compare_backends(subject, 5));
         append(rows, against_vdb_render(disney, subject));
     }
     return rows;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/bench/subject.h"
 
-#include "apps/pipeline.h"
-#include "scenes/reader.h"
+#include "scenes/format/reader.h"
+#include "simulation/pipeline.h"
 
 namespace nephos::bench {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "density/metaballs.h"
-#include "render/options.h"
-#include "render/splats.h"
+#include "render/cloud/splats.h"
+#include "render/options/options.h"
 
 namespace nephos::bench {
 

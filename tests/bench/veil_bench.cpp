@@ -9,7 +9,7 @@
 #include <tbb/global_control.h>
 
 #include "automaton/automaton.h"
-#include "density/noise.h"
+#include "core/noise.h"
 #include "density/smoothing.h"
 #include "density/veil.h"
 

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 
 namespace nephos {
 namespace {

@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 #include "density/smoothing.h"
 #include "density/statistics.h"
 #include "tests/density/naive_smoothing.h"

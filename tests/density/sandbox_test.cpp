@@ -3,7 +3,7 @@
 // The child process that reads untrusted files: whatever it does, this process gets a result or a clear
 // error.
 
-#include "density/sandbox.h"
+#include "density/vdb/sandbox.h"
 
 #include <chrono>
 #include <csignal>
@@ -17,7 +17,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 
 namespace nephos {
 namespace {

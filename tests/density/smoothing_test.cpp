@@ -14,7 +14,7 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 #include "tests/density/naive_smoothing.h"
 #include "tests/reference/with_threads.h"
 

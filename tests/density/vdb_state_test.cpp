@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
-#include "density/vdb_file.h"
+#include "core/error.h"
+#include "density/vdb/vdb_file.h"
 #include "tests/density/naive_smoothing.h"
 #include "tests/density/vdb_test_files.h"
 

@@ -12,10 +12,10 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 #include "density/metaballs.h"
 #include "density/smoothing.h"
-#include "density/vdb_file.h"
+#include "density/vdb/vdb_file.h"
 #include "tests/density/naive_smoothing.h"
 #include "tests/density/vdb_test_files.h"
 

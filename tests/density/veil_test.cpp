@@ -14,7 +14,7 @@
 #include <hwy/targets.h>
 
 #include "automaton/checkpoint.h"
-#include "automaton/error.h"
+#include "core/error.h"
 #include "density/statistics.h"
 #include "tests/reference/reference_veil.h"
 #include "tests/reference/with_threads.h"

@@ -13,7 +13,7 @@
 
 #include "density/metaballs.h"
 #include "density/smoothing.h"
-#include "density/vdb_file.h"
+#include "density/vdb/vdb_file.h"
 #include "density/veil.h"
 #include "tests/density/naive_smoothing.h"
 #include "tests/reference/reference_veil.h"

@@ -4,8 +4,8 @@
 [level_of_detail], and prints the mean and the largest difference in 1/255 and the share of pixels that differ by
 more than 4/255. Exits with 1 when a mean is above 1/255, the goal.
 
-    compare_detail.py --nephos build/release/apps/nephos scenes/*.toml scenes/genera/*.toml
-    compare_detail.py --nephos build/release/apps/nephos wdas_cloud_sixteenth.vdb
+    compare_detail.py --nephos build/release/bin/nephos scenes/*.toml scenes/genera/*.toml
+    compare_detail.py --nephos build/release/bin/nephos wdas_cloud_sixteenth.vdb
 """
 
 import argparse

@@ -43,7 +43,7 @@ CLOUDS = {
 
 
 def tone_mapped(linear):
-    """As nephos's PNG files: the identity up to 1/2, then a shoulder; then sRGB, 0..1 (render/tone_map.cpp)."""
+    """As nephos's PNG files: the identity up to 1/2, then a shoulder; then sRGB, 0..1 (render/image/tone_map.cpp)."""
     x = numpy.maximum(linear, 0)
     x = numpy.where(x <= 0.5, x, 1 - 0.5 * numpy.exp(-(x - 0.5) / 0.5))
     return numpy.where(x <= 0.0031308, 12.92 * x, 1.055 * numpy.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
@@ -169,7 +169,7 @@ def compare(name, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for pictures")
-    parser.add_argument("--nephos", type=pathlib.Path, default=ROOT / "build/release/apps/nephos", help="the program")
+    parser.add_argument("--nephos", type=pathlib.Path, default=ROOT / "build/release/bin/nephos", help="the program")
     parser.add_argument("--disney", type=pathlib.Path, help="wdas_cloud_sixteenth.vdb or a larger one of its family")
     parser.add_argument("--only", choices=CLOUDS, help="one of the clouds")
     parser.add_argument("--g", type=float, default=0.5, help="asymmetry of the phase function")

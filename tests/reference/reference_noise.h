@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The naive twin of density/noise.h: one point at a time, double precision, written down from the header's
+// The naive twin of core/noise.h: one point at a time, double precision, written down from the header's
 // formula alone.
 
 #include <cmath>

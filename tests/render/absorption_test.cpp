@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
+#include "render/cloud/voxel_absorption.h"
 #include "render/renderer.h"
-#include "render/voxel_absorption.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The tables of the atmosphere against their naive twin, closed forms and the conservation of energy.
 
-#include "render/atmosphere.h"
+#include "render/atmosphere/atmosphere.h"
 
 #include <cmath>
 #include <cstdio>
@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "render/shaders/shared.h"
-#include "render/sky_light.h"
+#include "render/atmosphere/sky_light.h"
+#include "render/shared/shared.h"
 #include "tests/reference/with_threads.h"
 #include "tests/render/reference_atmosphere.h"
 

@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
-#include "render/frame_data.h"
-#include "render/puff_textures.h"
+#include "core/error.h"
+#include "render/frame/billboard_textures.h"
+#include "render/frame/frame_data.h"
 #include "render/renderer.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/random_billboards.h"
@@ -21,7 +21,7 @@
 namespace nephos {
 namespace {
 
-class BillboardTest : public test::EveryWay {};
+class BillboardTest : public test::AllBackends {};
 
 RenderOptions view(Vec3 from, Vec3 to, int width = 65, int height = 65, double fov = 40) {
     return test::view(from, to, fov, width, height, 64);
@@ -52,7 +52,7 @@ Rgb diffuse(const Vec3& corner, const CloudBillboard& billboard, const Billboard
 
 // The finest level of a layer, mirrored and with exchanged axes as the variant says, at 0..1 from the left
 // and from the top of the billboard: what a linear filter gives.
-std::array<double, 2> texture(const PuffLevel& level, int layer, double right, double down) {
+std::array<double, 2> texture(const BillboardLevel& level, int layer, double right, double down) {
     const double x = right * level.side - 0.5, y = down * level.side - 0.5;
     const auto texel = [&](int i, int j, std::size_t c) {
         if (i < 0 || j < 0 || i >= level.side || j >= level.side) return 0.0;
@@ -73,8 +73,9 @@ std::array<double, 2> texture(const PuffLevel& level, int layer, double right, d
 // A billboard that fills the picture, each kind, seen level from the south: every pixel against the formula.
 // The light is that of the corners, mixed over each of the two triangles.
 TEST_P(BillboardTest, OneBillboardIsTexturedAndLitAsTheFormulaSays) {
-    const std::vector<PuffLevel>& levels = puff_textures();
-    for (const PuffTexture kind : {PuffTexture::soft, PuffTexture::wispy, PuffTexture::dense}) {
+    const std::vector<BillboardLevel>& levels = billboard_textures();
+    for (const BillboardTexture kind :
+         {BillboardTexture::soft, BillboardTexture::wispy, BillboardTexture::dense}) {
         RenderOptions options = view({0, -1000, 500}, {0, 0, 500}, 129, 129);
         options.sun = {35, 200, {1, 0.9, 0.8}};
         options.ground.height_m = -1e5;
@@ -109,7 +110,7 @@ TEST_P(BillboardTest, OneBillboardIsTexturedAndLitAsTheFormulaSays) {
                 const std::array<double, 2> texel =
                     right < 0 || right > 1 || down < 0 || down > 1
                         ? std::array<double, 2>{}
-                        : texture(levels[0], int(kind) * kPuffVariants + 2, right, down);
+                        : texture(levels[0], int(kind) * kBillboardVariants + 2, right, down);
                 opacities.add(double(picture.transmittance[at]), 1 - 0.75 * texel[0]);
                 for (std::size_t c = 0; c < 3; ++c) {
                     // The triangles share the diagonal from the lower left to the upper right.
@@ -144,7 +145,7 @@ TEST_P(BillboardTest, LightningHasItsOwnAbsorptionAndFallsOffWithTheSquareOfTheD
     CloudBillboard billboard;
     billboard.centre_m = {0, -50, 500};
     billboard.width_m = billboard.height_m = 4;
-    billboard.texture = PuffTexture::dense;
+    billboard.texture = BillboardTexture::dense;
     Splats splats;
     splats.clouds = {&cloud, 1};
     splats.billboards = {&billboard, 1};
@@ -198,7 +199,7 @@ TEST_P(BillboardTest, BillboardsAndMetaballsHideEachOtherByDistance) {
     const std::vector<BillboardCloud> clouds{{{0, 0, 1000}, 500, 1500}};
     std::vector<CloudBillboard> billboards(1);
     billboards[0].width_m = billboards[0].height_m = 800;
-    billboards[0].texture = PuffTexture::dense;
+    billboards[0].texture = BillboardTexture::dense;
     const std::vector<Metaball> balls{{0, 0, 1000, 300, 1}};
     Splats splats = test::scene_of(clouds, billboards);
     splats.metaballs = {balls, 1.0, 1.0};
@@ -261,7 +262,7 @@ TEST_P(BillboardTest, BillboardsSmallerThanAPixelKeepTheirOpacity) {
         std::vector<CloudBillboard> billboards(1);
         billboards[0].centre_m = {shift * pixel_m, 0, 1000 + 0.3 * shift * pixel_m};
         billboards[0].width_m = billboards[0].height_m = float(size_pixels * pixel_m);
-        billboards[0].texture = PuffTexture::soft;
+        billboards[0].texture = BillboardTexture::soft;
         double sum = 0;
         for (const float t : renderer_.draw_splats(test::scene_of(clouds, billboards), options).transmittance)
             sum += 1 - double(t);
@@ -305,18 +306,18 @@ INSTANTIATE_TEST_SUITE_P(Ways, BillboardTest,
                          test::way_name);
 
 // Every level is dark in its outermost texels, hides as much as the finest, and is no brighter than opaque.
-TEST(PuffTextures, AreDarkAtTheirRimsAndHideTheSameAtAllLevels) {
-    const std::vector<PuffLevel>& levels = puff_textures();
-    ASSERT_EQ(int(levels.size()), kPuffLevels);
-    const auto opacity = [](const PuffLevel& level, int layer) {
+TEST(BillboardTextures, AreDarkAtTheirRimsAndHideTheSameAtAllLevels) {
+    const std::vector<BillboardLevel>& levels = billboard_textures();
+    ASSERT_EQ(int(levels.size()), kBillboardLevels);
+    const auto opacity = [](const BillboardLevel& level, int layer) {
         const std::size_t texels = std::size_t(level.side * level.side);
         double sum = 0;
         for (std::size_t at = 0; at < texels; ++at)
             sum += level.texels[2 * (std::size_t(layer) * texels + at)] / 255.0;
         return sum / double(texels);
     };
-    for (const PuffLevel& level : levels) {
-        for (int layer = 0; layer < kPuffKinds * kPuffVariants; ++layer) {
+    for (const BillboardLevel& level : levels) {
+        for (int layer = 0; layer < kBillboardKinds * kBillboardVariants; ++layer) {
             EXPECT_NEAR(opacity(level, layer) / opacity(levels[0], layer), 1.0, 0.1)
                 << level.side << ", " << layer;
         }

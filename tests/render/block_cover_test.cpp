@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How much cloud covers an octant, against a naive twin on a dense grid.
 
-#include "render/block_cover.h"
+#include "render/cloud/block_cover.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "render/voxel_blocks.h"
+#include "render/cloud/voxel_blocks.h"
 
 namespace nephos {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Geometry: which way is east, where the horizon lies, where a point falls; options out of range.
 
-#include "render/camera.h"
+#include "render/options/camera.h"
 
 #include <cmath>
 #include <limits>
@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
-#include "automaton/vector_math.h"
-#include "render/cloud_preparation.h"
+#include "core/error.h"
+#include "core/vec.h"
+#include "render/cloud/cloud_preparation.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {

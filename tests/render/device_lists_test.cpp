@@ -11,15 +11,15 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
-#include "automaton/vector_math.h"
-#include "render/camera.h"
-#include "render/cloud_preparation.h"
-#include "render/eye_order.h"
+#include "core/error.h"
+#include "core/vec.h"
+#include "render/cloud/cloud_preparation.h"
+#include "render/frame/screen_box.h"
+#include "render/frame/tile_bins.h"
+#include "render/frame/view_sorting.h"
+#include "render/options/camera.h"
 #include "render/renderer.h"
 #include "render/renderer_test_access.h"
-#include "render/screen_box.h"
-#include "render/tile_bins.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
 #include "tests/render/renderer_views.h"
@@ -33,7 +33,7 @@ DeviceOptions with_lists(TileLists lists, int tile_size = 2048) {
 }
 
 struct HostLists {
-    EyeOrder order;
+    ViewSortedSplats order;
     std::vector<PixelBox> boxes;
     TileBins bins;
     TileGrid grid;
@@ -44,8 +44,8 @@ HostLists host_lists(const MetaballCloud& cloud, const RenderOptions& options) {
     Splats splats;
     splats.metaballs = cloud;
     HostLists lists;
-    lists.order = order_from_eye(prepare(cloud), splats, camera, pixels_per_unit(options.camera, camera),
-                                 options.ground);
+    lists.order = sort_for_view(prepare(cloud), splats, camera, pixels_per_unit(options.camera, camera),
+                                options.ground);
     const Tile whole{0, 0, options.camera.width, options.camera.height};
     lists.grid = {whole.width, whole.height};
     lists.boxes = screen_boxes(lists.order, camera, options.camera, whole);

@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 #include "render/renderer_test_access.h"
 
 namespace nephos {

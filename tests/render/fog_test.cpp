@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
-#include "density/noise.h"
+#include "core/error.h"
+#include "core/noise.h"
 #include "render/renderer.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
@@ -47,7 +47,7 @@ std::vector<RenderOptions> views() {
     return all;
 }
 
-TEST(Fog, TheThreeWaysAgree) {
+TEST(Fog, BackendsAgree) {
     Renderer reference(test::validated(Splatting::billboards));
     Renderer tiles(test::validated(Splatting::tiles)), processor(test::validated(Splatting::processor));
     const std::vector<Metaball> some = clouds(3);

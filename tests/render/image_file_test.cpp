@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Image files: what is written is read back, damage and full disks are errors that leave nothing behind.
 
-#include "render/image_file.h"
+#include "render/image/image_file.h"
 
 #include <csignal>
 #include <cstdio>
@@ -16,8 +16,8 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "automaton/error.h"
-#include "render/tone_map.h"
+#include "core/error.h"
+#include "render/image/tone_map.h"
 #include "tests/render/temporary_folder.h"
 
 namespace nephos {

@@ -16,7 +16,7 @@
 namespace nephos {
 namespace {
 
-class LevelOfDetailPicture : public test::EveryWay {
+class LevelOfDetailPicture : public test::AllBackends {
   protected:
     Picture draw(const RenderOptions& options, bool light = false) { return draw(renderer_, options, light); }
     Picture draw(Renderer& renderer, const RenderOptions& options, bool light = false) const {

@@ -2,7 +2,7 @@
 // What level of detail keeps: optical mass, optical depth along rays, bits for any threads; and that it is
 // continuous.
 
-#include "render/level_of_detail.h"
+#include "render/cloud/level_of_detail.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +13,8 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
-#include "automaton/vector_math.h"
+#include "core/error.h"
+#include "core/vec.h"
 #include "tests/reference/with_threads.h"
 #include "tests/render/reference_render.h"
 #include "tests/render/voxel_cloud.h"
@@ -66,7 +66,7 @@ std::vector<reference::Ray> random_rays(int count) {
     std::vector<reference::Ray> rays;
     for (int i = 0; i < count; ++i) {
         const Vec3 from{place(random), -2000, height(random)}, to{place(random), 2000, height(random)};
-        rays.push_back({from, normalised(to - from)});
+        rays.push_back({from, glm::normalize(to - from)});
     }
     return rays;
 }

@@ -7,10 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include "render/attenuation_texture.h"
-#include "render/frame_data.h"
-#include "render/shaders/shared.h"
-#include "render/tone_map.h"
+#include "render/blended/attenuation_texture.h"
+#include "render/frame/frame_data.h"
+#include "render/image/tone_map.h"
+#include "render/shared/shared.h"
 #include "tests/render/reference_render.h"
 
 namespace nephos {
@@ -22,11 +22,14 @@ TEST(Column, IsTheIntegralOfTheField) {
     for (double b = 0; b < 1; b += 0.05) {
         const Metaball ball{0, 0, 0, 1, 1};
         const double numeric = reference::column_m(ball, {{b, 0, -5}, {0, 0, 1}});
-        EXPECT_NEAR(shader::column(float(1 - b * b)), numeric, 1e-6) << "b = " << b;
+        EXPECT_NEAR(shader::line_integral(float(1 - b * b)), numeric, 1e-6) << "b = " << b;
         const double half = reference::column_m(ball, {{b, 0, 0.3}, {0, 0, 1}});
         const float w = float(1 - b * b);
         if (w > 0.09f) {
-            EXPECT_NEAR(shader::column_part(w, std::sqrt(w)) - shader::column_part(w, 0.3f), half, 1e-6) << b;
+            EXPECT_NEAR(
+                shader::partial_line_integral(w, std::sqrt(w)) - shader::partial_line_integral(w, 0.3f), half,
+                1e-6)
+                << b;
         }
     }
 }
@@ -40,7 +43,7 @@ TEST(OpacityFit, IsTheOpacity) {
         for (float w = 0; w <= 1; w += 1.0f / 512) {
             const float fitted =
                 w * w * (c[0] + w * (c[1] + w * (c[2] + w * (c[3] + w * (c[4] + w * c[5])))));
-            const double exact = -std::expm1(-double(depth_scale) * double(shader::column(w)));
+            const double exact = -std::expm1(-double(depth_scale) * double(shader::line_integral(w)));
             EXPECT_NEAR(double(fitted), exact, 0.0006 * std::min(1.0, double(depth_scale)))
                 << "depth scale " << depth_scale << ", w " << w;
         }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lines over a picture: where they fall, how wide they are, what is left of those behind the eye.
 
-#include "render/line_overlay.h"
+#include "render/image/line_overlay.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "render/camera.h"
+#include "render/options/camera.h"
 
 namespace nephos {
 namespace {

@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "render/phase_function.h"
-#include "render/scattering_table.h"
-#include "render/shaders/shared.h"
+#include "render/frame/scattering_table.h"
+#include "render/options/phase_function.h"
+#include "render/shared/shared.h"
 
 namespace nephos {
 namespace {

@@ -48,7 +48,7 @@ inline void expect_no_messages(const Renderer& renderer) {
 inline DeviceOptions validated(Splatting way, int tile_size = 2048) { return {{}, true, tile_size, way}; }
 
 // Tests that draw in every way, with the validation layer on, and fail when it says anything.
-class EveryWay : public ::testing::TestWithParam<Splatting> {
+class AllBackends : public ::testing::TestWithParam<Splatting> {
   protected:
     void TearDown() override { expect_no_messages(renderer_); }
     Renderer renderer_{validated(GetParam())};

@@ -2,7 +2,7 @@
 // Rain and snow: laws of size and speed, containers, particles as a function of time, and pictures across an
 // area's perimeter.
 
-#include "render/precipitation.h"
+#include "render/rain/precipitation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,11 +12,11 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "automaton/error.h"
-#include "automaton/vector_math.h"
-#include "render/drop_sizes.h"
-#include "render/particle_streaks.h"
-#include "render/rain_shafts.h"
+#include "core/error.h"
+#include "core/vec.h"
+#include "render/rain/drop_sizes.h"
+#include "render/rain/particle_streaks.h"
+#include "render/rain/rain_shafts.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/rain_scene.h"
 
@@ -126,7 +126,7 @@ TEST(RainContainer, FindsTheNearestPointOfThePerimeter) {
         const Ellipse e{place(random), place(random),  axis(random),
                         axis(random),  std::cos(turn), std::sin(turn)};
         const double x = place(random), y = place(random);
-        const Point2 found = nearest_on_perimeter(e, x, y);
+        const Vec2 found = nearest_on_perimeter(e, x, y);
         EXPECT_NEAR(ellipse_value(e, found.x, found.y), 1, 1e-9);
         double least = 1e30;
         for (int i = 0; i < 20'000; ++i) {
@@ -157,7 +157,7 @@ TEST(RainContainer, IsAsWideAsTheFrustumSeesTheEllipse) {
     const Crossing crossed = crossing(circle, {0, 0}, lines.right);
     for (const double t : {crossed.first, crossed.last})
         EXPECT_NEAR(ellipse_value(circle, t * lines.right.x, t * lines.right.y), 1, 1e-9);
-    const Point2 nearest = nearest_on_perimeter(circle, 0, 0);
+    const Vec2 nearest = nearest_on_perimeter(circle, 0, 0);
     EXPECT_NEAR(nearest.y, 600, 1e-9);
     // Down to 100 m behind the perimeter the sides are tan * 700 away.
     const VisibleWidth width = visible_width(circle, narrow, nearest, 100);
@@ -182,7 +182,7 @@ TEST(RainContainer, IsAsWideAsTheFrustumSeesTheEllipse) {
 // Turns by quarters; a view that turns by less than 90 degrees changes it at most once.
 TEST(RainContainer, TurnsByQuarters) {
     RainCurtain curtain = area();
-    Point2 before{};
+    Vec2 before{};
     int changes = -1;
     for (int degrees = 0; degrees < 90; ++degrees) {
         const double a = (10 + degrees) * std::numbers::pi / 180;
@@ -276,7 +276,7 @@ TEST(Precipitation, IsContinuousAcrossThePerimeter) {
     RainCurtain curtain = area();
     const Weather weather = weather_of(curtain);
     const Ellipse ellipse = ellipse_at(curtain, 2);
-    const Point2 gate = nearest_on_perimeter(ellipse, 100, 0);
+    const Vec2 gate = nearest_on_perimeter(ellipse, 100, 0);
     double before = -1, least = 1e30, most = 0;
     for (double way = -4; way <= 4; way += 0.1) {
         RenderOptions options = options_at({gate.x, gate.y + way, 2}, {gate.x, gate.y + way + 100, 12});

@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
-#include "render/processor_light.h"
-#include "render/processor_view.h"
-#include "render/scattering_table.h"
+#include "render/cpu/processor_light.h"
+#include "render/cpu/processor_view.h"
+#include "render/frame/scattering_table.h"
 #include "tests/render/random_billboards.h"
 #include "tests/render/reference_render.h"
 
@@ -28,13 +28,13 @@ Drawn draw(const Splats& splats, const RenderOptions& options, const BatchLimits
     Drawn drawn;
     Picture& picture = drawn.picture = blank_picture(options);
     picture.shadow_frame = shadow_frame(prepared, direction_to_sun(options.sun), options.shadow_map_size);
-    const SunOrder sun = order_from_sun(prepared, picture.shadow_frame, options.shadow_map_size);
+    const LightSortedSplats sun = sort_for_light(prepared, picture.shadow_frame, options.shadow_map_size);
     std::vector<float> ordered;
     light_by_processor(sun, picture.shadow_size, {}, ordered, picture.shadow, limits);
     drawn.light.resize(ordered.size());
     for (std::size_t i = 0; i < ordered.size(); ++i) drawn.light[sun.source[i]] = ordered[i];
-    EyeOrder eye =
-        order_from_eye(prepared, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
+    ViewSortedSplats eye =
+        sort_for_view(prepared, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
     set_light(eye, {drawn.light, {}});
     const Tile whole{0, 0, picture.width, picture.height};
     PictureFrame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "render/precipitation.h"
+#include "render/rain/precipitation.h"
 #include "tests/render/picture_checks.h"
 
 namespace nephos::test {

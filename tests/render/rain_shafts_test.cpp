@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rain seen from afar: what it lets through, and the picture against a twin that goes ray by ray.
 
-#include "render/rain_shafts.h"
+#include "render/rain/rain_shafts.h"
 
 #include <cmath>
 #include <functional>

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Billboards of two clouds, strewn at random.
+// Billboards of two clouds, scattered at random.
 
 #include <cstdint>
 #include <random>
 #include <vector>
 
-#include "render/splats.h"
+#include "render/cloud/splats.h"
 
 namespace nephos::test {
 
@@ -35,7 +35,7 @@ inline std::vector<CloudBillboard> random_billboards(unsigned seed, int count, s
         billboard.height_m = float(uniform(50, 300));
         billboard.sun_absorbed = float(uniform(0, 1));
         billboard.opacity = float(uniform(0.2, 1));
-        billboard.texture = PuffTexture(engine() % 3);
+        billboard.texture = BillboardTexture(engine() % 3);
         billboard.variant = std::uint32_t(engine());
         billboard.cloud = std::uint32_t(engine()) % clouds;
         result.push_back(billboard);

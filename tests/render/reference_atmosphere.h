@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "render/atmosphere.h"
+#include "render/atmosphere/atmosphere.h"
 
 namespace nephos::reference {
 

@@ -17,8 +17,8 @@
 namespace nephos::reference {
 
 struct Ray {
-    Vec3 origin_m;
-    Vec3 direction;  // unit
+    Vec3 origin_m{};
+    Vec3 direction{};  // unit
     double end_m = std::numeric_limits<double>::infinity();
 };
 
@@ -95,7 +95,7 @@ inline Vec3 to_sun(const Sun& sun) {
             std::sin(elevation)};
 }
 
-// Metaballs of all sizes and densities, strewn in a box of 2 x 2 x 1 km with its base 500 m above the origin.
+// Metaballs of all sizes and densities, scattered in a box of 2 x 2 x 1 km with its base 500 m above the origin.
 inline std::vector<Metaball> random_metaballs(unsigned seed, int count, double min_radius_m = 20,
                                               double max_radius_m = 200) {
     std::mt19937 engine(seed);

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "automaton/vector_math.h"
-#include "render/rain_shafts.h"
+#include "core/vec.h"
+#include "render/rain/rain_shafts.h"
 
 namespace nephos::reference {
 

@@ -17,7 +17,7 @@
 namespace nephos {
 namespace {
 
-class RendererIntegrals : public test::EveryWay {};
+class RendererIntegrals : public test::AllBackends {};
 
 reference::Difference compare_transmittance(const Picture& picture, const MetaballCloud& cloud,
                                             const RenderOptions& options) {

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 #include "tests/reference/with_threads.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
@@ -19,7 +19,7 @@
 namespace nephos {
 namespace {
 
-class RendererTest : public test::EveryWay {};
+class RendererTest : public test::AllBackends {};
 
 TEST_P(RendererTest, TwoRunsGiveTheSameBits) {
     const std::vector<Metaball> balls = reference::lattice_cloud(20, 50);

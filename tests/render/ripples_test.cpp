@@ -2,7 +2,7 @@
 
 // The surface of puddles against what is known of the wave equation: standing waves, energy, memory.
 
-#include "render/ripples.h"
+#include "render/ground/ripples.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 #include "render/renderer.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
@@ -49,7 +49,7 @@ std::vector<RenderOptions> views() {
     return all;
 }
 
-TEST(Shells, TheThreeWaysAgree) {
+TEST(Shells, BackendsAgree) {
     Renderer reference(test::validated(Splatting::billboards));
     Renderer tiles(test::validated(Splatting::tiles)), processor(test::validated(Splatting::processor));
     const std::vector<Metaball> balls = broken_layer(7);
@@ -190,7 +190,7 @@ class Marcher {
     const MetaballCloud& cloud_;
     const RenderOptions& options_;
     const Picture& picture_;
-    Vec3 to_sun_;
+    Vec3 to_sun_{};
 };
 
 // Mean of the light that shafts take from a picture, and of its error; thin clouds, which hide nothing.

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "render/atmosphere.h"
+#include "render/atmosphere/atmosphere.h"
 #include "render/renderer.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/reference_render.h"
@@ -29,7 +29,7 @@ RenderOptions under_sky(double elevation_deg, Vec3 from = {0, -4000, 800}, Vec3 
 }
 
 // From the side, from below, down from above, and towards the sun; some metaballs are integrated.
-TEST(Sky, IsTheSameInEveryWay) {
+TEST(Sky, IsTheSameInEveryBackend) {
     Renderer processor(test::validated(Splatting::processor)), tiles(test::validated(Splatting::tiles)),
         billboards(test::validated(Splatting::billboards));
     const std::vector<Metaball> balls = reference::random_metaballs(7, 150, 80, 250);

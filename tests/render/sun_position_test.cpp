@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sun's position against published values, and its texts.
 
-#include "render/sun_position.h"
+#include "render/options/sun_position.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "render/options.h"
+#include "render/options/options.h"
 
 namespace nephos {
 namespace {

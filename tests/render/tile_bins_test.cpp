@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Binning into tiles against a search through all boxes.
 
-#include "render/tile_bins.h"
+#include "render/frame/tile_bins.h"
 
 #include <random>
 

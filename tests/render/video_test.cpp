@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Videos through the ffmpeg command: a real file, and every way it can go wrong.
 
-#include "render/video.h"
+#include "render/image/video.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -13,8 +13,8 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
-#include "render/image_file.h"
+#include "core/error.h"
+#include "render/image/image_file.h"
 #include "tests/render/temporary_folder.h"
 
 namespace nephos {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which voxels the metaballs of a cloud stand for.
 
-#include "render/voxel_blocks.h"
+#include "render/cloud/voxel_blocks.h"
 
 #include <algorithm>
 #include <cmath>

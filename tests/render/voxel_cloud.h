@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "render/splats.h"
+#include "render/cloud/splats.h"
 
 namespace nephos::test {
 

@@ -3,7 +3,7 @@
 // Wet and snowy ground in pictures: the formulas of its light, reflections of a sky that is known, and the
 // three ways of drawing against each other.
 
-#include "render/wet_ground.h"
+#include "render/ground/wet_ground.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
-#include "automaton/vector_math.h"
+#include "core/error.h"
+#include "core/vec.h"
 #include "render/renderer.h"
 #include "tests/reference/with_threads.h"
 
@@ -244,7 +244,7 @@ std::vector<Metaball> cumulus() {
     return balls;
 }
 
-TEST(WetGroundTest, ThreeWaysAgree) {
+TEST(WetGroundTest, BackendsAgree) {
     RenderOptions options = small_options();
     options.air = {};
     options.wet_ground.puddle_film_mm = 2;

@@ -14,7 +14,7 @@
 
 #include <gtest/gtest.h>
 
-#include "scenes/reader.h"
+#include "scenes/format/reader.h"
 
 namespace nephos {
 namespace {

@@ -12,10 +12,10 @@
 
 #include <gtest/gtest.h>
 
-#include "scenes/describe.h"
-#include "scenes/reader.h"
-#include "scenes/schema.h"
-#include "scenes/writer.h"
+#include "scenes/format/describe.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/schema.h"
+#include "scenes/format/writer.h"
 
 namespace nephos {
 namespace {
@@ -57,7 +57,7 @@ std::size_t keys_at(const std::vector<std::string>& path) {
 }
 
 // A field that somebody adds to an option struct must become a key, too. Whoever comes here: add it to
-// scenes/schema_automaton.cpp or scenes/schema_output.cpp and build the target scene_descriptions.
+// scenes/format/schema_automaton.cpp or scenes/format/schema_output.cpp and build the target scene_descriptions.
 TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"density"}), member_count<DensityOptions>());
     EXPECT_EQ(keys_at({"density", "smoothing"}), member_count<SmoothingOptions>());
@@ -160,7 +160,7 @@ name = "layers"
 [climate]
 schedule = [{ time_s = 0, state = 0 }, { time_s = 900, state = 1 }]
 [[model]]
-name = "puff"
+name = "billboard"
 genus = "Cu"
 [[model.seeds]]
 roots = [{ reproductions = [1, 2], seeds_start = 3, seeds_end = 2 }]
@@ -168,12 +168,12 @@ roots = [{ reproductions = [1, 2], seeds_start = 3, seeds_end = 2 }]
 name = "fair"
 state = 0
 clouds = 3
-models = "puff"
+models = "billboard"
 [[sky]]
 name = "storm"
 state = 1
 clouds = 9
-models = ["puff"]
+models = ["billboard"]
 [[layer]]
 name = "low"
 skies = ["fair", "storm"]

@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "automaton/automaton.h"
-#include "scenes/reader.h"
+#include "scenes/format/reader.h"
 #include "tests/reference/with_threads.h"
 
 namespace nephos {
@@ -34,7 +34,7 @@ TEST(GoldenHashes, CoverEveryShippedScene) {
     std::set<std::string> shipped, covered;
     for (const auto& entry : fs::directory_iterator(kSource / "scenes")) {
         if (entry.path().extension() != ".toml") continue;
-        // Scenes with layers are stepped by tests/apps/climate_test.cpp.
+        // Scenes with layers are stepped by tests/simulation/climate_test.cpp.
         if (read_scene(entry.path()).layers.empty()) shipped.insert(entry.path().filename());
     }
     for (const auto& [scene, steps] : golden_hashes()) covered.insert(scene);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models from other files, and what a scene's layers become in the options of the libraries.
 
-#include "scenes/layers.h"
+#include "scenes/format/layers.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "scenes/reader.h"
-#include "scenes/writer.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/writer.h"
 
 namespace nephos {
 namespace {
@@ -113,13 +113,13 @@ initial_state = 0.25
 final_state = 1
 duration_s = 600
 [[model]]
-name = "puff"
+name = "billboard"
 seeds = [{}]
 [[sky]]
 name = "fair"
 state = 0
 clouds = 4
-models = "puff"
+models = "billboard"
 generated = 3
 [[layer]]
 name = "low"

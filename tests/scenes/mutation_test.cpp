@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "scenes/reader.h"
-#include "scenes/writer.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/writer.h"
 
 namespace nephos {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a scene file says is what the Scene holds: every form of every value, defaults, options, file names.
 
-#include "scenes/reader.h"
+#include "scenes/format/reader.h"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 
 #include <gtest/gtest.h>
 
-#include "scenes/writer.h"
+#include "scenes/format/writer.h"
 
 namespace nephos {
 namespace {

@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include "scenes/memory.h"
-#include "scenes/reader.h"
-#include "scenes/writer.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/writer.h"
+#include "simulation/memory.h"
 
 namespace nephos {
 namespace {

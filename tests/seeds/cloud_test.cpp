@@ -77,14 +77,10 @@ FrustumView some_view() {
 
 // A point of the frustum by its own coordinates: depth and the two tangents as fractions of their limits.
 Vec3 point_of(const FrustumView& v, double depth, double right, double up) {
-    const auto normalised = [](Vec3 a) {
-        const double l = std::hypot(a.x, a.y, a.z);
-        return Vec3{a.x / l, a.y / l, a.z / l};
-    };
     const auto cross = [](Vec3 a, Vec3 b) {
         return Vec3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
     };
-    const Vec3 f = normalised(v.forward), r = normalised(cross(f, v.up)), u = cross(r, f);
+    const Vec3 f = glm::normalize(v.forward), r = glm::normalize(cross(f, v.up)), u = cross(r, f);
     const double ty = std::tan(v.fov_y_deg * M_PI / 360), tx = ty * v.aspect;
     const auto at = [&](double e, double fo, double ri, double uu) {
         return e + depth * (fo + right * tx * ri + up * ty * uu);

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 #include "seeds/sky_simulation.h"
 
 namespace nephos::test {

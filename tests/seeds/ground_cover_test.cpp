@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "automaton/error.h"
+#include "core/error.h"
 
 namespace nephos {
 namespace {
@@ -203,11 +203,11 @@ TEST(GroundCoverTest, IsMixedLinearly) {
 TEST(DriftTest, IsTheWindOnTheWayDown) {
     Wind wind;
     wind.keyframes = {{0, {{0, {0, 0}}, {600, {0, 0}}, {600.001, {10, -4}}}}};
-    const Drift drift = drift_m(wind, 0, 1100, 100, 5);
-    EXPECT_NEAR(drift.x_m, 1000, 1e-6);
-    EXPECT_NEAR(drift.y_m, -400, 1e-6);
-    EXPECT_EQ(drift_m(wind, 0, 100, 100, 5).x_m, 0);
-    EXPECT_EQ(drift_m(wind, 0, 1100, 100, std::numeric_limits<double>::infinity()).x_m, 0);
+    const Vec2 drift = drift_m(wind, 0, 1100, 100, 5);
+    EXPECT_NEAR(drift.x, 1000, 1e-6);
+    EXPECT_NEAR(drift.y, -400, 1e-6);
+    EXPECT_EQ(drift_m(wind, 0, 100, 100, 5).x, 0);
+    EXPECT_EQ(drift_m(wind, 0, 1100, 100, std::numeric_limits<double>::infinity()).x, 0);
 }
 
 TEST(GroundCoverTest, RefusesBadOptions) {

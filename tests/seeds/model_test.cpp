@@ -5,9 +5,9 @@
 #include <set>
 #include <utility>
 
+#include "core/trigonometry.h"
 #include "seeds/billboards.h"
 #include "seeds/draw.h"
-#include "automaton/trigonometry.h"
 #include "tests/seeds/fixtures.h"
 
 namespace nephos {
@@ -138,7 +138,7 @@ TEST(Reproduction, FullOpeningIsUniform) {
     const BaseModel model =
         one_root({.open_pitch_deg = 360, .open_yaw_deg = 360, .seeds_start = n, .seeds_end = n});
     const Cloud cloud = reproduce(model, 11, 0, 0);
-    Vec3 mean, square;
+    Vec3 mean{}, square{};
     for (const SeedBox& box : cloud.boxes) {
         if (box.level == 0) continue;
         const Vec3 way = minus(box.centre_m, model.seeds[0].position_m);
@@ -201,7 +201,7 @@ TEST(Reproduction, GoldenFingerprint) {
         }
         f.add(cloud.radius_m);
         for (const Billboard& b :
-             strew_billboards(branching_model(), cloud, 0x123456789abcdef0, 17, number)) {
+             scatter_billboards(branching_model(), cloud, 0x123456789abcdef0, 17, number)) {
             f.add(b.centre_m);
             f.add(b.width_m);
             f.add(std::uint64_t(b.variant));
@@ -241,7 +241,7 @@ TEST(Draws, NeverShareACounter) {
 TEST(Billboards, LieInTheirBoxes) {
     const BaseModel model = branching_model();
     const Cloud cloud = reproduce(model, 4, 0, 9);
-    const auto billboards = strew_billboards(model, cloud, 4, 0, 9);
+    const auto billboards = scatter_billboards(model, cloud, 4, 0, 9);
     std::vector<int> in_box(cloud.boxes.size());
     for (const Billboard& b : billboards) {
         const SeedBox& box = cloud.boxes[b.box];

@@ -42,7 +42,7 @@ std::uint64_t fingerprint(const SkySimulation& sky) {
     return f.value();
 }
 
-// T: the sky nearest to the initial state, its clouds strewn over the world.
+// T: the sky nearest to the initial state, its clouds scattered over the world.
 TEST(SkySimulation, StartsFromTheNearestSky) {
     SkyOptions options = small_sky();
     options.skies[1].clouds = 1000;

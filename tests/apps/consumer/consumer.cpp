@@ -5,9 +5,9 @@
 #include <cstdio>
 
 #include "automaton/automaton.h"
-#include "automaton/error.h"
+#include "core/error.h"
 #include "density/smoothing.h"
-#include "density/vdb_file.h"
+#include "density/vdb/vdb_file.h"
 
 int main(int argc, char** argv) try {
     if (argc != 2) return 2;

@@ -11,11 +11,11 @@
 #define NEPHOS_PHILOX_INL_H_
 #endif
 
-#include <hwy/highway.h>
-
 #include <cstdint>
 
-#include "automaton/random.h"
+#include <hwy/highway.h>
+
+#include "core/random.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -30,12 +30,15 @@ struct PhiloxBatch {
     std::uint32_t word1, word3;
 };
 
-inline std::uint64_t pack_counter(std::uint32_t word0, std::uint32_t word2) { return word0 | std::uint64_t{word2} << 32; }
+inline std::uint64_t pack_counter(std::uint32_t word0, std::uint32_t word2) {
+    return word0 | std::uint64_t{word2} << 32;
+}
 
-HWY_INLINE void philox_counters(const PhiloxBatch&, const std::uint64_t*, int count, std::uint32_t* HWY_RESTRICT out) {
+HWY_INLINE void philox_counters(const PhiloxBatch&, const std::uint64_t*, int count,
+                                std::uint32_t* HWY_RESTRICT out) {
     alignas(64) static thread_local std::uint64_t states[2][8] = {
-        {0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB, 0x2545F4914F6CDD1D, 0x1D872B41, 0x5851F42D4C957F2D,
-         0x14057B7EF767814F, 0x369DEA0F31A53F85},
+        {0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB, 0x2545F4914F6CDD1D, 0x1D872B41,
+         0x5851F42D4C957F2D, 0x14057B7EF767814F, 0x369DEA0F31A53F85},
         {1, 2, 3, 4, 5, 6, 7, 8}};
     const hn::ScalableTag<std::uint64_t> d;
     const int lanes = int(hn::Lanes(d));

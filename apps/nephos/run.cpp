@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// nephos run: a scene to density grids, pictures and statistics.
+
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "apps/nephos/arguments.h"
+#include "apps/nephos/commands.h"
+#include "apps/nephos/signals.h"
+#include "apps/nephos/terminal.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "scenes/format/writer.h"
+#include "simulation/memory.h"
+#include "simulation/run_folder.h"
+#include "simulation/simulation.h"
+
+namespace nephos {
+namespace {
+
+struct RunArguments {
+    SceneArguments scene;
+    std::string out;
+    std::optional<FrameRange> frames;
+    bool no_render = false, statistics_only = false, video = false, resume = false, overwrite = false,
+         needs = false;
+    double checkpoint_every_s = 60;
+    WorkArguments work;
+};
+
+Scene scene_of(const RunArguments& a) {
+    Scene scene = load_scene(a.scene);
+    if (!a.needs && !a.work.quiet) note_unused_models(scene);
+    if (a.video) scene.frames.video = true;
+    return scene;
+}
+
+// For scripts that install what is missing (./run): the scene and --set decide as much as the options do.
+void print_needs(const RunArguments& a) {
+    const Scene scene = scene_of(a);
+    Output output;
+    const bool render = !a.no_render && !a.statistics_only;
+    if (render && wants_pictures(scene)) output.line("vulkan");
+    if (render && wants_video(scene)) output.line("ffmpeg");
+}
+
+RunSettings settings_of(const RunArguments& a) {
+    RunSettings settings;
+    Scene& scene = settings.scene;
+    scene = scene_of(a);
+    settings.scene_file = std::filesystem::path(a.scene.file).filename().string();
+    settings.scene_text = to_toml(scene);
+    settings.scene_hash = scene_hash(scene);
+    settings.range = a.frames ? range_of_frames(scene, a.frames->first, a.frames->last) : full_range(scene);
+    if (a.statistics_only) settings.range = {settings.range.last_step, 1, 0};
+    settings.render = !a.no_render && !a.statistics_only;
+    settings.folder =
+        a.out.empty() ? std::filesystem::path("out") / scene.name : std::filesystem::path(a.out);
+    settings.resume = a.resume;
+    settings.overwrite = a.overwrite;
+    settings.checkpoint_every_s = a.checkpoint_every_s;
+    check_memory(scene, settings.render);
+    settings.initial = initial_state(scene);
+    const std::string initial_hash =
+        settings.initial ? Automaton(scene.automaton, *settings.initial).hash().hex() : std::string();
+    settings.simulation_hash = simulation_hash(scene, initial_hash);
+    return settings;
+}
+
+// What opens a kind of file.
+std::string_view opened_by(std::string_view kind) {
+    if (kind == "density") return "Blender, Houdini, vdb_view, `nephos render`, `nephos info`";
+    if (kind == "png") return "any picture viewer";
+    if (kind == "exr") return "Blender, Krita, exrdisplay, `nephos info`";
+    if (kind == "video") return "any video player";
+    if (kind == "statistics") return "any spreadsheet, pandas, gnuplot";
+    if (kind == "manifest") return "any text editor, jq";
+    return "`nephos run --resume`, `nephos info`";
+}
+
+std::uint64_t total_bytes(const RunFiles& files) {
+    std::uint64_t bytes = 0;
+    for (const std::filesystem::path& file : files.files) {
+        std::error_code error;
+        const std::uintmax_t size = std::filesystem::file_size(file, error);
+        if (!error) bytes += size;
+    }
+    return bytes;
+}
+
+std::string counted(std::uint64_t number, std::string_view what) {
+    return fmt::format("{} {}{}", number, what, number == 1 ? "" : "s");
+}
+
+void print_files(Output& output, const RunReport& report) {
+    struct Row {
+        std::string files, size, opened_by;
+    };
+    std::vector<Row> rows;
+    std::size_t width = 0, size_width = 0;
+    for (const RunFiles& files : report.files) {
+        std::string name = files.files.front().string();
+        if (files.files.size() > 1) name += " .. " + files.files.back().filename().string();
+        rows.push_back({name, bytes_text(total_bytes(files)), std::string(opened_by(files.kind))});
+        width = std::max(width, name.size());
+        size_width = std::max(size_width, rows.back().size.size());
+    }
+    const bool colours = colours_on(stdout);
+    for (const Row& row : rows) {
+        output.line(fmt::format("  {:{}}  {:>{}}  {}", row.files, width, row.size, size_width,
+                                styled(row.opened_by, Style::dim, colours)));
+    }
+}
+
+void print_report(const RunReport& report, const RunSettings& settings) {
+    Output output;
+    output.line(styled(
+        fmt::format("{}: {}, {} in {}{}", settings.scene.name, counted(report.steps_reported - 1, "step"),
+                    counted(std::uint64_t(report.frames), "frame"), human_duration(report.wall_s),
+                    report.device.empty() ? "" : ", drawn by " + report.device),
+        Style::bold, colours_on(stdout)));
+    print_files(output, report);
+}
+
+void print_json(const RunReport& report, const RunSettings& settings) {
+    nlohmann::ordered_json files = nlohmann::ordered_json::object();
+    for (const RunFiles& entry : report.files) {
+        nlohmann::ordered_json list = nlohmann::ordered_json::array();
+        for (const std::filesystem::path& file : entry.files) list.push_back(file.string());
+        files[entry.kind] = list;
+    }
+    const nlohmann::ordered_json json = {
+        {"scene", settings.scene.name},
+        {"scene_hash", settings.scene_hash},
+        {"simulation_hash", settings.simulation_hash},
+        {"folder", settings.folder.string()},
+        {"complete", report.complete},
+        {"resumed_at_step", report.first_step},
+        {"steps", report.steps_reported == 0 ? 0 : report.steps_reported - 1},
+        {"frames", report.frames},
+        {"state_hash", report.state_hash},
+        {"wall_s", report.wall_s},
+        {"device", report.device},
+        {"files", files}};
+    Output().line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+}
+
+int run(const RunArguments& a) {
+    if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
+    if (a.statistics_only && (a.frames || a.video))
+        throw Error(ErrorCode::usage, "--statistics-only writes no frames: leave out --frames and --video");
+    if (a.needs) {
+        print_needs(a);
+        return 0;
+    }
+    const ThreadLimit limit(a.work.threads);
+    RunSettings settings = settings_of(a);
+    std::unique_ptr<ProgressBar> bar;
+    RunObserver observer;
+    observer.progress = [&](const RunProgress& progress) {
+        if (!bar) {
+            bar = std::make_unique<ProgressBar>("step", progress.steps, progress.steps_in_all, !a.work.quiet);
+        }
+        bar->update(progress.steps, progress.phase == "encoding" ? "encoding the video"
+                                                                 : fmt::format("frame {}/{}", progress.frames,
+                                                                               progress.frames_in_all));
+    };
+    observer.stop = [] { return pending_signal() != 0; };
+    defer_signals();
+    const RunReport report = run_scene(settings, observer);
+    bar.reset();
+    if (a.work.json) {
+        print_json(report, settings);
+    } else if (report.complete && !a.work.quiet) {
+        print_report(report, settings);
+    }
+    if (report.complete) return 0;
+    print_note(fmt::format("stopped after {} of {} steps and {}; the same command with --resume goes on",
+                           report.steps_reported == 0 ? 0 : report.steps_reported - 1,
+                           settings.range.last_step, counted(std::uint64_t(report.frames), "frame")));
+    return 128 + pending_signal();
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app, Action& action) {
+    CLI::App* command = app.add_subcommand("run", "Simulate a scene: density grids, pictures, statistics");
+    const auto a = std::make_shared<RunArguments>();
+    add_scene_arguments(*command, a->scene);
+    command->add_option("-o,--out", a->out, "Folder to write to (default: out/NAME)")->type_name("DIR");
+    add_value(*command, "--frames", "A..B",
+              "Write only these frames, counted from 1; A.., ..B and A alone work too",
+              [a](const std::string& text) { a->frames = parse_frames(text); });
+    command->add_flag("--no-render", a->no_render,
+                      "No pictures, only density grids and statistics; needs no GPU");
+    command->add_flag("--statistics-only", a->statistics_only,
+                      "No frames at all, only statistics of every step, the manifest and the checkpoint");
+    command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
+    command->add_flag("--resume", a->resume, "Go on where an interrupted run stopped");
+    command->add_flag(
+        "--overwrite", a->overwrite,
+        "Start anew although the folder holds an interrupted run, a run of another scene or seed, or files "
+        "that no run wrote");
+    add_value(*command, "--checkpoint-every", "S",
+              "Seconds between checkpoints (default: 60); Ctrl-C always leaves one",
+              [a](const std::string& text) { a->checkpoint_every_s = parse_real(text, 0, 1e9); });
+    command->add_flag("--needs", a->needs,
+                      "Only print what the run needs of the system, a word a line: vulkan, ffmpeg");
+    add_threads(*command, a->work);
+    add_json(*command, a->work);
+    add_quiet(*command, a->work);
+    command->footer(
+        "Writes DIR/density/NAME_0001.vdb ..., DIR/frames/NAME_0001.png ..., DIR/statistics.csv,\n"
+        "DIR/manifest.json and DIR/checkpoint.nephos; files of an earlier run of the same "
+        "scene are replaced.\n"
+        "The first Ctrl-C finishes the step and leaves a checkpoint, the second stops at once.\n"
+        "\n"
+        "Examples:\n"
+        "  nephos run scenes/cumulus.toml\n"
+        "  nephos run scenes/stratus.toml --out /tmp/st --no-render --set time.steps=500\n"
+        "  nephos run scenes/cumulus.toml --resume");
+    command->callback([a, &action] { action = [a] { return run(*a); }; });
+}
+
+}  // namespace nephos

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// nephos state: the automaton's bits after some steps, as a VDB file that can be looked at, changed and
+// started from.
+
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "apps/nephos/arguments.h"
+#include "apps/nephos/commands.h"
+#include "apps/nephos/terminal.h"
+#include "core/error.h"
+#include "core/random.h"
+#include "density/statistics.h"
+#include "density/vdb/vdb_file.h"
+#include "scenes/format/errors.h"
+#include "scenes/format/writer.h"
+#include "simulation/simulation.h"
+#include "simulation/version.h"
+
+namespace nephos {
+namespace {
+
+struct StateArguments {
+    SceneArguments scene;
+    std::optional<std::uint64_t> steps;
+    std::string from, out, layer;
+    WorkArguments work;
+};
+
+// The layer whose bits are wanted: the one of the name, or the only one.
+std::size_t chosen_layer(const StateArguments& a, const std::vector<LayerSimulation>& layers) {
+    std::vector<std::string_view> names;
+    for (std::size_t n = 0; n < layers.size(); ++n) {
+        if (layers[n].automaton() == nullptr) continue;
+        if (layers[n].name() == a.layer || (a.layer.empty() && layers.size() == 1)) return n;
+        names.push_back(layers[n].name());
+    }
+    const std::string_view meant = closest_word(a.layer, names);
+    throw Error(ErrorCode::usage,
+                a.layer.empty() ? fmt::format("{}: has several layers: give --layer, one of {}", a.scene.file,
+                                              fmt::join(names, ", "))
+                : meant.empty()
+                    ? fmt::format("{}: has no layer '{}' with an automaton (those that have one: {})",
+                                  a.scene.file, a.layer, fmt::join(names, ", "))
+                    : fmt::format("{}: has no layer '{}' with an automaton, did you mean '{}'?", a.scene.file,
+                                  a.layer, meant));
+}
+
+int state(const StateArguments& a) {
+    const ThreadLimit limit(a.work.threads);
+    const Scene scene = load_scene(a.scene);
+    std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);
+    const Automaton& automaton = *layers[chosen_layer(a, layers)].automaton();
+    const std::uint64_t steps = a.steps.value_or(scene.steps);
+    {
+        ProgressBar bar("step", 0, steps, !a.work.quiet);
+        for (std::uint64_t step = 0; step < steps; ++step) {
+            for (LayerSimulation& layer : layers) layer.step();
+            bar.update(step + 1);
+        }
+    }
+    VdbContent content;
+    content.hum = automaton.hum();
+    content.act = automaton.act();
+    content.cld = automaton.cld();
+    content.cells = automaton.options().placement;
+    VdbMetadata metadata;
+    metadata.extinction_per_m = scene.density.extinction_per_m;
+    metadata.time_s = automaton.time_s();
+    metadata.time_step_s = scene.automaton.time_step_s;
+    metadata.frames_per_second = scene.frames.per_second;
+    metadata.time_scale = scene.frames.time_scale;
+    metadata.seed = scene.automaton.seed;
+    metadata.scene_hash = scene_hash(scene);
+    metadata.state_hash = automaton.hash().hex();
+    metadata.nephos_version = version();
+    metadata.random_stream_version = int(kRandomStreamVersion);
+    write_vdb(a.out, content, metadata);
+
+    const CloudStatistics statistics =
+        cloud_statistics(automaton.hum(), automaton.act(), automaton.cld(), automaton.options().placement);
+    Output output;
+    if (a.work.json) {
+        const nlohmann::ordered_json json = {
+            {"file", a.out},         {"steps", steps},        {"hash", metadata.state_hash},
+            {"hum", statistics.hum}, {"act", statistics.act}, {"cld", statistics.cld}};
+        output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    } else {
+        output.line(fmt::format("{} {}", steps, metadata.state_hash));
+    }
+    return 0;
+}
+
+}  // namespace
+
+void add_state_command(CLI::App& app, Action& action) {
+    CLI::App* command =
+        app.add_subcommand("state", "Write the automaton's bits after some steps as a VDB file");
+    const auto a = std::make_shared<StateArguments>();
+    add_scene_arguments(*command, a->scene);
+    command->add_option("-o,--out", a->out, "VDB file to write: the bool grids hum, act and cld")
+        ->required()
+        ->type_name("FILE.vdb");
+    add_value(*command, "-n,--steps", "N", "Steps to take (default: the scene's)",
+              [a](const std::string& text) { a->steps = parse_unsigned(text, 0, kMaxSteps); });
+    command
+        ->add_option("--from", a->from,
+                     "VDB file with such grids to start from, instead of the scene's start")
+        ->type_name("FILE.vdb");
+    command->add_option("--layer", a->layer, "Layer whose bits are written, in a scene with several")
+        ->type_name("NAME");
+    add_threads(*command, a->work);
+    add_json(*command, a->work);
+    add_quiet(*command, a->work);
+    command->footer(
+        "Prints `step hash` of the state that was written. Steps count from the start that was given, and so "
+        "do wind\n"
+        "and randomness: a run that is to go on exactly where it stopped is what `nephos run --resume` is "
+        "for.\n"
+        "\n"
+        "Examples:\n"
+        "  nephos state scenes/cumulus.toml --steps 100 --out state.vdb\n"
+        "  nephos state scenes/cumulus.toml --steps 50 --from state.vdb --out later.vdb");
+    command->callback([a, &action] { action = [a] { return state(*a); }; });
+}
+
+}  // namespace nephos

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the command says: results on standard output, messages and the progress bar on standard error. Colours
+// and the bar appear only on a terminal; colours not when NO_COLOR is set or TERM is "dumb" (no-color.org).
+
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+#include "core/error.h"
+
+namespace nephos {
+
+// Thrown by Output when the reader of standard output has gone (`nephos hash ... | head`): nothing more to
+// say to anyone, and no failure.
+struct OutputClosed {};
+
+// Standard output, checked: a full disk or a closed pipe is not silent.
+class Output {
+  public:
+    // Writes text as it is. Throws OutputClosed, or Error(io) with the reason.
+    void write(std::string_view text);
+    // write() with a newline.
+    void line(std::string_view text);
+    // Must be called before the end of the program, so that a late failure is seen; throws as write().
+    void flush();
+};
+
+// Whether colours may be used on stdout or stderr.
+bool colours_on(std::FILE* stream);
+
+// Text between escape sequences when colours are on: "\033[1;31m" ... "\033[0m".
+enum class Style { bold, dim, red, cyan };
+std::string styled(std::string_view text, Style style, bool colours);
+
+// Messages on standard error, one line each or more: "error: ...", "note: ..."; the label in colour.
+void print_error(std::string_view message);
+void print_error(const Error& error);  // with its place, when it has one
+void print_note(std::string_view message);
+// Text as it is on standard error; failures to write are ignored, there is nowhere left to say so.
+void print_message(std::string_view text);
+
+// Columns of the terminal at `stream`, or `otherwise` when it is none.
+int terminal_width(std::FILE* stream, int otherwise);
+
+// Seconds as "0:07", "12:34" or "1:02:03"; a count as "1,234,567".
+std::string human_duration(double seconds);
+std::string human_count(std::uint64_t count);
+
+// One line on standard error that shows how far the work is:
+//
+//     step 108/240  ━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━  45%  35.2 steps/s  0:04 left
+//
+// Draws nothing unless standard error is a terminal. Not thread-safe.
+class ProgressBar {
+  public:
+    // `unit` in the singular ("step"). `enabled` = false draws nothing in any case. The rate counts from
+    // `start`.
+    ProgressBar(std::string unit, std::uint64_t start, std::uint64_t total, bool enabled);
+    ~ProgressBar();  // clears the line
+    ProgressBar(const ProgressBar&) = delete;
+    ProgressBar& operator=(const ProgressBar&) = delete;
+
+    // Redraws at most ten times a second. `detail` stands at the end of the line ("frame 12/40").
+    void update(std::uint64_t done, std::string_view detail = {});
+    // Removes the line, before other messages; the next update() draws it again.
+    void clear();
+
+    // The line as it would be drawn, without colours, at most `width` columns.
+    static std::string text(std::string_view unit, std::uint64_t start, std::uint64_t done,
+                            std::uint64_t total, double elapsed_s, std::string_view detail, int width,
+                            bool unicode);
+
+  private:
+    using Clock = std::chrono::steady_clock;
+
+    std::string unit_;
+    std::uint64_t start_, total_;
+    bool enabled_, unicode_;
+    bool drawn_ = false;
+    Clock::time_point begin_, last_;
+};
+
+}  // namespace nephos

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/atomic_file.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <system_error>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "core/descriptor.h"
+#include "core/error.h"
+
+namespace nephos {
+namespace {
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what, int error) {
+    throw Error(ErrorCode::io, path.string() + ": " + what + ": " + std::strerror(error));
+}
+
+void flush_to_device(const std::filesystem::path& subject, const std::filesystem::path& reported, int flags) {
+    const Descriptor descriptor(::open(subject.c_str(), flags | O_CLOEXEC));
+    if (descriptor.get() < 0) fail(reported, "cannot open after writing", errno);
+    // Some file systems cannot flush a folder and say EINVAL; there the rename itself is all there is.
+    if (::fsync(descriptor.get()) != 0 && errno != EINVAL)
+        fail(reported, "cannot flush to the device", errno);
+}
+
+// What a path stands for: a symbolic link keeps pointing to the file that is replaced. A rename would put a
+// file in the place of a device or a pipe, so those are refused.
+std::filesystem::path target_of(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto kind = std::filesystem::status(path, error).type();
+    if (kind == std::filesystem::file_type::directory) fail(path, "cannot be written", EISDIR);
+    if (kind != std::filesystem::file_type::regular && kind != std::filesystem::file_type::not_found &&
+        kind != std::filesystem::file_type::none) {
+        throw Error(ErrorCode::io, path.string() + ": is not a regular file");
+    }
+    if (!std::filesystem::is_symlink(path, error)) return path;
+    const std::filesystem::path target = std::filesystem::weakly_canonical(path, error);
+    if (error) fail(path, "cannot follow the link", error.value());
+    return target;
+}
+
+constexpr std::string_view kPart = ".part";
+
+// ".STEM.partNUMBERS.EXTENSION"; the extension last, because some writers choose the format by it.
+std::string temporary_name(const std::filesystem::path& path, const std::string& numbers) {
+    return "." + path.stem().string() + std::string(kPart) + numbers + path.extension().string();
+}
+
+bool all_digits(std::string_view text) {
+    return !text.empty() &&
+           std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+// Pieces of a file, gathered so that a call of the system writes a good many of them.
+class PieceWriter {
+  public:
+    explicit PieceWriter(int fd) : fd_(fd) {}
+    // 0, or the number of the error.
+    int append(std::string_view piece) {
+        constexpr std::size_t kGathered = std::size_t(1) << 16;
+        if (gathered_.size() + piece.size() <= kGathered) {
+            gathered_ += piece;
+            return 0;
+        }
+        if (const int failed = flush()) return failed;
+        if (piece.size() <= kGathered) return append(piece);
+        return write_all(fd_, std::as_bytes(std::span(piece)));
+    }
+    int flush() {
+        const int failed = write_all(fd_, std::as_bytes(std::span(gathered_)));
+        gathered_.clear();
+        return failed;
+    }
+
+  private:
+    int fd_;
+    std::string gathered_;
+};
+
+}  // namespace
+
+void write_atomically(const std::filesystem::path& given,
+                      const std::function<void(const std::filesystem::path& temporary)>& write) {
+    std::error_code error;
+    const std::filesystem::path path = target_of(given);
+    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+    std::filesystem::create_directories(folder, error);
+    if (error) fail(folder, "cannot create the folder", error.value());
+
+    // The process number keeps two runs apart, the address of this call's variable two threads.
+    const std::string name =
+        temporary_name(path, std::to_string(::getpid()) + "-" +
+                                 std::to_string(reinterpret_cast<std::uintptr_t>(&error) >> 4));
+    const std::filesystem::path temporary = folder / name;
+    try {
+        write(temporary);
+        flush_to_device(temporary, path, O_RDONLY);
+        std::filesystem::rename(temporary, path, error);
+        if (error) fail(path, "cannot rename into place", error.value());
+        flush_to_device(folder, path, O_RDONLY | O_DIRECTORY);
+    } catch (...) {
+        std::filesystem::remove(temporary, error);
+        throw;
+    }
+}
+
+void write_pieces_atomically(const std::filesystem::path& path,
+                             const std::function<void(const AppendPiece& append)>& fill) {
+    write_atomically(path, [&](const std::filesystem::path& temporary) {
+        Descriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+        if (descriptor.get() < 0) fail(path, "cannot create", errno);
+        PieceWriter writer(descriptor.get());
+        const auto check = [&](int error) {
+            if (error != 0) fail(path, "cannot write", error);
+        };
+        fill([&](std::string_view piece) { check(writer.append(piece)); });
+        check(writer.flush());
+        if (descriptor.close() != 0) fail(path, "cannot write", errno);
+    });
+}
+
+void write_atomically(const std::filesystem::path& path, std::string_view content) {
+    write_pieces_atomically(path, [&](const AppendPiece& append) { append(content); });
+}
+
+void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content) {
+    write_atomically(path, std::string_view(reinterpret_cast<const char*>(content.data()), content.size()));
+}
+
+std::string published_name(std::string_view temporary) {
+    const std::size_t part = temporary.rfind(kPart);
+    if (!temporary.starts_with('.') || part == temporary.npos || part < 2) return "";
+    const std::string_view rest = temporary.substr(part + kPart.size());
+    const std::string_view numbers = rest.substr(0, rest.find('.'));
+    const std::size_t dash = numbers.find('-');
+    if (dash == numbers.npos || !all_digits(numbers.substr(0, dash)) || !all_digits(numbers.substr(dash + 1)))
+        return "";
+    return std::string(temporary.substr(1, part - 1)).append(rest.substr(numbers.size()));
+}
+
+}  // namespace nephos

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/descriptor.h"
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include "core/error.h"
+
+namespace nephos {
+
+Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
+    // O_NONBLOCK has no effect on regular files, and does not wait for the other end of a pipe.
+    Descriptor descriptor(::open(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0666));
+    struct stat status {};
+    if (descriptor.get() < 0 && errno != ENXIO) {
+        const int error = errno;
+        throw Error(ErrorCode::io, path.string() + ": cannot open: " + std::strerror(error));
+    }
+    if (descriptor.get() >= 0 && ::fstat(descriptor.get(), &status) != 0) {
+        const int error = errno;
+        throw Error(ErrorCode::io, path.string() + ": cannot examine: " + std::strerror(error));
+    }
+    if (S_ISDIR(status.st_mode)) throw Error(ErrorCode::io, path.string() + ": is a folder");
+    // ENXIO: a pipe without a reader, or a socket.
+    if (!S_ISREG(status.st_mode)) throw Error(ErrorCode::io, path.string() + ": is not a regular file");
+    return descriptor;
+}
+
+void require_regular_file(const std::filesystem::path& path) { open_regular_file(path, O_RDONLY); }
+
+bool is_named_pipe(const std::filesystem::path& path) {
+    std::error_code error;
+    if (!std::filesystem::is_fifo(path, error)) return false;
+    const std::filesystem::path name = std::filesystem::canonical(path, error);
+    return !error && std::filesystem::exists(name, error);
+}
+
+int write_all(int fd, std::span<const std::byte> content) {
+    while (!content.empty()) {
+        const ssize_t written = ::write(fd, content.data(), content.size());
+        if (written < 0 && errno == EINTR) continue;
+        if (written < 0) return errno;
+        content = content.subspan(std::size_t(written));
+    }
+    return 0;
+}
+
+}  // namespace nephos

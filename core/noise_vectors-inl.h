@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gradient noise in vectors, of whatever width (not installed): what noise.cpp and veil_kernel.cpp share.
+// Included once for each target of Highway. Sums and products are never fused, so every lane has the bits
+// that it would have alone.
+
+#if defined(NEPHOS_DENSITY_NOISE_VECTORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_DENSITY_NOISE_VECTORS_INL_H_
+#undef NEPHOS_DENSITY_NOISE_VECTORS_INL_H_
+#else
+#define NEPHOS_DENSITY_NOISE_VECTORS_INL_H_
+#endif
+
+#include <cstdint>
+
+#include <hwy/highway.h>
+
+#include "core/noise_hash-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using NoiseFloats = hn::ScalableTag<float>;
+using NoiseWords = hn::Repartition<std::uint32_t, NoiseFloats>;
+using NoiseInts = hn::Repartition<std::int32_t, NoiseFloats>;
+using Floats = hn::Vec<NoiseFloats>;
+using Words = hn::Vec<NoiseWords>;
+
+// One axis of a point: hashes of the lattice points below and above, and the way from the one below.
+struct AxisPoint {
+    Words low, high;
+    Floats from_low, from_high, blend;
+};
+
+// n modulo period, for whole floats within +-2^22.
+HWY_INLINE Floats wrapped(Floats n, float period) {
+    const NoiseFloats d;
+    const auto p = hn::Set(d, period);
+    n = hn::Sub(n, hn::Mul(hn::Floor(hn::Mul(n, hn::Set(d, 1 / period))), p));
+    n = hn::IfThenElse(hn::Lt(n, hn::Zero(d)), hn::Add(n, p), n);  // the product was rounded
+    return hn::IfThenElse(hn::Ge(n, p), hn::Sub(n, p), n);
+}
+
+// `at` counts from lattice cell `cell`; a period of 0 is none.
+template <bool kPeriodic>
+HWY_INLINE AxisPoint axis_point(Floats at, std::uint32_t cell, std::uint32_t seed, float period) {
+    const NoiseFloats d;
+    const NoiseWords dw;
+    const NoiseInts di;
+    const Floats floor = hn::Floor(at);
+    AxisPoint axis;
+    axis.from_low = hn::Sub(at, floor);
+    axis.from_high = hn::Sub(axis.from_low, hn::Set(d, 1.0f));
+    Floats low = floor, high = hn::Add(floor, hn::Set(d, 1.0f));
+    if (kPeriodic && period > 0) {
+        low = wrapped(low, period);
+        high = wrapped(high, period);
+    }
+    const Words first = hn::Set(dw, cell * kAxisStep + seed), step = hn::Set(dw, kAxisStep);
+    const auto hash = [&](Floats n) HWY_ATTR {
+        return mixed(hn::Add(first, hn::Mul(hn::BitCast(dw, hn::ConvertTo(di, n)), step)));
+    };
+    axis.low = hash(low);
+    axis.high = hash(high);
+    // ((6 f - 15) f + 10) f^3
+    const Floats f = axis.from_low;
+    const Floats inner = hn::Sub(hn::Mul(hn::Set(d, 6.0f), f), hn::Set(d, 15.0f));
+    axis.blend = hn::Mul(hn::Add(hn::Mul(inner, f), hn::Set(d, 10.0f)), hn::Mul(hn::Mul(f, f), f));
+    return axis;
+}
+
+// g(l) . (p - l), g as whole numbers -1023, -1021 .. 1023.
+HWY_INLINE Floats gradient_dot(Words hash, Floats x, Floats y, Floats z) {
+    const NoiseFloats d;
+    const NoiseInts di;
+    const NoiseWords dw;
+    const Words h = mixed(hash), mask = hn::Set(dw, 1023);
+    const auto component = [&](Words bits) HWY_ATTR {
+        const auto number = hn::BitCast(di, hn::And(bits, mask));
+        return hn::Sub(hn::ConvertTo(d, hn::Add(number, number)), hn::Set(d, 1023.0f));
+    };
+    const Floats gx = component(h), gy = component(hn::ShiftRight<10>(h));
+    const Floats gz = component(hn::ShiftRight<20>(h));
+    return hn::Add(hn::Add(hn::Mul(gx, x), hn::Mul(gy, y)), hn::Mul(gz, z));
+}
+
+HWY_INLINE Floats between(Floats a, Floats b, Floats blend) {
+    return hn::Add(a, hn::Mul(hn::Sub(b, a), blend));
+}
+
+HWY_INLINE Floats noise(const AxisPoint& x, const AxisPoint& y, const AxisPoint& z) {
+    const NoiseFloats d;
+    const auto row = [&](Words yz, Floats fy, Floats fz) HWY_ATTR {
+        const Floats low = gradient_dot(hn::Add(yz, x.low), x.from_low, fy, fz);
+        const Floats high = gradient_dot(hn::Add(yz, x.high), x.from_high, fy, fz);
+        return between(low, high, x.blend);
+    };
+    const auto level = [&](Words hz, Floats fz) HWY_ATTR {
+        return between(row(hn::Add(hz, y.low), y.from_low, fz), row(hn::Add(hz, y.high), y.from_high, fz),
+                       y.blend);
+    };
+    const Floats sum = between(level(z.low, z.from_low), level(z.high, z.from_high), z.blend);
+    return hn::Mul(sum, hn::Set(d, kNoiseScale));
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace nephos
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "density/vdb/sandbox.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <exception>
+#include <fstream>
+#include <limits>
+#include <new>
+#include <sstream>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "core/available_memory.h"
+#include "core/descriptor.h"
+#include "core/error.h"
+#include "core/text.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define NEPHOS_SANITIZED 1  // shadow memory needs terabytes of addresses: no limit on them then
+#else
+#define NEPHOS_SANITIZED 0
+#endif
+
+namespace nephos {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// The stream is a sequence of chunks: a 32-bit length, then the bytes. Two lengths are signs.
+constexpr std::uint32_t kEnd = 0;  // all sent
+constexpr std::uint32_t kFailure =
+    std::numeric_limits<std::uint32_t>::max();  // a message follows as one chunk
+constexpr std::size_t kChunk = std::size_t{1} << 18;
+constexpr std::size_t kMaxText = std::size_t{1} << 16;
+constexpr int kMaxAttempts = 3;
+constexpr auto kStallTime = std::chrono::seconds(8);
+
+// Thrown inside run_sandboxed when the child seems to wait for a lock that nobody holds.
+struct Stalled {};
+
+// In the child.
+void send_all(int fd, const void* data, std::size_t size) {
+    if (write_all(fd, {static_cast<const std::byte*>(data), size}) != 0)
+        ::_exit(1);  // nobody listens any more
+}
+
+std::size_t sum_or_most(std::size_t a, std::size_t b) {
+    constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
+    return a > kMost - b ? kMost : a + b;
+}
+
+// Addresses that this process uses now.
+std::size_t address_space() {
+    std::ifstream statm("/proc/self/statm");
+    std::size_t pages = 0;
+    statm >> pages;
+    return pages * std::size_t(::sysconf(_SC_PAGESIZE));
+}
+
+void set_limit(int resource, rlim_t value) {
+    rlimit limit{};
+    ::getrlimit(static_cast<__rlimit_resource>(resource), &limit);
+    limit.rlim_cur = std::min(value, limit.rlim_max);
+    ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
+}
+
+// In the child: what it must not do to the terminal, to the disk and to the machine.
+void confine(std::size_t memory_bytes, double seconds) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    for (int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGPIPE}) ::signal(signal, SIG_DFL);
+    const int nowhere = ::open("/dev/null", O_RDWR);
+    if (nowhere >= 0) {
+        ::dup2(nowhere, STDOUT_FILENO);
+        ::dup2(nowhere, STDERR_FILENO);
+    }
+    set_limit(RLIMIT_CORE, 0);
+    set_limit(RLIMIT_CPU, rlim_t(seconds) + 1);
+    if (!NEPHOS_SANITIZED) set_limit(RLIMIT_AS, rlim_t(sum_or_most(address_space(), memory_bytes)));
+}
+
+[[noreturn]] void run_child(int fd, const VdbReadLimits& limits, std::size_t memory_bytes,
+                            const std::function<void(SandboxWriter&)>& child) {
+    confine(memory_bytes, limits.seconds);
+    SandboxWriter writer(fd);
+    try {
+        child(writer);
+        writer.finish();
+    } catch (const std::bad_alloc&) {
+        SandboxWriter(fd).fail("reading it takes more than the " + std::to_string(memory_bytes >> 20) +
+                               " MiB of memory that are allowed");
+    } catch (const std::exception& error) {
+        SandboxWriter(fd).fail(error.what());
+    } catch (...) {
+        SandboxWriter(fd).fail("unknown failure");
+    }
+    ::_exit(0);
+}
+
+// State letter and processor time of a process; '?' when unknown.
+std::pair<char, long> process_state(pid_t pid) {
+    std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+    std::string line;
+    std::getline(stat, line);
+    const std::size_t name_end = line.rfind(')');
+    if (name_end == std::string::npos) return {'?', 0};
+    std::istringstream fields(line.substr(name_end + 1));
+    char state = '?';
+    long skipped = 0, user = 0, system = 0;
+    fields >> state;
+    for (int n = 0; n < 10; ++n) fields >> skipped;
+    fields >> user >> system;
+    return {state, user + system};
+}
+
+class PipeReader final : public SandboxReader {
+  public:
+    PipeReader(int fd, pid_t pid, Clock::time_point deadline, bool last_attempt)
+        : fd_(fd),
+          pid_(pid),
+          deadline_(deadline),
+          watch_for_stall_(!last_attempt),
+          quiet_since_(Clock::now()) {}
+
+    void bytes(void* data, std::size_t size) override {
+        char* out = static_cast<char*>(data);
+        while (size > 0) {
+            if (left_ == 0) next_chunk();
+            const std::size_t part = std::min(size, left_);
+            receive(out, part);
+            out += part;
+            size -= part;
+            left_ -= part;
+        }
+    }
+
+    void expect_end() {
+        std::uint32_t length = 0;
+        if (left_ == 0) receive(&length, sizeof length);
+        if (length == kFailure) fail();
+        if (left_ != 0 || length != kEnd)
+            throw std::runtime_error("the reading process sent more than expected");
+    }
+
+  private:
+    void next_chunk() {
+        std::uint32_t length = 0;
+        receive(&length, sizeof length);
+        if (length == kFailure) fail();
+        if (length == kEnd || length > kChunk)
+            throw std::runtime_error("the reading process sent less than expected");
+        left_ = length;
+    }
+
+    [[noreturn]] void fail() {
+        std::uint32_t length = 0;
+        receive(&length, sizeof length);
+        std::string message(std::min<std::size_t>(length, kMaxText), ' ');
+        receive(message.data(), message.size());
+        throw std::runtime_error(message);
+    }
+
+    void receive(void* data, std::size_t size) {
+        char* out = static_cast<char*>(data);
+        while (size > 0) {
+            wait_for_data();
+            const ssize_t got = ::read(fd_, out, size);
+            if (got < 0 && errno == EINTR) continue;
+            if (got < 0)
+                throw std::runtime_error(std::string("cannot hear the reading process: ") +
+                                         std::strerror(errno));
+            if (got == 0) throw std::runtime_error("");  // the child is gone: its status says why
+            watch_for_stall_ = false;
+            out += got;
+            size -= std::size_t(got);
+        }
+    }
+
+    void wait_for_data() {
+        for (;;) {
+            const auto now = Clock::now();
+            if (now >= deadline_) throw std::runtime_error("reading it takes longer than allowed");
+            const auto left =
+                std::chrono::duration_cast<std::chrono::milliseconds>(deadline_ - now).count() + 1;
+            pollfd poll_fd{fd_, POLLIN, 0};
+            const int ready = ::poll(&poll_fd, 1, int(std::min<long long>(left, 500)));
+            if (ready > 0) return;
+            if (ready == 0 && watch_for_stall_) check_stall();
+        }
+    }
+
+    void check_stall() {
+        const auto [state, used] = process_state(pid_);
+        if (state != 'S' || used != used_) {
+            quiet_since_ = Clock::now();
+            used_ = used;
+        } else if (Clock::now() - quiet_since_ > kStallTime) {
+            throw Stalled();
+        }
+    }
+
+    int fd_;
+    pid_t pid_;
+    Clock::time_point deadline_;
+    bool watch_for_stall_;
+    Clock::time_point quiet_since_;
+    long used_ = -1;
+    std::size_t left_ = 0;  // bytes of the present chunk that were not yet taken
+};
+
+// Ends the child whatever happens, so that no process stays behind.
+class Child {
+  public:
+    explicit Child(pid_t pid) : pid_(pid) {}
+    Child(const Child&) = delete;
+    Child& operator=(const Child&) = delete;
+    ~Child() { end(true); }
+    // Waits for it, killing it first when asked to; returns how it ended, in words, "" when as it should.
+    std::string end(bool kill) {
+        if (pid_ <= 0) return "";
+        if (kill) ::kill(pid_, SIGKILL);
+        int status = 0;
+        pid_t result;
+        do {
+            result = ::waitpid(pid_, &status, 0);
+        } while (result < 0 && errno == EINTR);
+        pid_ = -1;
+        if (result < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0)) return "";
+        if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) return "reading it takes longer than allowed";
+        if (WIFSIGNALED(status)) {
+            return "it is damaged: OpenVDB ended with signal " + std::to_string(WTERMSIG(status)) +
+                   " while reading it";
+        }
+        return "it is damaged: OpenVDB ended while reading it";
+    }
+
+  private:
+    pid_t pid_;
+};
+
+void attempt(const VdbReadLimits& limits, std::size_t memory_bytes, Clock::time_point deadline,
+             bool last_attempt, const std::function<void(SandboxWriter&)>& child,
+             const std::function<void(SandboxReader&)>& parent) {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) {
+        throw std::runtime_error(std::string("no pipe to a reading process: ") + std::strerror(errno));
+    }
+    Descriptor out(ends[0]), in(ends[1]);
+    const pid_t pid = ::fork();
+    if (pid < 0) throw std::runtime_error(std::string("no process to read it in: ") + std::strerror(errno));
+    if (pid == 0) run_child(ends[1], limits, memory_bytes, child);
+    in.close();
+    Child process(pid);
+    PipeReader reader(out.get(), pid, deadline, last_attempt);
+    try {
+        parent(reader);
+        reader.expect_end();
+    } catch (const std::runtime_error& error) {
+        if (*error.what() != '\0') throw;
+        const std::string how = process.end(false);
+        throw std::runtime_error(how.empty() ? "the reading process ended early" : how);
+    }
+    process.end(false);
+}
+
+}  // namespace
+
+void SandboxWriter::bytes(const void* data, std::size_t size) {
+    const auto* at = static_cast<const std::byte*>(data);
+    while (size > 0) {
+        const std::size_t part = std::min(size, kChunk - buffer_.size());
+        buffer_.insert(buffer_.end(), at, at + part);
+        at += part;
+        size -= part;
+        if (buffer_.size() == kChunk) flush();
+    }
+}
+
+void SandboxWriter::text(std::string_view text) {
+    text = text.substr(0, kMaxText);
+    value(std::uint32_t(text.size()));
+    bytes(text.data(), text.size());
+}
+
+void SandboxWriter::flush() {
+    if (buffer_.empty()) return;
+    const auto length = std::uint32_t(buffer_.size());
+    send_all(fd_, &length, sizeof length);
+    send_all(fd_, buffer_.data(), buffer_.size());
+    buffer_.clear();
+}
+
+void SandboxWriter::finish() {
+    flush();
+    send_all(fd_, &kEnd, sizeof kEnd);
+}
+
+void SandboxWriter::fail(std::string_view message) {
+    message = message.substr(0, kMaxText);
+    const auto length = std::uint32_t(message.size());
+    send_all(fd_, &kFailure, sizeof kFailure);
+    send_all(fd_, &length, sizeof length);
+    send_all(fd_, message.data(), message.size());
+}
+
+std::string SandboxReader::text() {
+    const auto size = value<std::uint32_t>();
+    if (size > kMaxText) throw std::runtime_error("the reading process sent a text that is too long");
+    std::string result(size, ' ');
+    bytes(result.data(), result.size());
+    return result;
+}
+
+std::string clamp_message(std::string_view text, std::size_t length) {
+    std::string result;
+    for (char c : text.substr(0, length)) {
+        const auto code = static_cast<unsigned char>(c);
+        result += code >= 0x20 && code < 0x7F ? c : '?';
+    }
+    if (text.size() > length) result += "...";
+    return result;
+}
+
+std::size_t memory_limit(const VdbReadLimits& limits) {
+    if (limits.memory_bytes > 0) return limits.memory_bytes;
+    return available_memory().bytes / 2;
+}
+
+void run_sandboxed(const std::filesystem::path& subject, const VdbReadLimits& limits,
+                   const std::function<void(SandboxWriter&)>& child,
+                   const std::function<void(SandboxReader&)>& parent) {
+    if (!(limits.seconds > 0 && limits.seconds <= 1e6)) {
+        throw Error(ErrorCode::usage,
+                    "time limit of " + number_text(limits.seconds, 6) + " s: must be above 0");
+    }
+    const std::size_t memory_bytes = memory_limit(limits);
+    const auto deadline =
+        Clock::now() + std::chrono::milliseconds(static_cast<long long>(limits.seconds * 1000));
+    for (int n = 1; n <= kMaxAttempts; ++n) {
+        try {
+            attempt(limits, memory_bytes, deadline, n == kMaxAttempts, child, parent);
+            return;
+        } catch (const Stalled&) {
+        } catch (const Error&) {
+            throw;
+        } catch (const std::exception& error) {
+            throw Error(ErrorCode::io, subject.string() + ": " + clamp_message(error.what()));
+        }
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Density grids as OpenVDB files: written so that any program that reads OpenVDB understands them, read so
+// that no file, however damaged or large, can take the program down.
+//
+// World and index space of a file: metres, right-handed, z up; OpenVDB's index (i, j, k) is the CENTRE of
+// voxel (i, j, k), so the transform is: world = (i, j, k) * voxel + origin + voxel / 2. All grids of a file
+// share it.
+//
+// clang-format off
+//
+//     grid          type            content
+//     density       float, half     fog volume, 0..1; the two extreme corners are active with value 0
+//     hum act cld   bool            active and true where the bit is 1; on request
+//     vel           vec3s           wind in m/s (east, north, 0), in blocks of 8x8x8 that hold density; on request
+//
+// The two corner voxels of `density` make the active bounds, and with them OpenVDB's own `file_bbox_min` and
+// `file_bbox_max`, the same in every file of a sequence, clouds or none. The other grids keep the bounds of what they
+// hold; nephos_bbox_min/max say the constant ones. Where density is refined, one cell is refine^3 equal voxels in the
+// bool grids.
+//
+// Metadata, in the file and in each grid:
+//
+//     nephos_units                      string   "m"
+//     nephos_up_axis                    string   "z"
+//     nephos_extinction_per_m           double   extinction coefficient where density is 1
+//     nephos_time_s                     double   simulated time of this frame
+//     nephos_time_step_s                double   simulated time of one automaton step
+//     nephos_frames_per_second          double   frames per second of film
+//     nephos_time_scale                 double   simulated seconds per second of film
+//     nephos_seed                       string   decimal, 0..2^64-1
+//     nephos_scene_hash                 string   hash of the scene
+//     nephos_state_hash                 string   hash of the automaton's state at or before this frame
+//     nephos_version                    string   version of nephos that wrote the file
+//     nephos_random_stream_version      int32    version of the random stream
+//     nephos_refine                     int32    voxels per cell and axis
+//     nephos_bbox_min, nephos_bbox_max  vec3i    bounds of the voxels, both included; constant over a sequence
+//
+// clang-format on
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "automaton/lattice.h"
+#include "core/wind.h"
+#include "density/density_grid.h"
+
+namespace nephos {
+
+// See the table above.
+struct VdbMetadata {
+    double extinction_per_m = 0.02;
+    double time_s = 0;
+    double time_step_s = 0;
+    double frames_per_second = 0;
+    double time_scale = 1;
+    std::uint64_t seed = 0;
+    std::string scene_hash;
+    std::string state_hash;
+    std::string nephos_version;
+    int random_stream_version = 0;
+    bool operator==(const VdbMetadata&) const = default;
+};
+
+// What goes into one file. At least one of `density`, `hum`, `act`, `cld` must be there. Nothing is owned.
+struct VdbContent {
+    const DensityGrid* density = nullptr;
+    bool half = false;  // density as 16-bit floats
+    std::optional<BitPlaneView> hum, act, cld;
+    Placement cells;             // of the bit planes; must agree with density's placement and extent / refine
+    const Wind* wind = nullptr;  // writes `vel` at metadata.time_s; needs density
+};
+
+// Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content
+// contradicts itself, Error(io) naming the path when the file cannot be written (full disk included).
+void write_vdb(const std::filesystem::path& path, const VdbContent& content, const VdbMetadata& metadata);
+
+// NAME_0001.vdb: path of one frame of a sequence, frames counted from 1; at least four digits.
+std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame);
+
+// Which axis of a foreign file points up.
+enum class UpAxis {
+    automatic,  // what nephos_up_axis says, else z
+    z,
+    y,  // x stays, file z is south: world (x, -z, y); voxels are permuted, never resampled
+};
+
+// How much a file may cost before it is given up.
+struct VdbReadLimits {
+    std::size_t memory_bytes = 0;  // for the reading process; 0 = half of the memory that is free
+    double seconds = 120;          // wall clock, > 0
+};
+
+struct VdbReadOptions {
+    std::string grid;  // name of the grid; empty: `density`, else the first float grid
+    UpAxis up_axis = UpAxis::automatic;
+    double metres_per_unit = 1.0;  // world units of the file; > 0
+    VdbReadLimits limits;
+};
+
+// A density grid and what its file says about it.
+struct LoadedDensity {
+    DensityGrid density;
+    std::string grid_name;
+    std::optional<VdbMetadata> metadata;  // when nephos wrote the file
+    int refine = 1;  // voxels per cell of the lattice and axis; 1 unless the file says more
+    std::vector<std::string>
+        notes;  // one sentence for each thing that was adapted (negative values set to 0 ...)
+};
+
+// Reads any float or half fog volume (also double). Bounds are nephos_bbox where present, else the active
+// bounds, moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and
+// direction, are permuted; what is turned, sheared or not cubic is resampled, with a note. Everything
+// untrusted happens in a child process with limits on memory and time, which sends the voxels back; this
+// process never parses the file. Throws Error(io) naming the path and what was wrong with it; Error(usage) on
+// bad options.
+LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
+DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
+
+// Reads the bool (or mask) grids hum, act and cld as a state of this extent at this place. Throws Error(io)
+// as above, and when one of them is missing, is of another extent by its nephos_bbox_max, (without one) has a
+// voxel outside the extent, or stands elsewhere by its transform: a corner of its box of cells farther than a
+// hundredth of a cell from that of the lattice. The identity, which OpenVDB gives to grids of which nothing
+// else was said, stands nowhere in grids that nephos did not write, and fits every place.
+Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
+                   const VdbReadLimits& limits = {});
+
+// One grid as `nephos info` lists it.
+struct VdbGridInfo {
+    std::string name;
+    std::string type;        // "float", "half", "bool", "vec3s" ...
+    std::string grid_class;  // "fog volume", "level set", "unknown" ...
+    Vec3 voxel_size{};       // world units
+    VoxelBox active_box;
+    std::uint64_t active_voxels = 0;
+    std::vector<std::pair<std::string, std::string>> metadata;  // name, value as text; by name
+};
+
+struct VdbInfo {
+    std::string file_version;        // "10.0/224": library and format
+    std::vector<VdbGridInfo> grids;  // in the file's order
+    std::vector<std::pair<std::string, std::string>> metadata;
+};
+
+// Throws Error(io) as load_density().
+VdbInfo read_vdb_info(const std::filesystem::path& path, const VdbReadLimits& limits = {});
+
+}  // namespace nephos

@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "density/vdb/vdb_foreign.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include <openvdb/tools/Interpolation.h>
+
+#include "density/metaballs.h"
+#include "density/openvdb_access.h"
+
+namespace nephos {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::Vec3d;
+
+constexpr double kTolerance = 1e-5;                  // relative, for "along an axis" and "a cube"
+constexpr int kMaxVoxels = kMaxExtent * kMaxRefine;  // along one axis
+
+// Index space to metres, x east, y north, z up; column c is one index step along axis c.
+struct Affine {
+    std::array<Vec3d, 3> columns;
+    Vec3d shift;
+
+    Vec3d operator()(const Vec3d& index) const {
+        return columns[0] * index[0] + columns[1] * index[1] + columns[2] * index[2] + shift;
+    }
+};
+
+Affine affine_of(const ForeignGrid& foreign) {
+    const openvdb::math::Transform& transform = foreign.grid->transform();
+    if (!transform.isLinear())
+        throw std::runtime_error("its transform is not linear (a frustum), which is not supported");
+    const auto to_ours = [&](const Vec3d& v) {
+        const Vec3d m = v * foreign.metres_per_unit;
+        return foreign.y_up ? Vec3d(m.x(), -m.z(), m.y()) : m;
+    };
+    Affine affine;
+    const Vec3d zero = transform.indexToWorld(Vec3d(0.0));
+    affine.shift = to_ours(zero);
+    const Vec3d units[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    for (std::size_t c = 0; c < 3; ++c) affine.columns[c] = to_ours(transform.indexToWorld(units[c]) - zero);
+    for (const Vec3d& v : {affine.columns[0], affine.columns[1], affine.columns[2], affine.shift}) {
+        if (!std::isfinite(v.x()) || !std::isfinite(v.y()) || !std::isfinite(v.z())) {
+            throw std::runtime_error("its transform has values that are not finite");
+        }
+    }
+    const double volume = affine.columns[0].dot(affine.columns[1].cross(affine.columns[2]));
+    if (!(std::abs(volume) > 0) || !std::isfinite(volume))
+        throw std::runtime_error("its transform is singular");
+    return affine;
+}
+
+// For each of our axes the file's index axis along it, and whether it runs the same way.
+struct AxisMap {
+    std::array<int, 3> axis{};
+    std::array<bool, 3> same{};
+    double edge = 0;
+};
+
+bool axis_map_of(const Affine& affine, AxisMap& map) {
+    map.edge = affine.columns[0].length();
+    std::array<bool, 3> taken{};
+    for (int c = 0; c < 3; ++c) {
+        const Vec3d& column = affine.columns[std::size_t(c)];
+        if (std::abs(column.length() - map.edge) > kTolerance * map.edge) return false;
+        for (int r = 0; r < 3; ++r) {
+            if (std::abs(std::abs(column[r]) - map.edge) > kTolerance * map.edge) continue;
+            map.axis[std::size_t(r)] = c;
+            map.same[std::size_t(r)] = column[r] > 0;
+            taken[std::size_t(r)] = true;
+        }
+        // One component has the full length; the others must vanish.
+        const double rest =
+            column.lengthSqr() -
+            std::pow(std::max({std::abs(column[0]), std::abs(column[1]), std::abs(column[2])}), 2);
+        if (rest > kTolerance * kTolerance * map.edge * map.edge) return false;
+    }
+    return taken[0] && taken[1] && taken[2];
+}
+
+Extent checked_extent(std::array<double, 3> size) {
+    for (double n : size) {
+        if (!(n >= 1 && n <= kMaxVoxels)) {
+            throw std::runtime_error("its bounds of " + std::to_string(size[0]) + " x " +
+                                     std::to_string(size[1]) + " x " + std::to_string(size[2]) +
+                                     " voxels are too large: at most " + std::to_string(kMaxVoxels) +
+                                     " on each axis");
+        }
+    }
+    return {int(size[0]), int(size[1]), int(size[2])};
+}
+
+// Values as a fog volume has them: inactive ones 0, none below 0. Counts what it changed.
+class Sanitiser {
+  public:
+    float operator()(float value) {
+        if (!std::isfinite(value)) throw std::runtime_error("it has a density that is not a finite number");
+        if (value < 0) ++negative_;
+        return std::max(value, 0.0f);
+    }
+    std::uint64_t negative() const { return negative_; }
+
+  private:
+    std::uint64_t negative_ = 0;
+};
+
+// The same voxels at other indices.
+class Permuter {
+  public:
+    Permuter(const CoordBBox& bounds, const AxisMap& map, const DensityReceiver& receiver)
+        : bounds_(bounds), map_(map), receiver_(receiver), work_(0.0f), voxels_(work_) {}
+
+    ForeignResult run(const openvdb::FloatTree& tree) {
+        const bool blocks_stay =
+            map_.axis == std::array<int, 3>{0, 1, 2} && map_.same == std::array<bool, 3>{true, true, true} &&
+            ((bounds_.min().x() | bounds_.min().y() | bounds_.min().z()) & (kBlock - 1)) == 0;
+        for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+            if (blocks_stay) {
+                send_whole(*leaf);
+            } else {
+                for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) {
+                    const float value = sanitise_(*voxel);
+                    if (value > 0 && bounds_.isInside(voxel.getCoord()))
+                        voxels_.setValueOnly(moved(voxel.getCoord()), value);
+                }
+            }
+        }
+        auto tile = tree.cbeginValueOn();
+        tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
+        for (; tile; ++tile) move_tile(tile.getBoundingBox(), sanitise_(*tile));
+        for (auto leaf = work_.cbeginLeaf(); leaf; ++leaf)
+            receiver_.leaf(leaf->origin(), leaf->buffer().data());
+        return {false, sanitise_.negative()};
+    }
+
+  private:
+    Coord moved(const Coord& c) const {
+        Coord result;
+        for (int r = 0; r < 3; ++r) {
+            const int a = map_.axis[std::size_t(r)];
+            result[r] = map_.same[std::size_t(r)] ? c[a] - bounds_.min()[a] : bounds_.max()[a] - c[a];
+        }
+        return result;
+    }
+
+    void send_whole(const FloatLeaf& leaf) {
+        float values[kBlockVoxels] = {};
+        bool any = false;
+        for (auto voxel = leaf.cbeginValueOn(); voxel; ++voxel) {
+            const float value = sanitise_(*voxel);
+            if (!bounds_.isInside(voxel.getCoord())) continue;
+            values[voxel.pos()] = value;
+            any = any || value > 0;
+        }
+        if (any) receiver_.leaf(leaf.origin() - bounds_.min(), values);
+    }
+
+    // Cuts a tile along our blocks: whole ones stay tiles, the rest becomes voxels.
+    void move_tile(CoordBBox box, float value) {
+        box.intersect(bounds_);
+        if (value == 0 || box.empty()) return;
+        const Coord a = moved(box.min()), b = moved(box.max());
+        const CoordBBox target(Coord::minComponent(a, b), Coord::maxComponent(a, b));
+        const Coord first = target.min() & ~(kBlock - 1);
+        for (int z = first.z(); z <= target.max().z(); z += kBlock) {
+            for (int y = first.y(); y <= target.max().y(); y += kBlock) {
+                for (int x = first.x(); x <= target.max().x(); x += kBlock) {
+                    CoordBBox block = CoordBBox::createCube({x, y, z}, kBlock);
+                    if (target.isInside(block)) {
+                        receiver_.tile(block.min(), value);
+                        continue;
+                    }
+                    block.intersect(target);
+                    for (auto c = block.begin(); c; ++c) voxels_.setValueOnly(*c, value);
+                }
+            }
+        }
+    }
+
+    const CoordBBox bounds_;
+    const AxisMap map_;
+    const DensityReceiver& receiver_;
+    openvdb::FloatTree work_;
+    openvdb::tree::ValueAccessor<openvdb::FloatTree> voxels_;
+    Sanitiser sanitise_;
+};
+
+// Trilinear samples on cubes whose edge is the file's shortest voxel edge.
+class Skewed {
+  public:
+    Skewed(const ForeignGrid& foreign, const Affine& affine) : foreign_(foreign), affine_(affine) {
+        edge_ =
+            std::min({affine.columns[0].length(), affine.columns[1].length(), affine.columns[2].length()});
+        Vec3d high;
+        world_box(foreign.bounds, 0.5, low_, high);
+        const Vec3d size = (high - low_) / edge_;
+        extent_ = checked_extent({std::max(1.0, std::ceil(size.x() - kTolerance)),
+                                  std::max(1.0, std::ceil(size.y() - kTolerance)),
+                                  std::max(1.0, std::ceil(size.z() - kTolerance))});
+    }
+
+    ForeignResult run(const DensityReceiver& receiver) {
+        receiver.begin(extent_, {{low_.x(), low_.y(), low_.z()}, edge_});
+        const auto accessor = foreign_.grid->getConstAccessor();
+        Sanitiser sanitise;
+        for (const Coord& origin : blocks()) {
+            float values[kBlockVoxels] = {};
+            bool any = false;
+            for (int n = 0; n < kBlockVoxels; ++n) {
+                const Coord voxel = origin + Coord(n >> 6, n >> 3 & 7, n & 7);
+                if (voxel.x() >= extent_.x || voxel.y() >= extent_.y || voxel.z() >= extent_.z) continue;
+                const Vec3d world = low_ + (voxel.asVec3d() + Vec3d(0.5)) * edge_;
+                const Vec3d index = foreign_.grid->transform().worldToIndex(to_file(world));
+                values[n] = sanitise(openvdb::tools::BoxSampler::sample(accessor, index));
+                any = any || values[n] > 0;
+            }
+            if (any) receiver.leaf(origin, values);
+        }
+        return {true, sanitise.negative()};
+    }
+
+  private:
+    Vec3d to_file(const Vec3d& metres) const {
+        const Vec3d m = metres / foreign_.metres_per_unit;
+        return foreign_.y_up ? Vec3d(m.x(), m.z(), -m.y()) : m;
+    }
+
+    // Smallest box of our axes around a box of the file's voxels, `margin` voxels wider on each side.
+    void world_box(const CoordBBox& box, double margin, Vec3d& low, Vec3d& high) const {
+        for (int corner = 0; corner < 8; ++corner) {
+            Vec3d index;
+            for (int a = 0; a < 3; ++a)
+                index[a] = corner >> a & 1 ? box.max()[a] + margin : box.min()[a] - margin;
+            const Vec3d world = affine_(index);
+            low = corner == 0 ? world : openvdb::math::minComponent(low, world);
+            high = corner == 0 ? world : openvdb::math::maxComponent(high, world);
+        }
+    }
+
+    // Our blocks that a leaf or tile of the file reaches, each once, in block order.
+    std::vector<Coord> blocks() const {
+        std::vector<Coord> result;
+        const auto add = [&](CoordBBox box) {
+            box.intersect(foreign_.bounds);
+            if (box.empty()) return;
+            Vec3d low, high;
+            world_box(box, 1.0, low, high);
+            std::array<int, 3> first{}, last{};
+            const int size[] = {extent_.x, extent_.y, extent_.z};
+            for (int a = 0; a < 3; ++a) {
+                first[std::size_t(a)] =
+                    std::max(0, int(std::floor((low[a] - low_[a]) / edge_))) & ~(kBlock - 1);
+                last[std::size_t(a)] = std::min(size[a] - 1, int(std::ceil((high[a] - low_[a]) / edge_)));
+            }
+            for (int z = first[2]; z <= last[2]; z += kBlock) {
+                for (int y = first[1]; y <= last[1]; y += kBlock) {
+                    for (int x = first[0]; x <= last[0]; x += kBlock) result.emplace_back(x, y, z);
+                }
+            }
+            if (result.size() > foreign_.memory_bytes / 64) throw std::bad_alloc();
+        };
+        const openvdb::FloatTree& tree = foreign_.grid->tree();
+        for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) add(leaf->getNodeBoundingBox());
+        auto tile = tree.cbeginValueOn();
+        tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
+        for (; tile; ++tile) add(tile.getBoundingBox());
+        std::ranges::sort(result, {}, block_order);
+        result.erase(std::unique(result.begin(), result.end()), result.end());
+        return result;
+    }
+
+    const ForeignGrid& foreign_;
+    const Affine& affine_;
+    double edge_ = 0;
+    Vec3d low_;
+    Extent extent_;
+};
+
+}  // namespace
+
+ForeignResult convert_foreign(const ForeignGrid& foreign, const DensityReceiver& receiver) {
+    const Affine affine = affine_of(foreign);
+    AxisMap map;
+    if (!axis_map_of(affine, map)) return Skewed(foreign, affine).run(receiver);
+    std::array<double, 3> size{};
+    Vec3d low = affine(foreign.bounds.min().asVec3d());
+    low = openvdb::math::minComponent(low, affine(foreign.bounds.max().asVec3d()));
+    for (std::size_t r = 0; r < 3; ++r) {
+        size[r] = double(foreign.bounds.max()[map.axis[r]]) - double(foreign.bounds.min()[map.axis[r]]) + 1;
+        low[int(r)] -= map.edge / 2;  // from the centre of the lowest voxel to its corner
+    }
+    receiver.begin(checked_extent(size), {{low.x(), low.y(), low.z()}, map.edge});
+    return Permuter(foreign.bounds, map, receiver).run(foreign.grid->tree());
+}
+
+}  // namespace nephos

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Names and conversion of the metadata of vdb_file.h, shared by writer and reader (not installed).
+
+#include <optional>
+#include <string>
+
+#include <openvdb/openvdb.h>
+
+#include "density/density_grid.h"
+#include "density/vdb/vdb_file.h"
+
+namespace nephos {
+
+inline constexpr const char* kMetaUnits = "nephos_units";
+inline constexpr const char* kMetaUpAxis = "nephos_up_axis";
+inline constexpr const char* kMetaExtinction = "nephos_extinction_per_m";
+inline constexpr const char* kMetaTime = "nephos_time_s";
+inline constexpr const char* kMetaTimeStep = "nephos_time_step_s";
+inline constexpr const char* kMetaFrameRate = "nephos_frames_per_second";
+inline constexpr const char* kMetaTimeScale = "nephos_time_scale";
+inline constexpr const char* kMetaSeed = "nephos_seed";
+inline constexpr const char* kMetaSceneHash = "nephos_scene_hash";
+inline constexpr const char* kMetaStateHash = "nephos_state_hash";
+inline constexpr const char* kMetaVersion = "nephos_version";
+inline constexpr const char* kMetaStreamVersion = "nephos_random_stream_version";
+inline constexpr const char* kMetaRefine = "nephos_refine";
+inline constexpr const char* kMetaBoxMin = "nephos_bbox_min";
+inline constexpr const char* kMetaBoxMax = "nephos_bbox_max";
+
+openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int refine);
+
+// Nothing when `map` was not written by nephos; fields that are missing or of another type keep their
+// defaults.
+std::optional<VdbMetadata> from_meta_map(const openvdb::MetaMap& map);
+
+// The value when it is there and of type T.
+template <class T>
+std::optional<T> meta_value(const openvdb::MetaMap& map, const char* name) {
+    const auto typed = map.getMetadata<openvdb::TypedMetadata<T>>(name);
+    return typed ? std::optional<T>(typed->value()) : std::nullopt;
+}
+
+}  // namespace nephos

@@ -1,0 +1,418 @@
+// SPDX-License-Identifier: Apache-2.0
+// Density and states from OpenVDB files.
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "density/metaballs.h"
+#include "density/openvdb_access.h"
+#include "density/vdb/sandbox.h"
+#include "density/vdb/vdb_archive.h"
+#include "density/vdb/vdb_file.h"
+#include "density/vdb/vdb_foreign.h"
+#include "density/vdb/vdb_metadata.h"
+#include "density/vdb/vdb_sandbox.h"
+
+namespace nephos {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+
+// What follows in the stream of blocks.
+enum class Record : std::uint8_t { end, leaf, tile };
+
+template <class Grid>
+bool is(const openvdb::GridBase& grid) {
+    return grid.isType<Grid>();
+}
+
+bool is_fog(const openvdb::GridBase& grid) {
+    return (is<openvdb::FloatGrid>(grid) || is<openvdb::DoubleGrid>(grid)) &&
+           grid.getGridClass() != openvdb::GRID_LEVEL_SET;
+}
+
+std::string names_of(const VdbArchive& archive) {
+    std::string names;
+    for (const auto& entry : archive.entries()) {
+        names += (names.empty() ? "`" : ", `") + entry.descriptor.gridName() + "` (" +
+                 entry.header->valueType() + ")";
+    }
+    return names.empty() ? "none" : names;
+}
+
+std::size_t choose_grid(const VdbArchive& archive, const std::string& wanted) {
+    const auto& entries = archive.entries();
+    const auto find = [&](const auto& matches) {
+        return std::size_t(std::ranges::find_if(entries, matches) - entries.begin());
+    };
+    const std::string name = wanted.empty() ? "density" : wanted;
+    std::size_t n = find([&](const auto& e) { return e.descriptor.gridName() == name && is_fog(*e.header); });
+    if (n < entries.size()) return n;
+    if (!wanted.empty()) {
+        n = find([&](const auto& e) { return e.descriptor.gridName() == name; });
+        throw std::runtime_error(n < entries.size()
+                                     ? "grid `" + name + "` is not a float fog volume"
+                                     : "there is no grid `" + name + "`; it has " + names_of(archive));
+    }
+    n = find([](const auto& e) { return is_fog(*e.header); });
+    if (n == entries.size())
+        throw std::runtime_error("there is no float fog volume in it; it has " + names_of(archive));
+    return n;
+}
+
+// Bounds and counts that the file states must be bearable before any voxel is read.
+void check_stated_size(const openvdb::GridBase& header, std::size_t memory_bytes) {
+    const auto low = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MIN);
+    const auto high = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MAX);
+    for (int a = 0; low && high && a < 3; ++a) {
+        const std::int64_t size = std::int64_t{(*high)[a]} - (*low)[a] + 1;
+        if (size > std::int64_t{kMaxExtent} * kMaxRefine) {
+            throw std::runtime_error("its bounds of " + std::to_string(size) +
+                                     " voxels on an axis are too large");
+        }
+    }
+    const auto voxels = meta_value<std::int64_t>(header, openvdb::GridBase::META_FILE_VOXEL_COUNT);
+    if (voxels && *voxels > std::int64_t(memory_bytes / sizeof(float))) {
+        throw std::runtime_error("its " + std::to_string(*voxels) +
+                                 " voxels do not fit into the memory that is allowed");
+    }
+}
+
+openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
+    if (const auto typed = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return typed;
+    const auto typed = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
+    if (!typed) throw std::runtime_error("it is damaged: a grid changed its type");
+    auto result = openvdb::FloatGrid::create(openvdb::FloatTree::Ptr(new openvdb::FloatTree(typed->tree())));
+    result->setTransform(grid->transformPtr());
+    return result;
+}
+
+// The bounds that nephos wrote where they are there and hold all voxels, else those of the active voxels.
+CoordBBox bounds_of(const openvdb::FloatGrid& grid, const openvdb::GridBase& header) {
+    CoordBBox active;
+    const bool any = grid.tree().evalActiveVoxelBoundingBox(active);
+    const auto low = meta_value<openvdb::Vec3i>(header, kMetaBoxMin);
+    const auto high = meta_value<openvdb::Vec3i>(header, kMetaBoxMax);
+    if (low && high) {
+        const CoordBBox stated(Coord((*low)[0], (*low)[1], (*low)[2]),
+                               Coord((*high)[0], (*high)[1], (*high)[2]));
+        if (!stated.empty() && (!any || stated.isInside(active))) return stated;
+    }
+    return any ? active : CoordBBox(Coord(0), Coord(0));
+}
+
+bool has_y_up(const openvdb::GridBase& header, const openvdb::MetaMap& file, UpAxis wanted) {
+    if (wanted != UpAxis::automatic) return wanted == UpAxis::y;
+    auto stated = meta_value<std::string>(header, kMetaUpAxis);
+    if (!stated) stated = meta_value<std::string>(file, kMetaUpAxis);
+    return stated == "y";
+}
+
+int refine_of(const openvdb::GridBase& header) {
+    const int refine = meta_value<int>(header, kMetaRefine).value_or(1);
+    if (refine < 1 || refine > kMaxRefine)
+        throw std::runtime_error("it is damaged: nephos_refine is out of range");
+    return refine;
+}
+
+void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& metadata) {
+    writer.value(std::uint8_t(metadata.has_value()));
+    if (!metadata) return;
+    writer.value(metadata->extinction_per_m);
+    writer.value(metadata->time_s);
+    writer.value(metadata->time_step_s);
+    writer.value(metadata->frames_per_second);
+    writer.value(metadata->time_scale);
+    writer.value(metadata->seed);
+    writer.value(metadata->random_stream_version);
+    for (const std::string* text :
+         {&metadata->scene_hash, &metadata->state_hash, &metadata->nephos_version}) {
+        writer.text(clamp_message(*text, kMaxMetadataText));
+    }
+}
+
+std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
+    if (reader.value<std::uint8_t>() == 0) return std::nullopt;
+    VdbMetadata metadata;
+    metadata.extinction_per_m = reader.value<double>();
+    metadata.time_s = reader.value<double>();
+    metadata.time_step_s = reader.value<double>();
+    metadata.frames_per_second = reader.value<double>();
+    metadata.time_scale = reader.value<double>();
+    metadata.seed = reader.value<std::uint64_t>();
+    metadata.random_stream_version = reader.value<int>();
+    for (std::string* text : {&metadata.scene_hash, &metadata.state_hash, &metadata.nephos_version})
+        *text = reader.text();
+    return metadata;
+}
+
+// In the child: header, geometry, blocks, counts.
+void send_density(VdbArchive& archive, const VdbReadOptions& options, SandboxWriter& writer) {
+    const std::size_t memory_bytes = memory_limit(options.limits);
+    const std::size_t n = choose_grid(archive, options.grid);
+    const openvdb::GridBase& header = *archive.entries()[n].header;
+    check_stated_size(header, memory_bytes);
+    const auto grid = as_float(archive.read(n));
+    if (grid->background() != 0.0f) {
+        throw std::runtime_error("its background is " + number_text(grid->background(), 6) +
+                                 ", not 0: it is no fog volume");
+    }
+    if (grid->activeVoxelCount() > memory_bytes / sizeof(float)) throw std::bad_alloc();
+    writer.text(archive.entries()[n].descriptor.gridName());
+    auto metadata = from_meta_map(header);
+    send_metadata(writer, metadata ? metadata : from_meta_map(archive.metadata()));
+    writer.value(refine_of(header));
+
+    const auto coord = [&](const Coord& c) {
+        for (int a = 0; a < 3; ++a) writer.value(std::int32_t(c[a]));
+    };
+    DensityReceiver receiver;
+    receiver.begin = [&](const Extent& extent, const Placement& placement) {
+        writer.value(extent);
+        writer.value(placement);
+    };
+    receiver.leaf = [&](const Coord& origin, const float* values) {
+        writer.value(Record::leaf);
+        coord(origin);
+        writer.bytes(values, kBlockVoxels * sizeof(float));
+    };
+    receiver.tile = [&](const Coord& origin, float value) {
+        writer.value(Record::tile);
+        coord(origin);
+        writer.value(value);
+    };
+    const bool y_up = has_y_up(header, archive.metadata(), options.up_axis);
+    const ForeignGrid foreign{grid.get(), bounds_of(*grid, header), y_up, options.metres_per_unit,
+                              memory_bytes};
+    const ForeignResult result = convert_foreign(foreign, receiver);
+    writer.value(Record::end);
+    writer.value(result);
+}
+
+Coord receive_origin(SandboxReader& reader, const Extent& extent) {
+    const auto x = reader.value<std::int32_t>(), y = reader.value<std::int32_t>(),
+               z = reader.value<std::int32_t>();
+    const bool inside = x >= 0 && y >= 0 && z >= 0 && x < extent.x && y < extent.y && z < extent.z;
+    if (!inside || ((x | y | z) & (kBlock - 1)) != 0)
+        throw std::runtime_error("the reading process sent a misplaced block");
+    return {x, y, z};
+}
+
+// In the parent: builds the grid from what the child sends.
+LoadedDensity receive_density(SandboxReader& reader) {
+    LoadedDensity loaded;
+    loaded.grid_name = clamp_message(reader.text(), kMaxMetadataText);
+    loaded.metadata = receive_metadata(reader);
+    loaded.refine = std::clamp(reader.value<int>(), 1, kMaxRefine);
+    const auto extent = reader.value<Extent>();
+    const auto placement = reader.value<Placement>();
+    if (extent.x < 1 || extent.y < 1 || extent.z < 1 || !(placement.cell_size_m > 0)) {
+        throw std::runtime_error("the reading process sent an impossible size");
+    }
+    TreeBuilder builder;
+    for (;;) {
+        const auto record = reader.value<Record>();
+        if (record == Record::end) break;
+        const Coord origin = receive_origin(reader, extent);
+        if (record == Record::tile) {
+            NewBlock{nullptr, reader.value<float>()}.move_to(builder, origin);
+            continue;
+        }
+        auto leaf = uninitialised_leaf(origin);
+        reader.bytes(leaf->buffer().data(), kBlockVoxels * sizeof(float));
+        NewBlock::from(std::move(leaf)).move_to(builder, origin);
+    }
+    const auto result = reader.value<ForeignResult>();
+    loaded.density = builder.finish(extent, placement);
+    if (result.resampled) {
+        loaded.notes.push_back("its voxels are not cubes along the axes: resampled to voxels of " +
+                               number_text(placement.cell_size_m, 6) + " m");
+    }
+    if (result.negative > 0) {
+        loaded.notes.push_back(std::to_string(result.negative) + " values below 0 were set to 0");
+    }
+    return loaded;
+}
+
+// In the child: the blocks of one bool or mask tree.
+template <class Tree>
+void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& name, SandboxWriter& writer) {
+    if (tree.background()) throw std::runtime_error("the background of grid `" + name + "` is true");
+    CoordBBox active;
+    if (tree.evalActiveVoxelBoundingBox(active) && !allowed.isInside(active)) {
+        throw std::runtime_error("grid `" + name + "` has voxels outside the " +
+                                 std::to_string(allowed.dim().x()) + " x " +
+                                 std::to_string(allowed.dim().y()) + " x " +
+                                 std::to_string(allowed.dim().z()) + " voxels of the scene");
+    }
+    const auto send = [&](const Coord& origin, const std::uint64_t(&words)[8]) {
+        writer.value(Record::leaf);
+        for (int a = 0; a < 3; ++a) writer.value(std::int32_t(origin[a]));
+        writer.bytes(words, sizeof words);
+    };
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+        std::uint64_t words[8] = {};
+        for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) {
+            if (*voxel) words[voxel.pos() >> 6] |= std::uint64_t{1} << (voxel.pos() & 63);
+        }
+        send(leaf->origin(), words);
+    }
+    std::uint64_t full[8];
+    std::fill_n(full, 8, ~std::uint64_t{0});
+    auto tile = tree.cbeginValueOn();
+    tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        if (!*tile) continue;
+        const CoordBBox box = tile.getBoundingBox();
+        for (int z = box.min().z(); z <= box.max().z(); z += kBlock) {
+            for (int y = box.min().y(); y <= box.max().y(); y += kBlock) {
+                for (int x = box.min().x(); x <= box.max().x(); x += kBlock) send({x, y, z}, full);
+            }
+        }
+    }
+    writer.value(Record::end);
+}
+
+constexpr const char* kStateGrids[] = {"hum", "act", "cld"};
+
+// Without nephos's bounds nobody knows how large the state is: then only its voxels can lie outside.
+void check_state_extent(const openvdb::GridBase& header, int refine, const Extent& extent) {
+    const auto last = meta_value<openvdb::Vec3i>(header, kMetaBoxMax);
+    if (!last) return;
+    const auto cells = [&](int axis) { return (std::int64_t{(*last)[axis]} + 1) / refine; };
+    if (cells(0) == extent.x && cells(1) == extent.y && cells(2) == extent.z) return;
+    const auto text = [](std::int64_t x, std::int64_t y, std::int64_t z) {
+        return std::to_string(x) + " x " + std::to_string(y) + " x " + std::to_string(z);
+    };
+    throw std::runtime_error("it holds a state of " + text(cells(0), cells(1), cells(2)) +
+                             " cells, but the scene has " + text(extent.x, extent.y, extent.z));
+}
+
+std::string point_text(const openvdb::Vec3d& p) {
+    return "(" + number_text(p.x(), 9) + ", " + number_text(p.y(), 9) + ", " + number_text(p.z(), 9) + ") m";
+}
+
+// Compares where the grid puts the corners of the box of cells with where the scene has them.
+void check_state_placement(const openvdb::GridBase& header, const std::string& name, int refine,
+                           const Extent& extent, const Placement& placement) {
+    const openvdb::math::Transform& transform = header.transform();
+    const bool own = meta_value<openvdb::Vec3i>(header, kMetaBoxMax).has_value();
+    if (!own && transform.isIdentity()) return;
+    const double cell = placement.cell_size_m, tolerance_m = cell / 100;
+    const Vec3& origin = placement.origin_m;
+    const openvdb::Vec3d size = transform.voxelSize() * refine;
+    const double cells[3] = {double(extent.x), double(extent.y), double(extent.z)};
+    for (int axis = 0; axis < 3; ++axis) {
+        if (std::abs(size[axis] - cell) * cells[axis] <= tolerance_m) continue;
+        throw std::runtime_error("grid `" + name + "` has cells of " + number_text(size[axis], 9) +
+                                 " m, but the scene's lattice has cells of " + number_text(cell, 9) + " m");
+    }
+    // An index is a voxel's centre, so the lowest corner of the box has the indices -1/2.
+    const auto corner = [&](double x, double y, double z) {
+        return transform.indexToWorld(openvdb::Vec3d(x, y, z) * refine - openvdb::Vec3d(0.5));
+    };
+    const openvdb::Vec3d low = corner(0, 0, 0), expected(origin.x, origin.y, origin.z);
+    const auto agree = [&](const openvdb::Vec3d& a, const openvdb::Vec3d& b) {
+        return (a - b).length() <= tolerance_m;
+    };
+    if (!agree(low, expected)) {
+        throw std::runtime_error("grid `" + name + "` starts at " + point_text(low) +
+                                 ", but the scene's lattice at " + point_text(expected));
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        openvdb::Vec3d end(0.0);
+        end[axis] = cells[axis];
+        const openvdb::Vec3d found = corner(end.x(), end.y(), end.z());
+        if (agree(found, expected + end * cell)) continue;
+        throw std::runtime_error("the axes of grid `" + name + "` are turned: its corner at " +
+                                 point_text(found) + " stands at " + point_text(expected + end * cell) +
+                                 " in the scene");
+    }
+}
+
+void send_state(VdbArchive& archive, Extent extent, const Placement& placement, SandboxWriter& writer) {
+    for (const char* name : kStateGrids) {
+        const auto& entries = archive.entries();
+        const auto entry =
+            std::ranges::find_if(entries, [&](const auto& e) { return e.descriptor.gridName() == name; });
+        if (entry == entries.end()) {
+            throw std::runtime_error(std::string("there is no grid `") + name +
+                                     "`; a state needs hum, act and cld; it has " + names_of(archive));
+        }
+        const int refine = refine_of(*entry->header);
+        check_state_extent(*entry->header, refine, extent);
+        check_state_placement(*entry->header, name, refine, extent, placement);
+        writer.value(refine);
+        const Coord last(extent.x * refine - 1, extent.y * refine - 1, extent.z * refine - 1);
+        const auto grid = archive.read(std::size_t(entry - entries.begin()));
+        if (const auto bits = openvdb::gridPtrCast<openvdb::BoolGrid>(grid)) {
+            send_bits(bits->tree(), {Coord(0), last}, name, writer);
+        } else if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) {
+            send_bits(mask->tree(), {Coord(0), last}, name, writer);
+        } else {
+            throw std::runtime_error(std::string("grid `") + name + "` is of type " + grid->valueType() +
+                                     ", not bool");
+        }
+    }
+}
+
+void receive_plane(SandboxReader& reader, BitPlane& plane) {
+    const Extent extent = plane.extent();
+    const int refine = reader.value<int>();
+    if (refine < 1 || refine > kMaxRefine)
+        throw std::runtime_error("the reading process sent an impossible refinement");
+    const Extent voxels{extent.x * refine, extent.y * refine, extent.z * refine};
+    while (reader.value<Record>() != Record::end) {
+        const Coord origin = receive_origin(reader, voxels);
+        std::uint64_t words[8];
+        reader.bytes(words, sizeof words);
+        for (int n = 0; n < kBlockVoxels; ++n) {
+            if ((words[n >> 6] >> (n & 63) & 1) == 0) continue;
+            const Coord v = origin + Coord(n >> 6, n >> 3 & 7, n & 7);
+            if (v.x() >= voxels.x || v.y() >= voxels.y || v.z() >= voxels.z) {
+                throw std::runtime_error("the reading process sent a misplaced voxel");
+            }
+            if (v.x() % refine == 0 && v.y() % refine == 0 && v.z() % refine == 0) {
+                plane.set(v.x() / refine, v.y() / refine, v.z() / refine, true);
+            }
+        }
+    }
+}
+
+}  // namespace
+
+LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options) {
+    if (!(options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit))) {
+        throw Error(ErrorCode::usage,
+                    number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
+    }
+    LoadedDensity loaded;
+    in_sandbox(
+        path, options.limits,
+        [&](VdbArchive& archive, SandboxWriter& writer) { send_density(archive, options, writer); },
+        [&](SandboxReader& reader) { loaded = receive_density(reader); });
+    return loaded;
+}
+
+DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options) {
+    return load_density(path, options).density;
+}
+
+Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
+                   const VdbReadLimits& limits) {
+    Lattice lattice;
+    in_sandbox(
+        path, limits,
+        [&](VdbArchive& archive, SandboxWriter& writer) { send_state(archive, extent, placement, writer); },
+        [&](SandboxReader& reader) {
+            lattice = {BitPlane(extent), BitPlane(extent), BitPlane(extent)};
+            for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) receive_plane(reader, *plane);
+        });
+    return lattice;
+}
+
+}  // namespace nephos

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <string>
+
+#include <openvdb/io/Archive.h>
+
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "density/openvdb_access.h"
+#include "density/vdb/vdb_file.h"
+#include "density/vdb/vdb_metadata.h"
+
+namespace nephos {
+namespace {
+
+using BoolLeaf = openvdb::BoolTree::LeafNodeType;
+using VectorLeaf = openvdb::Vec3STree::LeafNodeType;
+using Mask = openvdb::util::NodeMask<3>;
+
+// io::File::write leaves its stream's errors unseen, so that a full disk passes for success. This archive
+// writes to a stream of the caller's, who has exceptions switched on.
+class CheckedArchive : public openvdb::io::Archive {
+  public:
+    void save(std::ostream& stream, const openvdb::GridCPtrVec& grids,
+              const openvdb::MetaMap& metadata) const {
+        Archive::write(stream, grids, true, metadata);
+    }
+};
+
+// Geometry that all grids of a file share.
+struct Frame {
+    Extent voxels;
+    int refine = 1;       // voxels per cell and axis
+    Placement placement;  // of the voxels
+    openvdb::math::Transform::Ptr transform;
+};
+
+void check_plane(const std::optional<BitPlaneView>& plane, std::optional<Extent>& cells) {
+    if (!plane) return;
+    if (cells && !(*cells == plane->extent))
+        throw Error(ErrorCode::usage, "the planes for a VDB file differ in extent");
+    cells = plane->extent;
+}
+
+// Voxels per cell, from the density grid's extent over the planes'.
+int refinement(Extent voxels, Extent cells) {
+    const int refine = std::max(1, voxels.x / std::max(1, cells.x));
+    if (voxels.x != cells.x * refine || voxels.y != cells.y * refine || voxels.z != cells.z * refine) {
+        throw Error(ErrorCode::usage, "a VDB file's density and planes do not cover the same box");
+    }
+    return refine;
+}
+
+Frame frame_of(const VdbContent& content) {
+    std::optional<Extent> cells;
+    check_plane(content.hum, cells);
+    check_plane(content.act, cells);
+    check_plane(content.cld, cells);
+    if (!content.density && !cells) throw Error(ErrorCode::usage, "nothing to write into a VDB file");
+    if (content.wind && !content.density)
+        throw Error(ErrorCode::usage, "`vel` in a VDB file needs a density grid");
+    Frame frame;
+    frame.voxels = content.density ? content.density->extent() : *cells;
+    if (frame.voxels.cells() == 0) throw Error(ErrorCode::usage, "a VDB file needs at least one voxel");
+    frame.placement = content.density ? content.density->placement() : content.cells;
+    if (content.density && cells) {
+        frame.refine = refinement(frame.voxels, *cells);
+        const double edge = frame.placement.cell_size_m * frame.refine;
+        if (!(content.cells.origin_m == frame.placement.origin_m) ||
+            std::abs(edge - content.cells.cell_size_m) > 1e-9 * content.cells.cell_size_m) {
+            throw Error(ErrorCode::usage, "a VDB file's density and planes lie at different places");
+        }
+    } else if (content.density && content.cells.cell_size_m > 0) {
+        const double ratio = content.cells.cell_size_m / frame.placement.cell_size_m;
+        if (ratio >= 1 && std::abs(ratio - std::round(ratio)) < 1e-9) frame.refine = int(std::round(ratio));
+    }
+    const double size = frame.placement.cell_size_m;
+    const Vec3 o = frame.placement.origin_m;
+    frame.transform = openvdb::math::Transform::createLinearTransform(size);
+    frame.transform->postTranslate({o.x + size / 2, o.y + size / 2, o.z + size / 2});
+    return frame;
+}
+
+void describe(openvdb::GridBase& grid, const char* name, const Frame& frame,
+              const openvdb::MetaMap& metadata) {
+    grid.setName(name);
+    grid.setTransform(frame.transform->copy());
+    grid.setIsInWorldSpace(false);
+    for (auto entry = metadata.beginMeta(); entry != metadata.endMeta(); ++entry) {
+        grid.insertMeta(entry->first, *entry->second);
+    }
+}
+
+// Transposes an 8x8 matrix of bits: bit n of byte m becomes bit m of byte n.
+std::uint64_t transpose_bits(std::uint64_t m) {
+    const auto swap = [&m](std::uint64_t mask, int shift) {
+        const std::uint64_t t = (m ^ m >> shift) & mask;
+        m ^= t ^ t << shift;
+    };
+    swap(0x00AA00AA00AA00AA, 7);
+    swap(0x0000CCCC0000CCCC, 14);
+    swap(0x00000000F0F0F0F0, 28);
+    return m;
+}
+
+// The 512 bits of the block at cell (x, y, z), x a multiple of 8, in OpenVDB's order.
+Mask block_bits(const BitPlaneView& plane, int x, int y, int z) {
+    std::uint8_t bytes[8][8] = {};  // [y][z], bit n = cell x + n
+    for (int dz = 0; dz < std::min(kBlock, plane.extent.z - z); ++dz) {
+        for (int dy = 0; dy < std::min(kBlock, plane.extent.y - y); ++dy) {
+            bytes[dy][dz] = std::uint8_t(plane.row(y + dy, z + dz)[x / 64] >> (x % 64));
+        }
+    }
+    std::uint64_t words[8] = {};  // word x, bit y << 3 | z
+    for (int dy = 0; dy < 8; ++dy) {
+        std::uint64_t matrix;
+        std::memcpy(&matrix, bytes[dy], 8);
+        matrix = transpose_bits(matrix);  // byte x, bit z
+        for (int dx = 0; dx < 8; ++dx) words[dx] |= (matrix >> (8 * dx) & 0xFF) << (8 * dy);
+    }
+    Mask mask;
+    for (openvdb::Index n = 0; n < 8; ++n) mask.getWord<std::uint64_t>(n) = words[n];
+    return mask;
+}
+
+// The same where one cell is refine^3 voxels.
+Mask refined_block_bits(const BitPlaneView& plane, int refine, int x, int y, int z) {
+    Mask mask;
+    for (int n = 0; n < kBlockVoxels; ++n) {
+        const int i = (x + (n >> 6)) / refine, j = (y + (n >> 3 & 7)) / refine, k = (z + (n & 7)) / refine;
+        const bool inside = i < plane.extent.x && j < plane.extent.y && k < plane.extent.z;
+        if (inside && plane.get(i, j, k)) mask.setOn(openvdb::Index(n));
+    }
+    return mask;
+}
+
+openvdb::BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const Frame& frame) {
+    auto grid = openvdb::BoolGrid::create(false);
+    openvdb::tree::ValueAccessor<openvdb::BoolTree> accessor(grid->tree());
+    for (int z = 0; z < frame.voxels.z; z += kBlock) {
+        for (int y = 0; y < frame.voxels.y; y += kBlock) {
+            for (int x = 0; x < frame.voxels.x; x += kBlock) {
+                const Mask mask = frame.refine == 1 ? block_bits(plane, x, y, z)
+                                                    : refined_block_bits(plane, frame.refine, x, y, z);
+                if (mask.isOff()) continue;
+                if (mask.isOn()) {
+                    accessor.addTile(1, {x, y, z}, true, true);
+                    continue;
+                }
+                auto leaf = std::make_unique<BoolLeaf>(openvdb::Coord(x, y, z), false, false);
+                leaf->setValueMask(mask);
+                for (openvdb::Index n = 0; n < 8; ++n)
+                    leaf->buffer().data()[n] = mask.getWord<std::uint64_t>(n);
+                accessor.addLeaf(leaf.release());
+            }
+        }
+    }
+    return grid;
+}
+
+// The wind at the height of each voxel, in every block of the density grid.
+openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const Frame& frame, double time_s) {
+    std::vector<openvdb::Vec3s> profile;
+    for (int k = 0; k < frame.voxels.z; ++k) {
+        const double height = frame.placement.origin_m.z + (k + 0.5) * frame.placement.cell_size_m;
+        const Velocity v = wind_at(*content.wind, height, time_s);
+        profile.emplace_back(float(v.east_m_per_s), float(v.north_m_per_s), 0.0f);
+    }
+    auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3s(0.0f));
+    grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+    openvdb::tree::ValueAccessor<openvdb::Vec3STree> accessor(grid->tree());
+    for (const Block& block : blocks_of(*content.density)) {
+        auto leaf = std::make_unique<VectorLeaf>(block.origin);
+        for (int n = 0; n < kBlockVoxels; ++n) {
+            const openvdb::Coord voxel = block.origin + openvdb::Coord(n >> 6, n >> 3 & 7, n & 7);
+            if (voxel.x() >= frame.voxels.x || voxel.y() >= frame.voxels.y || voxel.z() >= frame.voxels.z)
+                continue;
+            leaf->setValueOn(openvdb::Index(n), profile[std::size_t(voxel.z())]);
+        }
+        accessor.addLeaf(leaf.release());
+    }
+    return grid;
+}
+
+openvdb::GridCPtrVec make_grids(const VdbContent& content, const Frame& frame,
+                                const openvdb::MetaMap& metadata, double time_s) {
+    openvdb::GridCPtrVec grids;
+    if (content.density) {
+        // A new grid around the same tree: its own metadata, no copy of the voxels.
+        const auto tree = OpenvdbAccess::grid(*content.density).treePtr();
+        const auto grid = openvdb::FloatGrid::create(openvdb::ConstPtrCast<openvdb::FloatTree>(tree));
+        grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+        grid->setSaveFloatAsHalf(content.half);
+        describe(*grid, "density", frame, metadata);
+        grids.push_back(grid);
+    }
+    const std::pair<const char*, const std::optional<BitPlaneView>*> planes[] = {
+        {"hum", &content.hum}, {"act", &content.act}, {"cld", &content.cld}};
+    for (const auto& [name, plane] : planes) {
+        if (!*plane) continue;
+        const auto grid = bool_grid(**plane, frame);
+        describe(*grid, name, frame, metadata);
+        grids.push_back(grid);
+    }
+    if (content.wind) {
+        const auto grid = velocity_grid(content, frame, time_s);
+        describe(*grid, "vel", frame, metadata);
+        grids.push_back(grid);
+    }
+    return grids;
+}
+
+// OpenVDB puts a random UUID into every header. One that follows from the content makes files of the same
+// content the same bytes: version 8 of RFC 9562, from two FNV-1a hashes of the metadata, the file's name and
+// the voxel counts.
+std::string uuid_of(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids,
+                    const openvdb::MetaMap& metadata) {
+    std::string text = path.filename().string();
+    for (auto it = metadata.beginMeta(); it != metadata.endMeta(); ++it)
+        text += '\n' + it->first + '=' + it->second->str();
+    for (const auto& grid : grids)
+        text += '\n' + grid->getName() + ':' + std::to_string(grid->activeVoxelCount());
+    std::uint64_t high = 0xCBF29CE484222325u, low = 0x84222325CBF29CE4u;
+    for (const char c : text) {
+        high = (high ^ std::uint8_t(c)) * 0x100000001B3u;
+        low = (low ^ std::uint8_t(~c)) * 0x100000001B3u;
+    }
+    high = (high & ~std::uint64_t{0xF000}) | 0x8000;                   // version
+    low = (low & ~(std::uint64_t{3} << 62)) | std::uint64_t{2} << 62;  // variant
+    char uuid[37];
+    std::snprintf(uuid, sizeof uuid, "%08x-%04x-%04x-%04x-%012llx", unsigned(high >> 32),
+                  unsigned(high >> 16 & 0xFFFF), unsigned(high & 0xFFFF), unsigned(low >> 48),
+                  static_cast<unsigned long long>(low & 0xFFFFFFFFFFFFu));
+    return uuid;
+}
+
+// The UUID's place in a file: behind magic number, versions of file and library, and a flag.
+constexpr std::streamoff kUuidOffset = 8 + 3 * 4 + 1;
+
+void write_file(const std::filesystem::path& temporary, const std::filesystem::path& path,
+                const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) {
+    errno = 0;
+    try {
+        std::ofstream stream;
+        stream.exceptions(std::ios::badbit | std::ios::failbit);
+        stream.open(temporary, std::ios::binary | std::ios::trunc);
+        CheckedArchive().save(stream, grids, metadata);
+        stream.seekp(kUuidOffset);
+        stream << uuid_of(path, grids, metadata);
+        stream.close();
+    } catch (const std::ios_base::failure&) {
+        const int error = errno;
+        throw Error(ErrorCode::io,
+                    path.string() + ": cannot write: " + (error ? std::strerror(error) : "unknown error"));
+    } catch (const openvdb::Exception& error) {
+        throw Error(ErrorCode::io, path.string() + ": cannot write: " + error.what());
+    }
+}
+
+}  // namespace
+
+void write_vdb(const std::filesystem::path& path, const VdbContent& content, const VdbMetadata& metadata) {
+    openvdb::initialize();
+    const Frame frame = frame_of(content);
+    const openvdb::MetaMap meta = to_meta_map(metadata, frame.voxels, frame.refine);
+    const auto grids = make_grids(content, frame, meta, metadata.time_s);
+    write_atomically(
+        path, [&](const std::filesystem::path& temporary) { write_file(temporary, path, grids, meta); });
+}
+
+std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame) {
+    char number[16];
+    std::snprintf(number, sizeof number, "_%04d.vdb", frame);
+    return folder / (name + number);
+}
+
+}  // namespace nephos

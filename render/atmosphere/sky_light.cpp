@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/atmosphere/sky_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render/shared/shared.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr std::size_t kKept = 8;        // tables; 200 KB each
+constexpr double kBrightestDisc = 6;    // radiance: white in the picture, and its edge stays smooth
+constexpr double kLowestSun_deg = -18;  // astronomical twilight ends: below, the sky changes no more
+constexpr std::size_t kTexels = std::size_t{shader::kSkyColumns} * shader::kSkyRows;
+
+// Ranges of elevations and their tables per degree.
+struct NodeRange {
+    double from_deg, to_deg, per_deg;
+};
+constexpr NodeRange kNodes[] = {{kLowestSun_deg, -2, 5}, {-2, 2, 16}, {2, 6, 4}, {6, 16, 2}, {16, 90, 0.5}};
+
+double radians(double degrees) { return degrees * kPi / 180; }
+
+Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
+Rgb times(double s, const Rgb& a) { return {s * a[0], s * a[1], s * a[2]}; }
+
+// Radiance of the disc's middle, bounded, and how it changes with the sine of the elevation near the sun.
+void set_disc(const Atmosphere& air, const RenderOptions& options, const Rgb& sun_above_air,
+              double elevation_deg, SkyLight& light) {
+    // Of a disc of mean 1.
+    constexpr Rgb kMiddle{1 + double(shader::kLimbDarkeningRed) / 2,
+                          1 + double(shader::kLimbDarkeningGreen) / 2,
+                          1 + double(shader::kLimbDarkeningBlue) / 2};
+    light.has_disc = options.atmosphere.sun_disc && elevation_deg > -kSunRadius_deg - 0.01;
+    if (!light.has_disc) return;
+    const double radius = radians(kSunRadius_deg),
+                 low = std::max(std::sin(radians(elevation_deg)) - radius, 0.0);
+    const Rgb below = air.transmittance(light.eye_altitude_m, low),
+              above = air.transmittance(light.eye_altitude_m, std::min(low + 2 * radius, 1.0));
+    double brightest = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double fade = std::log(std::max(above[c], 1e-30) / std::max(below[c], 1e-30)) / (2 * radius);
+        light.disc_fade[c] = fade;
+        light.disc[c] = sun_above_air[c] * kPi * kMiddle[c] * below[c] * std::exp(fade * radius) /
+                        (kPi * radius * radius);
+        brightest = std::max(brightest, light.disc[c]);
+    }
+    if (brightest > kBrightestDisc) light.disc = times(kBrightestDisc / brightest, light.disc);
+}
+
+}  // namespace
+
+double sun_node(double elevation_deg) {
+    double node = 0;
+    for (const NodeRange& range : kNodes)
+        node +=
+            std::clamp(elevation_deg - range.from_deg, 0.0, range.to_deg - range.from_deg) * range.per_deg;
+    return node;
+}
+
+double elevation_of_node(double node) {
+    double elevation = kLowestSun_deg;
+    for (const NodeRange& range : kNodes) {
+        const double here = std::clamp(node, 0.0, (range.to_deg - range.from_deg) * range.per_deg);
+        elevation += here / range.per_deg;
+        node -= here;
+    }
+    return elevation;
+}
+
+const SkyTable& SkyLights::table(int node, double eye_altitude_m) {
+    const auto found = std::ranges::find_if(
+        kept_, [&](const Kept& kept) { return kept.node == node && kept.eye_altitude_m == eye_altitude_m; });
+    if (found != kept_.end()) {
+        kept_.splice(kept_.begin(), kept_, found);
+    } else {
+        kept_.push_front({node, eye_altitude_m, atmosphere_->sky(eye_altitude_m, elevation_of_node(node))});
+        if (kept_.size() > kKept) kept_.pop_back();
+    }
+    return kept_.front().table;
+}
+
+void SkyLights::mix_tables(const RenderOptions& options, double elevation_deg) {
+    const double node = sun_node(elevation_deg), low = std::floor(node);
+    const auto share = float(node - low);
+    const SkyTable& a = table(int(low), light_.eye_altitude_m);
+    const SkyTable& b = share > 0 ? table(int(low) + 1, light_.eye_altitude_m) : a;
+    const Rgb sun_above_air = adapted_sun(options, elevation_deg);
+    light_.texels.assign(4 * kTexels * shader::kSkyLayers, 0.0f);
+    float *scattered = light_.texels.data(), *haze = scattered + 4 * kTexels, *sun = haze + 4 * kTexels;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const auto full = float(kPi * sun_above_air[c]);
+        const auto night = float(options.atmosphere.night[c]);
+        for (std::size_t i = c; i < 4 * kTexels; i += 4) {
+            scattered[i] = full * (a.scattered[i] + share * (b.scattered[i] - a.scattered[i])) + night;
+            haze[i] = full * (a.haze[i] + share * (b.haze[i] - a.haze[i]));
+        }
+    }
+    light_.horizon = {};
+    for (std::size_t i = 0; i < shader::kSkyColumns; ++i)
+        for (std::size_t c = 0; c < 3; ++c)
+            light_.horizon[c] += (double(scattered[4 * i + c]) + double(haze[4 * i + c]) / (4 * kPi)) /
+                                 double(shader::kSkyColumns);
+    for (std::size_t i = 0; i < shader::kSkyColumns; ++i) {
+        const double altitude_m = double(shader::kSunlightTop) * double(i) / double(shader::kSkyColumns - 1);
+        const Rgb light = times(sun_above_air, atmosphere_->sunlight(altitude_m, options.sun.elevation_deg));
+        for (std::size_t row = 0; row < shader::kSkyRows; ++row)
+            for (std::size_t c = 0; c < 3; ++c)
+                sun[4 * (row * shader::kSkyColumns + i) + c] = float(light[c]);
+    }
+    ++light_.serial;
+}
+
+// The sun's colour above the air, in units of radiance as the eye has adapted.
+Rgb SkyLights::adapted_sun(const RenderOptions& options, double elevation_deg) const {
+    constexpr Rgb kLuminance{0.2126, 0.7152, 0.0722};  // Rec. 709
+    const Rgb sun = atmosphere_->sunlight(0, elevation_deg),
+              sky = atmosphere_->irradiance(0, elevation_deg).from_above;
+    double illuminance = 1e-9;
+    for (std::size_t c = 0; c < 3; ++c)
+        illuminance += kLuminance[c] * (sky[c] + sun[c] * std::max(0.0, std::sin(radians(elevation_deg))));
+    return times(kSunAboveAir * std::pow(1 + 0.1 / illuminance, options.atmosphere.adaptation),
+                 options.sun.colour);
+}
+
+const SkyLight& SkyLights::at(const RenderOptions& options, const CloudHeights& clouds) {
+    const AtmosphereModel model = atmosphere_model(options.atmosphere, options.ground.albedo);
+    if (!atmosphere_ || atmosphere_->model() != model) {
+        atmosphere_.emplace(model);
+        kept_.clear();
+        light_.texels.clear();
+    }
+    const double elevation = std::clamp(options.sun.elevation_deg, kLowestSun_deg, 90.0);
+    const double altitude = std::max(0.0, options.camera.position_m.z - options.ground.height_m);
+    const bool same = !light_.texels.empty() && altitude == light_.eye_altitude_m &&
+                      options.sun == last_.sun && options.atmosphere == last_.atmosphere;
+    light_.model = model;
+    light_.eye_altitude_m = altitude;
+    if (!same) {
+        mix_tables(options, elevation);
+        set_disc(*atmosphere_, options, adapted_sun(options, elevation), elevation, light_);
+        last_.sun = options.sun;
+        last_.atmosphere = options.atmosphere;
+    }
+
+    // Irradiance / pi is the radiance of a white surface.
+    const Rgb full = adapted_sun(options, elevation), night = options.atmosphere.night;
+    const auto above_ground = [&](double z_m) { return std::max(0.0, z_m - options.ground.height_m); };
+    const SkyIrradiance ground = atmosphere_->irradiance(0, elevation),
+                        top = atmosphere_->irradiance(above_ground(clouds.top_m), elevation),
+                        base = atmosphere_->irradiance(above_ground(clouds.base_m), elevation);
+    light_.ground_sun = times(full, atmosphere_->sunlight(0, options.sun.elevation_deg));
+    const double ambient = options.atmosphere.ambient;
+    for (std::size_t c = 0; c < 3; ++c) {
+        light_.ground_sky[c] = full[c] * ground.from_above[c] + night[c];
+        // A top faces the sky; a base faces the ground and, past the cloud's own shadow, the horizon.
+        light_.ambient_top[c] = ambient * (full[c] * top.from_above[c] + night[c]);
+        light_.ambient_base[c] =
+            ambient * (full[c] * 0.5 * (base.from_below[c] + base.sideways[c]) + 0.5 * night[c]);
+    }
+    return light_;
+}
+
+}  // namespace nephos

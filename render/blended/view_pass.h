@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Step 2 of D, tile by tile: background, then metaballs, billboards and shells of air back to front. Two
+// attachments in 32-bit floats: radiance with the clouds' transmittance in alpha, and the distance weighted
+// by what the eye sees of each metaball, which the same blending accumulates. Private to the module.
+
+#include "render/blended/billboard_pass.h"
+#include "render/frame/frame_data.h"
+#include "render/frame/view_sorting.h"
+#include "render/gpu/gpu_pipeline.h"
+#include "render/gpu/shell_buffers.h"
+#include "render/image/picture.h"
+
+namespace nephos {
+
+class ViewPass {
+  public:
+    ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+             const vk::raii::Sampler& sampler, const ShaderVariant& variant);
+
+    // Tables of the physical sky; readable by shaders.
+    void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
+    // The map that the ground wears; in the layout GENERAL and readable by fragment shaders.
+    void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
+
+    // The air between the clouds, in front of what `order` has; for a pass made for shells.
+    void use_shells(const GpuDevice& gpu, const AirShells& shells, const ViewSortedSplats& order);
+    // scattering_table.h
+    void use_scattering(const GpuDevice& gpu, const GpuBuffer& table);
+
+    // Draws one tile and stores its pixels in the picture.
+    void draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
+                   const ViewSortedSplats& order, Picture& picture);
+
+  private:
+    void resize_targets(const GpuDevice& gpu, const Tile& tile);
+    void bind(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& pipeline) const;
+    void draw_background(const GpuDevice& gpu, vk::Extent2D area) const;
+    void draw_splats(const GpuDevice& gpu, vk::Extent2D area, const ViewSortedSplats& order);
+    void draw_batch(const GpuDevice& gpu, vk::Extent2D area, const ViewSortedSplats& order,
+                    std::span<const Run> runs);
+    void read_back(const GpuDevice& gpu, vk::Extent2D area) const;
+
+    const PipelineLayout* layout_;
+    vk::raii::Pipeline background_, splat_, integrated_splat_, shell_;
+    Bindings bindings_;
+    GpuBuffer frame_, balls_, radiance_pixels_, depth_pixels_;
+    GpuImage radiance_, depth_;
+    BillboardPass billboards_;
+    ShellBuffers shells_;
+    std::vector<Run> runs_;  // between and with the shells in use; empty without shells
+};
+
+}  // namespace nephos

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Step 1 of D on the processor: what light_tiles.h has in compute shaders, in vectors of 4 to 16 lanes
+// (Highway, chosen at run time), tiles in parallel. The test reference of the compute shaders, and what draws
+// where there is no graphics card. The result does not depend on the number of threads. Private to the
+// module.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/cloud/cloud_preparation.h"
+#include "render/cloud/stage_times.h"
+#include "render/frame/tile_bins.h"
+
+namespace nephos {
+
+// What is asked for; an empty span asks for all.
+struct LightWanted {
+    std::span<const std::uint8_t> centres;    // one for each of LightSortedSplats::splats: not 0 if wanted
+    std::span<const std::uint8_t> map_tiles;  // one for each tile of the map: not 0 if wanted
+};
+
+// Fills what is wanted of `shadow`, shadow_size^2 texels, and of `depths`, the optical depths between
+// centres and sun, which has one for each of
+// order.splats, and leaves the rest of both as it is. What one centre or texel gets has the same bits
+// whatever else is wanted.
+void light_by_processor(const LightSortedSplats& order, int shadow_size, const LightWanted& wanted,
+                        std::vector<float>& depths, std::vector<float>& shadow,
+                        const BatchLimits& limits = {}, StageTimes* times = nullptr);
+
+}  // namespace nephos

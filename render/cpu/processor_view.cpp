@@ -1,0 +1,478 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/cpu/processor_view.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <ranges>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+#include "render/cpu/billboard_texels.h"
+#include "render/cpu/screen_ball.h"
+#include "render/cpu/view_scene.h"
+#include "render/frame/screen_box.h"
+#include "render/frame/tile_bins.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "render/cpu/processor_view.cpp"
+#include <hwy/foreach_target.h>
+// foreach_target.h must come first
+#include <hwy/cache_control.h>
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "render/cpu/screen_ball-inl.h"
+#include "render/cpu/screen_billboard-inl.h"
+#include "render/cpu/tile_air-inl.h"
+#include "render/cpu/visibility-inl.h"
+#include "render/shading/background-inl.h"
+#include "render/shading/line_integral-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+
+// sum += transmittance * opacity * radiance; transmittance *= 1 - opacity
+HWY_INLINE void add_to_sums(TileSums& sums, std::size_t at, Floats opacity, const Floats3& radiance,
+                            Floats distance) {
+    const Lanes d;
+    const Floats before = hn::Load(d, sums.transmittance + at), part = hn::Mul(before, opacity);
+    hn::Store(hn::Sub(before, part), d, sums.transmittance + at);
+    hn::Store(hn::MulAdd(part, radiance.x, hn::Load(d, sums.red + at)), d, sums.red + at);
+    hn::Store(hn::MulAdd(part, radiance.y, hn::Load(d, sums.green + at)), d, sums.green + at);
+    hn::Store(hn::MulAdd(part, radiance.z, hn::Load(d, sums.blue + at)), d, sums.blue + at);
+    hn::Store(hn::MulAdd(part, distance, hn::Load(d, sums.distance + at)), d, sums.distance + at);
+}
+
+HWY_INLINE Rows rows_of(const ScreenBall& ball, const ViewTile& tile, const Layout& layout) {
+    const int begin = std::clamp(ball.first - tile.y, 0, int(shader::kTileHeight)),
+              end = std::clamp(ball.end - tile.y, 0, int(shader::kTileHeight));
+    return {std::size_t(begin) / layout.rows * layout.rows, std::size_t(end)};
+}
+
+// Of a look, which only wants to know what is seen, the transmittance.
+template <bool kColours>
+HWY_INLINE void add_opacity(TileSums& sums, std::size_t at, Floats opacity, const Floats3& radiance,
+                            Floats distance) {
+    if constexpr (kColours) {
+        add_to_sums(sums, at, opacity, radiance, distance);
+    } else {
+        const Lanes d;
+        const Floats before = hn::Load(d, sums.transmittance + at);
+        hn::Store(hn::Sub(before, hn::Mul(before, opacity)), d, sums.transmittance + at);
+    }
+}
+
+template <bool kColours>
+HWY_INLINE void add_fitted(const ScreenBall& ball, const ViewTile& tile, const Layout& layout,
+                           const FirstPixels* first, const TileRays& rays, TileSums& sums) {
+    const Lanes d;
+    const Rows rows = rows_of(ball, tile, layout);
+    const Floats3 radiance{set(ball.red), set(ball.green), set(ball.blue)};
+    const Floats distance = set(ball.distance), one = set(1.0f), yy = set(ball.yy);
+    const Floats c0 = set(ball.fit[0]), c1 = set(ball.fit[1]), c2 = set(ball.fit[2]), c3 = set(ball.fit[3]),
+                 c4 = set(ball.fit[4]), c5 = set(ball.fit[5]);
+    for (std::size_t block = 0; block < layout.blocks; ++block) {
+        const Floats dx = hn::Add(hn::Load(d, first[block].x), set(float(tile.x) - ball.x)),
+                     down = hn::Add(hn::Load(d, first[block].y), set(float(tile.y) - ball.y));
+        const Floats across = hn::Mul(hn::Mul(set(ball.xx), dx), dx), slope = hn::Mul(set(ball.xy), dx);
+        for (std::size_t row = rows.begin; row < rows.end; row += layout.rows) {
+            const std::size_t at = row * shader::kTileWidth + block * layout.lanes;
+            const Floats dy = hn::Add(down, set(float(row)));
+            const Floats square = hn::MulAdd(dy, hn::MulAdd(yy, dy, slope), across);
+            const Floats w =
+                hn::Max(hn::NegMulAdd(square, hn::Load(d, rays.per_square + at), one), hn::Zero(d));
+            const Floats w2 = hn::Mul(w, w);
+            const Floats low = hn::MulAdd(w2, c2, hn::MulAdd(w, c1, c0)),
+                         high = hn::MulAdd(w2, c5, hn::MulAdd(w, c4, c3));
+            add_opacity<kColours>(sums, at, hn::Mul(w2, hn::MulAdd(hn::Mul(w2, w), high, low)), radiance,
+                                  distance);
+        }
+    }
+}
+
+// render/shading/integral.glsl: the part of the ball between the eye and the ground.
+HWY_INLINE Floats integrated_opacity(const ExactBall& ball, const Floats3& ray, Floats ground_m) {
+    const Lanes d;
+    const Floats3 centre{set(ball.x), set(ball.y), set(ball.z)}, offset = cross(centre, ray);
+    const Floats zero = hn::Zero(d);
+    const Floats w = hn::Max(hn::Sub(set(1.0f), dot(offset, offset)), zero);
+    const Floats half_chord = hn::Sqrt(w), middle = dot(centre, ray);
+    const Floats start = hn::Max(hn::Neg(half_chord), hn::Neg(middle));
+    const Floats end = hn::Min(half_chord, hn::MulSub(ground_m, set(ball.per_radius), middle));
+    const Floats part = hn::Sub(partial_line_integral(w, end), partial_line_integral(w, start));
+    const Floats depth = hn::IfThenElseZero(hn::Lt(start, end), hn::Mul(set(ball.depth_scale), part));
+    return hn::Sub(set(1.0f), hn::Exp(d, hn::Neg(hn::Max(depth, zero))));
+}
+
+template <bool kColours>
+void add_exact(const ScreenBall& screen, const ExactBall& ball, const ViewTile& tile, const Layout& layout,
+               const PictureFrame& frame, const TileRays& rays, TileSums& sums) {
+    const Lanes d;
+    const Rows rows = rows_of(screen, tile, layout);
+    const Floats3 diffuse{set(ball.diffuse[0]), set(ball.diffuse[1]), set(ball.diffuse[2])},
+        direct{set(ball.direct[0]), set(ball.direct[1]), set(ball.direct[2])};
+    for (std::size_t at = rows.begin * shader::kTileWidth; at < rows.end * shader::kTileWidth;
+         at += layout.lanes) {
+        const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
+        const Floats opacity = integrated_opacity(ball, ray, hn::Load(d, rays.ground + at));
+        if (hn::AllFalse(d, hn::Gt(opacity, hn::Zero(d)))) continue;
+        const Floats once = scattered_once(frame, dot(set3(frame.to_sun), ray));
+        add_opacity<kColours>(sums, at, opacity, times_add(once, direct, diffuse), set(ball.distance));
+    }
+}
+
+bool is_opaque(const TileSums& sums, std::size_t lanes) {
+    const Lanes d;
+    Floats most = hn::Zero(d);
+    for (std::size_t at = 0; at < kTilePixels; at += lanes)
+        most = hn::Max(most, hn::Load(d, sums.transmittance + at));
+    return hn::AllTrue(d, hn::Lt(most, set(shader::kOpaque)));
+}
+
+// Front to back, until the tile is opaque; what it took.
+template <bool kColours>
+HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+    constexpr std::size_t kAtOnce = 8;  // between two looks at the sums
+    const Layout layout;
+    if (tile.list.empty() || is_opaque(sums, layout.lanes)) return {};
+    for (const std::uint32_t splat : tile.list.first(std::min(kAtOnce, tile.list.size())))
+        hwy::Prefetch(&scene.balls[splat]);
+    const bool shells = kColours && !scene.before_shells.empty();
+    TileRays rays(*scene.frame, tile, shells || !scene.exact.empty());
+    if (shells) set_shell_offsets(*scene.frame, tile, rays);
+    FirstPixels first[shader::kTileWidth] = {{layout, 0}, {layout, 1}, {layout, 2}, {layout, 3},
+                                             {layout, 4}, {layout, 5}, {layout, 6}, {layout, 7}};
+    std::size_t end = 0, rows = 0;
+    for (std::size_t begin = 0; begin < tile.list.size(); begin += kAtOnce) {
+        end = std::min(begin + kAtOnce, tile.list.size());
+        for (std::size_t i = begin; i < end; ++i) {
+            if (i + kAtOnce < tile.list.size()) hwy::Prefetch(&scene.balls[tile.list[i + kAtOnce]]);
+            const ScreenBall& ball = scene.balls[tile.list[i]];
+            if (shells) add_shells_before(scene, rays, scene.first_ball + tile.list[i], sums);
+            const Rows of_ball = rows_of(ball, tile, layout);
+            rows += of_ball.end - std::min(of_ball.begin, of_ball.end);
+            if (ball.distance > 0) {
+                add_fitted<kColours>(ball, tile, layout, first, rays, sums);
+            } else if (ball.distance < 0) {
+                add_billboard<kColours>(std::bit_cast<ScreenBillboard>(ball), of_ball, tile, layout, first,
+                                        *scene.texels, scene.distances, sums);
+            } else {
+                const ExactBall& exact = scene.exact[std::bit_cast<std::uint32_t>(ball.x)];
+                add_exact<kColours>(ball, exact, tile, layout, *scene.frame, rays, sums);
+            }
+        }
+        if (is_opaque(sums, layout.lanes)) break;
+    }
+    return {end, rows * shader::kTileWidth};
+}
+
+TileWork add_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+    return add_some<true>(scene, tile, sums);
+}
+TileWork find_visible_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+    return add_some<false>(scene, tile, sums);
+}
+
+// Adds what is seen of the background behind the clouds; distances become means.
+void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+    const Lanes d;
+    const Layout layout;
+    const ShadowTexels map{scene.shadow, scene.shadow_size};
+    if (sums.next_shell < scene.before_shells.size() && !is_opaque(sums, layout.lanes)) {
+        TileRays rays(*scene.frame, tile, true);
+        set_shell_offsets(*scene.frame, tile, rays);
+        add_shells_before(scene, rays, SIZE_MAX, sums);
+    }
+    for (std::size_t block = 0; block < layout.blocks; ++block) {
+        const FirstPixels first(layout, block);
+        for (std::size_t row = 0; row < shader::kTileHeight; row += layout.rows) {
+            const std::size_t at = row * shader::kTileWidth + block * layout.lanes;
+            const Floats left = hn::Min(hn::Load(d, sums.transmittance + at), set(1.0f));
+            const Floats seen = hn::IfThenElseZero(hn::Ge(left, set(shader::kOpaque)), left);
+            hn::Store(seen, d, sums.transmittance + at);
+            const Floats opacity = hn::Sub(set(1.0f), seen);
+            const auto has_depth = hn::Ge(opacity, set(kLeastOpacity));
+            const Floats mean = hn::Div(hn::Load(d, sums.distance + at), opacity);
+            const Floats infinity = set(std::numeric_limits<float>::infinity());
+            hn::Store(hn::IfThenElse(has_depth, mean, infinity), d, sums.distance + at);
+            if (hn::AllFalse(d, hn::Gt(seen, hn::Zero(d)))) continue;
+            const Floats3 direction =
+                pixel_direction(*scene.frame, hn::Add(hn::Load(d, first.x), set(float(tile.x))),
+                                hn::Add(hn::Load(d, first.y), set(float(tile.y) + float(row))));
+            const Floats3 ray = times(hn::Div(set(1.0f), hn::Sqrt(dot(direction, direction))), direction);
+            const Floats3 behind = background(*scene.frame, map, ray);
+            hn::Store(hn::MulAdd(seen, behind.x, hn::Load(d, sums.red + at)), d, sums.red + at);
+            hn::Store(hn::MulAdd(seen, behind.y, hn::Load(d, sums.green + at)), d, sums.green + at);
+            hn::Store(hn::MulAdd(seen, behind.z, hn::Load(d, sums.blue + at)), d, sums.blue + at);
+        }
+    }
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephos {
+
+HWY_EXPORT(shape_balls);
+HWY_EXPORT(shape_billboards);
+HWY_EXPORT(light_balls);
+HWY_EXPORT(light_billboards);
+HWY_EXPORT(add_balls);
+HWY_EXPORT(find_visible_balls);
+HWY_EXPORT(mark_ground);
+HWY_EXPORT(finish_tile);
+
+namespace {
+
+constexpr std::size_t kPart = 2048;  // balls that one thread prepares
+
+// A look pays if it saves light: it goes on only if of some tiles' lists no more than this is seen.
+constexpr double kMostSeen = 0.75;
+constexpr std::size_t kSampleStep = 16;  // tiles from one that is tried to the next
+
+std::int16_t to_row(int y) { return std::int16_t(std::clamp(y, -32768, 32767)); }
+
+ViewTile tile_at(std::size_t t, const TileGrid& grid, const TileBins& bins) {
+    const auto columns = std::size_t(grid.columns());
+    const shader::TileRange range = bins.ranges[t];
+    return {int(t % columns) * int(shader::kTileWidth), int(t / columns) * int(shader::kTileHeight),
+            std::span(bins.list).subspan(range.begin, range.end - range.begin)};
+}
+
+void store(const TileSums& sums, const ViewTile& tile, const Tile& part, bool depth, Picture& picture) {
+    const int columns = std::min(int(shader::kTileWidth), part.width - tile.x),
+              rows = std::min(int(shader::kTileHeight), part.height - tile.y);
+    for (int y = 0; y < rows; ++y) {
+        std::size_t from = std::size_t(y) * shader::kTileWidth;
+        std::size_t to =
+            std::size_t(part.y + tile.y + y) * std::size_t(picture.width) + std::size_t(part.x + tile.x);
+        for (int x = 0; x < columns; ++x, ++from, ++to) {
+            picture.beauty[3 * to] = sums.red[from];
+            picture.beauty[3 * to + 1] = sums.green[from];
+            picture.beauty[3 * to + 2] = sums.blue[from];
+            picture.transmittance[to] = sums.transmittance[from];
+            picture.depth_m[to] = depth ? sums.distance[from] : std::numeric_limits<float>::infinity();
+        }
+    }
+}
+
+}  // namespace
+
+ProcessorView::ProcessorView(const RenderOptions& options, const CameraFrame& camera,
+                             const PictureFrame& frame, const Tile& part, const ViewSortedSplats& order,
+                             const BatchLimits& limits, StageTimes* times)
+    : order_(&order), frame_(frame), part_(part), limits_(limits), times_(times) {
+    const StageTimer timer(times_, DrawStage::eye_bins);
+    if (!order.billboards.empty()) source_ = splats_near_to_far(order);
+    boxes_ = screen_boxes(order, camera, options.camera, part, source_);
+}
+
+// Of a splat, counted from the nearest: as splats_near_to_far().
+std::uint32_t ProcessorView::source(std::size_t splat) const {
+    return source_.empty() ? std::uint32_t(boxes_.size() - 1 - splat) : source_[splat];
+}
+
+// The shapes of splats [first, last) of a batch; its metaballs that are not fitted begin with `number`.
+void ProcessorView::shape(Batch& batch, std::size_t first, std::size_t last, std::uint32_t number) const {
+    std::vector<shader::ViewBall> balls;
+    std::vector<const shader::ViewBillboard*> billboards;
+    std::vector<ScreenBall*> screen;  // of these
+    for (std::size_t i = first; i < last; ++i) {
+        const std::uint32_t from = source(batch.begin + i);
+        if ((from & kBillboardSplat) == 0) {
+            balls.push_back(order_->balls[from]);
+        } else {
+            billboards.push_back(&order_->billboards[from & ~kBillboardSplat]);
+            screen.push_back(&batch.screen[i]);
+        }
+    }
+    std::vector<ScreenBall> shaped(billboards.empty() ? 0 : balls.size());
+    HWY_DYNAMIC_DISPATCH(shape_balls)
+    (balls, frame_, billboards.empty() ? &batch.screen[first] : shaped.data(), batch.exact.data(), number);
+    HWY_DYNAMIC_DISPATCH(shape_billboards)(billboards, frame_, screen.data());
+    std::size_t next = 0;
+    for (std::size_t i = first; i < last; ++i) {
+        ScreenBall& splat = batch.screen[i];
+        if (!billboards.empty() && (source(batch.begin + i) & kBillboardSplat) == 0) splat = shaped[next++];
+        splat.first = to_row(boxes_[batch.begin + i].y0);
+        splat.end = to_row(boxes_[batch.begin + i].y1);
+    }
+}
+
+// The shapes of some splats, and their lists.
+ProcessorView::Batch ProcessorView::prepare_batch(std::size_t begin, std::size_t end) const {
+    const StageTimer timer(times_, DrawStage::eye_bins);
+    const std::size_t count = end - begin, parts = (count + kPart - 1) / kPart;
+    Batch batch{begin, end, {}, {}, {}};
+    std::vector<std::uint32_t> numbers(parts + 1, 0);
+    if (!order_->all_fitted) {
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::uint32_t from = source(begin + i);
+            const bool exact =
+                (from & kBillboardSplat) == 0 && (order_->balls[from].flags & shader::kNotFitted) != 0;
+            numbers[i / kPart + 1] += exact ? 1 : 0;
+        }
+        for (std::size_t p = 0; p < parts; ++p) numbers[p + 1] += numbers[p];
+    }
+    batch.screen.resize(count);
+    batch.exact.resize(numbers[parts]);
+    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
+        shape(batch, p * kPart, std::min(count, (p + 1) * kPart), numbers[p]);
+    });
+    batch.bins = bin_into_tiles(std::span(boxes_).subspan(begin, count), TileGrid{part_.width, part_.height});
+    if (times_ != nullptr)  // boxes written and read twice, balls read twice, shapes and lists written
+        (*times_)[DrawStage::eye_bins].bytes +=
+            count * (3 * sizeof(PixelBox) + 2 * sizeof(shader::ViewBall) + sizeof(ScreenBall)) +
+            4 * batch.bins.list.size();
+    return batch;
+}
+
+// Where there are no billboards, none are made.
+const BillboardTexels* ProcessorView::texels() const {
+    return source_.empty() ? nullptr : &billboard_texels();
+}
+
+void ProcessorView::light(Batch& batch, const VisibleSet* seen) const {
+    const StageTimer timer(times_, DrawStage::colour);
+    const std::size_t count = batch.end - batch.begin, parts = (count + kPart - 1) / kPart;
+    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t p) {
+        std::vector<shader::ViewBall> balls;
+        std::vector<const shader::ViewBillboard*> billboards;
+        std::vector<ScreenBall*> screen, screen_billboards;
+        for (std::size_t i = p * kPart; i < std::min(count, (p + 1) * kPart); ++i) {
+            const std::uint32_t from = source(batch.begin + i);
+            if ((from & kBillboardSplat) != 0) {
+                billboards.push_back(&order_->billboards[from & ~kBillboardSplat]);
+                screen_billboards.push_back(&batch.screen[i]);
+                continue;
+            }
+            if (seen != nullptr && seen->balls[from] == 0) continue;
+            balls.push_back(order_->balls[from]);
+            screen.push_back(&batch.screen[i]);
+        }
+        HWY_DYNAMIC_DISPATCH(light_balls)
+        (balls, frame_, screen.data(), batch.exact.data());
+        HWY_DYNAMIC_DISPATCH(light_billboards)(billboards, order_->clouds, frame_, screen_billboards.data());
+    });
+}
+
+// Looks at every `step`-th tile from `first` on; notes in `drawn` how many of its balls are seen, and, given
+// `seen`, what is seen. False if that is nearly everything.
+bool ProcessorView::find_visible_in_tiles(std::size_t first, std::size_t step,
+                                          std::vector<std::uint32_t>& drawn, VisibleSet* seen,
+                                          int shadow_size) {
+    const StageTimer timer(times_, DrawStage::look);
+    const Batch& batch = kept_.front();
+    const TileGrid grid{part_.width, part_.height};
+    const ViewScene scene{.frame = &frame_,
+                          .balls = batch.screen,
+                          .exact = batch.exact,
+                          .shadow_size = shadow_size,
+                          .texels = texels()};
+    const std::size_t count = first < grid.tiles() ? (grid.tiles() - first + step - 1) / step : 0;
+    std::atomic<std::size_t> listed = 0, shown = 0, pairs = 0;
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+        const std::size_t t = first + i * step;
+        const ViewTile tile = tile_at(t, grid, batch.bins);
+        TileSums sums;
+        const TileWork work = HWY_DYNAMIC_DISPATCH(find_visible_balls)(scene, tile, sums);
+        pairs += work.pairs;
+        drawn[t] = std::uint32_t(work.splats);
+        listed += tile.list.size();
+        shown += drawn[t];
+        if (seen == nullptr) return;
+        for (const std::uint32_t splat : tile.list.first(drawn[t]))
+            if (const std::uint32_t from = source(splat); (from & kBillboardSplat) == 0)
+                mark(seen->balls[from]);
+        HWY_DYNAMIC_DISPATCH(mark_ground)(scene, tile, sums, seen->map_tiles.data());
+    });
+    if (times_ != nullptr) (*times_)[DrawStage::look].pairs += pairs;
+    return double(shown) <= kMostSeen * double(listed);
+}
+
+void ProcessorView::find_visible(int shadow_size, VisibleSet& seen) {
+    const TileGrid grid{part_.width, part_.height};
+    const std::size_t end = end_of_batch(boxes_, 0, grid, limits_.boxes, limits_.entries);
+    if (end == boxes_.size()) {  // more are not kept until they are drawn
+        kept_.push_back(prepare_batch(0, end));
+        std::vector<std::uint32_t> drawn(grid.tiles(), 0);
+        if (find_visible_in_tiles(kSampleStep / 2, kSampleStep, drawn, nullptr, shadow_size)) {
+            find_visible_in_tiles(0, 1, drawn, &seen, shadow_size);
+            for (std::size_t t = 0; t < grid.tiles(); ++t)
+                kept_.front().bins.ranges[t].end = kept_.front().bins.ranges[t].begin + drawn[t];
+            return;
+        }
+    }
+    std::ranges::fill(seen.balls, std::uint8_t{1});
+    find_visible_ground(shadow_size, seen);
+}
+
+// As if there were no clouds before it.
+void ProcessorView::find_visible_ground(int shadow_size, VisibleSet& seen) const {
+    const StageTimer timer(times_, DrawStage::look);
+    const TileGrid grid{part_.width, part_.height};
+    const ViewScene scene{.frame = &frame_, .shadow_size = shadow_size};
+    const TileSums nothing;
+    TileBins bins;
+    bins.ranges.resize(grid.tiles());
+    tbb::parallel_for(std::size_t{0}, grid.tiles(), [&](std::size_t t) {
+        HWY_DYNAMIC_DISPATCH(mark_ground)(scene, tile_at(t, grid, bins), nothing, seen.map_tiles.data());
+    });
+}
+
+void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size, const AirShells& shells,
+                         const VisibleSet* seen) {
+    frame_.shells = shells.any() ? &shells : nullptr;
+    const std::vector<std::uint32_t> before_shells = splats_before_shells(shells, *order_);
+    const TileGrid grid{part_.width, part_.height};
+    std::vector<TileSums> sums_between;  // batches
+    std::size_t begin = 0;
+    do {  // once even without any ball, for the background
+        const std::size_t end = kept_.empty()
+                                    ? end_of_batch(boxes_, begin, grid, limits_.boxes, limits_.entries)
+                                    : kept_.front().end;
+        Batch batch = kept_.empty() ? prepare_batch(begin, end) : std::move(kept_.front());
+        light(batch, seen);
+        const StageTimer timer(times_, DrawStage::view);
+        const ViewScene scene{.frame = &frame_,
+                              .balls = batch.screen,
+                              .exact = batch.exact,
+                              .shadow = shadow,
+                              .shadow_size = shadow_size,
+                              .before_shells = before_shells,
+                              .first_ball = begin,
+                              .texels = texels(),
+                              .distances = order_->depth};
+        const bool last = end == boxes_.size();
+        if (begin == 0 && !last) sums_between.resize(grid.tiles());
+        std::atomic<std::size_t> pairs = 0;
+        tbb::parallel_for(std::size_t{0}, grid.tiles(), [&](std::size_t t) {
+            const ViewTile tile = tile_at(t, grid, batch.bins);
+            TileSums own;
+            TileSums& sums = sums_between.empty() ? own : sums_between[t];
+            pairs += HWY_DYNAMIC_DISPATCH(add_balls)(scene, tile, sums).pairs;
+            if (!last) return;
+            HWY_DYNAMIC_DISPATCH(finish_tile)(scene, tile, sums);
+            store(sums, tile, part_, order_->depth, picture);
+        });
+        if (times_ != nullptr) (*times_)[DrawStage::view].pairs += pairs;
+        begin = end;
+    } while (begin < boxes_.size());
+    kept_.clear();
+}
+
+void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
+                       const Tile& part, const ViewSortedSplats& order, const AirShells& shells,
+                       Picture& picture, const BatchLimits& limits) {
+    ProcessorView(options, camera, frame, part, order, limits)
+        .draw(picture, picture.shadow.data(), picture.shadow_size, shells);
+}
+
+}  // namespace nephos
+#endif

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the kernels of processor_view.h work on. Private to the module.
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "render/cpu/billboard_texels.h"
+#include "render/cpu/screen_ball.h"
+#include "render/frame/frame_data.h"
+#include "render/shared/shared.h"
+
+namespace nephos {
+
+// Sums over the splats in front, for the pixels of a tile row by row.
+struct TileSums {
+    static constexpr std::size_t kPixels = shader::kTileWidth * shader::kTileHeight;
+    alignas(64) float red[kPixels] = {}, green[kPixels] = {}, blue[kPixels] = {}, distance[kPixels] = {};
+    alignas(64) float transmittance[kPixels];
+    std::size_t next_shell = 0;  // of air: those before it are in the sums
+    TileSums() { std::fill_n(transmittance, kPixels, 1.0f); }
+};
+
+// What all tiles of a part of the picture share.
+struct ViewScene {
+    const PictureFrame* frame = nullptr;
+    std::span<const ScreenBall> balls;  // splats, nearest first; some are ScreenBillboards
+    std::span<const ExactBall> exact;
+    const float* shadow = nullptr;
+    int shadow_size = 0;
+    std::span<const std::uint32_t> before_shells;  // splats_before_shells() of frame->shells
+    std::size_t first_ball = 0;                    // number of balls[0], nearest first
+    const BillboardTexels* texels = nullptr;       // for ScreenBillboards
+    bool distances = true;                         // whether depth is wanted
+};
+
+// Many threads may.
+inline void mark(std::uint8_t& byte) {
+    const std::atomic_ref<std::uint8_t> shared(byte);
+    if (shared.load(std::memory_order_relaxed) == 0) shared.store(1, std::memory_order_relaxed);
+}
+
+struct ViewTile {
+    int x = 0, y = 0;                     // first pixel
+    std::span<const std::uint32_t> list;  // of splats, nearest first
+};
+
+// What a tile took.
+struct TileWork {
+    std::size_t splats = 0;  // of its list, until it was opaque
+    std::size_t pairs = 0;   // of a splat and a pixel
+};
+
+}  // namespace nephos

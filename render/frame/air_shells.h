@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The layers of air around the eye that are drawn between the clouds: D's shells, "interleaved back to front
+// (shell, clouds up to the next shell, next shell ...)". See docs/air.md.
+//
+// Shell k is the air between the distances ends[k - 1] and ends[k] of every ray, cut off by the ground. It is
+// drawn in front of all splats whose centres are at ends[k] or beyond, and behind all others. What lies
+// between the beginning of a splat's own shell and its centre is added to the light of the splat
+// (render/shading/shells.glsl, shells-inl.h), so that nothing jumps when a splat crosses from one shell into
+// another.
+//
+// The light that a shell takes away is read off the shade map: the mean of the shadow map over a few texels,
+// and for each texel at which height its shade begins and where it is complete (with a low
+// sun: how far along the light). Above the clouds the
+// sun shines, whatever lies below. No Vulkan here. Private to the module.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render/cloud/cloud_preparation.h"
+#include "render/frame/fog.h"
+#include "render/frame/view_sorting.h"
+#include "render/image/picture.h"
+#include "render/options/camera.h"
+#include "render/shared/shared.h"
+
+namespace nephos {
+
+// The shade map and what shaders read behind it: kept until the light of the cloud changes.
+struct ShadeCache {
+    bool known = false;        // false: the light has changed
+    std::uint64_t serial = 0;  // changes when the words do
+    std::vector<std::uint32_t> words;
+    std::size_t shade_words = 0;            // of them; the others are noise of fog
+    std::optional<std::uint64_t> fog_seed;  // of that; none: no noise
+    int columns = 0;
+    double texels_per_map = 0;  // texels across the whole shadow map
+    Vec3 along{};               // AirShells::data.shade_along in the world: dot(along, point) + along_offset
+    double along_offset = 0;
+    float first_shade = 0;
+};
+
+struct AirShells {
+    shader::Shells data;
+    // Three planes of words, rows of settings.z of them, each with four bytes: of a texel, of its right
+    // neighbour, and of the two in the next row. The planes: transmittance; where along
+    // `shade_along` the shade begins; where it is complete. Then, with fog, the words of FogNoise.
+    // They are ShadeCache's.
+    std::span<const std::uint32_t> shade;
+    std::uint64_t serial = 0;  // changes when they do; 0: none
+
+    // Transmittance of clear air up to the end of each shell, where it depends on the distance alone
+    // (gradient).
+    std::vector<std::array<float, 3>> clear;
+
+    std::size_t count() const { return std::size_t(data.settings.x); }
+    bool any() const { return count() > 0; }
+    bool has_fog() const { return data.fog.x > 0; }
+};
+
+// Distance from the eye at which shell k ends, metres.
+inline float shell_end(const shader::Shells& data, std::size_t k) {
+    const shader::vec4& four = data.ends[k / 4];
+    return k % 4 == 0 ? four.x : k % 4 == 1 ? four.y : k % 4 == 2 ? four.z : four.w;
+}
+
+// Number of shells that end at a distance or before it.
+std::size_t shells_before(const shader::Shells& data, float distance);
+
+// Whether these options have air to draw between the clouds: fog, or shafts of clouds whose shadow they are.
+// It looks at the whole shadow map.
+bool has_shells(const RenderOptions& options, const PreparedCloud& cloud);
+
+// No shells when the options ask for none or when they would draw nothing. `shadow`: the texels of the shadow
+// map; `time_s`: simulated time of the picture. Whoever calls says with `kept.known` whether cloud, frame and
+// shadow are those of the call before; what is returned lives as long as `kept` is not given to another call.
+AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
+                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise,
+                     ShadeCache& kept);
+
+// For each shell the number of splats, nearest first, that are drawn in front of it. Rises.
+std::vector<std::uint32_t> splats_before_shells(const AirShells& shells, const ViewSortedSplats& order);
+
+// The runs of an order with runs of SplatKind::shell between them, one shell each: what is drawn, farthest
+// first.
+std::vector<Run> runs_between_shells(const AirShells& shells, const ViewSortedSplats& order);
+
+}  // namespace nephos

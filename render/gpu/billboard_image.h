@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Uploads the textures of T's billboards, for both Vulkan back-ends. Private to the module.
+
+#include "render/gpu/gpu_resources.h"
+
+namespace nephos {
+
+// The pictures of billboard_textures.h; all levels, readable by shaders.
+GpuImage upload_billboard_textures(const GpuDevice& gpu);
+
+}  // namespace nephos

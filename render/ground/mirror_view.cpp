@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/ground/mirror_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render/frame/frame_data.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kMargin = 1.15;  // of the mirrored view's edges, as a multiple of the camera's
+
+// The mean of up to four texels of the level before; at odd sizes the last row and column count twice.
+void append_level(MirrorView& view) {
+    const MirrorView::Level fine = view.levels.back();
+    const MirrorView::Level coarse{fine.first + fine.width * fine.height, (fine.width + 1) / 2,
+                                   (fine.height + 1) / 2};
+    view.texels.resize(4 * std::size_t(coarse.first + coarse.width * coarse.height));
+    const auto texel = [&](int x, int y) {
+        return &view.texels[4 * std::size_t(fine.first + std::min(y, fine.height - 1) * fine.width +
+                                            std::min(x, fine.width - 1))];
+    };
+    for (int y = 0; y < coarse.height; ++y) {
+        for (int x = 0; x < coarse.width; ++x) {
+            float* out = &view.texels[4 * std::size_t(coarse.first + y * coarse.width + x)];
+            for (int c = 0; c < 4; ++c) {
+                out[c] = 0.25f * (texel(2 * x, 2 * y)[c] + texel(2 * x + 1, 2 * y)[c] +
+                                  texel(2 * x, 2 * y + 1)[c] + texel(2 * x + 1, 2 * y + 1)[c]);
+            }
+        }
+    }
+    view.levels.push_back(coarse);
+}
+
+}  // namespace
+
+Camera mirrored_camera(const Camera& camera, double ground_m, double scale) {
+    constexpr double kHalfDegree = std::numbers::pi / 360;
+    Camera mirrored = camera;
+    mirrored.position_m.z = 2 * ground_m - camera.position_m.z;
+    mirrored.target_m.z = 2 * ground_m - camera.target_m.z;
+    const double edge = kMargin * std::tan(camera.vertical_fov_deg * kHalfDegree);
+    mirrored.vertical_fov_deg = std::min(170.0, std::atan(edge) / kHalfDegree);
+    const auto pixels = [&](int size) {
+        return std::clamp(int(std::lround(size * scale * kMargin)), 1, 16384);
+    };
+    mirrored.width = pixels(camera.width);
+    mirrored.height = pixels(camera.height);
+    return mirrored;
+}
+
+MirrorView mirror_view(const Picture& picture, const Camera& camera) {
+    MirrorView view;
+    view.frame = camera_frame(camera);
+    view.pixels_per_unit = pixels_per_unit(camera, view.frame);
+    view.levels.push_back({0, picture.width, picture.height});
+    view.texels.resize(4 * picture.pixels());
+    for (std::size_t i = 0; i < picture.pixels(); ++i) {
+        std::copy_n(&picture.beauty[3 * i], 3, &view.texels[4 * i]);
+        view.texels[4 * i + 3] = picture.transmittance[i];
+    }
+    while (view.levels.back().width > 2 && view.levels.back().height > 2 && view.levels.size() < 8)
+        append_level(view);
+    return view;
+}
+
+}  // namespace nephos

@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/ground/wet_ground.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "render/frame/frame_data.h"
+#include "render/ground/ground_noise.h"
+#include "render/ground/ripples.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "render/ground/wet_ground.cpp"
+#include <hwy/foreach_target.h>
+// foreach_target.h must come first
+#include <hwy/highway.h>
+
+#include "render/ground/ground_look-inl.h"
+#include "render/ground/ripples-inl.h"
+
+#ifndef NEPHOS_RENDER_WET_GROUND_TYPES_
+#define NEPHOS_RENDER_WET_GROUND_TYPES_
+namespace nephos {
+
+// The map's texels from points relative to the eye: column = from_x + per_x x - 1/2.
+struct CoverTexels {
+    const GroundCoverView* map = nullptr;
+    float from_x = 0, from_y = 0, per_x = 0, per_y = 0;
+};
+
+// What all pixels share.
+struct GroundPass {
+    const WetGroundOptions* look = nullptr;
+    PictureFrame white;  // of ground with an albedo of 1
+    shader::vec4 dry;    // its albedo
+    const float* shadow = nullptr;
+    int shadow_size = 0;
+    CoverTexels cover;
+    std::vector<NoiseOctave> hollows, tufts;
+    RippleGrid ripples;
+    const MirrorView* mirror = nullptr;
+    float reflection = 0;
+};
+
+}  // namespace nephos
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+
+struct Lying {
+    Floats water_mm, snow_mm, rain_mm_per_h;
+};
+
+// What lies at points: the map between four texels, towards its edge and beyond it what lies outside.
+HWY_INLINE Lying lying_at(const CoverTexels& texels, const Floats3& point) {
+    const Lanes d;
+    const Ints di;
+    const GroundCoverView& map = *texels.map;
+    const Lying outside{set(float(map.outside_water_mm)), set(float(map.outside_snow_mm)),
+                        set(float(map.outside_rain_mm_per_h))};
+    if (map.columns == 0) return outside;
+    const Floats across = hn::MulAdd(set(texels.per_x), point.x, set(texels.from_x)),
+                 up = hn::MulAdd(set(texels.per_y), point.y, set(texels.from_y));
+    constexpr float kEdge = 0.1f;  // of the map's size, over which it fades out
+    const auto from_edge = [](Floats at, int count) {
+        return hn::Mul(hn::Min(at, hn::Sub(set(float(count)), at)), set(1.0f / float(count)));
+    };
+    const Floats inner = hn::Min(from_edge(across, map.columns), from_edge(up, map.rows));
+    const Floats share = smooth_step(hn::Zero(d), set(kEdge), inner);
+    if (hn::AllFalse(d, hn::Gt(share, hn::Zero(d)))) return outside;
+    const auto place = [&](Floats at, int count) {
+        return hn::Max(hn::Min(hn::Sub(at, set(0.5f)), set(float(count - 1))), hn::Zero(d));
+    };
+    const Floats x = place(across, map.columns), y = place(up, map.rows);
+    const Floats x0 = hn::Min(hn::Floor(x), set(float(map.columns - 2))),
+                 y0 = hn::Min(hn::Floor(y), set(float(map.rows - 2)));
+    const auto index =
+        hn::Add(hn::Mul(hn::ConvertTo(di, y0), hn::Set(di, map.columns)), hn::ConvertTo(di, x0));
+    const auto value = [&](std::span<const float> of, Floats beyond) {
+        const auto row = [&](const float* first) {
+            return lerp(hn::GatherIndex(d, first, index), hn::GatherIndex(d, first + 1, index),
+                        hn::Sub(x, x0));
+        };
+        return lerp(beyond, lerp(row(of.data()), row(of.data() + map.columns), hn::Sub(y, y0)), share);
+    };
+    return {value(map.water_mm, outside.water_mm), value(map.snow_mm, outside.snow_mm),
+            value(map.rain_mm_per_h, outside.rain_mm_per_h)};
+}
+
+// A pixel's ray and the ground that it meets.
+struct Seen {
+    Floats3 ray, point, beta, veil;  // veil: light of the air up to the ground
+    Floats pixel_m;                  // size of the pixel there, the geometric mean of both directions
+};
+
+// Light that a surface of this roughness reflects from the sky to the eye, behind the air: what arrives from
+// clouds has come through the air before the ground already.
+HWY_INLINE Floats3 reflected(const GroundPass& pass, const Seen& seen, const Floats3& direction,
+                             Floats blur) {
+    const Mirrored view = mirrored(*pass.mirror, direction, blur);
+    const Floats zero = hn::Zero(Lanes()), sky = view.transmittance, cloud = hn::Sub(set(1.0f), sky);
+    const auto of = [&](Floats light, Floats beta, Floats veil) {
+        const Floats beyond = hn::Max(hn::Sub(light, veil), zero);
+        return hn::MulAdd(hn::Mul(light, beta), sky, hn::Mul(beyond, cloud));
+    };
+    return {of(view.light.x, seen.beta.x, seen.veil.x), of(view.light.y, seen.beta.y, seen.veil.y),
+            of(view.light.z, seen.beta.z, seen.veil.z)};
+}
+
+// The mirrored direction of a ray that meets water with these slopes; never below the horizon.
+HWY_INLINE Floats3 mirrored_ray(const Floats3& ray, Floats slope_x, Floats slope_y) {
+    const Lanes d;
+    const Floats per_length =
+        hn::Div(set(1.0f), hn::Sqrt(hn::MulAdd(slope_x, slope_x, hn::MulAdd(slope_y, slope_y, set(1.0f)))));
+    const Floats3 normal{hn::Mul(hn::Neg(slope_x), per_length), hn::Mul(hn::Neg(slope_y), per_length),
+                         per_length};
+    const Floats along = hn::Mul(set(-2.0f), dot(ray, normal));
+    Floats3 out = times_add(along, normal, ray);
+    out.z = hn::Max(out.z, hn::Min(hn::Neg(ray.z), set(1.0e-3f)));
+    return hn::AllTrue(d, hn::Gt(out.z, hn::Zero(d))) ? out : Floats3{ray.x, ray.y, hn::Abs(ray.z)};
+}
+
+struct Surface {
+    Floats3 albedo;     // of what scatters below the surface
+    Floats3 reflected;  // light, behind the air
+};
+
+// Wet soil and puddles.
+HWY_INLINE Surface wet_surface(const GroundPass& pass, const Seen& seen, const Lying& lying,
+                               const ResolvedNoise& hollows) {
+    const WetGroundOptions& look = *pass.look;
+    const Lanes d;
+    const Floats one = set(1.0f);
+    const Floats puddle = covered(lying.water_mm, float(look.puddle_film_mm), hollows);
+    // Hollows stay damp longer than what stands out.
+    const Floats damp_mm = hn::Mul(lying.water_mm, hn::Exp(d, hn::Mul(set(-0.7f), hollows.value)));
+    const Floats soaked = hn::Sub(one, hn::Exp(d, hn::Mul(damp_mm, set(float(-1 / look.soaking_mm)))));
+    const Slopes slopes = ripples_at(pass.ripples, seen.point, seen.pixel_m, lying.rain_mm_per_h);
+    const Floats cosine = hn::Neg(seen.ray.z);
+    const Floats tilted =
+        hn::Max(hn::Add(cosine, hn::MulAdd(slopes.x, seen.ray.x, hn::Mul(slopes.y, seen.ray.y))), set(0.01f));
+    constexpr float kSoilSlopes = 0.09f;  // variance
+    const Floats of_water = water_reflectance(hn::Min(tilted, one), slopes.variance),
+                 of_soil = hn::Mul(hn::Mul(set(float(look.sheen)), soaked),
+                                   water_reflectance(cosine, set(kSoilSlopes)));
+    const Floats dry_part = hn::Mul(hn::Sub(one, puddle), hn::Sub(one, soaked));
+    const Floats soaked_part = hn::Mul(hn::Sub(one, puddle), hn::Sub(soaked, of_soil));
+    const Floats under_water = hn::Mul(puddle, hn::Sub(one, of_water));
+    Surface surface;
+    surface.albedo = times_add(dry_part, set3(pass.dry),
+                               times(hn::Add(soaked_part, under_water), soaked_albedo(pass.dry)));
+    surface.reflected = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    if (pass.mirror == nullptr) return surface;
+    const Floats strength = set(pass.reflection);
+    const auto reflects = [&](Floats share, Floats slope_x, Floats slope_y, Floats blur) {
+        if (hn::AllFalse(d, hn::Gt(share, set(1.0e-4f)))) return;
+        const Floats3 light = reflected(pass, seen, mirrored_ray(seen.ray, slope_x, slope_y), blur);
+        surface.reflected = times_add(hn::Mul(strength, share), light, surface.reflected);
+    };
+    reflects(hn::Mul(puddle, of_water), slopes.x, slopes.y, hn::Mul(set(2.0f), hn::Sqrt(slopes.variance)));
+    reflects(hn::Mul(hn::Sub(one, puddle), of_soil), hn::Zero(d), hn::Zero(d), set(0.6f));
+    return surface;
+}
+
+// Below snow; its grain shows as a little light and shade.
+HWY_INLINE void lay_snow(const GroundPass& pass, const Seen& seen, const Lying& lying, Surface& surface) {
+    const Lanes d;
+    if (hn::AllFalse(d, hn::Gt(lying.snow_mm, hn::Zero(d)))) return;
+    const WetGroundOptions& look = *pass.look;
+    const ResolvedNoise tufts = resolved_noise(pass.tufts, seen.point, seen.pixel_m);
+    const Floats white = covered(lying.snow_mm, float(look.snow_cover_mm), tufts), one = set(1.0f);
+    const Floats bright = hn::Max(hn::Min(hn::MulAdd(set(-0.02f), tufts.value, one), set(1.05f)), set(0.9f));
+    const auto snow = [&](std::size_t c) {
+        return hn::Min(hn::Mul(set(float(look.snow_albedo[c])), bright), one);
+    };
+    surface.albedo = mix(surface.albedo, {snow(0), snow(1), snow(2)}, {white, white, white});
+    surface.reflected = times(hn::Sub(one, white), surface.reflected);
+}
+
+// What pixels have more than with dry ground, without the clouds before it.
+HWY_INLINE Floats3 changed(const GroundPass& pass, const Floats3& direction) {
+    const Lanes d;
+    const Floats squared = dot(direction, direction);
+    Seen seen;
+    seen.ray = times(hn::Div(set(1.0f), hn::Sqrt(squared)), direction);
+    const Floats distance = ground_distance(pass.white, seen.ray.z);
+    const auto meets = hn::Lt(distance, set(kNowhere));
+    const Floats near = hn::IfThenElse(meets, distance, set(1.0f));
+    seen.point = times(near, seen.ray);
+    const Lying lying = lying_at(pass.cover, seen.point);
+    const auto some = hn::And(meets, hn::Gt(hn::Max(lying.water_mm, lying.snow_mm), hn::Zero(d)));
+    if (hn::AllFalse(d, some)) return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    seen.beta = air_transmittance(pass.white, seen.ray, near);
+    seen.veil = air_light(pass.white, seen.ray, seen.beta);
+    const Floats slant = hn::Sqrt(hn::Max(hn::Neg(seen.ray.z), set(1.0e-6f)));
+    seen.pixel_m = hn::Div(hn::Mul(near, set(1.0f / pass.white.up.w)), slant);
+    const ResolvedNoise hollows = resolved_noise(pass.hollows, seen.point, seen.pixel_m);
+    Surface surface = wet_surface(pass, seen, lying, hollows);
+    lay_snow(pass, seen, lying, surface);
+    const ShadowTexels shadow{pass.shadow, pass.shadow_size};
+    const Floats3 light = each_times(seen.beta, ground_light(pass.white, shadow, seen.point));
+    const Floats3 more = add(each_times(light, subtract(surface.albedo, set3(pass.dry))), surface.reflected);
+    return {hn::IfThenElseZero(some, more.x), hn::IfThenElseZero(some, more.y),
+            hn::IfThenElseZero(some, more.z)};
+}
+
+void draw_row(const GroundPass& pass, int y, Picture& picture) {
+    const Lanes d;
+    const std::size_t lanes = hn::Lanes(d), width = std::size_t(picture.width);
+    HWY_ALIGN float red[hn::MaxLanes(d)], green[hn::MaxLanes(d)], blue[hn::MaxLanes(d)];
+    for (std::size_t x = 0; x < width; x += lanes) {
+        const Floats across = hn::Add(hn::Iota(d, float(x)), set(0.5f));
+        const Floats3 more = changed(pass, pixel_direction(pass.white, across, set(float(y) + 0.5f)));
+        hn::Store(more.x, d, red);
+        hn::Store(more.y, d, green);
+        hn::Store(more.z, d, blue);
+        const std::size_t first = std::size_t(y) * width + x;
+        for (std::size_t lane = 0; lane < std::min(lanes, width - x); ++lane) {
+            const float left = picture.transmittance[first + lane];
+            float* beauty = &picture.beauty[3 * (first + lane)];
+            beauty[0] = std::max(0.0f, beauty[0] + left * red[lane]);
+            beauty[1] = std::max(0.0f, beauty[1] + left * green[lane]);
+            beauty[2] = std::max(0.0f, beauty[2] + left * blue[lane]);
+        }
+    }
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephos {
+
+HWY_EXPORT(draw_row);
+
+namespace {
+
+CoverTexels texels_of(const GroundCoverView& map, const Vec3& eye_m) {
+    return {&map, float((eye_m.x - map.x_m) / map.texel_x_m), float((eye_m.y - map.y_m) / map.texel_y_m),
+            float(1 / map.texel_x_m), float(1 / map.texel_y_m)};
+}
+
+bool any(std::span<const float> values) {
+    return std::ranges::any_of(values, [](float value) { return value > 0; });
+}
+
+bool any_water(const GroundCoverView& cover) { return cover.outside_water_mm > 0 || any(cover.water_mm); }
+
+// Whether a corner of the picture, and with it anything, looks below the horizon of the plane.
+bool ground_in_view(const RenderOptions& options) {
+    const Camera& camera = options.camera;
+    const CameraFrame frame = camera_frame(camera);
+    if (camera.position_m.z <= options.ground.height_m) return false;
+    double lowest = 1;
+    for (const double x : {0.0, 0.5, 1.0})
+        for (const double y : {0.0, 1.0})
+            lowest = std::min(lowest, pixel_ray(frame, camera, x * camera.width, y * camera.height).z);
+    return lowest < 0;
+}
+
+}  // namespace
+
+double water_reflectance(double cosine, double slope_variance) {
+    const double slope = std::sqrt(slope_variance);
+    const double grazing = std::pow(1 - cosine, 5 * std::exp(-2.69 * slope));
+    const double hidden = 1 + 22.7 * slope * std::sqrt(slope);
+    return kWaterNormalReflectance + (1 - kWaterNormalReflectance) * grazing / hidden;
+}
+
+double soaked_albedo(double dry_albedo) {
+    constexpr double kIndex = 1.333, kDiffuseReflectance = 0.066;
+    constexpr double kBack = 1 - (1 - kDiffuseReflectance) / (kIndex * kIndex);
+    return (1 - kBack) * dry_albedo / (1 - kBack * dry_albedo);
+}
+
+double covered_share(double film_mm, double half_mm) {
+    if (!(film_mm > 0)) return 0;
+    return 1 / (1 + std::exp(-1.702 * std::log(film_mm / half_mm) / kFilmSpread));
+}
+
+bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover) {
+    return (any_water(cover) || cover.outside_snow_mm > 0 || any(cover.snow_mm)) && ground_in_view(options);
+}
+
+bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover) {
+    return options.wet_ground.reflection > 0 && any_water(cover) && ground_in_view(options);
+}
+
+void check(const GroundCoverView& cover) {
+    const auto require = [](bool good, const char* what) {
+        if (!good) throw Error(ErrorCode::usage, std::string("ground cover: ") + what);
+    };
+    const bool none = cover.columns == 0 && cover.rows == 0;
+    require(none || (cover.columns >= 2 && cover.rows >= 2), "expected at least 2 x 2 texels, or none");
+    const std::size_t texels = std::size_t(cover.columns) * std::size_t(cover.rows);
+    require(cover.water_mm.size() == texels && cover.snow_mm.size() == texels &&
+                cover.rain_mm_per_h.size() == texels,
+            "expected as many values as texels");
+    require(cover.texel_x_m > 0 && cover.texel_y_m > 0, "expected texels above 0 m");
+    const auto bad = [](double value) { return !(value >= 0 && std::isfinite(value)); };
+    for (const std::span<const float> values : {cover.water_mm, cover.snow_mm, cover.rain_mm_per_h})
+        require(std::ranges::none_of(values, bad), "expected water, snow and rain of 0 mm or more");
+    require(!bad(cover.outside_water_mm) && !bad(cover.outside_snow_mm) && !bad(cover.outside_rain_mm_per_h),
+            "expected water, snow and rain of 0 mm or more outside");
+}
+
+void draw_wet_ground(const WetGround& ground, Picture& picture) {
+    const RenderOptions& options = ground.options;
+    const Vec3& eye = options.camera.position_m;
+    GroundPass pass;
+    pass.look = &options.wet_ground;
+    RenderOptions white = options;
+    white.ground.albedo = {1, 1, 1};
+    pass.white = frame_data(white, camera_frame(options.camera), picture.shadow_frame, ground.flash,
+                            {0, 0, picture.width, picture.height}, ground.sky);
+    const Rgb& albedo = options.ground.albedo;
+    pass.dry = {float(albedo[0]), float(albedo[1]), float(albedo[2]), 0};
+    pass.shadow = ground.shadow;
+    pass.shadow_size = ground.shadow_size;
+    pass.cover = texels_of(ground.cover, eye);
+    const double puddle_m = options.wet_ground.puddle_size_m;
+    pass.hollows = noise_octaves({150 * puddle_m, 0.45, 10, 1.0, 0x77657400u}, eye);
+    pass.tufts = noise_octaves({900, 0.42, 11, 1.0, 0x736e6f77u}, eye);
+    pass.ripples = ripple_grid(ground.cover, ground.time_s, options.wet_ground.ripples, eye);
+    pass.mirror = ground.mirror;
+    pass.reflection = float(options.wet_ground.reflection);
+    tbb::parallel_for(0, picture.height, [&](int y) { HWY_DYNAMIC_DISPATCH(draw_row)(pass, y, picture); });
+}
+
+}  // namespace nephos
+#endif

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/image/streak_overlay.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+namespace nephos {
+namespace {
+
+constexpr int kBandRows = 16;
+constexpr float kWide = 2.5f;  // pixels; from here on ends are round
+
+struct Rows {
+    int first = 0, end = 0;
+};
+
+// Rows or columns whose middles lie within `reach` of a..b.
+Rows touched(float a, float b, float reach, int limit) {
+    const float low = std::min(a, b) - reach, high = std::max(a, b) + reach;
+    if (!(high > 0.0f && low < float(limit))) return {};
+    return {std::max(0, int(std::floor(low))), std::min(limit, int(std::floor(high)) + 1)};
+}
+
+// Twice as far as a streak reaches on either side.
+float reach_of(const Streak& s) { return s.width + 1.0f; }
+
+void blend(Picture& picture, const Streak& s, int x, int y, float cover) {
+    const std::size_t i = std::size_t(y) * std::size_t(picture.width) + std::size_t(x);
+    const float seen = s.distance_m <= picture.depth_m[i] ? 1.0f : picture.transmittance[i];
+    const float share = s.opacity * cover * seen;
+    float* pixel = &picture.beauty[3 * i];
+    pixel[0] += share * (s.red - pixel[0]);
+    pixel[1] += share * (s.green - pixel[1]);
+    pixel[2] += share * (s.blue - pixel[2]);
+}
+
+// Along the longer axis, in each row (steep) or column the pixels near the middle line.
+template <bool steep>
+void draw_thin(Picture& picture, const Streak& s, const Rows& band) {
+    float from = steep ? s.y0 : s.x0, to = steep ? s.y1 : s.x1;
+    float across_from = steep ? s.x0 : s.y0, across_to = steep ? s.x1 : s.y1;
+    if (from > to) {
+        std::swap(from, to);
+        std::swap(across_from, across_to);
+    }
+    const float length = to - from, slope = (across_to - across_from) / std::max(length, 1e-6f);
+    const float half = 0.5f * s.width * std::sqrt(1.0f + slope * slope);
+    Rows along = touched(from, to, 0.5f, steep ? picture.height : picture.width);
+    if (steep) along = {std::max(along.first, band.first), std::min(along.end, band.end)};
+    for (int i = along.first; i < along.end; ++i) {
+        const float at = float(i) + 0.5f - from;
+        const float end_cover = std::clamp(std::min(at, length - at) + 0.5f, 0.0f, 1.0f);
+        const float middle = across_from + std::clamp(at, 0.0f, length) * slope;
+        Rows across = touched(middle, middle, half + 0.5f, steep ? picture.width : picture.height);
+        if (!steep) across = {std::max(across.first, band.first), std::min(across.end, band.end)};
+        for (int j = across.first; j < across.end; ++j) {
+            const float cover =
+                end_cover * std::clamp(half + 0.5f - std::abs(float(j) + 0.5f - middle), 0.0f, 1.0f);
+            if (cover > 0.0f) blend(picture, s, steep ? j : i, steep ? i : j, cover);
+        }
+    }
+}
+
+// By the distance from the line between the centres of the round ends; the wider, the softer.
+void draw_wide(Picture& picture, const Streak& s, const Rows& band) {
+    const float dx = s.x1 - s.x0, dy = s.y1 - s.y0, length = std::sqrt(dx * dx + dy * dy);
+    const float half = 0.5f * s.width, cut = std::min(half, 0.5f * length) / std::max(length, 1e-6f);
+    const float ax = s.x0 + cut * dx, ay = s.y0 + cut * dy;
+    const float bx = (1.0f - 2.0f * cut) * dx, by = (1.0f - 2.0f * cut) * dy;
+    const float squared = bx * bx + by * by, soft = std::max(1.0f, 0.6f * s.width);
+    Rows rows = touched(s.y0, s.y1, reach_of(s), picture.height);
+    rows = {std::max(rows.first, band.first), std::min(rows.end, band.end)};
+    const Rows columns = touched(s.x0, s.x1, reach_of(s), picture.width);
+    for (int y = rows.first; y < rows.end; ++y) {
+        for (int x = columns.first; x < columns.end; ++x) {
+            const float px = float(x) + 0.5f - ax, py = float(y) + 0.5f - ay;
+            const float t = squared > 0 ? std::clamp((px * bx + py * by) / squared, 0.0f, 1.0f) : 0.0f;
+            const float beside_x = px - t * bx, beside_y = py - t * by;
+            const float distance = std::sqrt(beside_x * beside_x + beside_y * beside_y);
+            const float cover = std::clamp((half + 0.5f * soft - distance) / soft, 0.0f, 1.0f);
+            if (cover > 0.0f) blend(picture, s, x, y, cover);
+        }
+    }
+}
+
+void draw(Picture& picture, const Streak& s, const Rows& band) {
+    if (s.width > kWide) {
+        draw_wide(picture, s, band);
+    } else if (std::abs(s.y1 - s.y0) >= std::abs(s.x1 - s.x0)) {
+        draw_thin<true>(picture, s, band);
+    } else {
+        draw_thin<false>(picture, s, band);
+    }
+}
+
+// The streaks that touch each band of rows, in their order, as one list with a begin for each band.
+struct Bands {
+    std::vector<std::uint32_t> begin, list;
+};
+
+Bands bands_of(std::span<const Streak> streaks, int height) {
+    const auto of = [&](const Streak& s) {
+        const Rows rows = touched(s.y0, s.y1, reach_of(s), height);
+        return Rows{rows.first / kBandRows, (rows.end + kBandRows - 1) / kBandRows};
+    };
+    Bands bands;
+    bands.begin.assign(std::size_t((height + kBandRows - 1) / kBandRows) + 1, 0);
+    for (const Streak& s : streaks)
+        for (Rows b = of(s); b.first < b.end; ++b.first) ++bands.begin[std::size_t(b.first) + 1];
+    for (std::size_t b = 1; b < bands.begin.size(); ++b) bands.begin[b] += bands.begin[b - 1];
+    bands.list.resize(bands.begin.back());
+    std::vector<std::uint32_t> next(bands.begin.begin(), bands.begin.end() - 1);
+    for (std::size_t i = 0; i < streaks.size(); ++i)
+        for (Rows b = of(streaks[i]); b.first < b.end; ++b.first)
+            bands.list[next[std::size_t(b.first)]++] = std::uint32_t(i);
+    return bands;
+}
+
+}  // namespace
+
+void draw_streaks(Picture& picture, std::span<const Streak> streaks) {
+    const Bands bands = bands_of(streaks, picture.height);
+    tbb::parallel_for(std::size_t(0), bands.begin.size() - 1, [&](std::size_t b) {
+        const Rows rows{int(b) * kBandRows, std::min(picture.height, (int(b) + 1) * kBandRows)};
+        for (std::uint32_t i = bands.begin[b]; i < bands.begin[b + 1]; ++i)
+            draw(picture, streaks[bands.list[i]], rows);
+    });
+}
+
+}  // namespace nephos

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/image/video.h"
+
+#include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "core/atomic_file.h"
+#include "core/descriptor.h"
+#include "core/error.h"
+#include "render/image/image_file.h"
+
+extern char** environ;
+
+namespace nephos {
+namespace {
+
+constexpr const char* kNoFfmpeg =
+    "the ffmpeg command was not found: install the package ffmpeg to write videos";
+
+// The running command. Its input is a socket rather than a pipe: writing to a dead reader is then an error
+// code (MSG_NOSIGNAL) and not a SIGPIPE, whatever the program around us does with signals.
+class Encoder {
+  public:
+    explicit Encoder(const std::vector<std::string>& command) {
+        int ends[2];
+        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+            fail_system("cannot start ffmpeg", errno);
+        ours_.reset(ends[0]);
+        const Descriptor theirs(ends[1]);
+        messages_.reset(::memfd_create("ffmpeg-messages", MFD_CLOEXEC));
+        if (messages_.get() < 0) fail_system("cannot start ffmpeg", errno);
+        spawn(command, theirs.get());
+    }
+    Encoder(const Encoder&) = delete;
+    Encoder& operator=(const Encoder&) = delete;
+
+    // Left without finish(): something failed elsewhere, and the command has nothing more to do.
+    ~Encoder() {
+        if (child_ <= 0) return;
+        ::kill(child_, SIGKILL);
+        wait();
+    }
+
+    // False when the command has stopped reading: finish() then says why.
+    bool write(std::span<const std::uint8_t> bytes) {
+        while (!bytes.empty()) {
+            const ssize_t sent = ::send(ours_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+            if (sent < 0 && errno == EINTR) continue;
+            if (sent < 0) return false;
+            bytes = bytes.subspan(std::size_t(sent));
+        }
+        return true;
+    }
+
+    // Ends the input and waits. Throws Error(io) unless the command succeeded.
+    void finish() {
+        ours_.close();
+        const int status = wait();
+        if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+        const std::string how = WIFSIGNALED(status)
+                                    ? "was killed by signal " + std::to_string(WTERMSIG(status))
+                                    : "failed with status " + std::to_string(WEXITSTATUS(status));
+        throw Error(ErrorCode::io, "ffmpeg " + how + ": " + last_message());
+    }
+
+  private:
+    [[noreturn]] static void fail_system(const std::string& what, int error) {
+        throw Error(ErrorCode::io, what + ": " + std::strerror(error));
+    }
+
+    void spawn(const std::vector<std::string>& command, int input) {
+        std::vector<char*> arguments;
+        for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
+        arguments.push_back(nullptr);
+        posix_spawn_file_actions_t actions;
+        posix_spawnattr_t attributes;
+        ::posix_spawn_file_actions_init(&actions);
+        ::posix_spawnattr_init(&attributes);
+        ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+        ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+        ::posix_spawn_file_actions_adddup2(&actions, messages_.get(), STDERR_FILENO);
+        // A Ctrl-C at the terminal is for the program that asked for the video, which then ends the command.
+        ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+        const int error =
+            ::posix_spawnp(&child_, arguments[0], &actions, &attributes, arguments.data(), environ);
+        ::posix_spawn_file_actions_destroy(&actions);
+        ::posix_spawnattr_destroy(&attributes);
+        if (error == 0) return;
+        child_ = -1;
+        if (error == ENOENT) throw Error(ErrorCode::io, kNoFfmpeg);
+        fail_system("cannot start ffmpeg", error);
+    }
+
+    int wait() {
+        int status = 0;
+        while (::waitpid(child_, &status, 0) < 0 && errno == EINTR) {
+        }
+        child_ = -1;
+        return status;
+    }
+
+    std::string last_message() {
+        char text[600];
+        const off_t end = ::lseek(messages_.get(), 0, SEEK_END);
+        const off_t start = end > off_t(sizeof text) ? end - off_t(sizeof text) : 0;
+        const ssize_t count = ::pread(messages_.get(), text, sizeof text, start);
+        std::string message(text, count > 0 ? std::size_t(count) : 0);
+        while (!message.empty() && (message.back() == '\n' || message.back() == ' ')) message.pop_back();
+        return message.empty() ? "no message" : message;
+    }
+
+    pid_t child_ = -1;
+    Descriptor ours_, messages_;
+};
+
+void check(const VideoOptions& options) {
+    const auto require = [](bool good, const char* what) {
+        if (!good) throw Error(ErrorCode::usage, std::string("video: ") + what);
+    };
+    require(options.width >= 1 && options.width <= 16384, "width must be 1..16384 pixels");
+    require(options.height >= 1 && options.height <= 16384, "height must be 1..16384 pixels");
+    require(options.frames_per_second > 0 && options.frames_per_second <= 1000,
+            "frames_per_second must be above 0 and at most 1000");
+    require(options.quality >= 0 && options.quality <= 51, "quality must be 0..51");
+}
+
+std::vector<std::string> command_line(const VideoOptions& options, const std::filesystem::path& output) {
+    char rate[32];
+    const auto end =
+        std::to_chars(rate, rate + sizeof rate, options.frames_per_second, std::chars_format::fixed, 6);
+    // An absolute path can be mistaken neither for an option nor for a protocol.
+    return {"ffmpeg", "-hide_banner", "-loglevel", "error", "-nostdin", "-y", "-f", "rawvideo",
+            "-pixel_format", "rgb24", "-video_size",
+            std::to_string(options.width) + "x" + std::to_string(options.height), "-framerate",
+            std::string(rate, end.ptr), "-i", "pipe:0",
+            // yuv420p, the one layout every player takes, halves the chroma: sides must be even.
+            "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p",
+            "-c:v", "libx264", "-crf", std::to_string(options.quality), "-preset", "medium", "-colorspace",
+            "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-movflags", "+faststart",
+            "-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "mp4",
+            "file:" + std::filesystem::absolute(output).string()};
+}
+
+}  // namespace
+
+void require_ffmpeg() {
+    // As posix_spawnp() looks for it.
+    const char* variable = std::getenv("PATH");
+    std::string_view rest = variable != nullptr ? variable : "/bin:/usr/bin";
+    while (true) {
+        const std::string_view folder = rest.substr(0, rest.find(':'));
+        const std::filesystem::path command = std::filesystem::path(folder.empty() ? "." : folder) / "ffmpeg";
+        std::error_code error;
+        if (std::filesystem::is_regular_file(command, error) && ::access(command.c_str(), X_OK) == 0) return;
+        if (folder.size() == rest.size()) throw Error(ErrorCode::io, kNoFfmpeg);
+        rest.remove_prefix(folder.size() + 1);
+    }
+}
+
+void write_mp4(const std::filesystem::path& path, const VideoOptions& options,
+               const std::function<bool(std::span<std::uint8_t> rgb)>& next_frame) {
+    check(options);
+    std::vector<std::uint8_t> frame(3 * std::size_t(options.width) * std::size_t(options.height));
+    if (!next_frame(frame))
+        throw Error(ErrorCode::usage, path.string() + ": a video needs at least one frame");
+    write_atomically(path, [&](const std::filesystem::path& temporary) {
+        Encoder encoder(command_line(options, temporary));
+        bool reading = encoder.write(frame);
+        while (reading && next_frame(frame)) reading = encoder.write(frame);
+        try {
+            encoder.finish();
+        } catch (const Error& error) {
+            throw Error(ErrorCode::io, path.string() + ": " + error.what());
+        }
+        if (!reading)
+            throw Error(ErrorCode::io, path.string() + ": ffmpeg stopped reading before the last frame");
+    });
+}
+
+void encode_mp4(const std::filesystem::path& path, std::span<const std::filesystem::path> png_files,
+                double frames_per_second) {
+    if (png_files.empty())
+        throw Error(ErrorCode::usage, path.string() + ": a video needs at least one frame");
+    Rgb8Image image = read_png(png_files.front());
+    const VideoOptions options{image.width, image.height, frames_per_second, VideoOptions{}.quality};
+    std::size_t next = 0;
+    write_mp4(path, options, [&](std::span<std::uint8_t> rgb) {
+        if (next == png_files.size()) return false;
+        if (next > 0) image = read_png(png_files[next]);
+        if (image.width != options.width || image.height != options.height)
+            throw Error(ErrorCode::usage,
+                        png_files[next].string() + ": the frames of a video must have one size");
+        std::memcpy(rgb.data(), image.rgb.data(), rgb.size());
+        ++next;
+        return true;
+    });
+}
+
+}  // namespace nephos

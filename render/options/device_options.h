@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Which device and which back-end draw a picture.
+
+#include <string>
+
+namespace nephos {
+
+// How metaballs are drawn; the picture is the same within 1/255.
+enum class Splatting {
+    automatic,   // processor on a device of type CPU, else tiles
+    processor,   // vectors on the processor, tile by tile, front to back
+    tiles,       // compute shaders, tile by tile, front to back: fast
+    billboards,  // blended billboards with attenuation textures, back to front, as D has it: the reference
+};
+
+// Where Splatting::tiles has the order of the metaballs and the lists of the tiles made; the picture is the
+// same within 1/255, as bounds on the screen are rounded differently. Pictures with billboards, and what is
+// too much for the device at once, take the host's.
+enum class TileLists {
+    automatic,  // host on a device of type CPU, else device
+    host,       // sorted by the processor and uploaded for each picture
+    device,     // sorted by compute shaders from metaballs that stay on the device
+};
+
+struct DeviceOptions {
+    // Part of a device's name ("llvmpipe") or its number in device_names(). Empty: the environment variable
+    // NEPHOS_DEVICE in the same form; without it a discrete card, then an integrated, a virtual and a
+    // software one.
+    std::string device;
+    // Load the Khronos validation layer with synchronization validation and collect what it says. Slow; for
+    // tests.
+    bool validation = false;
+    // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
+    // the picture; memory on the device is about 24 bytes * tile_size^2, and 40 bytes more to read back two
+    // pictures from lists of the device. Less where the device allows no such buffers or images.
+    int tile_size = 2048;
+    Splatting splatting = Splatting::automatic;
+    TileLists lists = TileLists::automatic;
+};
+
+}  // namespace nephos

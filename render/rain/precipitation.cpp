@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/rain/precipitation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <tbb/parallel_for.h>
+
+#include "core/smoothstep.h"
+#include "core/vec.h"
+#include "render/frame/frame_data.h"
+#include "render/image/streak_overlay.h"
+#include "render/rain/drop_sizes.h"
+#include "render/rain/particle_streaks.h"
+#include "render/rain/precipitation_light.h"
+#include "render/rain/rain_shafts.h"
+
+namespace nephos {
+namespace {
+
+// The boxes of the particles hold a cylinder, of which the front half counts: so many more are made.
+constexpr double kMadePerDrawn = 8 / std::numbers::pi;
+// Distance from the perimeter, in depths of the near container, over which near rain fades into far rain.
+constexpr double kFadeDepths = 3;
+constexpr double kFarDepths = 10;     // depth of the far container in depths of the near one
+constexpr double kNearHeight = 1.25;  // height of the near container in depths
+
+}  // namespace
+
+RainShares rain_shares(const PrecipitationOptions& p, double outside_m) {
+    RainShares shares;
+    shares.near = 1 - smoothstep(0, kFadeDepths * p.depth_m, outside_m);
+    shares.far = (1 - shares.near);
+    shares.far_number = std::clamp(1 - outside_m / p.reach_m, 0.0, 1.0);
+    return shares;
+}
+
+std::vector<ParticlePass> particle_passes(const RenderOptions& options, const CameraFrame& camera,
+                                          const Weather& weather, double time_s) {
+    const PrecipitationOptions& p = options.precipitation;
+    const double far_depth = kFarDepths * p.depth_m;
+    std::vector<CurtainTerm> near, far;
+    std::vector<RainContainer> outside;
+    for (const RainCurtain& curtain : weather.curtains) {
+        if (!(curtain.base_m > curtain.ground_m) || !(curtain.rate_mm_per_h > 0)) continue;
+        const CurtainTerm term{&curtain, size_law(p.kind, p.intensity_scale * curtain.rate_mm_per_h)};
+        const RainContainer at = rain_container(curtain, camera, p.margin_m, far_depth);
+        if (at.near) {
+            near.push_back(term);
+        } else if (at.seen && at.outside_m < p.reach_m) {
+            far.push_back(term);
+            outside.push_back(at);
+        }
+    }
+    const auto pass_of = [&](const RainContainer& at, double depth, double share) {
+        ParticlePass pass;
+        pass.container = at;
+        pass.share = share;
+        pass.boxes = {at.centre.x, at.centre.y, camera.position_m.z, weather.carried_x_m, weather.carried_y_m,
+                      time_s,      depth,       p.margin_m,          kNearHeight * depth};
+        return pass;
+    };
+    std::vector<ParticlePass> passes;
+    if (!near.empty()) {
+        passes.push_back(
+            pass_of(rain_container(*near.front().curtain, camera, p.margin_m, far_depth), p.depth_m, 1));
+        passes.back().rain = near;
+    }
+    // Where areas overlap it rains as in the strongest, so an area outside adds only what those before lack.
+    std::vector<CurtainTerm> before = near;
+    for (std::size_t i = 0; i < far.size(); ++i) {
+        const RainShares shares = rain_shares(p, outside[i].outside_m);
+        const RainCurtain& curtain = *far[i].curtain;
+        for (const bool is_far : {false, true}) {
+            const double share = is_far ? shares.far : shares.near;
+            if (share <= 0) continue;
+            ParticlePass pass = pass_of(outside[i], is_far ? far_depth : p.depth_m, share);
+            pass.far = is_far;
+            pass.number = is_far ? shares.far_number : 1;
+            if (is_far) {
+                pass.boxes.height_m = curtain.base_m - curtain.ground_m;
+                pass.boxes.centre_z_m = 0.5 * (curtain.base_m + curtain.ground_m);
+            }
+            pass.rain = {far[i]};
+            pass.less = before;
+            passes.push_back(std::move(pass));
+        }
+        before.push_back(far[i]);
+    }
+    return passes;
+}
+
+const Particles& PrecipitationPainter::particles(PrecipitationKind kind, std::uint64_t seed,
+                                                 std::size_t count) {
+    if (!particles_ || particles_->kind != kind || seed_ != seed || particles_->size() != count) {
+        particles_ = make_particles(kind, seed, count);
+        seed_ = seed;
+    }
+    return *particles_;
+}
+
+void PrecipitationPainter::draw(Picture& picture, const RenderOptions& options, const Weather& weather,
+                                double time_s) {
+    streaks_ = 0;
+    const PrecipitationOptions& p = options.precipitation;
+    if (!p.enabled || weather.curtains.empty()) return;
+    check(p);
+    RenderOptions now = options;
+    now.camera = camera_at(options.camera, time_s);
+    const CameraFrame camera = camera_frame(now.camera);
+    const PrecipitationLight light = precipitation_light(picture, now, camera, time_s);
+    draw_shafts(picture, now, camera, weather.curtains, light, time_s, weather.seed);
+    if (p.particles == 0 || p.visibility <= 0) return;
+    const auto count = std::size_t(std::ceil(kMadePerDrawn * p.particles));
+    const Particles& all = particles(p.kind, weather.seed, count);
+    StreakView view{now,
+                    camera,
+                    camera_frame(camera_at(options.camera, time_s - 0.5 * p.exposure_s)),
+                    camera_frame(camera_at(options.camera, time_s + 0.5 * p.exposure_s)),
+                    light,
+                    weather.wind_x_m_per_s,
+                    weather.wind_y_m_per_s,
+                    time_s};
+    for (const ParticlePass& pass : particle_passes(now, camera, weather, time_s)) {
+        const std::vector<Streak> streaks = streaks_of(all, pass, view, picture);
+        draw_streaks(picture, streaks);
+        streaks_ += streaks.size();
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/rain/precipitation_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/smoothstep.h"
+#include "core/vec.h"
+#include "render/frame/frame_data.h"
+#include "render/options/phase_function.h"
+
+namespace nephos {
+namespace {
+
+// Times pi: radiance per radiance of a white surface that faces the light.
+double particle_phase(PrecipitationKind kind, double cosine) {
+    return kForwardShare * std::numbers::pi * henyey_greenstein(cosine, forward_g(kind)) +
+           (1 - kForwardShare) * 0.25;
+}
+
+constexpr double kSkyShare[2] = {0.68, 0.8};  // of a drop's and a flake's light, the rest is the ground's
+
+// A mean of the picture's pixels, with a share of what the options say, which steps in where there are none.
+struct Mean {
+    Rgb sum{};
+    double weights = 0;
+    void add(const float* pixel, double weight) {
+        // Whatever is brighter than white is the sun or its rim, which has a term of its own.
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * std::min(1.0, double(pixel[c]));
+        weights += weight;
+    }
+    Rgb with(const Rgb& otherwise, double more) const {
+        Rgb mean;
+        for (std::size_t c = 0; c < 3; ++c) mean[c] = (sum[c] + more * otherwise[c]) / (weights + more);
+        return mean;
+    }
+};
+
+Rgb surroundings(const Picture& picture, const RenderOptions& options, const CameraFrame& camera) {
+    constexpr double kShareOfOptions = 0.1;  // of the picture
+    const int step = std::max(1, picture.width / 160);
+    Mean above, below;
+    std::size_t looked = 0;
+    for (int y = step / 2; y < picture.height; y += step) {
+        const double upward = (1 - (2 * y + 1.0) / options.camera.height) * camera.half_height;
+        for (int x = step / 2; x < picture.width; x += step, ++looked) {
+            const double across = ((2 * x + 1.0) / options.camera.width - 1) * camera.half_width;
+            const double up = (camera.forward.z + across * camera.right.z + upward * camera.up.z) /
+                              std::sqrt(1 + across * across + upward * upward);
+            const float* pixel =
+                &picture.beauty[3 * (std::size_t(y) * std::size_t(picture.width) + std::size_t(x))];
+            above.add(pixel, smoothstep(-0.05, 0.15, up));
+            below.add(pixel, smoothstep(0.02, -0.2, up));
+        }
+    }
+    const double more = kShareOfOptions * double(std::max<std::size_t>(looked, 1));
+    const Rgb sky = above.with(air_of(picture, options).sky, more);
+    Rgb both{};
+    for (std::size_t c = 0; c < 3; ++c) both[c] = options.ground.albedo[c] * sky[c];
+    const Rgb ground = below.with(both, more);
+    const double share = kSkyShare[int(options.precipitation.kind)];
+    for (std::size_t c = 0; c < 3; ++c) both[c] = share * sky[c] + (1 - share) * ground[c];
+    return both;
+}
+
+}  // namespace
+
+double forward_g(PrecipitationKind kind) { return kind == PrecipitationKind::rain ? 0.85 : 0.6; }
+
+PictureAir air_of(const Picture& picture, const RenderOptions& options) {
+    if (picture.air) return *picture.air;
+    const Daylight day = daylight(options.sun.elevation_deg);
+    PictureAir air;
+    air.extinction_per_m = options.air.extinction_per_m;
+    for (std::size_t c = 0; c < 3; ++c) {
+        air.sun[c] = day.sun * options.sun.colour[c];
+        air.sky[c] = 0.5 * (options.air.horizon[c] + options.air.zenith[c]) * day.sky;
+        air.horizon[c] = day.sky * options.air.horizon[c];
+    }
+    return air;
+}
+
+PrecipitationLight precipitation_light(const Picture& picture, const RenderOptions& options,
+                                       const CameraFrame& camera, double time_s) {
+    PrecipitationLight light;
+    light.kind = options.precipitation.kind;
+    light.surroundings = surroundings(picture, options, camera);
+    light.to_sun = direction_to_sun(options.sun);
+    const PictureAir air = air_of(picture, options);
+    light.sun = air.sun;
+    light.air_extinction_per_m = air.extinction_per_m;
+    if (const std::optional<Flash> flash = flash_at(options.lightning, time_s)) {
+        for (std::size_t c = 0; c < 3; ++c) light.flash[c] = flash->intensity * flash->colour[c];
+        light.flash_m = flash->position_m;
+    }
+    return light;
+}
+
+float sunlight_at(const Picture& picture, const Vec3& place_m) {
+    if (picture.shadow.empty()) return 1.0f;
+    const ShadowFrame& f = picture.shadow_frame;
+    const Vec3 from = place_m - f.origin_m;
+    const double size = picture.shadow_size;
+    const double u = dot(from, f.u_axis_m) / dot(f.u_axis_m, f.u_axis_m) * size - 0.5;
+    const double v = dot(from, f.v_axis_m) / dot(f.v_axis_m, f.v_axis_m) * size - 0.5;
+    if (!(u > -1 && u < size && v > -1 && v < size)) return 1.0f;
+    const int x = int(std::floor(u)), y = int(std::floor(v));
+    const float share_x = float(u - x), share_y = float(v - y);
+    const auto texel = [&](int column, int row) {
+        if (column < 0 || row < 0 || column >= picture.shadow_size || row >= picture.shadow_size) return 1.0f;
+        return picture.shadow[std::size_t(row) * std::size_t(picture.shadow_size) + std::size_t(column)];
+    };
+    const float above = texel(x, y) + share_x * (texel(x + 1, y) - texel(x, y));
+    const float below = texel(x, y + 1) + share_x * (texel(x + 1, y + 1) - texel(x, y + 1));
+    return above + share_y * (below - above);
+}
+
+Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Vec3& place_m,
+                      double sunlight) {
+    const double sun = sunlight * particle_phase(light.kind, dot(ray, light.to_sun));
+    double flash = 0;
+    if (light.flash[0] + light.flash[1] + light.flash[2] > 0) {
+        const Vec3 way = light.flash_m - place_m;
+        const double squared = std::max(dot(way, way), 1e4);
+        flash = 1e6 / squared * particle_phase(light.kind, dot(ray, (1 / std::sqrt(squared)) * way));
+    }
+    Rgb radiance;
+    for (std::size_t c = 0; c < 3; ++c)
+        radiance[c] = light.surroundings[c] + sun * light.sun[c] + flash * light.flash[c];
+    return radiance;
+}
+
+}  // namespace nephos

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/rain/rain_shafts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+#include "core/random.h"
+#include "core/vec.h"
+#include "render/frame/frame_data.h"
+#include "render/rain/drop_sizes.h"
+#include "render/rain/rain_shafts_pass.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "render/rain/rain_shafts.cpp"
+#include <hwy/foreach_target.h>
+// foreach_target.h must come first
+#include <hwy/highway.h>
+
+#include "render/rain/rain_shafts-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+
+void draw_shaft_row(const ShaftPass& p, std::size_t y, Picture& picture) {
+    const Lanes d;
+    const std::size_t lanes = hn::Lanes(d), first = y * p.width;
+    MetCurtains met(p.curtains.size());
+    std::size_t x = 0;
+    for (; x + lanes <= p.width; x += lanes)
+        draw_pixels(p, met, x, y,
+                    {&picture.beauty[3 * (first + x)], &picture.depth_m[first + x],
+                     &picture.transmittance[first + x]});
+    const std::size_t rest = p.width - x;
+    if (rest == 0) return;
+    std::array<float, 3 * hn::MaxLanes(Lanes())> beauty{}, depth_m{}, transmittance{};
+    std::copy_n(&picture.beauty[3 * (first + x)], 3 * rest, beauty.begin());
+    std::copy_n(&picture.depth_m[first + x], rest, depth_m.begin());
+    std::copy_n(&picture.transmittance[first + x], rest, transmittance.begin());
+    draw_pixels(p, met, x, y, {beauty.data(), depth_m.data(), transmittance.data()});
+    std::copy_n(beauty.begin(), 3 * rest, &picture.beauty[3 * (first + x)]);
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephos {
+
+HWY_EXPORT(draw_shaft_row);
+
+namespace {
+
+glm::vec3 floats(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
+glm::vec3 floats(const Rgb& v) { return {float(v[0]), float(v[1]), float(v[2])}; }
+bool any(const Rgb& v) { return v[0] + v[1] + v[2] > 0; }
+
+// Place of the eye in the texture less whole rounds of the noise, so that floats resolve it.
+float within_noise(double cells) {
+    return float(cells - kShaftNoiseSide * std::floor(cells / kShaftNoiseSide));
+}
+
+SeenCurtain seen_curtain(const RainCurtain& c, const PrecipitationOptions& p, const Vec3& eye,
+                         double time_s) {
+    SeenCurtain out;
+    const double height = c.base_m - c.ground_m, eye_z = eye.z - c.ground_m;
+    const double x = eye.x - c.x_m - c.lean_x * eye_z, y = eye.y - c.y_m - c.lean_y * eye_z;
+    out.ax = float(c.axis_x / c.semi_a_m);
+    out.ay = float(c.axis_y / c.semi_a_m);
+    out.bx = float(-c.axis_y / c.semi_b_m);
+    out.by = float(c.axis_x / c.semi_b_m);
+    out.eye_x = float((c.axis_x * x + c.axis_y * y) / c.semi_a_m);
+    out.eye_y = float((c.axis_x * y - c.axis_y * x) / c.semi_b_m);
+    out.eye_z = float(eye_z);
+    out.lean_x = float(c.lean_x);
+    out.lean_y = float(c.lean_y);
+    out.height_m = float(height);
+    out.per_height = float(1 / height);
+    const double up = 0.5 * height;  // the circle holds the curtain at all heights
+    out.centre_x = float(c.x_m + c.lean_x * up - eye.x);
+    out.centre_y = float(c.y_m + c.lean_y * up - eye.y);
+    out.reach_m = float(std::max(c.semi_a_m, c.semi_b_m) + up * std::hypot(c.lean_x, c.lean_y));
+    out.per_m = float(p.shafts * rain_extinction_per_m(p.kind, p.intensity_scale * c.rate_mm_per_h));
+    const double grain_m = shaft_grain_m(c);
+    out.grain_x = within_noise(x / grain_m);
+    out.grain_y = within_noise(y / grain_m);
+    out.per_grain = float(1 / grain_m);
+    out.own = float(c.id % kShaftsOwn);
+    out.fall = within_noise(kShaftFall_m_per_s * time_s / kShaftFallCell_m + double(c.id % kShaftsOwn));
+    return out;
+}
+
+std::vector<std::uint32_t> corners(const std::vector<std::uint8_t>& noise) {
+    constexpr std::size_t kLast = kShaftNoiseSide - 1;
+    std::vector<std::uint32_t> cells(noise.size());
+    const auto value = [&](std::size_t x, std::size_t y) {
+        return std::uint32_t(noise[((y & kLast) << kShaftNoiseBits) + (x & kLast)]);
+    };
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+        const std::size_t x = i & kLast, y = i >> kShaftNoiseBits;
+        cells[i] = value(x, y) | value(x + 1, y) << 8 | value(x, y + 1) << 16 | value(x + 1, y + 1) << 24;
+    }
+    return cells;
+}
+
+void set_light(ShaftPass& pass, const Picture& picture, const PrecipitationLight& light,
+               const PictureAir& air, const Vec3& eye) {
+    pass.surroundings = floats(light.surroundings);
+    pass.sun = floats(light.sun);
+    pass.to_sun = floats(light.to_sun);
+    pass.flash = floats(light.flash);
+    pass.flash_m = floats(light.flash_m - eye);
+    pass.has_sun = any(light.sun);
+    pass.has_flash = any(light.flash);
+    pass.forward_g = float(forward_g(light.kind));
+    pass.horizon = floats(air.horizon);
+    pass.air_per_m = floats(air.extinction_per_m);
+    if (picture.shadow.empty()) return;
+    const ShadowFrame& f = picture.shadow_frame;
+    const Vec3 u = (1 / dot(f.u_axis_m, f.u_axis_m)) * f.u_axis_m,
+               v = (1 / dot(f.v_axis_m, f.v_axis_m)) * f.v_axis_m;
+    pass.shadow = picture.shadow.data();
+    pass.shadow_size = picture.shadow_size;
+    pass.to_u = floats(u);
+    pass.to_v = floats(v);
+    pass.shadow_u = float(dot(eye - f.origin_m, u));
+    pass.shadow_v = float(dot(eye - f.origin_m, v));
+}
+
+}  // namespace
+
+double rain_extinction_per_m(PrecipitationKind kind, double rate_mm_per_h) {
+    return rate_mm_per_h > 0 ? 2 * shadow_per_m(size_law(kind, rate_mm_per_h)) : 0;
+}
+
+double left_of_rain(double height, double evaporation) {
+    if (evaporation <= 0) return 1;
+    const double s = std::clamp((height - evaporation) / std::max(1 - evaporation, 1e-3), 0.0, 1.0);
+    return s * (2 - s);
+}
+
+double shaft_grain_m(const RainCurtain& c) {
+    return std::clamp(0.3 * std::min(c.semi_a_m, c.semi_b_m), 20.0, 400.0);
+}
+
+std::vector<std::uint8_t> shaft_noise(std::uint64_t seed) {
+    std::vector<std::uint8_t> values(std::size_t(kShaftNoiseSide) * std::size_t(kShaftNoiseSide));
+    for (std::size_t i = 0; i < values.size(); i += 4) {
+        const PhiloxWords words =
+            philox(seed, item_counter(Domain::particles, 1, std::uint32_t(i / 4), 0, 0));
+        for (std::size_t w = 0; w < 4; ++w) values[i + w] = std::uint8_t(words[w] >> 24);
+    }
+    return values;
+}
+
+void draw_shafts(Picture& picture, const RenderOptions& options, const CameraFrame& camera,
+                 std::span<const RainCurtain> curtains, const PrecipitationLight& light, double time_s,
+                 std::uint64_t seed) {
+    const PrecipitationOptions& p = options.precipitation;
+    if (p.shafts <= 0) return;
+    ShaftPass pass;
+    for (const RainCurtain& c : curtains)
+        if (c.base_m > c.ground_m && c.rate_mm_per_h > 0)
+            pass.curtains.push_back(seen_curtain(c, p, camera.position_m, time_s));
+    if (pass.curtains.empty()) return;
+    pass.forward = floats(camera.forward);
+    pass.right = floats(camera.half_width * camera.right);
+    pass.up = floats(camera.half_height * camera.up);
+    pass.width = std::size_t(picture.width);
+    pass.column = 2 / float(options.camera.width);
+    pass.row = 2 / float(options.camera.height);
+    pass.noise = corners(shaft_noise(seed));
+    pass.softness = p.edge > 0 ? float(std::max(p.edge, kShaftSoftest)) : 0.0f;
+    pass.fray = float(kShaftFray * p.shaft_texture);
+    pass.contrast = float(p.shaft_texture);
+    pass.evaporation = float(p.evaporation);
+    pass.clear_m = p.particles > 0 ? float(p.depth_m) : 0.0f;
+    set_light(pass, picture, light, air_of(picture, options), camera.position_m);
+    tbb::parallel_for(std::size_t(0), std::size_t(picture.height), [&](std::size_t y) {
+        HWY_DYNAMIC_DISPATCH(draw_shaft_row)(pass, y, picture);
+    });
+}
+
+}  // namespace nephos
+#endif

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the rays of a picture need of its rain shafts, in floats and relative to the eye. Private to the
+// module.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "render/rain/rain_shafts.h"
+
+namespace nephos {
+
+// A curtain as the rays of one picture meet it: in units of its semi-axes, without its lean.
+struct SeenCurtain {
+    float eye_x = 0, eye_y = 0, eye_z = 0;            // in units; metres above the ground
+    float ax = 1, ay = 0, bx = 0, by = 1;             // from metres to units
+    float lean_x = 0, lean_y = 0;                     // metres per metre of height
+    float height_m = 1, per_height = 1;               // of the cloud above the ground
+    float reach_m = 0, centre_x = 0, centre_y = 0;    // circle around it, from the eye
+    float per_m = 0;                                  // extinction where the rain is whole
+    float grain_x = 0, grain_y = 0, per_grain = 0;    // the eye in cells of the texture, from metres to cells
+    float own = 0;                                    // its part of the noise
+    float fall = 0, per_fall = 1 / kShaftFallCell_m;  // of the texture, likewise
+};
+
+// What all rays of a picture share.
+struct ShaftPass {
+    glm::vec3 forward{}, right{}, up{};  // of the camera; right and up to the sides of the picture
+    std::size_t width = 0;
+    float column = 0, row = 0;  // of a pixel, in halves of the picture
+    std::vector<SeenCurtain> curtains;
+    std::vector<std::uint32_t> noise;  // of each cell its four corners, a byte each
+    float softness = 0, fray = 0, contrast = 0, evaporation = 0;
+    float clear_m = 0;  // around the eye, where particles are drawn instead
+    glm::vec3 surroundings{}, sun{}, to_sun{}, flash{}, flash_m{}, horizon{}, air_per_m{};
+    float forward_g = 0;
+    bool has_sun = false, has_flash = false;
+    const float* shadow = nullptr;
+    int shadow_size = 0;
+    float shadow_u = 0, shadow_v = 0;  // the eye in the map, 0..1
+    glm::vec3 to_u{}, to_v{};
+};
+
+}  // namespace nephos

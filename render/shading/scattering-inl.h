@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// render/shading/scattering.glsl for vectors: what metaballs and fog scatter of the sunlight, from the table
+// (scattering_table.h).
+
+#if defined(NEPHOS_RENDER_SCATTERING_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_RENDER_SCATTERING_INL_H_
+#undef NEPHOS_RENDER_SCATTERING_INL_H_
+#else
+#define NEPHOS_RENDER_SCATTERING_INL_H_
+#endif
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "render/shading/background-inl.h"
+#include "render/shading/line_integral-inl.h"
+#include "render/shared/shared.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+
+using Words = hn::Vec<hn::RebindToSigned<Lanes>>;
+
+// A place between two nodes of the scattering table.
+struct Between {
+    hn::Vec<hn::RebindToSigned<Lanes>> below;
+    Floats share;  // of the node above
+};
+
+HWY_INLINE Between between(Floats place, shader::uint nodes) {
+    const hn::RebindToSigned<Lanes> di;
+    const auto below = hn::Min(hn::ConvertTo(di, place), hn::Set(di, int(nodes) - 2));
+    return {below, hn::Sub(place, hn::ConvertTo(Lanes(), below))};
+}
+
+// scatter_column() and scatter_row() of render/shared/shared.h.
+HWY_INLINE Between scatter_column(Floats cosine) {
+    const Floats off = hn::Max(hn::Sub(set(1.0f), hn::Abs(cosine)), hn::Zero(Lanes()));
+    const Floats v = hn::Mul(set(0.5f), hn::Sqrt(hn::Sqrt(off)));
+    const Floats place = hn::IfThenElse(hn::Lt(cosine, hn::Zero(Lanes())), hn::Sub(set(1.0f), v), v);
+    return between(hn::Mul(set(float(shader::kScatterAngles - 1)), place), shader::kScatterAngles);
+}
+
+HWY_INLINE Between scatter_row(Floats depth) {
+    constexpr float kPerE = shader::kScatterRowsPerDoubling * 1.442695041f;
+    const Floats row = hn::Mul(set(kPerE), hn::Log(Lanes(), hn::Add(set(1.0f), depth)));
+    return between(hn::Min(row, set(float(shader::kScatterDepths - 1))), shader::kScatterDepths);
+}
+
+// `first`: index of the row's first node.
+HWY_INLINE Floats scattering_at(const float* HWY_RESTRICT table, hn::Vec<hn::RebindToSigned<Lanes>> first,
+                                const Between& angle) {
+    const auto at = hn::Add(first, angle.below);
+    const Floats a = hn::GatherIndex(Lanes(), table, at), b = hn::GatherIndex(Lanes(), table + 1, at);
+    return hn::MulAdd(angle.share, hn::Sub(b, a), a);
+}
+
+// Pi times the phase function of the cosine.
+HWY_INLINE Floats scattered_once(const PictureFrame& frame, Floats cosine) {
+    const hn::RebindToSigned<Lanes> di;
+    return scattering_at(frame.scattering, hn::Zero(di), scatter_column(cosine));
+}
+
+HWY_INLINE Floats scattered_often(const PictureFrame& frame, const Floats3& ray, Floats sun_depth) {
+    const hn::RebindToSigned<Lanes> di;
+    const Between column = scatter_column(dot(set3(frame.to_sun), ray)), row = scatter_row(sun_depth);
+    const auto angles = hn::Set(di, int(shader::kScatterAngles));
+    const auto first = hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles);
+    const Floats a = scattering_at(frame.scattering, first, column),
+                 b = scattering_at(frame.scattering, hn::Add(first, angles), column);
+    return hn::MulAdd(row.share, hn::Sub(b, a), a);
+}
+
+// The same at the node `angle` of the table alone: what was scattered often changes little from one to the
+// next.
+HWY_INLINE Floats scattered_often(const PictureFrame& frame, Words angle, Floats sun_depth) {
+    const hn::RebindToSigned<Lanes> di;
+    const Between row = scatter_row(sun_depth);
+    const auto angles = hn::Set(di, int(shader::kScatterAngles));
+    const auto at = hn::Add(hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles), angle);
+    const Floats a = hn::GatherIndex(Lanes(), frame.scattering, at),
+                 b = hn::GatherIndex(Lanes(), frame.scattering, hn::Add(at, angles));
+    return hn::MulAdd(row.share, hn::Sub(b, a), a);
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

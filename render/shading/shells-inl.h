@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// render/shading/shells.glsl for vectors of pixels: the shells of air around the eye (air_shells.h, docs/air.md).
+
+#if defined(NEPHOS_RENDER_SHELLS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_RENDER_SHELLS_INL_H_
+#undef NEPHOS_RENDER_SHELLS_INL_H_
+#else
+#define NEPHOS_RENDER_SHELLS_INL_H_
+#endif
+
+#include <algorithm>
+#include <cstdint>
+
+#include <hwy/highway.h>
+
+#include "render/frame/air_shells.h"
+#include "render/shading/background-inl.h"
+#include "render/shading/line_integral-inl.h"
+#include "render/shading/scattering-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+
+// What a part of the air does to the light behind it: light = light * transmittance + light of the layer.
+struct AirLayer {
+    Floats3 light;
+    Floats transmittance;
+    Floats distance;  // where half of what the layer hides is hidden
+};
+
+HWY_INLINE Floats along_row(const shader::vec4& row, const Floats3& point) {
+    return hn::Add(dot(set3(row), point), set(row.w));
+}
+
+HWY_INLINE Floats byte_of(Words word, int shift) {
+    const hn::RebindToSigned<Lanes> di;
+    return hn::ConvertTo(Lanes(), hn::And(hn::ShiftRightSame(word, shift), hn::Set(di, 0xFF)));
+}
+
+// Between the four bytes of words, 0..1: the upper half is the next row.
+HWY_INLINE Floats between_bytes(Words word, Floats share_u, Floats share_v) {
+    const auto mix = [](Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); };
+    const Floats left = mix(byte_of(word, 0), byte_of(word, 16), share_v),
+                 right = mix(byte_of(word, 8), byte_of(word, 24), share_v);
+    return hn::Mul(mix(left, right, share_u), set(1.0f / 255.0f));
+}
+
+// Share of the sunlight that the clouds leave at points relative to the eye: D's gamma. The shade of a cloud
+// begins at its top and is complete at its base.
+HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    const shader::Shells& data = air.data;
+    const auto place = [&](const shader::vec4& row, float largest) {
+        return hn::Min(hn::Max(along_row(row, point), hn::Zero(d)), set(largest));
+    };
+    const Floats u = place(data.shade_u, data.shade.x), v = place(data.shade_v, data.shade.y);
+    const auto column = hn::ConvertTo(di, u), row = hn::ConvertTo(di, v);
+    const Floats share_u = hn::Sub(u, hn::ConvertTo(d, column)), share_v = hn::Sub(v, hn::ConvertTo(d, row));
+    const auto columns = std::int32_t(data.settings.z), plane = std::int32_t(data.settings.w);
+    const auto index = hn::Add(hn::Mul(row, hn::Set(di, columns)), column);
+    const auto* words = reinterpret_cast<const std::int32_t*>(air.shade.data());
+    const auto of_plane = [&](int number) {
+        return between_bytes(hn::GatherIndex(di, words + number * plane, index), share_u, share_v);
+    };
+    const Floats gamma = of_plane(0), along = along_row(data.shade_along, point), one = set(1.0f);
+    if (hn::AllTrue(d, hn::Ge(along, one))) return gamma;  // below all clouds
+    const Floats begin = of_plane(1), length = hn::Max(hn::Sub(of_plane(2), begin), set(1.0f / 255.0f));
+    const Floats part = hn::Min(hn::Max(hn::Div(hn::Sub(along, begin), length), hn::Zero(d)), one);
+    return hn::NegMulAdd(part, hn::Sub(one, gamma), one);
+}
+
+HWY_INLINE Floats fraction(Floats value) { return hn::Sub(value, hn::Floor(value)); }
+
+// Noise of fog at points relative to the eye, 0..1.
+HWY_INLINE Floats fog_noise(const AirShells& air, const Floats3& point, const shader::vec4& eye) {
+    const hn::RebindToSigned<Lanes> di;
+    constexpr int kEdge = int(shader::kFogVoxels);
+    const auto voxel = [&](float from, Floats along) {
+        return hn::Mul(fraction(hn::MulAdd(set(eye.w), along, set(from))), set(float(kEdge)));
+    };
+    const Floats x = voxel(eye.x, point.x), y = voxel(eye.y, point.y), z = voxel(eye.z, point.z);
+    const auto wrapped = [&](auto number) { return hn::And(number, hn::Set(di, kEdge - 1)); };
+    const auto column = wrapped(hn::ConvertTo(di, x)), row = wrapped(hn::ConvertTo(di, y)),
+               level = wrapped(hn::ConvertTo(di, z));
+    const auto above = wrapped(hn::Add(level, hn::Set(di, 1)));
+    const auto plane = hn::Add(hn::Mul(row, hn::Set(di, kEdge)), column);
+    const auto* words =
+        reinterpret_cast<const std::int32_t*>(air.shade.data()) + 3 * std::ptrdiff_t(air.data.settings.w);
+    const auto at = [&](auto of) {
+        return hn::GatherIndex(di, words, hn::Add(hn::Mul(of, hn::Set(di, kEdge * kEdge)), plane));
+    };
+    const Floats low = between_bytes(at(level), fraction(x), fraction(y)),
+                 high = between_bytes(at(above), fraction(x), fraction(y));
+    return hn::MulAdd(fraction(z), hn::Sub(high, low), low);
+}
+
+// (1 - exp(-x)) / x for x from -80 on: the mean of an exponential over a way.
+HWY_INLINE Floats mean_decay(Floats x) {
+    const Floats one = set(1.0f);
+    const Floats near = hn::NegMulAdd(x, hn::NegMulAdd(x, set(1.0f / 6.0f), set(0.5f)), one);
+    const auto is_near = hn::Lt(hn::Abs(x), set(1.0e-1f));
+    const Floats far =
+        hn::Div(hn::Sub(one, quick_exp(hn::Neg(hn::Max(x, set(-80.0f))))), hn::IfThenElse(is_near, one, x));
+    return hn::IfThenElse(is_near, near, far);
+}
+
+HWY_INLINE Floats fog_column(Floats height_of_begin, Floats slope, Floats distance, float per_height) {
+    const Floats low = hn::MulAdd(hn::Min(slope, hn::Zero(Lanes())), distance, height_of_begin);
+    const Floats x = hn::Mul(hn::Mul(hn::Abs(slope), distance), set(per_height));
+    const Floats at_low = quick_exp(hn::Min(hn::Mul(low, set(-per_height)), set(60.0f)));
+    return hn::Mul(hn::Mul(at_low, distance), mean_decay(x));
+}
+
+struct FogPart {
+    Floats depth, low;
+};
+
+HWY_INLINE FogPart fog_part(const AirShells& air, const Floats3& ray, Floats begin, Floats end) {
+    const shader::Shells& data = air.data;
+    const Floats height = hn::MulAdd(ray.z, begin, set(data.fog.z));
+    const Floats low_end = hn::IfThenElse(hn::Lt(ray.z, hn::Zero(Lanes())), end, begin);
+    const Floats low = hn::MulAdd(ray.z, low_end, set(data.fog.z));
+    const Floats dense = quick_exp(hn::Min(hn::Mul(low, set(-data.fog.y)), set(60.0f)));
+    return {hn::Mul(set(data.fog.x), fog_column(height, ray.z, hn::Sub(end, begin), data.fog.y)),
+            hn::Mul(set(data.fog.x), dense)};
+}
+
+// `transmittance`: exp(-fog.depth).
+HWY_INLINE Floats fog_middle(const AirShells& air, const FogPart& fog, Floats transmittance,
+                             const Floats3& ray, Floats begin, Floats end) {
+    const Lanes d;
+    const Floats one = set(1.0f), zero = hn::Zero(d);
+    const Floats taken = hn::Neg(hn::Log(d, hn::MulAdd(set(0.5f), transmittance, set(0.5f))));
+    const auto down = hn::Lt(ray.z, zero);
+    const Floats rest = hn::IfThenElse(down, hn::Sub(fog.depth, taken), taken);
+    const Floats per_low = hn::Div(rest, hn::Max(fog.low, set(1.0e-30f)));
+    const Floats falls = hn::Mul(hn::Abs(ray.z), set(air.data.fog.y)), x = hn::Mul(falls, per_low);
+    const Floats near = hn::MulAdd(x, hn::MulAdd(x, set(1.0f / 3.0f), set(0.5f)), one);
+    const Floats log = hn::Log(d, hn::Max(hn::Sub(one, x), set(1.0e-7f)));
+    const Floats far = hn::Div(hn::Neg(log), hn::Max(falls, set(1.0e-30f)));
+    const Floats way =
+        hn::Min(hn::Max(hn::IfThenElse(hn::Lt(x, set(1.0e-2f)), hn::Mul(per_low, near), far), zero),
+                hn::Sub(end, begin));
+    return hn::IfThenElse(down, hn::Sub(end, way), hn::Add(begin, way));
+}
+
+HWY_INLINE Floats fog_patches(const AirShells& air, const Floats3& point, Floats begin, Floats end) {
+    const Lanes d;
+    const shader::Shells& data = air.data;
+    const Floats one = set(1.0f), zero = hn::Zero(d);
+    const Floats patches = hn::Max(hn::Mul(set(data.fog_coarse.w), hn::Sub(end, begin)), set(1.0e-6f));
+    const Floats fades = hn::NegMulAdd(set(4.0f / data.shade.w), begin, set(4.0f));
+    const Floats varies = hn::Mul(hn::Mul(set(data.fog.w), hn::Min(one, hn::Div(set(0.125f), patches))),
+                                  hn::Min(hn::Max(fades, zero), one));
+    if (hn::AllTrue(d, hn::Le(varies, zero))) return one;
+    const Floats noise = hn::Add(fog_noise(air, point, data.fog_coarse),
+                                 fog_noise(air, {point.y, point.z, point.x}, data.fog_fine));
+    return hn::Max(hn::MulAdd(varies, hn::Sub(noise, one), one), zero);
+}
+
+// exp(-extinction distance) of clear air (render/shading/air.glsl), to what quick_exp() is good for.
+HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floats distance) {
+    const auto decayed = [](Floats x, Floats y, Floats z) {
+        return Floats3{quick_exp(hn::Neg(x)), quick_exp(hn::Neg(y)), quick_exp(hn::Neg(z))};
+    };
+    if (frame.sky == nullptr) {
+        const Floats3 depth = times(distance, set3(frame.air_extinction));
+        return decayed(depth.x, depth.y, depth.z);
+    }
+    const auto column = [&](float per_height) {
+        const float ground = std::exp(-frame.air.x * per_height);
+        const Floats x = hn::Mul(hn::Mul(ray.z, distance), set(per_height));
+        return hn::Mul(hn::Mul(set(ground), distance), mean_decay(x));
+    };
+    const Floats3 depth = times_add(column(frame.rayleigh.w), set3(frame.rayleigh),
+                                    times(column(frame.haze.w), set3(frame.haze)));
+    return decayed(depth.x, depth.y, depth.z);
+}
+
+// What is the same for all shells along rays.
+struct RayAir {
+    Floats3 ray;
+    SunlitAir sunlit;
+    Floats once;  // scattered by fog
+    Words angle;  // to the sun: the nearest node of the table of what is scattered often
+
+    RayAir(const PictureFrame& frame, const Floats3& direction)
+        : ray(direction),
+          sunlit(sunlit_air(frame, direction)),
+          once(hn::Zero(Lanes())),
+          angle(hn::Zero(hn::RebindToSigned<Lanes>())) {
+        if (!frame.shells->has_fog()) return;
+        const Floats cosine = dot(set3(frame.to_sun), direction);
+        const Between column = scatter_column(cosine);
+        once = scattered_once(frame, cosine);
+        angle = hn::Add(column.below, hn::ConvertTo(hn::RebindToSigned<Lanes>(), hn::Round(column.share)));
+    }
+};
+
+HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Floats at,
+                                const Floats3& sunlight, Floats lit) {
+    const shader::Shells& data = frame.shells->data;
+    const Floats above_base = hn::MulAdd(of.ray.z, at, set(data.fog.z));
+    const Floats dense = quick_exp(hn::Min(hn::Mul(above_base, set(-data.fog.y)), set(60.0f)));
+    const Floats above = hn::Mul(set(data.fog.x / data.fog.y), dense);
+    const Floats sun_depth = hn::Mul(above, set(1.0f / std::max(frame.to_sun.z, 0.05f)));
+    const Floats sun = hn::Mul(
+        lit, hn::MulAdd(quick_exp(hn::Neg(sun_depth)), of.once, scattered_often(frame, of.angle, sun_depth)));
+    const Floats open = quick_exp(hn::Mul(set(-0.5f), above));
+    const Floats3 ambient = mix(set3(frame.ambient_base), set3(frame.ambient_top), {open, open, open});
+    Floats3 arriving = times_add(sun, sunlight, ambient);
+    if (frame.flash.w > 0) {
+        const Floats3 way = subtract(set3(frame.flash), times(at, of.ray));
+        const Floats share = hn::Mul(quick_exp(hn::Neg(above)), flash_falloff(dot(way, way)));
+        arriving = times_add(hn::Mul(set(frame.flash.w), share), set3(frame.flash_colour), arriving);
+    }
+    return times(set(frame.ambient_top.w), arriving);
+}
+
+// Sunlight at heights above the eye that differ little, as those of the pixels of a vector in one shell:
+// between the two nodes of the table that are nearest to the first of them.
+HWY_INLINE Floats3 sunlight_nearby(const PictureFrame& frame, Floats heights) {
+    if (frame.sky == nullptr) return set3(frame.sunlight);
+    constexpr auto kColumns = std::size_t(shader::kSkyColumns), kTexels = kColumns * shader::kSkyRows;
+    const Floats altitude = hn::Add(set(frame.air.x), heights);
+    const Floats place = hn::Mul(altitude, set(float(kColumns - 1) / shader::kSunlightTop));
+    const Floats x = hn::Min(hn::Max(place, hn::Zero(Lanes())), set(float(kColumns - 1)));
+    const auto below = std::min(std::size_t(hn::GetLane(x)), kColumns - 2);
+    const Floats share = hn::Sub(x, set(float(below)));
+    const float* const texel = frame.sky + 4 * (2 * kTexels + below);
+    const auto channel = [&](std::size_t c) {
+        return hn::MulAdd(share, set(texel[c + 4] - texel[c]), set(texel[c]));
+    };
+    return {channel(0), channel(1), channel(2)};
+}
+
+enum class Heights {
+    alike,  // pixels of a vector in one shell
+    apart,  // splats
+};
+
+// Where a part of the air is looked up.
+struct AirPlaces {
+    Floats at, middle;
+};
+
+HWY_INLINE AirPlaces air_places(const AirShells& air, const FogPart& fog, const Floats3& ray, Floats begin,
+                                Floats end, Floats share) {
+    const Lanes d;
+    const Floats distance = hn::Sub(end, begin), one = set(1.0f), half = set(0.5f), zero = hn::Zero(d);
+    const AirPlaces even{hn::MulAdd(share, distance, begin), hn::MulAdd(half, distance, begin)};
+    const auto last = hn::Ge(begin, set(air.data.shade.w));
+    const Floats transmittance = quick_exp(hn::Neg(fog.depth));
+    const Floats some = hn::Mul(hn::Sub(set(0.99f), transmittance), set(1.0f / 0.09f));
+    const Floats much = hn::IfThenElse(last, one, hn::Min(hn::Max(some, zero), one));
+    if (hn::AllTrue(d, hn::Le(much, zero))) return even;
+    const Floats seen = fog_middle(air, fog, transmittance, ray, begin, end);
+    const auto place = [&](Floats without) {
+        return hn::IfThenElse(last, seen, hn::MulAdd(much, hn::Sub(seen, without), without));
+    };
+    return {place(even.at), place(even.middle)};
+}
+
+// `before`, `behind`: transmittance of clear air up to the two distances.
+template <Heights kHeights>
+HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const Floats3& before,
+                              const Floats3& behind, Floats begin, Floats end, Floats share) {
+    const Lanes d;
+    const AirShells& air = *frame.shells;
+    const Floats one = set(1.0f), zero = hn::Zero(d);
+    const FogPart fog = air.has_fog() ? fog_part(air, of.ray, begin, end) : FogPart{zero, zero};
+    const bool foggy = !hn::AllTrue(d, hn::Lt(fog.depth, set(1.0e-5f))), shaded = air.data.settings.y > 0;
+    if (!foggy && !shaded) return {{zero, zero, zero}, one, begin};
+    const AirPlaces places = air_places(air, fog, of.ray, begin, end, share);
+    const Floats height = hn::Mul(of.ray.z, places.middle);
+    const Floats3 sunlight =
+        kHeights == Heights::alike ? sunlight_nearby(frame, height) : sunlight_at(frame, height);
+    const Floats lit = sunlight_left(air, times(places.at, of.ray));
+    const auto inside = hn::Lt(begin, set(air.data.shade.w));
+    Floats3 light{zero, zero, zero};
+    if (shaded) {
+        const Floats strength = hn::IfThenElseZero(inside, set(air.data.settings.y));
+        light = times(hn::Mul(strength, hn::Sub(lit, one)),
+                      each_times(subtract(before, behind), sunlit_at(frame, of.sunlit, height, sunlight)));
+    }
+    if (!foggy) return {light, one, places.middle};
+    const Floats patches = fog_patches(air, times(places.at, of.ray), begin, end);
+    const Floats transmittance = quick_exp(hn::Neg(hn::Mul(fog.depth, patches)));
+    const Floats way = hn::Div(hn::Sub(places.middle, begin), hn::Max(hn::Sub(end, begin), set(1.0e-6f)));
+    const Floats3 beta = hn::AllTrue(d, inside) ? mix(before, behind, {way, way, way})
+                                                : clear_air(frame, of.ray, places.middle);
+    const Floats3 veil =
+        each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)}, of.sunlit.endless);
+    const Floats3 of_fog = add(each_times(beta, fog_radiance(frame, of, places.middle, sunlight, lit)), veil);
+    light = times(hn::MulAdd(set(0.5f), transmittance, set(0.5f)), light);
+    return {times_add(hn::Sub(one, transmittance), of_fog, light), transmittance, places.middle};
+}
+
+// Where rays come out of the ground that the eye is below, as those of a mirror image do.
+HWY_INLINE Floats air_begin(const PictureFrame& frame, const Floats3& ray) {
+    if (!(frame.ground.w > 0)) return hn::Zero(Lanes());
+    return hn::Div(set(frame.ground.w), hn::Max(ray.z, set(1.0e-6f)));
+}
+
+// The part of the shells of splats that lies in front of their centres; beyond the last shell, they begin at
+// `distance` itself.
+HWY_INLINE AirLayer layer_in_front(const PictureFrame& frame, const Floats3& ray, Floats shell_begins,
+                                   Floats distance) {
+    const Floats begin = hn::Min(hn::Max(shell_begins, air_begin(frame, ray)), distance);
+    return air_layer<Heights::apart>(frame, RayAir(frame, ray), clear_air(frame, ray, begin),
+                                     clear_air(frame, ray, distance), begin, distance, set(0.5f));
+}
+
+// Distances along rays between which something is drawn.
+struct AirPart {
+    float begin = kNowhere, end = 0;
+    void add(Floats from, Floats until) {
+        const Lanes d;
+        const auto some = hn::Lt(from, until);
+        if (hn::AllFalse(d, some)) return;
+        begin = std::min(begin, hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(some, from, set(kNowhere)))));
+        end = std::max(end, hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(some, until))));
+    }
+};
+
+// Shade of clouds, and fog.
+HWY_INLINE AirPart part_with_air(const AirShells& air, const Floats3& ray) {
+    const Lanes d;
+    const shader::Shells& data = air.data;
+    AirPart part;
+    const auto steep = [](Floats slope) {
+        return hn::IfThenElse(hn::Lt(hn::Abs(slope), set(1.0e-12f)), set(1.0e-12f), slope);
+    };
+    if (data.settings.y > 0) {
+        Floats begin = hn::Zero(d), end = set(kNowhere);
+        const auto clip = [&](const shader::vec4& row, float low, float high) {
+            const Floats slope = steep(dot(set3(row), ray));
+            const Floats a = hn::Div(set(low - row.w), slope), b = hn::Div(set(high - row.w), slope);
+            begin = hn::Max(begin, hn::Min(a, b));
+            end = hn::Min(end, hn::Max(a, b));
+        };
+        clip(data.shade_u, 0, data.shade.x);
+        clip(data.shade_v, 0, data.shade.y);
+        clip(data.shade_along, data.shade.z, 1.0e12f);
+        part.add(begin, end);
+    }
+    if (air.has_fog()) {
+        const float below_top = data.fog_limits.x - data.fog.z;
+        const Floats crossing = hn::Min(hn::Div(set(below_top), steep(ray.z)), set(kNowhere));
+        const auto up = hn::Gt(ray.z, hn::Zero(d));
+        if (below_top > 0)
+            part.add(hn::Zero(d), hn::IfThenElse(up, crossing, set(kNowhere)));
+        else
+            part.add(hn::IfThenElse(up, set(kNowhere), crossing), set(kNowhere));
+    }
+    return part;
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

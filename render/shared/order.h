@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// What C++ and the shaders share that make the order from the eye and the lists of the tiles on the device
+// (device_lists.h): cull, sort by distance, boxes on the screen, (tile, splat) pairs, sort by tile.
+#ifndef NEPHOS_RENDER_SHADERS_ORDER_H
+#define NEPHOS_RENDER_SHADERS_ORDER_H
+
+#include "render/shared/shared.h"
+
+#ifdef __cplusplus
+namespace nephos::shader {
+#endif
+
+NEPHOS_CONST uint kSortGroup = 256u;      // invocations of a work group, and values of a digit
+NEPHOS_CONST uint kSortBlock = 2048u;     // elements that a work group sorts or sums
+NEPHOS_CONST uint kCulled = 0xffffffffu;  // the key of what is not seen; no distance has these bits
+NEPHOS_CONST float kFarthest_m = 1.0e9f;  // places beyond are left to the host
+NEPHOS_CONST float kCullReach = 1.5f;     // radii that a metaball covers at most, as in view_sorting.cpp
+
+// What a table of numbers is about, and with it its size.
+NEPHOS_CONST uint kAllBalls = 0u;    // OrderStep::count
+NEPHOS_CONST uint kSeenBalls = 1u;   // OrderCounts::visible
+NEPHOS_CONST uint kSeenDigits = 2u;  // digits of their keys, for each block
+NEPHOS_CONST uint kListDigits = 3u;  // digits of the entries' keys, for each block
+NEPHOS_CONST uint kMapTiles = 4u;    // items of work in the tiles of the shadow map: OrderStep::tiles
+
+// A metaball as it stays on the device; 32 bytes.
+struct CloudBall {
+    float x, y, z;      // world, metres
+    float radius;       // metres
+    float depth_scale;  // as in ViewBall, and the next two
+    float sun_depth;
+    float height;
+    uint pad0;
+};
+
+// The camera of a picture. Places are sums of two floats, high and low: differences from them are then as
+// exact as floats can be, wherever in the world the eye is.
+struct OrderFrame {
+    vec4 eye_high;   // xyz: the eye, world; w: height of the ground
+    vec4 eye_low;    // what rounding left of it
+    vec4 inward[5];  // xyz: normals of the planes of ViewPyramid
+    vec4 right;      // xyz: unit; w: pixels per unit of a tangent across
+    vec4 up;         // xyz: unit; w: ... upwards
+    vec4 forward;    // xyz: unit; w: pixels per unit at distance 1
+    vec4 middle;     // xy: of the picture, pixels; z: 1 = the eye is above the ground; w: 1 = lightning
+};
+
+// The shadow map, for the order from the sun.
+struct SunFrame {
+    vec4 corner_high;  // xyz: of texel (0, 0), world
+    vec4 corner_low;   // what rounding left of it
+    vec4 direction;    // xyz: unit; the way the light travels
+    vec4 u, v;         // xyz: from metres to texels along the map's axes; w: metres a texel
+};
+
+// Push constants.
+struct OrderStep {
+    uint count;           // metaballs of the cloud
+    uint table;           // kAllBalls ...
+    uint shift;           // of the digit in the key
+    uint x, y;            // corner of the tile of the picture, pixels
+    uint width, height;   // of it, pixels
+    uint columns, tiles;  // tiles of pixels in it: in a row, in all
+    uint capacity;        // entries that the lists have room for
+    uint shells;
+    uint per_item;  // centres in an item of work
+};
+
+// VkDispatchIndirectCommand
+struct Groups {
+    uint x, y, z;
+};
+
+// What the device counts for itself.
+struct OrderCounts {
+    uint visible;     // metaballs
+    uint entries;     // of the lists; 0 when there is no room for them
+    uint wanted;      // entries, room or not; at most 2^32 - 1
+    uint not_fitted;  // 1 = some metaballs are not fitted
+    uint total;       // of the last table that was summed
+    Groups visible_each, visible_blocks,
+        visible_digits;  // work groups: of an element each, of blocks, of the
+    Groups entries_each, entries_blocks, entries_digits;  // blocks of the table of their digits
+    Groups splats;                                        // of kComputeGroup
+    Groups items;                                         // of LightItem
+};
+
+// The splats between two shells of air, and the shells behind them that no splat separates.
+struct ViewPart {
+    Groups fitted, mixed;  // tiles, for the shader without and the one with balls that are not fitted: one of
+                           // them has none
+    Groups air;            // for the pixels
+    uint first, end;       // splats
+    uint first_shell, end_shell;
+};
+
+NEPHOS_FUNCTION uint groups_of(uint elements, uint per_group) {
+    return elements / per_group + (elements % per_group > 0u ? 1u : 0u);
+}
+NEPHOS_FUNCTION Groups dispatch_of(uint groups) {
+    Groups result;
+    result.x = groups < kGroupRow ? groups : kGroupRow;
+    result.y = groups_of(groups, kGroupRow);
+    result.z = groups > 0u ? 1u : 0u;
+    return result;
+}
+
+#ifdef __cplusplus
+static_assert(sizeof(CloudBall) == 32 && sizeof(OrderFrame) == 11 * 16 && sizeof(OrderStep) == 48);
+static_assert(sizeof(Groups) == 12 && offsetof(OrderCounts, visible_each) == 20 &&
+              sizeof(OrderCounts) == 116);
+static_assert(sizeof(ViewPart) == 52 && offsetof(ViewPart, first) == 36);
+
+}  // namespace nephos::shader
+#endif
+#endif

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: Apache-2.0
+// What C++ and GLSL both read: the structs in buffers, the constants, and the formulas that tests check in
+// C++. Positions are relative to the eye (view pass) or to the middle of the shadow map (light pass), in
+// metres: single precision keeps millimetres near the camera wherever it stands in the world.
+#ifndef NEPHOS_RENDER_SHADERS_SHARED_H
+#define NEPHOS_RENDER_SHADERS_SHARED_H
+
+#ifdef __cplusplus
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+namespace nephos::shader {
+
+struct vec4 {
+    float x = 0, y = 0, z = 0, w = 0;
+};
+using uint = std::uint32_t;
+using std::abs;
+using std::exp;
+using std::log2;
+using std::sqrt;
+#define NEPHOS_CONST inline constexpr
+#define NEPHOS_FUNCTION inline
+#else
+#define NEPHOS_CONST const
+#define NEPHOS_FUNCTION
+#endif
+
+NEPHOS_CONST uint kAttenuationLevels = 64u;   // textures in the array
+NEPHOS_CONST uint kAttenuationTexels = 64u;   // on each side of one texture
+NEPHOS_CONST float kMaxDepthScale = 32.0f;    // depth scale of the last level, see level_of()
+NEPHOS_CONST float kNearDistance = 1.5f;      // in radii: nearer metaballs are integrated, not textured
+NEPHOS_CONST float kMinRadiusPixels = 1.25f;  // smaller billboards are widened to it and thinned out
+NEPHOS_CONST float kPi = 3.14159265358979f;
+NEPHOS_CONST uint kComputeGroup = 64u;  // invocations in a work group, where nothing else decides
+NEPHOS_CONST uint kTileWidth = 8u;      // pixels
+NEPHOS_CONST uint kTileHeight = 16u;
+NEPHOS_CONST uint kQueriesPerLane = 4u;
+NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
+NEPHOS_CONST float kMaxFittedDepth = 6.0f;    // depth scale; denser metaballs are integrated in the tiles
+NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance at which what lies behind is left out
+NEPHOS_CONST uint kIntegrate = 1u;      // flag: evaluate the integral along the ray, do not use the textures
+NEPHOS_CONST uint kNotFitted = 4u;      // flag: the tiles evaluate the integral, whatever the billboards do
+NEPHOS_CONST uint kBillboardFlag = 8u;  // flag, of no metaball: a ViewBillboard, see project_billboard.glsl
+NEPHOS_CONST uint kAround = 2u;         // flag: around or close to the eye, covers the whole picture
+NEPHOS_CONST uint kSkyColumns = 64u;    // of the tables of the sky (atmosphere.h)
+NEPHOS_CONST uint kSkyRows = 96u;
+NEPHOS_CONST uint kSkyLayers = 3u;            // scattered, haze, and sunlight by altitude
+NEPHOS_CONST float kSunlightTop = 16000.0f;   // metres above the ground: sunlight changes no more
+NEPHOS_CONST float kSunRadius = 0.00462512f;  // radians
+// Radiance of the sun's disc falls off towards its limb as cosine^exponent; red, green, blue (near 680, 550
+// and 440 nm): D. Hestroffer and C. Magnan, "Wavelength dependency of the Solar limb darkening", 1998.
+NEPHOS_CONST float kLimbDarkeningRed = 0.397f;
+NEPHOS_CONST float kLimbDarkeningGreen = 0.503f;
+NEPHOS_CONST float kLimbDarkeningBlue = 0.652f;
+NEPHOS_CONST uint kFogVoxels = 32u;       // of the noise of fog, on a side; a power of two
+NEPHOS_CONST float kFarShell_m = 1.0e6f;  // with fog, a last shell of all the air beyond the others ends here
+NEPHOS_CONST uint kMaxShells = 128u;
+NEPHOS_CONST uint kGroupRow = 32768u;               // work groups in a row: devices allow 65535 on an axis
+NEPHOS_CONST uint kScatterAngles = 513u;            // nodes of the scattering table, see scatter_column()
+NEPHOS_CONST uint kScatterDepths = 97u;             // ... and scatter_row()
+NEPHOS_CONST float kScatterRowsPerDoubling = 8.0f;  // of 1 + optical depth
+NEPHOS_CONST float kMaxSunDepth = 4095.0f;          // of the last row; beyond it nothing changes
+NEPHOS_CONST float kMinBillboardPixels = 1.0f;      // smaller billboards of T are widened to this half size
+
+// A metaball as the eye sees it; 32 bytes.
+struct ViewBall {
+    float x, y, z;      // centre relative to the eye
+    float radius;       // metres
+    float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * line_integral()
+    float sun_depth;    // optical depth towards the sun: exp(-sun_depth) arrives
+    float height;       // in the cloud: 0 base, 1 top
+    uint flags;         // lower half; upper half: share of the lightning that arrives, 0..65535
+};
+
+// One of T's billboards as the eye sees it; 32 bytes.
+struct ViewBillboard {
+    float x, y, z;      // centre relative to the eye
+    uint half_size;     // half width, half height in metres as two 16-bit floats
+    uint texture_bits;  // layer | turn << 8 | level << 12
+    uint absorbed;      // of the sun, of the lightning: two times 0..65535 for 0..1
+    float opacity;
+    uint cloud;
+};
+
+// What the billboards of a cloud share; 32 bytes.
+struct ViewCloud {
+    float x, y, z;         // centre relative to the eye
+    float base;            // height relative to the eye
+    float inverse_height;  // of the cloud
+    uint pad0, pad1, pad2;
+};
+
+// A metaball on the screen, as the tiles draw it; 16 bytes, and 4 more of SplatTail. As small as can be:
+// lavapipe fetches words from a buffer one by one, which costs more than drawing a splat's pixels.
+struct ViewSplat {
+    float x, y;           // of the centre, pixels
+    uint size_and_depth;  // halves: radius at the centre's depth, pixels; square root of the depth scale
+    uint red_and_green;   // halves: radiance at opacity 1
+};
+// halves: blue; distance in units of kDistanceUnit, or 0: evaluate the integral of its ViewBall along each
+// ray instead.
+#define SplatTail uint
+
+// A metaball on the shadow map, as the tiles draw it; 16 bytes.
+struct LightSplat {
+    float x, y;         // of the centre, texels
+    uint radii;         // halves: along x and y, texels
+    float depth_scale;  // optical depth through the middle = depth_scale * line_integral(1)
+};
+// Its place along the light; 8 bytes.
+struct LightPlace {
+    float z;           // metres from the first centre
+    float per_radius;  // 1 / radius in metres
+};
+
+// A place whose light is asked for; 16 bytes.
+struct LightQuery {
+    float x, y, z;  // as in LightSplat
+    float depth;    // optical depth towards the sun; what is found is added to it
+};
+
+// Queries that lie in one tile: up to kQueriesPerLane for each invocation.
+struct LightItem {
+    uint tile, first, count, pad0;
+};
+
+// Entries of the list of splats that belong to a tile: list[begin] .. list[end - 1].
+struct TileRange {
+    uint begin, end;
+};
+
+// Push constants of the compute passes.
+struct TileStep {
+    uint width, height;            // of the picture or the map, pixels
+    uint tiles_x;                  // tiles in a row
+    uint tile_count;               // or number of splats, or of items
+    uint first_batch, last_batch;  // booleans: clear the sums before; finish them after
+    float largest_radius;          // light: metres, of any splat
+    uint first, end;               // view: the splats, or shells, that are drawn
+    uint distances;                // view: boolean, whether depth is wanted
+    uint listed;  // view: boolean, first is the number of a ViewPart (order.h) that has the splats and shells
+};
+
+// Everything about one picture (or tile of it) that shaders need.
+struct Frame {
+    vec4 right;           // xyz: the camera's axis * half the picture's width at distance 1
+    vec4 up;              // xyz: likewise; w: pixels per unit at distance 1
+    vec4 forward;         // xyz: unit
+    vec4 picture;         // width, height of the picture; column and row of the tile's corner, pixels
+    vec4 tile;            // clip position in the tile = position in the picture * tile.xy + tile.zw
+    vec4 to_sun;          // xyz: unit
+    vec4 sunlight;        // rgb: colour of the direct sun
+    vec4 ambient_top;     // rgb; w: albedo of the cloud
+    vec4 ambient_base;    // rgb
+    vec4 air_extinction;  // rgb: per metre
+    vec4 horizon;  // gradient: sky at the horizon, and light of the air; w: share of it straight from the sun
+    vec4 zenith;   // rgb; w: asymmetry g of the haze
+    vec4 ground;  // rgb: radiance of the ground under open sky without the sun; w: height above the eye (< 0)
+    vec4 ground_sun;  // rgb: what the unshaded sun adds; w: 1 = there is a ground
+    vec4 shadow_u;    // shadow map coordinate 0..1 of a point p: dot(xyz, p) + w
+    vec4 shadow_v;
+    vec4 flash;         // xyz: lightning relative to the eye; w: irradiance at 1 km, 0 = none
+    vec4 flash_colour;  // rgb
+    vec4 ground_flash;  // rgb: what it adds to ground 1 km below it
+    // The physical sky (air.glsl); zero with the gradient.
+    vec4 rayleigh;  // rgb: extinction by molecules per metre on the ground; w: 1 / height of the layer
+    vec4 haze;      // rgb: extinction by particles; w: likewise
+    vec4 air;       // eye's altitude above the ground, m; asymmetry and albedo of particles; 1 = physical sky
+    vec4 sun_disc;  // rgb: radiance of its middle; w: 1 = there is a disc
+    vec4 sun_fade;  // rgb: change of the logarithm of its radiance with the sine of the elevation
+};
+
+// Shells of air around the eye (air_shells.h).
+struct Shells {
+    vec4 ends[kMaxShells / 4u + 1u];  // metres from the eye at which each shell ends and the next begins
+    vec4 settings;  // x: number of shells; y: strength of light shafts; z: texels in a row of the shade map;
+                    // w: in all
+    vec4 shade_u;   // shade map: column of a point p relative to the eye, dot(xyz, p) + w, texels
+    vec4 shade_v;   // row
+    vec4 shade_along;  // downwards, or along the light: 0 where the first cloud begins, 1 where the last ends
+    vec4 shade;  // x, y: largest column and row; z: along `shade_along`, where the first shade begins; w:
+                 // metres from the eye at which shafts end
+    vec4 fog;    // x: extinction at the base, per metre; y: 1 / height over which it falls off; z: height of
+                 // the eye above the base; w: how much it varies
+    vec4 fog_coarse;  // xyz: where in the noise the eye is, 0..1; w: 1 / size of the noise in metres
+    vec4 fog_fine;    // the same of the second look-up, for y, z, x
+    vec4 fog_limits;  // x: height above the base beyond which there is no fog worth drawing
+};
+
+// Integral over a part of a ray of fog that falls off exponentially with height: exp(-height per_height),
+// from `begin` on over `distance`. `slope`: sine of the ray's elevation. The lower end is what counts: no fog
+// is lost to rounding when the eye is far above it.
+NEPHOS_FUNCTION float fog_column(float height_of_begin, float slope, float distance, float per_height) {
+    float low = height_of_begin + (slope < 0.0f ? slope * distance : 0.0f);
+    float x = abs(slope) * distance * per_height;
+    float near = 1.0f - x * (0.5f - x * (1.0f / 6.0f));
+    float share = x < 1.0e-2f ? near : (1.0f - exp(-x)) / (x < 1.0e-2f ? 1.0f : x);
+    float at_low = -low * per_height;
+    return exp(at_low < 60.0f ? at_low : 60.0f) * distance * share;
+}
+
+// Where in a shell a pixel of the picture samples it, 0..1: an additive recurrence in two dimensions (Roberts
+// 2018, "R2") spreads the samples of neighbouring pixels evenly. In integers: the same on every machine.
+NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
+    return float((x * 3242174889u + y * 2447445414u) >> 8) * (1.0f / 16777216.0f);
+}
+
+// Irradiance of lightning relative to that at 1 km.
+NEPHOS_FUNCTION float flash_falloff(float squared_distance_m) {
+    return 1.0e6f / (squared_distance_m > 1.0e4f ? squared_distance_m : 1.0e4f);
+}
+
+// Where the tables of the sky have a direction, 0..1. Across: sine of half the azimuth from the sun's. Up,
+// from the sine of the elevation: q = 1 - sqrt(1 - sine), which is even around the zenith, and half of the
+// rows lie in the lowest quarter of q, where the sky changes fastest.
+NEPHOS_FUNCTION float sky_across(float cos_azimuth) {
+    float square = 0.5f - 0.5f * cos_azimuth;
+    return sqrt(square > 0.0f ? square : 0.0f);
+}
+NEPHOS_FUNCTION float sky_upwards(float sine) {
+    float rest = 1.0f - sine;
+    return sqrt(sine / (1.0f + sqrt(rest > 0.0f ? rest : 0.0f)));
+}
+
+// Integral of exp(-altitude / height) in metres along a ray over a flat Earth, from an altitude on, whose
+// sine of elevation is `slope`: exp(-altitude / height) distance (1 - exp(-x)) / x, x = slope distance /
+// height.
+NEPHOS_FUNCTION float layer_column(float altitude, float slope, float distance, float per_height) {
+    float x = slope * distance * per_height;
+    x = x > -80.0f ? x : -80.0f;
+    float near = 1.0f - x * (0.5f - x * (1.0f / 6.0f));
+    float share = x * x < 1.0e-4f ? near : (1.0f - exp(-x)) / (x * x < 1.0e-4f ? 1.0f : x);
+    return exp(-altitude * per_height) * distance * share;
+}
+
+// Phase functions of molecules (Rayleigh) and of particles (Cornette and Shanks 1992; Sapronov's F / 4 pi),
+// per steradian; each integrates to 1 over the sphere. cos_theta: as below.
+NEPHOS_FUNCTION float molecule_phase(float cos_theta) {
+    return 3.0f / (16.0f * kPi) * (1.0f + cos_theta * cos_theta);
+}
+NEPHOS_FUNCTION float particle_phase(float cos_theta, float g) {
+    float base = 1.0f + g * g - 2.0f * g * cos_theta;
+    return 3.0f / (8.0f * kPi) * (1.0f - g * g) * (1.0f + cos_theta * cos_theta) /
+           ((2.0f + g * g) * base * sqrt(base));
+}
+
+// The field of a metaball with u = 1 - a^2 is f = u^2 (5 + 4 u) / 9. Along a line at distance b from the
+// centre, with w = 1 - b^2 (square of half the chord) and s from -sqrt(w) to sqrt(w), u = w - s^2 and
+//
+//     integral of (w - s^2)^2 = 16/15 w^(5/2),   of (w - s^2)^3 = 32/35 w^(7/2),   so
+//     line_integral(w) = w^(5/2) (16/27 + 128/315 w),   in units of the radius
+NEPHOS_FUNCTION float line_integral(float w) {
+    return w * w * sqrt(w) * (0.592592592592593f + 0.406349206349206f * w);
+}
+
+// 1 - exp(-d line_integral(w)) as w^2 (c0 + c1 w + ... + c5 w^5), for depth scales d up to kMaxFittedDepth; the
+// coefficients are polynomials of s = d / (d + 4). Largest error 0.0005 min(1, d); from
+// tests/reference/fit_opacity.py.
+NEPHOS_FUNCTION float fit_parameter(float depth_scale) { return depth_scale / (depth_scale + 4.0f); }
+NEPHOS_FUNCTION float fit_row(float s, float a, float b, float c, float d, float e) {
+    return s * (a + s * (b + s * (c + s * (d + s * e))));
+}
+NEPHOS_FUNCTION float opacity_c0(float s) {
+    return fit_row(s, 0.4231499f, 1.2760525f, -11.549244f, 42.971609f, -38.80289f);
+}
+NEPHOS_FUNCTION float opacity_c1(float s) {
+    return fit_row(s, 5.0145599f, -34.206589f, 320.55556f, -886.62836f, 752.04615f);
+}
+NEPHOS_FUNCTION float opacity_c2(float s) {
+    return fit_row(s, -6.3734665f, 194.69115f, -1524.4345f, 4065.3462f, -3188.8959f);
+}
+NEPHOS_FUNCTION float opacity_c3(float s) {
+    return fit_row(s, 10.831419f, -377.91478f, 2859.7263f, -7389.1236f, 5301.7407f);
+}
+NEPHOS_FUNCTION float opacity_c4(float s) {
+    return fit_row(s, -8.3280895f, 306.77561f, -2368.4252f, 5817.7935f, -3754.5104f);
+}
+NEPHOS_FUNCTION float opacity_c5(float s) {
+    return fit_row(s, 2.426292f, -94.490722f, 721.69415f, -1645.7595f, 927.43252f);
+}
+
+// The integral from the middle of the chord up to s (|s| <= sqrt(w)), odd in s.
+NEPHOS_FUNCTION float partial_line_integral(float w, float s) {
+    float s2 = s * s;
+    float square = w * w + s2 * (-2.0f / 3.0f * w + 0.2f * s2);
+    float cube = w * w * w + s2 * (-w * w + s2 * (0.6f * w - s2 / 7.0f));
+    return s * (5.0f / 9.0f * square + 4.0f / 9.0f * cube);
+}
+
+// A metaball is seen under all angles within its outline, not only that of its centre: with the square of its
+// angular radius and its opacity as weights, the mean of 1 - cos is larger by this much of that square. A
+// lobe narrower than the metaball then is as bright as its disc, and not one bright dot.
+NEPHOS_CONST float kDiscSpread = 0.11f;
+
+// Where an angle and an optical depth lie in the scattering table (scattering_table.h), in nodes. With v =
+// (1 - |cos|)^(1/4) nodes are evenly spaced in v, from v = 0 (straight on) over 1 (sideways) back to 0
+// (back): near both ends the angle itself grows with the square of their number.
+NEPHOS_FUNCTION float scatter_column(float cos_theta) {
+    float off = 1.0f - abs(cos_theta);
+    float v = 0.5f * sqrt(sqrt(off > 0.0f ? off : 0.0f));
+    return float(kScatterAngles - 1u) * (cos_theta < 0.0f ? 1.0f - v : v);
+}
+NEPHOS_FUNCTION float scatter_row(float depth) {
+    float row = kScatterRowsPerDoubling * log2(1.0f + depth);
+    return row < float(kScatterDepths - 1u) ? row : float(kScatterDepths - 1u);
+}
+
+#ifdef __cplusplus
+static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&
+              offsetof(ViewBall, flags) == 28);
+static_assert(sizeof(ViewSplat) == 16 && sizeof(LightSplat) == 16 && sizeof(LightPlace) == 8);
+static_assert(sizeof(LightQuery) == 16 && sizeof(LightItem) == 16);
+static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 44);
+static_assert(sizeof(ViewBillboard) == 32 && offsetof(ViewBillboard, half_size) == 12 &&
+              offsetof(ViewBillboard, cloud) == 28);
+static_assert(sizeof(ViewCloud) == 32 && offsetof(ViewCloud, inverse_height) == 16);
+static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 10) &&
+              offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 2));
+static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
+              offsetof(Frame, flash_colour) == 272 && offsetof(Frame, sun_fade) == 368);
+
+}  // namespace nephos::shader
+#endif
+#endif

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The light pass from an order and lists that the device makes, for a cloud that lies there (device_lists.h):
+// the twin of sort_for_light() and shadow_map_bins.h.
+//
+//     keys      distances along the light; sort
+//     view      metaballs on the shadow map, the tiles that each touches, and the tile of its centre
+//     lists     as of a picture (device_lists.h)
+//     centres   sorted by tile, in each tile nearest to the sun first; cut into items of work
+//     map, light at the centres (light_tiles.h)
+//     store     the light goes to the cloud
+//
+// Private to the module.
+
+#include <vector>
+
+#include "render/cloud/cloud_preparation.h"
+#include "render/vulkan/device_lists.h"
+#include "render/vulkan/light_tiles.h"
+
+namespace nephos {
+
+shader::SunFrame sun_frame(const ShadowFrame& frame, int shadow_size);
+
+// What is to be lit by which sun.
+struct SunRequest {
+    std::size_t metaballs = 0;  // the first of lists.cloud()
+    ShadowFrame frame;
+    int shadow_size = 0;       // texels on a side of the map
+    float largest_radius = 0;  // metres, of any metaball
+};
+
+class DeviceSun {
+  public:
+    DeviceSun(const GpuDevice& gpu, const DeviceLists& lists);
+
+    // Lights metaballs, on the device and in `depths`, and makes the shadow map, in `tiles` and in `shadow`.
+    // False if the lists would be larger than `limits`: then the light is not there. Nothing else may be on
+    // its way.
+    bool run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists, const ListLimits& limits,
+             LightTiles& tiles, std::vector<float>& depths, std::vector<float>& shadow);
+
+  private:
+    void bind(const GpuDevice& gpu, const DeviceLists& lists);
+    // The set that reads the centres in the order of their tiles.
+    vk::DescriptorSet centres_of(const TileGrid& grid) const;
+    void record(const vk::raii::CommandBuffer& commands, const DeviceLists& lists, std::size_t count,
+                const TileGrid& grid, std::uint32_t per_item) const;
+
+    OrderSets sets_;
+    GpuBuffer frame_, no_shells_;
+    GpuBuffer places_, queries_, items_, depths_, counts_;
+};
+
+}  // namespace nephos

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+// What concerns models, skies and layers together: names that refer to each other, keys that default to those
+// of the scene, and whether the sky can be simulated at all.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/trigonometry.h"
+#include "scenes/format/schema_sections.h"
+#include "scenes/format/text.h"
+#include "seeds/sky_simulation.h"
+
+namespace nephos {
+namespace {
+
+SectionReader item_of(const SectionReader& scene, const char* array, std::size_t index) {
+    return {scene.document, scene.find(array)->value.items[index], indexed(array, index), {}};
+}
+
+// The reader of a table within a table; one of an empty table at the place of its parent when it is missing.
+SectionReader below(const SectionReader& reader, std::string_view name) {
+    static const Node empty;
+    const Entry* entry = reader.find(name);
+    const std::string path = reader.path + "." + std::string(name);
+    if (entry == nullptr || entry->value.kind != Node::Kind::table) return {reader.document, empty, path, {}};
+    return {reader.document, entry->value, path, {}};
+}
+
+// The item of an array of texts, or the text alone.
+const Node& text_item(const SectionReader& reader, std::string_view key, std::size_t index) {
+    const Node& node = reader.find(key)->value;
+    return node.kind == Node::Kind::array ? node.items[index] : node;
+}
+
+template <typename Item>
+void check_names_differ(const SectionReader& reader, const char* array, const std::vector<Item>& items,
+                        const char* what) {
+    for (std::size_t n = 0; n < items.size(); ++n) {
+        const SectionReader item = item_of(reader, array, n);
+        if (items[n].name.empty()) {
+            item.report("name", item.quoted("name") + " is empty",
+                        std::string("expected the name of a ") + what);
+            continue;
+        }
+        for (std::size_t m = 0; m < n; ++m) {
+            if (items[m].name != items[n].name) continue;
+            item.report("name", "there are two of the name " + enclosed(shortened(items[n].name), '"'),
+                        std::string("expected another name for each ") + what);
+            break;
+        }
+    }
+}
+
+// Whether one of the items has this name; otherwise it is reported with the name that was probably meant.
+template <typename Item>
+bool check_known(const SectionReader& reader, const Node& node, const std::string& name,
+                 const std::string& key, const std::vector<Item>& items, const char* what) {
+    if (std::ranges::find(items, name, &Item::name) != items.end()) return true;
+    std::vector<std::string_view> names;
+    std::vector<std::string> quoted;
+    for (const Item& item : items) {
+        names.push_back(item.name);
+        if (quoted.size() < 20) quoted.push_back(enclosed(shortened(item.name), '"'));
+    }
+    const std::string_view meant = closest_word(name, names);
+    std::string expected = quoted.empty()
+                               ? std::string("expected the name of a ") + what + ", but there is none"
+                               : "expected " + joined(quoted);
+    if (!meant.empty()) expected = "did you mean " + enclosed(meant, '"') + "?";
+    reader.document.report(
+        node.place, reader.quoted(key) + ": there is no " + what + " " + enclosed(shortened(name), '"'),
+        std::move(expected));
+    return false;
+}
+
+void check_sky(const SectionReader& reader, const Scene& scene, const NamedSky& sky) {
+    for (std::size_t m = 0; m < sky.models.size() && !reader.document.models_missing; ++m) {
+        check_known(reader, text_item(reader, "models", m), sky.models[m], "models", scene.models,
+                    "base model");
+    }
+    if (sky.clouds > 0 && sky.models.empty()) {
+        reader.report("models",
+                      "the sky " + enclosed(sky.name, '"') + " has " + std::to_string(sky.clouds) +
+                          " clouds and no base model",
+                      "expected at least one name in `models`");
+    }
+}
+
+void check_layer_name(const SectionReader& reader, const std::string& name) {
+    const auto allowed = [](char c) {
+        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+        return letter || (c >= '0' && c <= '9') || c == '-' || c == '_';
+    };
+    if (name.size() <= 64 && std::ranges::all_of(name, allowed) && !name.starts_with('-')) return;
+    reader.report(
+        "name",
+        reader.quoted("name") + " is " + enclosed(shortened(name), '"') + ", which makes no file names",
+        "expected 1 to 64 letters, digits, `-` or `_`, not starting with `-`");
+}
+
+// The skies that a layer names: known, and no two of one state.
+void check_layer_skies(const SectionReader& reader, const Scene& scene, const LayerOptions& layer) {
+    if (reader.find("skies") == nullptr) {
+        reader.report("skies", reader.quoted("skies") + " is missing",
+                      "expected the name of a sky or several, or a `veil`");
+        return;
+    }
+    if (layer.skies.empty()) {
+        reader.report("skies", "the layer " + enclosed(layer.name, '"') + " has no sky",
+                      "expected at least one");
+    }
+    std::vector<const NamedSky*> known;
+    for (std::size_t s = 0; s < layer.skies.size(); ++s) {
+        const Node& node = text_item(reader, "skies", s);
+        if (!check_known(reader, node, layer.skies[s], "skies", scene.skies, "sky")) continue;
+        const NamedSky& sky = *std::ranges::find(scene.skies, layer.skies[s], &NamedSky::name);
+        const auto twin = std::ranges::find(known, sky.state, [](const NamedSky* k) { return k->state; });
+        if (twin != known.end()) {
+            reader.document.report(node.place,
+                                   reader.quoted("skies") + ": \"" + (*twin)->name + "\" and \"" + sky.name +
+                                       "\" have the same state " + number_text(sky.state),
+                                   "expected skies of different states in one layer");
+        }
+        known.push_back(&sky);
+    }
+}
+
+// Keys that are missing take the values of the scene, or of other keys of the layer.
+void fill_in_lattice(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
+    const SectionReader lattice = below(reader, "lattice");
+    const AutomatonOptions& shared = scene.automaton;
+    if (!lattice.find("cells")) layer.extent = shared.extent;
+    if (!lattice.find("cell_size_m")) layer.placement.cell_size_m = shared.placement.cell_size_m;
+    if (!lattice.find("origin_m")) layer.placement.origin_m = shared.placement.origin_m;
+}
+
+void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
+    const SectionReader lattice = below(reader, "lattice"), background = below(reader, "background");
+    const AutomatonOptions& shared = scene.automaton;
+    fill_in_lattice(reader, scene, layer);
+    if (!lattice.find("boundaries")) layer.boundaries = shared.boundaries;
+    if (!background.find("hum")) layer.background.hum = shared.field.background.hum;
+    if (!background.find("act")) layer.background.act = shared.field.background.act;
+    if (!background.find("ext")) layer.background.ext = shared.field.background.ext;
+    if (!below(reader, "coupling").find("min_semi_axis_m")) {
+        layer.coupling.min_semi_axis_m = layer.placement.cell_size_m;
+    }
+    if (!reader.find("cross_edges_whole")) layer.cross_edges_whole = layer.automaton;
+    HumidColumn& column = layer.rain.column;
+    if (std::isinf(column.bottom_m)) column.bottom_m = layer.placement.origin_m.z;
+    if (std::isinf(column.top_m)) {
+        column.top_m = layer.placement.origin_m.z + layer.extent.z * layer.placement.cell_size_m;
+    }
+}
+
+// Base heights: those of the file, or of the genus as far as they lie in the lattice.
+void fill_in_base_height(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
+    const double bottom = layer.placement.origin_m.z;
+    const double top = bottom + layer.extent.z * layer.placement.cell_size_m;
+    const std::string lattice_text = number_text(bottom) + " to " + number_text(top) + " m of its lattice";
+    if (const Entry* genus = reader.find("genus")) {
+        const Range heights = base_height_m(genus_from_name(genus->value.text), scene.climate.region);
+        layer.base_height_m = heights;
+        if (!layer.automaton) return;
+        layer.base_height_m = {std::max(heights.min, bottom), std::min(heights.max, top)};
+        if (layer.base_height_m.min <= layer.base_height_m.max) return;
+        reader.report("genus",
+                      "bases of " + genus->value.text + " lie from " + number_text(heights.min) + " to " +
+                          number_text(heights.max) + " m, outside the " + lattice_text,
+                      "expected a lattice that reaches these heights, or `base_height_m`");
+    } else if (reader.find("base_height_m") == nullptr) {
+        reader.report("name", reader.quoted("base_height_m") + " is missing",
+                      "expected `base_height_m` or `genus`");
+    } else if (layer.automaton && (layer.base_height_m.min < bottom || layer.base_height_m.max > top)) {
+        reader.report("base_height_m", reader.quoted("base_height_m") + " leaves the " + lattice_text,
+                      "expected heights within the layer's lattice");
+    }
+}
+
+void check_rain(const SectionReader& reader, const Scene& scene, const LayerOptions& layer) {
+    const SectionReader rain = below(reader, "rain");
+    for (std::size_t r = 0; r < layer.rain.attached.size(); ++r) {
+        const AttachedRainRule& rule = layer.rain.attached[r];
+        if (rule.model.empty() || reader.document.models_missing) continue;
+        const SectionReader item{
+            reader.document, rain.find("attached")->value.items[r], indexed(rain.path + ".attached", r), {}};
+        check_known(item, item.find("model")->value, rule.model, "model", scene.models, "base model");
+    }
+    if (layer.rain.find && !layer.automaton) {
+        rain.report("find", rain.quoted("find") + " is true in a layer without automaton",
+                    "expected `automaton` = true, or rain that is placed or attached");
+    }
+    if (layer.rain.column.bottom_m >= layer.rain.column.top_m) {
+        const SectionReader column = below(rain, "column");
+        column.report(column.find("top_m") ? "top_m" : "bottom_m",
+                      column.quoted("bottom_m") + " = " + number_text(layer.rain.column.bottom_m) +
+                          " is not below `top_m` = " + number_text(layer.rain.column.top_m),
+                      "expected a column that has a height");
+    }
+}
+
+// A layer that is a veil: what it leaves to its lattice and wind, and keys that mean nothing to it.
+void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
+    for (const std::string_view key : keys_of_clouds()) {
+        if (reader.find(key) == nullptr) continue;
+        reader.report(key, reader.quoted(key) + " stands beside `veil`",
+                      "expected `name`, `opacity`, `lattice`, `wind` and `veil` alone: a veil has no clouds "
+                      "and no automaton");
+    }
+    const SectionReader lattice = below(reader, "lattice"), veil = below(reader, "veil");
+    if (lattice.find("boundaries") != nullptr) {
+        lattice.report("boundaries", lattice.quoted("boundaries") + " stands beside `veil`",
+                       "expected none: a veil is a function of place and goes on beyond its lattice");
+    }
+    fill_in_lattice(reader, scene, layer);
+    const double bottom = layer.placement.origin_m.z;
+    if (!veil.find("base_m")) layer.veil.base_m = bottom;
+    if (!veil.find("top_m")) layer.veil.top_m = bottom + layer.extent.z * layer.placement.cell_size_m;
+    if (veil.find("direction_deg")) return;
+    const Wind& wind = layer.wind.keyframes.empty() ? scene.automaton.wind : layer.wind;
+    const Velocity velocity = wind_at(wind, layer.veil.top_m, 0);
+    layer.veil.direction_deg = degrees_of_vector(velocity.east_m_per_s, velocity.north_m_per_s);
+}
+
+// The libraries' own checks, and whether every cloud fits into the world: makes the clouds.
+void check_simulation(const SectionReader& reader, const Scene& scene, std::size_t layer) {
+    const LayerOptions& options = scene.layers[layer];
+    if (options.is_veil) {
+        try {
+            check(veil_options(scene, layer), options.extent, options.placement);
+        } catch (const Error& error) {
+            reader.report("veil", error.what());
+        }
+        return;
+    }
+    try {
+        if (options.automaton) check(automaton_options(scene, layer));
+        SkySimulation(sky_options(scene, layer));
+    } catch (const Error& error) {
+        reader.report("name", error.what());
+    }
+}
+
+// What a scene with layers leaves to its clouds, and what is nothing without layers.
+void check_layers_or_field(const SectionReader& reader, const Scene& scene) {
+    if (scene.layers.empty()) {
+        if (!scene.skies.empty()) {
+            reader.report("sky", "the scene has skies and no layer",
+                          "expected [[layer]] tables that use them");
+        }
+        return;
+    }
+    const FieldOptions& field = scene.automaton.field;
+    if (!field.ellipsoids.empty() || !field.scatters.empty()) {
+        reader.report("field", "the scene has layers and ellipsoids in `field`",
+                      "expected ellipsoids in a scene without layers, or clouds in the skies of layers");
+    }
+    if (scene.initial_state_file) {
+        reader.report("lattice", "the scene has layers and `lattice.initial_state`",
+                      "expected the state of a file in a scene without layers alone");
+    }
+}
+
+}  // namespace
+
+void finish_layers(const SectionReader& reader, Scene& scene) {
+    if (reader.sound({"model"})) check_names_differ(reader, "model", scene.models, "base model");
+    if (!reader.sound({"model", "models", "sky", "climate", "layer", "lattice", "field"})) return;
+    check_layers_or_field(reader, scene);
+    check_names_differ(reader, "sky", scene.skies, "sky");
+    check_names_differ(reader, "layer", scene.layers, "layer");
+    for (std::size_t s = 0; s < scene.skies.size(); ++s)
+        check_sky(item_of(reader, "sky", s), scene, scene.skies[s]);
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        const SectionReader item = item_of(reader, "layer", n);
+        LayerOptions& layer = scene.layers[n];
+        check_layer_name(item, layer.name);
+        check_wind_times(item, layer.wind);
+        if (layer.is_veil) {
+            finish_veil_layer(item, scene, layer);
+            continue;
+        }
+        check_layer_skies(item, scene, layer);
+        fill_in(item, scene, layer);
+        fill_in_base_height(item, scene, layer);
+        check_rain(item, scene, layer);
+    }
+    if (!reader.document.problems.empty()) return;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n)
+        check_simulation(item_of(reader, "layer", n), scene, n);
+}
+
+}  // namespace nephos

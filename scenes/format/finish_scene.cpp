@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// What concerns several sections of a scene.
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "scenes/format/schema_sections.h"
+#include "scenes/format/text.h"
+
+namespace nephos {
+namespace {
+
+// The reader of a section below the scene, or of the scene itself when the file has no such section.
+SectionReader below(const SectionReader& reader, std::string_view name) {
+    const Entry* entry = reader.find(name);
+    if (entry == nullptr || entry->value.kind != Node::Kind::table) return reader;
+    return {reader.document, entry->value, std::string(name), {}};
+}
+
+void check_name(const SectionReader& reader, const Scene& scene) {
+    if (reader.find("name") == nullptr || !reader.sound({"name"})) return;
+    constexpr std::size_t kLongest = 100;
+    const auto allowed = [](char c) {
+        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+        return letter || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+    };
+    const std::string& name = scene.name;
+    const bool starts_well = !name.empty() && name.front() != '.' && name.front() != '-';
+    if (starts_well && name.size() <= kLongest && std::all_of(name.begin(), name.end(), allowed)) return;
+    reader.report("name", "`name` is \"" + shortened(name) + "\", which makes no file names",
+                  "expected 1 to 100 letters, digits, `-`, `_` or `.`, starting with none of `-` and `.`");
+}
+
+// The displacement of one step is held as cells * 2^32 in 64 bits.
+void check_wind_speed(const SectionReader& reader, const Scene& scene) {
+    if (!reader.sound({"wind", "time", "lattice"})) return;
+    constexpr double kMostCells = 1 << 30;
+    double fastest = 0;
+    for (const WindKeyframe& keyframe : scene.automaton.wind.keyframes) {
+        for (const WindLevel& level : keyframe.levels) {
+            fastest = std::max(
+                {fastest, std::abs(level.velocity.east_m_per_s), std::abs(level.velocity.north_m_per_s)});
+        }
+    }
+    const double cells = fastest * scene.automaton.time_step_s / scene.automaton.placement.cell_size_m;
+    if (cells <= kMostCells) return;
+    reader.report("wind", "the wind moves " + number_text(cells) + " cells in one step",
+                  "expected at most " + number_text(kMostCells) +
+                      " cells: a shorter `time.step_s`, a larger `lattice.cell_size_m` or less wind");
+}
+
+// The axis of a lattice along which an ellipsoid reaches too far, and how far.
+struct TooFar {
+    const char* axis;
+    double reach_m, most_m;
+};
+
+std::optional<TooFar> too_far(const char* axis, double reach_m, int cells, double cell_m, Boundary boundary) {
+    const double most_m = kMaxPeriodicReach * cells * cell_m;
+    if (boundary == Boundary::open || reach_m <= most_m) return {};
+    return TooFar{axis, reach_m, most_m};
+}
+
+// A periodic axis repeats an ellipsoid, and every image that reaches the box costs time. `horizontal` and
+// `vertical` are the keys that decide how far it reaches; each is reported once.
+void check_periodic_reach(const SectionReader& item, const AutomatonOptions& o, const Vec3& reach,
+                          std::string_view horizontal, std::string_view vertical) {
+    const double cell_m = o.placement.cell_size_m;
+    const auto x = too_far("x (east)", reach.x, o.extent.x, cell_m, o.boundaries.x),
+               y = too_far("y (north)", reach.y, o.extent.y, cell_m, o.boundaries.y),
+               z = too_far("z (up)", reach.z, o.extent.z, cell_m, o.boundaries.z);
+    const auto report = [&](std::string_view key, const TooFar& found) {
+        item.report(key,
+                    item.quoted(key) + " reaches " + number_text(found.reach_m) +
+                        " m from the centre along the periodic axis " + found.axis,
+                    "expected at most " + number_text(found.most_m) + " m, " +
+                        number_text(kMaxPeriodicReach) +
+                        " times the lattice along that axis, or an open boundary there");
+    };
+    if (x || y) report(horizontal, x ? *x : *y);
+    if (z && (vertical != horizontal || !(x || y))) report(vertical, *z);
+}
+
+void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
+    if (!reader.sound({"lattice", "field"})) return;
+    const AutomatonOptions& o = scene.automaton;
+    const auto check_items = [&](const char* name, const auto& check_item) {
+        const Entry* items = below(reader, "field").find(name);
+        for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n) {
+            check_item(
+                n, SectionReader{
+                       reader.document, items->value.items[n], indexed(std::string("field.") + name, n), {}});
+        }
+    };
+    check_items("ellipsoids", [&](std::size_t n, const SectionReader& item) {
+        check_periodic_reach(item, o, reach_m(o.field.ellipsoids[n]), "semi_axes_m", "semi_axes_m");
+    });
+    check_items("scatters", [&](std::size_t n, const SectionReader& item) {
+        const EllipsoidScatter& s = o.field.scatters[n];
+        const bool longer = s.semi_axis_x_m.max >= s.semi_axis_y_m.max;
+        check_periodic_reach(item, o, reach_m(s), longer ? "semi_axis_x_m" : "semi_axis_y_m",
+                             "semi_axis_z_m");
+    });
+}
+
+void check_frames(const SectionReader& reader, const Scene& scene) {
+    if (!reader.sound({"time", "frames"})) return;
+    const SectionReader frames = below(reader, "frames");
+    const double end_s = simulated_time_s(scene);
+    const std::string simulated =
+        number_text(end_s) + " s that `time.steps` = " + std::to_string(scene.steps) +
+        " and `time.step_s` = " + number_text(scene.automaton.time_step_s) + " simulate";
+    if (steps_up_to(moment_of_frame(scene, 0)) > scene.steps) {
+        frames.report(
+            "start_s",
+            "`frames.start_s` is " + number_text(scene.frames.start_s) + " s, after the " + simulated,
+            "expected a start within the simulated time, or more steps");
+        return;
+    }
+    if (scene.frames.count == 0) {
+        if (frame_count(scene) < kMaxFrames) return;
+        const bool with_scale = frames.find("time_scale") != nullptr;
+        const SectionReader at = with_scale ? frames : below(reader, "time");
+        at.report(with_scale ? "time_scale" : "steps",
+                  "the scene has more than " + std::to_string(kMaxFrames) + " frames",
+                  "expected a larger `frames.time_scale`, fewer `time.steps`, or a `frames.count`");
+        return;
+    }
+    const int last = scene.frames.count - 1;
+    if (steps_up_to(moment_of_frame(scene, last)) <= scene.steps) return;
+    Scene all = scene;
+    all.frames.count = 0;
+    frames.report("count",
+                  "the last of the " + std::to_string(scene.frames.count) + " frames shows " +
+                      number_text(frame_time_s(scene.frames, last)) + " s, after the " + simulated,
+                  "expected `frames.count` up to " + std::to_string(frame_count(all)) + ", or more steps");
+}
+
+void replace_infinite(Range& range, double low, double size) {
+    if (std::isinf(range.min)) range = {low, low + size};
+}
+
+}  // namespace
+
+void check_wind_times(const SectionReader& owner, const Wind& wind) {
+    const std::string path = owner.path.empty() ? "wind" : owner.path + ".wind";
+    for (std::size_t n = 1; n < wind.keyframes.size(); ++n) {
+        const double before_s = wind.keyframes[n - 1].time_s, time_s = wind.keyframes[n].time_s;
+        if (time_s > before_s) continue;
+        const Node& item = owner.find("wind")->value.items[n];
+        const SectionReader profile{owner.document, item, indexed(path, n), {}};
+        profile.report("time_s",
+                       profile.quoted("time_s") + " is " + number_text(time_s) +
+                           ", not after the profile before it at " + number_text(before_s),
+                       "expected times that rise from profile to profile, in seconds");
+    }
+}
+
+void finish_scene(const SectionReader& reader, void* owner) {
+    auto& scene = *static_cast<Scene*>(owner);
+    check_name(reader, scene);
+    if (reader.sound({"wind"})) check_wind_times(reader, scene.automaton.wind);
+    check_wind_speed(reader, scene);
+    check_periodic_sizes(reader, scene);
+    check_frames(reader, scene);
+    finish_layers(reader, scene);
+    const Placement& placement = scene.automaton.placement;
+    for (EllipsoidScatter& scatter : scene.automaton.field.scatters) {
+        replace_infinite(scatter.x_m, placement.origin_m.x, scene.automaton.extent.x * placement.cell_size_m);
+        replace_infinite(scatter.y_m, placement.origin_m.y, scene.automaton.extent.y * placement.cell_size_m);
+        replace_infinite(scatter.z_m, placement.origin_m.z, scene.automaton.extent.z * placement.cell_size_m);
+    }
+}
+
+}  // namespace nephos

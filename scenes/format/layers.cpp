@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scenes/format/layers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "scenes/format/scene.h"
+#include "scenes/format/text.h"
+
+namespace nephos {
+namespace {
+
+// Index of the item of this name.
+template <typename Item>
+std::size_t index_of(const std::vector<Item>& items, const std::string& name, const char* what) {
+    const auto found = std::ranges::find(items, name, &Item::name);
+    if (found == items.end()) {
+        throw Error(ErrorCode::usage, std::string("there is no ") + what + " called \"" + name + "\"");
+    }
+    return std::size_t(found - items.begin());
+}
+
+Sky resolved(const Scene& scene, const NamedSky& named) {
+    Sky sky{named.name, named.state, named.clouds, {}};
+    for (const std::string& model : named.models) {
+        sky.models.push_back({index_of(scene.models, model, "base model"), named.generated});
+    }
+    return sky;
+}
+
+}  // namespace
+
+std::uint64_t layer_seed(std::uint64_t scene_seed, std::size_t layer) {
+    if (layer == 0) return scene_seed;
+    const PhiloxWords words = philox(scene_seed, item_counter(Domain::layers, 0, std::uint32_t(layer), 0, 0));
+    return words[0] | std::uint64_t(words[1]) << 32;
+}
+
+std::size_t lattice_count(const Scene& scene) { return scene.layers.empty() ? 1 : scene.layers.size(); }
+
+bool has_density(const LayerOptions& layer) { return layer.automaton || layer.is_veil; }
+
+bool has_density(const Scene& scene) {
+    return scene.layers.empty() ||
+           std::ranges::any_of(scene.layers, [](const LayerOptions& layer) { return has_density(layer); });
+}
+
+const Wind& layer_wind(const Scene& scene, std::size_t layer) {
+    const Wind& own = scene.layers[layer].wind;
+    return own.keyframes.empty() ? scene.automaton.wind : own;
+}
+
+WorldRectangle whole_world(const Scene& scene) {
+    WorldRectangle world;
+    // Of veils only when there is nothing else: no rain falls out of them, and they may reach to the horizon.
+    const bool veils_alone = std::ranges::all_of(scene.layers, &LayerOptions::is_veil);
+    bool first = true;
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        if (!veils_alone && scene.layers[n].is_veil) continue;
+        const AutomatonOptions lattice = automaton_options(scene, n);
+        const Vec3& origin = lattice.placement.origin_m;
+        const double x_m = lattice.extent.x * lattice.placement.cell_size_m,
+                     y_m = lattice.extent.y * lattice.placement.cell_size_m;
+        const WorldRectangle layer{origin.x, origin.y, origin.x + x_m, origin.y + y_m};
+        world = first ? layer
+                      : WorldRectangle{
+                            std::min(world.min_x_m, layer.min_x_m), std::min(world.min_y_m, layer.min_y_m),
+                            std::max(world.max_x_m, layer.max_x_m), std::max(world.max_y_m, layer.max_y_m)};
+        first = false;
+    }
+    return world;
+}
+
+SkyOptions sky_options(const Scene& scene, std::size_t layer) {
+    const LayerOptions& given = scene.layers[layer];
+    SkyOptions options;
+    options.name = given.name;
+    options.seed = scene.automaton.seed;
+    options.layer = std::uint32_t(layer);
+    const Vec3& origin = given.placement.origin_m;
+    options.world = {origin.x, origin.y, origin.x + given.extent.x * given.placement.cell_size_m,
+                     origin.y + given.extent.y * given.placement.cell_size_m};
+    options.base_height_m = given.base_height_m;
+    options.models = scene.models;
+    for (const std::string& sky : given.skies) {
+        options.skies.push_back(resolved(scene, scene.skies[index_of(scene.skies, sky, "sky")]));
+    }
+    if (!scene.climate.schedule.empty()) options.schedule = scene.climate.schedule;
+    if (!given.schedule.empty()) options.schedule = given.schedule;
+    options.wind = layer_wind(scene, layer);
+    options.time_step_s = scene.automaton.time_step_s;
+    options.formation_s = given.formation_s;
+    options.dissolution_s = given.dissolution_s;
+    options.formation_softness = given.formation_softness;
+    options.cross_edges_whole = given.cross_edges_whole;
+    return options;
+}
+
+AutomatonOptions automaton_options(const Scene& scene, std::size_t layer) {
+    if (scene.layers.empty()) return scene.automaton;
+    const LayerOptions& given = scene.layers[layer];
+    AutomatonOptions options = scene.automaton;
+    options.extent = given.extent;
+    options.placement = given.placement;
+    options.boundaries = given.boundaries;
+    options.seed = layer_seed(scene.automaton.seed, layer);
+    options.field = {given.background, {}, {}};
+    options.wind = layer_wind(scene, layer);
+    return options;
+}
+
+std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer) {
+    std::vector<AttachedRain> rains;
+    for (const AttachedRainRule& rule : scene.layers[layer].rain.attached) {
+        AttachedRain& rain = rains.emplace_back();
+        if (!rule.model.empty()) rain.model = index_of(scene.models, rule.model, "base model");
+        rain.genus = rule.genus;
+        rain.state = rule.state;
+        rain.size_scale = rule.size_scale;
+        rain.intensity_mm_per_h = rule.intensity_mm_per_h;
+    }
+    return rains;
+}
+
+VeilOptions veil_options(const Scene& scene, std::size_t layer) {
+    VeilOptions options = scene.layers[layer].veil;
+    options.seed = layer_seed(scene.automaton.seed, layer);
+    return options;
+}
+
+SkiesAtTime skies_at(const Scene& scene, double time_s) {
+    if (!(time_s >= 0) || !std::isfinite(time_s)) {
+        throw Error(ErrorCode::usage,
+                    "no sky at " + number_text(time_s) + " s, expected a time of 0 s or later");
+    }
+    const double step_s = scene.automaton.time_step_s;
+    const Moment moment = moment_of(time_s, step_s);
+    SkiesAtTime result{{}, moment.fraction * step_s};
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        if (scene.layers[n].is_veil) continue;
+        SkySimulation& sky = result.skies.emplace_back(sky_options(scene, n));
+        while (sky.steps() < moment.step) sky.step();
+    }
+    return result;
+}
+
+}  // namespace nephos

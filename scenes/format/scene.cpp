@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scenes/format/scene.h"
+
+#include <cmath>
+#include <limits>
+
+namespace nephos {
+
+double simulated_time_s(const Scene& scene) { return double(scene.steps) * scene.automaton.time_step_s; }
+
+double frame_time_s(const FrameOptions& frames, int index) {
+    return frames.start_s + double(index) * frames.time_scale / frames.per_second;
+}
+
+Moment moment_of(double time_s, double time_step_s) {
+    constexpr double kTolerance = 4 * std::numeric_limits<double>::epsilon(), kMostSteps = 0x1p63;
+    const double steps = time_s / time_step_s;
+    if (!(steps < kMostSteps)) return {std::uint64_t(kMostSteps), 0};
+    const double nearest = std::round(steps);
+    if (std::abs(steps - nearest) <= kTolerance * nearest) return {std::uint64_t(nearest), 0};
+    const double whole = std::floor(steps);
+    return {std::uint64_t(whole), steps - whole};
+}
+
+Moment moment_of_frame(const Scene& scene, int index) {
+    return moment_of(frame_time_s(scene.frames, index), scene.automaton.time_step_s);
+}
+
+std::uint64_t steps_up_to(const Moment& moment) { return moment.step + (moment.fraction > 0 ? 1 : 0); }
+
+int frame_count(const Scene& scene) {
+    if (scene.frames.count > 0) return scene.frames.count;
+    // Every operation up to the moment is monotonic, so those that fit come before those that do not.
+    int fit = 0, most = kMaxFrames;
+    while (fit < most) {
+        const int middle = fit + (most - fit) / 2;
+        if (steps_up_to(moment_of_frame(scene, middle)) <= scene.steps) {
+            fit = middle + 1;
+        } else {
+            most = middle;
+        }
+    }
+    return fit;
+}
+
+}  // namespace nephos

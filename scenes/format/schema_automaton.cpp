@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sections that decide the bits: lattice, time, field and wind.
+
+#include "automaton/air_parcels.h"
+#include "scenes/format/schema_build.h"
+#include "scenes/format/schema_sections.h"
+#include "scenes/format/text.h"
+
+namespace nephos {
+
+using namespace schema_build;
+
+// Parcels as large as those of fair-weather cumulus. Infinite ranges of the centre stand for the whole
+// lattice until finish_scene() knows it.
+template <>
+const EllipsoidScatter& schema_build::default_element<EllipsoidScatter>() {
+    static const EllipsoidScatter scatter = [] {
+        EllipsoidScatter made;
+        made.x_m = made.y_m = made.z_m = {-kForever, kForever};
+        made.semi_axis_x_m = made.semi_axis_y_m = {400, 900};
+        made.semi_axis_z_m = {200, 500};
+        made.yaw_deg = {0, 180};
+        return made;
+    }();
+    return scatter;
+}
+
+namespace {
+
+constexpr double kFarthest_m = 1e7;  // beyond any weather on Earth
+constexpr double kLongest_s = 1e9;   // about 30 years
+constexpr double kFastest_m_per_s = 1000;
+
+const std::vector<std::string_view> kBoundaryWords{"open", "periodic"};
+
+void check_fades(const SectionReader& reader, double fades_s, double life_s) {
+    if (fades_s <= life_s) return;
+    const char* at = reader.find("fade_out_s") != nullptr ? "fade_out_s" : "fade_in_s";
+    reader.report(at,
+                  "fading in and out takes " + number_text(fades_s) + " s, longer than the life of " +
+                      number_text(life_s) + " s",
+                  "expected `fade_in_s` + `fade_out_s` <= `life_s`");
+}
+
+void finish_ellipsoid(const SectionReader& reader, void* owner) {
+    const auto& ellipsoid = *static_cast<const Ellipsoid*>(owner);
+    check_fades(reader, ellipsoid.fade_in_s + ellipsoid.fade_out_s, ellipsoid.life_s);
+}
+
+void finish_scatter(const SectionReader& reader, void* owner) {
+    const auto& scatter = *static_cast<const EllipsoidScatter*>(owner);
+    check_fades(reader, scatter.fade_in_s + scatter.fade_out_s, scatter.life_s.min);
+}
+
+const char* const kCentreEffect =
+    "Probabilities at the centre, as `[field.background]`; towards the rim they change smoothly.";
+const char* const kRimEffect =
+    "Probabilities at the rim, as `[field.background]`. They take effect where they exceed the background's "
+    "`hum` "
+    "and `act` or stay below its `ext`: with a higher `ext`, the background's holds from inside the rim on.";
+const char* const kCarriedEffect =
+    "Whether it moves with the wind at its centre's height; otherwise it stands still.";
+
+// The effect of a size of ellipsoids, with the limit that periodic axes set.
+std::string with_periodic_reach(const char* effect) {
+    return effect + (" Along a periodic axis of the lattice an ellipsoid reaches at most " +
+                     number_text(kMaxPeriodicReach) + " times the length of that axis from its centre.");
+}
+
+const Section& ellipsoid_section() {
+    static const Section section{
+        "An ellipsoid placed by hand",
+        "Parcels of humid air, placed by hand: inside, clouds are born and live longer. Of all that "
+        "overlap, and of the background, the larger `hum` and `act` and the smaller `ext` count.",
+        {required(key<&Ellipsoid::centre_m>("centre_m", "m", between(-kFarthest_m, kFarthest_m),
+                                            "Centre at its birth, or at time 0 if `birth_s` is below 0: "
+                                            "east, north, height.",
+                                            "D, control of motion")),
+         key<&Ellipsoid::semi_axes_m>("semi_axes_m", "m", above(0, kFarthest_m),
+                                      with_periodic_reach("Half of its length, width and height, before the "
+                                                          "turn by `yaw_deg`.")),
+         key<&Ellipsoid::yaw_deg>("yaw_deg", "deg", between(-360, 360),
+                                  "Turn about the vertical, counter-clockwise seen from above."),
+         table<&Ellipsoid::centre>("centre", probabilities_section(), kCentreEffect),
+         table<&Ellipsoid::rim>("rim", probabilities_section(), kRimEffect),
+         key<&Ellipsoid::birth_s>(
+             "birth_s", "s", between(-kLongest_s, kLongest_s),
+             "Simulated time at which it appears; before 0: it is there from the start."),
+         key<&Ellipsoid::life_s>("life_s", "s", or_infinite(above(0, 0)),
+                                 "Time until it is gone, fades included."),
+         key<&Ellipsoid::fade_in_s>("fade_in_s", "s", between(0, kLongest_s),
+                                    "Time in which it comes to full strength."),
+         key<&Ellipsoid::fade_out_s>("fade_out_s", "s", between(0, kLongest_s),
+                                     "Time in which it vanishes at the end of its life."),
+         key<&Ellipsoid::carried>("carried", "", kAny, kCarriedEffect, "D, control of motion")},
+        &finish_ellipsoid};
+    return section;
+}
+
+const Section& scatter_section() {
+    static const Section section{
+        "Ellipsoids at random",
+        "Parcels of humid air, drawn at random from the scene's seed. Each value is drawn uniformly from its "
+        "range.",
+        {required(key<&EllipsoidScatter::count>(
+             "count", "", between(0, 100'000),
+             "Their number: at any time with `replace`, otherwise in total.", "D, control of motion")),
+         default_is(key<&EllipsoidScatter::x_m>("x_m", "m", between(-kFarthest_m, kFarthest_m),
+                                                "Where centres are drawn, east."),
+                    "the whole lattice"),
+         default_is(key<&EllipsoidScatter::y_m>("y_m", "m", between(-kFarthest_m, kFarthest_m),
+                                                "Where centres are drawn, north."),
+                    "the whole lattice"),
+         default_is(key<&EllipsoidScatter::z_m>("z_m", "m", between(-kFarthest_m, kFarthest_m),
+                                                "Where centres are drawn, height."),
+                    "the whole lattice"),
+         key<&EllipsoidScatter::semi_axis_x_m>(
+             "semi_axis_x_m", "m", above(0, kFarthest_m),
+             with_periodic_reach("Half of the length, before the turn by `yaw_deg`.")),
+         key<&EllipsoidScatter::semi_axis_y_m>("semi_axis_y_m", "m", above(0, kFarthest_m),
+                                               with_periodic_reach("Half of the width.")),
+         key<&EllipsoidScatter::semi_axis_z_m>("semi_axis_z_m", "m", above(0, kFarthest_m),
+                                               with_periodic_reach("Half of the height.")),
+         key<&EllipsoidScatter::yaw_deg>("yaw_deg", "deg", between(-360, 360),
+                                         "Turn about the vertical, counter-clockwise seen from above."),
+         table<&EllipsoidScatter::centre>("centre", probabilities_section(), kCentreEffect),
+         table<&EllipsoidScatter::rim>("rim", probabilities_section(), kRimEffect),
+         key<&EllipsoidScatter::birth_s>(
+             "birth_s", "s", between(-kLongest_s, kLongest_s),
+             "Simulated time at which each appears; before 0: it is there from the start."),
+         key<&EllipsoidScatter::life_s>("life_s", "s", or_infinite(above(0, 0)),
+                                        "Time until each is gone, fades included."),
+         key<&EllipsoidScatter::fade_in_s>("fade_in_s", "s", between(0, kLongest_s),
+                                           "Time in which each comes to full strength."),
+         key<&EllipsoidScatter::fade_out_s>("fade_out_s", "s", between(0, kLongest_s),
+                                            "Time in which each vanishes at the end of its life."),
+         key<&EllipsoidScatter::carried>("carried", "", kAny, kCarriedEffect, "D, control of motion"),
+         key<&EllipsoidScatter::replace>(
+             "replace", "", kAny,
+             "Whether a new one is drawn for each that left the lattice (upwind) or died "
+             "(anywhere), so that their number stays the same.")},
+        &finish_scatter};
+    return section;
+}
+
+// The wind that comes from a direction, clockwise from north. sin_cos_deg() has the same bits on every
+// machine, which matters because the velocity decides the bits of the simulation.
+Velocity velocity_from(double from_deg, double speed_m_per_s) {
+    const SinCos from = sin_cos_deg(from_deg);
+    return {0.0 - speed_m_per_s * from.sin, 0.0 - speed_m_per_s * from.cos};
+}
+
+void finish_level(const SectionReader& reader, void* owner) {
+    auto& level = *static_cast<WindLevel*>(owner);
+    const bool components = reader.find("east_m_per_s") != nullptr || reader.find("north_m_per_s") != nullptr;
+    const bool direction = reader.find("from_deg") != nullptr && reader.find("speed_m_per_s") != nullptr;
+    if (components && direction) {
+        reader.report(
+            "from_deg", "the wind of this level is given twice",
+            "expected either `east_m_per_s` and `north_m_per_s`, or `from_deg` and `speed_m_per_s`");
+    } else if (direction) {
+        level.velocity = velocity_from(reader.number("from_deg", 0), reader.number("speed_m_per_s", 0));
+    } else if (!components) {
+        reader.report("", "this level has no wind",
+                      "expected `east_m_per_s` and `north_m_per_s`, or `from_deg` and `speed_m_per_s`");
+    }
+}
+
+const Section& level_section() {
+    constexpr Limits kSpeed = between(-kFastest_m_per_s, kFastest_m_per_s);
+    static const Section section{
+        "A level of the wind",
+        "The wind at a height, by its components or as pilots say it; between levels it is linear, below the "
+        "first "
+        "and above the last constant.",
+        {required(key<&WindLevel::height_m>("height_m", "m", between(-kFarthest_m, kFarthest_m),
+                                            "Height above the ground; levels rise.", "D, advection")),
+         key<&WindLevel::velocity, &Velocity::east_m_per_s>("east_m_per_s", "m/s", kSpeed,
+                                                            "Velocity towards east."),
+         key<&WindLevel::velocity, &Velocity::north_m_per_s>("north_m_per_s", "m/s", kSpeed,
+                                                             "Velocity towards north."),
+         together(
+             derived_number("from_deg", "deg", between(-360, 360),
+                            "Where the wind comes from, clockwise from north: 270 is a west wind. Instead of "
+                            "`east_m_per_s` and `north_m_per_s`."),
+             {"speed_m_per_s"}),
+         together(derived_number("speed_m_per_s", "m/s", between(0, kFastest_m_per_s), "Its speed."),
+                  {"from_deg"})},
+        &finish_level};
+    return section;
+}
+
+void finish_wind(const SectionReader& reader, void* owner) {
+    const auto& levels = static_cast<const WindKeyframe*>(owner)->levels;
+    const Entry* entry = reader.find("levels");
+    for (std::size_t n = 1; entry != nullptr && n < levels.size(); ++n) {
+        if (levels[n].height_m > levels[n - 1].height_m) continue;
+        const Node& item = entry->value.items[n];
+        const SectionReader level{reader.document, item, indexed(reader.path + ".levels", n), {}};
+        level.report("height_m",
+                     level.quoted("height_m") + " is " + number_text(levels[n].height_m) +
+                         ", not above the level before it at " + number_text(levels[n - 1].height_m),
+                     "expected heights that rise from level to level, in metres");
+    }
+}
+
+}  // namespace
+
+const Section& probabilities_section() {
+    static const Section section{
+        "Probabilities",
+        "How likely vapour, activation and extinction are in a cell and step.",
+        {key<&Probabilities::hum>("hum", "per step", between(0, 1),
+                                  "Probability that a cell without vapour gets some.",
+                                  "D, extinction and birth"),
+         key<&Probabilities::act>("act", "per step", between(0, 1),
+                                  "Probability that a cell is activated, the start of a cloud.",
+                                  "D, extinction and birth"),
+         key<&Probabilities::ext>("ext", "per step", between(0, 1), "Probability that a cloud cell dies.",
+                                  "D, extinction and birth")},
+        nullptr};
+    return section;
+}
+
+const Section& wind_section() {
+    static const Section section{
+        "Wind",
+        "The wind, at one or several times: each `[[wind]]` is a profile over height. Between their times "
+        "profiles "
+        "are mixed linearly. Without any, the air is calm. Cells move by whole cells: after n steps of a "
+        "constant wind a layer has moved floor(n * d) cells, d = velocity * `time.step_s` / "
+        "`lattice.cell_size_m` (0.3 cells a step: 2 after 9 steps, 3 after 10; -0.3: -3 after 9 and after "
+        "10). "
+        "d is rounded up to a multiple of 2^-32 cells, so that decimal fractions arrive in time.",
+        {key<&WindKeyframe::time_s>("time_s", "s", between(-kLongest_s, kLongest_s),
+                                    "Simulated time of this profile; times rise."),
+         required(tables<&WindKeyframe::levels>("levels", level_section(), 1, 1000))},
+        &finish_wind};
+    return section;
+}
+
+const Section& field_section() {
+    static const Section section{
+        "Probability field",
+        "How likely vapour, activation and extinction are: the same everywhere, plus ellipsoids of humid "
+        "air.",
+        {table<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::background>(
+             "background", probabilities_section(),
+             "Probabilities everywhere. Inside ellipsoids the background counts as well: the larger `hum` "
+             "and "
+             "`act` and the smaller `ext` of both."),
+         tables<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::ellipsoids>(
+             "ellipsoids", ellipsoid_section(), 0, 100'000),
+         tables<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::scatters>(
+             "scatters", scatter_section(), 0, 1000)},
+        nullptr};
+    return section;
+}
+
+const Section& lattice_section() {
+    Key boundaries = key<&Scene::automaton, &AutomatonOptions::boundaries>(
+        "boundaries", "", kAny,
+        "What lies beyond the box along east, north and up: nothing (open), or the box again (periodic).",
+        "D, advection");
+    boundaries.words = kBoundaryWords;
+    static const Section section{
+        "Lattice",
+        "The box of cells.",
+        {key<&Scene::automaton, &AutomatonOptions::extent>(
+             "cells", "cells", between(1, kMaxExtent),
+             "Number of cells towards east, north and up. Memory and time grow with their product.", "D"),
+         key<&Scene::automaton, &AutomatonOptions::placement, &Placement::cell_size_m>(
+             "cell_size_m", "m", between(0.01, 1e5), "Edge of a cubic cell."),
+         key<&Scene::automaton, &AutomatonOptions::placement, &Placement::origin_m>(
+             "origin_m", "m", between(-kFarthest_m, kFarthest_m),
+             "Where the lower south-west corner of the box stands; its third number is the height of the "
+             "lowest clouds."),
+         boundaries,
+         replaced(word<&Scene::automaton, &AutomatonOptions::initial>(
+                      "initial", {"empty", "field"},
+                      "How the box starts: without any vapour or cloud, or with vapour and activation drawn "
+                      "from the field at time 0; in a layer that field is its background and its clouds and "
+                      "rain.",
+                      "D"),
+                  "initial_state"),
+         default_is(
+             key<&Scene::initial_state_file>(
+                 "initial_state", "", kAny,
+                 "A VDB file whose bool grids `hum`, `act` and `cld` are the start, instead of `initial`; "
+                 "relative to the scene's folder. Its cells, their size and its place are those of the "
+                 "lattice."),
+             "none")},
+        nullptr};
+    return section;
+}
+
+const Section& time_section() {
+    static const Section section{"Time",
+                                 "The simulation's length.",
+                                 {key<&Scene::automaton, &AutomatonOptions::time_step_s>(
+                                      "step_s", "s", above(0, 86'400),
+                                      "Simulated time of one step: a larger one makes clouds change faster."),
+                                  key<&Scene::steps>("steps", "", between(0, 1e9), "Number of steps.")},
+                                 nullptr};
+    return section;
+}
+
+}  // namespace nephos

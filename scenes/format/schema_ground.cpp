@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// The section of wet and snowy ground: how much lies there over time, and how it looks.
+
+#include "scenes/format/schema_build.h"
+#include "scenes/format/schema_sections.h"
+
+namespace nephos {
+
+using namespace schema_build;
+
+namespace {
+
+template <auto... Members>
+Key cover_key(std::string name, std::string unit, Limits limits, std::string effect,
+              std::string source = {}) {
+    return key<&Scene::ground_cover, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
+                                                 std::move(source));
+}
+
+template <auto... Members>
+Key look_key(std::string name, std::string unit, Limits limits, std::string effect, std::string source = {}) {
+    return key<&Scene::render, &RenderOptions::wet_ground, Members...>(
+        std::move(name), std::move(unit), limits, std::move(effect), std::move(source));
+}
+
+using Cover = GroundCoverOptions;
+using Look = WetGroundOptions;
+
+// How water and snow come and go.
+std::vector<Key> cover_keys() {
+    return {
+        cover_key<&Cover::enabled>("enabled", "", kAny,
+                                   "Whether rain areas wet the ground; false: it is dry for ever.",
+                                   "S, wetness"),
+        cover_key<&Cover::initial_water_mm>("initial_water_mm", "mm", between(0, 100),
+                                            "Film of water everywhere at the start."),
+        cover_key<&Cover::initial_snow_mm>("initial_snow_mm", "mm", between(0, 1000),
+                                           "Snow everywhere at the start, as the water that it holds."),
+        cover_key<&Cover::capacity_mm>(
+            "capacity_mm", "mm", between(0.01, 100),
+            "Film that hollows can hold: the nearer to it, the more of what falls runs off.",
+            "Linsley, Kohler and Paulhus 1949"),
+        cover_key<&Cover::drying_s>("drying_s", "s", or_infinite(above(0, 0)),
+                                    "Time in which a film dries to 1/e."),
+        cover_key<&Cover::melting_mm_per_h>("melting_mm_per_h", "mm/h", between(0, 100),
+                                            "Rate at which snow melts, as water; 0: it is freezing."),
+        cover_key<&Cover::edge>("edge", "", between(0, 1),
+                                "Outer share of a rain area over which its rain falls off to nothing.", "P"),
+        cover_key<&Cover::fall_speed_m_per_s>(
+            "fall_speed_m_per_s", "m/s", or_infinite(above(0, 0)),
+            "Speed of drops on their way down from the clouds' base, during which the wind carries them: "
+            "about 6.5 for rain, 1 for snow; inf: straight down.",
+            "Atlas, Srivastava and Sekhon 1973 (drops of 2 mm)"),
+        cover_key<&Cover::texels>("texels", "texels", between(2, 1024),
+                                  "Side of the map of water and snow; larger is sharper."),
+        cover_key<&Cover::margin>("margin", "", between(0, 10),
+                                  "By how much of the world's size the map reaches beyond it on each side.")};
+}
+
+std::vector<Key> look_keys() {
+    return {
+        look_key<&Look::soaking_mm>(
+            "soaking_mm", "mm", between(1e-3, 100),
+            "Film at which the ground has gone 1 - 1/e of the way from dry to soaked, which is darker.",
+            "Lekner and Dorf 1988"),
+        look_key<&Look::puddle_film_mm>("puddle_film_mm", "mm", between(1e-3, 100),
+                                        "Film at which half of the ground is under water."),
+        look_key<&Look::puddle_size_m>("puddle_size_m", "m", between(0.1, 1000),
+                                       "Size of the largest puddles."),
+        look_key<&Look::reflection>(
+            "reflection", "", between(0, 1),
+            "Strength of the reflection of sky and clouds; 0: none, and no second view is drawn.",
+            "S, wetness"),
+        look_key<&Look::reflection_scale>("reflection_scale", "", between(0.1, 1),
+                                          "Resolution of the mirrored view relative to the picture."),
+        look_key<&Look::sheen>("sheen", "", between(0, 1),
+                               "How much wet ground that is not under water reflects, relative to water."),
+        look_key<&Look::ripples>("ripples", "", between(0, 10),
+                                 "Height of the rings that drops make in puddles; 0: still water.",
+                                 "S, ripples"),
+        look_key<&Look::snow_cover_mm>("snow_cover_mm", "mm", between(1e-3, 1000),
+                                       "Snow, as water, that covers half of the ground."),
+        look_key<&Look::snow_albedo>("snow_albedo", "", between(0, 1),
+                                     "Share of the light that snow reflects: red, green, blue.",
+                                     "Wiscombe and Warren 1980")};
+}
+
+}  // namespace
+
+const Section& wet_ground_section() {
+    static const Section section = [] {
+        std::vector<Key> keys = cover_keys();
+        for (Key& key : look_keys()) keys.push_back(std::move(key));
+        return Section{
+            "Wet and snowy ground",
+            "Water and snow on the ground: rain areas wet it over time, it dries, darkens, mirrors "
+            "sky and clouds, and turns white.",
+            std::move(keys),
+            nullptr,
+            {{"precipitation", "precipitation.kind"}, {"kind", "precipitation.kind"}}};
+    }();
+    return section;
+}
+
+}  // namespace nephos

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sections that decide what is made of the bits: density, frames and pictures.
+
+#include "render/options/sun_position.h"
+#include "scenes/format/schema_build.h"
+#include "scenes/format/schema_render_key.h"
+#include "scenes/format/schema_sections.h"
+#include "scenes/format/text.h"
+
+namespace nephos {
+
+using namespace schema_build;
+
+namespace {
+
+constexpr double kFarthest_m = 1e7;
+constexpr Limits kLight = between(0, 1000);
+
+template <auto... Members>
+Key density_key(std::string name, std::string unit, Limits limits, std::string effect,
+                std::string source = {}) {
+    return key<&Scene::density, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
+                                            std::move(source));
+}
+
+const Section& smoothing_section() {
+    constexpr Limits kReach = between(0, 16);
+    static const Section section{
+        "Smoothing",
+        "The window in space and time over which cloud cells are averaged to a density.",
+        {word<&SmoothingOptions::kernel>(
+             "kernel", {"box", "tent", "gaussian"},
+             "Weights in the window: all the same, falling to the edge, or bell-shaped.", "D, density"),
+         key<&SmoothingOptions::i0>("i0", "cells", kReach, "Reach towards east and west; larger is softer.",
+                                    "D, density"),
+         key<&SmoothingOptions::j0>("j0", "cells", kReach, "Reach towards north and south.", "D, density"),
+         key<&SmoothingOptions::k0>("k0", "cells", kReach, "Reach up and down.", "D, density"),
+         key<&SmoothingOptions::t0>("t0", "steps", kReach,
+                                    "Reach in time; larger makes clouds change more calmly.", "D, density")},
+        nullptr};
+    return section;
+}
+
+void finish_camera(const SectionReader& reader, void* owner) {
+    const Camera& camera = static_cast<const Scene*>(owner)->render.camera;
+    if (camera.position_m == camera.target_m) {
+        reader.report(reader.find("target_m") != nullptr ? "target_m" : "position_m",
+                      "the camera looks at the point where it stands",
+                      "expected `position_m` and `target_m` to differ");
+    }
+    check_camera_path(reader, camera);
+}
+
+void finish_sun(const SectionReader& reader, void* owner) {
+    const Sun& sun = static_cast<const Scene*>(owner)->render.sun;
+    const bool with_date = !sun.date.empty(), with_time = !sun.time.empty();
+    if (with_date != with_time) {
+        const char* given = with_date ? "date" : "time";
+        reader.report(given, reader.quoted(given) + " stands alone", "expected `date` and `time` together");
+    } else if (with_date && !days_since_2000(sun.date, "00:00")) {
+        reader.report("date", reader.quoted("date") + " is \"" + shortened(sun.date) + "\"",
+                      "expected a day from 1900 to 2100 such as \"2026-06-21\"");
+    } else if (with_date && !days_since_2000(sun.date, sun.time)) {
+        reader.report("time", reader.quoted("time") + " is \"" + shortened(sun.time) + "\"",
+                      "expected a universal time such as \"18:30\" or \"18:30:15\"");
+    } else if (sun.moves && !with_date) {
+        reader.report("moves", "the sun moves, but nothing says from where", "expected `date` and `time`");
+    }
+}
+
+}  // namespace
+
+const Section& density_section() {
+    static const Section section{
+        "Density",
+        "How bits become density between 0 and 1, and what is written to VDB files.",
+        {table<&Scene::density, &DensityOptions::smoothing>("smoothing", smoothing_section(),
+                                                            smoothing_section().effect),
+         density_key<&DensityOptions::extinction_per_m>(
+             "extinction_per_m", "1/m", above(0, 100),
+             "Extinction coefficient where the density is 1: larger makes clouds more opaque. Also in every "
+             "file."),
+         density_key<&DensityOptions::metaball_radius_cells>(
+             "metaball_radius_cells", "cells", between(1, 8),
+             "Effective radius of a metaball; larger is softer.", "D, density"),
+         density_key<&DensityOptions::refine>(
+             "refine", "voxels per cell", between(1, 8),
+             "Voxels written per cell and axis; above 1 the field of metaballs is sampled on a finer grid.",
+             "D, density"),
+         density_key<&DensityOptions::half>("half", "", kAny,
+                                            "Write 16-bit floats: 3 digits, half the memory in programs that "
+                                            "keep them so; compressed files are about as large."),
+         density_key<&DensityOptions::write_state>("write_state", "", kAny,
+                                                   "Write also the bool grids `hum`, `act` and `cld`."),
+         density_key<&DensityOptions::write_velocity>("write_velocity", "", kAny,
+                                                      "Write also the wind as the grid `vel`, in m/s.")},
+        nullptr};
+    return section;
+}
+
+const Section& frames_section() {
+    static const Section section{
+        "Frames",
+        "Which moments become density files and pictures: frame n, counted from 0, shows the simulated time "
+        "`start_s` + n * `time_scale` / `per_second`, whatever the time step is.",
+        {key<&Scene::frames, &FrameOptions::per_second>("per_second", "1/s", above(0, 1000),
+                                                        "Frames of one second of film.", "D, density"),
+         key<&Scene::frames, &FrameOptions::time_scale>(
+             "time_scale", "s/s", above(0, 1e6), "Simulated seconds in one second of film: 1 is real time."),
+         key<&Scene::frames, &FrameOptions::start_s>(
+             "start_s", "s", between(0, 1e15),
+             "Simulated time of the first frame: skips the growing of the clouds."),
+         key<&Scene::frames, &FrameOptions::count>(
+             "count", "", between(0, kMaxFrames),
+             "Number of frames; 0: as many as the simulated time holds (for none at all: `nephos run "
+             "--statistics-only`)."),
+         key<&Scene::frames, &FrameOptions::png>("png", "", kAny,
+                                                 "Write a tone-mapped picture of each frame."),
+         key<&Scene::frames, &FrameOptions::exr>("exr", "", kAny,
+                                                 "Write a linear picture of each frame with all layers."),
+         key<&Scene::frames, &FrameOptions::video>("video", "", kAny,
+                                                   "Write an MP4 of all frames, by the ffmpeg command.")},
+        nullptr};
+    return section;
+}
+
+const Section& camera_section() {
+    constexpr Limits kPixels = between(1, 16'384);
+    constexpr Limits kWorld = between(-kFarthest_m, kFarthest_m);
+    static const Section section{
+        "Camera",
+        "A perspective camera; height is up in the picture.",
+        {render_key<&RenderOptions::camera, &Camera::position_m>("position_m", "m", kWorld,
+                                                                 "Where it stands."),
+         render_key<&RenderOptions::camera, &Camera::target_m>("target_m", "m", kWorld, "What it looks at."),
+         render_key<&RenderOptions::camera, &Camera::vertical_fov_deg>(
+             "vertical_fov_deg", "deg", between(1, 170), "Angle from the picture's lower to its upper edge."),
+         render_key<&RenderOptions::camera, &Camera::width>("width", "pixels", kPixels,
+                                                            "Width of the picture."),
+         render_key<&RenderOptions::camera, &Camera::height>("height", "pixels", kPixels,
+                                                             "Height of the picture."),
+         render_key<&RenderOptions::camera, &Camera::exposure_ev>(
+             "exposure_ev", "stops", between(-30, 30), "Each stop doubles the brightness of the picture."),
+         tables<&Scene::render, &RenderOptions::camera, &Camera::path>("path", camera_path_section(), 0,
+                                                                       10'000)},
+        &finish_camera};
+    return section;
+}
+
+const Section& sun_section() {
+    static const Section section{
+        "Sun",
+        "The light.",
+        {render_key<&RenderOptions::sun, &Sun::elevation_deg>("elevation_deg", "deg", between(-18, 90),
+                                                              "Height above the horizon."),
+         render_key<&RenderOptions::sun, &Sun::azimuth_deg>("azimuth_deg", "deg", between(-360, 360),
+                                                            "Where it stands, clockwise from north."),
+         render_key<&RenderOptions::sun, &Sun::colour>("colour", "", kLight,
+                                                       "Its linear colour and strength.", "D, step 1"),
+         render_key<&RenderOptions::sun, &Sun::date>(
+             "date", "", kAny,
+             "Day such as \"2026-06-21\": the sun stands where it is seen from `latitude_deg` and "
+             "`longitude_deg` at that `time`, whatever `elevation_deg` and `azimuth_deg` say.",
+             "S; Michalsky 1988"),
+         render_key<&RenderOptions::sun, &Sun::time>(
+             "time", "", kAny, "Universal time such as \"18:30\" or \"18:30:15\", with `date`."),
+         render_key<&RenderOptions::sun, &Sun::latitude_deg>("latitude_deg", "deg", between(-90, 90),
+                                                             "Place for `date`; north is positive."),
+         render_key<&RenderOptions::sun, &Sun::longitude_deg>("longitude_deg", "deg", between(-180, 180),
+                                                              "Place for `date`; east is positive."),
+         render_key<&RenderOptions::sun, &Sun::moves>(
+             "moves", "", kAny, "Move the sun with simulated time, which begins at `date` and `time`."),
+         render_key<&RenderOptions::shadow_map_size>(
+             "shadow_map_size", "texels", between(16, 8192),
+             "Side of the map of the clouds' shadow; larger is sharper.", "D, step 1")},
+        &finish_sun};
+    return section;
+}
+
+const Section& lightning_section() {
+    constexpr Limits kWorld = between(-kFarthest_m, kFarthest_m);
+    static const Section section{
+        "Lightning",
+        "Flashes that light clouds and ground from their place. A flash is brightest when it begins and "
+        "fades as (1 - "
+        "t / `duration_s`)^2; of several at one moment the brightest lights the picture.",
+        {required(key<&LightningFlash::position_m>("position_m", "m", kWorld, "Its place.")),
+         key<&LightningFlash::time_s>("time_s", "s", between(0, 1e15), "Simulated time at which it begins."),
+         key<&LightningFlash::duration_s>("duration_s", "s", above(0, 1e9), "How long it lasts."),
+         key<&LightningFlash::colour>("colour", "", between(0, 1), "Its linear colour."),
+         key<&LightningFlash::intensity>("intensity", "", between(0, 1e6),
+                                         "Light that arrives at a distance of 1 km, as a multiple of that of "
+                                         "a sun of colour 1; falls off with "
+                                         "the square of the distance.")},
+        nullptr};
+    return section;
+}
+
+const Section& debug_view_section() {
+    static const Section section{
+        "Debug view",
+        "What clouds made of base models consist of, drawn over the picture.",
+        {render_key<&RenderOptions::debug_view, &DebugView::boxes>(
+             "boxes", "", kAny, "Edges of the seed boxes, blue.", "T, figure 28"),
+         render_key<&RenderOptions::debug_view, &DebugView::axes>(
+             "axes", "", kAny, "Axes through the centres of clouds: east red, north green, up blue.",
+             "T, figure 28"),
+         render_key<&RenderOptions::debug_view, &DebugView::roots>(
+             "roots", "", kAny, "An arrow for each root of the base model, yellow.", "T, figure 28"),
+         render_key<&RenderOptions::debug_view, &DebugView::rays>(
+             "rays", "", kAny,
+             "Rays from the boxes to the sun, white, and red inside of boxes, where light is absorbed.",
+             "T, figure 28")},
+        nullptr};
+    return section;
+}
+
+const Section& air_section() {
+    static const Section section{
+        "Air",
+        "The air between cloud and eye, and the sky behind.",
+        {render_key<&RenderOptions::air, &Air::extinction_per_m>(
+             "extinction_per_m", "1/m", between(0, 1),
+             "Extinction of the air for red, green and blue: larger veils what is far away.",
+             "D, light shafts (beta)"),
+         render_key<&RenderOptions::air, &Air::horizon>(
+             "horizon", "", kLight, "Linear colour of the sky at the horizon, also of the veil."),
+         render_key<&RenderOptions::air, &Air::zenith>("zenith", "", kLight,
+                                                       "Linear colour of the sky overhead.")},
+        nullptr};
+    return section;
+}
+
+const Section& ground_section() {
+    static const Section section{"Ground",
+                                 "The plane that wears the clouds' shadow.",
+                                 {render_key<&RenderOptions::ground, &Ground::height_m>(
+                                      "height_m", "m", between(-1e5, 1e5), "Its height."),
+                                  render_key<&RenderOptions::ground, &Ground::albedo>(
+                                      "albedo", "", between(0, 1),
+                                      "Share of the light that it reflects: red, green, blue.", "D, step 2")},
+                                 nullptr};
+    return section;
+}
+
+}  // namespace nephos

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Keys of Scene::render, for the schema sources that describe pictures. Private to the module.
+
+#include <string>
+#include <utility>
+
+#include "scenes/format/schema_build.h"
+
+namespace nephos::schema_build {
+
+// `Members`: the way from RenderOptions to the option.
+template <auto... Members>
+Key render_key(std::string name, std::string unit, Limits limits, std::string effect,
+               std::string source = {}) {
+    return key<&Scene::render, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
+                                           std::move(source));
+}
+
+}  // namespace nephos::schema_build

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The sections of a scene file; see schema.h. Internal to scenes/.
+
+#include <span>
+#include <string_view>
+
+#include "scenes/format/schema.h"
+
+namespace nephos {
+
+// Owner: Scene.
+const Section& lattice_section();
+const Section& time_section();
+const Section& field_section();
+const Section& density_section();
+const Section& frames_section();
+const Section& camera_section();
+const Section& sun_section();
+const Section& light_section();
+const Section& lightning_section();
+const Section& debug_view_section();
+const Section& air_section();
+const Section& atmosphere_section();
+const Section& ground_section();
+const Section& shells_section();
+const Section& light_shafts_section();
+const Section& fog_section();
+const Section& wet_ground_section();
+const Section& precipitation_section();
+const Section& level_of_detail_section();
+
+// Owner: CameraKey.
+const Section& camera_path_section();
+// Owner: WindKeyframe.
+const Section& wind_section();
+// Owner: Probabilities.
+const Section& probabilities_section();
+// Owner: BaseModel, NamedSky, ClimateOptions, LayerOptions.
+const Section& model_section();
+const Section& sky_section();
+const Section& climate_section();
+const Section& layer_section();
+// Owner: VeilOptions.
+const Section& veil_section();
+
+// Keys of a layer that mean nothing beside `veil`.
+std::span<const std::string_view> keys_of_clouds();
+
+// The key `models`: files that base models are taken from (model_files.h); it has no value of its own.
+Key model_files_key();
+inline constexpr int kMaxModels = 10'000;
+
+// Checks of values that lie in several sections, and the defaults that depend on them; owner: Scene.
+void finish_scene(const SectionReader& reader, void* owner);
+
+// Reports profiles of the key `wind` of a scene or a layer whose times do not rise.
+void check_wind_times(const SectionReader& owner, const Wind& wind);
+
+// Reports key frames of the camera whose times do not rise; the reader is that of [camera].
+void check_camera_path(const SectionReader& reader, const Camera& camera);
+
+// The part of it that concerns models, skies, climate and layers.
+void finish_layers(const SectionReader& reader, Scene& scene);
+
+}  // namespace nephos

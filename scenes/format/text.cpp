@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scenes/format/text.h"
+
+#include <charconv>
+#include <cmath>
+
+namespace nephos {
+namespace {
+
+constexpr char32_t kReplacement = 0xFFFD;
+
+bool is_control(char32_t code) {
+    const bool c0_or_c1 = code < 0x20 || (code >= 0x7F && code < 0xA0);
+    const bool reorders_text = (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
+    return c0_or_c1 || reorders_text || code == 0x2028 || code == 0x2029;
+}
+
+}  // namespace
+
+Character character_at(std::string_view text, std::size_t offset) {
+    const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(text[offset + n]); };
+    const Character invalid{kReplacement, text.substr(offset, 1), false};
+    const unsigned first = byte(0);
+    if (first < 0x80) return {first, text.substr(offset, 1), true};
+    const int length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
+    if (first < 0xC2 || first > 0xF4 || text.size() - offset < std::size_t(length)) return invalid;
+    char32_t code = first & (0xFFu >> (length + 1));
+    for (int n = 1; n < length; ++n) {
+        if ((byte(std::size_t(n)) & 0xC0) != 0x80) return invalid;
+        code = (code << 6) | (byte(std::size_t(n)) & 0x3F);
+    }
+    constexpr char32_t kSmallest[] = {0, 0, 0x80, 0x800, 0x10000};
+    const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
+    if (code < kSmallest[length] || code > 0x10FFFF || surrogate) return invalid;
+    return {code, text.substr(offset, std::size_t(length)), true};
+}
+
+std::size_t find_invalid_utf8(std::string_view text) {
+    std::size_t offset = 0;
+    while (offset < text.size()) {
+        const Character character = character_at(text, offset);
+        if (!character.valid) return offset;
+        offset += character.bytes.size();
+    }
+    return text.size();
+}
+
+int display_width(char32_t code) {
+    const auto in = [code](char32_t low, char32_t high) { return code >= low && code <= high; };
+    if (in(0x300, 0x36F) || in(0x200B, 0x200F) || in(0x20D0, 0x20FF) || in(0xFE00, 0xFE0F)) return 0;
+    if (in(0x1100, 0x115F) || in(0x2E80, 0xA4CF) || in(0xAC00, 0xD7A3) || in(0xF900, 0xFAFF)) return 2;
+    if (in(0xFE30, 0xFE6F) || in(0xFF00, 0xFF60) || in(0x1F300, 0x1FAFF) || in(0x20000, 0x3FFFD)) return 2;
+    return 1;
+}
+
+std::string printable(std::string_view text) {
+    std::string out;
+    for (std::size_t offset = 0; offset < text.size();) {
+        const Character character = character_at(text, offset);
+        const bool shown = character.valid && (character.code == '\t' || !is_control(character.code));
+        out += shown ? character.bytes : std::string_view("\xEF\xBF\xBD");
+        offset += character.bytes.size();
+    }
+    return out;
+}
+
+std::string shortened(std::string_view text, std::size_t limit) {
+    std::size_t offset = 0;
+    for (std::size_t n = 0; n < limit && offset < text.size(); ++n)
+        offset += character_at(text, offset).bytes.size();
+    std::string out = printable(text.substr(0, offset));
+    if (offset < text.size()) out += "...";
+    return out;
+}
+
+std::string number_text(double value) {
+    if (std::isnan(value)) return "nan";
+    if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
+    constexpr double kLargestPlain = 1e15, kSmallestPlain = 1e-4;  // beyond, an exponent reads better
+    const double size = std::abs(value);
+    const bool plain = size < kLargestPlain && (size >= kSmallestPlain || size == 0);
+    char buffer[32];
+    char* const limit = buffer + sizeof buffer;
+    const auto end = plain ? std::to_chars(buffer, limit, value, std::chars_format::fixed)
+                           : std::to_chars(buffer, limit, value);
+    return std::string(buffer, end.ptr);
+}
+
+std::string toml_number(double value) {
+    std::string text = number_text(value);
+    if (text.find_first_of(".en") == std::string::npos) text += ".0";
+    return text;
+}
+
+std::string toml_string(std::string_view text) {
+    constexpr char kHex[] = "0123456789ABCDEF";
+    std::string out = "\"";
+    for (const char c : text) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (c == '"' || c == '\\') {
+            out += '\\';
+            out += c;
+        } else if (byte < 0x20 || byte == 0x7F) {
+            out += "\\u00";
+            out += kHex[byte >> 4];
+            out += kHex[byte & 15];
+        } else {
+            out += c;
+        }
+    }
+    return out + '"';
+}
+
+std::string enclosed(std::string_view text, char mark) {
+    std::string out(1, mark);
+    out += text;
+    out += mark;
+    return out;
+}
+
+std::string indexed(std::string_view path, std::size_t index) {
+    std::string out(path);
+    out += '[';
+    out += std::to_string(index);
+    out += ']';
+    return out;
+}
+
+std::string joined(const std::vector<std::string>& items, std::string_view last_separator) {
+    std::string out;
+    for (std::size_t n = 0; n < items.size(); ++n) {
+        if (n > 0) out += n + 1 == items.size() ? last_separator : std::string_view(", ");
+        out += items[n];
+    }
+    return out;
+}
+
+}  // namespace nephos

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/layer_simulation.h"
+
+#include <utility>
+
+#include "automaton/checkpoint.h"
+#include "core/bytes.h"
+#include "core/error.h"
+#include "scenes/format/writer.h"
+#include "seeds/coupling.h"
+
+namespace nephos {
+namespace {
+
+// A part of the saved state, with its length before it; nothing but the length when there is no such part.
+template <typename Part>
+void put_part(ByteWriter& writer, const std::optional<Part>& part) {
+    const std::vector<std::byte> bytes = part ? part->save() : std::vector<std::byte>();
+    writer.put(std::uint64_t(bytes.size()));
+    writer.put_bytes(bytes);
+}
+
+template <typename Part>
+void restore_part(ByteReader& reader, std::optional<Part>& part) {
+    const auto size = reader.get<std::uint64_t>();
+    if (size > reader.rest().size() || (size > 0) != part.has_value()) {
+        throw Error(ErrorCode::io, "the saved state is not of this layer");
+    }
+    const std::span<const std::byte> bytes = reader.rest().first(std::size_t(size));
+    if (part) part->restore(bytes);
+    reader.skip(bytes.size());
+}
+
+double metres(std::int64_t after, std::int64_t before) {
+    // Unsigned: the sum of a very long simulation wraps around.
+    return double(std::int64_t(std::uint64_t(after) - std::uint64_t(before))) * 0x1p-32;
+}
+
+// All that a veil's density depends on, but for the time.
+std::string text_of_veil(const Scene& scene, std::size_t layer) {
+    Scene alone;
+    alone.automaton.seed = layer_seed(scene.automaton.seed, layer);
+    alone.automaton.time_step_s = scene.automaton.time_step_s;
+    alone.automaton.wind = layer_wind(scene, layer);
+    alone.layers = {scene.layers[layer]};
+    alone.layers.front().wind = {};
+    return to_toml(alone);
+}
+
+}  // namespace
+
+LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::optional<Lattice> initial)
+    : number_(std::uint32_t(layer)), time_step_s_(scene.automaton.time_step_s) {
+    if (!scene.layers.empty()) {
+        options_ = scene.layers[layer];
+        if (options_.is_veil) {
+            veil_ = veil_options(scene, layer);
+            wind_ = layer_wind(scene, layer);
+            veil_text_ = text_of_veil(scene, layer);
+            return;
+        }
+        attached_ = attached_rain(scene, layer);
+        sky_.emplace(sky_options(scene, layer));
+    }
+    if (!options_.automaton) return;
+    const AutomatonOptions lattice = automaton_options(scene, layer);
+    if (initial) {
+        automaton_.emplace(lattice, std::move(*initial));
+    } else {
+        automaton_.emplace(lattice, field_of_clouds());
+    }
+    if (options_.rain.find) {
+        finder_.emplace(options_.rain.finder, lattice.extent, lattice.placement, lattice.boundaries, number_);
+    }
+}
+
+std::uint64_t LayerSimulation::steps() const {
+    if (is_veil()) return steps_;
+    return automaton_ ? automaton_->steps() : sky_->steps();
+}
+
+DensityGrid LayerSimulation::veil_at(double time_s) const {
+    return scaled(veil_density(veil_, wind_, options_.extent, options_.placement, time_s), options_.opacity);
+}
+
+GridBox LayerSimulation::box() const {
+    if (is_veil()) return {options_.extent, options_.placement};
+    return {automaton_->options().extent, automaton_->options().placement};
+}
+
+Boundaries LayerSimulation::boundaries() const {
+    return automaton_ ? automaton_->options().boundaries : Boundaries{};
+}
+
+void LayerSimulation::step() {
+    if (is_veil()) {
+        ++steps_;
+        return;
+    }
+    if (sky_ && automaton_) automaton_->set_external_ellipsoids(field_of_clouds());
+    if (automaton_) automaton_->step();
+    if (!sky_) return;
+    const Displacement before = sky_->carried();
+    sky_->step();
+    if (!finder_) return;
+    const Displacement& after = sky_->carried();
+    finder_->update(automaton_->cld(), time_step_s_, metres(after.x, before.x), metres(after.y, before.y));
+}
+
+std::vector<ActiveEllipsoid> LayerSimulation::field_of_clouds() const {
+    if (!sky_) return {};
+    std::vector<ActiveEllipsoid> ellipsoids = ellipsoids_of(*sky_, options_.coupling);
+    append_columns(ellipsoids, rain(), options_.rain.column);
+    return ellipsoids;
+}
+
+std::vector<RainArea> LayerSimulation::rain() const {
+    if (!sky_) return {};
+    std::vector<RainArea> areas =
+        placed_areas(options_.rain.placed, sky_->time_s(), sky_->carried(), number_);
+    const auto add = [&](const std::vector<RainArea>& more) {
+        areas.insert(areas.end(), more.begin(), more.end());
+    };
+    add(attached_areas(attached_, *sky_));
+    if (finder_) add(finder_->areas());
+    return areas;
+}
+
+StateHash LayerSimulation::hash() const {
+    if (is_veil()) {
+        ByteWriter writer;
+        writer.put_bytes(std::as_bytes(std::span(veil_text_)));
+        writer.put(steps_);
+        return hash_of_bytes(writer.bytes());
+    }
+    return automaton_ ? automaton_->hash() : sky_->hash();
+}
+
+std::vector<std::byte> LayerSimulation::save() const {
+    if (is_veil()) {
+        ByteWriter writer;
+        writer.put(steps_);
+        return writer.take();
+    }
+    if (!sky_) return automaton_->save();
+    ByteWriter writer;
+    put_part(writer, automaton_);
+    put_part(writer, sky_);
+    put_part(writer, finder_);
+    return writer.take();
+}
+
+void LayerSimulation::restore(std::span<const std::byte> bytes) {
+    if (is_veil()) {
+        ByteReader reader(bytes);
+        steps_ = reader.get<std::uint64_t>();
+        if (!reader.rest().empty()) throw Error(ErrorCode::io, "the saved state is not of this layer");
+        return;
+    }
+    if (!sky_) {
+        automaton_->restore(bytes);
+        return;
+    }
+    ByteReader reader(bytes);
+    restore_part(reader, automaton_);
+    restore_part(reader, sky_);
+    restore_part(reader, finder_);
+    if (!reader.rest().empty() || (automaton_ && automaton_->steps() != sky_->steps())) {
+        throw Error(ErrorCode::io, "the saved state is not of this layer");
+    }
+}
+
+std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial) {
+    std::vector<LayerSimulation> layers;
+    layers.reserve(lattice_count(scene));
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        layers.emplace_back(scene, n, scene.layers.empty() ? std::move(initial) : std::nullopt);
+    }
+    return layers;
+}
+
+StateHash combined_hash(std::span<const StateHash> hashes) {
+    return hashes.size() == 1 ? hashes.front() : hash_of_bytes(std::as_bytes(hashes));
+}
+
+StateHash combined_hash(std::span<const LayerSimulation> layers) {
+    std::vector<StateHash> hashes;
+    for (const LayerSimulation& layer : layers) hashes.push_back(layer.hash());
+    return combined_hash(hashes);
+}
+
+}  // namespace nephos

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/manifest.h"
+
+#include <array>
+#include <fstream>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "core/atomic_file.h"
+#include "core/descriptor.h"
+#include "core/error.h"
+#include "core/random.h"
+#include "core/trigonometry.h"
+#include "density/combine.h"
+#include "simulation/version.h"
+
+namespace nephos {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormatVersion = 1;
+
+Json vector_json(const Vec3& v) { return {v.x, v.y, v.z}; }
+
+// A path below the run's folder, with forward slashes.
+std::string relative(const RunSettings& settings, const std::filesystem::path& path) {
+    return path.lexically_relative(settings.folder).generic_string();
+}
+
+Json frame_json(const RunSettings& settings, const FrameRecord& frame, const ManifestState& state,
+                const RunFolder& folder) {
+    const FrameOptions& frames = settings.scene.frames;
+    Json entry = {{"number", frame.number},
+                  {"time_s", frame.time_s},
+                  {"step", frame.step},
+                  {"state_hash", frame.state_hash.hex()}};
+    if (has_density(settings.scene)) entry["density"] = relative(settings, folder.density(frame.number));
+    if (settings.render && (frames.png || frames.video)) {
+        entry["png"] = relative(settings, folder.picture(frame.number, ".png"));
+    }
+    if (settings.render && frames.exr)
+        entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
+    Json layers = Json::object();
+    for (const LayerOptions& layer : settings.scene.layers) {
+        if (has_density(layer))
+            layers[layer.name] = relative(settings, folder.density(frame.number, layer.name));
+    }
+    if (!layers.empty()) entry["layers"] = std::move(layers);
+    const auto rain = state.rain.find(frame.number);
+    if (rain != state.rain.end()) entry["rain"] = Json::parse(rain->second);
+    return entry;
+}
+
+Json area_json(const RainArea& area, const std::string& layer) {
+    constexpr std::array kSources{"placed", "attached", "found"};
+    return {{"id", fmt::format("{:016x}", area.id)},
+            {"layer", layer},
+            {"source", kSources.at(std::size_t(area.id >> 62))},
+            {"centre_m", {area.x_m, area.y_m}},
+            {"semi_axes_m", {area.semi_a_m, area.semi_b_m}},
+            {"yaw_deg", degrees_of_vector(area.axis_x, area.axis_y)},
+            {"intensity_mm_per_h", area.intensity_mm_per_h}};
+}
+
+Json bounds_json(const Scene& scene, const GridBox& box) {
+    const int refine = scene.density.refine;
+    const Placement& at = box.placement;
+    const Extent& cells = box.extent;
+    return {{"voxels", {cells.x * refine, cells.y * refine, cells.z * refine}},
+            {"voxel_size_m", at.cell_size_m / refine},
+            {"min_m", vector_json(at.origin_m)},
+            {"max_m",
+             {at.origin_m.x + cells.x * at.cell_size_m, at.origin_m.y + cells.y * at.cell_size_m,
+              at.origin_m.z + cells.z * at.cell_size_m}},
+            {"up_axis", "z"},
+            {"extinction_per_m", scene.density.extinction_per_m}};
+}
+
+// The box of all layers together.
+GridBox whole_box(const Scene& scene) {
+    std::vector<GridBox> boxes;
+    for (const LayerOptions& layer : scene.layers) {
+        if (has_density(layer)) boxes.push_back({layer.extent, layer.placement});
+    }
+    if (boxes.empty()) boxes.push_back({scene.automaton.extent, scene.automaton.placement});
+    return common_box(boxes);
+}
+
+Json layers_json(const RunSettings& settings, const RunFolder& folder) {
+    Json layers = Json::array();
+    for (const LayerOptions& layer : settings.scene.layers) {
+        layers.push_back({{"name", layer.name},
+                          {"automaton", layer.automaton},
+                          {"veil", layer.is_veil},
+                          {"opacity", layer.opacity},
+                          {"bounds", bounds_json(settings.scene, {layer.extent, layer.placement})},
+                          {"statistics", relative(settings, folder.statistics(layer.name))}});
+    }
+    return layers;
+}
+
+// All that stands before the list of frames.
+Json head_json(const RunSettings& settings, const ManifestState& state) {
+    const Scene& scene = settings.scene;
+    const RunFolder folder{settings.folder, scene.name};
+    Json json;
+    json["format"] = "nephos run";
+    json["format_version"] = kFormatVersion;
+    json["nephos_version"] = version();
+    json["random_stream_version"] = kRandomStreamVersion;
+    json["complete"] = state.complete;
+    json["scene"] = {{"name", scene.name},
+                     {"file", settings.scene_file},
+                     {"hash", settings.scene_hash},
+                     {"simulation_hash", settings.simulation_hash},
+                     {"seed", std::to_string(scene.automaton.seed)}};
+    json["range"] = {{"last_step", settings.range.last_step},
+                     {"first_frame", settings.range.first_frame},
+                     {"last_frame", settings.range.last_frame},
+                     {"pictures", settings.render}};
+    json["steps"] = {{"reported", state.steps_reported},
+                     {"time_step_s", scene.automaton.time_step_s},
+                     {"state_hash", state.state_hash}};
+    json["bounds"] = bounds_json(scene, whole_box(scene));
+    if (!scene.layers.empty()) json["layers"] = layers_json(settings, folder);
+    json["files"] = {{"statistics", relative(settings, folder.statistics())},
+                     {"checkpoint", relative(settings, folder.checkpoint())}};
+    if (state.complete && settings.render && scene.frames.video) {
+        json["files"]["video"] = relative(settings, folder.video());
+    }
+    json["frames_per_second"] = scene.frames.per_second;
+    json["time_scale"] = scene.frames.time_scale;
+    return json;
+}
+
+// The members of an object in lines of their own, without its braces.
+std::string members(const Json& object) {
+    const std::string text = object.dump(2, ' ', false, Json::error_handler_t::replace);
+    return text.substr(2, text.size() - 4);
+}
+
+}  // namespace
+
+void write_manifest(const RunSettings& settings, const ManifestState& state) {
+    const RunFolder folder{settings.folder, settings.scene.name};
+    write_pieces_atomically(folder.manifest(), [&](const AppendPiece& append) {
+        append("{\n" + members(head_json(settings, state)) + ",\n  \"frames\": [");
+        std::string_view separator = "\n";
+        for (const FrameRecord& frame : state.frames) {
+            append(separator);
+            append("    " + frame_json(settings, frame, state, folder)
+                                .dump(-1, ' ', false, Json::error_handler_t::replace));
+            separator = ",\n";
+        }
+        const Json tail = {{"scene_text", settings.scene_text},
+                           {"timing", {{"wall_s", state.wall_s}, {"device", state.device}}}};
+        append("\n  ],\n" + members(tail) + "\n}\n");
+    });
+}
+
+std::string rain_text(const FrameResult& frame) {
+    Json areas = Json::array();
+    for (const LayerFrame& layer : frame.layers) {
+        for (const RainArea& area : layer.rain) areas.push_back(area_json(area, layer.name));
+    }
+    return areas.empty() ? std::string() : areas.dump();
+}
+
+std::map<int, std::string> read_rain(const std::filesystem::path& path) {
+    require_regular_file(path);
+    std::ifstream stream(path, std::ios::binary);
+    try {
+        std::map<int, std::string> rain;
+        const Json json = Json::parse(stream);
+        for (const Json& frame : json.at("frames")) {
+            if (frame.contains("rain")) rain[frame.at("number").get<int>()] = frame.at("rain").dump();
+        }
+        return rain;
+    } catch (const nlohmann::json::exception&) {
+        throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
+    }
+}
+
+EarlierRun read_manifest(const std::filesystem::path& path) {
+    require_regular_file(path);
+    std::ifstream stream(path, std::ios::binary);
+    try {
+        // The frames are not needed here, and may be very many.
+        const Json json = Json::parse(stream, [](int depth, Json::parse_event_t event, const Json& parsed) {
+            return !(depth == 1 && event == Json::parse_event_t::key && parsed == "frames");
+        });
+        if (json.at("format") != "nephos run" || json.at("format_version") != kFormatVersion) {
+            throw Error(ErrorCode::io, path.string() + ": is not a manifest of this version of nephos");
+        }
+        EarlierRun run;
+        run.complete = json.at("complete").get<bool>();
+        run.name = json.at("scene").at("name").get<std::string>();
+        run.scene_hash = json.at("scene").at("hash").get<std::string>();
+        run.simulation_hash = json.at("scene").at("simulation_hash").get<std::string>();
+        run.render = json.at("range").at("pictures").get<bool>();
+        run.range.last_step = json.at("range").at("last_step").get<std::uint64_t>();
+        run.range.first_frame = json.at("range").at("first_frame").get<int>();
+        run.range.last_frame = json.at("range").at("last_frame").get<int>();
+        run.steps_reported = json.at("steps").at("reported").get<std::uint64_t>();
+        return run;
+    } catch (const nlohmann::json::exception&) {
+        throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
+    }
+}
+
+}  // namespace nephos

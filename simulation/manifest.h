@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// manifest.json: what was run, with which hashes, and every file of the run with its moment, so that another
+// program needs to guess nothing. All but "timing" is a function of the scene and the command line alone.
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "automaton/automaton.h"
+#include "simulation/run_folder.h"
+
+namespace nephos {
+
+// A frame that is in the folder. Small: a run keeps one for each frame, 40 bytes beside a grid of kilobytes
+// on disk.
+struct FrameRecord {
+    int number = 1;
+    double time_s = 0;
+    std::uint64_t step = 0;
+    StateHash state_hash;
+};
+
+// What a run tells its manifest.
+struct ManifestState {
+    bool complete = false;
+    std::uint64_t steps_reported = 0;
+    std::string state_hash;  // at the last reported step
+    std::vector<FrameRecord> frames;
+    std::map<int, std::string>
+        rain;  // frame: its rain areas as JSON, by rain_text(); frames without rain left out
+    double wall_s = 0;
+    std::string device;
+};
+
+// Writes atomically, frame by frame. As JSON cannot be appended to, every call writes the whole list anew:
+// some 200 bytes a frame, against seconds between two checkpoints. Throws Error(io).
+void write_manifest(const RunSettings& settings, const ManifestState& state);
+
+// The rain areas of a frame as the manifest lists them; empty without any.
+std::string rain_text(const FrameResult& frame);
+
+// Those that the manifest of an earlier run lists, for ManifestState::rain. Throws Error(io) as
+// read_manifest().
+std::map<int, std::string> read_rain(const std::filesystem::path& path);
+
+// What a later run must know about an earlier one.
+struct EarlierRun {
+    bool complete = false;
+    std::string name, scene_hash, simulation_hash;
+    bool render = true;
+    PipelineRange range;
+    std::uint64_t steps_reported = 0;
+};
+
+// Throws Error(io) when the file cannot be read or is no manifest.
+EarlierRun read_manifest(const std::filesystem::path& path);
+
+}  // namespace nephos

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/memory.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "automaton/automaton.h"
+#include "core/error.h"
+#include "core/text.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
+
+constexpr double kCheckpointCopies = 3;
+// 43 MiB on two cores; threads have heaps of their own.
+constexpr std::size_t kProgram = std::size_t(64) << 20;
+constexpr double kGrids = 3;  // two steps and the frame between them
+// Frames under way in simulation/frame_output.h: one that is written and one that waits for it; before them, with
+// pictures, one that a graphics card draws and one that is prepared for it.
+constexpr double kFramesWritten = 2;
+constexpr double kFramesDrawn = 2;
+constexpr double kBytesPerVoxel = 4.5;    // a float, and the masks and nodes of the tree above it
+constexpr double kBytesPerVelocity = 13;  // three floats and the same
+constexpr double kBytesPerBits = 1;       // hum, act and cld with their masks and nodes
+constexpr double kPlannedCover = 0.5;     // share of voxels that are metaballs
+// Itself twice, its colour, its keys while sorting, on the device too.
+constexpr double kBytesPerMetaball = 84;
+constexpr double kBytesPerPixel = 96;  // layers of the picture on both sides, and the files being written
+constexpr double kBytesPerShadowTexel = 16;
+constexpr double kBytesPerPictureWritten = 20;  // a pixel of Picture: colour, transmittance, depth
+
+std::size_t saturated(double bytes) { return bytes < double(kUnlimited) ? std::size_t(bytes) : kUnlimited; }
+
+std::size_t sum(std::size_t a, std::size_t b) { return a > kUnlimited - b ? kUnlimited : a + b; }
+
+std::string advice(const MemoryEstimate& estimate) {
+    const std::size_t largest = std::max({estimate.automaton, estimate.density, estimate.pictures});
+    if (largest == estimate.automaton) return "fewer `lattice.cells`";
+    if (largest == estimate.density) return "fewer `lattice.cells` or a smaller `density.refine`";
+    return "fewer `lattice.cells`, a smaller `density.refine` or smaller pictures";
+}
+
+// Voxels in memory when every block of 8x8x8 holds something.
+double voxels_in_blocks(const Extent& cells, int refine) {
+    const auto along = [&](int n) { return std::ceil(double(n) * refine / 8) * 8; };
+    return along(cells.x) * along(cells.y) * along(cells.z);
+}
+
+// The grids of the frame that is made, of those that are under way to their files, and the copies that are
+// written, of one frame at a time.
+double grid_bytes(const Extent& cells, const DensityOptions& density, double under_way) {
+    const double written = voxels_in_blocks(cells, density.refine);
+    double bytes = (kGrids + under_way) * kBytesPerVoxel * voxels_in_blocks(cells, 1);
+    if (density.refine > 1) bytes += kBytesPerVoxel * written;
+    if (density.write_velocity) bytes += kBytesPerVelocity * written;
+    if (density.write_state) bytes += kBytesPerBits * written;
+    return bytes;
+}
+
+}  // namespace
+
+std::size_t MemoryEstimate::total() const { return sum(sum(program, automaton), sum(density, pictures)); }
+
+namespace {
+
+// Voxels of a lattice whose blocks all hold something, in voxels of `voxel_m`.
+double voxels_of_size(const AutomatonOptions& lattice, double voxel_m) {
+    const double per_cell = lattice.placement.cell_size_m / voxel_m;
+    return voxels_in_blocks(lattice.extent, 1) * per_cell * per_cell * per_cell;
+}
+
+MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& lattice, double under_way) {
+    const double window =
+        2.0 * scene.density.smoothing.t0 + 2;  // the steps around both neighbours of a frame
+    // With the state written, hum and act are remembered beside cld. A checkpoint holds the planes and that
+    // history as bytes: gathered in a growing buffer, and copied once into the file's content.
+    const double plane = double(BitPlane::bytes(lattice.extent));
+    const double history = window * (scene.density.write_state ? 3 : 1) * plane;
+    const double planes_under_way = scene.density.write_state ? under_way * 3 * plane : 0;
+    const double checkpoint = kCheckpointCopies * (3 * plane + history);
+    MemoryEstimate estimate;
+    estimate.automaton = Automaton::memory_bytes(lattice);
+    estimate.density = saturated(history + planes_under_way + checkpoint +
+                                 grid_bytes(lattice.extent, scene.density, under_way));
+    return estimate;
+}
+
+// A veil has grids alone: nothing of it is remembered.
+MemoryEstimate veil_estimate(const Scene& scene, const AutomatonOptions& lattice, double under_way) {
+    DensityOptions density = scene.density;
+    density.write_state = false;
+    MemoryEstimate estimate;
+    estimate.density = saturated(grid_bytes(lattice.extent, density, under_way));
+    return estimate;
+}
+
+// Grids of all layers together, which have the smallest voxels of all: of the frame that is made and of those
+// under way. A refined one is of one frame alone.
+double combined_bytes(const Scene& scene, double under_way) {
+    if (scene.layers.size() < 2) return 0;
+    double finest_m = std::numeric_limits<double>::infinity(), voxels = 0;
+    for (const LayerOptions& layer : scene.layers) {
+        if (has_density(layer))
+            finest_m = std::min(finest_m, layer.placement.cell_size_m / scene.density.refine);
+    }
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        if (has_density(scene.layers[n])) voxels += voxels_of_size(automaton_options(scene, n), finest_m);
+    }
+    const double coarse = voxels / std::pow(double(scene.density.refine), 3);
+    return (voxels + under_way * coarse) * kBytesPerVoxel;
+}
+
+}  // namespace
+
+namespace {
+
+// Maps of the ground: those that the history remembers, and of frames under way; the history's again in
+// checkpoints.
+double ground_bytes(const Scene& scene, double under_way) {
+    if (!scene.ground_cover.enabled) return 0;
+    const double map = 3.0 * sizeof(float) * scene.ground_cover.texels * scene.ground_cover.texels;
+    const double history = 2.0 * scene.density.smoothing.t0 + 2;
+    return map * (history * (1 + kCheckpointCopies) + under_way);
+}
+
+// The mirrored view and its levels.
+double mirror_bytes(const Scene& scene, double pixels) {
+    if (!scene.ground_cover.enabled || scene.render.wet_ground.reflection == 0) return 0;
+    const double scale = 1.15 * scene.render.wet_ground.reflection_scale;
+    return pixels * scale * scale * (kBytesPerPixel + 4 * sizeof(float) * 4 / 3);
+}
+
+}  // namespace
+
+MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
+    MemoryEstimate estimate;
+    estimate.program = kProgram;
+    const double under_way = kFramesWritten + (with_pictures ? kFramesDrawn : 0);
+    double cells = 0;
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        if (!scene.layers.empty() && !has_density(scene.layers[n])) continue;
+        const AutomatonOptions options = automaton_options(scene, n);
+        const bool veil = !scene.layers.empty() && scene.layers[n].is_veil;
+        const MemoryEstimate lattice =
+            veil ? veil_estimate(scene, options, under_way) : lattice_estimate(scene, options, under_way);
+        estimate.automaton = sum(estimate.automaton, lattice.automaton);
+        estimate.density = sum(estimate.density, lattice.density);
+        cells += double(options.extent.x) * options.extent.y * options.extent.z;
+    }
+    estimate.density =
+        sum(estimate.density, saturated(combined_bytes(scene, under_way) + ground_bytes(scene, under_way)));
+    if (!with_pictures) return estimate;
+    const double pixels = double(scene.render.camera.width) * scene.render.camera.height;
+    const double texels = double(scene.render.shadow_map_size) * scene.render.shadow_map_size;
+    const double metaballs = cells * kPlannedCover;
+    estimate.pictures =
+        saturated(metaballs * kBytesPerMetaball + pixels * kBytesPerPixel + texels * kBytesPerShadowTexel +
+                  mirror_bytes(scene, pixels) +
+                  kFramesWritten * (pixels * kBytesPerPictureWritten + texels * sizeof(float)));
+    return estimate;
+}
+
+std::size_t memory_estimate_bytes(const Scene& scene, bool with_pictures) {
+    return memory_estimate(scene, with_pictures).total();
+}
+
+void check_memory(const Scene& scene, const AvailableMemory& available, bool with_pictures) {
+    const MemoryEstimate estimate = memory_estimate(scene, with_pictures);
+    if (estimate.total() <= available.bytes) return;
+    const Extent& extent = scene.automaton.extent;
+    const auto text = [](int number) { return std::to_string(number); };
+    throw Error(ErrorCode::usage, "the scene needs about " + bytes_text(estimate.total()) +
+                                      " of memory (automaton " + bytes_text(estimate.automaton) +
+                                      ", density " + bytes_text(estimate.density) + ", pictures " +
+                                      bytes_text(estimate.pictures) + ") for " + text(extent.x) + " x " +
+                                      text(extent.y) + " x " + text(extent.z) + " cells" +
+                                      (scene.layers.empty() ? "" : " and the lattices of its layers") +
+                                      ", but the " + available.limit + " leaves " +
+                                      bytes_text(available.bytes) + ": expected " + advice(estimate));
+}
+
+void check_memory(const Scene& scene, bool with_pictures) {
+    check_memory(scene, available_memory(), with_pictures);
+}
+
+}  // namespace nephos

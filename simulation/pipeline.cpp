@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/pipeline.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "density/combine.h"
+#include "density/smoothing.h"
+
+namespace nephos {
+namespace {
+
+// Layers whose state is about to be replaced: empty lattices are the cheapest to make.
+std::vector<LayerSimulation> blank_layers(const Scene& scene) {
+    std::vector<LayerSimulation> layers;
+    layers.reserve(lattice_count(scene));
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        const Extent extent = automaton_options(scene, n).extent;
+        layers.emplace_back(scene, n, Lattice{BitPlane(extent), BitPlane(extent), BitPlane(extent)});
+    }
+    return layers;
+}
+
+BitPlane copy_of(const BitPlaneView& view) {
+    BitPlane plane(view.extent);
+    std::copy_n(view.words, view.word_count(), plane.words().begin());
+    return plane;
+}
+
+// Cells of a box in all, and the volume that they fill.
+double volume_m3(const GridBox& box) {
+    const double edge = box.placement.cell_size_m;
+    return double(box.extent.cells()) * edge * edge * edge;
+}
+
+// Statistics of several layers as those of the whole sky (StepResult).
+class TotalStatistics {
+  public:
+    void add(const CloudStatistics& layer, double volume_m3) {
+        total_.hum += layer.hum;
+        total_.act += layer.act;
+        total_.cld += layer.cld;
+        clear_ *= 1 - layer.cover;
+        base_ = std::fmin(base_, layer.base_m);
+        top_ = std::fmax(top_, layer.top_m);
+        density_ += layer.mean_density * volume_m3;
+        volume_ += volume_m3;
+    }
+    CloudStatistics result() const {
+        CloudStatistics total = total_;
+        total.cover = 1 - clear_;
+        total.base_m = base_;
+        total.top_m = top_;
+        total.mean_density = volume_ > 0 ? density_ / volume_ : 0;
+        return total;
+    }
+
+  private:
+    CloudStatistics total_;
+    double clear_ = 1, density_ = 0, volume_ = 0;
+    double base_ = std::numeric_limits<double>::quiet_NaN(), top_ = base_;
+};
+
+std::optional<GroundCover> dry_or_covered(const Scene& scene) {
+    if (!scene.ground_cover.enabled) return {};
+    return GroundCover(scene.ground_cover, scene.render.precipitation.kind, whole_world(scene));
+}
+
+CloudStatistics no_automaton() {
+    CloudStatistics none;
+    none.base_m = none.top_m = std::numeric_limits<double>::quiet_NaN();
+    return none;
+}
+
+}  // namespace
+
+PipelineRange full_range(const Scene& scene) { return {scene.steps, 1, frame_count(scene)}; }
+
+PipelineRange range_of_frames(const Scene& scene, int first, int last) {
+    const int count = frame_count(scene);
+    if (last == kLastFrame) last = count;
+    if (first < 1 || last < first || last > count) {
+        throw Error(ErrorCode::usage,
+                    count == 0
+                        ? fmt::format("the scene '{}' has no frames", scene.name)
+                        : fmt::format("no such frame: the scene '{}' has frames 1 to {}", scene.name, count));
+    }
+    return {steps_up_to(moment_of_frame(scene, last - 1)), first, last};
+}
+
+Pipeline::Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
+                   std::optional<Lattice> initial)
+    : scene_(scene),
+      range_(range),
+      simulation_hash_(std::move(simulation_hash)),
+      layers_(make_layers(scene, std::move(initial))),
+      ground_(dry_or_covered(scene)),
+      next_frame_(range.first_frame) {
+    if (range_.last_frame >= range_.first_frame &&
+        steps_up_to(moment_of_number(range_.last_frame)) > range_.last_step) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("frame {} shows {:g} s, but the simulation ends at {:g} s", range_.last_frame,
+                                frame_time_s(scene_.frames, range_.last_frame - 1),
+                                double(range_.last_step) * scene_.automaton.time_step_s));
+    }
+    remember();
+}
+
+Pipeline::Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
+                   const Checkpoint& checkpoint)
+    : scene_(scene),
+      range_(range),
+      simulation_hash_(std::move(simulation_hash)),
+      layers_(blank_layers(scene)),
+      ground_(dry_or_covered(scene)) {
+    if (checkpoint.simulation_hash != simulation_hash_) {
+        throw Error(ErrorCode::usage, "the checkpoint belongs to another simulation");
+    }
+    restore_layers(checkpoint);
+    if (steps_taken() != checkpoint.steps || combined_hash(layers_) != checkpoint.state) {
+        throw Error(ErrorCode::io, "the checkpoint's state does not have the hash that it names");
+    }
+    restore_history(checkpoint);
+}
+
+std::uint64_t Pipeline::steps_in_all() const {
+    return range_.last_step + std::uint64_t(scene_.density.smoothing.t0);
+}
+
+bool Pipeline::finished() const { return next_step_ > range_.last_step && next_frame_ > range_.last_frame; }
+
+Moment Pipeline::moment_of_number(int number) const { return moment_of_frame(scene_, number - 1); }
+
+bool Pipeline::density_is_due(std::uint64_t step) const {
+    return steps_taken() >= step + std::uint64_t(scene_.density.smoothing.t0);
+}
+
+// The lowest step whose density a result still needs.
+std::uint64_t Pipeline::lowest_needed() const {
+    std::uint64_t lowest = next_step_ <= range_.last_step ? next_step_ : steps_taken();
+    if (next_frame_ <= range_.last_frame) lowest = std::min(lowest, moment_of_number(next_frame_).step);
+    return lowest;
+}
+
+void Pipeline::advance(PipelineSink& sink) {
+    assert(!finished());
+    const bool frames_left = next_frame_ <= range_.last_frame;
+    const std::uint64_t frame_needs = frames_left ? steps_up_to(moment_of_number(next_frame_)) : 0;
+    if (frames_left && frame_needs < next_step_ && density_is_due(frame_needs)) {
+        report_frame(sink);
+    } else if (next_step_ <= range_.last_step && density_is_due(next_step_)) {
+        report_step(sink);
+    } else {
+        step();
+    }
+}
+
+void Pipeline::step() {
+    for (LayerSimulation& layer : layers_) layer.step();
+    if (ground_) ground_->advance(scene_.automaton.time_step_s);
+    remember();
+}
+
+void Pipeline::report_step(PipelineSink& sink) {
+    const std::vector<DensityGrid>& densities = densities_at_step(next_step_);
+    const Past& state = past(next_step_);
+    StepResult result;
+    result.step = state.step;
+    result.time_s = double(state.step) * scene_.automaton.time_step_s;
+    result.hash = state.hash;
+    TotalStatistics total;
+    for (std::size_t n = 0; n < layers_.size(); ++n) {
+        const PastLayer& past = state.layers[n];
+        LayerStep layer{layers_[n].name(), past.state, past.clouds.size(), past.rain.size(), 0,
+                        past.statistics,   past.hash};
+        for (const RainArea& area : past.rain) {
+            layer.rain_mm_per_h = std::max(layer.rain_mm_per_h, area.intensity_mm_per_h);
+        }
+        if (layers_[n].has_density()) {
+            const GridBox box = layers_[n].box();
+            if (layers_[n].is_veil()) layer.statistics = cloud_statistics(densities[n]);
+            layer.statistics.mean_density = densities[n].sum() / double(box.extent.cells());
+            total.add(layer.statistics, volume_m3(box));
+        }
+        result.layers.push_back(std::move(layer));
+    }
+    result.statistics = layers_.size() == 1 ? result.layers.front().statistics : total.result();
+    if (scene_.layers.empty()) result.layers.clear();
+    sink.step(result);
+    ++next_step_;
+    forget();
+}
+
+double Pipeline::time_s(const Moment& moment) const {
+    return (double(moment.step) + moment.fraction) * scene_.automaton.time_step_s;
+}
+
+DensityGrid Pipeline::density_at(std::size_t layer, const Moment& moment) {
+    if (moment.fraction != 0 && layers_[layer].is_veil()) return layers_[layer].veil_at(time_s(moment));
+    const DensityGrid before = densities_at_step(moment.step)[layer];
+    if (moment.fraction == 0 || !layers_[layer].automaton()) return before;
+    return mix(before, densities_at_step(moment.step + 1)[layer], moment.fraction);
+}
+
+// A layer at a moment between two steps.
+LayerFrame Pipeline::layer_frame(std::size_t layer, const Moment& moment) {
+    LayerFrame frame;
+    frame.name = layers_[layer].name();
+    frame.density = density_at(layer, moment);
+    frame.boundaries = layers_[layer].boundaries();
+    const PastLayer& state = past(moment.step).layers[layer];
+    frame.hash = state.hash;
+    frame.direct = !layers_[layer].has_density();
+    frame.sky = layers_[layer].sky();
+    frame.rain = state.rain;
+    if (scene_.density.write_state && layers_[layer].automaton()) {
+        frame.planes = state.planes;
+        frame.hum = state.planes->hum.view();
+        frame.act = state.planes->act.view();
+        frame.cld = state.planes->cld.view();
+    }
+    const double step_s = scene_.automaton.time_step_s, at_s = double(moment.step) * step_s;
+    for (const SkyCloud& cloud : state.clouds) {
+        frame.clouds.push_back(frame.sky->ahead(cloud, at_s, moment.fraction * step_s));
+    }
+    if (moment.fraction > 0) {
+        frame.rain = mix(state.rain, past(moment.step + 1).layers[layer].rain, moment.fraction);
+    }
+    return frame;
+}
+
+std::shared_ptr<const GroundCoverMap> Pipeline::ground_at(const Moment& moment) const {
+    const std::shared_ptr<const GroundCoverMap>& before = past(moment.step).ground;
+    if (moment.fraction == 0 || !before) return before;
+    return std::make_shared<const GroundCoverMap>(
+        mix(*before, *past(moment.step + 1).ground, moment.fraction));
+}
+
+void Pipeline::report_frame(PipelineSink& sink) {
+    const Moment moment = moment_of_number(next_frame_);
+    FrameResult result;
+    result.number = next_frame_;
+    result.time_s = frame_time_s(scene_.frames, next_frame_ - 1);
+    result.step = moment.step;
+    result.hash = past(moment.step).hash;
+    std::vector<DensityGrid> densities;
+    std::vector<Boundaries> boundaries;
+    for (std::size_t n = 0; n < layers_.size(); ++n) {
+        result.layers.push_back(layer_frame(n, moment));
+        if (!layers_[n].has_density()) continue;
+        densities.push_back(result.layers.back().density);
+        boundaries.push_back(result.layers.back().boundaries);
+    }
+    if (!densities.empty()) result.density = combine(densities, boundaries);
+    result.ground = ground_at(moment);
+    if (scene_.layers.empty()) {
+        result.hum = result.layers.front().hum;
+        result.act = result.layers.front().act;
+        result.cld = result.layers.front().cld;
+        result.planes = result.layers.front().planes;
+        result.layers.clear();
+    }
+    sink.frame(result);
+    ++next_frame_;
+    forget();
+}
+
+Pipeline::PastLayer Pipeline::past_of(const LayerSimulation& layer) const {
+    PastLayer state;
+    state.hash = layer.hash();
+    state.statistics = no_automaton();
+    Lattice planes;
+    if (const Automaton* automaton = layer.automaton()) {
+        state.statistics = cloud_statistics(automaton->hum(), automaton->act(), automaton->cld(),
+                                            automaton->options().placement);
+        planes.cld = copy_of(automaton->cld());
+        if (scene_.density.write_state) {
+            planes.hum = copy_of(automaton->hum());
+            planes.act = copy_of(automaton->act());
+        }
+    }
+    state.planes = std::make_shared<const Lattice>(std::move(planes));
+    if (const SkySimulation* sky = layer.sky()) {
+        state.state = sky->state();
+        state.clouds.assign(sky->clouds().begin(), sky->clouds().end());
+        state.rain = layer.rain();
+    }
+    return state;
+}
+
+void Pipeline::remember() {
+    Past state;
+    state.step = steps_taken();
+    std::vector<StateHash> hashes;
+    for (const LayerSimulation& layer : layers_) {
+        state.layers.push_back(past_of(layer));
+        hashes.push_back(state.layers.back().hash);
+    }
+    state.hash = combined_hash(hashes);
+    if (ground_) expose_ground(state);
+    history_.push_back(std::move(state));
+    forget();
+}
+
+// The rain areas of a new state fall onto the ground, which lies as it does now.
+void Pipeline::expose_ground(Past& state) {
+    const double time_s = double(state.step) * scene_.automaton.time_step_s;
+    std::vector<FallingRain> falling;
+    for (std::size_t n = 0; n < scene_.layers.size(); ++n) {
+        const Range& base_m = scene_.layers[n].base_height_m;
+        falling.push_back({state.layers[n].rain,
+                           drift_m(layer_wind(scene_, n), time_s, (base_m.min + base_m.max) / 2,
+                                   scene_.render.ground.height_m, scene_.ground_cover.fall_speed_m_per_s)});
+    }
+    ground_->expose(falling);
+    state.ground = std::make_shared<const GroundCoverMap>(ground_->map());
+}
+
+void Pipeline::forget() {
+    const std::uint64_t lowest = lowest_needed();
+    const auto reach = std::uint64_t(scene_.density.smoothing.t0);
+    while (history_.size() > 1 && history_.front().step + reach < lowest) history_.pop_front();
+    std::erase_if(densities_, [&](const auto& entry) { return entry.step < lowest; });
+}
+
+const Pipeline::Past& Pipeline::past(std::uint64_t step) const {
+    assert(!history_.empty() && step >= history_.front().step && step <= history_.back().step);
+    return history_[std::size_t(step - history_.front().step)];
+}
+
+DensityGrid Pipeline::density_of(std::size_t layer, std::uint64_t step) const {
+    if (layers_[layer].is_veil()) return layers_[layer].veil_at(time_s({step, 0}));
+    const Automaton* automaton = layers_[layer].automaton();
+    if (automaton == nullptr) return {};
+    const auto reach = std::uint64_t(scene_.density.smoothing.t0);
+    std::vector<TimedPlane> planes;
+    for (std::uint64_t at = step > reach ? step - reach : 0; at <= step + reach; ++at) {
+        planes.push_back(
+            {past(at).layers[layer].planes->cld.view(), int(std::int64_t(at) - std::int64_t(step))});
+    }
+    const AutomatonOptions& lattice = automaton->options();
+    return scaled(smooth(planes, scene_.density.smoothing, lattice.placement, lattice.boundaries),
+                  layers_[layer].opacity());
+}
+
+const std::vector<DensityGrid>& Pipeline::densities_at_step(std::uint64_t step) {
+    for (const Densities& known : densities_) {
+        if (known.step == step) return known.layers;
+    }
+    Densities made{step, {}};
+    for (std::size_t n = 0; n < layers_.size(); ++n) made.layers.push_back(density_of(n, step));
+    densities_.push_back(std::move(made));
+    return densities_.back().layers;
+}
+
+}  // namespace nephos

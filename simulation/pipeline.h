@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// From a scene to its frames, without files, devices or a command line:
+//
+//     step of every layer -> history of the last states -> density q at steps -> frames between steps
+//
+// q at step s needs the states s-t0 .. s+t0, and a frame between two steps needs q at both. The history keeps
+// exactly the states that something still needs; so the automaton runs up to t0 steps ahead of the results,
+// also beyond the scene's last step. A frame therefore never depends on where the run ends.
+//
+//     Pipeline pipeline(scene, full_range(scene), simulation_hash);
+//     while (!pipeline.finished()) pipeline.advance(sink);
+//
+// Between any two calls of advance() the pipeline can be saved; one that is restored goes on with the same
+// results.
+
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "automaton/automaton.h"
+#include "automaton/checkpoint.h"
+#include "density/density_grid.h"
+#include "density/statistics.h"
+#include "scenes/format/scene.h"
+#include "seeds/ground_cover.h"
+#include "simulation/layer_simulation.h"
+
+namespace nephos {
+
+class ByteReader;
+
+// One layer after a step; a row of its own file of statistics.
+struct LayerStep {
+    std::string name;
+    double state = 0;        // of the atmosphere, 0..1
+    std::size_t clouds = 0;  // in the sky, those that form or dissolve included
+    std::size_t rain_areas = 0;
+    double rain_mm_per_h = 0;    // the strongest of them
+    CloudStatistics statistics;  // of a veil, of its voxels; all 0 of clouds drawn directly
+    StateHash hash;
+};
+
+// One row of statistics.csv: the state after `step` steps.
+struct StepResult {
+    std::uint64_t step = 0;
+    double time_s = 0;
+    // mean_density is that of q at this step. Of several layers: sums of cells, the cover of layers that
+    // overlap at random (1 - product of 1 - cover), lowest base, highest top, mean density of all their boxes
+    // together.
+    CloudStatistics statistics;
+    StateHash hash;
+    std::vector<LayerStep> layers;  // none in a scene without layers
+};
+
+// One layer in a frame.
+struct LayerFrame {
+    std::string name;
+    DensityGrid density;    // one voxel a cell; without automaton there are no voxels
+    Boundaries boundaries;  // of the density's box
+    StateHash hash;
+    std::optional<BitPlaneView> hum, act, cld;  // as in FrameResult
+    std::shared_ptr<const Lattice> planes;      // what they look at
+    // Clouds at the frame's time; their shapes and models are those of `sky`, which itself stands at a later
+    // step.
+    const SkySimulation* sky = nullptr;  // null without clouds of its own; lives as long as the pipeline
+    std::vector<SkyCloud> clouds;
+    bool direct = false;         // there is no density: clouds are drawn as billboards
+    std::vector<RainArea> rain;  // at the frame's time
+};
+
+// One frame: density at a moment that need not be a step. A copy is cheap, shares voxels and planes, and
+// stays valid while the pipeline lives; another thread may use it while the pipeline advances.
+struct FrameResult {
+    int number = 1;  // as in file names, counted from 1
+    double time_s = 0;
+    DensityGrid density;  // one voxel a cell (not refined); of layers, all together (density/combine.h)
+    std::uint64_t step =
+        0;  // the last step at or before time_s, whose state the three planes and the hash are
+    StateHash hash;
+    // Only when the scene writes the state. A scene with layers has them in these.
+    std::optional<BitPlaneView> hum, act, cld;
+    std::shared_ptr<const Lattice> planes;         // what they look at
+    std::vector<LayerFrame> layers;                // none in a scene without layers
+    std::shared_ptr<const GroundCoverMap> ground;  // at time_s; null when the scene does not ask for it
+};
+
+// Receives results in the order of time; a step comes before the frames at or after it.
+class PipelineSink {
+  public:
+    virtual ~PipelineSink() = default;
+    virtual void step(const StepResult& result) = 0;
+    virtual void frame(const FrameResult& result) = 0;
+};
+
+// Which part of the scene is produced. Frames by their number, counted from 1; an empty range (last < first)
+// means no frame at all.
+struct PipelineRange {
+    std::uint64_t last_step = 0;  // steps 0..last_step are reported
+    int first_frame = 1, last_frame = 0;
+    bool operator==(const PipelineRange&) const = default;
+};
+
+// Everything that the scene names; with a range of frames, these and the steps up to the last of them.
+// `last` = kLastFrame is the last that there is; throws Error(usage) when the scene has no such frame.
+inline constexpr int kLastFrame = std::numeric_limits<int>::max();
+PipelineRange full_range(const Scene& scene);
+PipelineRange range_of_frames(const Scene& scene, int first, int last);
+
+class Pipeline {
+  public:
+    // At step 0: from the scene's own initial state, or from `initial`. Throws as Automaton.
+    Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
+             std::optional<Lattice> initial = {});
+    // Where `checkpoint` was saved. Throws Error(usage) when it belongs to another simulation, another
+    // smoothing window or another range; Error(io) when its content is damaged.
+    Pipeline(const Scene& scene, const PipelineRange& range, std::string simulation_hash,
+             const Checkpoint& checkpoint);
+
+    bool finished() const;
+
+    // Does the smallest piece of work that is due: reports one step or one frame, or lets the automaton take
+    // a step. Precondition: not finished().
+    void advance(PipelineSink& sink);
+
+    // Gives back the densities, to make room for the copy; they are computed again when they are needed.
+    Checkpoint save();
+
+    std::uint64_t steps_taken() const { return layers_.front().steps(); }
+    std::uint64_t next_step() const { return next_step_; }  // the first that was not reported yet
+    int next_frame() const { return next_frame_; }          // the first that was not reported yet
+    // Steps that the automaton takes in all, those ahead included.
+    std::uint64_t steps_in_all() const;
+
+  private:
+    // A past state of a layer, as much of it as is still needed.
+    struct PastLayer {
+        CloudStatistics statistics;
+        StateHash hash;
+        double state = 0;
+        // Never null; without automaton all are empty, hum and act unless the scene writes the state.
+        std::shared_ptr<const Lattice> planes;
+        std::vector<SkyCloud> clouds;
+        std::vector<RainArea> rain;
+    };
+    struct Past {
+        std::uint64_t step = 0;
+        StateHash hash;
+        std::vector<PastLayer> layers;
+        std::shared_ptr<const GroundCoverMap> ground;  // null without ground cover
+    };
+    // q of all layers at a step; empty grids where there is no automaton.
+    struct Densities {
+        std::uint64_t step = 0;
+        std::vector<DensityGrid> layers;
+    };
+
+    void step();
+    void remember();
+    void expose_ground(Past& state);
+    PastLayer past_of(const LayerSimulation& layer) const;
+    void forget();
+    bool density_is_due(std::uint64_t step) const;
+    const std::vector<DensityGrid>& densities_at_step(std::uint64_t step);
+    DensityGrid density_of(std::size_t layer, std::uint64_t step) const;
+    double time_s(const Moment& moment) const;
+    DensityGrid density_at(std::size_t layer, const Moment& moment);
+    const Past& past(std::uint64_t step) const;
+    void report_step(PipelineSink& sink);
+    void report_frame(PipelineSink& sink);
+    LayerFrame layer_frame(std::size_t layer, const Moment& moment);
+    std::shared_ptr<const GroundCoverMap> ground_at(const Moment& moment) const;
+    Moment moment_of_number(int number) const;
+    std::uint64_t lowest_needed() const;
+    void restore_layers(const Checkpoint& checkpoint);
+    void restore_history(const Checkpoint& checkpoint);
+    void restore_ground(ByteReader& reader);
+
+    Scene scene_;
+    PipelineRange range_;
+    std::string simulation_hash_;
+    std::vector<LayerSimulation> layers_;  // never empty; the one of a scene without layers has no sky
+    std::optional<GroundCover> ground_;    // at the last step taken
+    std::deque<Past> history_;             // consecutive steps, the newest last; never empty
+    std::vector<Densities> densities_;     // q at steps that are still needed
+    std::uint64_t next_step_ = 0;
+    int next_frame_ = 1;
+};
+
+}  // namespace nephos

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A run on disk: which files the folder of a run has, and the run itself, which fills it.
+//
+//     DIR/density/NAME_0001.vdb ...    a density grid a frame; of layers, all together
+//     DIR/density/LAYER/NAME_0001.vdb  a density grid a frame of each layer, with its own voxels
+//     DIR/frames/NAME_0001.png ...     a picture a frame, and/or NAME_0001.exr; NAME.mp4 of them all
+//     DIR/statistics.csv               a row a step
+//     DIR/statistics/LAYER.csv         a row a step of each layer
+//     DIR/manifest.json                what was run, and every file with its moment
+//     DIR/checkpoint.nephos            where to go on
+//
+// Every file appears complete or not at all, but for statistics.csv, to which each checkpoint appends whole
+// rows. A run that was interrupted and resumed at any moment leaves the same content as one that was not;
+// only the part "timing" of the manifest differs.
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render/renderer.h"
+#include "scenes/format/scene.h"
+#include "simulation/pipeline.h"
+
+namespace nephos {
+
+struct RunFolder {
+    std::filesystem::path folder;
+    std::string name;
+
+    std::filesystem::path density(int frame) const;  // frames count from 1
+    std::filesystem::path density(int frame, const std::string& layer) const;
+    std::filesystem::path picture(int frame, std::string_view extension) const;  // ".png" or ".exr"
+    std::filesystem::path video() const;
+    std::filesystem::path statistics() const { return folder / "statistics.csv"; }
+    std::filesystem::path statistics(const std::string& layer) const {
+        return folder / "statistics" / (layer + ".csv");
+    }
+    std::filesystem::path manifest() const { return folder / "manifest.json"; }
+    std::filesystem::path checkpoint() const { return folder / "checkpoint.nephos"; }
+};
+
+struct RunSettings {
+    Scene scene;
+    std::optional<Lattice> initial;  // the state at step 0, when it is not the scene's own
+    std::string scene_file;          // as the manifest names it
+    std::string scene_text;          // canonical
+    std::string scene_hash;          // of everything in the scene
+    std::string simulation_hash;     // of what decides the automaton's bits
+    PipelineRange range;
+    bool render = true;      // pictures too; needs a Vulkan device
+    DeviceOptions device{};  // that draws them
+    std::filesystem::path folder;
+    bool resume = false;             // go on from the folder's checkpoint
+    bool overwrite = false;          // start anew although the folder holds what would be lost
+    double checkpoint_every_s = 60;  // wall time between checkpoints; 0 = after every piece of work
+};
+
+struct RunProgress {
+    std::uint64_t steps = 0, steps_in_all = 0;
+    int frames = 0, frames_in_all = 0;
+    std::string_view phase;  // "simulating", "drawing", "encoding"
+};
+
+struct RunObserver {
+    std::function<void(const RunProgress&)> progress;  // may be empty
+    // Asked between pieces of work; true ends the run with a checkpoint. May be empty.
+    std::function<bool()> stop;
+};
+
+// One kind of file that a run wrote.
+struct RunFiles {
+    std::string kind;  // "density", "png", "exr", "video", "statistics", "manifest", "checkpoint"
+    std::vector<std::filesystem::path> files;
+};
+
+struct RunReport {
+    bool complete = false;
+    std::uint64_t first_step = 0;      // 0, or where it was resumed
+    std::uint64_t steps_taken = 0;     // by the automaton, those ahead of the results included
+    std::uint64_t steps_reported = 0;  // rows in statistics.csv
+    int frames = 0;                    // in the folder
+    std::string state_hash;            // at the last reported step
+    double wall_s = 0;
+    std::string device;  // that drew; empty without pictures
+    std::vector<RunFiles> files;
+};
+
+// What a run of this scene with pictures writes of them: any, which takes a Vulkan device; a video, which
+// takes the ffmpeg command.
+bool wants_pictures(const Scene& scene);
+bool wants_video(const Scene& scene);
+
+// Runs, or goes on. Throws Error(usage) when the settings contradict each other or the folder's checkpoint,
+// or when files would be lost that are not of a complete run; Error(io) naming a file that could not be
+// written or read, or when another run is writing into the folder. Before anything is simulated: Error(gpu)
+// when pictures are wanted and there is no device, Error(io) when a video is wanted and there is no ffmpeg.
+// After any exception the folder can be resumed from its last checkpoint.
+RunReport run_scene(const RunSettings& settings, const RunObserver& observer);
+
+}  // namespace nephos

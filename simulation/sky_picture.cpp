@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/sky_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+#include "core/vec.h"
+#include "render/ground/wet_ground.h"
+#include "render/options/camera.h"
+#include "seeds/light_schedule.h"
+#include "simulation/debug_view.h"
+#include "simulation/simulation.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kFarthest_m = 1e7;
+constexpr double kLeastFlash = 1.0 / 512;  // relative to the sun; less does not show
+
+}  // namespace
+
+Light light_of(const Sun& sun) { return {direction_to_sun(sun), true}; }
+Light light_of(const Flash& flash) { return {flash.position_m, false}; }
+
+GroundCoverView view_of(const GroundCoverMap& map) {
+    return {map.x_m,
+            map.y_m,
+            map.texel_x_m,
+            map.texel_y_m,
+            map.columns,
+            map.rows,
+            map.water_mm,
+            map.snow_mm,
+            map.rain_mm_per_h,
+            map.outside.water_mm,
+            map.outside.snow_mm,
+            map.outside_rain_mm_per_h};
+}
+
+Frustum frustum_of(const Camera& camera) {
+    const CameraFrame frame = camera_frame(camera);
+    FrustumView view;
+    view.eye_m = camera.position_m;
+    view.forward = frame.forward;
+    view.up = frame.up;
+    view.fov_y_deg = camera.vertical_fov_deg;
+    view.aspect = double(camera.width) / camera.height;
+    view.far_m = kFarthest_m;
+    return frustum_of(view);
+}
+
+const SkyBillboards::ScatteredBillboards& SkyBillboards::scattered(const SkySimulation& sky,
+                                                                   const SkyCloud& cloud) {
+    scattered_.resize(sky.shapes().size());
+    std::optional<ScatteredBillboards>& result = scattered_[cloud.shape];
+    if (result) return *result;
+    const CloudShape& shape = sky.shapes()[cloud.shape];
+    result.emplace();
+    result->billboards = scatter_billboards(sky.model(cloud), shape.cloud, sky.options().seed,
+                                            std::uint32_t(shape.model), shape.number);
+    result->low_m = shape.cloud.low_m.z;
+    result->high_m = std::max(shape.cloud.high_m.z, result->low_m + 1e-3);
+    for (const Billboard& billboard : result->billboards) {
+        result->reach_m = std::max(result->reach_m, 0.5 * std::hypot(billboard.width_m, billboard.height_m));
+        result->low_m = std::min(result->low_m, billboard.centre_m.z - 0.5 * billboard.height_m);
+        result->high_m = std::max(result->high_m, billboard.centre_m.z + 0.5 * billboard.height_m);
+    }
+    return *result;
+}
+
+std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                                        const RenderOptions& options, const std::optional<FilmFrame>& film) {
+    const LightSchedule schedule(sky.options(), film ? options.light.cfa_clouds_per_frame : 0);
+    const Light present = light_of(options.sun);
+    std::unordered_map<int, Light> earlier;  // by frame
+    const auto light_for = [&](const SkyCloud& cloud) -> const Light& {
+        if (schedule.period() == 1) return present;
+        const int frame = schedule.frame_of_light(cloud.slot, film->index);
+        const auto [found, added] = earlier.try_emplace(frame);
+        if (added) found->second = light_of(sun_at(film->sun, frame_time_s(film->frames, frame)));
+        return found->second;
+    };
+    std::vector<CloudToLight> lit;
+    for (const SkyCloud& cloud : clouds)
+        lit.push_back({cloud.serial, &sky.shape(cloud), sky.position_m(cloud), light_for(cloud)});
+    return sun_.update(lit);
+}
+
+void SkyBillboards::light_by_flash(const SkySimulation& sky, const Flash& flash,
+                                   const std::vector<const SkyCloud*>& seen) {
+    std::vector<CloudToLight> lit;
+    for (const SkyCloud* cloud : seen) {
+        const Sphere sphere = sky.sphere(*cloud);
+        const double nearest = std::max(
+            length(sphere.centre_m - flash.position_m) - sphere.radius_m - scattered(sky, *cloud).reach_m,
+            1.0);
+        if (flash.intensity * 1e6 / (nearest * nearest) < kLeastFlash) continue;
+        lit.push_back({cloud->serial, &sky.shape(*cloud), sky.position_m(*cloud), light_of(flash)});
+    }
+    flash_.update(lit);
+}
+
+void SkyBillboards::list(const SkySimulation& sky, const SkyCloud& cloud, bool flash, DrawnClouds& out) {
+    const Cloud& shape = sky.shape(cloud);
+    const ScatteredBillboards& what = scattered(sky, cloud);
+    const Vec3 place = sky.position_m(cloud);
+    const std::span<const double> sun = sun_.absorbed(cloud.serial);
+    // A cloud that the lightning does not reach is as dark in it as one that absorbs it all.
+    const std::span<const double> lightning =
+        flash ? flash_.absorbed(cloud.serial) : std::span<const double>{};
+    const auto index = std::uint32_t(out.clouds.size());
+    out.clouds.push_back({shape.centre_m + place, what.low_m + place.z, what.high_m + place.z});
+    for (const Billboard& billboard : what.billboards) {
+        const double weight =
+            phase_weight(shape.boxes[billboard.box].distance, cloud.phase, sky.options().formation_softness);
+        if (weight <= 0) continue;
+        CloudBillboard& drawn = out.billboards.emplace_back();
+        drawn.centre_m = billboard.centre_m + place;
+        drawn.width_m = float(billboard.width_m);
+        drawn.height_m = float(billboard.height_m);
+        drawn.sun_absorbed = float(sun[billboard.box]);
+        drawn.flash_absorbed = lightning.empty() ? 1.0f : float(lightning[billboard.box]);
+        drawn.opacity = float(weight);
+        drawn.texture = billboard.texture;
+        drawn.variant = billboard.variant;
+        drawn.cloud = index;
+    }
+}
+
+std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                                  const RenderOptions& options, const std::optional<Flash>& flash,
+                                  DrawnClouds& out, bool cull, const std::optional<Camera>& mirrored,
+                                  const std::optional<FilmFrame>& film) {
+    const std::size_t computed = light_by_sun(sky, clouds, options, film);
+    const Frustum frustum = frustum_of(options.camera);
+    const Frustum below = frustum_of(mirrored.value_or(options.camera));
+    std::vector<const SkyCloud*> seen;
+    for (const SkyCloud& cloud : clouds) {
+        Sphere sphere = sky.sphere(cloud);
+        sphere.radius_m += scattered(sky, cloud).reach_m;
+        if (!cull || may_see(frustum, sphere) || may_see(below, sphere)) seen.push_back(&cloud);
+    }
+    if (flash) light_by_flash(sky, *flash, seen);
+    std::size_t billboards = out.billboards.size();
+    for (const SkyCloud* cloud : seen) billboards += scattered(sky, *cloud).billboards.size();
+    // With what the renderer makes of one: its order and its form on the device.
+    require_memory(billboards * (sizeof(CloudBillboard) + 128),
+                   "the billboards of " + std::to_string(seen.size()) + " clouds");
+    out.billboards.reserve(billboards);
+    for (const SkyCloud* cloud : seen) list(sky, *cloud, flash.has_value(), out);
+    return computed;
+}
+
+Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
+                         const RenderOptions& moving, double time_s, bool depth,
+                         const std::optional<GroundCoverView>& ground_cover, const Weather& weather,
+                         const std::optional<FilmFrame>& film) {
+    return finish(renderer,
+                  begin(renderer, voxels, layers, moving, time_s, depth, ground_cover, weather, film));
+}
+
+PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& voxels,
+                                    std::span<const SkyLayer> layers, const RenderOptions& moving,
+                                    double time_s, bool depth,
+                                    const std::optional<GroundCoverView>& ground_cover,
+                                    const Weather& weather, const std::optional<FilmFrame>& film) {
+    check(moving);
+    RenderOptions options = moving;
+    options.camera = camera_at(moving.camera, time_s);
+    options.sun = sun_at(moving.sun, time_s);
+    const bool rain = options.precipitation.enabled && !weather.curtains.empty();
+    layers_.resize(layers.size());
+    DrawnClouds drawn;
+    const std::optional<Flash> flash = flash_at(options.lightning, time_s);
+    std::optional<Camera> mirrored;
+    if (ground_cover && shows_reflections(options, *ground_cover)) {
+        mirrored =
+            mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
+    }
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+        const SkyLayer& layer = layers[i];
+        if (layer.direct)
+            layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn, true, mirrored, film);
+    }
+    std::vector<std::vector<WorldLine>> lines;
+    for (const SkyLayer& layer : layers)
+        lines.push_back(debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun)));
+    // Rain wants the depth of the clouds and their shadow.
+    const bool all = depth || rain;
+    PendingPicture picture = renderer.begin(
+        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all, all, ground_cover}, options);
+    RenderOptions raining = moving;  // knows the camera's path itself
+    raining.sun = options.sun;
+    return {std::move(picture), std::move(options), std::move(raining), weather, time_s,
+            std::move(lines),   std::move(drawn)};
+}
+
+Picture SkyPainter::finish(Renderer& renderer, PendingSkyPicture&& pending) {
+    Picture picture = renderer.finish(std::move(pending.picture));
+    precipitation_.draw(picture, pending.raining, pending.weather, pending.time_s);
+    for (const std::vector<WorldLine>& lines : pending.lines)
+        draw_lines(picture, pending.options.camera, lines);
+    return picture;
+}
+
+}  // namespace nephos

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// T's clouds drawn directly: from a layer's simulation to what the renderer draws. The boxes' billboards are
+// scattered once for each shape; each cloud that the camera can see lists them at its place, thinned where it
+// forms or dissolves, and lit by the absorption factors that seeds/light_absorption.h keeps up to date.
+//
+//     SkyPainter painter;  // for as long as the layers live
+//     const SkyLayer layer{&sky, sky.clouds()};
+//     const Picture picture = painter.draw(renderer, {}, {&layer, 1}, options, sky.time_s());
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render/cloud/splats.h"
+#include "render/image/line_overlay.h"
+#include "render/options/options.h"
+#include "render/rain/precipitation.h"
+#include "render/renderer.h"
+#include "scenes/format/scene.h"
+#include "seeds/billboards.h"
+#include "seeds/ground_cover.h"
+#include "seeds/light_absorption.h"
+#include "seeds/sky_simulation.h"
+
+namespace nephos {
+
+// Clouds of all layers of a picture; what Splats points to.
+struct DrawnClouds {
+    std::vector<BillboardCloud> clouds;
+    std::vector<CloudBillboard> billboards;
+};
+
+// A frame of a film. With options.light.cfa_clouds_per_frame, clouds keep the sun of earlier frames in turn
+// (seeds/light_schedule.h), and these are the frames.
+struct FilmFrame {
+    int index = 0;  // from 0
+    FrameOptions frames;
+    Sun sun;  // before sun_at()
+};
+
+class SkyBillboards {
+  public:
+    // Lists what the camera can see of `clouds`, which have shapes of `sky`. Light first: the sun's
+    // absorption of all clouds of the layer, with options.sun or, in a film with a bound on the clouds that
+    // are computed in a frame, the sun of the frame whose turn it was; and the lightning's of those that it
+    // reaches. What is listed never depends on earlier calls. `cull` false lists also what the camera cannot
+    // see: the picture is the same. `mirrored`: another camera whose clouds are listed as well. Returns of
+    // how many clouds the sun's absorption was computed anew.
+    std::size_t append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                       const RenderOptions& options, const std::optional<Flash>& flash, DrawnClouds& out,
+                       bool cull = true, const std::optional<Camera>& mirrored = {},
+                       const std::optional<FilmFrame>& film = {});
+
+    // Absorbed sunlight of a cloud's boxes as it was used last; empty before the first append().
+    std::span<const double> sun_absorbed(const SkyCloud& cloud) const { return sun_.absorbed(cloud.serial); }
+
+  private:
+    // What does not change with a cloud's place.
+    struct ScatteredBillboards {
+        std::vector<Billboard> billboards;
+        double reach_m = 0;            // how far billboards reach beyond their boxes, at most
+        double low_m = 0, high_m = 1;  // of all billboards, model space
+    };
+    const ScatteredBillboards& scattered(const SkySimulation& sky, const SkyCloud& cloud);
+    std::size_t light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+                             const RenderOptions& options, const std::optional<FilmFrame>& film);
+    void light_by_flash(const SkySimulation& sky, const Flash& flash,
+                        const std::vector<const SkyCloud*>& seen);
+    void list(const SkySimulation& sky, const SkyCloud& cloud, bool flash, DrawnClouds& out);
+
+    std::vector<std::optional<ScatteredBillboards>> scattered_;  // one for each of SkySimulation::shapes()
+    LightAbsorption sun_, flash_;
+};
+
+// One layer of the sky in a picture.
+struct SkyLayer {
+    const SkySimulation* sky = nullptr;  // not null; has the shapes of `clouds`
+    std::span<const SkyCloud> clouds;
+    bool direct = true;  // draw them; false: only the debug view shows them
+};
+
+// A picture that was begun, and what is drawn over it.
+struct PendingSkyPicture {
+    PendingPicture picture;
+    RenderOptions options, raining;
+    Weather weather;
+    double time_s = 0;
+    std::vector<std::vector<WorldLine>> lines;  // of each layer
+    DrawnClouds drawn;                          // what `picture` refers to
+};
+
+// Draws pictures of skies, one after the other: keeps what they have in common. Not thread-safe.
+class SkyPainter {
+  public:
+    // Voxel clouds, the billboards of layers, the lightning of options.lightning that burns at `time_s`, what
+    // lies on the ground, and the debug view over it, as the camera is at that time; over all of it the rain
+    // of `weather`, where options.precipitation is enabled. Every call has the same layers in the same order.
+    // A picture depends on these arguments alone; one that is no frame of a `film` has all its clouds in the
+    // light of its own time.
+    // Throws as Renderer::draw_splats().
+    Picture draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
+                 const RenderOptions& options, double time_s, bool depth = true,
+                 const std::optional<GroundCoverView>& ground_cover = {}, const Weather& weather = {},
+                 const std::optional<FilmFrame>& film = {});
+
+    // The same in two steps, as Renderer::begin() and finish(): voxels and ground cover must stay as they are
+    // until the second. Pictures are finished in the order in which they were begun.
+    PendingSkyPicture begin(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
+                            const RenderOptions& options, double time_s, bool depth = true,
+                            const std::optional<GroundCoverView>& ground_cover = {},
+                            const Weather& weather = {}, const std::optional<FilmFrame>& film = {});
+    Picture finish(Renderer& renderer, PendingSkyPicture&& pending);
+
+  private:
+    std::vector<SkyBillboards> layers_;
+    PrecipitationPainter precipitation_;
+};
+
+// The light of the sun, or of a flash, as the absorption factor takes it.
+Light light_of(const Sun& sun);
+Light light_of(const Flash& flash);
+
+// A map as the renderer reads it; it must outlive the view.
+GroundCoverView view_of(const GroundCoverMap& map);
+
+// What the camera of a picture sees.
+Frustum frustum_of(const Camera& camera);
+
+}  // namespace nephos

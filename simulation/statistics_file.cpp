@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/statistics_file.h"
+
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+
+#include "core/error.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kGatheredBytes = std::size_t(1) << 20;
+
+std::string field(double value) { return std::isnan(value) ? std::string() : fmt::format("{}", value); }
+
+// What the two kinds of rows end with.
+std::string fields(const CloudStatistics& s, const StateHash& hash) {
+    return fmt::format("{},{},{},{},{},{},{},{}", s.hum, s.act, s.cld, field(s.cover), field(s.base_m),
+                       field(s.top_m), field(s.mean_density), hash.hex());
+}
+
+// The hash at the end of a row.
+std::optional<StateHash> hash_in(std::string_view row) {
+    const std::string_view digits = row.substr(row.rfind(',') + 1);
+    if (digits.size() != 32) return std::nullopt;
+    StateHash hash;
+    const auto number = [](std::string_view text, std::uint64_t& value) {
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+        return error == std::errc() && end == text.data() + text.size();
+    };
+    if (!number(digits.substr(0, 16), hash.high) || !number(digits.substr(16), hash.low)) return std::nullopt;
+    return hash;
+}
+
+[[noreturn]] void fail(const std::filesystem::path& path, int error) {
+    throw Error(ErrorCode::io, path.string() + ": cannot write: " + std::strerror(error));
+}
+
+}  // namespace
+
+std::string statistics_row(const StepResult& result) {
+    return fmt::format("{},{},{}\n", result.step, field(result.time_s),
+                       fields(result.statistics, result.hash));
+}
+
+std::string statistics_row(const StepResult& result, const LayerStep& layer) {
+    return fmt::format("{},{},{},{},{},{},{}\n", result.step, field(result.time_s), field(layer.state),
+                       layer.clouds, layer.rain_areas, field(layer.rain_mm_per_h),
+                       fields(layer.statistics, layer.hash));
+}
+
+std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
+                              const StatisticsVisitor& visit, std::string_view header) {
+    require_regular_file(path);
+    std::ifstream stream(path, std::ios::binary);
+    std::string line;
+    // A last line without its newline is one that was being written.
+    const auto next_line = [&] { return std::getline(stream, line) && !stream.eof(); };
+    bool good = next_line() && line + '\n' == header;
+    std::uint64_t bytes = header.size();
+    for (std::uint64_t step = 0; good && step < steps; ++step) {
+        good = next_line() && line.starts_with(fmt::format("{},", step));
+        const std::optional<StateHash> hash = good ? hash_in(line) : std::nullopt;
+        good = hash.has_value();
+        if (good && visit) visit(step, line, *hash);
+        bytes += line.size() + 1;
+    }
+    if (!good) {
+        throw Error(ErrorCode::io,
+                    fmt::format("{}: does not hold the steps 0 to {} that the checkpoint goes on from",
+                                path.string(), steps == 0 ? 0 : steps - 1));
+    }
+    return bytes;
+}
+
+bool is_statistics(const std::filesystem::path& path, std::string_view header) {
+    try {
+        return read_statistics(path, 0, {}, header) > 0;
+    } catch (const Error&) {
+        return false;
+    }
+}
+
+StatisticsFile::StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size)
+    : path_(std::move(path)), file_(std::move(file)), size_(size) {}
+
+StatisticsFile StatisticsFile::create(const std::filesystem::path& path, std::string_view header) {
+    StatisticsFile file(path, open_regular_file(path, O_WRONLY | O_APPEND | O_CREAT | O_TRUNC), 0);
+    file.gathered_ = header;
+    file.write_out();
+    return file;
+}
+
+StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::uint64_t steps,
+                                      const StatisticsVisitor& visit, std::string_view header) {
+    const std::uint64_t size = read_statistics(path, steps, visit, header);
+    Descriptor file = open_regular_file(path, O_WRONLY | O_APPEND);
+    if (::ftruncate(file.get(), off_t(size)) != 0) fail(path, errno);
+    return StatisticsFile(path, std::move(file), size);
+}
+
+void StatisticsFile::add(std::string_view row) {
+    gathered_ += row;
+    if (gathered_.size() >= kGatheredBytes) write_out();
+}
+
+void StatisticsFile::save() {
+    write_out();
+    if (::fsync(file_.get()) != 0) fail(path_, errno);
+}
+
+void StatisticsFile::write_out() {
+    if (const int error = write_all(file_.get(), std::as_bytes(std::span(gathered_)))) {
+        // Half a row may be in the file. Should taking it away fail too, resume() does it.
+        [[maybe_unused]] const int ignored = ::ftruncate(file_.get(), off_t(size_));
+        fail(path_, error);
+    }
+    size_ += gathered_.size();
+    gathered_.clear();
+}
+
+}  // namespace nephos

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// statistics.csv: one row a step, in the order of steps, without gaps. Numbers are written so that they read
+// back exactly; a field without a value (base and top of no cloud) is empty.
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/descriptor.h"
+#include "simulation/pipeline.h"
+
+namespace nephos {
+
+inline constexpr std::string_view kStatisticsHeader =
+    "step,time_s,hum,act,cld,cloud_cover,base_m,top_m,mean_density,hash\n";
+// Of the file that each layer has in a scene with layers.
+inline constexpr std::string_view kLayerStatisticsHeader =
+    "step,time_s,state,clouds,rain_areas,rain_mm_per_h,hum,act,cld,cloud_cover,base_m,top_m,mean_density,"
+    "hash\n";
+
+// A row with its newline.
+std::string statistics_row(const StepResult& result);
+std::string statistics_row(const StepResult& result, const LayerStep& layer);
+
+// Receives a row without its newline, and the hash in it.
+using StatisticsVisitor =
+    std::function<void(std::uint64_t step, std::string_view row, const StateHash& hash)>;
+
+// Calls `visit`, which may be empty, for the rows of the first `steps` steps of a file in their order, and
+// gives back where the next row begins, in bytes. Throws Error(io) when the file does not begin with exactly
+// these rows.
+std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
+                              const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
+
+// Whether a file begins with the header; false also when it cannot be read.
+bool is_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
+
+// The file while a run appends to it. It holds whole rows at any moment, except while rows are being written:
+// then a power cut may leave a part of them, which resume() takes away.
+class StatisticsFile {
+  public:
+    // A file with the header alone, in the place of any other. Throws Error(io).
+    static StatisticsFile create(const std::filesystem::path& path,
+                                 std::string_view header = kStatisticsHeader);
+    // The file as read_statistics() has checked it, later rows cut off. Throws Error(io).
+    static StatisticsFile resume(const std::filesystem::path& path, std::uint64_t steps,
+                                 const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
+
+    // Keeps a row for the next save(), or writes out what has gathered. Throws Error(io).
+    void add(std::string_view row);
+    // When it returns, all rows are in the file and on the device. Throws Error(io); the file then ends with
+    // a whole row.
+    void save();
+
+  private:
+    StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size);
+    void write_out();
+
+    std::filesystem::path path_;
+    Descriptor file_;
+    std::uint64_t size_ = 0;  // bytes in the file
+    std::string gathered_;    // rows that are not in the file yet
+};
+
+}  // namespace nephos

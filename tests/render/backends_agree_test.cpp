@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each way of drawing metaballs against the blended reference.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "render/renderer.h"
+#include "tests/render/picture_checks.h"
+#include "tests/render/reference_render.h"
+#include "tests/render/renderer_views.h"
+
+namespace nephos {
+namespace {
+
+class BackendsAgree : public test::AllBackends {};
+
+// Each way against the reference: the same picture within 1/255, from everywhere and at every thickness.
+TEST_P(BackendsAgree, AgreesWithBillboards) {
+    Renderer reference_renderer(test::validated(Splatting::billboards));
+    float beauty = 0, transmittance = 0;
+    for (const test::View& each : test::views()) {
+        const double radius = test::smallest_radius_m(each.options.camera);
+        const std::vector<Metaball> balls =
+            reference::random_metaballs(7, 400, radius, std::max(200.0, 1.5 * radius));
+        for (const double extinction : {0.0005, 0.01, 0.1}) {
+            const MetaballCloud cloud{balls, extinction, 0.7};
+            const Picture fast = renderer_.draw(cloud, each.options);
+            const Picture slow = reference_renderer.draw(cloud, each.options);
+            EXPECT_LE(test::largest_difference(fast.shadow, slow.shadow), 1e-4f) << each.name;
+            EXPECT_LE(test::largest_difference(fast.light, slow.light), 1e-4f) << each.name;
+            beauty = std::max(beauty, test::largest_difference(fast.beauty, slow.beauty));
+            transmittance =
+                std::max(transmittance, test::largest_difference(fast.transmittance, slow.transmittance));
+            EXPECT_LE(beauty, 1.0f / 255.0f) << each.name << ", extinction " << extinction;
+            EXPECT_LE(transmittance, 1.0f / 255.0f) << each.name << ", extinction " << extinction;
+            for (std::size_t i = 0; i < fast.depth_m.size(); ++i) {
+                if (slow.transmittance[i] > 0.99f || fast.transmittance[i] > 0.99f) continue;
+                const float opacity = 1.0f - slow.transmittance[i];
+                ASSERT_NEAR(fast.depth_m[i] / slow.depth_m[i], 1.0f, 0.005f / opacity) << each.name;
+            }
+        }
+    }
+    std::printf("against billboards: beauty %.5f, transmittance %.5f\n", double(beauty),
+                double(transmittance));
+    test::expect_no_messages(reference_renderer);
+}
+
+struct NamedLight {
+    std::string name;
+    CloudLight light;
+};
+
+std::vector<NamedLight> every_light() {
+    std::vector<NamedLight> all;
+    for (const Phase kind : {Phase::isotropic, Phase::rayleigh, Phase::henyey_greenstein,
+                             Phase::cornette_shanks, Phase::hg_draine}) {
+        CloudLight light;
+        light.phase = {kind, 0.8, 12};
+        for (const MultipleScattering multiple :
+             {MultipleScattering::diffusion, MultipleScattering::octaves}) {
+            light.multiple = multiple;
+            all.push_back(
+                {"phase " + std::to_string(int(kind)) + ", multiple " + std::to_string(int(multiple)),
+                 light});
+        }
+    }
+    all.back().light.octaves = {8, 0.8, 0.3, 0.7};
+    all.push_back({"absorbed", {}});
+    all.back().light.lighting = Lighting::cfa;
+    return all;
+}
+
+// Each way against the reference, for every phase function and kind of multiple scattering, before the sun
+// and with the sun behind, and lit by lightning. Before the sun radiances are above 1: there the difference
+// is relative, and the aureole of droplets is outside of the picture: there an opacity of 0.0005 shows.
+TEST_P(BackendsAgree, AgreesWithBillboardsInEveryLight) {
+    Renderer reference_renderer(test::validated(Splatting::billboards));
+    const std::vector<Metaball> balls = reference::random_metaballs(9, 300);
+    Splats splats;
+    splats.metaballs = {balls, 0.01, 0.7};
+    splats.flash = Flash{{300, 200, 1200}, {0.75, 0.8, 1.0}, 0.5};
+    for (const auto& [name, light] : every_light()) {
+        for (const double azimuth : {0.0, 160.0}) {
+            RenderOptions options = test::view({0, -4000, 800}, {0, 0, 1000}, 40, 90, 60);
+            options.sun.azimuth_deg = azimuth;
+            options.sun.elevation_deg = 30;
+            options.light = light;
+            const Picture fast = renderer_.draw_splats(splats, options);
+            const Picture slow = reference_renderer.draw_splats(splats, options);
+            float worst = 0, brightest = 0;
+            for (std::size_t i = 0; i < fast.beauty.size(); ++i) {
+                const float scale = std::max(1.0f, slow.beauty[i]);
+                worst = std::max(worst, std::abs(fast.beauty[i] - slow.beauty[i]) / scale);
+                brightest = std::max(brightest, slow.beauty[i]);
+            }
+            EXPECT_LE(worst, 1.0f / 255.0f) << name << ", sun in " << azimuth;
+            EXPECT_GT(brightest, 0.3f) << name;
+        }
+    }
+    test::expect_no_messages(reference_renderer);
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, BackendsAgree,
+                         ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
+                         test::way_name);
+
+}  // namespace
+}  // namespace nephos

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames in flight to a device that is lost (lost_device_layer.cpp): each says so.
+
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "render/renderer.h"
+
+namespace nephos {
+namespace {
+
+class LostPictures : public testing::Test {
+  protected:
+    void SetUp() override {
+        ::setenv("VK_LAYER_PATH", NEPHOS_LAYERS, 1);
+        ::setenv("VK_INSTANCE_LAYERS", "VK_LAYER_NEPHOS_lost_device", 1);
+        splats_.metaballs = {balls_, 0.002, 0.7};
+    }
+    void TearDown() override {
+        for (const char* name : {"VK_LAYER_PATH", "VK_INSTANCE_LAYERS", kWaits}) ::unsetenv(name);
+    }
+
+    // A lattice that fills the picture from within, and the same from far away.
+    static std::vector<Metaball> lattice() {
+        std::vector<Metaball> balls;
+        for (int n = 0; n < 500; ++n)
+            balls.push_back({float(n % 10) * 200 - 900, float(n / 10 % 10) * 200 - 900,
+                             float(n / 100) * 200 + 600, 190, 1});
+        return balls;
+    }
+    static RenderOptions seen_from(double y) {
+        RenderOptions options;
+        options.camera.position_m = {0, y, 1000};
+        options.camera.target_m = {0, y + 100, 1000};
+        options.camera.width = 320;
+        options.camera.height = 240;
+        options.shadow_map_size = 64;
+        options.level_of_detail.pixels = 0;  // other metaballs would wait for both
+        return options;
+    }
+    static void expect_lost(const std::function<void()>& finish, const char* what) {
+        try {
+            finish();
+            ADD_FAILURE() << what;
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::gpu);
+            EXPECT_NE(std::string(error.what()).find("ErrorDeviceLost"), std::string::npos) << error.what();
+        }
+    }
+
+    static constexpr const char* kWaits = "NEPHOS_LOSE_WAIT_AFTER";
+    const std::vector<Metaball> balls_ = lattice();
+    Splats splats_;
+    Renderer renderer() const { return Renderer({{}, false, 2048, Splatting::tiles, TileLists::device}); }
+};
+
+// The wait for the second fails while the lists of the first grow, which waits for both.
+TEST_F(LostPictures, AreNotTakenForOthersWhileListsGrow) {
+    for (const int waits : {0, 1}) {
+        SCOPED_TRACE(waits);
+        Renderer drawing = renderer();
+        drawing.draw_splats(splats_, seen_from(-40000));  // its pixels are there to be taken
+        PendingPicture first = drawing.begin(splats_, seen_from(0)),
+                       second = drawing.begin(splats_, seen_from(-40000));
+        ASSERT_TRUE(first.is_pending() && second.is_pending());
+        ::setenv(kWaits, std::to_string(waits).c_str(), 1);
+        expect_lost([&] { drawing.finish(std::move(first)); }, "the first");
+        expect_lost([&] { drawing.finish(std::move(second)); }, "the second");
+        expect_lost([&] { drawing.draw_splats(splats_, seen_from(-40000)); }, "another");
+        ::unsetenv(kWaits);
+    }
+}
+
+// Nor are those of whom nobody wants to know any more the end of others that come after them.
+TEST_F(LostPictures, AreWaitedForBeforeOthersTakeTheirPlace) {
+    Renderer drawing = renderer();
+    const Picture expected = drawing.draw_splats(splats_, seen_from(-40000));
+    {
+        const PendingPicture dropped = drawing.begin(splats_, seen_from(-40000));
+        ::setenv(kWaits, "0", 1);
+    }
+    ::unsetenv(kWaits);
+    for (int n = 0; n < 3; ++n)
+        EXPECT_EQ(drawing.draw_splats(splats_, seen_from(-40000)).beauty, expected.beauty);
+}
+
+}  // namespace
+}  // namespace nephos

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Layers that are veils, beside one with an automaton: frames are the veil at their own time whatever the
+// steps, an interruption leaves no trace, and every file of a layer is there.
+
+#include <bit>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "density/combine.h"
+#include "density/vdb/vdb_file.h"
+#include "density/veil.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/writer.h"
+#include "simulation/layer_simulation.h"
+#include "simulation/memory.h"
+#include "simulation/pipeline.h"
+#include "simulation/run_folder.h"
+#include "tests/reference/with_threads.h"
+#include "tests/simulation/file_content.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char* const kScene = R"(
+name = "veils"
+seed = 11
+[time]
+step_s = 10
+steps = 6
+[[wind]]
+levels = [{ height_m = 0, east_m_per_s = 5, north_m_per_s = 3 }, { height_m = 8000, east_m_per_s = 20, north_m_per_s = 8 }]
+[[model]]
+name = "Cu"
+seeds = [{ size_m = [400, 400, 200] }]
+[[sky]]
+name = "fair"
+state = 0
+clouds = 6
+models = "Cu"
+[[layer]]
+name = "Ci"
+opacity = 0.25
+lattice = { cells = [40, 30, 9], cell_size_m = 200, origin_m = [-4000, -3000, 7000] }
+[layer.veil]
+form = "cirrus"
+wavelength_m = 2000
+octaves = 2
+fallstreak_m = 3000
+[[layer]]
+name = "low"
+skies = "fair"
+base_height_m = 900
+lattice = { cells = [32, 32, 12], cell_size_m = 100, origin_m = [-1600, -1600, 500] }
+coupling = { centre = { hum = 0.2, act = 0.02, ext = 0.05 } }
+[frames]
+per_second = 1
+time_scale = 7
+)";
+
+Scene scene_of(const std::vector<std::string>& overrides = {}) {
+    return read_scene_text(kScene, "veils.toml", {}, overrides);
+}
+
+// All results in order, as text, and the frames themselves.
+class Listing : public PipelineSink {
+  public:
+    void step(const StepResult& r) override {
+        std::string text = "step " + std::to_string(r.step) + " " + r.hash.hex();
+        for (const LayerStep& layer : r.layers) {
+            text += " " + layer.name + " " + layer.hash.hex() + " " + std::to_string(layer.statistics.cld) +
+                    " " + std::to_string(std::bit_cast<std::uint64_t>(layer.statistics.mean_density));
+        }
+        events.push_back(text);
+        steps.push_back(r);
+    }
+    void frame(const FrameResult& r) override {
+        std::uint64_t sum = 0;
+        for (const float value : r.density.to_dense())
+            sum = sum * 1000003 + std::bit_cast<std::uint32_t>(value);
+        events.push_back("frame " + std::to_string(r.number) + " " + std::to_string(r.step) + " " +
+                         r.hash.hex() + " " + std::to_string(sum));
+        frames.push_back(r);
+    }
+    std::vector<std::string> events;
+    std::vector<StepResult> steps;
+    std::vector<FrameResult> frames;
+};
+
+Listing listing_of(const Scene& scene, const PipelineRange& range) {
+    Listing listing;
+    for (Pipeline p(scene, range, std::string(32, '0')); !p.finished();) p.advance(listing);
+    return listing;
+}
+
+TEST(VeilLayer, FramesAreTheVeilAtTheirOwnTime) {
+    const Scene scene = scene_of();
+    const Listing listing = listing_of(scene, full_range(scene));
+    ASSERT_EQ(listing.frames.size(), 9u);  // 0, 7 .. 56 s, steps of 10 s
+    const LayerOptions& layer = scene.layers[0];
+    for (const FrameResult& frame : listing.frames) {
+        const DensityGrid expected = scaled(veil_density(veil_options(scene, 0), scene.automaton.wind,
+                                                         layer.extent, layer.placement, frame.time_s),
+                                            0.25);
+        ASSERT_EQ(frame.layers.size(), 2u);
+        EXPECT_EQ(frame.layers[0].density.to_dense(), expected.to_dense()) << frame.time_s;
+        EXPECT_LE(frame.layers[0].density.max_value(), 0.25f);
+        EXPECT_GT(frame.layers[0].density.active_voxels(), 1000u);
+        EXPECT_FALSE(frame.layers[0].direct);
+        EXPECT_EQ(frame.layers[0].sky, nullptr);
+        // Both layers in the voxels of the finer one.
+        EXPECT_EQ(frame.density.placement().cell_size_m, 100);
+        EXPECT_NEAR(frame.density.sum(), 8 * expected.sum() + frame.layers[1].density.sum(),
+                    0.03 * frame.density.sum());
+    }
+    EXPECT_NE(listing.frames[0].density.to_dense(), listing.frames[8].density.to_dense());
+}
+
+TEST(VeilLayer, StepsHaveItsStatisticsAndAHashOfTheirOwn) {
+    const Scene scene = scene_of();
+    const Listing listing = listing_of(scene, full_range(scene));
+    ASSERT_EQ(listing.steps.size(), 7u);
+    for (std::size_t n = 0; n < listing.steps.size(); ++n) {
+        const LayerStep& veil = listing.steps[n].layers[0];
+        EXPECT_GT(veil.statistics.cld, 1000u);
+        EXPECT_GT(veil.statistics.cover, 0.2);
+        EXPECT_GE(veil.statistics.base_m, 7000);
+        EXPECT_LE(veil.statistics.top_m, 8800);
+        EXPECT_GT(veil.statistics.mean_density, 0.001);
+        EXPECT_LT(veil.statistics.mean_density, 0.25);
+        for (std::size_t m = 0; m < n; ++m) EXPECT_NE(veil.hash, listing.steps[m].layers[0].hash);
+    }
+    // Of what decides the density and of nothing else.
+    const auto first_hash = [](const std::vector<std::string>& overrides) {
+        return LayerSimulation(scene_of(overrides), 0).hash();
+    };
+    EXPECT_EQ(first_hash({}), listing.steps[0].layers[0].hash);
+    EXPECT_EQ(first_hash({"layer[1].opacity=0.5", "density.refine=2", "frames.time_scale=9"}),
+              first_hash({}));
+    for (const char* change : {"seed=12", "layer[0].veil.coverage=0.4", "layer[0].opacity=0.5",
+                               "wind[0].levels[1].east_m_per_s=21", "layer[0].lattice.cell_size_m=190"}) {
+        EXPECT_NE(first_hash({change}), first_hash({})) << change;
+    }
+}
+
+TEST(VeilLayer, HasTheSameBitsOnAnyNumberOfThreads) {
+    const Scene scene = scene_of();
+    const auto run = [&] { return listing_of(scene, full_range(scene)).events; };
+    const std::vector<std::string> one = test::with_threads(1, run);
+    for (const std::size_t threads : {2, 3, 8}) EXPECT_EQ(test::with_threads(threads, run), one) << threads;
+}
+
+TEST(VeilLayer, GoesOnWithTheSameResultsAfterAnyInterruption) {
+    for (const std::vector<std::string>& overrides :
+         {std::vector<std::string>{"density.write_state=true"}, std::vector<std::string>{}}) {
+        const Scene scene = scene_of(overrides);
+        const PipelineRange range = full_range(scene);
+        const Listing whole = listing_of(scene, range);
+        Listing first;
+        Pipeline pipeline(scene, range, std::string(32, '0'));
+        for (std::size_t restarts = 0;; ++restarts) {
+            Listing joined = first;
+            for (Pipeline again(scene, range, std::string(32, '0'), pipeline.save()); !again.finished();) {
+                again.advance(joined);
+            }
+            ASSERT_EQ(joined.events, whole.events) << "restart " << restarts;
+            if (pipeline.finished()) break;
+            pipeline.advance(first);
+        }
+    }
+}
+
+TEST(VeilLayer, ARangeOfFramesIsThatPartOfTheWhole) {
+    const Scene scene = scene_of();
+    const Listing whole = listing_of(scene, full_range(scene)),
+                  part = listing_of(scene, range_of_frames(scene, 4, 6));
+    ASSERT_EQ(part.frames.size(), 3u);
+    for (std::size_t n = 0; n < 3; ++n) {
+        EXPECT_EQ(part.frames[n].density.to_dense(), whole.frames[n + 3].density.to_dense());
+        EXPECT_EQ(part.frames[n].hash, whole.frames[n + 3].hash);
+    }
+}
+
+TEST(VeilLayer, ACheckpointOfAnotherLengthIsRefused) {
+    LayerSimulation layer(scene_of(), 0);
+    layer.step();
+    layer.step();
+    std::vector<std::byte> bytes = layer.save();
+    LayerSimulation other(scene_of(), 0);
+    other.restore(bytes);
+    EXPECT_EQ(other.steps(), 2u);
+    EXPECT_EQ(other.hash(), layer.hash());
+    bytes.push_back({});
+    EXPECT_THROW(other.restore(bytes), Error);
+    EXPECT_THROW(other.restore(std::span(bytes).first(5)), Error);
+}
+
+TEST(VeilLayer, ARunHasItsFiles) {
+    const fs::path base = fs::temp_directory_path() / ("nephos veils " + std::to_string(::getpid()));
+    RunSettings settings;
+    settings.scene = scene_of({"time.steps=2", "density.write_velocity=true", "density.write_state=true"});
+    settings.scene_text = to_toml(settings.scene);
+    settings.scene_hash = scene_hash(settings.scene);
+    settings.simulation_hash = simulation_hash(settings.scene);
+    settings.range = full_range(settings.scene);
+    settings.render = false;
+    settings.folder = base;
+    ASSERT_TRUE(run_scene(settings, {}).complete);
+    const auto manifest = nlohmann::json::parse(content(base / "manifest.json"));
+    EXPECT_EQ(manifest["layers"][0]["veil"], true);
+    EXPECT_EQ(manifest["layers"][0]["automaton"], false);
+    EXPECT_EQ(manifest["layers"][1]["veil"], false);
+    ASSERT_EQ(manifest["frames"].size(), 3u);
+    const auto& frame = manifest["frames"][2];
+    const LoadedDensity loaded =
+        load_density(base / frame["layers"]["Ci"].get<std::string>(), VdbReadOptions{});
+    const LayerOptions& layer = settings.scene.layers[0];
+    const DensityGrid expected =
+        scaled(veil_density(veil_options(settings.scene, 0), settings.scene.automaton.wind, layer.extent,
+                            layer.placement, 14),
+               0.25);
+    EXPECT_EQ(loaded.density.to_dense(), expected.to_dense());
+    EXPECT_EQ(loaded.density.placement(), layer.placement);
+    EXPECT_TRUE(fs::exists(base / frame["density"].get<std::string>()));
+    EXPECT_TRUE(fs::exists(base / "statistics/Ci.csv"));
+    fs::remove_all(base);
+}
+
+TEST(VeilLayer, IsReadWrittenAndReckonedWith) {
+    const Scene scene = scene_of();
+    const LayerOptions& layer = scene.layers[0];
+    EXPECT_TRUE(layer.is_veil);
+    EXPECT_FALSE(layer.automaton);
+    EXPECT_EQ(layer.veil.base_m, 7000);
+    EXPECT_EQ(layer.veil.top_m, 8800);
+    EXPECT_NEAR(layer.veil.direction_deg, 21.8014, 1e-4);  // of (20, 8)
+    EXPECT_EQ(read_scene_text(to_toml(scene), "again.toml"), scene);
+    EXPECT_EQ(to_toml(scene).find("coupling", to_toml(scene).find("[[layer]]")),
+              to_toml(scene).find("coupling", to_toml(scene).find("\"low\"")));
+    const Scene listed = scene_of({"layer[0].veil={ octave = [{ weight = 2 }, { crest = 1 }] }"});
+    ASSERT_EQ(listed.layers[0].veil.octaves.size(), 2u);
+    EXPECT_EQ(listed.layers[0].veil.octaves[1].crest, 1);
+    EXPECT_EQ(read_scene_text(to_toml(listed), "again.toml"), listed);
+
+    const Scene larger = scene_of({"layer[0].lattice.cells=[400, 300, 9]", "density.half=true"});
+    EXPECT_GT(memory_estimate(larger).density, memory_estimate(scene).density + 99 * 40 * 30 * 9 * 4 * 3);
+    EXPECT_EQ(memory_estimate(larger).automaton, memory_estimate(scene).automaton);
+}
+
+}  // namespace
+}  // namespace nephos
