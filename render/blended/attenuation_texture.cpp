@@ -24,7 +24,7 @@ std::vector<float> attenuation_textures() {
                 const float x = float(i) / float(kTexels - 1), y = float(j) / float(kTexels - 1);
                 const float w = std::max(0.0f, 1.0f - x * x - y * y);
                 for (const float depth_scale : {here, next})
-                    texels.push_back(-std::expm1(-depth_scale * shader::line_integral(w)));
+                    texels.push_back(-std::expm1(-depth_scale * shader::line_integral(w, std::sqrt(w))));
             }
         }
     }

@@ -22,7 +22,7 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
-#include "render/shading/line_integral-inl.h"
+#include "render/shading/formulas-inl.h"
 
 #ifndef NEPHOS_PROCESSOR_LIGHT_TYPES_
 #define NEPHOS_PROCESSOR_LIGHT_TYPES_

@@ -31,7 +31,7 @@
 #include "render/cpu/tile_air-inl.h"
 #include "render/cpu/visibility-inl.h"
 #include "render/shading/background-inl.h"
-#include "render/shading/line_integral-inl.h"
+#include "render/shading/formulas-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {

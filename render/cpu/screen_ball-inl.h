@@ -21,7 +21,7 @@
 
 #include "render/cpu/screen_ball.h"
 #include "render/shading/background-inl.h"
-#include "render/shading/line_integral-inl.h"
+#include "render/shading/formulas-inl.h"
 #include "render/shading/shells-inl.h"
 #include "render/shared/shared.h"
 

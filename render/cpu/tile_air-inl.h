@@ -16,7 +16,7 @@
 
 #include "render/cpu/view_scene.h"
 #include "render/shading/background-inl.h"
-#include "render/shading/line_integral-inl.h"
+#include "render/shading/formulas-inl.h"
 #include "render/shading/shells-inl.h"
 
 HWY_BEFORE_NAMESPACE();

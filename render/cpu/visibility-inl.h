@@ -17,7 +17,7 @@
 #include "render/cpu/view_scene.h"
 #include "render/frame/tile_bins.h"
 #include "render/shading/background-inl.h"
-#include "render/shading/line_integral-inl.h"
+#include "render/shading/formulas-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {

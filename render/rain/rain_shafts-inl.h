@@ -103,7 +103,7 @@ HWY_INLINE Floats falls_at(const ShaftPass& p, const SeenCurtain& c, const Way& 
     const Floats height_m = hn::MulAdd(t, rise, set(c.eye_z));
     const Floats falls =
         noise_at(p, hn::Add(grains.x, grains.y), hn::MulAdd(height_m, set(c.per_fall), set(c.fall)));
-    return quick_exp(hn::MulAdd(set(1.5f / 255 * p.contrast), falls, set(-0.75f * p.contrast)));
+    return fast_exp(hn::MulAdd(set(1.5f / 255 * p.contrast), falls, set(-0.75f * p.contrast)));
 }
 
 // Extinction of one curtain at distances along its rays, without its falls.
@@ -135,7 +135,7 @@ HWY_INLINE Floats extinction(const ShaftPass& p, const SeenCurtain& c, const Way
     if (p.contrast <= 0) return even;
     const float mean = -2.25f * p.contrast - 0.25f * p.contrast * p.contrast;
     const Floats power = hn::MulAdd(set(4.5f * p.contrast), strands, set(mean));
-    return hn::Mul(even, quick_exp(power));
+    return hn::Mul(even, fast_exp(power));
 }
 
 // particle_phase() and particle_radiance() of precipitation_light.h; `sun`: what the sun adds without clouds.
@@ -193,7 +193,7 @@ struct Through {
 };
 
 HWY_INLINE void add(Through& run, Floats depth, const Floats3& light) {
-    const Floats kept = quick_exp(hn::Neg(depth));
+    const Floats kept = fast_exp(hn::Neg(depth));
     const Floats share = hn::NegMulAdd(run.transmittance, kept, run.transmittance);
     run.radiance = times_add(share, light, run.radiance);
     run.transmittance = hn::Mul(run.transmittance, kept);
@@ -260,7 +260,7 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
     const Floats step = hn::Mul(hn::Sub(end, begin), set(1.0f / kShaftSteps));
     const auto at = [&](int i) { return hn::MulAdd(hn::Add(offset, set(float(i))), step, begin); };
     const auto through_air = [&](Floats way_m) {
-        const auto of = [&](float per_m) { return quick_exp(hn::Mul(set(-per_m), way_m)); };
+        const auto of = [&](float per_m) { return fast_exp(hn::Mul(set(-per_m), way_m)); };
         return Floats3{of(p.air_per_m.x), of(p.air_per_m.y), of(p.air_per_m.z)};
     };
     Floats3 kept = through_air(at(kShaftStepsPerLight / 2));

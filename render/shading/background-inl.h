@@ -16,7 +16,7 @@
 #include <hwy/highway.h>
 
 #include "render/frame/frame_data.h"
-#include "render/shading/line_integral-inl.h"
+#include "render/shading/formulas-inl.h"
 #include "render/shared/shared.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -76,52 +76,6 @@ HWY_INLINE Floats ground_distance(const PictureFrame& frame, Floats ray_z) {
     const auto meets = hn::Lt(ray_z, set(frame.ground_sun.w > 0 ? 0.0f : -2.0f));
     const Floats distance = hn::Min(hn::Div(set(frame.ground.w), ray_z), set(kNowhere));
     return hn::IfThenElse(meets, distance, set(kNowhere));
-}
-
-// Irradiance of lightning relative to that at 1 km (flash_falloff() of render/shared/shared.h).
-HWY_INLINE Floats flash_falloff(Floats squared_m) {
-    return hn::Div(set(1.0e6f), hn::Max(squared_m, set(1.0e4f)));
-}
-
-// exp() to 4e-5 of it, for -80 .. 80, by 2^n times a polynomial: the air needs no more.
-HWY_INLINE Floats quick_exp(Floats x) {
-    const Lanes d;
-    const hn::RebindToSigned<Lanes> di;
-    const Floats binary = hn::Mul(hn::Max(x, set(-80)), set(1.44269504f)), whole = hn::Round(binary);
-    const Floats rest = hn::Sub(binary, whole);
-    Floats power = hn::MulAdd(rest, set(0.00961813f), set(0.05550411f));
-    power = hn::MulAdd(rest, power, set(0.24022651f));
-    power = hn::MulAdd(rest, power, set(0.69314718f));
-    power = hn::MulAdd(rest, power, set(1));
-    return hn::BitCast(d, hn::Add(hn::BitCast(di, power), hn::ShiftLeft<23>(hn::ConvertTo(di, whole))));
-}
-
-// sky_across(), sky_upwards(), layer_column(), molecule_phase() and particle_phase() of render/shared/shared.h.
-HWY_INLINE Floats sky_across(Floats cos_azimuth) {
-    return hn::Sqrt(hn::Max(hn::NegMulAdd(set(0.5f), cos_azimuth, set(0.5f)), hn::Zero(Lanes())));
-}
-HWY_INLINE Floats sky_upwards(Floats sine) {
-    const Floats one = set(1.0f), rest = hn::Max(hn::Sub(one, sine), hn::Zero(Lanes()));
-    return hn::Sqrt(hn::Div(sine, hn::Add(one, hn::Sqrt(rest))));
-}
-HWY_INLINE Floats layer_column(float altitude, Floats slope, Floats distance, float per_height) {
-    const Lanes d;
-    const Floats x = hn::Max(hn::Mul(hn::Mul(slope, distance), set(per_height)), set(-80.0f)),
-                 one = set(1.0f);
-    const Floats near = hn::NegMulAdd(x, hn::NegMulAdd(x, set(1.0f / 6.0f), set(0.5f)), one);
-    const auto is_near = hn::Lt(hn::Mul(x, x), set(1.0e-4f));
-    const Floats far = hn::Div(hn::Sub(one, hn::Exp(d, hn::Neg(x))), hn::IfThenElse(is_near, one, x));
-    return hn::Mul(hn::Mul(set(std::exp(-altitude * per_height)), distance),
-                   hn::IfThenElse(is_near, near, far));
-}
-HWY_INLINE Floats molecule_phase(Floats cosine) {
-    return hn::Mul(set(3.0f / (16.0f * shader::kPi)), hn::MulAdd(cosine, cosine, set(1.0f)));
-}
-HWY_INLINE Floats particle_phase(Floats cosine, float g) {
-    const Floats base = hn::NegMulAdd(set(2.0f * g), cosine, set(1.0f + g * g));
-    const float factor = 3.0f / (8.0f * shader::kPi) * (1.0f - g * g) / (2.0f + g * g);
-    return hn::Div(hn::Mul(set(factor), hn::MulAdd(cosine, cosine, set(1.0f))),
-                   hn::Mul(base, hn::Sqrt(base)));
 }
 
 // render/shading/air.glsl. A layer of the sky's tables between four texels; places are 0..1.
@@ -242,7 +196,7 @@ HWY_INLINE Floats3 sunlit_at(const PictureFrame& frame, const SunlitAir& air, Fl
     if (frame.sky == nullptr) return air.most;
     const Lanes d;
     const Floats altitude = hn::Max(hn::Add(set(frame.air.x), height), hn::Zero(d));
-    const auto density = [&](float per_height) { return quick_exp(hn::Mul(altitude, set(-per_height))); };
+    const auto density = [&](float per_height) { return fast_exp(hn::Mul(altitude, set(-per_height))); };
     const Floats3 molecules = times(density(frame.rayleigh.w), set3(frame.rayleigh)),
                   particles = times(density(frame.haze.w), set3(frame.haze));
     const Floats3 scattered = times_add(air.molecules, molecules, times(air.particles, particles));

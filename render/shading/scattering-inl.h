@@ -14,7 +14,7 @@
 #include <hwy/highway.h>
 
 #include "render/shading/background-inl.h"
-#include "render/shading/line_integral-inl.h"
+#include "render/shading/formulas-inl.h"
 #include "render/shared/shared.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -34,18 +34,11 @@ HWY_INLINE Between between(Floats place, shader::uint nodes) {
     return {below, hn::Sub(place, hn::ConvertTo(Lanes(), below))};
 }
 
-// scatter_column() and scatter_row() of render/shared/shared.h.
 HWY_INLINE Between scatter_column(Floats cosine) {
-    const Floats off = hn::Max(hn::Sub(set(1.0f), hn::Abs(cosine)), hn::Zero(Lanes()));
-    const Floats v = hn::Mul(set(0.5f), hn::Sqrt(hn::Sqrt(off)));
-    const Floats place = hn::IfThenElse(hn::Lt(cosine, hn::Zero(Lanes())), hn::Sub(set(1.0f), v), v);
-    return between(hn::Mul(set(float(shader::kScatterAngles - 1)), place), shader::kScatterAngles);
+    return between(formulas::scatter_column(cosine), shader::kScatterAngles);
 }
-
 HWY_INLINE Between scatter_row(Floats depth) {
-    constexpr float kPerE = shader::kScatterRowsPerDoubling * 1.442695041f;
-    const Floats row = hn::Mul(set(kPerE), hn::Log(Lanes(), hn::Add(set(1.0f), depth)));
-    return between(hn::Min(row, set(float(shader::kScatterDepths - 1))), shader::kScatterDepths);
+    return between(formulas::scatter_row(depth), shader::kScatterDepths);
 }
 
 // `first`: index of the row's first node.

@@ -16,7 +16,7 @@
 
 #include "render/frame/air_shells.h"
 #include "render/shading/background-inl.h"
-#include "render/shading/line_integral-inl.h"
+#include "render/shading/formulas-inl.h"
 #include "render/shading/scattering-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -96,23 +96,6 @@ HWY_INLINE Floats fog_noise(const AirShells& air, const Floats3& point, const sh
     return hn::MulAdd(fraction(z), hn::Sub(high, low), low);
 }
 
-// (1 - exp(-x)) / x for x from -80 on: the mean of an exponential over a way.
-HWY_INLINE Floats mean_decay(Floats x) {
-    const Floats one = set(1.0f);
-    const Floats near = hn::NegMulAdd(x, hn::NegMulAdd(x, set(1.0f / 6.0f), set(0.5f)), one);
-    const auto is_near = hn::Lt(hn::Abs(x), set(1.0e-1f));
-    const Floats far =
-        hn::Div(hn::Sub(one, quick_exp(hn::Neg(hn::Max(x, set(-80.0f))))), hn::IfThenElse(is_near, one, x));
-    return hn::IfThenElse(is_near, near, far);
-}
-
-HWY_INLINE Floats fog_column(Floats height_of_begin, Floats slope, Floats distance, float per_height) {
-    const Floats low = hn::MulAdd(hn::Min(slope, hn::Zero(Lanes())), distance, height_of_begin);
-    const Floats x = hn::Mul(hn::Mul(hn::Abs(slope), distance), set(per_height));
-    const Floats at_low = quick_exp(hn::Min(hn::Mul(low, set(-per_height)), set(60.0f)));
-    return hn::Mul(hn::Mul(at_low, distance), mean_decay(x));
-}
-
 struct FogPart {
     Floats depth, low;
 };
@@ -122,7 +105,7 @@ HWY_INLINE FogPart fog_part(const AirShells& air, const Floats3& ray, Floats beg
     const Floats height = hn::MulAdd(ray.z, begin, set(data.fog.z));
     const Floats low_end = hn::IfThenElse(hn::Lt(ray.z, hn::Zero(Lanes())), end, begin);
     const Floats low = hn::MulAdd(ray.z, low_end, set(data.fog.z));
-    const Floats dense = quick_exp(hn::Min(hn::Mul(low, set(-data.fog.y)), set(60.0f)));
+    const Floats dense = fast_exp(hn::Min(hn::Mul(low, set(-data.fog.y)), set(60.0f)));
     return {hn::Mul(set(data.fog.x), fog_column(height, ray.z, hn::Sub(end, begin), data.fog.y)),
             hn::Mul(set(data.fog.x), dense)};
 }
@@ -160,10 +143,10 @@ HWY_INLINE Floats fog_patches(const AirShells& air, const Floats3& point, Floats
     return hn::Max(hn::MulAdd(varies, hn::Sub(noise, one), one), zero);
 }
 
-// exp(-extinction distance) of clear air (render/shading/air.glsl), to what quick_exp() is good for.
+// exp(-extinction distance) of clear air (render/shading/air.glsl), to what fast_exp() is good for.
 HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floats distance) {
     const auto decayed = [](Floats x, Floats y, Floats z) {
-        return Floats3{quick_exp(hn::Neg(x)), quick_exp(hn::Neg(y)), quick_exp(hn::Neg(z))};
+        return Floats3{fast_exp(hn::Neg(x)), fast_exp(hn::Neg(y)), fast_exp(hn::Neg(z))};
     };
     if (frame.sky == nullptr) {
         const Floats3 depth = times(distance, set3(frame.air_extinction));
@@ -203,17 +186,17 @@ HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Flo
                                 const Floats3& sunlight, Floats lit) {
     const shader::Shells& data = frame.shells->data;
     const Floats above_base = hn::MulAdd(of.ray.z, at, set(data.fog.z));
-    const Floats dense = quick_exp(hn::Min(hn::Mul(above_base, set(-data.fog.y)), set(60.0f)));
+    const Floats dense = fast_exp(hn::Min(hn::Mul(above_base, set(-data.fog.y)), set(60.0f)));
     const Floats above = hn::Mul(set(data.fog.x / data.fog.y), dense);
     const Floats sun_depth = hn::Mul(above, set(1.0f / std::max(frame.to_sun.z, 0.05f)));
     const Floats sun = hn::Mul(
-        lit, hn::MulAdd(quick_exp(hn::Neg(sun_depth)), of.once, scattered_often(frame, of.angle, sun_depth)));
-    const Floats open = quick_exp(hn::Mul(set(-0.5f), above));
+        lit, hn::MulAdd(fast_exp(hn::Neg(sun_depth)), of.once, scattered_often(frame, of.angle, sun_depth)));
+    const Floats open = fast_exp(hn::Mul(set(-0.5f), above));
     const Floats3 ambient = mix(set3(frame.ambient_base), set3(frame.ambient_top), {open, open, open});
     Floats3 arriving = times_add(sun, sunlight, ambient);
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), times(at, of.ray));
-        const Floats share = hn::Mul(quick_exp(hn::Neg(above)), flash_falloff(dot(way, way)));
+        const Floats share = hn::Mul(fast_exp(hn::Neg(above)), flash_falloff(dot(way, way)));
         arriving = times_add(hn::Mul(set(frame.flash.w), share), set3(frame.flash_colour), arriving);
     }
     return times(set(frame.ambient_top.w), arriving);
@@ -252,7 +235,7 @@ HWY_INLINE AirPlaces air_places(const AirShells& air, const FogPart& fog, const 
     const Floats distance = hn::Sub(end, begin), one = set(1.0f), half = set(0.5f), zero = hn::Zero(d);
     const AirPlaces even{hn::MulAdd(share, distance, begin), hn::MulAdd(half, distance, begin)};
     const auto last = hn::Ge(begin, set(air.data.shade.w));
-    const Floats transmittance = quick_exp(hn::Neg(fog.depth));
+    const Floats transmittance = fast_exp(hn::Neg(fog.depth));
     const Floats some = hn::Mul(hn::Sub(set(0.99f), transmittance), set(1.0f / 0.09f));
     const Floats much = hn::IfThenElse(last, one, hn::Min(hn::Max(some, zero), one));
     if (hn::AllTrue(d, hn::Le(much, zero))) return even;
@@ -287,7 +270,7 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
     }
     if (!foggy) return {light, one, places.middle};
     const Floats patches = fog_patches(air, times(places.at, of.ray), begin, end);
-    const Floats transmittance = quick_exp(hn::Neg(hn::Mul(fog.depth, patches)));
+    const Floats transmittance = fast_exp(hn::Neg(hn::Mul(fog.depth, patches)));
     const Floats way = hn::Div(hn::Sub(places.middle, begin), hn::Max(hn::Sub(end, begin), set(1.0e-6f)));
     const Floats3 beta = hn::AllTrue(d, inside) ? mix(before, behind, {way, way, way})
                                                 : clear_air(frame, of.ray, places.middle);

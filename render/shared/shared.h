@@ -189,73 +189,13 @@ struct Shells {
     vec4 fog_limits;  // x: height above the base beyond which there is no fog worth drawing
 };
 
-// Integral over a part of a ray of fog that falls off exponentially with height: exp(-height per_height),
-// from `begin` on over `distance`. `slope`: sine of the ray's elevation. The lower end is what counts: no fog
-// is lost to rounding when the eye is far above it.
-NEPHOS_FUNCTION float fog_column(float height_of_begin, float slope, float distance, float per_height) {
-    float low = height_of_begin + (slope < 0.0f ? slope * distance : 0.0f);
-    float x = abs(slope) * distance * per_height;
-    float near = 1.0f - x * (0.5f - x * (1.0f / 6.0f));
-    float share = x < 1.0e-2f ? near : (1.0f - exp(-x)) / (x < 1.0e-2f ? 1.0f : x);
-    float at_low = -low * per_height;
-    return exp(at_low < 60.0f ? at_low : 60.0f) * distance * share;
-}
-
 // Where in a shell a pixel of the picture samples it, 0..1: an additive recurrence in two dimensions (Roberts
 // 2018, "R2") spreads the samples of neighbouring pixels evenly. In integers: the same on every machine.
 NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
     return float((x * 3242174889u + y * 2447445414u) >> 8) * (1.0f / 16777216.0f);
 }
 
-// Irradiance of lightning relative to that at 1 km.
-NEPHOS_FUNCTION float flash_falloff(float squared_distance_m) {
-    return 1.0e6f / (squared_distance_m > 1.0e4f ? squared_distance_m : 1.0e4f);
-}
-
-// Where the tables of the sky have a direction, 0..1. Across: sine of half the azimuth from the sun's. Up,
-// from the sine of the elevation: q = 1 - sqrt(1 - sine), which is even around the zenith, and half of the
-// rows lie in the lowest quarter of q, where the sky changes fastest.
-NEPHOS_FUNCTION float sky_across(float cos_azimuth) {
-    float square = 0.5f - 0.5f * cos_azimuth;
-    return sqrt(square > 0.0f ? square : 0.0f);
-}
-NEPHOS_FUNCTION float sky_upwards(float sine) {
-    float rest = 1.0f - sine;
-    return sqrt(sine / (1.0f + sqrt(rest > 0.0f ? rest : 0.0f)));
-}
-
-// Integral of exp(-altitude / height) in metres along a ray over a flat Earth, from an altitude on, whose
-// sine of elevation is `slope`: exp(-altitude / height) distance (1 - exp(-x)) / x, x = slope distance /
-// height.
-NEPHOS_FUNCTION float layer_column(float altitude, float slope, float distance, float per_height) {
-    float x = slope * distance * per_height;
-    x = x > -80.0f ? x : -80.0f;
-    float near = 1.0f - x * (0.5f - x * (1.0f / 6.0f));
-    float share = x * x < 1.0e-4f ? near : (1.0f - exp(-x)) / (x * x < 1.0e-4f ? 1.0f : x);
-    return exp(-altitude * per_height) * distance * share;
-}
-
-// Phase functions of molecules (Rayleigh) and of particles (Cornette and Shanks 1992; Sapronov's F / 4 pi),
-// per steradian; each integrates to 1 over the sphere. cos_theta: as below.
-NEPHOS_FUNCTION float molecule_phase(float cos_theta) {
-    return 3.0f / (16.0f * kPi) * (1.0f + cos_theta * cos_theta);
-}
-NEPHOS_FUNCTION float particle_phase(float cos_theta, float g) {
-    float base = 1.0f + g * g - 2.0f * g * cos_theta;
-    return 3.0f / (8.0f * kPi) * (1.0f - g * g) * (1.0f + cos_theta * cos_theta) /
-           ((2.0f + g * g) * base * sqrt(base));
-}
-
-// The field of a metaball with u = 1 - a^2 is f = u^2 (5 + 4 u) / 9. Along a line at distance b from the
-// centre, with w = 1 - b^2 (square of half the chord) and s from -sqrt(w) to sqrt(w), u = w - s^2 and
-//
-//     integral of (w - s^2)^2 = 16/15 w^(5/2),   of (w - s^2)^3 = 32/35 w^(7/2),   so
-//     line_integral(w) = w^(5/2) (16/27 + 128/315 w),   in units of the radius
-NEPHOS_FUNCTION float line_integral(float w) {
-    return w * w * sqrt(w) * (0.592592592592593f + 0.406349206349206f * w);
-}
-
-// 1 - exp(-d line_integral(w)) as w^2 (c0 + c1 w + ... + c5 w^5), for depth scales d up to kMaxFittedDepth; the
+// 1 - exp(-d line_integral(w, sqrt(w))) as w^2 (c0 + c1 w + ... + c5 w^5), for depth scales d up to kMaxFittedDepth; the
 // coefficients are polynomials of s = d / (d + 4). Largest error 0.0005 min(1, d); from
 // tests/reference/fit_opacity.py.
 NEPHOS_FUNCTION float fit_parameter(float depth_scale) { return depth_scale / (depth_scale + 4.0f); }
@@ -281,31 +221,25 @@ NEPHOS_FUNCTION float opacity_c5(float s) {
     return fit_row(s, 2.426292f, -94.490722f, 721.69415f, -1645.7595f, 927.43252f);
 }
 
-// The integral from the middle of the chord up to s (|s| <= sqrt(w)), odd in s.
-NEPHOS_FUNCTION float partial_line_integral(float w, float s) {
-    float s2 = s * s;
-    float square = w * w + s2 * (-2.0f / 3.0f * w + 0.2f * s2);
-    float cube = w * w * w + s2 * (-w * w + s2 * (0.6f * w - s2 / 7.0f));
-    return s * (5.0f / 9.0f * square + 4.0f / 9.0f * cube);
-}
-
 // A metaball is seen under all angles within its outline, not only that of its centre: with the square of its
 // angular radius and its opacity as weights, the mean of 1 - cos is larger by this much of that square. A
 // lobe narrower than the metaball then is as bright as its disc, and not one bright dot.
 NEPHOS_CONST float kDiscSpread = 0.11f;
 
-// Where an angle and an optical depth lie in the scattering table (scattering_table.h), in nodes. With v =
-// (1 - |cos|)^(1/4) nodes are evenly spaced in v, from v = 0 (straight on) over 1 (sideways) back to 0
-// (back): near both ends the angle itself grows with the square of their number.
-NEPHOS_FUNCTION float scatter_column(float cos_theta) {
-    float off = 1.0f - abs(cos_theta);
-    float v = 0.5f * sqrt(sqrt(off > 0.0f ? off : 0.0f));
-    return float(kScatterAngles - 1u) * (cos_theta < 0.0f ? 1.0f - v : v);
-}
-NEPHOS_FUNCTION float scatter_row(float depth) {
-    float row = kScatterRowsPerDoubling * log2(1.0f + depth);
-    return row < float(kScatterDepths - 1u) ? row : float(kScatterDepths - 1u);
-}
+#ifdef __cplusplus
+using Real = float;
+inline float mul_add(float a, float b, float c) { return a * b + c; }
+inline float select(bool condition, float a, float b) { return condition ? a : b; }
+inline float min(float a, float b) { return b < a ? b : a; }
+inline float max(float a, float b) { return a < b ? b : a; }
+inline float fast_exp(float x) { return exp(x); }
+#else
+#define Real float
+#define mul_add(a, b, c) ((a) * (b) + (c))
+#define select(condition, a, b) ((condition) ? (a) : (b))
+#define fast_exp(x) exp(x)
+#endif
+#include "render/shared/formulas.h"
 
 #ifdef __cplusplus
 static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&

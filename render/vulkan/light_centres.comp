@@ -28,7 +28,7 @@ void add_splat(vec4 splat, float depth_scale, vec2 place) {
         float w = max(1.0 - (splat.z * dx * dx + splat.w * dy * dy), 0.0);
         float half_chord = sqrt(w);
         float end = clamp((centres[n].z - place.x) * place.y, -half_chord, half_chord);
-        float whole = w * w * half_chord * (0.592592592592593 + 0.406349206349206 * w);  // line_integral(w)
+        float whole = line_integral(w, half_chord);
         depths[n] += depth_scale * (0.5 * whole + partial_line_integral(w, end));
     }
 }

@@ -20,7 +20,8 @@ void add_splat(vec4 splat, float depth_scale, vec2 texel) {
     float square = splat.z * dx * dx + splat.w * dy * dy;
     float step = splat.w * (2.0 * dy + 1.0), bend = 2.0 * splat.w;
     [[unroll]] for (uint row = 0u; row < kRows; ++row) {
-        sums[row] += depth_scale * line_integral(max(1.0 - square, 0.0));
+        float w = max(1.0 - square, 0.0);
+        sums[row] += depth_scale * line_integral(w, sqrt(w));
         square += step;
         step += bend;
     }
