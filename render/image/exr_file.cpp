@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <exception>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfVecAttribute.h>
+#include <glm/gtc/type_ptr.hpp>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
@@ -60,9 +62,10 @@ Imf::Header picture_header(const Picture& picture, const RenderOptions& options,
     header.channels().insert("transmittance.Y", Imf::Channel(Imf::FLOAT));
     header.channels().insert("depth.Z", Imf::Channel(Imf::FLOAT));
     Imf::addChromaticities(header, Imf::Chromaticities());  // the default is Rec. 709
-    const std::array<float, 16> m = world_to_camera(camera_frame(options.camera));
-    Imf::addWorldToCamera(header, Imath::M44f(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9],
-                                              m[10], m[11], m[12], m[13], m[14], m[15]));
+    Imath::M44f matrix;
+    std::memcpy(matrix.getValue(), glm::value_ptr(world_to_camera(camera_frame(options.camera))),
+                sizeof matrix);
+    Imf::addWorldToCamera(header, matrix);
     if (metadata.frames_per_second > 0) {
         Imf::addFramesPerSecond(
             header,

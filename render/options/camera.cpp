@@ -41,18 +41,11 @@ PixelPosition project(const CameraFrame& frame, const Camera& camera, const Vec3
     return {0.5 * (x + 1.0) * camera.width, 0.5 * (1.0 - y) * camera.height, true};
 }
 
-std::array<float, 16> world_to_camera(const CameraFrame& frame) {
-    const Vec3 axes[3] = {frame.right, frame.up, -frame.forward};
-    std::array<float, 16> matrix{};
-    for (int column = 0; column < 3; ++column) {
-        const Vec3& axis = axes[column];
-        matrix[std::size_t(column)] = float(axis.x);
-        matrix[std::size_t(4 + column)] = float(axis.y);
-        matrix[std::size_t(8 + column)] = float(axis.z);
-        matrix[std::size_t(12 + column)] = float(-dot(axis, frame.position_m));
-    }
-    matrix[15] = 1.0f;
-    return matrix;
+glm::mat4 world_to_camera(const CameraFrame& frame) {
+    const glm::dmat3 turn = glm::transpose(glm::dmat3(frame.right, frame.up, -frame.forward));
+    glm::dmat4 matrix(turn);
+    matrix[3] = glm::dvec4(-(turn * frame.position_m), 1.0);
+    return glm::mat4(matrix);
 }
 
 }  // namespace nephos

@@ -6,7 +6,7 @@
 //
 //     forward + (2 px / width - 1) * right * half_width + (1 - 2 py / height) * up * half_height
 
-#include <array>
+#include <glm/mat4x4.hpp>
 
 #include "render/options/options.h"
 
@@ -32,8 +32,8 @@ struct PixelPosition {
 };
 PixelPosition project(const CameraFrame& frame, const Camera& camera, const Vec3& point_m);
 
-// Row-major 4x4 matrix for row vectors (v' = v M), from world to camera space: x right, y up, looking along
-// -z. The convention of OpenEXR's worldToCamera.
-std::array<float, 16> world_to_camera(const CameraFrame& frame);
+// Maps world to camera space, as a matrix for column vectors (v' = M v): x right, y up, looking along -z. Its memory,
+// column by column, is that of OpenEXR's worldToCamera, which is row-major and for row vectors.
+glm::mat4 world_to_camera(const CameraFrame& frame);
 
 }  // namespace nephos
