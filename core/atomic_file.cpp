@@ -5,10 +5,12 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <random>
 #include <string>
 #include <system_error>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/descriptor.h"
@@ -24,9 +26,11 @@ namespace {
 void flush_to_device(const std::filesystem::path& subject, const std::filesystem::path& reported, int flags) {
     const Descriptor descriptor(::open(subject.c_str(), flags | O_CLOEXEC));
     if (descriptor.get() < 0) fail(reported, "cannot open after writing", errno);
+    int failed;
+    do failed = ::fsync(descriptor.get());
+    while (failed != 0 && errno == EINTR);
     // Some file systems cannot flush a folder and say EINVAL; there the rename itself is all there is.
-    if (::fsync(descriptor.get()) != 0 && errno != EINVAL)
-        fail(reported, "cannot flush to the device", errno);
+    if (failed != 0 && errno != EINVAL) fail(reported, "cannot flush to the device", errno);
 }
 
 // What a path stands for: a symbolic link keeps pointing to the file that is replaced. A rename would put a
@@ -50,6 +54,43 @@ constexpr std::string_view kPart = ".part";
 // ".STEM.partNUMBERS.EXTENSION"; the extension last, because some writers choose the format by it.
 std::string temporary_name(const std::filesystem::path& path, const std::string& numbers) {
     return "." + path.stem().string() + std::string(kPart) + numbers + path.extension().string();
+}
+
+// A file that this process created: where it is, and which one it is, whatever is found under its name later.
+struct CreatedFile {
+    std::filesystem::path path;
+    dev_t device = 0;
+    ino_t inode = 0;
+};
+
+// Creates an empty file beside `path` under a name that holds this process' number and 64 random bits. O_EXCL: in a
+// folder that others may write to, a file or link that waits under that name is never opened.
+CreatedFile create_temporary(const std::filesystem::path& folder, const std::filesystem::path& path) {
+    constexpr int kAttempts = 100;
+    std::random_device random;
+    for (int attempt = 1;; ++attempt) {
+        const std::uint64_t number = std::uint64_t{random()} << 32 | random();
+        CreatedFile file{folder /
+                         temporary_name(path, std::to_string(::getpid()) + "-" + std::to_string(number))};
+        const Descriptor descriptor(
+            ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+        if (descriptor.get() < 0 && errno == EEXIST && attempt < kAttempts) continue;
+        struct stat status {};
+        if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0)
+            fail(path, "cannot create", errno);
+        file.device = status.st_dev;
+        file.inode = status.st_ino;
+        return file;
+    }
+}
+
+// Throws Error(io) unless `file` still has its name.
+void require_same_file(const CreatedFile& file, const std::filesystem::path& reported) {
+    struct stat status {};
+    if (::lstat(file.path.c_str(), &status) != 0) fail(reported, "its temporary file is gone", errno);
+    if (status.st_dev != file.device || status.st_ino != file.inode || !S_ISREG(status.st_mode))
+        throw Error(ErrorCode::io,
+                    reported.string() + ": another file was put in the place of its temporary one");
 }
 
 bool all_digits(std::string_view text) {
@@ -93,19 +134,16 @@ void write_atomically(const std::filesystem::path& given,
     std::filesystem::create_directories(folder, error);
     if (error) fail(folder, "cannot create the folder", error.value());
 
-    // The process number keeps two runs apart, the address of this call's variable two threads.
-    const std::string name =
-        temporary_name(path, std::to_string(::getpid()) + "-" +
-                                 std::to_string(reinterpret_cast<std::uintptr_t>(&error) >> 4));
-    const std::filesystem::path temporary = folder / name;
+    const CreatedFile temporary = create_temporary(folder, path);
     try {
-        write(temporary);
-        flush_to_device(temporary, path, O_RDONLY);
-        std::filesystem::rename(temporary, path, error);
+        write(temporary.path);
+        require_same_file(temporary, path);
+        flush_to_device(temporary.path, path, O_RDONLY | O_NOFOLLOW);
+        std::filesystem::rename(temporary.path, path, error);
         if (error) fail(path, "cannot rename into place", error.value());
         flush_to_device(folder, path, O_RDONLY | O_DIRECTORY);
     } catch (...) {
-        std::filesystem::remove(temporary, error);
+        std::filesystem::remove(temporary.path, error);
         throw;
     }
 }
@@ -113,8 +151,8 @@ void write_atomically(const std::filesystem::path& given,
 void write_pieces_atomically(const std::filesystem::path& path,
                              const std::function<void(const AppendPiece& append)>& fill) {
     write_atomically(path, [&](const std::filesystem::path& temporary) {
-        Descriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-        if (descriptor.get() < 0) fail(path, "cannot create", errno);
+        Descriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC));
+        if (descriptor.get() < 0) fail(path, "cannot open", errno);
         PieceWriter writer(descriptor.get());
         const auto check = [&](int error) {
             if (error != 0) fail(path, "cannot write", error);

@@ -13,7 +13,8 @@
 
 namespace nephos {
 
-// Calls `write` with the path of the temporary file, which `write` must create and close; then publishes it.
+// Creates an empty temporary file whose name nobody can foresee, calls `write` with its path, which `write` must
+// open, fill and close; then publishes it. A file or link that somebody else put in its place meanwhile is refused.
 // Missing parent folders are created. A symbolic link keeps pointing to the new file; a device, a pipe or a
 // folder in the place of the file is refused. On any failure the temporary file is removed and Error(io)
 // names `path` and the reason; what `write` throws passes through.

@@ -13,7 +13,7 @@ namespace nephos {
 
 CheckedStream::CheckedStream(const std::filesystem::path& file, const std::filesystem::path& reported)
     : Imf::OStream(file.c_str()),
-      descriptor_(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)),
+      descriptor_(::open(file.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC)),
       reported_(reported.string()) {
     if (descriptor_ < 0) fail(errno);
 }

@@ -15,7 +15,7 @@ namespace nephos {
 
 class CheckedStream : public Imf::OStream {
   public:
-    // Creates `file`; failures name `reported` (the file the user asked for). Throws Error(io).
+    // Opens `file`, which must be there and no link, and empties it; failures name `reported` (the file the user asked for). Throws Error(io).
     CheckedStream(const std::filesystem::path& file, const std::filesystem::path& reported);
     CheckedStream(const CheckedStream&) = delete;
     CheckedStream& operator=(const CheckedStream&) = delete;

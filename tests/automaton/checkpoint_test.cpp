@@ -179,6 +179,28 @@ TEST(AtomicFile, FollowsLinksAndRefusesWhatIsNoFile) {
     EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
 }
 
+// Others who may write into the folder see the name of the temporary file once it is there: a link that they put in
+// its place is neither published nor, by the next file, written through.
+TEST(AtomicFile, RefusesALinkInThePlaceOfItsTemporaryFile) {
+    const TemporaryFolder folder;
+    write_atomically(folder / "victim", "precious");
+    std::vector<fs::path> names;
+    const auto plant = [&](const fs::path& temporary) {
+        EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(temporary))) << "it is created before it is named";
+        names.push_back(temporary);
+        fs::remove(temporary);
+        fs::create_symlink("victim", temporary);
+    };
+    EXPECT_THROW(write_atomically(folder / "file", plant), Error);
+    EXPECT_THROW(write_atomically(folder / "file", plant), Error);
+    ASSERT_EQ(names.size(), 2u);
+    EXPECT_NE(names[0], names[1]) << "a name that was seen says nothing of the next";
+    EXPECT_EQ(published_name(names[0].filename().string()), "file");
+    EXPECT_FALSE(fs::exists(fs::symlink_status(folder / "file")));
+    std::ifstream in(folder / "victim");
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "precious");
+}
+
 TEST(Checkpoint, AFailedRestoreChangesNothing) {
     Automaton automaton(stormy_options());
     automaton.step();
