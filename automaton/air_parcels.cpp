@@ -77,7 +77,7 @@ Box box_of(const AutomatonOptions& o) {
             origin.y + o.extent.y * o.placement.cell_size_m};
 }
 
-// Whether the whole ellipsoid has left the box downwind, through an open side.
+// Returns true when the whole ellipsoid has left the box downwind, through an open side.
 bool has_left(const AutomatonOptions& options, const AirParcel& parcel, const Velocity& wind) {
     const Box box = box_of(options);
     const HalfSize half = half_size(parcel.ellipsoid);

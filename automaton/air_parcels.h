@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The ellipsoids of the probability field over time: those placed by hand and those drawn at random, carried
-// by the wind, fading in and out, and drawn anew when they left or died and the scene wants that.
+// The ellipsoids of the probability field over time: placed by hand or drawn at random, advected by the wind,
+// faded in and out, and replaced when they left the box or died, if the scene says so.
 
 #include <cstdint>
 #include <vector>
@@ -13,7 +13,7 @@
 
 namespace nephos {
 
-// One ellipsoid and where it comes from.
+// One ellipsoid with its origin and its displacement.
 struct AirParcel {
     Ellipsoid ellipsoid;           // as born
     int scatter = -1;              // index in FieldOptions::scatters, -1 when placed by hand
@@ -25,13 +25,14 @@ struct AirParcel {
 
 class AirParcels {
   public:
-    // The parcels at time 0. `options` must have passed check().
+    // Creates the parcels at time 0. `options` must have passed check().
     explicit AirParcels(const AutomatonOptions& options);
 
-    // Those with weight > 0 at `time_s`, at their present centre, in the order of the options.
+    // Returns the ellipsoids with weight > 0 at `time_s`, at their present centres, in the order of the
+    // options.
     std::vector<ActiveEllipsoid> active(const AutomatonOptions& options, double time_s) const;
 
-    // Carries every parcel over the step that starts at `time_s`, then replaces those that left or died by
+    // Advects every parcel over the step that starts at `time_s`, then replaces those that left or died by
     // its end.
     void advance(const AutomatonOptions& options, double time_s);
 
@@ -42,10 +43,11 @@ class AirParcels {
     std::vector<AirParcel> parcels_;
 };
 
-// Fade weight of an ellipsoid at a time: 0 outside its life, 1 in the middle, linear in the fades.
+// Returns the fade weight of an ellipsoid at a time: 0 outside its life, 1 in its middle, linear in between.
 double fade_weight(const Ellipsoid& ellipsoid, double time_s);
 
-// sin and cos of an angle in degrees by polynomials: the same bits on every machine; error < 1e-15.
+// Returns sine and cosine of an angle in degrees by polynomials: the same bits on every machine; error below
+// 1e-15.
 struct SinCos {
     double sin = 0, cos = 1;
 };

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The cellular automaton of D: growth, then extinction and birth, then advection by the wind, one bit an
-// operation for every cell. Same options, same bits: whatever the thread count, SIMD width or interruption.
+// The cellular automaton of D: growth, then extinction and birth, then advection by the wind, in bitwise
+// operations on whole words of cells. Equal options give equal bits, whatever the thread count, SIMD width or
+// interruption.
 //
 //     Automaton automaton(options);
 //     automaton.step();
@@ -31,7 +32,7 @@ struct StateHash {
     bool operator==(const StateHash&) const = default;
 };
 
-// An ellipsoid of the field as it stands now: where, and how strong.
+// An ellipsoid of the field at one time, with its position and fade weight.
 struct ActiveEllipsoid {
     Ellipsoid ellipsoid;  // centre_m is the present centre
     double weight = 1.0;  // fade weight, 0..1
@@ -39,8 +40,8 @@ struct ActiveEllipsoid {
 
 class Automaton {
   public:
-    // Starts from options.initial; a state that is drawn from the field takes in `external`, which are set as
-    // by set_external_ellipsoids(). Throws Error(usage) on bad options (see check()) or ellipsoids.
+    // Starts from options.initial and sets `external` as by set_external_ellipsoids(); InitialState::field
+    // includes them. Throws Error(usage) on bad options (see check()) or ellipsoids.
     explicit Automaton(const AutomatonOptions& options, std::vector<ActiveEllipsoid> external = {});
     // Starts from a given state; throws Error(usage) when its extent is not options.extent.
     Automaton(const AutomatonOptions& options, Lattice initial);
@@ -48,27 +49,30 @@ class Automaton {
     Automaton(Automaton&&) noexcept;
     Automaton& operator=(Automaton&&) noexcept;
 
+    // Advances the state by one step of options().time_step_s. Not thread-safe on one object.
     void step();
 
     const AutomatonOptions& options() const;
     std::uint64_t steps() const;  // steps taken so far
     double time_s() const;        // steps() * time_step_s
+    // The planes of the current state; the views are valid until the next non-const call.
     BitPlaneView hum() const;
     BitPlaneView act() const;
     BitPlaneView cld() const;
     StateHash hash() const;
-    std::vector<ActiveEllipsoid> ellipsoids() const;  // those alive now
+    std::vector<ActiveEllipsoid> ellipsoids() const;  // of options().field, with weight > 0 now
 
-    // Replaces the ellipsoids that were set this way before; they act in the next step and until set again,
-    // in addition to those of options.field. For callers that steer the field themselves. Not part of a
-    // checkpoint. Throws Error(usage) on an ellipsoid that check() would refuse or a weight outside 0..1.
+    // Sets further ellipsoids, in addition to those of options().field, for callers that control the field
+    // themselves. They act from the next step until the next call, which replaces them. Not part of a
+    // checkpoint. Throws Error(usage) on an ellipsoid that check() refuses or a weight outside 0..1.
     void set_external_ellipsoids(std::vector<ActiveEllipsoid> ellipsoids);
 
-    // The complete state as bytes, for checkpoint.h; `restore` throws Error(io) on bytes it did not write.
+    // Serialise and restore the complete state, for checkpoint.h; restore() throws Error(io) on bytes that
+    // save() did not write.
     std::vector<std::byte> save() const;
     void restore(std::span<const std::byte> bytes);
 
-    // Bytes that a simulation with these options holds; to check against memory before constructing one.
+    // Returns the bytes that a simulation with these options allocates, to check before constructing one.
     static std::size_t memory_bytes(const AutomatonOptions& options);
 
   private:

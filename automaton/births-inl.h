@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Extinction and birth for rows of blocks (D): per cell and draw an event with the field's probability, which
-// sets hum or act or clears cld. Two exact ways, chosen per block and draw: sparse-inl.h and dense-inl.h.
+// sets hum or act or clears cld. Two exact methods, chosen per block and draw: sparse-inl.h and dense-inl.h.
 
 #if defined(NEPHOS_BIRTHS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_BIRTHS_INL_H_
@@ -26,7 +26,7 @@ HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Which blocks of the segment hold any cld: the others need no extinction.
+// Marks the blocks of the segment that hold any cld: the others need no extinction.
 inline void find_cloudy(const Segment& g, std::uint64_t* any) {
     const int words = (g.blocks + 7) / 8;
     const std::uint64_t* cld = g.planes.cld + g.bx0 / 8;
@@ -41,7 +41,7 @@ inline void find_cloudy(const Segment& g, std::uint64_t* any) {
     }
 }
 
-// Puts the events of the segment into the planes and forgets them.
+// Applies the events of the segment to the planes and clears them.
 inline void merge_events(const Segment& g, BirthScratch& s) {
     const int words = (g.blocks + 7) / 8;
     const int cells_left = g.planes.extent.x - g.bx0 * kBlockEdge;
@@ -97,7 +97,7 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
     merge_events(g, s);
 }
 
-// Rows of blocks by_begin..by_end of slab bz.
+// Draws the events of rows of blocks by_begin..by_end (end excluded) of slab bz.
 inline void draw_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
     const PhiloxKeys keys(random.seed);
     const auto scratch = std::make_unique<BirthScratch>();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Between the two orders of bits: rows of the lattice, whose words hold 8 cells of each of 8 neighbouring
-// blocks, and blocks, whose 512 bits lie together (CellBits). A layer of 8 blocks is a square of 8x8 bytes
-// that is mirrored at its diagonal; the 8 layers are the lanes of vectors.
+// Conversion between the two orders of bits: rows of the lattice, whose words hold 8 cells of each of 8
+// neighbouring blocks, and blocks, whose 512 bits are contiguous (CellBits). A layer of 8 blocks is a matrix
+// of 8x8 bytes that is transposed; the 8 layers are the lanes of vectors.
 
 #if defined(NEPHOS_BLOCK_BITS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_BLOCK_BITS_INL_H_
@@ -24,7 +24,7 @@ HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Exchanges the bits of a above `kShift` with those of b below it, in every group of 2 * kShift bits.
+// Exchanges, in every group of 2 * kShift bits, the upper half of a with the lower half of b.
 template <int kShift, class D, class V = hn::Vec<D>>
 HWY_INLINE void exchange(D d, std::uint64_t low_mask, V& a, V& b) {
     const V t = hn::And(hn::Xor(hn::ShiftRight<kShift>(a), b), hn::Set(d, low_mask));
@@ -32,7 +32,7 @@ HWY_INLINE void exchange(D d, std::uint64_t low_mask, V& a, V& b) {
     a = hn::Xor(a, hn::ShiftLeft<kShift>(t));
 }
 
-// Byte i of out[j][layer] = byte j of in[i][layer], for 8 layers.
+// Transposes bytes: byte i of out[j][layer] = byte j of in[i][layer], for 8 layers.
 HWY_INLINE void mirror_bytes(const CellBits* HWY_RESTRICT in, CellBits* HWY_RESTRICT out) {
     const hn::CappedTag<std::uint64_t, 8> d;
     for (std::size_t layer = 0; layer < 8; layer += hn::Lanes(d)) {
@@ -45,7 +45,7 @@ HWY_INLINE void mirror_bytes(const CellBits* HWY_RESTRICT in, CellBits* HWY_REST
     }
 }
 
-// The cells of a block that are cld now: only these can be extinguished.
+// Returns the cells of a block that are cld now: only these can be extinguished.
 inline const CellBits& cloud_of_block(const Segment& g, int block, BirthScratch& s) {
     const int word = block / 8;
     if ((s.known_cloud >> word & 1) == 0) {

@@ -2,8 +2,7 @@
 #pragma once
 
 // The probability field of one step in the form that the kernels read: ellipsoids as matrices in cells,
-// listed by slab of 8 layers, with bounds that tell which blocks of 8x8x8 cells they touch and how large p
-// can become there.
+// listed by slab of 8 layers, with bounds on the blocks of 8x8x8 cells that they touch and on p there.
 //
 // Values at a cell are float32, in this order of operations (IEEE, no FMA), for every kernel and for the
 // naive twin:
@@ -28,23 +27,23 @@ inline constexpr int kBlockEdge = 8;
 // Index into per-draw arrays.
 enum : int { kHum = 0, kAct = 1, kExt = 2 };
 
-// One ellipsoid, in cells. Rows of M turn and scale an offset so that the rim is at length 1.
+// One ellipsoid, in cells. The matrix M rotates and scales an offset so that the rim is at length 1.
 struct FieldEllipsoid {
     double centre_x, centre_y, centre_z;
     double xx, xy, yx, yy, zz;
     float block_reach;                 // length of M * (half diagonal of a block's cell centres), rounded up
     std::array<float, 3> rim, span;    // p at the rim and centre minus rim, fade weight applied
-    int bx0, bx1, by0, by1, bz0, bz1;  // blocks that it can touch, half-open
+    int bx0, bx1, by0, by1, bz0, bz1;  // half-open ranges of the blocks that it can touch
 };
 
-// One ellipsoid seen from one block: what remains to be evaluated per cell.
+// One ellipsoid relative to one block: the terms that are evaluated per cell.
 struct BlockEllipsoid {
     float base_a, base_b, base_c;
     float xx, xy, yx, yy, zz;
     const FieldEllipsoid* source;
 };
 
-// What a block has to do for one draw.
+// The kind of one draw of a block, which selects its method, with a bound on p.
 struct DrawPlan {
     enum class Kind : std::uint8_t {
         none,     // p = 0 everywhere
@@ -61,6 +60,7 @@ struct BlockPlan {
     std::vector<BlockEllipsoid> ellipsoids;  // those that touch the block; capacity is reused
 };
 
+// Immutable after construction, hence thread-safe.
 class BlockField {
   public:
     BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> ellipsoids);
@@ -70,7 +70,7 @@ class BlockField {
     bool anything() const { return anything_; }
     bool any_birth() const { return any_birth_; }
     bool any_extinction() const { return any_extinction_; }
-    // The ellipsoids that can touch blocks with this by and bz.
+    // Writes the ellipsoids that can touch blocks of row (by, bz) to `out`.
     void collect(int by, int bz, std::vector<const FieldEllipsoid*>& out) const;
     // Fills the plans of blocks bx0, bx0 + 1, ... from the ellipsoids collected for their row of blocks.
     void plan_blocks(int bx0, int by, int bz, std::span<const FieldEllipsoid* const> row,
@@ -87,7 +87,8 @@ class BlockField {
     std::vector<std::vector<std::uint32_t>> by_slab_;  // indices into ellipsoids_, rising
 };
 
-// p of one draw at offset (dx, dy, dz) cells inside the block, from one ellipsoid; see the file's head.
+// Returns p of one draw at offset (dx, dy, dz) cells inside the block, from one ellipsoid, by the formula
+// above; -1 outside the ellipsoid.
 inline float ellipsoid_probability(const BlockEllipsoid& e, int draw, float dx, float dy, float dz) {
     const float a = e.base_a + (dx * e.xx + dy * e.xy);
     const float b = e.base_b + (dx * e.yx + dy * e.yy);
@@ -97,7 +98,7 @@ inline float ellipsoid_probability(const BlockEllipsoid& e, int draw, float dx, 
     return u2 < 1.0f ? e.source->rim[std::size_t(draw)] + e.source->span[std::size_t(draw)] * (s * s) : -1.0f;
 }
 
-// The same for all ellipsoids of the block and the background: the larger hum and act, the smaller ext.
+// Combines all ellipsoids of the block and the background: the largest hum and act, the smallest ext.
 float probability_at(const BlockField& field, const BlockPlan& plan, int draw, int dx, int dy, int dz);
 
 }  // namespace nephos

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A simulation on disk, so that it can go on at any step with the same bits. One file, little-endian:
+// Checkpoints: the state of a simulation on disk, to resume it with the same bits. One file, little-endian:
 //
 //     "NEPHOSCP"  8 bytes
 //     format version  u32, random stream version  u32
 //     simulation hash  32 characters          state hash  2 x u64          steps  u64
 //     size of the automaton's state  u64, its bytes (Automaton::save)
-//     size of the history  u64, its bytes (what the caller needs to go on, such as earlier cld planes)
+//     size of the history  u64, its bytes (the caller's own state, such as earlier cld planes)
 //     XXH3-128 of everything above  2 x u64
 
 #include <cstddef>
@@ -26,20 +26,20 @@ struct Checkpoint {
     std::uint64_t steps = 0;
     StateHash state;
     std::vector<std::byte> automaton;  // Automaton::save()
-    std::vector<std::byte> history;    // the caller's
+    std::vector<std::byte> history;    // the caller's own state
 };
 
 // Writes atomically; throws Error(io).
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
 
-// Reads and verifies: magic, versions, sizes against the file's, hash over the content. Throws Error(io) that
-// says what is wrong with the file.
+// Reads a checkpoint and verifies magic, versions, sizes against the file's, and the hash of the content.
+// Throws Error(io) with the failed check.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
-// XXH3-128 of bytes, as a state hash. Pure.
+// Returns the XXH3-128 of bytes. Pure.
 StateHash hash_of_bytes(std::span<const std::byte> bytes);
 
-// Whether a file starts as a checkpoint does; false also when it cannot be read.
+// Returns true for a file that starts with a checkpoint's magic, false also when it cannot be read.
 bool is_checkpoint(const std::filesystem::path& path);
 
 }  // namespace nephos

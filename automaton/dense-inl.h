@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The dense draw (docs/adr/0002): one random byte a cell against the top byte of its p; the 1 in 256 that tie
-// compare 24 bits more, at the end of the segment. Layers of a block that the draw cannot change are skipped.
+// The dense draw (docs/adr/0002): compares one random byte a cell with the top byte of its p; ties, 1 in 256,
+// compare 24 bits more at the end of the segment. Layers of a block that the draw cannot change are skipped.
 
 #if defined(NEPHOS_DENSE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_DENSE_INL_H_
@@ -33,7 +33,7 @@ struct LayerThresholds {
     alignas(64) std::array<std::uint8_t, 64> top;
 };
 
-// a*a + b*b (block_field.h) of the 64 columns of a block, x fastest, for each of its ellipsoids.
+// Computes a*a + b*b (block_field.h) of the 64 columns of a block, x fastest, for each of its ellipsoids.
 inline void locate_columns(const BlockPlan& plan, std::vector<float>& columns) {
     const hn::CappedTag<float, 8> d;
     columns.resize(64 * plan.ellipsoids.size());
@@ -52,8 +52,8 @@ inline void locate_columns(const BlockPlan& plan, std::vector<float>& columns) {
     }
 }
 
-// The ellipsoids that reach into a layer. One whose rim does not exceed the background, where it ends,
-// changes nothing outside even if it is taken into account there.
+// Collects the ellipsoids that reach into a layer. One whose p at the rim does not exceed the background may
+// be evaluated outside its rim as well (bounded = false): the maximum with the background hides it there.
 inline void find_in_layer(const Segment& g, const BlockPlan& plan, int draw, int layer, BirthScratch& s) {
     const auto which = std::size_t(draw);
     const float background = g.random.field->background()[which];
@@ -68,7 +68,7 @@ inline void find_in_layer(const Segment& g, const BlockPlan& plan, int draw, int
     }
 }
 
-// Only vectors with a bit in `wanted` are made.
+// Computes the thresholds of a layer; skips vectors without a bit in `wanted`.
 inline void make_thresholds(const Segment& g, int draw, std::uint64_t wanted,
                             const std::vector<LayerEllipsoid>& ellipsoids, LayerThresholds& out) {
     const hn::CappedTag<float, 16> d;
@@ -97,7 +97,7 @@ inline void make_thresholds(const Segment& g, int draw, std::uint64_t wanted,
     }
 }
 
-// A bit for each of 64 cells: random byte below `top(cell)`, and equal to it.
+// One bit for each of 64 cells: random byte less than, or equal to, that of `top(cell)`.
 struct LayerBits {
     std::uint64_t less = 0, tie = 0;
 };
@@ -126,7 +126,7 @@ HWY_INLINE LayerBits compare_bytes(const std::uint8_t* random, const Top& top) {
     return bits;
 }
 
-// Decides the queued ties. Cell c takes word c % 4 of counter 32 + c / 4.
+// Decides the queued ties by 24 more random bits. Cell c takes word c % 4 of counter 32 + c / 4.
 inline void run_ties(const Segment& g, BirthScratch& s) {
     constexpr int kBatch = 64;
     HWY_ALIGN std::uint64_t counters[kBatch + kMaxLanes64] = {};
@@ -155,18 +155,17 @@ inline void run_ties(const Segment& g, BirthScratch& s) {
     s.tie_count = 0;
 }
 
-// What the 24 bits of a tied cell are compared with.
+// Returns the threshold of the 24 further bits of a tied cell.
 inline std::uint32_t tie_threshold(std::uint32_t t) { return t == kCertain ? 0x1000000u : t & 0xFFFFFFu; }
 
-// Queues the tied cells of a layer that share a threshold. Without a branch: whether there are any is a
-// toss-up.
+// Queues the tied cells of a layer that share a threshold. Branchless: about half of all layers have one.
 HWY_INLINE void queue_ties(int block, int draw, int layer, std::uint64_t cells, std::uint32_t below,
                            BirthScratch& s) {
     s.ties[s.tie_count] = {cells, block, draw, std::uint32_t(layer), below};
     s.tie_count += int{cells != 0};
 }
 
-// The random bytes of the layers in `layers` (a bit each): 4 counters a layer, 16 bytes a counter.
+// Generates the random bytes of the layers in `layers` (a bit each): 4 counters a layer, 16 bytes a counter.
 inline void random_bytes(const Segment& g, int block, int draw, unsigned layers, std::uint32_t* out) {
     HWY_ALIGN std::uint64_t counters[32 + kMaxLanes64] = {};
     const std::uint64_t first = g.counter(draw_of(draw), block, 0);

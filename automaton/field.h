@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The probability field: how likely vapour, activation and extinction are in each cell and step (D, control
-// of motion). A background plus ellipsoids, each a parcel of air that is humid inside and is carried by the
-// wind.
+// The probability field: probabilities of vapour, activation and extinction in each cell and step (D, control
+// of motion). A background and ellipsoids, each a humid parcel of air that the wind advects.
 //
 // Inside an ellipsoid, with u = the normalised distance from its centre (0 at the centre, 1 at the rim):
 //
@@ -32,7 +31,7 @@ struct Probabilities {
 
 inline constexpr double kForever = std::numeric_limits<double>::infinity();
 
-// One parcel of air.
+// One ellipsoid: a parcel of air.
 struct Ellipsoid {
     Vec3 centre_m{};                  // at its birth, or at time 0 if that is later
     Vec3 semi_axes_m{500, 500, 300};  // > 0, before the turn by yaw
@@ -47,10 +46,10 @@ struct Ellipsoid {
     bool operator==(const Ellipsoid&) const = default;
 };
 
-// Ellipsoids drawn at random from the scene's seed.
+// Ellipsoids with parameters drawn uniformly from ranges, by the scene's seed.
 struct EllipsoidScatter {
     int count = 0;        // alive at any time when `replace`, else in total; 0..100000
-    Range x_m, y_m, z_m;  // where centres are drawn (world)
+    Range x_m, y_m, z_m;  // of the centres, in world space
     Range semi_axis_x_m, semi_axis_y_m, semi_axis_z_m;  // > 0
     Range yaw_deg;
     Probabilities centre{0.1, 0.001, 0.1};
@@ -59,8 +58,8 @@ struct EllipsoidScatter {
     Range life_s{kForever, kForever};
     double fade_in_s = 0, fade_out_s = 0;
     bool carried = true;
-    bool replace =
-        false;  // one that left the box or died is drawn anew: upwind when it left, anywhere when it died
+    // Redraws an ellipsoid that left the box (upwind of it) or died (anywhere).
+    bool replace = false;
     bool operator==(const EllipsoidScatter&) const = default;
 };
 

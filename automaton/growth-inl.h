@@ -80,7 +80,7 @@ HWY_INLINE hn::Vec<D> load_first(D d, std::size_t count, const std::uint64_t* p)
 #endif
 }
 
-// kEnds: the vector holds the row's first or last word, so that bits of other rows must be kept out.
+// kEnds: the vector holds the row's first or last word, so that bits of other rows must be masked.
 template <bool kEnds, bool kStream, class D>
 HWY_INLINE void grow_vector(D d, const ActRows& rows, std::size_t w, std::size_t words, std::uint64_t* hum,
                             std::uint64_t* cld, std::uint64_t* act_next) {

@@ -28,7 +28,7 @@ struct StepPlanes {
     const std::uint64_t* zero_row = nullptr;  // words_per_row zeros with 64 bytes of zeros before and after
 };
 
-// Below these a draw is sparse, from them on dense. Part of the random stream (docs/adr/0002).
+// Limits of p_max: a draw below is sparse, any other dense. Part of the random stream (docs/adr/0002).
 inline constexpr float kUniformSparseLimit = 0.125f;  // p is the background's in the whole block
 inline constexpr float kVaryingSparseLimit = 0.25f;   // p varies: evaluating it in every cell would cost more
 
@@ -37,10 +37,11 @@ inline bool is_sparse(const DrawPlan& plan) {
     return plan.kind == DrawPlan::Kind::varying && plan.p_max < kVaryingSparseLimit;
 }
 
-// At least the sum over a block's sparse draws (a bit each in `draws`) of the rate in any of its cells.
+// Returns an upper bound, over the cells of a block, of the summed rates of its sparse draws (a bit each in
+// `draws`).
 float sparse_rate_bound(const BlockPlan& plan, unsigned draws);
 
-// The chance of one step.
+// The random numbers and probabilities of one step.
 struct StepRandom {
     std::uint64_t seed = 0;
     std::uint32_t step = 0;
@@ -48,29 +49,32 @@ struct StepRandom {
     const PoissonLadder* ladder = nullptr;
 };
 
-// Rows of blocks by_begin..by_end of slab bz. Blocks are 8x8x8 cells; the last ones may be cut by the extent.
+// Steps the rows of blocks by_begin..by_end (end excluded) of slab bz. Blocks are 8x8x8 cells; the last ones
+// may be cut by the extent.
 void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end);
 
-// Name of the instruction set in use; for tests and reports.
+// Returns the name of the instruction set in use, for tests and reports.
 const char* kernel_target();
 
-// A probability as the integer that 32 random bits are compared with; p in 0..1. `kCertain` means always.
+// Returns the integer that 32 random bits are compared with for an event of probability p in 0..1;
+// `kCertain` means always.
 inline constexpr std::uint32_t kCertain = 0xFFFFFFFFu;
 inline std::uint32_t probability_threshold(float p) {
     return p >= 1.0f ? kCertain : std::uint32_t(std::int32_t(p * 0x1p31f)) << 1;
 }
 
-// -ln(1 - p) in float32 for 0 <= p <= kVaryingSparseLimit, by the series of 2 artanh(p / (2 - p)); relative
-// error < 1e-6. Same operations in every kernel.
+// Returns -ln(1 - p) in float32 for 0 <= p <= kVaryingSparseLimit, by the series of 2 artanh(p / (2 - p));
+// relative error < 1e-6. Same operations in every kernel.
 inline float sparse_rate(float p) {
     const float z = p / (2.0f - p);
     const float z2 = z * z;
     return (z + z) * (1.0f + z2 * (1.0f / 3.0f + z2 * (0.2f + z2 * (1.0f / 7.0f))));
 }
 
-// The draw of a sparse event (docs/adr/0002) by the two words of the event, the rate of its level and the
-// rates of its cell, 0 for draws that are not made: kHum, kAct, kExt, or above for none. v has 53 bits, so a
-// draw of 2^-30 of the level's rate keeps a relative precision of 2^-23.
+// Selects the draw that a sparse event belongs to (docs/adr/0002): kHum, kAct, kExt, or 3 for a rejected
+// event. `first` and `second` are the event's random words, `level` the rate of its block's ladder level,
+// `rates` those of its cell (0 for draws that are not sparse). v has 53 bits, so that a draw of 2^-30 of the
+// level's rate has a relative precision of 2^-23.
 inline int sparse_draw(std::uint32_t first, std::uint32_t second, double level,
                        const std::array<float, 3>& rates) {
     const auto bits = std::int64_t{second >> 1} << 22 | first >> 10;

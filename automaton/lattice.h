@@ -34,7 +34,7 @@ struct Extent {
 
 inline constexpr int kMaxExtent = 65536;
 
-// What lies beyond the box along one axis: nothing (all bits 0), or the box again.
+// The boundary condition along one axis: open (all bits beyond the box are 0) or periodic.
 enum class Boundary { open, periodic };
 
 struct Boundaries {
@@ -42,7 +42,8 @@ struct Boundaries {
     bool operator==(const Boundaries&) const = default;
 };
 
-// Position of cell (i, j, k) in any dense array over the box; x fastest. The only such formula in nephos.
+// Returns the position of cell (i, j, k) in any dense array over the box; x fastest. The only such formula in
+// nephos.
 inline std::size_t linear_index(const Extent& extent, int i, int j, int k) {
     return (std::size_t(k) * std::size_t(extent.y) + std::size_t(j)) * std::size_t(extent.x) + std::size_t(i);
 }
@@ -65,7 +66,8 @@ struct BitPlaneView {
 class BitPlane {
   public:
     BitPlane() = default;
-    // All bits 0. Throws Error(usage) when an axis is outside 1..kMaxExtent, std::bad_alloc without memory.
+    // Creates a plane of 0 bits. Throws Error(usage) when an axis is outside 1..kMaxExtent, std::bad_alloc
+    // without memory.
     explicit BitPlane(Extent extent);
 
     const Extent& extent() const { return extent_; }
@@ -83,7 +85,7 @@ class BitPlane {
     std::uint64_t count() const;  // number of cells that are 1
     bool operator==(const BitPlane& other) const;
 
-    // Bytes that a plane of this extent takes; to check sizes before anything is allocated.
+    // Returns the bytes that a plane of this extent takes, to check sizes before allocating.
     static std::size_t bytes(Extent extent);
 
   private:
@@ -107,7 +109,8 @@ struct Lattice {
     BitPlane cld;  // cloud
 };
 
-// How cells lie in the world. The centre of cell (i, j, k) is origin_m + (i+0.5, j+0.5, k+0.5) * cell_size_m.
+// The map from index space to world space: cell (i, j, k) has its centre at
+// origin_m + (i+0.5, j+0.5, k+0.5) * cell_size_m.
 struct Placement {
     Vec3 origin_m{};  // world position of the lower corner of cell (0, 0, 0); z = height above ground
     double cell_size_m = 50.0;  // edge of a cubic cell, > 0

@@ -44,7 +44,7 @@ struct PhiloxBatch {
     std::uint32_t word1, word3;
 };
 
-// One vector of counters on their way through the rounds.
+// One vector of counters between two rounds.
 template <class D>
 struct PhiloxState {
     hn::Vec<D> w0, w1, w2, w3;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Numbers of events for the sparse draw of a block (docs/adr/0002).
+// The number of events of a block's sparse draw (docs/adr/0002): a Poisson distribution by inversion.
 //
 // Throwing N ~ Poisson(512 * rate) events uniformly, with replacement, on the 512 cells of a block gives
 // every cell independently a Poisson number of events of mean `rate`. Keeping an event with probability r /
@@ -23,7 +23,7 @@ struct PoissonTable {
     std::vector<std::uint32_t> thresholds;   // thresholds[n] = floor(2^32 * P(N <= n)), rising
     std::array<std::uint16_t, 256> start{};  // number of thresholds <= the lowest word with that top byte
 
-    // Number of events for a uniform 32-bit word: how many thresholds are <= word.
+    // Returns the number of events for a uniform 32-bit word: the count of thresholds <= word.
     int events(std::uint32_t word) const {
         std::size_t n = start[word >> 24];
         while (n < thresholds.size() && thresholds[n] <= word) ++n;
@@ -31,15 +31,15 @@ struct PoissonTable {
     }
 };
 
-// Computed with additions, multiplications and divisions alone, hence the same on every machine. rate in
-// 0..1.
+// Computes the table of a rate in 0..1 with additions, multiplications and divisions alone, hence with the
+// same bits on every machine.
 PoissonTable make_poisson_table(double rate);
 
 // Tables in rising order of their rates, 2^-28 to 1. Immutable.
 class PoissonLadder {
   public:
     PoissonLadder();
-    // The table with the lowest rate >= `rate`, which must be in 0..1.
+    // Returns the table with the lowest rate >= `rate`, which must be in 0..1.
     const PoissonTable& level(float rate) const;
 
   private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the sparse and the dense draw share: a segment of 64 blocks, the events that it gathers, and the
-// evaluation of the probability field on vectors of cells.
+// Shared by the sparse and the dense draw: a segment of 64 blocks, its list of events, and the evaluation of
+// the probability field on vectors of cells.
 
 #if defined(NEPHOS_SEGMENT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_SEGMENT_INL_H_

@@ -33,8 +33,8 @@ void flush_to_device(const std::filesystem::path& subject, const std::filesystem
     if (failed != 0 && errno != EINVAL) fail(reported, "cannot flush to the device", errno);
 }
 
-// What a path stands for: a symbolic link keeps pointing to the file that is replaced. A rename would put a
-// file in the place of a device or a pipe, so those are refused.
+// Resolves symbolic links, so that the file that one points to is replaced and not the link. Refuses devices
+// and pipes, which a rename would replace by a plain file.
 std::filesystem::path target_of(const std::filesystem::path& path) {
     std::error_code error;
     const auto kind = std::filesystem::status(path, error).type();

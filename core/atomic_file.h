@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Files that are either complete or not there: written under a temporary name in the same folder, flushed to
-// the device, renamed, and the folder flushed. A full disk, a kill or a power cut leaves the old file or
-// none.
+// Atomic replacement of files: the content is written under a temporary name in the same folder, flushed to
+// the device (fsync), renamed, and the folder flushed. A full disk, a kill or a power cut leaves the old file
+// or none, never a part of the new one. All functions are thread-safe for different paths.
 
 #include <filesystem>
 #include <functional>
@@ -21,18 +21,18 @@ namespace nephos {
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write);
 
-// The same for content that is in memory.
+// Writes content that is in memory; errors as above.
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
 void write_atomically(const std::filesystem::path& path, std::string_view content);
 
-// The same for content that comes in pieces and need never be in memory as a whole: `fill` hands them over in
-// order.
+// Writes content that is never in memory as a whole: `fill` calls `append` with one piece after the other.
+// Errors as above.
 using AppendPiece = std::function<void(std::string_view piece)>;
 void write_pieces_atomically(const std::filesystem::path& path,
                              const std::function<void(const AppendPiece& append)>& fill);
 
-// The name that a file of this name, a temporary one of the functions above, was to get ("cloud.vdb" for
-// ".cloud.part123-456.vdb"); empty for any other name. A process that was killed leaves such files behind.
+// Returns the final name of a temporary file of the functions above ("cloud.vdb" for
+// ".cloud.part123-456.vdb"), or "" for any other name. A killed process leaves such files behind.
 std::string published_name(std::string_view temporary);
 
 }  // namespace nephos

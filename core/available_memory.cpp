@@ -54,7 +54,8 @@ void tighten(AvailableMemory& available, std::optional<std::size_t> bytes, const
     if (bytes && *bytes < available.bytes) available = {*bytes, limit};
 }
 
-// What a group may still take; the cache of files counts as free, because the kernel drops it first.
+// Returns the memory left in a control group; its page cache counts as free, because the kernel drops it
+// first.
 std::optional<std::size_t> left_in_group(const std::filesystem::path& group, const char* limit_file,
                                          const char* usage_file, std::string_view cache_key) {
     const auto limit = number_of_file(group / limit_file);
@@ -104,7 +105,7 @@ std::optional<std::size_t> left_of_address_space(const std::filesystem::path& ro
     return std::size_t(limit.rlim_cur) - std::min(taken, std::size_t(limit.rlim_cur));
 }
 
-// What was freed and will be handed out again.
+// Returns the bytes that malloc holds after free() and will hand out again.
 std::size_t kept_by_malloc() {
 #ifdef __GLIBC__
     return mallinfo2().fordblks;

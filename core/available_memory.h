@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How much memory this process may still take, asked before something large is allocated.
+// The memory that this process may still allocate; queried before a large allocation.
 
 #include <cstddef>
 #include <filesystem>
@@ -9,16 +9,16 @@
 
 namespace nephos {
 
-// The tightest of what limits this process, and its name for messages.
+// The tightest of the limits on this process, and its name for messages.
 struct AvailableMemory {
     std::size_t bytes = 0;
     std::string limit;  // "free memory of the machine", "memory limit of the control group", ...
 };
 
-// Reads MemAvailable, the limits of the control groups that the process is in (version 2 and 1, what can be
-// reclaimed counts as free) and RLIMIT_AS; what malloc keeps of freed memory counts as free. `root` is where
-// the file system starts, for tests. What cannot be read does not limit; with nothing to read, bytes is the
-// largest std::size_t. Thread-safe.
+// Returns the least of MemAvailable, the limits of the process's control groups (version 2 and 1) and
+// RLIMIT_AS. Reclaimable page cache and memory that malloc holds after free() count as available. `root` is
+// the root of the file system that /proc and /sys are read from, for tests. A limit that cannot be read does
+// not count; if none can, bytes is the largest std::size_t. Thread-safe.
 AvailableMemory available_memory(const std::filesystem::path& root = "/");
 
 }  // namespace nephos

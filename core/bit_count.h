@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Counting bits in vectors (not installed): std::popcount is a table look-up where the compiler may not
+// Population count with SIMD (not installed): std::popcount is a table look-up where the compiler may not
 // assume the instruction.
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace nephos {
 
-// Number of 1 bits in `count` words.
+// Returns the number of 1 bits in `count` words. Thread-safe.
 std::uint64_t count_bits(const std::uint64_t* words, std::size_t count);
 
 }  // namespace nephos

@@ -17,6 +17,7 @@ namespace nephos {
 
 static_assert(std::endian::native == std::endian::little, "checkpoints and bit planes are little-endian");
 
+// Appends plain values to a buffer in their memory representation, without padding between them.
 class ByteWriter {
   public:
     template <class T>
@@ -35,7 +36,8 @@ class ByteWriter {
     std::vector<std::byte> bytes_;
 };
 
-// Reads what ByteWriter wrote; throws Error(io) when the bytes end early.
+// Reads values in the order in which ByteWriter wrote them; throws Error(io) when the bytes end early. Does
+// not own the bytes.
 class ByteReader {
   public:
     explicit ByteReader(std::span<const std::byte> bytes) : left_(bytes) {}
@@ -51,7 +53,7 @@ class ByteReader {
         if (!out.empty()) std::memcpy(out.data(), left_.data(), out.size());
         left_ = left_.subspan(out.size());
     }
-    // Leaves out bytes that were read from rest(); at most rest().size().
+    // Skips bytes; at most rest().size().
     void skip(std::size_t bytes) { left_ = left_.subspan(bytes); }
     std::span<const std::byte> rest() const { return left_; }
 

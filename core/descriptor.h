@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Owned file descriptors, and files that are opened for certain: no folder, and no pipe that nobody writes to
-// and that would keep the program waiting for ever (not installed).
+// RAII file descriptors, and opening of regular files only: opening a pipe that nobody writes to would block
+// for ever (not installed).
 
 #include <cstddef>
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace nephos {
 
-// Closes the descriptor that it owns; -1 stands for none.
+// Owns a file descriptor and closes it; -1 = none. Movable, not copyable.
 class Descriptor {
   public:
     Descriptor() = default;
@@ -34,8 +34,8 @@ class Descriptor {
         fd_ = -1;
         return fd;
     }
-    // What close(2) says: on some file systems the first sign of a failed write. 0 when there is nothing to
-    // close.
+    // Closes and returns the result of close(2), on some file systems the first sign of a failed write; 0
+    // when there is nothing to close.
     int close() {
         const int fd = release();
         return fd < 0 ? 0 : ::close(fd);
@@ -45,20 +45,18 @@ class Descriptor {
     int fd_ = -1;
 };
 
-// Opens a regular file, or what a symbolic link to one points to; never waits. `flags` as for open(2),
-// O_CLOEXEC is added; a file that O_CREAT makes has the usual rights. Throws Error(io) that names the path
-// and the reason.
+// Opens a regular file, following symbolic links; never blocks. `flags` as for open(2), O_CLOEXEC is added;
+// O_CREAT uses mode 0666 and the umask. Throws Error(io) that names the path and the reason.
 Descriptor open_regular_file(const std::filesystem::path& path, int flags);
 
 // Throws Error(io) unless open_regular_file() can read it.
 void require_regular_file(const std::filesystem::path& path);
 
-// Whether a path is a pipe with a name in the file system. Nobody may ever write to it, and a program that
-// opens it to read waits for that. The pipe of a running command (/dev/stdin, what a shell puts for
-// `<(command)`) has no such name.
+// Returns true for a FIFO with a name in the file system, which blocks its reader until somebody opens it to
+// write. The anonymous pipe of a running command (/dev/stdin, a shell's `<(command)`) returns false.
 bool is_named_pipe(const std::filesystem::path& path);
 
-// Writes everything, however many calls it takes. 0, or the error number of the call that failed.
+// Writes all of `content`, with as many calls of write(2) as it takes. Returns 0 or errno of the failed call.
 int write_all(int fd, std::span<const std::byte> content);
 
 }  // namespace nephos

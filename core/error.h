@@ -10,7 +10,7 @@
 
 namespace nephos {
 
-// What went wrong, from the user's point of view. The numbers are the exit codes of the `nephos` command.
+// The class of an error as the user sees it. The numbers are the exit codes of the `nephos` command.
 enum class ErrorCode {
     check = 1,  // a check that the user asked for failed (a hash differs, a file is not what it claims)
     usage = 2,  // a bad argument or a bad scene: nothing was done
@@ -18,7 +18,7 @@ enum class ErrorCode {
     gpu = 4,    // no Vulkan device, or it failed
 };
 
-// Where in a text file; line and column count from 1, 0 = unknown.
+// A position in a text file; line and column count from 1, 0 = unknown.
 struct SourcePosition {
     std::string file;
     int line = 0;

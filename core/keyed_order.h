@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Sorts indices by a float key. Private to the module.
+// Sorts indices by a float key (not installed).
 
 #include <bit>
 #include <cstddef>
@@ -11,19 +11,21 @@
 
 namespace nephos {
 
-// Order by a key that is not negative, then by the order of add(): the bits of floats >= 0 rise with them.
+// A list of indices with keys >= 0. Entries are 64 bits, the key's bits above the index: the bit patterns of
+// floats >= 0 rise with their values, so that integers can be sorted.
 class KeyedOrder {
   public:
     explicit KeyedOrder(std::size_t count) { entries_.reserve(count); }
     void add(float key, std::uint32_t index) { entries_.push_back(entry(key, index)); }
 
-    // Adds those of `count` indices from `first` on of which `work` says so, in this order; asks for their
-    // keys in parallel.
+    // Adds, in rising order, those of the indices first .. first + count - 1 for which `work` returns true
+    // and sets `key`. Calls `work` in parallel.
     void add_all(std::uint32_t first, std::size_t count,
                  const std::function<bool(std::uint32_t index, float& key)>& work);
 
-    // Least significant digit first, 11 bits a pass, which takes a fifth of std::sort's time at a few 100,000
-    // keys; in parallel. Stable, so that the result does not depend on the number of threads.
+    // Sorts by rising key, equal keys in the order of add(): radix sort, least significant digit first, 11
+    // bits a pass, in parallel; a fifth of std::sort's time at a few 100,000 keys. Stable, so that the result
+    // does not depend on the number of threads.
     void sort();
 
     std::size_t size() const { return entries_.size(); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// mix_bits() of noise_hash.h for vectors of 32-bit words (not installed).
+// mix_bits() of noise_hash.h for SIMD vectors of 32-bit words (not installed).
 
 #if defined(NEPHOS_DENSITY_NOISE_HASH_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_DENSITY_NOISE_HASH_INL_H_

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The integers behind core/noise.h (not installed). A lattice point (x, y, z) has the hash
+// The integer hash behind core/noise.h (not installed). A lattice point (x, y, z) has the hash
 //
 //     mix(mix(x S + seed_x) + mix(y S + seed_y) + mix(z S + seed_z))   modulo 2^32
 //
@@ -18,7 +18,7 @@ namespace nephos {
 inline constexpr std::uint32_t kMixFirst = 0x7feb352dU, kMixSecond = 0x846ca68bU;
 inline constexpr std::uint32_t kAxisStep = 0x9e3779b1U;  // 2^32 / golden ratio, odd
 
-// Makes the largest possible sum, 1023 * 3/2 in the middle of a cell, 1.
+// Scales the largest possible sum, 1023 * 3/2 in the middle of a cell, to 1.
 inline constexpr float kNoiseScale = 2.0f / (3.0f * 1023.0f);
 
 constexpr std::uint32_t mix_bits(std::uint32_t h) {
@@ -27,7 +27,7 @@ constexpr std::uint32_t mix_bits(std::uint32_t h) {
     return h ^ h >> 16;
 }
 
-// One seed for each axis.
+// Returns one seed for each axis.
 constexpr std::array<std::uint32_t, 3> axis_seeds(std::uint32_t seed) {
     const std::uint32_t x = mix_bits(seed + kAxisStep), y = mix_bits(x + kAxisStep);
     return {x, y, mix_bits(y + kAxisStep)};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The vector part of core/noise.h (not installed).
+// The SIMD kernel of core/noise.h (not installed).
 
 #include <cstddef>
 
@@ -9,7 +9,7 @@
 
 namespace nephos {
 
-// As gradient_noise(), of `count` points, without checks.
+// Evaluates gradient_noise() at `count` points without checking the arguments.
 void noise_points(const float* x, const float* y, const float* z, const NoiseOptions& options,
                   std::size_t count, float* out);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradient noise in vectors, of whatever width (not installed): what noise.cpp and veil_kernel.cpp share.
-// Included once for each target of Highway. Sums and products are never fused, so every lane has the bits
-// that it would have alone.
+// Gradient noise in SIMD vectors of any width, for core/noise_kernel.cpp and density/veil_kernel.cpp (not
+// installed). Included once for each target of Highway. Sums and products are never fused, so that every
+// lane has the bits of the scalar formula.
 
 #if defined(NEPHOS_DENSITY_NOISE_VECTORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_DENSITY_NOISE_VECTORS_INL_H_
@@ -27,13 +27,14 @@ using NoiseInts = hn::Repartition<std::int32_t, NoiseFloats>;
 using Floats = hn::Vec<NoiseFloats>;
 using Words = hn::Vec<NoiseWords>;
 
-// One axis of a point: hashes of the lattice points below and above, and the way from the one below.
+// One axis of a point: hashes of the lattice points below and above, the distances from both, and the weight
+// s of the upper one.
 struct AxisPoint {
     Words low, high;
     Floats from_low, from_high, blend;
 };
 
-// n modulo period, for whole floats within +-2^22.
+// Returns n modulo period, for integer-valued floats within +-2^22.
 HWY_INLINE Floats wrapped(Floats n, float period) {
     const NoiseFloats d;
     const auto p = hn::Set(d, period);
@@ -42,7 +43,7 @@ HWY_INLINE Floats wrapped(Floats n, float period) {
     return hn::IfThenElse(hn::Ge(n, p), hn::Sub(n, p), n);
 }
 
-// `at` counts from lattice cell `cell`; a period of 0 is none.
+// Locates the coordinate `at`, relative to lattice cell `cell`, on one axis; a period of 0 is none.
 template <bool kPeriodic>
 HWY_INLINE AxisPoint axis_point(Floats at, std::uint32_t cell, std::uint32_t seed, float period) {
     const NoiseFloats d;
@@ -70,7 +71,7 @@ HWY_INLINE AxisPoint axis_point(Floats at, std::uint32_t cell, std::uint32_t see
     return axis;
 }
 
-// g(l) . (p - l), g as whole numbers -1023, -1021 .. 1023.
+// Returns g(l) . (p - l) with components of g in the odd integers -1023 .. 1023.
 HWY_INLINE Floats gradient_dot(Words hash, Floats x, Floats y, Floats z) {
     const NoiseFloats d;
     const NoiseInts di;

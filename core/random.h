@@ -18,10 +18,10 @@
 
 namespace nephos {
 
-// Changes whenever any bit of any golden hash changes on purpose (docs/adr/0002).
+// Increased with every deliberate change of any bit of any golden hash (docs/adr/0002).
 inline constexpr std::uint32_t kRandomStreamVersion = 1;
 
-// Who draws. Domains never share counters.
+// The purpose of a draw. Domains never share counters.
 enum class Domain : std::uint32_t {
     lattice = 0,        // extinction and birth
     initial_state = 1,  // the first hum and act
@@ -32,12 +32,12 @@ enum class Domain : std::uint32_t {
     particles = 6,      // rain and snow
 };
 
-// What is drawn for a block of 8x8x8 cells: the number of sparse events, the events, and the dense draws.
+// The draws of a block of 8x8x8 cells: number of sparse events, sparse events, dense draws of hum, act, ext.
 enum class Draw : std::uint32_t { counts = 0, hum = 1, act = 2, ext = 3, sparse = 4 };
 
 using PhiloxWords = std::array<std::uint32_t, 4>;
 
-// One Philox4x32-10 output: 128 random bits. Thread-safe, pure.
+// Returns one Philox4x32-10 output: 128 random bits. Thread-safe, pure.
 inline PhiloxWords philox(std::uint64_t seed, const PhiloxWords& counter) {
     const r123::Philox4x32::ctr_type in = {{counter[0], counter[1], counter[2], counter[3]}};
     const r123::Philox4x32::key_type key = {{std::uint32_t(seed), std::uint32_t(seed >> 32)}};
@@ -49,20 +49,21 @@ constexpr std::uint32_t counter_word_0(std::uint32_t draw, std::uint32_t sub_ind
     return sub_index | draw << 16 | kRandomStreamVersion << 24;
 }
 
-// Counter of a block of the lattice; blocks count in units of 8 cells.
+// Returns the counter of block (bx, by, bz) of the lattice; block coordinates are in units of 8 cells.
 constexpr PhiloxWords block_counter(Domain domain, Draw draw, std::uint32_t step, int bx, int by, int bz,
                                     std::uint32_t sub_index) {
     return {counter_word_0(std::uint32_t(draw), sub_index), step, std::uint32_t(bx) | std::uint32_t(by) << 16,
             std::uint32_t(bz) | std::uint32_t(domain) << 16};
 }
 
-// Counter of an item of another domain: item `index` of `group` (0..65535), drawn anew per `generation`.
+// Returns the counter of item `index` of `group` (0..65535) of another domain; `generation` counts its
+// redraws.
 constexpr PhiloxWords item_counter(Domain domain, std::uint32_t group, std::uint32_t index,
                                    std::uint32_t generation, std::uint32_t sub_index) {
     return {counter_word_0(0, sub_index), generation, index, group | std::uint32_t(domain) << 16};
 }
 
-// A 32-bit word as a number in [0, 1).
+// Returns a 32-bit word as a number in [0, 1).
 constexpr double unit_interval(std::uint32_t word) { return word * 0x1p-32; }
 
 }  // namespace nephos

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// smooth_blend() of core/smoothstep.h for vectors of floats.
+// smooth_blend() of core/smoothstep.h for SIMD vectors of floats.
 
 #if defined(NEPHOS_RENDER_SMOOTHSTEP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_RENDER_SMOOTHSTEP_INL_H_

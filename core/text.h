@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Numbers as text, the same whatever the locale of the program around us is.
+// Numbers as text, independent of the locale of the program.
 
 #include <cstddef>
 #include <string>
 
 namespace nephos {
 
-// A number with at most so many significant digits (1..17, which read back exactly): "0.25", "1e+20", "inf".
+// Formats a number with at most `digits` significant digits (1..17; 17 read back exactly): "0.25", "1e+20",
+// "inf".
 std::string number_text(double value, int digits);
 
-// An amount of memory, three digits or so: "12 bytes", "3.2 GiB", "300 MiB".
+// Formats an amount of memory with binary units and about three digits: "12 bytes", "3.2 GiB", "300 MiB".
 std::string bytes_text(std::size_t bytes);
 
 }  // namespace nephos

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Sine, cosine and angle of a vector from additions, multiplications, divisions and square roots alone, so
+// Sine, cosine and arc tangent from IEEE additions, multiplications, divisions and square roots alone, so
 // that clouds have the same bits with every C library and processor (libm's functions may differ in the last
 // bit). Angles are in degrees, whose reduction to a quarter turn is exact.
 
@@ -9,12 +9,12 @@
 
 namespace nephos {
 
-// A turn by an angle: (cos, sin) of it.
+// A rotation in the plane, by the angle whose cosine and sine these are.
 struct Rotation {
     double cos = 1, sin = 0;
 };
 
-// Absolute error below 4e-16. |degrees| up to 1e6; pure.
+// Returns cosine and sine of an angle of |degrees| <= 1e6; absolute error below 4e-16. Pure.
 inline Rotation rotation_of_degrees(double degrees) {
     const double quarters = std::floor(degrees / 90 + 0.5);
     const double r = (degrees - quarters * 90) * (3.14159265358979323846 / 180);  // -pi/4 .. pi/4
@@ -45,13 +45,13 @@ inline Rotation rotation_of_degrees(double degrees) {
     }
 }
 
-// Angle of the vector (x, y) from the x axis, counter-clockwise, -180..180; 0 for the null vector.
-// Error below 1e-12 degrees.
+// Returns the angle of the vector (x, y) from the x axis in degrees, counter-clockwise, -180..180; 0 for the
+// null vector. Error below 1e-12 degrees. Pure.
 inline double degrees_of_vector(double x, double y) {
     const double length = std::sqrt(x * x + y * y);
     if (!(length > 0)) return 0;
-    // Three times tan(a/2) = tan a / (1 + sqrt(1 + tan^2 a)), the first one from the sides: |a| <= 90 degrees
-    // after it.
+    // Halves the angle three times by tan(a/2) = tan a / (1 + sqrt(1 + tan^2 a)), first in the form
+    // y / (length + |x|), which is exact up to |a| = 90 degrees.
     const double absolute = x < 0 ? -x : x;
     double t = y / (length + absolute);
     t = t / (1 + std::sqrt(1 + t * t));

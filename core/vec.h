@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Vectors of world space, from GLM. A default-initialised GLM vector is not zero: declare `Vec3 a{};`.
+// Vectors of world space, from GLM (docs/adr/0005-rooms.md). A default-initialised GLM vector is not zero:
+// declare `Vec3 a{};`.
 
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Plain types of weather that several modules share.
+// Plain types that several modules share.
 
 namespace nephos {
 
-// Pictures that billboards wear, made when the renderer starts (render/frame/billboard_textures.h).
+// Texture of a billboard, generated when the renderer starts (render/frame/billboard_textures.h).
 enum class BillboardTexture {
     soft,   // a hazy ball
-    wispy,  // drawn out fibres
-    dense,  // a cauliflower's head
+    wispy,  // elongated fibres, as of cirrus
+    dense,  // cauliflower-like knobs, as of cumulus congestus
 };
 
-// What falls from rain areas: onto the ground (seeds/ground_cover.h) and before the eye
-// (render/rain/precipitation.h).
+// The precipitation of a rain area, which accumulates on the ground (seeds/ground_cover.h) and is drawn as
+// particles and shafts (render/rain/precipitation.h).
 enum class PrecipitationKind { rain, snow };
 
 }  // namespace nephos

@@ -2,50 +2,51 @@
 #pragma once
 
 // Wind: a horizontal velocity that depends on height and time, piecewise linear in both (D: advection; D
-// names vector fields as the improvement). Motion is accumulated as integers, so nothing drifts: after n
-// steps of a constant wind the displacement is floor(n * d) cells exactly, whatever the speed, with d the
-// displacement of one step, velocity * step / cell, rounded up to a multiple of 2^-32 cell. Up, because few
-// decimal fractions are such multiples: n * d then never falls short of the whole number that the exact
-// product reaches. So 0.2 cells a step are 1 cell after 5 steps, and -0.3 are -3 cells after 10. Where the
-// exact displacement of a step is a multiple of 1/q cell, floor(n * d) is the floor of the exact product for
-// all n < 2^32 / q.
+// names vector fields as the improvement).
+//
+// Motion accumulates as fixed-point integers, without rounding drift: after n steps of a constant wind the
+// displacement is exactly floor(n * d) cells, with d = velocity * step / cell rounded up to a multiple of
+// 2^-32 cell. Rounding up makes decimal fractions arrive: 0.2 cells a step are 1 cell after 5 steps, and
+// -0.3 are -3 cells after 10. If the exact displacement of a step is a multiple of 1/q cell, floor(n * d)
+// equals the floor of the exact product for all n < 2^32 / q.
 
 #include <cstdint>
 #include <vector>
 
 namespace nephos {
 
-// Velocity towards east and north.
+// Horizontal velocity, positive towards east and north.
 struct Velocity {
     double east_m_per_s = 0, north_m_per_s = 0;
     bool operator==(const Velocity&) const = default;
 };
 
+// The velocity at one height of a profile.
 struct WindLevel {
     double height_m = 0;  // world z; levels rise strictly
     Velocity velocity;
     bool operator==(const WindLevel&) const = default;
 };
 
-// The profile at one time. Between levels linear, below the first and above the last constant.
+// The wind profile at one time: linear between levels, constant below the first and above the last.
 struct WindKeyframe {
     double time_s = 0;  // keyframes rise strictly
     std::vector<WindLevel> levels;
     bool operator==(const WindKeyframe&) const = default;
 };
 
-// Between keyframes each profile is evaluated and mixed linearly; before the first and after the last
-// constant. No keyframe at all: calm air.
+// Profiles over time: linear between keyframes, constant before the first and after the last. Without
+// keyframes the air is calm.
 struct Wind {
     std::vector<WindKeyframe> keyframes;
     bool operator==(const Wind&) const = default;
 };
 
-// Velocity at a height and time. Thread-safe; pure.
+// Returns the velocity at a height and time. Thread-safe; pure.
 Velocity wind_at(const Wind& wind, double height_m, double time_s);
 
-// A displacement in cells as a fixed-point number with 32 fractional bits: exact sums, floor for the whole
-// part.
+// A displacement in cells as a fixed-point number with 32 fractional bits: sums are exact, and the integer
+// part is the floor.
 struct Displacement {
     std::int64_t x = 0, y = 0;  // cells * 2^32
 
@@ -54,9 +55,9 @@ struct Displacement {
     bool operator==(const Displacement&) const = default;
 };
 
-// The displacement of one step of `time_step_s`, rounded up (towards east and north) to a multiple of 2^-32
-// cell; 0 where it is less than half of that either way, which is calm air. Throws Error(usage) when it
-// exceeds 2^30 cells: more than any lattice is wide.
+// Returns the displacement of one step of `time_step_s`, rounded up (towards east and north) to a multiple of
+// 2^-32 cell; 0 where its magnitude is below 2^-33 cell. Throws Error(usage) when it exceeds 2^30 cells, more
+// than any lattice is wide.
 Displacement displacement_of_step(const Velocity& velocity, double time_step_s, double cell_size_m);
 
 }  // namespace nephos

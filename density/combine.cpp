@@ -21,7 +21,7 @@ using openvdb::Coord;
 // seldom are.
 constexpr double kWhole = 1e-6;
 
-// From the common box's voxels to those of one grid: source = scale * common + offset, both at voxel centres.
+// Maps voxel centres of the common box to those of one grid: source = scale * common + offset.
 struct Mapping {
     double scale = 1;
     Vec3 offset{};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A sparse box of density values: what smoothing makes out of bits, what files hold and what is drawn.
+// A sparse grid of density values: the result of smoothing, the content of VDB files, the input of rendering.
 //
 // Voxels have the index space of the lattice: (0, 0, 0) is the lowest corner, x east, y north, z up, and a
 // voxel's centre lies at origin + (i+0.5, j+0.5, k+0.5) * voxel size. Only voxels with a value above 0 take
@@ -32,36 +32,36 @@ struct VoxelBox {
 
 class DensityGrid {
   public:
-    // No voxels at all: extent 0 x 0 x 0.
+    // Creates an empty grid of extent 0 x 0 x 0.
     DensityGrid();
 
-    // From extent.cells() values, x fastest. Values are kept as they are; 0 stays empty.
-    // Throws Error(usage) when the number of values is not extent.cells(), when a value is negative or not
-    // finite, or when cell_size_m is not above 0.
+    // Creates a grid from extent.cells() values, x fastest, without rounding; zeros take no memory. Throws
+    // Error(usage) when the number of values is not extent.cells(), when a value is negative or not finite,
+    // or when cell_size_m is not above 0.
     static DensityGrid from_dense(std::span<const float> values, Extent extent, const Placement& placement);
 
-    // Bounds of the voxels, the same for every grid of a sequence however much of it is cloud.
+    // Returns the number of voxels on each axis, the same for every grid of a sequence.
     Extent extent() const;
-    // World position; cell_size_m is the edge of a voxel (a refined grid has smaller voxels than the lattice
-    // cells).
+    // Returns the placement in the world; cell_size_m is the edge of a voxel (smaller than a cell of the
+    // lattice in a refined grid).
     const Placement& placement() const;
 
-    // Value of one voxel; 0 outside the extent. For many values to_dense() is far faster.
+    // Returns the value of one voxel; 0 outside the extent. For many values to_dense() is far faster.
     float value(int i, int j, int k) const;
-    // Number of voxels with a value above 0.
+    // Returns the number of voxels with a value above 0.
     std::uint64_t active_voxels() const;
-    // Smallest box around the voxels above 0.
+    // Returns the smallest box around the voxels above 0.
     VoxelBox bounding_box() const;
-    // Largest value; 0 for an empty grid.
+    // Returns the largest value; 0 for an empty grid.
     float max_value() const;
-    // Sum of all values, in a fixed order.
+    // Returns the sum of all values, added in a fixed order.
     double sum() const;
-    // All extent().cells() values, x fastest; index with linear_index(extent(), i, j, k).
+    // Returns all extent().cells() values, x fastest; index with linear_index(extent(), i, j, k).
     std::vector<float> to_dense() const;
-    // Bytes that the voxels and the tree above them take.
+    // Returns the bytes that the voxels and the tree above them take.
     std::size_t memory_bytes() const;
 
-    // The same voxels at another place or size in the world. Shares the voxels.
+    // Returns a grid with another placement that shares the voxels.
     DensityGrid with_placement(const Placement& placement) const;
 
   private:

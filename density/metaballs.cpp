@@ -193,7 +193,8 @@ double metaball_field(double a) {
     return w * w * (5 + 4 * w) / 9;
 }
 
-// With s along the line, w = h^2 - s^2; the integrals of w^2 and w^3 over -h..h are 16/15 h^5 and 32/35 h^7.
+// With s the position along the line, f is a polynomial in w = h^2 - s^2; the integrals of w^2 and w^3 over
+// -h..h are 16/15 h^5 and 32/35 h^7.
 double metaball_line_integral(double b) {
     if (!(b < 1)) return 0;
     const double h2 = 1 - b * b;

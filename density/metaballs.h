@@ -11,9 +11,8 @@
 //   D(x) = sum q f / sum f. Both sums run in the same order, so a saturated neighbourhood gives 1 exactly,
 //   everywhere.
 // - a renderer that adds up metaballs has no such sum at hand. It scales every metaball by
-//   metaball_normalisation(R): then sum q f has the mean q in a uniform region, with a ripple around it that
-//   is at most 2.2 % at R = 2 voxel edges, 0.5 % at 3 (and -59 % .. +23 % at 1, where metaballs hardly
-//   overlap).
+//   metaball_normalisation(R): then sum q f has the mean q in a uniform region, with a ripple around it of at
+//   most 2.2 % at R = 2 voxel edges and 0.5 % at 3 (-59 % .. +23 % at 1, where metaballs hardly overlap).
 //
 // A periodic axis repeats the grid, as in smoothing: the same q near both of its faces, the same D at both.
 // Beyond the faces of an open axis q is 0, and D falls towards them.
@@ -27,12 +26,14 @@
 
 namespace nephos {
 
-// Radii that every function here takes, in voxel edges of the grid: below 1 a point could lie in no metaball.
+// Range of the radius in voxel edges of the grid, for every function here: below 1 there would be points in
+// no metaball.
 inline constexpr double kMinMetaballRadius = 1.0;
 inline constexpr double kMaxMetaballRadius = 8.0;
-// Voxels per cell and axis that resample() makes at most.
+// Largest `refine` of resample(): voxels per cell and axis.
 inline constexpr int kMaxRefine = 8;
 
+// One metaball in world space: the splat that the renderer draws.
 struct Metaball {
     float x, y, z;  // centre, world metres
     float radius;   // effective radius R, metres
@@ -40,29 +41,28 @@ struct Metaball {
     bool operator==(const Metaball&) const = default;
 };
 
-// f above; a >= 0. 0 from a = 1 on.
+// Returns f above for a >= 0; 0 from a = 1 on.
 double metaball_field(double a);
 
-// The integral of f along the straight line that passes the centre at distance b R, in units of R; 0 from b =
-// 1 on. Closed form with h = sqrt(1 - b^2) (half the chord).
+// Returns the line integral of f along a straight line that passes the centre at distance b R, in units of R;
+// 0 from b = 1 on. Closed form with h = sqrt(1 - b^2) (half the chord).
 double metaball_line_integral(double b);
 
-// One cell's volume over the integral of f over its ball: 2835 / (736 pi R^3), R in voxel edges. With it, the
-// extinction extinction_per_m * metaball_normalisation(R) * sum q f along a ray through a saturated region is
-// extinction_per_m on average.
+// Returns the volume of one voxel divided by the volume integral of f: 2835 / (736 pi R^3), R in voxel edges.
+// Then extinction_per_m * metaball_normalisation(R) * sum q f is extinction_per_m on average in a saturated
+// region.
 double metaball_normalisation(double radius_cells);
 
-// One metaball per voxel with q > 0: blocks of 8x8x8 voxels by z, y, x, and inside a block x fastest.
-// The same order for the same voxels, however the grid came about.
-// Throws Error(usage) when the radius is out of range.
+// Returns one metaball per voxel with q > 0, ordered by block of 8x8x8 voxels (by z, y, x) and inside a block
+// x fastest, an order that depends on the voxels alone. Throws Error(usage) when the radius is out of range.
 std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells);
 
-// D at any point of the world, images of the grid along periodic axes included; 0 far from all cloud. Throws
-// as metaballs().
+// Returns D at any point of the world, periodic images of the grid included; 0 far from all cloud. Throws as
+// metaballs().
 double density_at(const DensityGrid& grid, const Vec3& position_m, double radius_cells,
                   const Boundaries& boundaries = {});
 
-// D sampled at the centres of voxels `refine` times smaller than the grid's. Throws Error(usage) when
+// Returns D sampled at the centres of voxels `refine` times smaller than the grid's. Throws Error(usage) when
 // refine is outside 1..8, the radius is out of range, or the result would have more than 2^31 - 1 voxels on
 // an axis.
 DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells,

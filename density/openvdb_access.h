@@ -38,15 +38,15 @@ struct Block {
     int positive_count() const;  // values above 0
 };
 
-// Takes finished blocks one by one and hangs them into a new tree. Not thread-safe: blocks are made in
-// parallel and handed over in a fixed order.
+// Assembles a tree from finished blocks. Not thread-safe: blocks are computed in parallel and added in a
+// fixed order.
 class TreeBuilder {
   public:
     TreeBuilder();
     // The leaf's mask must be set.
     void add(std::unique_ptr<FloatLeaf> leaf);
     void add_tile(const openvdb::Coord& origin, float value);  // value > 0
-    // Activates the corners and hands over the grid.
+    // Activates the two corner voxels and returns the grid; leaves the builder empty.
     DensityGrid finish(Extent extent, const Placement& placement);
 
   private:
@@ -56,30 +56,31 @@ class TreeBuilder {
 
 struct OpenvdbAccess {
     static const openvdb::FloatGrid& grid(const DensityGrid& density);
-    // The grid must keep the invariants above; its transform is not used.
+    // Wraps a grid that satisfies the invariants above; its transform is not used.
     static DensityGrid wrap(openvdb::FloatGrid::Ptr grid, Extent extent, const Placement& placement);
 };
 
-// All blocks of the tree, ordered by z, y, x of their origins. A corner's block may have no value above 0.
+// Returns all blocks of the tree, ordered by z, y, x of their origins. A corner's block may have no value
+// above 0.
 std::vector<Block> blocks_of(const DensityGrid& density);
-// Position of a block in that order.
+// Returns the sort key of a block in that order.
 std::tuple<int, int, int> block_order(const openvdb::Coord& origin);
 
-// What a parallel computation of one block yields: at most one of leaf and tile.
+// The result of a parallel computation of one block: at most one of leaf and tile.
 struct NewBlock {
     std::unique_ptr<FloatLeaf> leaf;
     float tile = 0;
 
-    // A leaf whose values are all set, masks not: empty when all are 0, a tile when all are the same.
+    // Classifies a leaf whose values are set and whose mask is not: nothing when all are 0, a tile when all
+    // are equal, else a leaf with its mask set.
     static NewBlock from(std::unique_ptr<FloatLeaf> leaf);
     void move_to(TreeBuilder& builder, const openvdb::Coord& origin);
 };
 
-// A leaf at `origin` whose values are not yet set and whose voxels are all inactive.
+// Returns a leaf at `origin` with uninitialised values, all inactive.
 std::unique_ptr<FloatLeaf> uninitialised_leaf(const openvdb::Coord& origin);
 
-// Index of the voxel that stands at index i of an axis of n voxels: of a periodic one the voxel in 0..n-1
-// that it repeats there, of an open one i.
+// Wraps index i into 0..n-1 on a periodic axis of n voxels; returns i on an open one.
 inline int repeated(int i, int n, Boundary boundary) {
     if (boundary == Boundary::open || (i >= 0 && i < n)) return i;
     const int rest = i % n;

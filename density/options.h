@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How bits become density, and what is written; plain data, filled by a scene or by another program.
+// Options of the conversion from bits to density and of the files; plain data, filled by a scene or by
+// another program.
 
 #include <cstdint>
 

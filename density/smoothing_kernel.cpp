@@ -32,8 +32,8 @@ std::vector<T> as(const std::vector<std::uint32_t>& weights) {
     return std::vector<T>(weights.begin(), weights.end());
 }
 
-// One tile on its way up. T is the type of the sums; kUnit: every weight is 1. Rows are handled in groups
-// of 8.
+// The state of one tile while its planes are processed from bottom to top. T is the type of the sums; kUnit:
+// every weight is 1. Rows are processed in groups of 8.
 template <class T, bool kUnit>
 class TilePass {
   public:

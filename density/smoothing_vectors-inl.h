@@ -30,7 +30,7 @@ constexpr int kWord = 64;  // cells per word
 template <class T>
 using Tag = hn::CappedTag<T, kWord>;
 
-// How many floats lie before the next cache line; streaming stores fill whole lines, so that the
+// Returns the number of floats before the next cache line: streaming stores fill whole lines, so that the
 // write-combining buffers empty at once.
 HWY_INLINE int floats_to_line(const float* out) {
     constexpr std::uintptr_t kLine = 64;  // bytes
@@ -80,7 +80,7 @@ void weighted_sum(const T* const* lines, const std::vector<T>& weights, int coun
     }
 }
 
-// The mask of the lanes from bit n on.
+// Returns the mask of the lanes whose first is bit n.
 template <class D>
 HWY_INLINE hn::Mask<D> mask_at(D d, const std::uint8_t* bits, int n) {
     if (hn::Lanes(d) >= 8) return hn::LoadMaskBits(d, bits + unsigned(n) / 8);
@@ -126,7 +126,7 @@ void running_sums(const T* const* lines, int radius, int count, T* HWY_RESTRICT 
     }
 }
 
-// A vector of floats and the sums that become one.
+// The vector of floats with as many lanes as a vector of sums.
 template <class T>
 using FloatTag = hn::CappedTag<float, sizeof(T) == 8 ? Tag<double>::kPrivateN : std::size_t{kWord}>;
 
@@ -147,7 +147,7 @@ HWY_INLINE hn::Vec<FloatTag<T>> converted(const T* HWY_RESTRICT sums, float reci
     return hn::Min(hn::Mul(value, hn::Set(d, reciprocal)), hn::Set(d, 1.0f));
 }
 
-// out[n] = min(1, float(sums[n]) * reciprocal). kStream: past the caches.
+// out[n] = min(1, float(sums[n]) * reciprocal). kStream: non-temporal stores.
 template <class T, bool kStream>
 HWY_INLINE void to_floats(const T* HWY_RESTRICT sums, int count, float reciprocal, float* HWY_RESTRICT out) {
     const FloatTag<T> d;
@@ -197,7 +197,7 @@ HWY_INLINE void transpose_block(const T* s, std::size_t stride_y, std::size_t st
 }
 
 #if HWY_TARGET != HWY_SCALAR
-// The narrow types in vectors: three rounds of interleaving turn 8 rows of z into 8 rows of x.
+// 8-bit sums in vectors: three rounds of interleaving transpose 8 rows of z into 8 rows of x.
 HWY_INLINE void transpose_block(const std::uint8_t* s, std::size_t stride_y, std::size_t stride_z,
                                 std::uint8_t* HWY_RESTRICT block) {
     const hn::FixedTag<std::uint8_t, 8> d8;
@@ -259,7 +259,7 @@ HWY_INLINE void transpose_block(const std::uint16_t* s, std::size_t stride_y, st
 }
 #endif
 
-// mask: where block[n] is not 0. Returns whether all 512 are `total`.
+// Sets bit n of `mask` where block[n] is not 0. Returns true when all 512 values are `total`.
 template <class T>
 HWY_INLINE bool classify_block(const T* block, T total, std::uint64_t (&mask)[8]) {
     if constexpr (HWY_TARGET != HWY_SCALAR && sizeof(T) <= 2) {  // whole bytes of mask

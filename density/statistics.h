@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a researcher plots over time: how many cells are humid, active and cloud, how much of the sky they
-// cover, and between which heights.
+// Statistics of one step, for plots over time: numbers of humid, active and cloud cells, cloud cover, base
+// and top.
 
 #include <cstdint>
 
@@ -19,13 +19,14 @@ struct CloudStatistics {
     double mean_density = 0;  // mean of cld over all cells of the box
 };
 
-// Statistics of one state. Throws Error(usage) when the planes differ in extent. Thread-safe; does not depend
-// on the number of threads.
+// Returns the statistics of one state. Throws Error(usage) when the planes differ in extent. Thread-safe; the
+// result does not depend on the number of threads.
 CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& act, const BitPlaneView& cld,
                                  const Placement& placement);
 
-// Of density without an automaton: cells above 0 are cloud, none humid or active, and the mean is that of the
-// density. Thread-safe; does not depend on the number of threads.
+// Returns the statistics of a density grid that no automaton produced: voxels above 0 count as cloud, none as
+// humid or active, and mean_density is the mean of the density. Thread-safe; the result does not depend on
+// the number of threads.
 CloudStatistics cloud_statistics(const DensityGrid& density);
 
 }  // namespace nephos

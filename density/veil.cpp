@@ -133,7 +133,7 @@ VeilPlan plan_of(const VeilOptions& options, double time_s) {
     return plan;
 }
 
-// What the voxels of all blocks share.
+// The state shared by all blocks of voxels.
 struct VeilField {
     VeilPlan plan;
     Extent extent;

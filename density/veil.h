@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Procedural veils: density that is a function of place and time alone, a sum of octaves of noise (S, eq. 4
-// to 6), for high, thin, wide layers where an automaton would be wasted:
+// Procedural veils: density as a function of position and time alone, a sum of octaves of noise (S, eq. 4 to
+// 6), for high, thin, wide layers that need no automaton:
 //
 //     q(p, t) = sum_k w_k N_k
 //     N_k     = X_k                      the plain form: stratus, cirrostratus
@@ -10,8 +10,8 @@
 //     X_k     = b_k N((p_k - v_k t) / a_k) + c_k
 //     p_0     = p,  p_k = p_{k-1} + N_{k-1} s_k        with displacement (cirrus, cirrostratus), else p_k = p
 //
-// N is the gradient noise of core/noise.h, another one for each octave. S multiplies by a frequency; here
-// a_k is the wavelength, for each direction its own, so that cirrus has fibres along the wind.
+// N is the gradient noise of core/noise.h with a seed of its own for each octave. S multiplies by a
+// frequency; here a_k is the wavelength, one per direction, so that cirrus has fibres along the wind.
 //
 // The frame of the noise. p is counted along and across the fibres and up, from a point that the wind at the
 // veil's `top_m` carries; v_k are velocities relative to that wind. Ice that falls out of a cloud at a
@@ -20,13 +20,13 @@
 //
 //     fallstreak_m * (h / (top_m - base_m))^2,   against the wind (streaks trail behind)
 //
-// From q to density. Two thresholds are the quantiles of q that make the veil cover the share `coverage` of
-// the sky, and let the density rise from 0 to 1 over the share `softness` of what is covered; between them
-// it is smooth. `sheet` is added below, and all is multiplied by the profile in height (0 at base_m and
-// top_m, 1 between the soft ends) and by the fade towards the sides of the lattice. Densities below 2^-10 are
-// 0.
+// From q to density. Two thresholds are quantiles of q: the veil covers the fraction `coverage` of the sky,
+// and its density rises from 0 to 1, by a smoothstep, over the fraction `softness` of the covered part.
+// `sheet` is a minimum: the pattern fills the range from it to 1. The result is multiplied by the profile in
+// height (0 at base_m and top_m, 1 between the soft ends) and by the fade towards the sides of the lattice.
+// Densities below 2^-10 are 0.
 //
-// The same bits on every machine, for any number of threads and with any vector width: see core/noise.h.
+// The bits are the same on every machine, for any number of threads and any vector width: see core/noise.h.
 // All functions are pure and thread-safe.
 
 #include <cstdint>
@@ -42,7 +42,7 @@ enum class VeilForm { cumulus, stratus, cirrus, cirrostratus };
 // One octave, with S's names in brackets. Vectors are along the fibres, across them, up.
 struct VeilOctave {
     Vec3 wavelength_m{4000, 4000, 4000};  // size of a lattice cell of the noise [1/a], > 0
-    double weight = 1;                    // [w]; S: falls from octave to octave
+    double weight = 1;                    // [w]; in S it falls from octave to octave
     Vec3 velocity_m_per_s{};          // relative to the wind [v]: octaves that slide over each other evolve
     Vec3 displacement_m{};            // of this octave's point per value of the octave before [s]
     double gain = 1.5, offset = 0.5;  // [b], [c]: X lies about 0..1
@@ -52,49 +52,50 @@ struct VeilOctave {
 
 struct VeilOptions {
     VeilForm form = VeilForm::cirrus;
-    // Given one by one; none: `octave_count` of them by powers (veil_octaves()).
+    // Explicit octaves; if empty, `octave_count` octaves by powers (veil_octaves()).
     std::vector<VeilOctave> octaves;
     int octave_count = 4;          // 1..12
     double wavelength_m = 3000;    // of the first octave, across the fibres; > 0
-    double lacunarity = 2.1;       // wavelength per wavelength of the octave after, 1..8
-    double persistence = 0.5;      // weight per weight of the octave before, above 0, below 1
-    double stretch = 1;            // wavelength along the fibres per that across, 0.01..1000
-    double stretch_up = 1;         // and upwards
+    double lacunarity = 2.1;       // ratio of the wavelengths of an octave and the next, 1..8
+    double persistence = 0.5;      // ratio of the weights of an octave and the one before, above 0, below 1
+    double stretch = 1;            // ratio of the wavelengths along and across the fibres, 0.01..1000
+    double stretch_up = 1;         // ratio of the wavelengths upwards and across the fibres, 0.01..1000
     double displacement = 0;       // [s] across the fibres, in wavelengths of the octave; 0..10
-    double evolution_m_per_s = 1;  // speed of the first octave; each after has 0.8 of it, elsewhere directed
+    double evolution_m_per_s = 1;  // speed of the first octave; times 0.8 per further octave
     double direction_deg = 0;      // of the fibres, counter-clockwise from east
-    double coverage = 0.5;         // share of the sky where there is a veil, above 0, at most 1
-    double softness = 1;           // share of that over which density rises from 0 to 1; 0..1
-    double sheet = 0;              // density everywhere in the layer, 0..1: the rest is the pattern
+    double coverage = 0.5;         // fraction of the sky that the veil covers, above 0, at most 1
+    double softness = 1;           // fraction of the covered part over which density rises from 0 to 1; 0..1
+    double sheet = 0;              // least density in the layer, 0..1: the pattern adds to it up to 1
     double base_m = 0, top_m = 1000;             // world z; base below top
     double soft_base_m = 200, soft_top_m = 200;  // heights over which density fades in from the ends, >= 0
-    double fallstreak_m = 0;                     // how far streaks have fallen behind at the base
+    double fallstreak_m = 0;                     // displacement of streaks at the base, against the wind
     double margin_m = 0;  // width along the sides of the lattice over which density fades; >= 0
     std::uint64_t seed = 1;
     bool operator==(const VeilOptions&) const = default;
 };
 
-// Octaves by powers: wavelength_m / lacunarity^k, weights persistence^k, velocities of evolution_m_per_s
-// 0.8^k (eddies of half the size are slower by 2^(1/3): Kolmogorov) in six directions in turn, displacements
-// from the second octave on; in the ridged form crests lie at X = 1/2. Those given one by one as they are.
+// Returns options.octaves, or if there are none octaves by powers: wavelength_m / lacunarity^k, weights
+// persistence^k, speeds evolution_m_per_s 0.8^k (eddies of half the size are slower by 2^(1/3): Kolmogorov)
+// in six directions in turn, displacements from the second octave on; in the ridged form crests lie at X =
+// 1/2.
 std::vector<VeilOctave> veil_octaves(const VeilOptions& options);
 
-// The sums q at which the density of the pattern begins, and reaches 1; the same at all times.
+// The sums q at which the density of the pattern rises above 0, and reaches 1; constant over time.
 struct VeilThresholds {
     float low = 0, high = 1;
 };
 VeilThresholds veil_thresholds(const VeilOptions& options);
 
-// Throws Error(usage) that names the first option that is out of range, or too fine for cells of this size:
-// an octave needs two cells, and some cell's centre must lie between base and top.
+// Throws Error(usage) that names the first option out of range or too fine for the cells: a wavelength is at
+// least two cells, and some cell's centre must lie between base and top.
 void check(const VeilOptions& options, const Extent& extent, const Placement& placement);
 
-// Way of the air at a height from time 0 to `time_s`, metres towards east and north; exact for winds that are
-// linear between keyframes.
+// Returns the integral of the wind at a height from time 0 to `time_s`: the displacement of the air in metres
+// towards east and north. Exact for winds that are linear between keyframes.
 Vec3 wind_displacement_m(const Wind& wind, double height_m, double time_s);
 
-// Density at a moment as a sparse grid of extent.cells() voxels. Throws as check(), and Error(usage) when
-// time_s is not finite or the pattern has moved more than 2^30 cells.
+// Returns the density at a time as a sparse grid of extent.cells() voxels. Throws as check(), and
+// Error(usage) when time_s is not finite or the pattern has moved more than 2^30 cells.
 DensityGrid veil_density(const VeilOptions& options, const Wind& wind, const Extent& extent,
                          const Placement& placement, double time_s);
 

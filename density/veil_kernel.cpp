@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-// As density/smoothing_kernel.cpp.
+// Compiled once for each SIMD target of Highway and dispatched at run time.
 #ifndef HWY_DISABLED_TARGETS
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
 #endif

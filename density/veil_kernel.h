@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The vector part of density/veil.h: q of points that lie near each other (not installed).
+// The SIMD kernel of density/veil.h: evaluates q at points that are close together (not installed).
 
 #include <array>
 #include <cstddef>
@@ -10,14 +10,14 @@
 
 namespace nephos {
 
-// One octave at one moment, as the kernel takes it.
+// One octave at one time, in the form that the kernel reads.
 struct VeilOctavePlan {
     std::array<double, 3> per_m{};  // lattice cells per metre along, across, up
-    std::array<double, 3> phase{};  // lattice cells at the origin of p: a place of its own, less v t
+    std::array<double, 3> phase{};  // origin of p in lattice cells of the noise: random, minus v t
     std::array<std::uint32_t, 3> seeds{};
     std::array<float, 3> displacement_m{};
     float weight = 1, gain = 1, offset = 0, ridge = 0, crest = 0;
-    float most_after = 0;  // the largest sum that the octaves after this one may have
+    float most_after = 0;  // upper bound of the summed octaves after this one, for early termination
 };
 
 struct VeilPlan {
@@ -28,15 +28,16 @@ struct VeilPlan {
 
 inline constexpr std::size_t kVeilLanes = 64;  // points are padded to a multiple of this
 
-// Points relative to a base in the frame of the noise, metres: differences as floats keep their precision
-// wherever the base lies.
+// Points in the frame of the noise, in metres, as float offsets from a double base, so that precision does
+// not depend on the position.
 struct VeilPoints {
     std::array<double, 3> base_m{};
     std::array<const float*, 3> from_base_m{};
     std::size_t count = 0;  // multiple of kVeilLanes
 };
 
-// out[n] = q of point n; or anything below `threshold` where q is below it, the sooner found the better.
+// Computes out[n] = q of point n. Where q is below `threshold`, out[n] is any value below it: octaves that
+// cannot reach it any more are skipped.
 void veil_sums(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out);
 
 }  // namespace nephos

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the options of a veil mean, and which make sense.
+// Derived octaves and validation of a veil's options.
 
 #include <algorithm>
 #include <array>

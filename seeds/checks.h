@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Checks of user input in this module: one line a rule, every message with the value and what was expected.
+// Checks of user input in this module; every message names the value and the expected range.
 
 #include <cmath>
 #include <string>
@@ -16,7 +16,7 @@ namespace nephos {
 
 inline std::string text_of(double value) { return number_text(value, 6); }
 
-// Throws unless min <= value <= max; false for NaN too.
+// Throws Error(usage) unless min <= value <= max; also for NaN.
 inline void require_in(const std::string& what, double value, double min, double max) {
     if (value >= min && value <= max) return;
     usage_error(what + " is " + text_of(value) + ", expected " + text_of(min) + ".." + text_of(max));
@@ -27,7 +27,7 @@ inline void require_positive(const std::string& what, double value) {
     usage_error(what + " is " + text_of(value) + ", expected a number above 0");
 }
 
-// Throws unless lowest <= min <= max <= highest.
+// Throws Error(usage) unless lowest <= min <= max <= highest.
 inline void require_range(const std::string& what, double min, double max, double lowest, double highest) {
     if (min > max)
         usage_error(what + ": the minimum " + text_of(min) + " is above the maximum " + text_of(max));

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The atmospheric state over time, and which skies the clouds that enter now come from (T, chapter 3.4).
+// The atmospheric state over time, and the probabilities of the skies that entering clouds are drawn from (T,
+// chapter 3.4).
 
 #include <span>
 #include <vector>
@@ -10,29 +11,30 @@
 
 namespace nephos {
 
-// T's straight line: St = Si + (Sf - Si) T / D, as a schedule. One point when the duration is 0.
-// Throws Error(usage) unless the states are 0..1 and the duration is finite and not negative.
+// Returns T's linear schedule St = Si + (Sf - Si) T / D; one point when the duration is 0. Throws
+// Error(usage) unless the states are 0..1 and the duration is finite and not negative.
 std::vector<StatePoint> straight_schedule(double initial_state, double final_state, double duration_s);
 
-// The state at a time: linear between the points, constant before the first and after the last.
-// `schedule` must have passed check() of its SkyOptions: not empty, times rise strictly.
+// Returns the state at a time: linear between the points, constant before the first and after the last.
+// Precondition: `schedule` has passed check() of its SkyOptions (not empty, times rise strictly). Pure.
 double state_at(std::span<const StatePoint> schedule, double time_s);
 
-// The two skies that bracket a state, with P_Si = 1 - |St - Si| / Diff, Diff = the distance of their states.
-// On a sky's state, and outside all states, one sky has it all.
+// The two skies that bracket a state, with their probabilities P_Si = 1 - |St - Si| / Diff, Diff = the
+// distance of their states. At a sky's own state, and outside all states, one sky has probability 1.
 struct SkyShares {
-    std::size_t lower = 0, upper = 0;         // indices; equal when one sky has it all
+    std::size_t lower = 0, upper = 0;         // indices; equal when one sky has probability 1
     double lower_share = 1, upper_share = 0;  // sum 1
 };
 
-// `skies` in any order, at least one, no two with one state.
+// Returns the bracketing skies of a state. `skies` in any order, at least one, all states different. Pure.
 SkyShares shares_at(std::span<const Sky> skies, double state);
 
-// Number of clouds at a state: the bracketing skies' numbers, weighted by their shares, rounded half up.
+// Returns the number of clouds at a state: the mean of the bracketing skies' numbers, weighted by their
+// probabilities, rounded half up. Pure.
 int clouds_at(std::span<const Sky> skies, double state);
 
-// Index of the sky nearest to a state, the lower one if two are equally near: the one a simulation starts
-// with.
+// Returns the index of the sky nearest to a state, of two equally near ones the lower: the initial sky of a
+// simulation. Pure.
 std::size_t nearest_sky(std::span<const Sky> skies, double state);
 
 }  // namespace nephos

@@ -17,10 +17,10 @@ namespace nephos {
 enum class Genus { Ci, Cs, Cc, As, Ac, Ns, St, Sc, Cu, Cb, StFra, CuFra };
 inline constexpr int kGenusCount = 12;
 
-// The belts of the earth that T's table 2 tells apart.
+// The climatic belts of T's table 2.
 enum class Region { tropical, temperate, polar };
 
-// Heights of the group's bases: up to 2 km, 2-8 km, 3-18 km, depending on the region.
+// Groups of genera by the height of their bases: up to 2 km, 2-8 km, 3-18 km, depending on the region.
 enum class HeightGroup { low, middle, high };
 
 struct GenusFacts {
@@ -32,20 +32,20 @@ struct GenusFacts {
     std::optional<Range> top_m;                             // usual top above ground, where T gives one
 };
 
-// All of them, in the order of the enum. Thread-safe, as everything here.
+// Returns all genera in the order of the enum. Thread-safe, as all functions here.
 std::span<const GenusFacts> genera();
 
 const GenusFacts& facts_of(Genus genus);
 Range base_height_m(Genus genus, Region region);
 
-// Heights of the whole group in a region (T, table 2).
+// Returns the range of heights of a group in a region (T, table 2).
 Range group_height_m(HeightGroup group, Region region);
 
-// By abbreviation ("Cb", "St fra") or name ("cumulonimbus"), whatever the case.
-// Throws Error(usage) that lists the abbreviations and names the nearest one.
+// Parses an abbreviation ("Cb", "St fra") or name ("cumulonimbus"), ignoring case. Throws Error(usage) that
+// lists the abbreviations and suggests the nearest one.
 Genus genus_from_name(std::string_view text);
 
-// "tropical", "temperate" or "polar", whatever the case. Throws Error(usage).
+// Parses "tropical", "temperate" or "polar", ignoring case. Throws Error(usage).
 Region region_from_name(std::string_view text);
 
 }  // namespace nephos

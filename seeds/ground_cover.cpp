@@ -21,7 +21,7 @@ double wetted(double water_mm, double input_mm_per_h, double duration_s, const G
     return balance + (water_mm - balance) * std::exp(-rate * duration_s);
 }
 
-// Of the rain on the outermost texels.
+// Returns the mean of the rain on the outermost texels.
 double mean_at_edge(const GroundCoverMap& map) {
     const auto columns = std::size_t(map.columns), rows = std::size_t(map.rows);
     double sum = 0;

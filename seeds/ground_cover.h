@@ -7,9 +7,8 @@
 //     cover.expose(falling);                      // the rain areas now; fills map().rain_mm_per_h
 //     cover.advance(step_s); cover.expose(...);   // a step, during which it rained as it was exposed
 //
-// Exposure is seen from above, like a shadow map: a texel gets the strongest rain of all areas at the place
-// that its drops left at the cloud's base, up the wind (drift_m()). Nothing stands on the ground, so nothing
-// shelters it.
+// The exposure map works like a shadow map from above: a texel gets the strongest rain of all areas at the
+// point upwind where its drops left the cloud's base (drift_m()). There are no obstacles.
 //
 // Water is a film of V mm. Hollows fill and then overflow (Linsley, Kohler and Paulhus 1949: depression
 // storage V = S (1 - exp(-P / S)) after a rain of P, so the share V / S of what falls runs off), and the film
@@ -33,13 +32,13 @@
 namespace nephos {
 
 struct GroundCoverOptions {
-    bool enabled = false;             // false: the ground is dry for ever and nothing is computed
+    bool enabled = false;             // false: the ground stays dry and nothing is computed
     double initial_water_mm = 0;      // of the film everywhere at time 0, 0..100
     double initial_snow_mm = 0;       // of water in the snow everywhere at time 0, 0..1000
-    double capacity_mm = 3;           // S: film at which all that falls runs off, 0.01..100
+    double capacity_mm = 3;           // S: film at which all precipitation runs off, 0.01..100
     double drying_s = 5400;           // tau: a film dries to 1/e in this time, > 0, may be infinite
     double melting_mm_per_h = 0;      // M, of water, 0..100
-    double edge = 0.5;                // outer share of a rain area over which rain falls off, 0..1
+    double edge = 0.5;                // outer fraction of a rain area over which its rain decreases, 0..1
     double fall_speed_m_per_s = 6.5;  // of drops on their way from the cloud's base, > 0, may be infinite
     int texels = 256;                 // of the map on each side, 2..1024
     double margin = 0.1;              // by which the map is wider than the world on each side, 0..10
@@ -49,59 +48,62 @@ struct GroundCoverOptions {
 // Throws Error(usage) on values outside the ranges above.
 void check(const GroundCoverOptions& options);
 
-// What lies on a square of ground.
+// Water and snow on the ground at one point.
 struct GroundFilm {
     double water_mm = 0;
     double snow_mm = 0;
     bool operator==(const GroundFilm&) const = default;
 };
 
-// After `duration_s` >= 0 in which it rains or snows steadily, in mm/h. Pure.
+// Returns the film after `duration_s` >= 0 of constant rain or snow (mm/h of water). Pure.
 GroundFilm advanced(const GroundFilm& film, double rain_mm_per_h, double snow_mm_per_h, double duration_s,
                     const GroundCoverOptions& options);
 
-// What lies where, at one moment. Texel (column, row) is the rectangle of texel_x_m by texel_y_m whose lower
-// corner is at (x_m + column texel_x_m, y_m + row texel_y_m); rows from south to north, x fastest.
+// A map of water and snow at one time. Texel (column, row) is the rectangle of texel_x_m by texel_y_m whose
+// south-western corner is at (x_m + column texel_x_m, y_m + row texel_y_m); rows from south to north, x
+// fastest.
 struct GroundCoverMap {
     double x_m = 0, y_m = 0;  // south-western corner, world
     double texel_x_m = 1, texel_y_m = 1;
     int columns = 0, rows = 0;
     std::vector<float> water_mm, snow_mm;  // columns * rows
-    std::vector<float> rain_mm_per_h;      // that reaches the ground now, rain or snow
-    GroundFilm outside;                    // of all ground beyond the map
-    double outside_rain_mm_per_h = 0;      // the mean of the rain on the outermost texels
+    std::vector<float> rain_mm_per_h;      // precipitation that reaches the ground now, rain or snow
+    GroundFilm outside;                    // film on all ground beyond the map
+    double outside_rain_mm_per_h = 0;      // mean of rain_mm_per_h over the outermost texels
     bool operator==(const GroundCoverMap&) const = default;
 };
 
-// The map at `fraction` of the way from one moment to a later one: linear. Both have the same texels.
+// Interpolates linearly in time between two maps with the same texels; fraction 0 = `from`, 1 = `to`. Pure.
 GroundCoverMap mix(const GroundCoverMap& from, const GroundCoverMap& to, double fraction);
 
-// How far the wind carries drops on their way from a cloud's base down to the ground, in metres:
+// Returns the horizontal displacement by the wind, in metres, of drops that fall from a cloud's base to the
+// ground:
 //
 //     the integral of wind(z) / fall speed from ground_m to base_m, of 32 slices
 //
-// Drops are as fast as the air at every height. Zero when the base is not above the ground. Pure.
+// Drops move with the air at every height. Zero when the base is not above the ground. Pure.
 Vec2 drift_m(const Wind& wind, double time_s, double base_m, double ground_m, double fall_speed_m_per_s);
 
-// Rain areas whose drops drift alike: those of one layer.
+// Rain areas whose drops have the same displacement: those of one layer.
 struct FallingRain {
     std::span<const RainArea> areas;
     Vec2 drift{};  // metres
 };
 
+// The map over time. Not thread-safe.
 class GroundCover {
   public:
-    // Over `world`, widened by options.margin; `kind` is what falls from all rain areas. Throws Error(usage)
-    // on options that check() refuses.
+    // Creates the map over `world`, widened by options.margin, in its initial state. `kind` is the
+    // precipitation of all rain areas. Throws Error(usage) on options that check() refuses.
     GroundCover(const GroundCoverOptions& options, PrecipitationKind kind, const WorldRectangle& world);
 
-    // It rains from these areas from now on.
+    // Sets the rain areas from now on, and with them map().rain_mm_per_h.
     void expose(std::span<const FallingRain> falling);
-    // Lets time pass, >= 0 s, in which it rains as it does now.
+    // Advances the film by a duration >= 0 s of the present rain.
     void advance(double duration_s);
 
     const GroundCoverMap& map() const { return map_; }
-    // Goes on from a map that a cover with the same options had. Throws Error(io) on a map of another size.
+    // Continues from a map of a cover with the same options. Throws Error(io) on a map of another size.
     void restore(GroundCoverMap map);
 
   private:

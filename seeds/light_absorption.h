@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// T's light absorption factor (CFA, chapter 3.3): how much of a light is lost on its way through a cloud to
-// the centre of each box. A ray leaves the box's centre towards the light; the lengths that lie inside the
-// cloud's boxes are summed up (Kay and Kajiya's slab test, each box by itself, its own from the centre
+// T's light absorption factor (CFA, chapter 3.3): the fraction of a light that is absorbed between the light
+// and the centre of each box of a cloud. Along a ray from the box's centre towards the light, the lengths
+// inside the cloud's boxes are summed (Kay and Kajiya's slab test for each box, its own from the centre
 // outwards) and divided by the cloud's light distance:
 //
 //     absorbed = clamp(sum over boxes of weight * length inside / light distance, 0, 1)
 //
-// 1 = fully absorbed, only ambient light is left. (T's first sentence on the factor has it the other way
-// round, its examples and its shader have it this way.) Where boxes overlap the length counts once for each:
-// denser cloud. A ray that runs exactly in the face of a box counts as inside. Beyond a light at a finite
-// place nothing counts.
+// 1 = fully absorbed, only ambient light is left. (T's first sentence on the factor inverts it, its examples
+// and its shader have it this way.) Where boxes overlap, the length counts once for each: denser cloud. A ray
+// exactly in the face of a box counts as inside. With a light at a finite distance the ray ends there.
 //
-// Cost: boxes^2 slab tests a cloud, one lane a ray. Each ray adds up the boxes in their order, so the bits do
-// not depend on the width of the vectors.
+// Cost: boxes^2 slab tests a cloud, one SIMD lane a ray. Each ray sums the boxes in their order, so the bits
+// do not depend on the vector width.
 
 #include <cstdint>
 #include <span>
@@ -25,42 +24,41 @@
 
 namespace nephos {
 
-// The sun, or a flash of lightning: anywhere outside the clouds, above or below the horizon.
+// The sun, or a flash of lightning: outside the clouds, above or below the horizon.
 struct Light {
-    Vec3 towards{0, 0,
-                 1};  // at infinity: direction to the light, any length > 0; otherwise its world position
+    // At infinity: direction to the light, any length > 0; otherwise its world position.
+    Vec3 towards{0, 0, 1};
     bool at_infinity = true;
     bool operator==(const Light&) const = default;
 };
 
-// Absorbed light of each box of `cloud`, which stands at world position `position_m`, 0..1, in the order of
-// the boxes. `weights` (one a box, 0..1, or none for all 1) thin a cloud that is forming. A light in the
-// centre of a box gives 0 there. Throws Error(usage) when `out` or `weights` have another size than the
-// boxes, or the light has no direction or is not finite.
+// Computes the absorbed fraction, 0..1, of each box of `cloud` at world position `position_m`, in the order
+// of the boxes. `weights` (one a box, 0..1, or none for all 1) scale the boxes of a cloud that is forming. A
+// light in the centre of a box gives 0 there. Throws Error(usage) when `out` or `weights` have another size
+// than the boxes, or the light has no direction or is not finite. Thread-safe.
 void absorb_light(const Cloud& cloud, const Vec3& position_m, const Light& light, std::span<double> out,
                   std::span<const double> weights = {});
 
 std::vector<double> absorbed_light(const Cloud& cloud, const Vec3& position_m, const Light& light);
 
-// One cloud to keep lit.
+// One cloud for LightAbsorption::update().
 struct CloudToLight {
-    std::uint64_t id = 0;          // the same cloud has the same id in every call
-    const Cloud* cloud = nullptr;  // not null; shape of an id never changes
+    std::uint64_t id = 0;          // constant over all calls
+    const Cloud* cloud = nullptr;  // not null; an id always has the same shape
     Vec3 position_m{};
     Light light;
 };
 
-// Keeps the absorption of many clouds up to date, and computes it only where the light moved: seen from the
-// cloud; so a drifting cloud is recomputed for lightning, but never for the sun. What absorbed() returns is
-// that of the light last given, whatever was before; LightSchedule bounds how many lights move in a frame.
-// Not thread-safe.
+// Caches the absorption of many clouds, and recomputes it where the light moved relative to the cloud: a
+// drifting cloud is recomputed for lightning, but never for the sun. absorbed() depends on the last light
+// alone; LightSchedule bounds the number of lights that move in a frame. Not thread-safe.
 class LightAbsorption {
   public:
-    // Computes new clouds and those whose light moved; of a cloud that is named twice, the first counts.
-    // Forgets clouds that are not in the list. Returns how many it computed.
+    // Computes new clouds and those whose light moved; of a repeated id the first counts. Drops clouds that
+    // are not in the list. Returns the number of computed clouds.
     std::size_t update(std::span<const CloudToLight> clouds);
 
-    // As computed last; empty for a cloud that was not in the last list.
+    // Returns the absorbed fractions of a cloud; empty if it was not in the last list.
     std::span<const double> absorbed(std::uint64_t id) const;
 
   private:

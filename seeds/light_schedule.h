@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// In which frames of a film the absorption factor of a cloud follows a moving light, so that a frame costs a
-// bounded number of clouds (T: one). A function of the frame's number and the cloud's slot alone: a frame has
-// the same light whether it is drawn by itself, after others or by a run that goes on from a checkpoint.
+// The schedule by which the absorption factors of clouds follow a moving light, so that each frame recomputes
+// a bounded number of clouds (T: one). A function of the frame's number and the cloud's slot alone: a frame
+// has the same light whether it is drawn by itself, after others or by a resumed run.
 //
-// With period P, a cloud in slot s is refreshed in the frames s mod P, s mod P + P, ... and keeps the light
-// of the last of them; before the first it has the light of frame 0.
+// With period P, a cloud in slot s is updated in the frames s mod P, s mod P + P, ... and holds the light of
+// the last of them; before the first it has the light of frame 0.
 //
 // Bound: P = ceil(room / clouds_per_frame), where room is the largest number of clouds of the layer's skies
-// and a quarter more for clouds that dissolve. New clouds take the lowest free slots (SkyCloud::slot). So
-// when frames are drawn in their order, at most clouds_per_frame of the clouds that the frame before had are
-// due in one, as long as no more than room of them were ever there at once; beyond that, ceil(slots / P) are.
-// Clouds that enter come on top (they are computed once, with the light of their slot), and so do all clouds
-// in the first frame that a run draws.
+// plus a quarter for clouds that dissolve. New clouds take the lowest free slots (SkyCloud::slot). When
+// frames are drawn in their order, each updates at most clouds_per_frame of the clouds of the frame before as
+// long as there were never more than `room` clouds at once, else ceil(slots / P). In addition each frame
+// computes the clouds that enter (once, with the light of their slot), and the first frame of a run computes
+// all.
 
 #include <cstdint>
 
@@ -28,7 +28,7 @@ class LightSchedule {
 
     int period() const { return period_; }  // in frames, >= 1
 
-    // The frame, 0..frame, whose light the cloud in `slot` has in `frame`; frames count from 0.
+    // Returns the frame, 0..frame, whose light the cloud in `slot` has in `frame`; frames count from 0.
     int frame_of_light(std::uint32_t slot, int frame) const;
 
   private:

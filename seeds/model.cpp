@@ -77,7 +77,7 @@ double box_radius(const Vec3& size, const Vec3& direction) {
     return std::min({reach(size.x, direction.x), reach(size.y, direction.y), reach(size.z, direction.z)});
 }
 
-// Whose draws these are.
+// The identity of a cloud in the random stream.
 struct CloudName {
     std::uint64_t scene_seed;
     std::uint32_t model_index, number;

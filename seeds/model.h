@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Base models (T, chapter 3.1): the boxes that an artist sets, the roots by which they reproduce, and the
-// clouds that this makes, any number of different ones from one model.
+// Base models (T, chapter 3.1): boxes (seeds) placed by an artist and the roots by which they reproduce. One
+// model generates any number of different clouds.
 //
-// Where the digest of T is silent, its text (3.1, figures 10, 12 and 13) decides:
+// Reproduction, by T's chapter 3.1 and its figures 10, 12 and 13:
 // - All children of a root descend from the seed that owns the root; children have no roots. ("the remaining
-// ones
-//   were created from the roots that the progenitor has"; the level "defines the distance from the
+//   ones were created from the roots that the progenitor has"; the level "defines the distance from the
 //   progenitor".)
-// - The numbers at the levels of figure 12 are children of the whole level, not of each seed of the level
-// before.
+// - The numbers at the levels of figure 12 count the children of the whole level, not of each seed of the
+//   level before.
 // - The direction varies within the opening angle, half of it to each side; the region is a cone.
-// Not in T: which radius a box has. It speaks of one "radius of the seed", like that of a cloud, which is the
-// sphere around it: `RootRadius::sphere`. For flat boxes `RootRadius::box` keeps the spacing proportionate.
-// Directions: yaw counter-clockwise from east seen from above, pitch up from the horizon.
+// T leaves the radius of a box open: its one "radius of the seed" is read as that of the sphere around the
+// box, as for clouds (`RootRadius::sphere`). For flat boxes `RootRadius::box` makes the spacing proportional
+// to the edges. Directions: yaw counter-clockwise from east seen from above, pitch up from the horizon.
 
 #include <cstdint>
 #include <limits>
@@ -30,18 +29,19 @@
 
 namespace nephos {
 
-// Integers from which a uniform one is drawn, both ends included.
+// A range of integers, both ends included, from which a uniform one is drawn.
 struct CountRange {
     int min = 0, max = 0;
     bool operator==(const CountRange&) const = default;
 };
 
-// How far one reproduction level reaches.
+// The distance between successive levels of reproduction.
 enum class RootRadius {
     sphere,  // half the diagonal of the parent's box, in every direction
     box,     // from the parent's centre to the face of its box that the direction meets
 };
 
+// A direction of growth of a seed.
 struct Root {
     double pitch_deg = 0;            // -360..360
     double yaw_deg = 0;              // -360..360
@@ -54,6 +54,7 @@ struct Root {
     bool operator==(const Root&) const = default;
 };
 
+// A box that the artist placed.
 struct Seed {
     Vec3 position_m{};                 // of the box's centre, model space
     Vec3 size_m{100, 100, 100};        // width (x), depth (y), height (z), each > 0
@@ -68,20 +69,20 @@ struct Seed {
 
 struct BaseModel {
     std::string name;
-    std::optional<Genus> genus;  // what kind of cloud it makes; rain may be attached to it
+    std::optional<Genus> genus;  // of its clouds; rain areas may be attached by genus
     std::vector<Seed> seeds;     // at least one
-    double light_distance_m =
-        std::numeric_limits<double>::infinity();  // > 0, way of light until it is absorbed
+    // Path length in the cloud after which light is absorbed, > 0.
+    double light_distance_m = std::numeric_limits<double>::infinity();
     bool operator==(const BaseModel&) const = default;
 };
 
-// No cloud has more boxes than this; a model whose largest cloud could is refused.
+// Largest number of boxes of a cloud; check() refuses a model that could exceed it.
 inline constexpr int kMaxBoxes = 1'000'000;
 
-// Boxes of the largest cloud that a model can make. Pure.
+// Returns the number of boxes of the largest cloud that a model can generate. Pure.
 std::int64_t largest_cloud(const BaseModel& model);
 
-// Throws Error(usage) with the model's name, the value and what was expected.
+// Throws Error(usage) with the model's name, the value and the expected range.
 void check(const BaseModel& model);
 
 // The directions of a root, orthonormal: ahead, towards growing yaw, and towards growing pitch. Pure.
@@ -90,13 +91,13 @@ struct RootAxes {
 };
 RootAxes axes_of(const Root& root);
 
-// Children of level 1..levels: start + (end - start) (level - 1) / (levels - 1), rounded half up; start if
-// there is but one level.
+// Returns the number of children at a level in 1..levels: start + (end - start) (level - 1) / (levels - 1),
+// rounded half up; start if there is but one level.
 int children_of_level(const Root& root, int level, int levels);
 
-// Cloud `number` of the base model with index `model_index` (0..65535) in the scene: a pure function of its
-// arguments. Boxes are listed seed by seed: its own box, then root by root and level by level.
-// `model` must have passed check().
+// Generates cloud `number` of the base model with index `model_index` (0..65535) in the scene. Boxes are
+// ordered seed by seed: its own box, then root by root and level by level. Precondition: `model` has passed
+// check(). Pure.
 Cloud reproduce(const BaseModel& model, std::uint64_t scene_seed, std::uint32_t model_index,
                 std::uint32_t number);
 

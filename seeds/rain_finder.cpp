@@ -227,7 +227,7 @@ double RainFinder::target_mm_per_h(const RainPatch& patch) const {
     return std::min(patch.water_m * options_.mm_per_h_per_m, options_.max_mm_per_h);
 }
 
-// Which track each patch continues, -1 for none.
+// Returns for each patch the index of the track that it continues, -1 for none.
 std::vector<int> RainFinder::match(const std::vector<RainPatch>& patches) const {
     struct Pair {
         double distance2;  // relative to the two radii

@@ -1,23 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Rain areas found in the automaton itself: where columns hold much water, joined to patches, each fitted by
-// an ellipse, and followed from frame to frame so that neither the areas nor their names flicker.
+// Detects rain areas in the automaton's state: columns with much water are joined to patches, each patch is
+// fitted by an ellipse and tracked from frame to frame, so that neither areas nor ids flicker.
 //
 // One update:
 //   1. Water of a column = its cloudy cells * cell size (metres of cloud), averaged over a square of columns.
-//   2. Columns above `keep_water_m` are joined to patches (eight neighbours, through periodic sides too). A
-//   patch
-//      counts if it reaches `start_water_m` somewhere, or continues an area of the last update.
+//   2. Columns above `keep_water_m` are joined to patches (eight neighbours, periodic sides included). A
+//      patch counts if it reaches `start_water_m` somewhere, or continues an area of the last update.
 //   3. The ellipse has the patch's centre and second moments: semi-axes 2 sqrt(variance) along the principal
-//   axes,
-//      exact for a filled ellipse. Intensity = mean water of the patch * mm_per_h_per_m.
-//   4. Areas of the last update, carried by the wind since, take the nearest patch, the closest pairs first.
-//   Place,
-//      moments and intensity follow it with the time constant `respond_s`; an area without patch fades with
-//      `fade_s`; a patch without area begins a new one at intensity 0.
-// Two thresholds at each decision (water of columns, intensity of what is reported) are the hysteresis.
-// Deterministic: patches are made in the order of the columns (x fastest), sums have a fixed order.
+//      axes, exact for a filled ellipse. Intensity = mean water of the patch * mm_per_h_per_m.
+//   4. Areas of the last update, advected by the wind since, are matched to the nearest patches, the closest
+//      pairs first. Position, moments and intensity follow the patch with the time constant `respond_s`; an
+//      area without patch fades with `fade_s`; a patch without area starts a new one at intensity 0.
+// Both decisions, which columns are wet and which areas are listed, have two thresholds (hysteresis).
+// Deterministic: patches are found in the order of the columns (x fastest), sums have a fixed order.
 
 #include <cstdint>
 #include <span>
@@ -29,17 +26,17 @@
 namespace nephos {
 
 struct RainFinderOptions {
-    double start_water_m = 400;          // metres of cloud in a column from which it rains, > 0
-    double keep_water_m = 250;           // and above which an area goes on; 0 < keep <= start
+    double start_water_m = 400;          // water at which a patch starts to rain, metres of cloud, > 0
+    double keep_water_m = 250;           // water above which it continues to rain; 0 < keep <= start
     int smooth_columns = 2;              // radius of the averaging square, 0..64
     double min_area_m2 = 250000;         // smaller patches are ignored, >= 0
-    int max_areas = 256;                 // only so many of the largest patches, 1..4096
+    int max_areas = 256;                 // number of patches, the largest first, 1..4096
     double mm_per_h_per_m = 0.02;        // rain per metre of mean water, > 0
-    double max_mm_per_h = 100;           // cap, > 0
-    double respond_s = 120;              // >= 0; 0: at once
-    double fade_s = 300;                 // >= 0
-    double report_from_mm_per_h = 0.5;   // an area is listed once it reaches this
-    double report_until_mm_per_h = 0.2;  // and until it falls below this; 0 < until <= from
+    double max_mm_per_h = 100;           // upper limit of the intensity, > 0
+    double respond_s = 120;              // time constant of tracking, >= 0; 0: immediate
+    double fade_s = 300;                 // time constant of fading, >= 0
+    double report_from_mm_per_h = 0.5;   // an area is listed from this intensity on
+    double report_until_mm_per_h = 0.2;  // and until it falls below this one; 0 < until <= from
     bool operator==(const RainFinderOptions&) const = default;
 };
 
@@ -55,27 +52,30 @@ struct RainPatch {
     bool starts = false;  // reaches start_water_m
 };
 
-// Cloudy cells in each column, extent.x * extent.y of them, x fastest.
+// Returns the number of cloudy cells in each of the extent.x * extent.y columns, x fastest.
 std::vector<std::uint32_t> column_counts(const BitPlaneView& cld);
 
-// Steps 1 and 2 and the moments; largest first, at most max_areas.
+// Performs steps 1 and 2 and computes the moments. Returns the largest patches first, at most max_areas.
 std::vector<RainPatch> find_patches(const BitPlaneView& cld, const Placement& placement,
                                     const Boundaries& boundaries, const RainFinderOptions& options);
 
+// Tracks the rain areas of one layer. Not thread-safe.
 class RainFinder {
   public:
     // `layer` makes ids unique among several finders. Throws Error(usage) on bad options.
     RainFinder(const RainFinderOptions& options, Extent extent, const Placement& placement,
                const Boundaries& boundaries, std::uint32_t layer = 0);
 
-    // The automaton `elapsed_s` (>= 0) after the last update, in which the wind moved the air by `moved_*_m`.
-    // Throws Error(usage) when `cld` has another extent or a number is not finite.
+    // Updates the areas from the cloud plane `elapsed_s` (>= 0) after the last update; the wind displaced the
+    // air by `moved_*_m` in between. Throws Error(usage) when `cld` has another extent or a number is not
+    // finite.
     void update(const BitPlaneView& cld, double elapsed_s, double moved_x_m, double moved_y_m);
 
-    // Those listed now, oldest first.
+    // Returns the areas listed now, oldest first.
     std::vector<RainArea> areas() const;
 
-    // The complete state; `restore` throws Error(io) on bytes that it did not write.
+    // Serialise and restore the complete state; restore() throws Error(io) on bytes that save() did not
+    // write.
     std::vector<std::byte> save() const;
     void restore(std::span<const std::byte> bytes);
 

@@ -47,7 +47,7 @@ SkySimulation::SkySimulation(const SkyOptions& options) : options_(options) {
 
 void SkySimulation::make_shapes() {
     const WorldRectangle& w = options_.world;
-    // How many shapes of each model any sky uses; skies that share a model share its shapes.
+    // The number of shapes of each model over all skies; skies that share a model share its shapes.
     std::vector<int> generated(options_.models.size(), 0);
     for (const Sky& sky : options_.skies) {
         for (const SkyModel& m : sky.models) generated[m.model] = std::max(generated[m.model], m.generated);
@@ -135,7 +135,7 @@ void SkySimulation::move_clouds() {
     }
 }
 
-// Whether the whole cloud is beyond a side that the wind does not bring it back through.
+// Returns true when the whole cloud is beyond a side through which the wind does not bring it back.
 bool SkySimulation::outside(const SkyCloud& cloud, const Displacement& wind) const {
     const Cloud& c = shape(cloud);
     const Vec3 p = position_m(cloud);

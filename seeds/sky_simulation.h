@@ -2,24 +2,26 @@
 #pragma once
 
 // One layer of the sky over time (T, chapter 3.4): clouds drift with the wind, leave the world downwind and
-// enter it on the opposite side; those that enter now come from the skies that bracket the state of the
-// atmosphere, so that a change of weather comes over the horizon, while the clouds that are there stay.
+// enter it on the opposite side. Entering clouds are drawn from the skies that bracket the state of the
+// atmosphere, so that a change of weather comes over the horizon while the present clouds remain.
 //
 //     SkySimulation sky(options);       // scattered at random, from the sky nearest to the initial state
 //     sky.step();                       // together with the automaton's step
 //     for (const SkyCloud& cloud : sky.clouds()) ... sky.shape(cloud), sky.position_m(cloud), cloud.phase ...
 //
-// A step: every cloud moves by the wind at its centre's height and the step's begin; phases advance; clouds
-// that have left go; then the number of clouds is brought to that of the state (climate.h): for each that
-// left one enters upwind (where its shape just reaches the edge, at a random place of the way of one step, so
-// that fast wind leaves no gaps; the two upwind sides share them as the air that crosses them), further ones
-// form inside, and superfluous ones, drawn among all, dissolve inside. In calm air new clouds form inside.
-// Wind that crosses the world in one step leaves none for longer than two steps. A sky without base models
-// lets no cloud enter: the other bracketing sky then has all of them.
+// A step moves every cloud by the wind at its centre's height at the step's begin, advances the phases,
+// removes the clouds that have left, and then adjusts the number of clouds to that of the state (climate.h):
+// - For each cloud that left, one enters upwind, where its shape just touches the edge. Its position along
+//   the wind is random within the displacement of one step, so that fast wind leaves no gaps, and the two
+//   upwind sides get clouds in proportion to the air that crosses them.
+// - Missing clouds form inside; surplus ones, drawn at random, dissolve inside. In calm air all form inside.
+// - Wind that crosses the world in one step leaves no cloud for longer than two steps.
+// - A sky without base models supplies no cloud: the other bracketing sky then supplies all.
 //
-// Positions are fixed-point sums of whole displacements (core/wind.h): nothing drifts, and the state can
-// be saved and restored exactly. One object is one simulation; while a thread steps, others may call what
-// depends on the options alone: options(), shapes(), shape(), model(), position_m(), sphere() and ahead().
+// Positions are fixed-point sums of displacements (core/wind.h): there is no rounding drift, and the state
+// can be saved and restored exactly. One object is one simulation; while a thread steps, others may call the
+// functions that depend on the options alone: options(), shapes(), shape(), model(), position_m(), sphere()
+// and ahead().
 
 #include <cstddef>
 #include <cstdint>
@@ -33,7 +35,7 @@
 
 namespace nephos {
 
-// One of the shapes that the layer's skies use, made when the simulation starts.
+// One of the shapes of the layer's skies, generated when the simulation starts.
 struct CloudShape {
     std::size_t model = 0;     // index in SkyOptions::models
     std::uint32_t number = 0;  // of the cloud made from it
@@ -42,15 +44,15 @@ struct CloudShape {
 
 // One cloud in the sky.
 struct SkyCloud {
-    std::uint32_t serial = 0;  // unique in its layer, rises with the time of birth
+    std::uint32_t serial = 0;  // unique in its layer, rises in order of birth
     std::uint32_t shape = 0;   // index in SkySimulation::shapes()
-    std::uint32_t sky = 0;     // index in SkyOptions::skies that it came from
+    std::uint32_t sky = 0;     // index in SkyOptions::skies, of the sky that it was drawn from
     Displacement place;        // of the model's origin in the world, metres * 2^32
     double base_m = 0;         // world z of the model's origin
-    double phase = 1;          // 0 nothing .. 1 the whole cloud (cloud.h, phase_weight)
-    bool dissolving = false;   // no longer one of the sky's number
-    // The lowest number that no other cloud had at its birth: spreads recurring work over frames
-    // (light_schedule.h), and decides nothing else.
+    double phase = 1;          // 0 no cloud .. 1 the whole cloud (cloud.h, phase_weight)
+    bool dissolving = false;   // no longer counts towards the sky's number of clouds
+    // The lowest number that was free at its birth. Distributes recurring work over frames
+    // (light_schedule.h) and has no other effect.
     std::uint32_t slot = 0;
     bool operator==(const SkyCloud&) const = default;
 };
@@ -60,7 +62,8 @@ class SkySimulation {
     // Throws Error(usage) on options that check() refuses, and when a cloud is larger than the world.
     explicit SkySimulation(const SkyOptions& options);
 
-    // One step of options().time_step_s. Throws Error(usage) when the wind moves a cloud by more than 5e8 m.
+    // Advances by one step of options().time_step_s. Throws Error(usage) when the wind moves a cloud by more
+    // than 5e8 m.
     void step();
 
     const SkyOptions& options() const { return options_; }
@@ -69,7 +72,7 @@ class SkySimulation {
     double state() const;  // of the atmosphere, 0..1, now
 
     std::span<const SkyCloud> clouds() const { return clouds_; }  // oldest first
-    std::size_t count() const;                                    // those that are not dissolving
+    std::size_t count() const;                                    // of clouds that are not dissolving
     std::span<const CloudShape> shapes() const { return shapes_; }
     const Cloud& shape(const SkyCloud& cloud) const { return shapes_[cloud.shape].cloud; }
     const BaseModel& model(const SkyCloud& cloud) const {
@@ -78,19 +81,19 @@ class SkySimulation {
     Vec3 position_m(const SkyCloud& cloud) const;  // world position of the model's origin
     Sphere sphere(const SkyCloud& cloud) const;    // around the cloud, in the world
 
-    // A cloud that stood at time `at_s`, `after_s` later, 0..time_step_s: moved by the wind and formed or
-    // dissolved further as the step from there does it, so that its motion is continuous from step to step.
+    // Extrapolates a cloud at time `at_s` by `after_s`, 0..time_step_s, with the motion and change of phase
+    // of the step that begins at `at_s`, so that it moves continuously from step to step.
     SkyCloud ahead(const SkyCloud& cloud, double at_s, double after_s) const;
 
-    // How far the air at the middle of the base heights has moved since the start, metres * 2^32 (wraps
-    // around).
+    // Returns the displacement of the air at the middle of the base heights since the start, metres * 2^32
+    // (wraps around).
     const Displacement& carried() const { return carried_; }
 
-    // What the clouds to come depend on: the complete state but the slots.
+    // Returns the hash of the state without the slots: of everything that determines later clouds.
     StateHash hash() const;
 
-    // The complete state; `restore` throws Error(io) on bytes that no simulation with these options wrote,
-    // and then leaves the simulation as it was.
+    // Serialise and restore the complete state. restore() throws Error(io) on bytes that no simulation with
+    // these options wrote, and then leaves the simulation unchanged.
     std::vector<std::byte> save() const;
     void restore(std::span<const std::byte> bytes);
 

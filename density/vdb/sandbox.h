@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Work on untrusted input in a child process (not installed). The child does everything that a damaged or
-// hostile file may turn into a crash, an endless loop or an exhausted memory; what it finds, it sends through
-// a pipe. This process only ever reads that stream, whose length and order its own code decides.
+// Parsing of untrusted input in a child process (not installed). A damaged or hostile file may crash the
+// child, hang it or exhaust its memory; the child sends its results through a pipe, and the parent reads
+// nothing but that stream, whose length and order its own code determines.
 //
 // fork() without exec() in a program with threads: the child has only the calling thread, and a lock that
-// another thread held at that moment stays locked in it. glibc makes its own allocator safe; others' locks
-// (OpenVDB's type registries) may be caught. A child that has neither sent anything nor used processor time
-// for a while is therefore ended and started again, twice at most; after that only the time limit ends it.
+// another thread held at that moment stays locked in it. glibc makes its own allocator safe; other locks
+// (OpenVDB's type registries) may deadlock. A child that has neither sent anything nor used processor time
+// for a while is therefore killed and restarted, twice at most; after that only the time limit ends it.
 
 #include <cstddef>
 #include <cstdint>
@@ -24,7 +24,7 @@
 
 namespace nephos {
 
-// The child's end: a stream of plain values.
+// The child's end of the pipe: a stream of plain values.
 class SandboxWriter {
   public:
     explicit SandboxWriter(int fd) : fd_(fd) {}
@@ -34,8 +34,8 @@ class SandboxWriter {
         static_assert(std::is_trivially_copyable_v<T>);
         bytes(&v, sizeof v);
     }
-    void text(std::string_view text);  // its first 64 KiB
-    void finish();                     // the result is complete
+    void text(std::string_view text);  // sends the first 64 KiB
+    void finish();                     // marks the result as complete
     void fail(std::string_view message);
 
   private:
@@ -45,7 +45,7 @@ class SandboxWriter {
     std::vector<std::byte> buffer_;
 };
 
-// The parent's end. Every read throws Error(io) when the child failed, died or ran out of time.
+// The parent's end of the pipe. Every read throws Error(io) when the child failed, died or ran out of time.
 class SandboxReader {
   public:
     virtual ~SandboxReader() = default;
@@ -60,17 +60,17 @@ class SandboxReader {
     std::string text();
 };
 
-// Runs `child` in a child process and `parent` here, on what the child sends. When `child` throws, or dies,
-// or exceeds a limit, Error(io) names `subject` and the reason. `parent` may be called again from the start
-// and must throw away what it had. Messages are printable and at most 300 characters long.
+// Runs `child` in a child process and `parent` in this one, on the values that the child sends. When `child`
+// throws, dies or exceeds a limit, throws Error(io) that names `subject` and the reason, printable and at
+// most 300 characters long. After a restart `parent` is called again and must discard its earlier results.
 void run_sandboxed(const std::filesystem::path& subject, const VdbReadLimits& limits,
                    const std::function<void(SandboxWriter&)>& child,
                    const std::function<void(SandboxReader&)>& parent);
 
-// limits.memory_bytes, or what 0 stands for.
+// Returns limits.memory_bytes, or half of the free memory where that is 0.
 std::size_t memory_limit(const VdbReadLimits& limits);
 
-// `text` without control characters and cut to `length`.
+// Returns `text` without control characters, cut to `length`.
 std::string clamp_message(std::string_view text, std::size_t length = 300);
 
 }  // namespace nephos

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Reading an OpenVDB file with every stream error reported (not installed; to be used inside a sandbox only).
-// io::File does not check its stream: a truncated file yields voxels that were never read. This archive reads
-// the same format through OpenVDB's own code from a stream with exceptions switched on, never delays loading,
-// and checks offsets before it follows them.
+// Reads an OpenVDB file and reports every stream error (not installed; for use inside a sandbox only).
+// io::File does not check its stream: a truncated file yields uninitialised voxels. This archive reads the
+// same format through OpenVDB's own code from a stream with exceptions enabled, without delayed loading, and
+// checks offsets before it follows them.
 
 #include <filesystem>
 #include <fstream>
@@ -20,7 +20,7 @@ namespace nephos {
 
 class VdbArchive : public openvdb::io::Archive {
   public:
-    // Reads everything but the grids. Throws std::exception of some kind when the file is not sound.
+    // Reads everything but the voxels. Throws a std::exception when the file is damaged.
     explicit VdbArchive(const std::filesystem::path& path);
 
     struct Entry {
@@ -30,7 +30,7 @@ class VdbArchive : public openvdb::io::Archive {
     const std::vector<Entry>& entries() const { return entries_; }
     const openvdb::MetaMap& metadata() const { return metadata_; }
 
-    // The grid with its voxels.
+    // Reads and returns grid `n` of entries() with its voxels.
     openvdb::GridBase::Ptr read(std::size_t n);
 
   private:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Density grids as OpenVDB files: written so that any program that reads OpenVDB understands them, read so
-// that no file, however damaged or large, can take the program down.
+// Density grids as OpenVDB files. Writing follows the conventions of other programs; reading happens in a
+// child process, so that a damaged or oversized file gives an error and no crash.
 //
 // World and index space of a file: metres, right-handed, z up; OpenVDB's index (i, j, k) is the CENTRE of
 // voxel (i, j, k), so the transform is: world = (i, j, k) * voxel + origin + voxel / 2. All grids of a file
@@ -16,9 +16,9 @@
 //     vel           vec3s           wind in m/s (east, north, 0), in blocks of 8x8x8 that hold density; on request
 //
 // The two corner voxels of `density` make the active bounds, and with them OpenVDB's own `file_bbox_min` and
-// `file_bbox_max`, the same in every file of a sequence, clouds or none. The other grids keep the bounds of what they
-// hold; nephos_bbox_min/max say the constant ones. Where density is refined, one cell is refine^3 equal voxels in the
-// bool grids.
+// `file_bbox_max`, the same in every file of a sequence, clouds or none. The other grids keep the bounds of
+// what they hold; nephos_bbox_min/max say the constant ones. Where density is refined, one cell is refine^3
+// equal voxels in the bool grids.
 //
 // Metadata, in the file and in each grid:
 //
@@ -68,7 +68,7 @@ struct VdbMetadata {
     bool operator==(const VdbMetadata&) const = default;
 };
 
-// What goes into one file. At least one of `density`, `hum`, `act`, `cld` must be there. Nothing is owned.
+// The content of one file: at least one of `density`, `hum`, `act`, `cld`. Pointers and views are not owned.
 struct VdbContent {
     const DensityGrid* density = nullptr;
     bool half = false;  // density as 16-bit floats
@@ -81,17 +81,18 @@ struct VdbContent {
 // contradicts itself, Error(io) naming the path when the file cannot be written (full disk included).
 void write_vdb(const std::filesystem::path& path, const VdbContent& content, const VdbMetadata& metadata);
 
-// NAME_0001.vdb: path of one frame of a sequence, frames counted from 1; at least four digits.
+// Returns the path of one frame of a sequence, folder/NAME_0001.vdb: frames count from 1, at least four
+// digits.
 std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame);
 
-// Which axis of a foreign file points up.
+// The vertical axis of a file that another program wrote.
 enum class UpAxis {
-    automatic,  // what nephos_up_axis says, else z
+    automatic,  // that of nephos_up_axis, else z
     z,
     y,  // x stays, file z is south: world (x, -z, y); voxels are permuted, never resampled
 };
 
-// How much a file may cost before it is given up.
+// Limits on the child process that reads a file; Error(io) beyond them.
 struct VdbReadLimits {
     std::size_t memory_bytes = 0;  // for the reading process; 0 = half of the memory that is free
     double seconds = 120;          // wall clock, > 0
@@ -104,30 +105,29 @@ struct VdbReadOptions {
     VdbReadLimits limits;
 };
 
-// A density grid and what its file says about it.
+// A density grid with the metadata of its file.
 struct LoadedDensity {
     DensityGrid density;
     std::string grid_name;
     std::optional<VdbMetadata> metadata;  // when nephos wrote the file
     int refine = 1;  // voxels per cell of the lattice and axis; 1 unless the file says more
-    std::vector<std::string>
-        notes;  // one sentence for each thing that was adapted (negative values set to 0 ...)
+    // One sentence for each adaptation (negative values set to 0, resampling ...).
+    std::vector<std::string> notes;
 };
 
-// Reads any float or half fog volume (also double). Bounds are nephos_bbox where present, else the active
-// bounds, moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and
-// direction, are permuted; what is turned, sheared or not cubic is resampled, with a note. Everything
-// untrusted happens in a child process with limits on memory and time, which sends the voxels back; this
-// process never parses the file. Throws Error(io) naming the path and what was wrong with it; Error(usage) on
-// bad options.
+// Reads any float, half or double fog volume. Bounds are nephos_bbox where present, else the active bounds,
+// moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and direction, are
+// permuted; rotated, sheared or non-cubic voxels are resampled, with a note. A child process with limits on
+// memory and time parses the file and sends the voxels (sandbox.h). Throws Error(io) naming the path and the
+// defect, Error(usage) on bad options. Thread-safe.
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 
-// Reads the bool (or mask) grids hum, act and cld as a state of this extent at this place. Throws Error(io)
-// as above, and when one of them is missing, is of another extent by its nephos_bbox_max, (without one) has a
-// voxel outside the extent, or stands elsewhere by its transform: a corner of its box of cells farther than a
-// hundredth of a cell from that of the lattice. The identity, which OpenVDB gives to grids of which nothing
-// else was said, stands nowhere in grids that nephos did not write, and fits every place.
+// Reads the bool (or mask) grids hum, act and cld as a state of this extent and placement. Throws Error(io)
+// as above, and when a grid is missing, has another extent by its nephos_bbox_max or (without one) a voxel
+// outside the extent, or has another placement: by its transform a corner of the box is more than a hundredth
+// of a cell from that of the lattice. In files of other programs the identity transform, OpenVDB's default,
+// counts as unspecified and fits every placement.
 Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
                    const VdbReadLimits& limits = {});
 
@@ -148,7 +148,7 @@ struct VdbInfo {
     std::vector<std::pair<std::string, std::string>> metadata;
 };
 
-// Throws Error(io) as load_density().
+// Lists the grids and metadata of a file. Throws Error(io) as load_density().
 VdbInfo read_vdb_info(const std::filesystem::path& path, const VdbReadLimits& limits = {});
 
 }  // namespace nephos

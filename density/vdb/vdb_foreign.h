@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// From the index space of any OpenVDB file to that of a DensityGrid (not installed; runs inside the sandbox):
-// axes permuted and turned round so that x is east, y north and z up, bounds moved so that they begin at
-// voxel 0. Voxels that are not cubes, or do not lie along the axes, are resampled.
+// Conversion from the index space of any OpenVDB file to that of a DensityGrid (not installed; runs inside
+// the sandbox): axes are permuted and mirrored so that x is east, y north and z up, and bounds moved to begin
+// at voxel 0. Voxels that are not cubes, or not along the axes, are resampled.
 
 #include <cstdint>
 #include <functional>
@@ -35,7 +35,8 @@ struct ForeignResult {
     std::uint64_t negative = 0;  // values below 0 that became 0
 };
 
-// Throws std::runtime_error when the grid cannot be represented: not linear, too large, not finite.
+// Converts a grid and passes it to `receiver`. Throws std::runtime_error when it cannot be represented: a
+// transform that is not linear, too many voxels, values that are not finite.
 ForeignResult convert_foreign(const ForeignGrid& foreign, const DensityReceiver& receiver);
 
 }  // namespace nephos

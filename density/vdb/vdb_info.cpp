@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an OpenVDB file says about itself, for `nephos info`.
+// Lists grids and metadata of an OpenVDB file, for `nephos info`.
 
 #include <cstdint>
 #include <string>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Names and conversion of the metadata of vdb_file.h, shared by writer and reader (not installed).
+// Names and conversion of the metadata of vdb_file.h, for writer and reader (not installed).
 
 #include <optional>
 #include <string>
@@ -31,11 +31,11 @@ inline constexpr const char* kMetaBoxMax = "nephos_bbox_max";
 
 openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int refine);
 
-// Nothing when `map` was not written by nephos; fields that are missing or of another type keep their
+// Returns nullopt when nephos did not write `map`; fields that are missing or of another type have their
 // defaults.
 std::optional<VdbMetadata> from_meta_map(const openvdb::MetaMap& map);
 
-// The value when it is there and of type T.
+// Returns the value of a field, or nullopt when it is missing or not of type T.
 template <class T>
 std::optional<T> meta_value(const openvdb::MetaMap& map, const char* name) {
     const auto typed = map.getMetadata<openvdb::TypedMetadata<T>>(name);

@@ -22,7 +22,7 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-// What follows in the stream of blocks.
+// The type of the next record in the stream of blocks.
 enum class Record : std::uint8_t { end, leaf, tile };
 
 template <class Grid>

@@ -19,7 +19,7 @@ namespace {
     throw Error(ErrorCode::io, path.string() + ": " + what);
 }
 
-// What can be said about a file without OpenVDB.
+// Checks a file without OpenVDB.
 void check_file(const std::filesystem::path& path) {
     std::error_code error;
     const auto status = std::filesystem::status(path, error);

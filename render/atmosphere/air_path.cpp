@@ -21,7 +21,7 @@
 #define NEPHOS_AIR_PATH_TYPES_
 namespace nephos {
 
-// What the kernel needs of one part of a path: light by the sun's sine, at the part's radius.
+// The input of the kernel for one part of a path: sunlight by the sun's sine, at the part's radius.
 struct PartRows {
     float optical_depth[3][kColumnSines];
     float log_psi[3][kSunSines];
@@ -175,8 +175,8 @@ void fill_rows(const SphericalAir& air, const AirTables& tables, const AirPath& 
     std::copy_n(part.mie, 3, rows.mie);
 }
 
-// Where parts of a ray begin, 0..1 of its length: the denser the air, the closer. `tangent`: where the ray is
-// lowest.
+// Returns the beginnings of the parts of a ray, 0..1 of its length, closer in denser air. `tangent`: distance
+// of the ray's lowest point.
 std::vector<double> cuts(double length, double tangent, std::size_t parts, double even) {
     std::vector<double> at(parts + 1);
     const auto away = [even](double x) { return x * (even + (1 - even) * x); };

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The parts of a ray through the air, and the light that they scatter (Atmosphere). Lengths are kilometres.
-// Private to the module.
+// Numerical integration of single scattering along a ray through the air, for Atmosphere. Lengths are in
+// kilometres. Private to the module.
 //
-// The ray is cut where density changes; of each part the weights
+// The ray is divided into parts, shorter where density changes faster. For each part the weights
 //
 //     w = integral over the part of  transmittance to the eye * scattering coefficient
 //
-// are integrated finely, once for all suns, and the sun's light is taken at one place, the weights' centre of
-// gravity: light that changes linearly along the part is integrated exactly.
+// are integrated finely, once for all suns, and the sunlight is evaluated at one point, the centroid of the
+// weights: sunlight that varies linearly along the part is integrated exactly.
 
 #include <cstddef>
 #include <span>
@@ -19,7 +19,7 @@
 
 namespace nephos {
 
-inline constexpr std::size_t kColumnSines = 256, kColumnRadii = 64;  // table of columns
+inline constexpr std::size_t kColumnSines = 256, kColumnRadii = 64;  // table of optical depths to space
 inline constexpr std::size_t kSunSines = 128, kPsiRadii = 32;        // table of multiple scattering
 inline constexpr std::size_t kAirLanes = 16;                         // numbers of suns are multiples of it
 
@@ -32,13 +32,13 @@ struct SphericalAir {
     explicit SphericalAir(const AtmosphereModel& model);
     double horizontal(double radius) const;  // from a sphere's tangent point to `radius`
     double most_horizontal() const { return horizontal(top); }
-    // Along a ray from `radius`: to the top, and to the ground (negative when it passes).
+    // Distance along a ray from `radius` to the top, and to the ground (negative when the ray misses it).
     double to_top(double radius, double sine) const;
     double to_ground(double radius, double sine) const;
     double horizon_sine(double radius) const;  // of the ray that touches the ground, <= 0
 };
 
-// Places in tables, as indices with fractions.
+// Coordinates of tables, as indices with fractions.
 double sun_coordinate(double sine);                             // 0..kSunSines - 1, sines from -0.5 on
 double sun_sine(double coordinate);                             // its inverse
 double psi_coordinate(const SphericalAir& air, double radius);  // 0..kPsiRadii - 1
@@ -58,27 +58,29 @@ struct AirPath {
     double transmittance[3] = {};  // of all of it
 };
 
-// From a point to the top of the air or to the ground. `even`: 0 cuts it most finely where it is lowest, 1
-// evenly.
+// Returns the path from a point to the top of the air or to the ground. `even`: 0 makes parts shortest where
+// the ray is lowest, 1 equal.
 AirPath air_path(const SphericalAir& air, double radius, double sine, std::size_t parts, double even = 0);
 
-// Tables as the kernel reads them: planes for red, green, blue (columns: rayleigh, mie, ozone), rows of
+// Tables in the kernel's layout: planes for red, green, blue (of `columns`: rayleigh, mie, ozone), rows of
 // radii.
 struct AirTables {
     std::vector<float> columns;  // km of air of the density on the ground, 3 planes
     std::vector<float> psi;      // logarithms of multiple scattering, 3 planes; empty: none
 };
 
-// What parts of a path scatter of suns at `sun_sine` (as seen from the path's start) towards the eye, without
-// phase functions; `cos_to_sun`: between ray and sun. Each plane has as many numbers as there are suns.
+// Light scattered towards the eye along a path, without phase functions, for several suns: by molecules, by
+// particles, and multiply scattered. Each plane has one number per sun.
 struct ScatteredPlanes {
     std::vector<float> rayleigh[3], mie[3], many[3];
     explicit ScatteredPlanes(std::size_t suns);
 };
+// Computes it for suns whose sine of elevation at the path's start is `sun_sine`; `cos_to_sun`: of the angle
+// between ray and sun. Both spans have a multiple of kAirLanes elements.
 void scatter_along(const SphericalAir& air, const AirTables& tables, const AirPath& path,
                    std::span<const float> sun_sine, std::span<const float> cos_to_sun, ScatteredPlanes& out);
 
-// Share of the sun's disc above the horizon.
+// Returns the fraction of the sun's disc above the horizon.
 double visible_sun(double sine, double horizon_sine);
 
 // Nodes and weights of the Gauss-Legendre rule on 0..1.

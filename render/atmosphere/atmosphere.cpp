@@ -14,15 +14,15 @@ namespace nephos {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr float kLeast = 1e-30f;  // of what is kept as a logarithm
+constexpr float kLeast = 1e-30f;  // lower limit of values stored as logarithms
 constexpr std::size_t kDayParts = 56, kTwilightParts = 96, kPsiParts = 48;
 
 // Heights of the table of irradiances: kIrradianceTop_km (k / (kIrradianceRows - 1))^2.
 constexpr std::size_t kIrradianceRows = 8;
 constexpr double kIrradianceTop_km = 16;
 
-// Directions from a point: elevations with their share of the sphere's solid angle / 2 pi. They are dense
-// around the horizon, where light changes fastest.
+// Quadrature over directions: elevations with weights of solid angle / 2 pi, dense around the horizon, where
+// radiance varies fastest.
 struct Elevations {
     struct One {
         double sine, weight;
@@ -145,7 +145,7 @@ void Atmosphere::Tables::make_columns() {
     });
 }
 
-// Of a ray that does not meet the ground; of the lowest such ray when it does.
+// Returns the optical depth of a ray that misses the ground; of the lowest such ray for one that meets it.
 Rgb Atmosphere::Tables::optical_depth(double radius, double sine) const {
     const double nearest = air.top - radius, farthest = air.horizontal(radius) + air.most_horizontal();
     const double part = (air.to_top(radius, sine) - nearest) / std::max(farthest - nearest, 1e-9);
@@ -185,7 +185,7 @@ Rgb Atmosphere::Tables::from_sun_on_ground(double sine) const {
     return light;
 }
 
-// What the ground at the end of a path adds to the radiance at its start.
+// Returns the radiance that the ground at the end of a path contributes at its start.
 Rgb Atmosphere::Tables::ground_radiance(const AirPath& path, double sun, double cos_to_sun,
                                         bool with_sky) const {
     Rgb radiance{};
@@ -199,8 +199,8 @@ Rgb Atmosphere::Tables::ground_radiance(const AirPath& path, double sun, double 
     return radiance;
 }
 
-// Psi = second order / (1 - share that is scattered again), Hillaire's equations 5 to 9: the second order is
-// the mean over all directions of light scattered once (without phase functions) or by the ground.
+// Psi = second order / (1 - fraction that is scattered again), Hillaire's equations 5 to 9: the second order
+// is the mean over all directions of light scattered once (without phase functions) or by the ground.
 void Atmosphere::Tables::make_psi_row(std::size_t row, std::vector<float>& psi) const {
     constexpr std::size_t kAzimuths = 8;
     const double radius = std::min(psi_radius(air, double(row)), air.top - 1e-3);
@@ -291,7 +291,7 @@ void Atmosphere::Tables::make_irradiance_row(std::size_t row, std::size_t first_
                     std::log(std::max(float(sums[kind][c * kSunSines + s]), kLeast));
 }
 
-// From above first: the ground reflects it.
+// Irradiance from above comes first, because the ground reflects it.
 void Atmosphere::Tables::make_irradiances() {
     for (std::vector<float>& plane : irradiances) plane.resize(3 * kIrradianceRows * kSunSines);
     tbb::parallel_for(std::size_t{0}, kIrradianceRows,

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The light of a clear sky, in tables.
+// Precomputed radiance of a clear sky.
 //
 //     Atmosphere    does not depend on sun or eye:
-//                     columns              air between a height and space in a direction; transmittance
+//                     optical depths       from a height to space in a direction, for transmittance
 //                     multiple scattering  mean radiance of light scattered twice and more (Hillaire 2020)
-//                     irradiances          of sky and ground, from above, from below and from all sides
-//     SkyTable      the sky at one height of the sun as an eye at one height sees it: light scattered by
-//                   molecules and many times, with its phase function, and light scattered once by particles,
-//                   without: a pixel takes two look-ups (Sapronov), and the glow around the sun stays sharp
+//                     irradiances          of sky and ground, from above, from below and sideways
+//     SkyTable      radiance for one elevation of the sun and one height of the eye, in two parts: molecules
+//                   with their phase function plus multiple scattering, and single scattering by particles
+//                   without phase function. A pixel takes two look-ups (Sapronov); the aureole stays sharp
 //
-// Single scattering is integrated as by Nishita et al. 1993; light scattered n > 1 times arrives from all
-// sides alike, a geometric series over n: S. Hillaire, "A Scalable and Production Ready Sky and Atmosphere
-// Rendering Technique", EGSR 2020, equations 5 to 11. Here the ground's reflection is part of that series.
+// Single scattering is integrated as by Nishita et al. 1993. Light scattered n > 1 times is isotropic, a
+// geometric series over n: S. Hillaire, "A Scalable and Production Ready Sky and Atmosphere Rendering
+// Technique", EGSR 2020, equations 5 to 11. Here the ground's reflection is part of that series.
 //
-// Altitudes are metres above the ground sphere. All light is for a sun of irradiance 1 above the air.
+// Altitudes are metres above the ground sphere. Radiances are for a sun of irradiance 1 above the air.
 // Everything is const after construction and may be read by many threads; tables are computed with oneTBB and
 // have the same bits for any number of threads.
 
@@ -45,27 +45,30 @@ struct AtmosphereModel {
     bool operator==(const AtmosphereModel&) const = default;
 };
 
+// Returns the Earth's air with the options' haze and ozone.
 AtmosphereModel atmosphere_model(const AtmosphereOptions& options, const Rgb& ground_albedo);
 
 // Irradiance above the air of a sun of colour 1, in units of pi: a white surface that faces the sun at noon
 // then has a radiance of about 1 (luminance of the zenith's transmittance: 0.876).
 inline constexpr double kSunAboveAir = 1.14;
 
-// Half the angle under which the sun is seen, degrees.
+// Angular radius of the sun's disc, degrees.
 inline constexpr double kSunRadius_deg = 0.265;
 
-// Light that falls on a surface, per irradiance of the sun above the air; without the sun's own.
+// Irradiance by sky and ground on a surface, per irradiance of the sun above the air; without direct
+// sunlight.
 struct SkyIrradiance {
     Rgb from_above{};  // on a surface that faces the zenith
     Rgb from_below{};  // ... that faces the ground
     Rgb sideways{};    // ... on a wall, the mean over its orientations
 };
 
-// Radiances, RGB and one unused number a texel; rows are elevations, columns azimuths from the sun's:
-// sky_across() and sky_upwards() of render/shared/shared.h. Column and row 0 and the last lie on the ends.
+// Radiances, RGB and one unused number a texel; rows are elevations, columns azimuths from the sun's, by
+// sky_across() and sky_upwards() of render/shared/shared.h. The first and last columns and rows are at the
+// ends of the range.
 struct SkyTable {
-    std::vector<float> scattered;  // by molecules, with their phase function, and many times by all
-    std::vector<float> haze;       // once by particles, without their phase function
+    std::vector<float> scattered;  // molecules with their phase function, plus multiple scattering
+    std::vector<float> haze;       // single scattering by particles, without their phase function
 };
 
 class Atmosphere {
@@ -77,15 +80,16 @@ class Atmosphere {
 
     const AtmosphereModel& model() const;
 
-    // Of the air between a point and space; `sine`: of the elevation of the ray. 0 where it meets the ground.
+    // Returns the transmittance of the air between a point and space along a ray; `sine`: of its elevation. 0
+    // where it meets the ground.
     Rgb transmittance(double altitude_m, double sine) const;
-    // Irradiance of the sun's disc on a surface that faces it, -90..90 degrees.
+    // Returns the irradiance of the sun's disc on a surface that faces it, for elevations of -90..90 degrees.
     Rgb sunlight(double altitude_m, double sun_elevation_deg) const;
-    // Mean over all directions of the radiance of light that was scattered before (Hillaire's Psi).
+    // Returns the mean over all directions of the radiance of multiply scattered light (Hillaire's Psi).
     Rgb multiple_scattering(double altitude_m, double sun_sine) const;
     SkyIrradiance irradiance(double altitude_m, double sun_elevation_deg) const;
 
-    // Directions from the horizontal to the zenith.
+    // Computes the sky for directions from the horizontal to the zenith.
     SkyTable sky(double eye_altitude_m, double sun_elevation_deg) const;
 
   private:
@@ -93,8 +97,8 @@ class Atmosphere {
     std::unique_ptr<const Tables> tables_;
 };
 
-// Radiance along a ray: `sine` of its elevation (0..1), cosine of its azimuth from the sun's, cosine of the
-// angle to the sun. As the shaders have it (shaders/sky.glsl).
+// Returns the radiance along a ray: `sine` of its elevation (0..1), cosine of its azimuth from the sun's,
+// cosine of the angle to the sun. The scalar form of render/shading/air.glsl.
 Rgb sky_radiance(const SkyTable& table, double sine, double cos_azimuth, double cos_to_sun, double mie_g);
 
 }  // namespace nephos

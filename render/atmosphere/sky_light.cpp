@@ -30,7 +30,7 @@ Rgb times(double s, const Rgb& a) { return {s * a[0], s * a[1], s * a[2]}; }
 // Radiance of the disc's middle, bounded, and how it changes with the sine of the elevation near the sun.
 void set_disc(const Atmosphere& air, const RenderOptions& options, const Rgb& sun_above_air,
               double elevation_deg, SkyLight& light) {
-    // Of a disc of mean 1.
+    // Radiance at the centre of a disc of mean radiance 1.
     constexpr Rgb kMiddle{1 + double(shader::kLimbDarkeningRed) / 2,
                           1 + double(shader::kLimbDarkeningGreen) / 2,
                           1 + double(shader::kLimbDarkeningBlue) / 2};

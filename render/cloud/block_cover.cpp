@@ -31,7 +31,7 @@ std::vector<Neighbours> neighbours_of(std::span<const std::uint64_t> blocks) {
     return all;
 }
 
-// Where the 4 x 4 x 4 octants in and around a block are: in which neighbour, and which of its octants.
+// The positions of the 4 x 4 x 4 octants in and around a block: the neighbour, and the octant in it.
 struct Halo {
     std::array<std::uint8_t, 64> neighbour, octant;
     constexpr Halo() : neighbour(), octant() {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How much cloud lies around each part of a cloud, whichever way one looks: what is covered by enough of it
-// cannot be seen. No Vulkan here. Private to the module.
+// Occlusion of the interior of a cloud by its surroundings, for all directions of view: parts behind enough
+// optical depth are invisible from anywhere. Private to the module.
 
 #include <array>
 #include <cstdint>
@@ -11,14 +11,14 @@
 
 namespace nephos {
 
-// A number for each octant of a block: 4 x 4 x 4 of its voxels
+// One number for each octant of a block (4 x 4 x 4 of its voxels).
 using OfOctants = std::array<float, 8>;  // x fastest
 
-// The least optical depth between the outside and each octant of each block, at most `most`: over all chains
-// of octants that touch each other, at their faces, edges or corners, the least sum of `depths`, without the
-// octant's own, and at most twice that: what is thin is outside itself, so that a hollow that fills is not
-// covered at once. What is in no block is outside. `blocks`: numbers
-// (voxel_blocks.h), rising.
+// Returns for each octant of each block the least optical depth between it and the outside, clamped to
+// `most`: the minimum, over all chains of octants that touch at faces, edges or corners, of the sum of
+// `depths` without the octant's own. It is clamped to twice the octant's own depth as well, so that an octant
+// in a hollow that fills gradually is not covered at once. All space without blocks is outside. `blocks`:
+// numbers (voxel_blocks.h), rising.
 std::vector<OfOctants> cover_of_octants(std::span<const std::uint64_t> blocks,
                                         std::span<const OfOctants> depths, float most);
 

@@ -51,7 +51,7 @@ struct Interval {
 constexpr std::size_t kPart = 8192;  // metaballs that one thread looks at
 constexpr std::size_t kAhead = 12;   // from a metaball of an order to that which is fetched meanwhile
 
-// What one part of the metaballs adds to a PreparedCloud.
+// The contribution of one part of the metaballs to a PreparedCloud.
 struct VisiblePart {
     std::vector<std::uint32_t> visible;
     std::vector<float> depth_scale;
@@ -79,7 +79,7 @@ VisiblePart visible_part(std::span<const Metaball> balls, std::size_t begin, std
     return part;
 }
 
-// What a cloud takes up along three axes.
+// The bounds of a cloud along three axes.
 struct Extent {
     Interval u, v, sun;
 };
@@ -189,7 +189,7 @@ LightSortedSplats sort_for_light(const PreparedCloud& cloud, const ShadowFrame& 
         const std::uint32_t source = by_distance[i];
         const Metaball& ball = cloud.metaballs[cloud.visible[source]];
         const Vec3 offset = centre_of(ball) - frame.origin_m;
-        // What is smaller than a texel is widened and thinned out: its optical depth times area stays.
+        // A metaball smaller than a texel is widened, with the same product of optical depth and area.
         const double radius = ball.radius, least = double(shader::kMinRadiusPixels);
         const double radius_u = std::max(radius / texel_u, least),
                      radius_v = std::max(radius / texel_v, least);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What happens to a cloud of metaballs before the device sees it: checks, optical depth scales, bounds, the
-// frame of the shadow map, and the order from the sun (that from the eye: view_sorting.h). No Vulkan here.
+// Preparation of a cloud of metaballs for all back-ends: validation, optical depth scales, bounds, the frame
+// of the shadow map, and sorting by distance from the sun (from the camera: render/frame/view_sorting.h).
 // Private to the module.
 //
-// The order is total: equal distances are ordered by index, so a picture never depends on how a sort is done.
+// The order is total: equal distances are ordered by index, so images do not depend on the sort algorithm.
 
 #include <cstdint>
 #include <span>
@@ -17,7 +17,7 @@
 
 namespace nephos {
 
-// The metaballs that draw anything.
+// The metaballs of a cloud with a non-zero extinction.
 struct PreparedCloud {
     std::span<const Metaball> metaballs;
     std::vector<std::uint32_t> visible;  // indices into metaballs, rising
@@ -25,13 +25,14 @@ struct PreparedCloud {
     double base_m = 0, top_m = 0;        // world z of the lowest and highest centre
 };
 
-// Throws Error(usage) when a metaball is not finite, has no radius, or there are more than 2^31 of them.
+// Selects and validates the metaballs. Throws Error(usage) when a metaball is not finite, has no radius, or
+// there are more than 2^31 of them.
 PreparedCloud prepare(const MetaballCloud& cloud);
 
-// The smallest frame along the sun's rays around all visible metaballs, with a margin of two texels.
+// Returns the smallest frame along the sun's rays around all visible metaballs, with a margin of two texels.
 ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size);
 
-// Metaballs as the shadow map sees them, nearest to the sun first.
+// Metaballs projected to the shadow map, nearest to the sun first.
 struct LightSortedSplats {
     std::vector<shader::LightSplat> splats;
     std::vector<shader::LightPlace> places;  // of the same metaballs

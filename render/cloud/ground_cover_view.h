@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Water and snow on the ground at the moment of a picture, as the renderer reads them. Texel (column, row) is
-// the rectangle of texel_x_m by texel_y_m whose lower corner is at (x_m + column texel_x_m, y_m + row
-// texel_y_m); rows from south to north, x fastest. Beyond the map, and towards its edge, the values outside
-// take over.
+// The renderer's view of the map of water and snow on the ground (seeds/ground_cover.h) at the time of a
+// frame. Texel (column, row) is the rectangle of texel_x_m by texel_y_m whose south-western corner is at (x_m
+// + column texel_x_m, y_m + row texel_y_m); rows from south to north, x fastest. Towards its edge the map
+// fades to the outside values.
 
 #include <span>
 

@@ -18,8 +18,8 @@
 namespace nephos {
 namespace {
 
-constexpr float kEdge = 0.15f;   // share of a block's mean depth that counts as contrast
-constexpr float kFull = 0.85f;   // share of the threshold below which a block is merged wholly
+constexpr float kEdge = 0.15f;   // fraction of a block's mean depth that counts as contrast
+constexpr float kFull = 0.85f;   // fraction of the threshold below which a block is merged entirely
 constexpr double kLevel = 0.25;  // a block's threshold relative to its children's
 constexpr float kSpread = 1.5f;  // of the second moment that a block adds to its metaball
 // Optical depths around an octant from which on it begins to be merged for being hidden, and is wholly; and
@@ -42,7 +42,7 @@ struct Sums {
     Values square{};                 // mass times place squared
     Values depth{}, depth_square{};  // of the optical depths through the children's centres
     Values balls{};
-    // Of the metaball that stands for it.
+    // The metaball that replaces it.
     Values radius{}, own_depth{};  // voxels; optical depth scale
     Values share{};                // of what larger blocks leave
 
@@ -59,7 +59,7 @@ struct Sums {
     }
 };
 
-// What all blocks of a cloud share.
+// The state shared by all blocks of a cloud.
 struct Merging {
     Vec3 eye_m{};
     double radius_voxels = 1;
@@ -86,7 +86,7 @@ struct Merging {
     }
 };
 
-// Of a block of 2 x 2 x 2 voxels: the octant that it is in.
+// Returns the octant of a block of 2 x 2 x 2 voxels.
 std::size_t octant_of(std::size_t n) { return (n >> 5 & 1) << 2 | (n >> 3 & 1) << 1 | (n >> 1 & 1); }
 
 // The metaballs of a block of 8 x 8 x 8 voxels, and where it lies.
@@ -149,7 +149,7 @@ class BlockTree {
         merge_whole(hidden);
     }
 
-    // Whether any metaball stands for several.
+    // Returns true when any metaball replaces several.
     bool merges() const {
         const auto merges_some = [](const auto& sums) {
             for (std::size_t n = 0; n < sums.kCount; ++n)
@@ -264,7 +264,7 @@ class BlockTree {
             const float variance = std::max(0.125f * sums.depth_square[n] - mean * mean, 0.0f);
             const float contrast = std::sqrt(variance + kEdge * kEdge * mean * mean);
             const float limit = threshold * std::min(std::max(way[n] * per_far_square, 1e-12f), 1e12f);
-            // From 1 at kFull of the limit to 0.
+            // Falls from 1 at kFull of the limit to 0 at the limit.
             const float t = std::min(std::max((limit - contrast) / ((1 - kFull) * limit), 0.0f), 1.0f);
             sums.share[n] = least[n] * std::max(t * t * (3 - 2 * t), hidden[n]);
         }
@@ -290,7 +290,7 @@ class BlockTree {
     Sums<1> whole_;
 };
 
-// What some blocks become.
+// The result of merging a range of blocks.
 struct MergedPart {
     MergedCloud cloud;
     bool merges = false;
@@ -309,7 +309,7 @@ MergedCloud joined(const std::vector<MergedPart>& parts) {
     return all;
 }
 
-// How far the octants of each block are hidden behind others, 0..1.
+// Returns the occlusion of the octants of each block, 0..1.
 std::vector<OfOctants> hidden_octants(const PreparedCloud& cloud, const VoxelBlocks& blocks,
                                       double per_scale) {
     const std::size_t count = blocks.size();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What one picture shows: voxel clouds as metaballs (D) and clouds drawn directly as billboards (T), in one
-// set and in one picture, back to front among each other. Plain data in world metres; what spans refer to
-// must stay as it is until the picture is finished (Renderer::finish(); draw_splats() finishes it itself).
+// The input of a frame: voxel clouds as metaballs (D) and clouds drawn directly as billboards (T), which are
+// sorted and composited together. Plain data in world metres; the memory behind spans must not change until
+// the frame is finished (Renderer::finish(); draw_splats() finishes it itself).
 
 #include <cstdint>
 #include <optional>
@@ -25,27 +25,26 @@ struct MetaballCloud {
     double normalisation = 1.0;           // such that a saturated lattice has density 1; >= 0
 };
 
-// One of T's billboards, facing the eye. Its light is that of T's vertex shader, for each corner:
+// One of T's billboards, facing the eye, lit per corner as by T's vertex shader:
 //
-//     diffuse  = clamp(dot(direction to the sun, direction from the cloud's centre to the corner) * sun's
-//     colour
+//     diffuse  = clamp(dot(to_sun, direction from the cloud's centre to the corner) * sun's colour
 //                      - absorbed, 0, 1) + ambient
 //     radiance = texture * albedo * diffuse
 //
-// with the ambient light by the corner's height between the cloud's base and top, and behind the veil of the
-// air. A flash of lightning adds a second term of the same form, towards its place and times its irradiance.
+// with ambient light by the corner's height between the cloud's base and top, then attenuated by the air. A
+// flash of lightning adds a second term of the same form, towards its position and times its irradiance.
 struct CloudBillboard {
     Vec3 centre_m{};                  // world
     float width_m = 1, height_m = 1;  // > 0, at most 60000
-    float sun_absorbed = 0;           // CFA: share of the sunlight that is absorbed on its way, 0..1
-    float flash_absorbed = 0;         // the same of the lightning
+    float sun_absorbed = 0;           // CFA: absorbed fraction of the sunlight, 0..1
+    float flash_absorbed = 0;         // absorbed fraction of the lightning, 0..1
     float opacity = 1;                // 0..1; below 1 while its cloud forms or dissolves
     BillboardTexture texture = BillboardTexture::soft;
-    std::uint32_t variant = 0;  // any number: which of the texture's pictures, and how it is turned
+    std::uint32_t variant = 0;  // any number; selects the texture's variant and orientation
     std::uint32_t cloud = 0;    // index in Splats::clouds
 };
 
-// What the billboards of one cloud share.
+// The cloud that a set of billboards belongs to.
 struct BillboardCloud {
     Vec3 centre_m{};               // world
     double base_m = 0, top_m = 1;  // world z; base_m < top_m
@@ -56,11 +55,11 @@ struct Splats {
     std::span<const CloudBillboard> billboards;
     MetaballCloud metaballs;
     std::optional<Flash> flash;
-    double time_s = 0;  // simulated time of the picture
-    // False: nobody asks for Picture::depth_m, which is infinity then; billboards are drawn a sixth faster.
+    double time_s = 0;  // simulated time of the frame
+    // True: Picture::depth_m is requested. False: it is infinity, and billboards are drawn a sixth faster.
     bool depth = true;
-    // False: nobody asks for Picture::light and Picture::shadow, which are empty then. On the processor light
-    // is then computed only where the picture shows it; its pixels are the same.
+    // True: Picture::light and Picture::shadow are requested. False: they are empty, and the back-end `cpu`
+    // computes light for visible metaballs and texels alone; the pixels are the same.
     bool light = true;
     std::optional<GroundCoverView> ground_cover{};  // none: the ground is dry
 };

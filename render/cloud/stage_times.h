@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Where the time of a picture goes, for measurements (./bench).
+// Times of the stages of a frame, for measurements (./bench).
 
 #include <array>
 #include <chrono>
@@ -12,23 +12,23 @@
 namespace nephos {
 
 enum class DrawStage {
-    prepare,       // has the cloud changed? checks, optical depths, bounds
-    view_sorting,  // culling, distances and their sort
-    eye_bins,      // boxes on the screen, shapes of the balls, lists of the tiles
-    look,          // which balls and which of the ground are seen
-    sun_order,     // distances from the sun and their sort
+    prepare,       // hash of the cloud; validation, optical depths, bounds, merging
+    view_sorting,  // culling and sorting by distance from the camera
+    eye_bins,      // screen-space boxes, shapes of the splats, lists of the tiles
+    look,          // visibility pre-pass of metaballs and ground
+    sun_order,     // sorting by distance from the sun
     sun_bins,      // boxes on the shadow map, lists of its tiles
     light,         // the shadow map, and the light at the centres
-    colour,        // what the balls scatter towards the eye
-    view,  // front to back over the pixels, and the background; on a device all from the sorted splats on
+    colour,        // radiance that the metaballs scatter towards the eye
+    view,          // compositing, and the background; on a device all stages after sorting
 };
 inline constexpr std::size_t kDrawStages = 9;
 
 struct StageTime {
     double wall_ms = 0;
-    double processor_ms = 0;  // of all threads of the program, whatever they do meanwhile
-    std::uint64_t bytes = 0;  // that have to be read and written at least; 0: not counted
-    std::uint64_t pairs = 0;  // (ball, pixel), (ball, texel) or (ball, centre) that were evaluated
+    double processor_ms = 0;  // of all threads of the program
+    std::uint64_t bytes = 0;  // least memory traffic, read and written; 0: not counted
+    std::uint64_t pairs = 0;  // number of evaluated (splat, pixel), (splat, texel) or (splat, centre)
 };
 
 struct StageTimes {
@@ -37,7 +37,7 @@ struct StageTimes {
     const StageTime& operator[](DrawStage stage) const { return stages[std::size_t(stage)]; }
 };
 
-// Adds the time of its life to a stage. `times` may be null.
+// Adds the time between its construction and destruction to a stage. `times` may be null.
 class StageTimer {
   public:
     StageTimer(StageTimes* times, DrawStage stage) : time_(times != nullptr ? &(*times)[stage] : nullptr) {}

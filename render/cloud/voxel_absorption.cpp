@@ -83,8 +83,8 @@ float DensityBlocks::density(const int (&cell)[3]) const {
                       std::size_t(cell[0])];
 }
 
-// From cube to cube: along each axis the distance at which the ray crosses the next face is kept (Amanatides
-// and Woo 1987).
+// Traverses the grid cube by cube with the distance to the next face on each axis (3-D DDA, Amanatides and
+// Woo 1987).
 double DensityBlocks::column_m(const Vec3& from_m, const Vec3& way, double length_m, double enough_m) const {
     if (densities_.empty()) return 0;
     double enter = 0, leave = length_m;

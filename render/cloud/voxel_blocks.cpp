@@ -19,8 +19,8 @@ constexpr std::size_t kPart = 8192;              // metaballs that one thread lo
 
 double coordinate(const Metaball& ball, int axis) { return axis == 0 ? ball.x : axis == 1 ? ball.y : ball.z; }
 
-// Of a lattice's first metaball, whose centre is that of a voxel. In steps of 1/64, so that rounding of
-// coordinates moves no voxel into another block.
+// Returns the phase of a lattice by its first metaball, whose centre is that of a voxel; rounded to 1/64, so
+// that rounding of coordinates moves no voxel into another block.
 double phase_of(double coordinate_in_voxels) {
     const double steps = std::floor((coordinate_in_voxels - std::floor(coordinate_in_voxels)) * 64 + 0.5);
     return (steps >= 64 ? 0 : steps / 64) - 0.5;
@@ -75,7 +75,7 @@ RunPart runs_of_part(const PreparedCloud& cloud, std::span<const VoxelLattice> l
     return part;
 }
 
-// The lattices of a cloud; none if there are too many.
+// Returns the lattices of a cloud; none if there are too many.
 std::vector<VoxelLattice> voxel_lattices(const PreparedCloud& cloud, double radius_voxels) {
     const std::size_t count = cloud.visible.size(), parts = (count + kPart - 1) / kPart;
     std::vector<std::vector<std::uint32_t>> found(parts);

@@ -28,7 +28,7 @@ int texels_in_one(int shadow_size) {
     return std::max(std::clamp(shadow_size / 256, 1, 4), (shadow_size + 511) / 512);
 }
 
-// What the cloud above a texel of the shade map is like, along the light: 0..1 from its first to its last
+// The distribution of cloud along the light above a texel of the shade map: 0..1 from the first to the last
 // metaball.
 struct Span {
     double weight = 0, sum = 0, sum_squares = 0;
@@ -80,9 +80,9 @@ struct Along {
     double operator()(const Vec3& p) const { return dot(row, p) + offset; }
 };
 
-// Where in a texel the shade begins and ends is told by height, so that all air below the clouds is known to
-// be in full shade without a look; by the way along the light where that is so flat that clouds shade each
-// other at one height.
+// Returns the axis along which shade begins and is complete: height, by which all air below the clouds is
+// known to be in full shade without a look-up; the direction of light where the sun is so low that clouds
+// shade each other at one height.
 Vec3 shade_axis(const Vec3& light) { return light.z < -0.25 ? Vec3{0, 0, -1} : light; }
 
 Along along_axis(const PreparedCloud& cloud, const Vec3& direction) {
@@ -115,7 +115,7 @@ class ShadeMap {
 
     int columns() const { return columns_; }
     std::size_t texels() const { return std::size_t(columns_) * std::size_t(columns_); }
-    // From a shadow map coordinate 0..1 to a column or row whose whole numbers are the middles of texels.
+    // Scale from a shadow map coordinate 0..1 to columns or rows, whose integers are the centres of texels.
     double scale() const { return double(shadow_size_) / step_; }
     static double shift() { return 0.5; }
 
@@ -126,7 +126,7 @@ class ShadeMap {
         const auto columns = std::size_t(columns_), last = texels() - 1;
         tbb::parallel_for(std::size_t{0}, columns, [&](std::size_t row) {
             for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) {
-                // Of the last column and row, nothing is looked up.
+                // The last column and row are never sampled.
                 const std::size_t four[] = {i, std::min(i + 1, last), std::min(i + columns, last),
                                             std::min(i + columns + 1, last)};
                 for (int n = 0; n < 4; ++n) {
@@ -220,7 +220,7 @@ class ShadeMap {
             const double mean = all[i].sum / all[i].weight;
             const double variance = std::max(0.0, all[i].sum_squares / all[i].weight - mean * mean);
             const double half = std::sqrt(3 * variance);
-            // With several layers the even cloud would be longer than all of them.
+            // With several layers the range of a uniform cloud of that variance would exceed all of them.
             range[i] = byte_of(std::max(mean - half, double(all[i].first))) |
                        byte_of(std::min(mean + half, double(all[i].last))) << 8;
             first = std::min(first, range[i] & 255u);

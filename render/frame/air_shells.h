@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The layers of air around the eye that are drawn between the clouds: D's shells, "interleaved back to front
-// (shell, clouds up to the next shell, next shell ...)". See docs/air.md.
+// D's shells: layers of air around the eye, "interleaved back to front (shell, clouds up to the next shell,
+// next shell ...)" with the clouds. See docs/air.md.
 //
 // Shell k is the air between the distances ends[k - 1] and ends[k] of every ray, cut off by the ground. It is
-// drawn in front of all splats whose centres are at ends[k] or beyond, and behind all others. What lies
+// composited in front of all splats whose centres are at ends[k] or beyond, and behind all others. The air
 // between the beginning of a splat's own shell and its centre is added to the light of the splat
-// (render/shading/shells.glsl, shells-inl.h), so that nothing jumps when a splat crosses from one shell into
+// (render/shading/shells.glsl, shells-inl.h), so that nothing pops when a splat crosses from one shell into
 // another.
 //
-// The light that a shell takes away is read off the shade map: the mean of the shadow map over a few texels,
-// and for each texel at which height its shade begins and where it is complete (with a low
-// sun: how far along the light). Above the clouds the
-// sun shines, whatever lies below. No Vulkan here. Private to the module.
+// The shade map gives the light that a shell loses: the mean of the shadow map over a few texels, and for
+// each texel the heights at which its shade begins and is complete (with a low sun: the distances along the
+// light). Air above the clouds is sunlit. Private to the module.
 
 #include <array>
 #include <cstdint>
@@ -46,15 +45,15 @@ struct ShadeCache {
 
 struct AirShells {
     shader::Shells data;
-    // Three planes of words, rows of settings.z of them, each with four bytes: of a texel, of its right
-    // neighbour, and of the two in the next row. The planes: transmittance; where along
-    // `shade_along` the shade begins; where it is complete. Then, with fog, the words of FogNoise.
-    // They are ShadeCache's.
+    // Three planes of words in rows of settings.z words; each word has four bytes: of a texel, of its right
+    // neighbour, and of the two in the next row. The planes: transmittance; the position along `shade_along`
+    // at which the shade begins; that at which it is complete. Then, with fog, the words of FogNoise. Owned
+    // by ShadeCache.
     std::span<const std::uint32_t> shade;
-    std::uint64_t serial = 0;  // changes when they do; 0: none
+    std::uint64_t serial = 0;  // changes with the words; 0: none
 
-    // Transmittance of clear air up to the end of each shell, where it depends on the distance alone
-    // (gradient).
+    // Transmittance of clear air up to the end of each shell, if it depends on the distance alone (gradient
+    // sky).
     std::vector<std::array<float, 3>> clear;
 
     std::size_t count() const { return std::size_t(data.settings.x); }
@@ -62,17 +61,17 @@ struct AirShells {
     bool has_fog() const { return data.fog.x > 0; }
 };
 
-// Distance from the eye at which shell k ends, metres.
+// Returns the distance from the eye at which shell k ends, metres.
 inline float shell_end(const shader::Shells& data, std::size_t k) {
     const shader::vec4& four = data.ends[k / 4];
     return k % 4 == 0 ? four.x : k % 4 == 1 ? four.y : k % 4 == 2 ? four.z : four.w;
 }
 
-// Number of shells that end at a distance or before it.
+// Returns the number of shells that end at a distance or before it.
 std::size_t shells_before(const shader::Shells& data, float distance);
 
-// Whether these options have air to draw between the clouds: fog, or shafts of clouds whose shadow they are.
-// It looks at the whole shadow map.
+// Returns true when the options have shells: fog, or light shafts with clouds that cast a shadow. Shells
+// sample the whole shadow map.
 bool has_shells(const RenderOptions& options, const PreparedCloud& cloud);
 
 // No shells when the options ask for none or when they would draw nothing. `shadow`: the texels of the shadow
@@ -82,11 +81,10 @@ AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, c
                      std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise,
                      ShadeCache& kept);
 
-// For each shell the number of splats, nearest first, that are drawn in front of it. Rises.
+// Returns for each shell the number of splats in front of it; rising.
 std::vector<std::uint32_t> splats_before_shells(const AirShells& shells, const ViewSortedSplats& order);
 
-// The runs of an order with runs of SplatKind::shell between them, one shell each: what is drawn, farthest
-// first.
+// Returns the runs of an order interleaved with runs of SplatKind::shell, one shell each, farthest first.
 std::vector<Run> runs_between_shells(const AirShells& shells, const ViewSortedSplats& order);
 
 }  // namespace nephos

@@ -10,7 +10,7 @@
 namespace nephos {
 namespace {
 
-// Only + - * / and sqrt below: the textures have the same bytes with every C library.
+// Uses + - * / and sqrt alone, so that the textures have the same bytes with every C library.
 
 // 0..1, a function of its arguments.
 double random_at(std::uint32_t seed, int x, int y) {

@@ -14,7 +14,8 @@ constexpr int kCells = 4;  // of the noise along an edge of the cube
 
 double fraction(double value) { return value - std::floor(value); }
 
-// Of one look-up: where the eye is in the cube, and cubes per metre. What drifts with the fog is the noise.
+// Returns for one sample the position of the eye in the cube, and cubes per metre. The noise drifts with the
+// fog.
 shader::vec4 place(const Vec3& eye_m, const Vec3& way_m, double per_m) {
     const Vec3 at = per_m * (eye_m - way_m);
     return {float(fraction(at.x)), float(fraction(at.y)), float(fraction(at.z)), float(per_m)};

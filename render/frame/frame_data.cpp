@@ -22,7 +22,7 @@ shader::vec4 shadow_row(const Vec3& axis, const ShadowFrame& shadow, const Vec3&
     return to_vec4(row, dot(row, eye - shadow.origin_m));
 }
 
-// What the physical sky has in place of the gradient.
+// Replaces the gradient's values by those of the physical sky.
 void use_sky(const RenderOptions& options, const SkyLight& sky, PictureFrame& frame) {
     const AtmosphereModel& air = sky.model;
     frame.sky = sky.texels.data();

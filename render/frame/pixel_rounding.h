@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Rounds to whole pixels: four times for each splat, for which calls of std::floor take too long where the
-// processor that is compiled for has no instruction for it. Private to the module.
+// Rounding to whole pixels, four times per splat: faster than std::floor, which is a function call for target
+// processors without an instruction for it. Private to the module.
 
 #include <algorithm>
 
 namespace nephos {
 
-// Far beyond any picture, and far from the limits of int.
+// Limit of pixel coordinates, far outside any image and far from the limits of int.
 inline constexpr double kFarthestPixel = 1e6;
 
 inline int floor_to_pixel(double value) {

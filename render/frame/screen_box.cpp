@@ -27,7 +27,7 @@ Tangents tangents(double across, double depth, double radius) {
     return {(across * depth - root) * scale, (across * depth + root) * scale};
 }
 
-// What all boxes share.
+// The projection shared by all boxes.
 struct Screen {
     const CameraFrame& camera;
     const Tile& tile;

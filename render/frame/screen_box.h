@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Where splats fall on the screen. Private to the module.
+// Screen-space bounding boxes of splats. Private to the module.
 
 #include <cstdint>
 #include <span>
@@ -14,16 +14,16 @@
 
 namespace nephos {
 
-// Of a number of splats_near_to_far(): the rest is an index into ViewSortedSplats::billboards.
+// Flag of a number of splats_near_to_far(): the other bits are an index into ViewSortedSplats::billboards.
 inline constexpr std::uint32_t kBillboardSplat = 1u << 31;
 
-// All splats of an order from the nearest to the farthest: index into ViewSortedSplats::balls, or kBillboardSplat and one
-// into ViewSortedSplats::billboards.
+// Returns all splats of an order from the nearest to the farthest: an index into ViewSortedSplats::balls, or
+// kBillboardSplat and an index into ViewSortedSplats::billboards.
 std::vector<std::uint32_t> splats_near_to_far(const ViewSortedSplats& order);
 
-// For each splat, from the nearest to the farthest (the other way round than `order`), the pixels of the tile
-// of the picture that it can touch, from the tile's corner on. `splats`: splats_near_to_far(); not needed for
-// an order without billboards.
+// Returns for each splat, from the nearest to the farthest (the reverse of `order`), a bounding box in pixels
+// relative to the tile's corner. `splats`: splats_near_to_far(); may be empty for an order without
+// billboards.
 std::vector<PixelBox> screen_boxes(const ViewSortedSplats& order, const CameraFrame& camera,
                                    const Camera& options, const Tile& tile,
                                    std::span<const std::uint32_t> splats = {});

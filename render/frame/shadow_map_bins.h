@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Metaballs and their centres on the shadow map's tiles. No Vulkan here. Private to the module.
+// Binning of metaballs and of their centres into the shadow map's tiles. Private to the module.
 
 #include <span>
 #include <vector>
@@ -11,11 +11,11 @@
 
 namespace nephos {
 
-// The texels that each splat can touch.
+// Returns a bounding box in texels for each splat.
 std::vector<PixelBox> light_boxes(std::span<const shader::LightSplat> splats);
 
-// Which centres lie in which tile, in each tile in order from the sun. Every centre is in one tile, but for
-// those whose `wanted` is 0; without it all are wanted.
+// Bins the centres, in each tile in order from the sun. Every centre is in one tile, except those whose
+// `wanted` is 0; if `wanted` is empty, none is excepted.
 TileBins bin_centres(std::span<const shader::LightSplat> splats, const TileGrid& grid,
                      std::span<const std::uint8_t> wanted = {});
 

@@ -19,7 +19,7 @@ struct TileBox {
     std::uint16_t x0, y0, x1, y1;
 };
 
-// Calls work(number) for the tiles of a box; only for those wanted, if any are named.
+// Calls work(number) for the tiles of a box, except those whose `wanted` is 0.
 template <bool kAll, class Work>
 void for_each_tile(const TileBox& box, std::size_t columns, std::span<const std::uint8_t> wanted,
                    const Work& work) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Which splats touch which tile of a picture. Private to the module.
+// Binning of splats into the tiles of an image. Private to the module.
 
 #include <cstdint>
 #include <span>
@@ -11,47 +11,48 @@
 
 namespace nephos {
 
-// A rectangle of pixels, half-open; may reach beyond the picture or be empty.
+// A rectangle of pixels, half-open; may extend beyond the image or be empty.
 struct PixelBox {
     int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
 struct TileGrid {
-    int width = 0, height = 0;  // of the picture, pixels
+    int width = 0, height = 0;  // of the image, pixels
     int columns() const { return (width + int(shader::kTileWidth) - 1) / int(shader::kTileWidth); }
     int rows() const { return (height + int(shader::kTileHeight) - 1) / int(shader::kTileHeight); }
     std::size_t tiles() const { return std::size_t(columns()) * std::size_t(rows()); }
 };
 
-// Push constants of a compute pass over all tiles of a picture or map that is drawn in one batch.
+// Returns the push constants of a compute pass over all tiles of an image or map in one batch.
 shader::TileStep step_over(const TileGrid& grid);
 
-// The tiles that a box touches, half-open; empty when it lies outside.
+// Returns the tiles that a box touches, half-open; empty when it is outside.
 PixelBox tiles_of(const PixelBox& box, const TileGrid& grid);
 
+// The lists of all tiles.
 struct TileBins {
     std::vector<shader::TileRange> ranges;  // of `list`, one a tile, x fastest
     std::vector<std::uint32_t> list;        // indices into the boxes, rising in each tile
 };
 
-// In parallel; the result does not depend on the number of threads. `wanted`: 0 for tiles whose list stays
-// empty; without it all are filled.
+// Bins boxes in parallel; the result does not depend on the number of threads. `wanted`: 0 for tiles whose
+// list remains empty; if it is empty, all lists are filled.
 TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid,
                         std::span<const std::uint8_t> wanted = {});
 
-// What is in memory at once.
+// Limits of one batch, for the memory of its lists.
 struct BatchLimits {
     std::size_t boxes = std::size_t{1} << 22;
     std::size_t entries = std::size_t{1} << 26;  // of the tiles' lists: 256 MiB
 };
 
-// End of a batch that starts at `begin`: at most `max_boxes` boxes with at most `max_entries` entries in the
-// list, but at least one box. A box has at most one entry a tile.
+// Returns the end of a batch that starts at `begin`: at most `max_boxes` boxes with at most `max_entries`
+// list entries, but at least one box. A box has at most one entry a tile.
 std::size_t end_of_batch(std::span<const PixelBox> boxes, std::size_t begin, const TileGrid& grid,
                          std::size_t max_boxes, std::size_t max_entries);
 
-// Lists for the boxes from `begin` to `end`; less of them, and then a smaller `end`, where a tile's list
-// would have more than `longest` >= 1 entries.
+// Bins the boxes from `begin` to `end`. Reduces `end` where a tile's list would exceed `longest` >= 1
+// entries.
 TileBins bin_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size_t& end, const TileGrid& grid,
                    std::size_t longest);
 

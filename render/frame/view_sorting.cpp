@@ -31,7 +31,8 @@ constexpr float kLargestBillboard_m = 60000;  // half of it is a 16-bit float
 bool finite(const Vec3& v) { return std::isfinite(v.x + v.y + v.z); }
 bool within(float value, float min, float max) { return value >= min && value <= max; }
 
-// What a billboard lacks; null if it is as splats.h wants it.
+// Returns the first field of a billboard that is out of the range in splats.h, with that range; null if none
+// is.
 const char* wanted(const CloudBillboard& billboard, std::size_t clouds) {
     if (!finite(billboard.centre_m)) return "a finite centre";
     if (!(billboard.width_m > 0 && billboard.height_m > 0 && billboard.width_m <= kLargestBillboard_m &&
@@ -125,7 +126,7 @@ class Collector {
     static constexpr std::size_t kPart = 4096;  // splats that one thread looks at
     static constexpr std::size_t kAhead = 12;   // from a splat to that which is fetched meanwhile
 
-    // Where the splats of each part go: the part's share of balls and billboards, from the farthest on.
+    // Computes the positions of each part's balls and billboards in the sorted arrays, from the farthest on.
     void place_splats(ViewSortedSplats& order) {
         const std::size_t count = by_distance_.size(), parts = (count + kPart - 1) / kPart;
         first_ball_.assign(parts + 1, 0);
@@ -228,8 +229,8 @@ class Collector {
         order.runs.back().end = ++next;
     }
 
-    // Whether the tiles can draw it as an ellipse with a polynomial. Beside or behind the eye the outline is
-    // no ellipse; halves, which hold the radius in pixels, end at 65504.
+    // Returns true when tiles can draw it as an ellipse with a polynomial. Beside or behind the eye the
+    // outline is no ellipse; the half floats of the radius in pixels end at 65504.
     bool is_fitted(const Vec3& offset, double distance, double ball_radius, float depth_scale) const {
         const double least = double(shader::kMinRadiusPixels) * distance / pixels_per_unit_;
         const double radius = std::max(ball_radius, least), depth = dot(offset, camera_.forward);

@@ -2,8 +2,8 @@
 #pragma once
 
 // An output stream for OpenEXR that reports every failed write. The library writes its last offset table in a
-// destructor, where an exception is swallowed: a full disk would leave a damaged file and a happy caller.
-// This stream remembers the first failure, and close() throws it. Private to the module.
+// destructor, which swallows exceptions, so that a full disk would go unnoticed. This stream records the
+// first failure, and close() throws it. Private to the module.
 
 #include <cstdint>
 #include <filesystem>
@@ -15,7 +15,8 @@ namespace nephos {
 
 class CheckedStream : public Imf::OStream {
   public:
-    // Opens `file`, which must be there and no link, and empties it; failures name `reported` (the file the user asked for). Throws Error(io).
+    // Opens `file`, which must be there and no link, and empties it; messages name `reported`, the file that the
+    // user requested. Throws Error(io).
     CheckedStream(const std::filesystem::path& file, const std::filesystem::path& reported);
     CheckedStream(const CheckedStream&) = delete;
     CheckedStream& operator=(const CheckedStream&) = delete;
@@ -25,7 +26,7 @@ class CheckedStream : public Imf::OStream {
     std::uint64_t tellp() override { return position_; }
     void seekp(std::uint64_t position) override { position_ = position; }
 
-    // Closes the file and throws Error(io) when anything failed before.
+    // Closes the file and throws Error(io) when any operation has failed.
     void close();
 
   private:

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Pictures as files. Every file is either complete or not there (core/atomic_file.h); all functions
-// throw Error(io) naming the file, and none keeps state: they may run in several threads for different files.
+// Pictures as EXR and PNG files. Writing is atomic (core/atomic_file.h); all functions throw Error(io) naming
+// the file. They have no state and may run in several threads for different files.
 //
 // OpenEXR: two parts, 32-bit float, ZIP.
 //
-//     part "picture"   R, G, B            beauty as 16-bit floats: the layer that every viewer opens first
+//     part "picture"   R, G, B            beauty as 16-bit floats: the default layer of viewers
 //                      beauty.R, .G, .B   linear Rec. 709, exposure not applied
 //                      transmittance.Y    of the clouds, 1 = none
 //                      depth.Z            metres along the ray, infinity without cloud (picture.h)
-//     part "shadow"    shadow.Y           the square shadow map; where it lies is told by the attributes
+//     part "shadow"    shadow.Y           the square shadow map; its ShadowFrame is in the attributes
 //                                         shadowOrigin, shadowU, shadowV, shadowDirection
 //
 // Attributes of both: scene, seed, sceneHash, stateHash, nephosVersion, time, extinctionPerMetre; of
@@ -30,8 +30,7 @@
 
 namespace nephos {
 
-// Writes the picture with all its layers. The file is opened again and found complete before it gets its
-// name.
+// Writes the picture with all its layers, and checks that the file is complete before renaming it.
 void write_exr(const std::filesystem::path& path, const Picture& picture, const RenderOptions& options,
                const PictureMetadata& metadata);
 
@@ -63,13 +62,14 @@ struct ExrPart {
     std::vector<std::pair<std::string, std::string>> attributes;  // name, value as text; sorted by name
 };
 
-// What an OpenEXR file of any origin says of itself; only headers are read.
+// The headers of an OpenEXR file of any program.
 struct ExrInfo {
     std::vector<ExrPart> parts;
 };
+// Reads the headers alone.
 ExrInfo read_exr_info(const std::filesystem::path& path);
 
-// Reads a file of write_exr back; throws Error(io) when layers are missing. `light` is not stored and stays
+// Reads a file of write_exr(); throws Error(io) when layers are missing. Picture::light is not stored and is
 // empty.
 Picture read_exr(const std::filesystem::path& path);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the renderer hands out: a picture with its auxiliary layers, and what is written beside it into a
-// file. Plain data in main memory; row 0 is the top row, x runs fastest, no padding between rows.
+// The output of the renderer: a picture with its auxiliary layers, and the metadata of its file. Plain data
+// in main memory; row 0 is the top row, x runs fastest, no padding between rows.
 
 #include <array>
 #include <cstddef>
@@ -15,17 +15,16 @@
 
 namespace nephos {
 
-// Where the texels of the shadow map lie. The map is a parallel projection along the sun's rays: texel
-// (column u, row v) is the line through origin_m + (u + 0.5) / size * u_axis_m + (v + 0.5) / size * v_axis_m
-// along direction.
+// The projection of the shadow map, parallel along the sun's rays: texel (column u, row v) is the line
+// through origin_m + (u + 0.5) / size * u_axis_m + (v + 0.5) / size * v_axis_m along direction.
 struct ShadowFrame {
     Vec3 origin_m{};   // world; corner of texel (0, 0)
     Vec3 u_axis_m{};   // from the first to the last column's far edge
     Vec3 v_axis_m{};   // from the first to the last row's far edge; perpendicular to u_axis_m
-    Vec3 direction{};  // unit; the way the light travels
+    Vec3 direction{};  // unit; of the light's travel
 };
 
-// Light in the air of a picture, for what is drawn over it; linear colours.
+// Light in the air of a picture, for overlays such as rain; linear colours.
 struct PictureAir {
     std::array<double, 3> sun{};               // radiance of a white surface that faces the unshaded sun
     std::array<double, 3> sky{};               // mean radiance of the sky
@@ -38,12 +37,11 @@ struct Picture {
     std::vector<float> beauty;  // 3 * width * height, linear RGB, exposure not applied
     std::vector<float>
         transmittance;  // width * height, of the clouds along the pixel's ray: 1 = no cloud, 0 = opaque
-    // width * height, metres from the eye along the pixel's ray: the mean over the cloud, each part weighted
-    // by what the eye sees of it. Infinity where the cloud hides less than 1/1024 of what lies behind (sky
-    // and ground).
+    // width * height, metres from the eye along the pixel's ray: the mean over the cloud, weighted by the
+    // visible opacity. Infinity where the cloud's opacity is less than 1/1024 (sky and ground).
     std::vector<float> depth_m;
 
-    std::optional<PictureAir> air;  // of the physical sky; none: as RenderOptions::air says
+    std::optional<PictureAir> air;  // of the physical sky; none: by RenderOptions::air
 
     int shadow_size = 0;        // texels on a side
     std::vector<float> shadow;  // shadow_size^2, transmittance of the whole cloud along the sun's rays
@@ -56,7 +54,7 @@ struct Picture {
     std::size_t pixels() const { return std::size_t(width) * std::size_t(height); }
 };
 
-// Where a picture comes from; written into the header of every image file. Empty texts are left out.
+// The origin of a picture, for the header of every image file. Empty texts are omitted.
 struct PictureMetadata {
     std::string scene;  // name or file of the scene, or of the volume that is drawn
     std::uint64_t seed = 0;

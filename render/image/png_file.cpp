@@ -24,8 +24,8 @@ constexpr int kCompressionLevel = 4;
 
 using Texts = std::vector<std::pair<std::string, std::string>>;
 
-// What the callbacks of libpng share with us. libpng reports errors by longjmp, so the functions between
-// setjmp and the call hold nothing that has a destructor; all memory lives here, outside of them.
+// State shared with the callbacks of libpng. libpng reports errors by longjmp, so the functions between
+// setjmp and the call have no objects with destructors; all memory is here, outside of them.
 struct Exchange {
     std::string error;
     std::string file;  // written

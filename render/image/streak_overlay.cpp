@@ -65,7 +65,7 @@ void draw_thin(Picture& picture, const Streak& s, const Rows& band) {
     }
 }
 
-// By the distance from the line between the centres of the round ends; the wider, the softer.
+// Draws a streak by the distance from its axis, with round ends; the wider, the softer its edge.
 void draw_wide(Picture& picture, const Streak& s, const Rows& band) {
     const float dx = s.x1 - s.x0, dy = s.y1 - s.y0, length = std::sqrt(dx * dx + dy * dy);
     const float half = 0.5f * s.width, cut = std::min(half, 0.5f * length) / std::max(length, 1e-6f);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Streaks drawn over a finished picture: what a particle leaves in it while it is exposed. The same code for
-// all ways of drawing clouds.
+// Motion-blurred particles, composited over finished pictures as streaks. The same code for all back-ends.
 
 #include <span>
 
@@ -18,11 +17,13 @@ struct Streak {
     float red = 0, green = 0, blue = 0;    // radiance
 };
 
-// Blends the streaks into the beauty layer, in their order: pixel = pixel + opacity * cover * seen *
-// (radiance
-// - pixel), where `seen` is 1 before the cloud of the pixel (Picture::depth_m) and the cloud's transmittance
-// behind it. Edges and ends are smooth; a streak covers its length times its width in pixels, at least one
-// either way. Bands of rows in parallel; the same bits for any number of threads.
+// Blends the streaks into the beauty layer, in their order:
+//
+//     pixel = pixel + opacity * cover * visible * (radiance - pixel)
+//
+// where `visible` is 1 in front of the cloud of the pixel (Picture::depth_m) and the cloud's transmittance
+// behind it. Edges and ends are antialiased; a streak covers its length times its width in pixels, at least
+// one pixel in each. Runs bands of rows in parallel; the bits are the same for any number of threads.
 void draw_streaks(Picture& picture, std::span<const Streak> streaks);
 
 }  // namespace nephos

@@ -158,7 +158,7 @@ std::vector<std::string> command_line(const VideoOptions& options, const std::fi
 }  // namespace
 
 void require_ffmpeg() {
-    // As posix_spawnp() looks for it.
+    // Searches the PATH as posix_spawnp() does.
     const char* variable = std::getenv("PATH");
     std::string_view rest = variable != nullptr ? variable : "/bin:/usr/bin";
     while (true) {

@@ -2,7 +2,7 @@
 #pragma once
 
 // Geometry of the perspective camera. Pixel (x, y) has its centre at (x + 0.5, y + 0.5), row 0 at the top.
-// The ray through a point (px, py) of the picture, in pixels, has the direction
+// The ray through a point (px, py) of the image, in pixels, has the direction
 //
 //     forward + (2 px / width - 1) * right * half_width + (1 - 2 py / height) * up * half_height
 
@@ -12,20 +12,20 @@
 
 namespace nephos {
 
-// The camera's axes: unit vectors in world space, and half the picture's extent on the plane at distance 1.
+// The camera's axes as unit vectors in world space, and half the extent of the image plane at distance 1.
 struct CameraFrame {
     Vec3 position_m{}, right{}, up{}, forward{};
     double half_width = 1, half_height = 1;  // tangents of half the fields of view
 };
 
-// Throws Error(usage) when target and position coincide. Looking straight up or down, north is up in the
-// picture.
+// Returns the axes of a camera; north is up in the image when it looks straight up or down. Throws
+// Error(usage) when target and position coincide. Pure, as all functions here.
 CameraFrame camera_frame(const Camera& camera);
 
-// Direction of the ray through a point of the picture, in pixels; unit length.
+// Returns the direction of the ray through a point of the image, in pixels; unit length.
 Vec3 pixel_ray(const CameraFrame& frame, const Camera& camera, double px, double py);
 
-// Where a world point falls, in pixels; `in_front` is false for points at or behind the eye's plane.
+// The projection of a world point, in pixels; `in_front` is false for points at or behind the eye's plane.
 struct PixelPosition {
     double x = 0, y = 0;
     bool in_front = false;

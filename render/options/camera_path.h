@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A camera that moves: key frames of position and target over simulated time.
+// Animation of the camera: key frames of position and target over simulated time.
 
 #include <vector>
 
@@ -18,11 +18,11 @@ struct CameraKey {
     bool operator==(const CameraKey&) const = default;
 };
 
-// The camera at a time: without a path as it is. Through the keys go cubic Hermite curves with the slopes of
-// Fritsch and Butland (1984): position and velocity are continuous, and between two keys no coordinate leaves
-// the range of the two, so that a camera near the ground stays above it. Before the first key and after the
-// last it stands still. The result has no path. Where position and target would meet, the view of the key
-// before is kept. Pure.
+// Returns the camera at a time, without its path; a camera without path unchanged. Position and target are
+// interpolated by cubic Hermite curves with the slopes of Fritsch and Butland (1984): they and their
+// velocities are continuous, and monotonic between two keys in each coordinate, so that a camera near the
+// ground stays above it. Before the first key and after the last the camera is constant. Where position and
+// target would coincide, it has the direction of view of the key before. Pure.
 Camera camera_at(const Camera& camera, double time_s);
 
 }  // namespace nephos

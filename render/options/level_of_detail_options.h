@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// When voxels are drawn together as one larger metaball (level_of_detail.h). Plain data.
+// Criterion by which voxels are merged into one larger metaball (render/cloud/level_of_detail.h). Plain data.
 
 namespace nephos {
 
 struct LevelOfDetailOptions {
-    // Radius in the picture, pixels, at which the metaballs of a block of 2 x 2 x 2 voxels are drawn as one
-    // if their optical depths spread by less than 1; at n times that radius they must spread n^2 times less.
-    // 0..1000; larger is faster and softer, 0: every voxel is drawn for itself.
+    // Projected radius in pixels, 0..1000, at which the metaballs of a block of 2 x 2 x 2 voxels are merged
+    // if their optical depths differ by less than 1; at n times that radius they must differ by n^2 times
+    // less. Larger is faster and softer; 0: no merging.
     double pixels = 2.5;
     bool operator==(const LevelOfDetailOptions&) const = default;
 };

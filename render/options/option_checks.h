@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Checks of options in this module: one line a rule, every message with the option's key and what was
-// expected. Private to the module.
+// Checks of options in this module; every message names the option's key and the expected value. Private to
+// the module.
 
 #include <algorithm>
 #include <array>
@@ -19,7 +19,7 @@ inline void require(bool good, const char* key, const char* expected) {
     if (!good) throw Error(ErrorCode::usage, std::string(key) + ": expected " + expected);
 }
 
-// NaN fails every comparison, so it is out of every range.
+// Returns true when min <= value <= max; false for NaN.
 inline bool within(double value, double min, double max) { return value >= min && value <= max; }
 inline bool within(const std::array<double, 3>& values, double min, double max) {
     return std::ranges::all_of(values, [&](double value) { return within(value, min, max); });

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Phase functions: which way scattered light goes on. All of them share one convention: theta is the angle
-// between the directions of travel before and after, so cos(theta) = 1 is straight on and forward scattering
-// is g > 0 (S counts its g the other way round). A value is the share of the scattered light per steradian:
-// the integral over the sphere is 1. Pure functions, safe in any thread; arguments out of their ranges are
-// programming errors.
+// Phase functions: the angular distribution of scattered light. All share one convention: theta is the angle
+// between the directions of travel before and after, so that cos(theta) = 1 is straight on and forward
+// scattering is g > 0 (S has the opposite sign of g). Values are per steradian: the integral over the sphere
+// is 1. Pure functions, thread-safe; arguments out of their ranges are programming errors.
 
 namespace nephos {
 
 enum class Phase {
     isotropic,          // the same in all directions
-    rayleigh,           // molecules: forward and backward alike, half of it sideways
+    rayleigh,           // molecules: symmetric forward and backward, half of that sideways
     henyey_greenstein,  // one lobe of asymmetry g
-    cornette_shanks,    // S: that lobe times (1 + cos^2), Rayleigh for g = 0
+    cornette_shanks,    // S: that lobe times (1 + cos^2); Rayleigh for g = 0
     hg_draine,          // water droplets by their diameter: forward peak, fogbow side and glory
 };
 
@@ -49,11 +48,11 @@ struct HgDraine {
 };
 HgDraine hg_draine_fit(double droplet_diameter_um);
 
-// Any of them. `directed` in 0..1 makes it blunter, for light that was scattered many times: 1 is the
-// function itself, 0 has no direction. It scales g and alpha, and mixes Rayleigh with the isotropic function.
+// Evaluates any of them. `directed` in 0..1 makes it less anisotropic, for multiply scattered light: 1 is the
+// function itself, 0 is isotropic. It scales g and alpha, and mixes Rayleigh with the isotropic function.
 double phase(const PhaseFunction& function, double cos_theta, double directed = 1);
 
-// Mean of cos(theta), -1..1: how much of its direction light keeps, in closed form.
+// Returns the mean of cos(theta) in closed form, -1..1: the asymmetry.
 double mean_cosine(const PhaseFunction& function);
 
 }  // namespace nephos

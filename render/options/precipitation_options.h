@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How rain and snow are drawn (P, S); where they fall is for the rain areas to say (precipitation.h).
+// Options of the rendering of rain and snow (P, S); the rain areas determine where they fall
+// (precipitation.h).
 
 #include "core/weather.h"
 
@@ -10,24 +11,25 @@ namespace nephos {
 struct PrecipitationOptions {
     bool enabled = false;
     PrecipitationKind kind = PrecipitationKind::rain;
-    // Drops or flakes in the container before the eye (P: fixed, 50,000), 0..2,000,000; 0: only the shafts.
+    // Number of drops or flakes in the container around the camera (P: fixed, 50,000), 0..2,000,000; 0: only
+    // the shafts.
     int particles = 50'000;
-    // How long a picture is exposed: the length of streaks is speed times this. 0..1 s
+    // Exposure time, 0..1 s: the length of streaks is speed times this.
     double exposure_s = 1.0 / 60;
-    // Opacity of drops and flakes as a multiple of the true one, 0..1000: streaks of real rain hide less than
-    // a hundredth of what is behind them, which a picture of few pixels hardly shows.
+    // Factor of the physical opacity of drops and flakes, 0..1000: streaks of real rain have an opacity of
+    // less than a hundredth, which is hardly visible in images of few pixels.
     double visibility = 3;
-    double intensity_scale = 1;  // of the rain of all areas, 0..100
-    double wind_drift = 1;       // share of the wind that particles and shafts are carried with, 0..10
+    double intensity_scale = 1;  // factor of the rain of all areas, 0..100
+    double wind_drift = 1;       // factor of the wind that displaces particles and shafts, 0..10
     double depth_m = 16;         // depth of the container around the eye, 1..1000
-    double margin_m = 1;         // free movement of the eye in it before it is put elsewhere, 0..100
+    double margin_m = 1;         // distance that the eye may move before the container follows, 0..100
     double reach_m = 600;        // distance of an area beyond which no particle is drawn, > 0..100000
-    double edge = 0.4;           // outer share of an area in which the rain falls off to 0, 0..1
-    // Rain shafts: extinction as a multiple of the true one, 0..100; 0: none.
+    double edge = 0.4;           // outer fraction of an area over which the rain decreases to 0, 0..1
+    // Factor of the physical extinction of rain shafts, 0..100; 0: no shafts.
     double shafts = 1;
     double shaft_texture = 0.7;  // contrast of their streaks, 0..1
-    // Virga: rain thins out on its way and is gone at this share of the way up from the ground to the cloud;
-    // 0: it reaches the ground.
+    // Virga: rain evaporates as it falls, completely at this fraction of the height from ground to cloud; 0:
+    // all of it reaches the ground.
     double evaporation = 0;  // 0..1
     bool operator==(const PrecipitationOptions&) const = default;
 };

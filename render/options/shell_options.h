@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Shells of air around the eye, and what they carry: light shafts and fog. Included by options.h.
+// Shells of air around the eye, and the effects that are sampled in them: light shafts and fog. Included by
+// options.h.
 
 #include <cstdint>
 
@@ -9,44 +10,45 @@
 
 namespace nephos {
 
-// D's spherical shells around the eye, between which the clouds are drawn. The first begins at the eye, and
-// each begins where the one before it ends. Both light shafts and fog are drawn as layers of these shells;
-// without either there are none.
+// D's shells: concentric spherical layers of air around the eye, composited in depth order with the clouds.
+// The first begins at the eye, each further one at the end of the one before. Light shafts and fog are
+// sampled once per shell; without either there are no shells.
 struct Shells {
-    int count = 40;          // 1..128; more reach farther, or sample more finely
+    int count = 40;          // 1..128
     double spacing_m = 500;  // thickness of the first, > 0
-    double growth = 1;       // thickness of a shell in those of the one before it, 1..2; 1 is D's
+    double growth = 1;       // ratio of the thicknesses of successive shells, 1..2; D: 1
     bool operator==(const Shells&) const = default;
 };
 
-// Distance from the eye at which the last shell ends, metres.
+// Returns the distance from the eye at which the last shell ends, metres.
 inline double reach_m(const Shells& shells) {
     double end = 0, thickness = shells.spacing_m;
     for (int k = 0; k < shells.count; ++k, thickness *= shells.growth) end += thickness;
     return end;
 }
 
-// Air in the shadow of clouds scatters less light: what stays lit stands out as shafts.
+// Light shafts (crepuscular rays): air in the shadow of clouds scatters less light than sunlit air.
 struct LightShafts {
-    double strength = 0;  // 0..1; 0 = none, 1 = as much as the air really loses
-    // Both for the gradient; the physical sky knows them.
+    double strength = 0;  // 0..1; 0 = none, 1 = physical
+    // The following are for AirModel::gradient; the physical sky computes them.
     double g = 0.6;  // asymmetry of the haze (Cornette-Shanks), -0.99..0.99; forward is > 0
-    // Share of the air's light that is scattered once from the sun at a right angle or so, 0..1; the rest
-    // comes from the sky and the ground, and clouds do not take it away. Towards the sun it is larger by g.
+    // Fraction of the air's radiance at about a right angle to the sun that is single scattering of sunlight,
+    // 0..1; towards the sun it is larger by g. Shadows do not reduce the rest, the light of sky and ground.
     double sun_share = 0.6;
     bool operator==(const LightShafts&) const = default;
 };
 
-// Droplets near the ground, which scatter light as the clouds do. Along a ray, extinction (per metre) is
+// Fog: droplets near the ground that scatter light as clouds do. Along a ray, extinction (per metre) is
 //     extinction_per_m * exp(-(z - base_m) / height_m) * max(0, 1 + 2 patchiness (n - 1)),
-// with n the sum of two looks into noise of 0..1 (fog.h), whose mean is 1. Beyond the last shell n is 1.
+// with n the sum of two samples of a noise in 0..1 (render/frame/fog.h), whose mean is 1. Beyond the last
+// shell n is 1.
 struct Fog {
-    double extinction_per_m = 0;  // at base_m, >= 0; 0 = none. Visibility is about 3.9 / extinction
-    double base_m = 0;            // world z
-    double height_m = 100;        // over which the fog thins out to 1 / e, > 0
-    double patchiness = 0.5;  // 0..1: how much thicker and thinner than its mean it is from place to place
-    double patch_m = 600;     // size of a patch, > 0
-    Vec3 velocity_m_per_s{1, 0, 0};  // at which patches drift
+    double extinction_per_m = 0;     // at base_m, >= 0; 0 = none. Visibility is about 3.9 / extinction
+    double base_m = 0;               // world z
+    double height_m = 100;           // scale height: extinction falls to 1 / e over it, > 0
+    double patchiness = 0.5;         // 0..1: contrast of the patches
+    double patch_m = 600;            // size of a patch, > 0
+    Vec3 velocity_m_per_s{1, 0, 0};  // drift of the patches
     std::uint64_t seed = 1;          // of the patches
     bool operator==(const Fog&) const = default;
 };

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Where the sun stands at a place on the Earth at a moment. Low precision: within 0.01 degrees (without
-// refraction) from 1950 to 2050: J. J. Michalsky, "The Astronomical
-// Almanac's algorithm for approximate solar position (1950-2050)", Solar Energy 40, 1988.
+// The position of the sun in the sky for a place and time, within 0.01 degrees (without refraction) from 1950
+// to 2050: J. J. Michalsky, "The Astronomical Almanac's algorithm for approximate solar position
+// (1950-2050)", Solar Energy 40, 1988.
 
 #include <chrono>
 #include <optional>
@@ -13,7 +13,7 @@ namespace nephos {
 
 namespace sun_text {
 
-// So many digits and nothing else.
+// Parses exactly `count` decimal digits; nullopt for any other text.
 inline std::optional<int> digits(std::string_view text, std::size_t count) {
     if (text.size() != count) return {};
     int value = 0;
@@ -35,9 +35,8 @@ inline std::optional<double> day_share(std::string_view time) {
 
 }  // namespace sun_text
 
-// Universal time, in days since 2000-01-01 12:00 (Julian date - 2451545).
-// Texts are "2026-06-21" (years 1900..2100) and "18:30" or "18:30:15"; empty when they are not such a moment.
-// In the header: scenes are checked without this module's library.
+// Parses a date "2026-06-21" (years 1900..2100) and a universal time "18:30" or "18:30:15". Returns days
+// since 2000-01-01 12:00 (Julian date - 2451545), or nullopt for any other text. Pure.
 inline std::optional<double> days_since_2000(std::string_view date, std::string_view time) {
     using namespace std::chrono;
     using namespace sun_text;
@@ -53,11 +52,12 @@ inline std::optional<double> days_since_2000(std::string_view date, std::string_
 }
 
 struct SunPosition {
-    double elevation_deg = 0;  // of the disc's middle above the horizon, without refraction
+    double elevation_deg = 0;  // of the disc's centre above the horizon, without refraction
     double azimuth_deg = 0;    // clockwise from north, 0..360
 };
 
-// Latitude: -90..90, north is positive. Longitude: -180..180, east is positive.
+// Returns the position at a latitude of -90..90 (north positive) and a longitude of -180..180 (east
+// positive). Pure.
 SunPosition sun_position(double days_since_2000, double latitude_deg, double longitude_deg);
 
 }  // namespace nephos

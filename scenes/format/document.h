@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// TOML text as a small tree of nodes that know where they stand, so that the file and the --set options can
-// be merged and every message can point at its place. The only place that knows the TOML parser is
-// document.cpp.
+// TOML text as a tree of nodes with their source positions, so that the file and the --set options can be
+// merged and every message can point at its position. Only document.cpp includes the TOML parser.
 
 #include <cstdint>
 #include <deque>
@@ -16,7 +15,7 @@
 
 namespace nephos {
 
-// A text that nodes come from: the scene file or one --set option.
+// A source text of nodes: the scene file or one --set option.
 struct Origin {
     std::string label;  // "scenes/cumulus.toml" or "--set density.half=maybe"
     std::string text;
@@ -24,7 +23,7 @@ struct Origin {
     std::vector<std::size_t> line_starts;  // byte offsets
 };
 
-// A character in an origin; line and column count from 1.
+// The position of a character in an origin; line and column count from 1.
 struct Place {
     int origin = 0;
     int line = 1;
@@ -57,41 +56,41 @@ struct Entry {
     Node value;
 };
 
-// "a text", "an array", ...: the kind of a node in a message.
+// Returns the kind of a node for messages: "a text", "an array", ...
 std::string_view kind_name(Node::Kind kind);
 
-// What the value of an option is to be.
+// The expected form of an option's value.
 struct KeyForm {
-    bool takes_text = false;  // a value that starts with no quote and no bracket is the text itself
+    bool takes_text = false;  // a value without leading quote or bracket is taken as text
     std::string expected;     // "true or false"; empty: the key is not known
 };
 
-// The file, the options, and all problems found so far.
+// The parsed scene file merged with the options, and all problems found so far. Not thread-safe.
 class Document {
   public:
     Node root;
     std::vector<Problem> problems;
-    bool models_missing = false;  // a file that base models were to come from could not be read
+    bool models_missing = false;  // a file named by `models` could not be read
 
-    // Adds a text that places may refer to and returns its number.
+    // Adds a source text and returns its index for Place::origin.
     int add_origin(std::string label, std::string text, bool is_file);
     const Origin& origin(int index) const { return origins_[std::size_t(index)]; }
 
     void report(const Place& place, std::string message, std::string expected = {});
 
-    // Parses the text of an origin. On a syntax error, or a text that no sensible scene contains (not UTF-8,
-    // nested too deeply), the problem is reported and the result is empty.
+    // Parses the text of an origin. Reports a problem and returns nullopt on a syntax error, invalid UTF-8 or
+    // nesting that is too deep.
     std::optional<Node> parse(int origin);
 
-    // Puts "key.path=value" into root. `describe` says what is known of the key of this path (without
-    // indices). Problems are reported.
+    // Sets a value in `root` by an option "key.path=value". `describe` returns the expected form of the key
+    // at a path (without indices). Reports problems.
     void set(const std::string& option, KeyForm (*describe)(const std::vector<std::string>& path));
 
   private:
-    // `text` lies over the origin's text, so that a place in it is the same place in the origin.
+    // Parses `text`, which has the same line and column positions as the origin's text.
     std::optional<Node> parse_text(int origin, std::string_view text, const std::string& expected);
 
-    // The value of an option whose '=' stands at byte `equals`.
+    // Parses the value of an option whose '=' is at byte `equals`.
     std::optional<Node> option_value(int origin, std::size_t equals, const KeyForm& form);
 
     std::deque<Origin> origins_;

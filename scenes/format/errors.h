@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The problems of a scene: all of them in one exception, each with its place, its source line and what was
-// expected.
+// The errors of a scene file, collected in one exception, each with its position, source line and expected
+// value.
 
 #include <span>
 #include <string>
@@ -13,31 +13,31 @@
 
 namespace nephos {
 
-// One thing that is wrong with a scene.
+// One error in a scene.
 struct Problem {
-    SourcePosition
-        where;  // the file, or the whole option "--set key=value" with line 0; columns count characters
+    // The file, or the whole option "--set key=value" with line 0; columns count characters.
+    SourcePosition where;
     std::string message;      // one sentence without a full stop, naming the key by its path
-    std::string expected;     // what would be right, with unit and range, or the "did you mean"; may be empty
-    std::string source_line;  // the line it stands in, shortened around the place when long; printable UTF-8
-    int caret = 0;            // the character of source_line that is meant, counted from 1; 0: none
+    std::string expected;     // valid values with unit and range, or a "did you mean"; may be empty
+    std::string source_line;  // its line, shortened around the position when long; printable UTF-8
+    int caret = 0;            // position of the marked character in source_line, counted from 1; 0: none
 };
 
-// The problem as text that ends with a newline:
+// Formats a problem as text that ends with a newline:
 //
 //     scenes/cumulus.toml:12:17: error: `sun.elevation_deg` is 95, too large
 //      12 | elevation_deg = 95
 //         |                 ^
 //         = expected a number from -18 to 90, in degrees
 //
-// A tab in the source line stays a tab in the caret line, so that both line up in any terminal.
+// A tab in the source line is repeated in the caret line, so that both align in any terminal.
 std::string format(const Problem& problem);
 
-// The same for all of them, each followed by an empty line, and at the end how many there are.
+// Formats all problems, each followed by an empty line, and at the end their number.
 std::string format(std::span<const Problem> problems);
 
-// Everything that is wrong with a scene, in the order of the file and then of the options; never empty.
-// what() is format(problems()) without the last newline, where() the place of the first; the code is
+// All errors of a scene, in the order of the file and then of the options; never empty. what() is
+// format(problems()) without the last newline, where() the position of the first; the code is
 // ErrorCode::usage.
 class SceneErrors : public Error {
   public:
@@ -48,9 +48,9 @@ class SceneErrors : public Error {
     std::vector<Problem> problems_;
 };
 
-// The candidate that was probably meant by `word`: the one with the smallest edit distance (insertion,
-// deletion, replacement, swap of neighbours; case counts half), if that is small for the word's length;
-// before all others one that only adds a unit ("elevation_deg" for "elevation"). Otherwise empty.
+// Returns the candidate with the smallest edit distance to `word` (insertion, deletion, replacement, swap of
+// neighbours; case counts half) if that is small for the word's length, preferring one that only adds a unit
+// ("elevation_deg" for "elevation"); "" if none is close. For "did you mean" messages. Pure.
 std::string_view closest_word(std::string_view word, std::span<const std::string_view> candidates);
 
 }  // namespace nephos

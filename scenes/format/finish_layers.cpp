@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What concerns models, skies and layers together: names that refer to each other, keys that default to those
-// of the scene, and whether the sky can be simulated at all.
+// Checks of models, skies and layers together: references by name, keys that default to those of the scene,
+// and options that SkySimulation would refuse.
 
 #include <algorithm>
 #include <cmath>
@@ -51,7 +51,7 @@ void check_names_differ(const SectionReader& reader, const char* array, const st
     }
 }
 
-// Whether one of the items has this name; otherwise it is reported with the name that was probably meant.
+// Returns true when one of the items has this name; otherwise reports it with the closest name.
 template <typename Item>
 bool check_known(const SectionReader& reader, const Node& node, const std::string& name,
                  const std::string& key, const std::vector<Item>& items, const char* what) {
@@ -241,7 +241,7 @@ void check_simulation(const SectionReader& reader, const Scene& scene, std::size
     }
 }
 
-// What a scene with layers leaves to its clouds, and what is nothing without layers.
+// Reports keys that a scene with layers may not have, and keys that need layers.
 void check_layers_or_field(const SectionReader& reader, const Scene& scene) {
     if (scene.layers.empty()) {
         if (!scene.skies.empty()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What concerns several sections of a scene.
+// Checks and defaults that involve several sections of a scene.
 
 #include <algorithm>
 #include <cmath>

@@ -54,7 +54,7 @@ const Wind& layer_wind(const Scene& scene, std::size_t layer) {
 
 WorldRectangle whole_world(const Scene& scene) {
     WorldRectangle world;
-    // Of veils only when there is nothing else: no rain falls out of them, and they may reach to the horizon.
+    // Veils count only when there is nothing else: they have no rain, and they may reach to the horizon.
     const bool veils_alone = std::ranges::all_of(scene.layers, &LayerOptions::is_veil);
     bool first = true;
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {

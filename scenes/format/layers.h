@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Skies, climate and layers as a scene file says them: by name. A layer is T's simulation at one height: its
-// own lattice, skies and wind. The functions below turn a layer into the options of the libraries that
-// simulate it:
+// Skies, climate and layers in the form of the scene file, where they refer to each other by name. A layer is
+// T's simulation at one height, with its own lattice, skies and wind. The functions below convert a layer
+// into the options of the libraries that simulate it:
 //
 //     [[model]], [[sky]], [climate], [[layer]]  -->  sky_options()        -->  SkySimulation
 //     [[layer]], what all layers share          -->  automaton_options()  -->  Automaton
 //
-// A scene without layers is one lattice with the field of [field], as before; none of this concerns it.
+// A scene without layers is one lattice with the field of [field] and uses none of this.
 
 #include <limits>
 #include <optional>
@@ -38,19 +38,19 @@ struct NamedSky {
     bool operator==(const NamedSky&) const = default;
 };
 
-// The atmosphere that all layers share.
+// The state of the atmosphere, shared by all layers.
 struct ClimateOptions {
-    Region region = Region::temperate;  // where on Earth: decides the heights of genera
-    std::vector<StatePoint>
-        schedule;  // state over time: linear between points, constant outside; no point: 0
+    Region region = Region::temperate;  // climatic belt, for the heights of genera
+    // State over time: linear between points, constant outside; without points 0.
+    std::vector<StatePoint> schedule;
     bool operator==(const ClimateOptions&) const = default;
 };
 
-// Rain below every cloud of a kind, the base model by name (seeds/rain_area.h).
+// AttachedRain (seeds/rain_area.h) with the base model by name.
 struct AttachedRainRule {
     std::string model;           // empty: of any
     std::optional<Genus> genus;  // none: of any
-    Range state{0, 1};           // of the sky that the cloud came from
+    Range state{0, 1};           // of the sky that the cloud was drawn from
     double size_scale = 1;
     double intensity_mm_per_h = 5;
     bool operator==(const AttachedRainRule&) const = default;
@@ -59,9 +59,9 @@ struct AttachedRainRule {
 struct LayerRain {
     std::vector<PlacedRain> placed;
     std::vector<AttachedRainRule> attached;
-    bool find = false;         // look for rain in the automaton
-    RainFinderOptions finder;  // how
-    // Humid air above every area; infinite heights stand for the bottom and the top of the layer's lattice.
+    bool find = false;         // detect rain in the automaton's state
+    RainFinderOptions finder;  // used if `find`
+    // Humid air above every area; infinite heights mean the bottom and the top of the layer's lattice.
     HumidColumn column{.bottom_m = -std::numeric_limits<double>::infinity(),
                        .top_m = std::numeric_limits<double>::infinity()};
     bool operator==(const LayerRain&) const = default;
@@ -69,23 +69,23 @@ struct LayerRain {
 
 struct LayerOptions {
     std::string name;  // letters, digits, '-' and '_': part of file names; no two layers share one
-    // The density is that of `veil`, a function of place and time: no skies, no clouds, no automaton. What
-    // follows further down but for lattice, opacity and wind is nothing to such a layer.
+    // True: the density is that of `veil`, a function of position and time, without skies, clouds and
+    // automaton. Of the fields below such a layer uses lattice, opacity and wind alone.
     bool is_veil = false;
     VeilOptions veil;                // its seed is that of veil_options()
     std::vector<std::string> skies;  // names, at least one
-    bool automaton = true;           // false: clouds are drawn directly as billboards, there is no density
-    double opacity = 1;              // times the density, above 0, at most 1: veils are thin
+    bool automaton = true;           // false: clouds are drawn directly as billboards, without density
+    double opacity = 1;              // factor of the density, above 0, at most 1
 
-    // The lattice, as in AutomatonOptions. Its horizontal rectangle is the world in which the clouds live.
+    // The lattice, as in AutomatonOptions. Its horizontal rectangle is the clouds' world.
     Extent extent{256, 128, 20};
     Placement placement;
     Boundaries boundaries;
     Probabilities background{0, 0, 0.1};  // of the field, everywhere (field.h)
 
-    Range base_height_m{1000, 1000};   // world z of clouds' bases, drawn for each cloud
-    Wind wind;                         // no keyframe: the scene's wind
-    std::vector<StatePoint> schedule;  // no point: the climate's
+    Range base_height_m{1000, 1000};   // world z of a cloud's base, drawn for each cloud
+    Wind wind;                         // without keyframes: the scene's wind
+    std::vector<StatePoint> schedule;  // without points: the climate's
 
     double formation_s = 300, dissolution_s = 300, formation_softness = 0.5;  // as in SkyOptions
     bool cross_edges_whole = true;  // the reader's default: only with an automaton
@@ -94,44 +94,45 @@ struct LayerOptions {
     bool operator==(const LayerOptions&) const = default;
 };
 
-// Most layers of one scene.
+// Largest number of layers of a scene.
 inline constexpr std::size_t kMaxLayers = 64;
 
-// The seed of a layer's randomness in the automaton: the scene's own for layer 0, so that a scene with one
-// layer has the bits of one without, and 64 bits of Philox for the others. A pure function.
+// Returns the seed of a layer's automaton: the scene's own for layer 0, so that a scene with one layer has
+// the bits of one without, and 64 bits of Philox for the others. Pure.
 std::uint64_t layer_seed(std::uint64_t scene_seed, std::size_t layer);
 
-// Lattices that the scene is simulated on: its layers, or the one of a scene without layers.
+// Returns the number of lattices: one per layer, or 1 for a scene without layers.
 std::size_t lattice_count(const Scene& scene);
 
-// Whether frames have a density: of a layer with an automaton or a veil; of any of them.
+// Returns true when the layer, or any layer of the scene, has density: an automaton or a veil.
 bool has_density(const LayerOptions& layer);
 bool has_density(const Scene& scene);
 
-// What the libraries need to simulate layer `layer` < scene.layers.size(). Pure; throw Error(usage) when the
-// scene was not made by the reader and a name in it is unknown.
+// Convert layer `layer` < scene.layers.size() into the options of the libraries. Pure; throw Error(usage) on
+// an unknown name, which only a scene that did not come from the reader can have.
 SkyOptions sky_options(const Scene& scene, std::size_t layer);
 AutomatonOptions automaton_options(const Scene& scene, std::size_t layer);
 std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer);
-// Of a layer that is a veil, with the layer's seed.
+// Returns the options of a layer that is a veil, with the layer's seed. Pure.
 VeilOptions veil_options(const Scene& scene, std::size_t layer);
 
-// The rectangle in which clouds live, of all layers together: the world that has a map of its ground.
+// Returns the bounding rectangle of the worlds of all layers, which the map of the ground covers. Pure.
 WorldRectangle whole_world(const Scene& scene);
 
-// The wind of a layer: its own or the scene's.
+// Returns the wind of a layer: its own, or the scene's if it has none.
 const Wind& layer_wind(const Scene& scene, std::size_t layer);
 
-// The sky of every layer that has one, the first layer's first, as it stands at a time: at its last step,
-// with `since_step_s` the rest. SkySimulation::ahead(cloud, time_s(), since_step_s) moves a cloud on to the
-// moment itself. All steps from 0 are taken again, microseconds each. For pictures of clouds without an
-// automaton; a run has them in its frames (simulation/pipeline.h).
+// The skies of the layers that have one, in the order of the layers, at the last step not after a time;
+// `since_step_s` is the remainder. SkySimulation::ahead(cloud, time_s(), since_step_s) extrapolates a cloud
+// to the time itself.
 struct SkiesAtTime {
     std::vector<SkySimulation> skies;
     double since_step_s = 0;
 };
 
-// Throws Error(usage) when time_s is negative or not finite, and as SkySimulation.
+// Simulates the skies from step 0 to a time, microseconds a step. For images of clouds without an automaton;
+// a run has the skies in its frames. Throws Error(usage) when time_s is negative or not finite, and as
+// SkySimulation.
 SkiesAtTime skies_at(const Scene& scene, double time_s);
 
 }  // namespace nephos

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// "did you mean `genera/Cu.toml`?" when a file of nearly that name lies where the wanted one should.
+// Returns "did you mean `genera/Cu.toml`?" when the folder of the missing file has one of a similar name.
 std::string advice_on_missing_file(const fs::path& path, const fs::path& wanted) {
     std::error_code error;
     std::vector<std::string> names;

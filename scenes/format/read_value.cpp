@@ -23,7 +23,7 @@ struct Reading {
     }
 };
 
-// What a node is, for "... is X": its value when it is short.
+// Describes a node for messages of the form "... is X": its value when it is short, else its kind.
 std::string node_text(const Node& node) {
     switch (node.kind) {
         case Node::Kind::boolean:

@@ -21,7 +21,7 @@ std::string key_path(const std::string& section_path, const std::string& name) {
     return section_path.empty() ? name : section_path + "." + name;
 }
 
-// Where else in the scene a key of this name stands: "density.half".
+// Finds the paths of keys with this name in other sections: "density.half".
 void find_namesakes(const Section& section, const std::string& path, std::string_view name,
                     std::vector<std::string>& found) {
     for (const Key& key : section.keys) {
@@ -171,7 +171,7 @@ bool sets_model_files(std::string_view option) {
            std::string_view("=[ \t").find(option[kKey.size()]) != std::string_view::npos;
 }
 
-// Only letters that every file system takes.
+// Replaces characters that some file system does not allow.
 std::string name_from(const std::filesystem::path& file) {
     std::string name = file.stem().string().substr(0, 100);
     for (char& c : name) {

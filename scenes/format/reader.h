@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Reads a scene file. Every problem of the file and of the options is found in one pass and thrown together.
+// Reads a scene file. One pass finds all problems of the file and of the options and throws them together.
 
 #include <filesystem>
 #include <span>
@@ -13,18 +13,18 @@
 
 namespace nephos {
 
-// Files larger than this are refused before they are read to the end.
+// Largest size of a scene file; larger ones are refused without reading them to the end.
 inline constexpr std::size_t kMaxSceneBytes = 8u << 20;
 
-// The scene in `path`, changed by `overrides`: each is "key.path=value" as given to --set, where the path may
-// index arrays ("wind[0].levels[1].height_m=800") and the value is TOML; for a key that holds text or a word
-// the quotes may be left out. A relative file name in the scene is relative to the scene's folder, one in an
-// override to the current folder. Without `name` the scene is called like its file. Throws SceneErrors with
-// every problem found, Error(io) when the file cannot be read. Thread-safe.
+// Reads the scene in `path` and applies `overrides`, each "key.path=value" as of --set: the path may index
+// arrays ("wind[0].levels[1].height_m=800"), the value is TOML, and text and words may lack their quotes. A
+// relative file name in the scene is relative to the scene's folder, one in an override to the current
+// folder. A scene without `name` is named after its file. Throws SceneErrors with every problem found,
+// Error(io) when the file cannot be read. Thread-safe.
 Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides = {});
 
-// The same for TOML text; `label` stands for the file in messages, `folder` is what relative names start
-// from.
+// Reads a scene from TOML text; `label` names it in messages, relative file names are relative to `folder`.
+// Errors as above.
 Scene read_scene_text(std::string_view text, const std::string& label,
                       const std::filesystem::path& folder = {}, std::span<const std::string> overrides = {});
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A scene: everything that one run needs, as plain data. Read from a TOML file by reader.h, written back by
-// writer.h; every key of the file, with unit, range and effect, is described once, in schema.h.
+// A scene: the complete input of a run, as plain data. reader.h reads it from a TOML file, writer.h writes
+// it; schema.h describes every key of the file with unit, range and effect.
 
 #include <cstdint>
 #include <filesystem>
@@ -19,9 +19,9 @@
 
 namespace nephos {
 
-// Which moments of the simulation become frames (a density file and a picture each), and what is written of
-// them. Frame n, counted from 0, shows the simulated time start_s + n * time_scale / per_second, whatever the
-// time step is: between two steps the density is interpolated.
+// The frames of a run, each a density file and a picture, and their output formats. Frame n, counted from 0,
+// shows the simulated time start_s + n * time_scale / per_second, independent of the time step: between two
+// steps the density is interpolated.
 struct FrameOptions {
     double per_second = 24.0;  // frames of one second of film, > 0, at most 1000
     double time_scale = 60.0;  // simulated seconds that pass in one second of film, > 0
@@ -34,13 +34,13 @@ struct FrameOptions {
 };
 
 struct Scene {
-    std::string name;  // base name of what is written; letters, digits, '-', '_' and '.'
+    std::string name;  // base name of output files; letters, digits, '-', '_' and '.'
     AutomatonOptions automaton;
     std::uint64_t steps = 240;  // length of the simulation
-    // A VDB file whose bool grids hum, act and cld are the state at step 0, instead of automaton.initial.
+    // A VDB file with bool grids hum, act and cld for the state at step 0; none: automaton.initial.
     std::optional<std::filesystem::path> initial_state_file;
-    // Clouds from base models (layers.h). With layers, `automaton` holds what they share: seed, time step,
-    // wind, how lattices start, and the lattice and background of layers that say nothing else.
+    // Clouds from base models (layers.h). With layers, `automaton` holds their common options: seed, time
+    // step, wind, initial state, and the defaults of lattice and background.
     std::vector<BaseModel> models;
     std::vector<NamedSky> skies;
     ClimateOptions climate;
@@ -52,39 +52,40 @@ struct Scene {
     bool operator==(const Scene&) const = default;
 };
 
-// Simulated time from the first to the last step, in seconds.
+// Returns the simulated time from the first to the last step, in seconds.
 double simulated_time_s(const Scene& scene);
 
-// Simulated time of frame `index`, in seconds; index counts from 0. Correct to 2 units in the last place:
-// where a frame lies between the steps, and whether it lies beyond the last, is asked of moment_of_frame()
-// alone.
+// Returns the simulated time of frame `index` (from 0) in seconds, correct to 2 units in the last place. To
+// locate a frame between steps, or beyond the last one, use moment_of_frame(), which rounds consistently.
 double frame_time_s(const FrameOptions& frames, int index);
 
-// A moment in steps: `step` <= moment < step + 1, `fraction` the rest. A quotient within four units in the
-// last place (2^-52 of the number) of a whole number is that number. So a frame whose decimal inputs put it
-// exactly on a step is on it: the seven roundings up to the quotient (start, time_scale, per_second and step
-// as doubles, of which a frame's time takes three and the quotient one; product, quotient and sum of
-// frame_time_s(); the quotient by the step; all numbers are >= 0, so errors do not grow in the sum) are at
-// most half a unit each, 3.5 in all. And a frame that they put between steps stays there if their digits are
-// few: with the moment as a fraction p / q of whole numbers, q times per_second and step_s in units of their
-// last decimal, it is at least 1 / q away from any step, more than the 7.5 units for p < 2^49. Only beyond
-// that, about 14 digits, is it moved onto a step, by 2 parts in 10^15 at most.
+// A time in units of steps: step + fraction, 0 <= fraction < 1. A quotient time / time step within four units
+// in the last place (ulp, 2^-52 of the number) of an integer is rounded to it.
+//
+// Why four: a frame whose decimal inputs put it exactly on a step must be on it. The quotient has seven
+// roundings of at most half an ulp, 3.5 in all: time_scale and per_second as doubles, their product with the
+// index and quotient, the sum with start_s, the time step as a double, and the division by it. (The error of
+// start_s does not add: the relative error of a sum of non-negative terms is at most the larger of theirs.)
+// Conversely, a frame between steps stays there if its inputs have few digits: as a fraction p / q of
+// integers it is at least 1 / q away from any step, more than 7.5 ulp for p < 2^49. Only inputs of about 14
+// digits or more are moved onto a step, by 2 parts in 10^15 at most.
 struct Moment {
     std::uint64_t step = 0;
     double fraction = 0;
 };
 
-// Both times in seconds, time_s >= 0, time_step_s > 0. After 2^63 steps the moment is step 2^63.
+// Returns the moment of a time; both in seconds, time_s >= 0, time_step_s > 0. Saturates at step 2^63. Pure.
 Moment moment_of(double time_s, double time_step_s);
 
-// That of frame `index`, which counts from 0: the one place that decides between which steps a frame lies.
+// Returns the moment of frame `index`, which counts from 0. The only function that locates frames between
+// steps.
 Moment moment_of_frame(const Scene& scene, int index);
 
-// Steps that a moment needs: the first that is not before it.
+// Returns the number of steps needed for a moment: the first step that is not before it.
 std::uint64_t steps_up_to(const Moment& moment);
 
-// Number of frames of the scene: frames.count, or with 0 as many as need no more than its steps (so that one
-// on the last step counts), at most kMaxFrames.
+// Returns the number of frames: frames.count, or if that is 0 all frames up to and including the last step,
+// at most kMaxFrames.
 int frame_count(const Scene& scene);
 
 inline constexpr int kMaxFrames = 1'000'000;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The description of every key of a scene: its name, type, unit, range, default, effect and source, and where
-// its value lies in the option structs. Reading, checking, writing, the JSON Schema and the reference page
-// all walk this one description, so that none of them can drift from the others.
+// The description of every key of a scene: name, type, unit, range, default, effect, source, and an accessor
+// to its value in the option structs. Reading, checking, writing, the JSON Schema and the reference page all
+// traverse this one description, so that they cannot disagree.
 //
 //     Section (a table of the file)  -- keys -->  Key  -- section -->  Section of a nested table
 //
-// A key knows its value by a function from the section's owner to the value: sections such as [lattice] have
-// the Scene itself as owner and reach into its parts; the elements of an array of tables own themselves.
+// Key::value maps a section's owner to the value. The owner of a section such as [lattice] is the Scene; the
+// owner of an element of an array of tables is that element.
 
 #include <cstdint>
 #include <limits>
@@ -21,7 +21,7 @@
 
 namespace nephos {
 
-// What a key holds: the form in the file, and the C++ type behind Key::value.
+// The type of a key: its form in the file, and the C++ type behind Key::value.
 enum class KeyKind {
     boolean,  // true or false                                           bool
     integer,  //                                                         int
@@ -42,7 +42,7 @@ enum class KeyKind {
     tables,      // any number of tables, each described by Key::section    std::vector of owners
 };
 
-// What numbers are allowed; also for each component of an extent, vector, colour or range.
+// The valid numbers; also for each component of an extent, vector, colour or range.
 struct Limits {
     double min = -std::numeric_limits<double>::infinity();
     double max = std::numeric_limits<double>::infinity();
@@ -58,21 +58,21 @@ struct Key {
     KeyKind kind{};
     std::string unit;  // "m", "deg", "cells", ...; empty: none
     Limits limits;
-    std::string effect;  // what it does, in a sentence or two
-    std::string source;  // where it comes from: "D, advection"; empty: nephos' own
+    std::string effect;  // in a sentence or two
+    std::string source;  // publication and chapter: "D, advection"; empty: nephos' own
 
-    // The value within its section's owner; null for a key that Section::finish reads (another form of the
-    // same).
+    // Returns the value within its section's owner; null for a key that Section::finish reads (an
+    // alternative form of another key).
     void* (*value)(void* owner) = nullptr;
 
     bool required = false;
-    std::string default_text;             // what a missing key means, where no constant says it
+    std::string default_text;             // the meaning of a missing key, if not a constant default
     std::vector<std::string_view> words;  // in the order of the enum's values
     int (*word_index)(const void* value) = nullptr;
     void (*set_word)(void* value, int index) = nullptr;
-    std::vector<std::string> together_with;  // keys that must be there with this one
-    std::string replaced_by;  // a key that takes this one's place: only one of both may be there
-    bool (*written)(const void* owner) = nullptr;  // whether the canonical scene has it; null: always
+    std::vector<std::string> together_with;        // keys that are required beside this one
+    std::string replaced_by;                       // a key that excludes this one
+    bool (*written)(const void* owner) = nullptr;  // true if the canonical scene has it; null: always
 
     const Section* section = nullptr;         // table, tables
     int min_items = 0, max_items = 0;         // tables
@@ -82,29 +82,29 @@ struct Key {
     const void* (*element)(const void* vector, std::size_t index) = nullptr;
 };
 
-// What a section's finishing touch may use: the table as it was read, and where to report.
+// The input of Section::finish: the table as it was read, and the document for reports.
 struct SectionReader {
     Document& document;
     const Node& table;
     std::string path;  // of the section, "" at the top
-    std::vector<std::string>
-        failed;  // its keys that have problems already; their values are still the defaults
+    // Its keys with reported problems; their values are the defaults.
+    std::vector<std::string> failed;
 
-    // Whether all of these keys were read without a problem, or are missing.
+    // Returns true when all of these keys were read without a problem, or are missing.
     bool sound(std::initializer_list<std::string_view> names) const;
 
-    // The path of a key in it, for messages: "`sun.elevation_deg`".
+    // Returns the quoted path of a key of the section, for messages: "`sun.elevation_deg`".
     std::string quoted(std::string_view key) const;
-    // The key's entry; null when it is missing.
+    // Returns the key's entry; null when it is missing.
     const Entry* find(std::string_view key) const { return table.find(key); }
-    // The place of the key's value, or of the table when the key is missing.
+    // Returns the position of the key's value, or of the table when the key is missing.
     Place place(std::string_view key) const;
-    // Its number; `otherwise` when it is missing or no number.
+    // Returns the key's number; `otherwise` when it is missing or no number.
     double number(std::string_view key, double otherwise) const;
     void report(std::string_view key, std::string message, std::string expected = {}) const;
 };
 
-// A name that is looked for in a section although another key says it.
+// A name that users expect in a section although another key has its meaning.
 struct Elsewhere {
     std::string name;
     std::string meant;  // path of that key: "precipitation.kind"
@@ -114,27 +114,27 @@ struct Section {
     std::string title;
     std::string effect;
     std::vector<Key> keys;
-    // Checks what concerns several keys, and reads keys without a value. Called when every key was read
+    // Checks conditions on several keys, and reads keys without a value. Called when every key was read
     // without a problem; for the whole scene always, with SectionReader::failed. May be null.
     void (*finish)(const SectionReader& reader, void* owner) = nullptr;
-    std::vector<Elsewhere> elsewhere{};  // for messages on unknown keys
+    std::vector<Elsewhere> elsewhere{};  // suggestions for unknown keys
 
     const Key* find(std::string_view name) const;
 };
 
-// The section of the whole file; its owner is a Scene.
+// Returns the section of the whole file; its owner is a Scene. Thread-safe.
 const Section& scene_section();
 
-// The key at a path of names without indices ("field", "scatters", "count"); null when there is none.
+// Returns the key at a path of names without indices ("field", "scatters", "count"); null when there is none.
 const Key* find_key(const std::vector<std::string>& path);
 
-// What a key expects, for messages: "a number from -18 to 90, in degrees".
+// Returns the expected value of a key for messages: "a number from -18 to 90, in degrees".
 std::string expected_text(const Key& key);
 
-// Its range alone: "-18 to 90", "> 0"; empty when anything goes.
+// Returns the range for messages: "-18 to 90", "> 0"; empty without limits.
 std::string limits_text(const Limits& limits);
 
-// A unit in words: "deg" is "degrees".
+// Returns a unit in words: "degrees" for "deg".
 std::string unit_text(std::string_view unit);
 
 }  // namespace nephos

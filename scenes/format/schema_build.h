@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How the tables of schema_keys.cpp are written down: a key is built from pointers to members, from which its
-// kind and the way to its value follow. Internal to scenes/.
+// Builders for the tables of the schema_*.cpp sources (not installed): a key is built from a chain of
+// pointers to members, which determines its kind and the accessor to its value.
 
 #include <array>
 #include <filesystem>
@@ -36,7 +36,7 @@ struct Chain<Only> {
     static value_type& of(owner_type& owner) { return owner.*Only; }
 };
 
-// From an owner to the value behind a chain of members.
+// Returns the value behind a chain of members of an owner.
 template <auto... Members>
 void* value_at(void* owner) {
     using Path = Chain<Members...>;
@@ -98,7 +98,7 @@ Key key(std::string name, std::string unit, Limits limits, std::string effect, s
     return made;
 }
 
-// All 64 bits of a std::uint64_t, where plain key() takes no more than a TOML integer holds.
+// Builds a key for all 64 bits of a std::uint64_t; key() is limited to the range of a TOML integer.
 template <auto... Members>
 Key seed_key(std::string name, std::string effect) {
     static_assert(std::is_same_v<typename Chain<Members...>::value_type, std::uint64_t>);
@@ -107,7 +107,7 @@ Key seed_key(std::string name, std::string effect) {
     return made;
 }
 
-// A number that Section::finish reads.
+// Builds a key without accessor for a number that Section::finish reads.
 inline Key derived_number(std::string name, std::string unit, Limits limits, std::string effect) {
     return plain_key(KeyKind::number, std::move(name), std::move(unit), limits, std::move(effect), {});
 }
@@ -124,7 +124,7 @@ Key word(std::string name, std::vector<std::string_view> words, std::string effe
     return made;
 }
 
-// A genus by its abbreviation, or "none".
+// Builds a key for a genus by its abbreviation, or "none".
 template <auto... Members>
 Key genus_word(std::string name, std::string effect, std::string source = {}) {
     static_assert(std::is_same_v<typename Chain<Members...>::value_type, std::optional<Genus>>);
@@ -149,14 +149,14 @@ inline Key with_section(KeyKind kind, std::string name, const Section& section) 
     return made;
 }
 
-// A table whose keys reach into the same owner.
+// Builds a table whose keys have the same owner.
 inline Key group(std::string name, const Section& section) {
     Key made = with_section(KeyKind::table, std::move(name), section);
     made.value = &whole_owner;
     return made;
 }
 
-// A table whose owner is a member.
+// Builds a table whose owner is a member.
 template <auto... Members>
 Key table(std::string name, const Section& section, std::string effect) {
     Key made = with_section(KeyKind::table, std::move(name), section);
@@ -165,7 +165,7 @@ Key table(std::string name, const Section& section, std::string effect) {
     return made;
 }
 
-// What a new element of an array of tables holds before its keys are read.
+// Returns the defaults of a new element of an array of tables.
 template <typename Element>
 const Element& default_element() {
     static const Element element{};

@@ -26,7 +26,7 @@ Key look_key(std::string name, std::string unit, Limits limits, std::string effe
 using Cover = GroundCoverOptions;
 using Look = WetGroundOptions;
 
-// How water and snow come and go.
+// Keys of the balance of water and snow.
 std::vector<Key> cover_keys() {
     return {
         cover_key<&Cover::enabled>("enabled", "", kAny,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sections that decide what is made of the bits: density, frames and pictures.
+// The sections of the output: density, frames and pictures.
 
 #include "render/options/sun_position.h"
 #include "scenes/format/schema_build.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Keys of Scene::render, for the schema sources that describe pictures. Private to the module.
+// Keys of Scene::render, for the schema sources that describe rendering. Private to the module.
 
 #include <string>
 #include <utility>
@@ -10,7 +10,7 @@
 
 namespace nephos::schema_build {
 
-// `Members`: the way from RenderOptions to the option.
+// Builds a key of an option of RenderOptions; `Members` is the chain of members to it.
 template <auto... Members>
 Key render_key(std::string name, std::string unit, Limits limits, std::string effect,
                std::string source = {}) {

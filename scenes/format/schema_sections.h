@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The sections of a scene file; see schema.h. Internal to scenes/.
+// The sections of a scene file; see schema.h (not installed).
 
 #include <span>
 #include <string_view>
@@ -45,23 +45,23 @@ const Section& layer_section();
 // Owner: VeilOptions.
 const Section& veil_section();
 
-// Keys of a layer that mean nothing beside `veil`.
+// Returns the keys of a layer that have no effect beside `veil`.
 std::span<const std::string_view> keys_of_clouds();
 
-// The key `models`: files that base models are taken from (model_files.h); it has no value of its own.
+// Returns the key `models`, the files of base models (model_files.h); it has no value of its own.
 Key model_files_key();
 inline constexpr int kMaxModels = 10'000;
 
-// Checks of values that lie in several sections, and the defaults that depend on them; owner: Scene.
+// Checks conditions on several sections and sets the defaults that depend on them; owner: Scene.
 void finish_scene(const SectionReader& reader, void* owner);
 
-// Reports profiles of the key `wind` of a scene or a layer whose times do not rise.
+// Reports profiles of the key `wind` of a scene or a layer unless their times rise strictly.
 void check_wind_times(const SectionReader& owner, const Wind& wind);
 
-// Reports key frames of the camera whose times do not rise; the reader is that of [camera].
+// Reports key frames of the camera unless their times rise strictly; the reader is that of [camera].
 void check_camera_path(const SectionReader& reader, const Camera& camera);
 
-// The part of it that concerns models, skies, climate and layers.
+// The part of finish_scene() on models, skies, climate and layers.
 void finish_layers(const SectionReader& reader, Scene& scene);
 
 }  // namespace nephos

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Small helpers for text in messages: UTF-8, numbers, quoting. Pure functions, independent of the locale.
+// Text in messages: UTF-8, numbers, quoting. Pure functions, independent of the locale.
 
 #include <cstddef>
 #include <string>
@@ -13,42 +13,41 @@ namespace nephos {
 // One character of a text.
 struct Character {
     char32_t code = 0;
-    std::string_view bytes;  // where it stands in the text
+    std::string_view bytes;  // its bytes in the text
     bool valid = true;       // false: a byte that is not UTF-8; code is then U+FFFD
 };
 
-// The character at byte `offset`, which must be inside the text.
+// Decodes the character at byte `offset`, which must be inside the text.
 Character character_at(std::string_view text, std::size_t offset);
 
-// Byte offset of the first byte that is not valid UTF-8; text.size() when all is well.
+// Returns the offset of the first byte that is not valid UTF-8; text.size() if there is none.
 std::size_t find_invalid_utf8(std::string_view text);
 
-// Columns that a character takes in a terminal: 0 (combining), 1 or 2 (East Asian wide, emoji).
+// Returns the width of a character in columns of a terminal: 0 (combining), 1 or 2 (East Asian wide, emoji).
 int display_width(char32_t code);
 
-// The text without control characters and invalid bytes (each becomes U+FFFD), so that it can be shown; tabs
-// stay.
+// Replaces control characters but tabs, and invalid bytes, by U+FFFD.
 std::string printable(std::string_view text);
 
-// A text for a message: printable, at most `limit` characters and then an ellipsis.
+// Returns printable(text), cut to `limit` characters with an ellipsis.
 std::string shortened(std::string_view text, std::size_t limit = 60);
 
-// The shortest decimal that reads back as the same double: "0.1", "40", "1e-07", "inf".
+// Returns the shortest decimal that reads back as the same double: "0.1", "40", "1e-07", "inf".
 std::string number_text(double value);
 
-// The same as a TOML float: always with a point, an exponent or a word.
+// Returns number_text() as a TOML float: always with a point, an exponent or a word.
 std::string toml_number(double value);
 
-// A TOML basic string with its quotes.
+// Returns a TOML basic string with its quotes.
 std::string toml_string(std::string_view text);
 
-// The text between two marks: enclosed("cells", '`') is "`cells`".
+// Returns the text between two marks: enclosed("cells", '`') is "`cells`".
 std::string enclosed(std::string_view text, char mark);
 
-// The path of an item: indexed("wind", 2) is "wind[2]".
+// Returns the path of an item: indexed("wind", 2) is "wind[2]".
 std::string indexed(std::string_view path, std::size_t index);
 
-// "a, b or c".
+// Returns the items as a list: "a, b or c".
 std::string joined(const std::vector<std::string>& items, std::string_view last_separator = " or ");
 
 }  // namespace nephos

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Reading of text files of a user. Internal to scenes/.
+// Reading of text files (not installed).
 
 #include <cstddef>
 #include <filesystem>
@@ -9,8 +9,8 @@
 
 namespace nephos {
 
-// The first `most_bytes` + 1 bytes of a file, so that the caller sees when it is larger. Throws Error(io)
-// naming the path when it is a folder or cannot be read.
+// Returns at most the first `most_bytes` + 1 bytes of a file, so that the caller can detect a larger one.
+// Throws Error(io) naming the path when it is a folder or cannot be read.
 std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes);
 
 }  // namespace nephos

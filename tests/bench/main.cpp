@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// ./bench: prints the tables of the README. Nothing here passes or fails: figures are for people to judge.
+// ./bench: prints the tables of docs/measurements.md. Nothing here passes or fails: figures are for people to judge.
 
 #include <algorithm>
 #include <cstdlib>
