@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include <glm/common.hpp>
+
 #include "automaton/air_parcels.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -157,10 +159,17 @@ Vec3 reach_m(const Ellipsoid& e) {
 
 Vec3 reach_m(const EllipsoidScatter& s) {
     const Vec3 largest{s.semi_axis_x_m.max, s.semi_axis_y_m.max, s.semi_axis_z_m.max};
-    if (s.yaw_deg.min == s.yaw_deg.max)
-        return reach_m(Ellipsoid{.semi_axes_m = largest, .yaw_deg = s.yaw_deg.min});
-    const double horizontal = std::max(largest.x, largest.y);  // at some turn, along either axis
-    return {horizontal, horizontal, largest.z};
+    Vec3 reach{};
+    const auto turn_to = [&](double yaw_deg) {
+        reach = glm::max(reach, reach_m(Ellipsoid{.semi_axes_m = largest, .yaw_deg = yaw_deg}));
+    };
+    turn_to(s.yaw_deg.min);
+    turn_to(s.yaw_deg.max);
+    // Between multiples of 90 degrees the reach along an axis only rises or only falls; two of them are all.
+    const double quarter = std::ceil(s.yaw_deg.min / 90) * 90;
+    for (const double yaw_deg : {quarter, quarter + 90})
+        if (yaw_deg <= s.yaw_deg.max) turn_to(yaw_deg);
+    return reach;
 }
 
 void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& name) {

@@ -7,8 +7,8 @@
 // Motion accumulates as fixed-point integers, without rounding drift: after n steps of a constant wind the
 // displacement is exactly floor(n * d) cells, with d = velocity * step / cell rounded up to a multiple of
 // 2^-32 cell. Rounding up makes decimal fractions arrive: 0.2 cells a step are 1 cell after 5 steps, and
-// -0.3 are -3 cells after 10. If the exact displacement of a step is a multiple of 1/q cell, floor(n * d)
-// equals the floor of the exact product for all n < 2^32 / q.
+// -0.3 are -3 cells after 10. If the exact displacement of a step is below 16 cells and a multiple of 1/q
+// cell, floor(n * d) equals the floor of the exact product for all n < 2^32 / q.
 
 #include <cstdint>
 #include <vector>

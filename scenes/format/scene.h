@@ -55,7 +55,7 @@ struct Scene {
 // Returns the simulated time from the first to the last step, in seconds.
 double simulated_time_s(const Scene& scene);
 
-// Returns the simulated time of frame `index` (from 0) in seconds, correct to 2 units in the last place. To
+// Returns the simulated time of frame `index` (from 0) in seconds, correct to 3 units in the last place. To
 // locate a frame between steps, or beyond the last one, use moment_of_frame(), which rounds consistently.
 double frame_time_s(const FrameOptions& frames, int index);
 

@@ -88,8 +88,10 @@ const Section& light_section() {
          render_key<&RenderOptions::light, &CloudLight::cfa_clouds_per_frame>(
              "cfa_clouds_per_frame", "", between(0, 1e6),
              "Clouds of a layer drawn as billboards whose absorption follows a moving sun in a frame, in "
-             "turn "
-             "by the frame's number; 0: all.",
+             "turn by the "
+             "frame's number, so that any frame can be drawn alone; a cloud that enters has the sun of the "
+             "last turn "
+             "before it. 0: all.",
              "T, CFA")},
         nullptr};
     return section;

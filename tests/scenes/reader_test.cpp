@@ -70,6 +70,20 @@ semi_axis_z_m = 5000
     EXPECT_TRUE(contains(messages, "3 errors")) << messages;
 }
 
+// A scatter reaches as far as its yaw lets it, here 2.03 m along y; the limit is 16 m.
+TEST(Reader, ScattersReachAsFarAsTheirYawTurnsThem) {
+    const auto scene_with_yaw = [](const std::string& yaw_deg) {
+        return "[lattice]\ncell_size_m = 1\ncells = [512, 1, 64]\nboundaries = ['open', 'periodic', 'open']\n"
+               "[[field.scatters]]\ncount = 2\nsemi_axis_x_m = 20\nsemi_axis_y_m = 2\nsemi_axis_z_m = 5\n"
+               "yaw_deg = " +
+               yaw_deg;
+    };
+    for (const char* narrow : {"[-1, 1]", "[170, 190]", "[-181, -180]", "30"})
+        EXPECT_NO_THROW(scene_of(scene_with_yaw(narrow))) << narrow;
+    for (const char* wide : {"[-1, 91]", "[89, 91]", "[-360, 360]", "[200, 300]", "90"})
+        EXPECT_TRUE(contains(messages_of(scene_with_yaw(wide)), "1 error")) << wide;
+}
+
 TEST(Reader, TenLinesMakeAScene) {
     const Scene scene = scene_of(R"(
 name = "ten-lines"
