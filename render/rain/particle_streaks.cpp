@@ -24,19 +24,19 @@ constexpr double kMostSize[2] = {1e6, 1.5};  // s0; flakes are large enough as t
 constexpr double kMostPixels = 2;            // width of a far streak
 constexpr double kOpacityAtEye = 0.5;
 constexpr double kFlicker = 0.25;
-constexpr double kNumberFade = 0.1;  // share of the particles that fade when their number falls
+constexpr double kNumberFade = 0.1;  // fraction of the particles that fade when their number decreases
 
 // Far from overflow, which std::hypot() takes its time to rule out.
 double flat_length(double x, double y) { return std::sqrt(x * x + y * y); }
 
-// What all particles of a pass share.
+// The state shared by all particles of a pass.
 struct Pass {
     const Particles& particles;
     const ParticlePass& pass;
     const StreakView& view;
     double pixels_per_unit = 1;
     double size = 1;      // s0
-    double sunlight = 1;  // share of the sun's light in the container
+    double sunlight = 1;  // transmitted fraction of sunlight at the container
     bool snow = false;
 };
 
@@ -78,7 +78,7 @@ double real_particles(const ParticlePass& pass, const PrecipitationOptions& p, c
 
 double linear(double low, double high, double x) { return std::clamp((x - low) / (high - low), 0.0, 1.0); }
 
-// How much of a particle is there: by its reach, the container's top and bottom, the eye, the number.
+// Returns the fade weight of a particle: by its reach, the container's top and bottom, the eye, the number.
 double presence(const Pass& p, std::size_t i, double d, double z, double distance_m) {
     const double reach = double(p.particles.reach[i]);
     double share = p.pass.share * std::min(1.0, (reach - d) / (kFadeShare * reach));
@@ -201,7 +201,7 @@ double size_at_eye(const Particles& particles, const ParticlePass& pass, const S
 }  // namespace
 
 double drawn_per_m3(std::size_t count, const ParticleBoxes& boxes, double d) {
-    // The integral of 3 e^2 / (4 e^2) from d to 1, where what fades in counts by its share.
+    // The integral of 3 e^2 / (4 e^2) from d to 1, with the fade weights of particles near their reach.
     const double left = d <= 1 - kFadeShare ? 1 - d - 0.5 * kFadeShare / (1 - kFadeShare) * d
                                             : (1 - d) * (1 - d) * (1 - kFadeShare) / (2 * kFadeShare * d);
     return 0.75 * double(count) * std::max(left, 0.01) / (boxes.depth_m * boxes.depth_m * boxes.height_m);

@@ -289,7 +289,7 @@ HWY_INLINE Floats3 ground(const PictureFrame& frame, const ShadowTexels& map, co
     return add(each_times(beta, ground_light(frame, map, times(distance, ray))), air_light(frame, ray, beta));
 }
 
-// What lies behind the clouds along unit rays.
+// Returns the radiance behind the clouds along unit rays: sky or ground, with the air in front of it.
 HWY_INLINE Floats3 background(const PictureFrame& frame, const ShadowTexels& map, const Floats3& ray) {
     const Lanes d;
     const Floats distance = ground_distance(frame, ray.z);

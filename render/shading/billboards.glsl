@@ -22,7 +22,7 @@ vec3 billboard_light_at(vec3 position, ViewBillboard billboard, ViewCloud cloud)
     return frame.ambient_top.w * light;
 }
 
-// What the air between the eye and a billboard does, times the billboard's opacity.
+// Transmittance and in-scattered light of the air between the eye and a billboard, times the billboard's opacity.
 struct BillboardAir {
     vec3 share;  // of the cloud's light that arrives
     vec3 veil;   // radiance of the air

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What metaballs scatter of the sunlight, from the table; needs frame.glsl.
+// Sunlight that metaballs scatter, by the scattering table; needs frame.glsl.
 
 // scattering_table.h: kScatterAngles columns.
 layout(set = 0, binding = 12, std430) readonly buffer Scattering {

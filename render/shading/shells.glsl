@@ -2,7 +2,7 @@
 // The shells of air around the eye (air_shells.h, docs/air.md); needs ray.glsl, air.glsl and
 // scattering.glsl.
 
-// Whether there are shells. Without them shaders are compiled as if they did not know any.
+// Specialisation constants: without shells or fog their code is compiled out.
 layout(constant_id = 6) const bool kShells = false;
 layout(constant_id = 7) const bool kFog = false;
 
@@ -13,7 +13,7 @@ layout(set = 0, binding = 14, std430) readonly buffer Shade {
     uint shade[];
 };
 
-// What a part of the air does to the light behind it: light = light * transmittance + light of the layer.
+// The effect of a layer of air on the light behind it: light = light * transmittance + light of the layer.
 struct AirLayer {
     vec3 light;
     float transmittance;
@@ -69,8 +69,8 @@ FogPart fog_part(vec3 ray, float begin, float end) {
                    shells.fog.x * exp(min(-low * shells.fog.y, 60.0)));
 }
 
-// Where this fog has taken half of all the light that it takes. Counted from the lower end, so that nothing is lost to
-// rounding where the eye is far above.
+// Returns the distance at which half of the opacity of this fog is reached. Computed from the lower end, without loss of
+// precision where the eye is far above.
 float fog_middle(FogPart fog, vec3 ray, float begin, float end) {
     float taken = -log(0.5 + 0.5 * exp(-fog.depth));
     float rest = ray.z < 0.0 ? fog.depth - taken : taken, per_low = rest / max(fog.low, 1.0e-30);
@@ -90,8 +90,8 @@ float fog_patches(vec3 point, float begin, float end) {
     return max(1.0 + varies * (noise - 1.0), 0.0);
 }
 
-// Radiance at opacity 1 that fog at a point scatters towards the eye; lit as the clouds are. `lit`: share of the sunlight
-// that the clouds leave.
+// Returns the radiance that fog of opacity 1 at a point scatters towards the eye; lit as clouds are. `lit`: fraction of
+// the sunlight that passes the clouds.
 vec3 fog_radiance(vec3 ray, float at, vec3 sunlight, float lit) {
     float dense = exp(min(-(shells.fog.z + ray.z * at) * shells.fog.y, 60.0));
     float above = shells.fog.x * dense / shells.fog.y;  // optical depth upwards
@@ -103,10 +103,10 @@ vec3 fog_radiance(vec3 ray, float at, vec3 sunlight, float lit) {
     return frame.ambient_top.w * arriving;
 }
 
-// The air of a ray between two distances. All the light of clear air is in the picture already (air_light()); what clouds
-// shade is taken away: radiance below zero. Shade and patches are looked up at a share, 0..1, of the way, light in the
-// middle: it changes with height so fast that looking it up here and there would show as grain. Where there is much fog,
-// both are looked up in the middle of what is seen of it.
+// Returns the layer of air between two distances of a ray. The light of clear air is in the image already (air_light());
+// the shaded part of it is subtracted: the radiance is negative. Shade and patches are sampled at the fraction `share`,
+// 0..1, of the interval; light in its middle, because it varies so fast with height that an offset would be visible as
+// grain. In dense fog both are sampled where half of its opacity is reached.
 AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float share) {
     float at = mix(begin, end, share), middle = mix(begin, end, 0.5);
     bool last = begin >= shells.shade.w;  // it has no end
@@ -131,7 +131,7 @@ AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float sha
     return AirLayer(light + (1.0 - transmittance) * of_fog, transmittance, middle);
 }
 
-// Where a ray comes out of the ground that the eye is below, as that of a mirror image is.
+// Returns the distance at which a ray of a mirrored eye, which is below the ground, leaves the ground.
 float air_begin(vec3 ray) { return frame.ground.w > 0.0 ? frame.ground.w / max(ray.z, 1.0e-6) : 0.0; }
 
 // Shell k along the ray of a pixel of the picture, cut off by the ground.
