@@ -63,7 +63,7 @@ enum class Lighting {
     cfa,         // T's light absorption factor over blocks of voxels (voxel_absorption.h)
 };
 
-// How a cloud scatters light (D: the colour of a metaball). With the defaults a thick cloud top in the sun
+// Scattering of light in clouds (D: the colour of a metaball). With the defaults a thick cloud top in the sun
 // has a radiance of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
     double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker
