@@ -19,7 +19,7 @@ double draw(const AutomatonOptions& options, const AirParcel& parcel, ParcelDraw
     return range.min + (range.max - range.min) * unit_interval(words[what % 4u]);
 }
 
-// The parcel of a scatter, at the place and time that its ranges say.
+// Draws a parcel of a scatter: position, time and shape from its ranges.
 AirParcel draw_parcel(const AutomatonOptions& options, int scatter, std::uint32_t index,
                       std::uint32_t generation) {
     const EllipsoidScatter& s = options.field.scatters[std::size_t(scatter)];

@@ -28,7 +28,7 @@ struct Turned {
     double xx, xy, yx, yy, zz;
 };
 
-// Everything of an ellipsoid but its place.
+// Converts an ellipsoid to cells, without its position.
 FieldEllipsoid field_ellipsoid(const AutomatonOptions& options, const ActiveEllipsoid& active,
                                const Turned& m) {
     FieldEllipsoid f{.xx = m.xx, .xy = m.xy, .yx = m.yx, .yy = m.yy, .zz = m.zz};

@@ -180,7 +180,7 @@ void SkySimulation::adjust_number(std::size_t left) {
     assign_slots(first_new);
 }
 
-// To the clouds from index `first_new` on, in their order.
+// Assigns free slots to the clouds from index `first_new` on, in their order.
 void SkySimulation::assign_slots(std::size_t first_new) {
     if (first_new == clouds_.size()) return;
     std::vector<bool> taken(clouds_.size());  // a lower slot is always free

@@ -150,7 +150,7 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
     return metadata;
 }
 
-// In the child: header, geometry, blocks, counts.
+// The child's part: sends header, geometry, blocks and counts.
 void send_density(VdbArchive& archive, const VdbReadOptions& options, SandboxWriter& writer) {
     const std::size_t memory_bytes = memory_limit(options.limits);
     const std::size_t n = choose_grid(archive, options.grid);
@@ -202,7 +202,7 @@ Coord receive_origin(SandboxReader& reader, const Extent& extent) {
     return {x, y, z};
 }
 
-// In the parent: builds the grid from what the child sends.
+// The parent's part: builds the grid from the child's stream.
 LoadedDensity receive_density(SandboxReader& reader) {
     LoadedDensity loaded;
     loaded.grid_name = clamp_message(reader.text(), kMaxMetadataText);

@@ -88,7 +88,7 @@ class Sweeps {
     }
 
   private:
-    // True if it changed, and with it what its neighbours have to look at.
+    // Updates a block; returns true if it changed, so that its neighbours must be updated.
     bool visit(std::size_t b) {
         if (due_[b] == 0) return false;
         due_[b] = 0;

@@ -270,7 +270,7 @@ void make_shade(const PreparedCloud& cloud, const ShadowFrame& frame, std::span<
     ++kept.serial;
 }
 
-// Behind the shade map; without fog nothing looks there.
+// Appends the fog's noise to the shade map; without fog none is read.
 void add_fog_noise(const Fog& fog, FogNoise& noise, ShadeCache& kept) {
     if (!(fog.extinction_per_m > 0) || kept.fog_seed == fog.seed) return;
     const std::vector<std::uint32_t>& words = noise.words(fog.seed);

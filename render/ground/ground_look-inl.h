@@ -57,7 +57,7 @@ struct Mirrored {
     Floats transmittance;
 };
 
-// One level of the mirrored view between four texels; u and v are 0..1.
+// Samples one level of the mirrored view bilinearly; u and v are 0..1.
 HWY_INLINE Mirrored mirrored_level(const MirrorView& view, hn::Vec<Ints> first, hn::Vec<Ints> width,
                                    hn::Vec<Ints> height, Floats u, Floats v) {
     const Lanes d;

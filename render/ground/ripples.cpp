@@ -41,7 +41,7 @@ void laplacian_row(const std::vector<float>& z, int row, float* out) {
     }
 }
 
-// Uniform in [0, 1): word `which` of drop `drop` of a step.
+// Returns word `which` of drop `drop` of a step as a uniform number in [0, 1).
 float drawn(std::int64_t step, std::uint32_t drop, std::uint32_t which) {
     std::uint32_t h = mix_bits(std::uint32_t(step) + kAxisStep);
     h = mix_bits(h + std::uint32_t(std::uint64_t(step) >> 32) + drop * kAxisStep);

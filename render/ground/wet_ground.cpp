@@ -130,7 +130,7 @@ struct Surface {
     Floats3 reflected;  // light, behind the air
 };
 
-// Wet soil and puddles.
+// Computes the surface of wet soil and puddles.
 HWY_INLINE Surface wet_surface(const GroundPass& pass, const Seen& seen, const Lying& lying,
                                const ResolvedNoise& hollows) {
     const WetGroundOptions& look = *pass.look;

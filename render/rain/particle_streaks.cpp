@@ -95,14 +95,14 @@ struct Ends {
     PixelPosition from, to;
 };
 
-// Shutter open to shutter closed, as the moving camera sees it.
+// Returns the projections of a particle at the opening and closing of the shutter, with the camera's motion.
 Ends ends_of(const Pass& p, const Vec3& place, const Vec3& velocity) {
     const Vec3 half = (0.5 * p.view.options.precipitation.exposure_s) * velocity;
     const Camera& camera = p.view.options.camera;
     return {project(p.view.opening, camera, place - half), project(p.view.closing, camera, place + half)};
 }
 
-// Drawn out from their middle to a length in pixels; upright where they coincide.
+// Extends a streak about its middle to a least length in pixels; vertical where its ends coincide.
 Ends at_least(const Ends& e, double length) {
     double dx = e.to.x - e.from.x, dy = e.to.y - e.from.y;
     const double span = flat_length(dx, dy);

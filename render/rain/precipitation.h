@@ -43,7 +43,7 @@ class PrecipitationPainter {
   private:
     const Particles& particles(PrecipitationKind kind, std::uint64_t seed, std::size_t count);
 
-    // Kept from picture to picture.
+    // Cached from frame to frame.
     std::optional<Particles> particles_;
     std::uint64_t seed_ = 0;
     std::size_t streaks_ = 0;

@@ -10,7 +10,7 @@
 namespace nephos {
 namespace {
 
-// A place in the ellipse's own axes.
+// Returns a point in the ellipse's own axes.
 Vec2 own(const Ellipse& e, double x, double y) {
     const double dx = x - e.x_m, dy = y - e.y_m;
     return {dx * e.axis_x + dy * e.axis_y, dy * e.axis_x - dx * e.axis_y};

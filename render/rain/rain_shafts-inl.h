@@ -232,8 +232,8 @@ struct MetCurtains {
     }
 };
 
-// The next of the runs that the curtains' ways cover together, after `begin` .. `end`; false when no ray has
-// one.
+// Finds for each ray the next interval of the union of the curtains' intersections after `begin` .. `end`.
+// Returns false when no ray has one.
 HWY_INLINE bool next_run(const MetCurtains& met, Floats& begin, Floats& end) {
     const Lanes d;
     const Floats nowhere = set(kNowhere), last = end;

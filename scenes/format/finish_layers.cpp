@@ -98,7 +98,7 @@ void check_layer_name(const SectionReader& reader, const std::string& name) {
         "expected 1 to 64 letters, digits, `-` or `_`, not starting with `-`");
 }
 
-// The skies that a layer names: known, and no two of one state.
+// Checks the skies that a layer names: known, and all states different.
 void check_layer_skies(const SectionReader& reader, const Scene& scene, const LayerOptions& layer) {
     if (reader.find("skies") == nullptr) {
         reader.report("skies", reader.quoted("skies") + " is missing",
