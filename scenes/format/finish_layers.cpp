@@ -199,7 +199,7 @@ void check_rain(const SectionReader& reader, const Scene& scene, const LayerOpti
     }
 }
 
-// A layer that is a veil: what it leaves to its lattice and wind, and keys that mean nothing to it.
+// Finishes a layer that is a veil: defaults by its lattice and wind, and keys without effect.
 void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
     for (const std::string_view key : keys_of_clouds()) {
         if (reader.find(key) == nullptr) continue;
