@@ -39,7 +39,7 @@ HWY_INLINE Floats byte_of(Words word, int shift) {
     return hn::ConvertTo(Lanes(), hn::And(hn::ShiftRightSame(word, shift), hn::Set(di, 0xFF)));
 }
 
-// Between the four bytes of words, 0..1: the upper half is the next row.
+// Interpolates the four bytes of words, 0..1, bilinearly; the upper half is the next row.
 HWY_INLINE Floats between_bytes(Words word, Floats share_u, Floats share_v) {
     const auto mix = [](Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); };
     const Floats left = mix(byte_of(word, 0), byte_of(word, 16), share_v),
@@ -111,7 +111,7 @@ HWY_INLINE FogPart fog_part(const AirShells& air, const Floats3& ray, Floats beg
             hn::Mul(set(data.fog.x), dense)};
 }
 
-// `transmittance`: exp(-fog.depth).
+// Returns the distance at which half of the opacity of fog is reached; `transmittance`: exp(-fog.depth).
 HWY_INLINE Floats fog_middle(const AirShells& air, const FogPart& fog, Floats transmittance,
                              const Floats3& ray, Floats begin, Floats end) {
     const Lanes d;

@@ -189,8 +189,9 @@ struct Shells {
     vec4 fog_limits;  // x: height above the base beyond which there is no fog worth drawing
 };
 
-// Where in a shell a pixel of the picture samples it, 0..1: an additive recurrence in two dimensions (Roberts
-// 2018, "R2") spreads the samples of neighbouring pixels evenly. In integers: the same on every machine.
+// Returns the position in a shell, 0..1, at which a pixel samples it: an additive recurrence in two
+// dimensions (Roberts 2018, "R2") distributes the samples of neighbouring pixels evenly. In integers: the
+// same on every machine.
 NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
     return float((x * 3242174889u + y * 2447445414u) >> 8) * (1.0f / 16777216.0f);
 }
@@ -221,9 +222,9 @@ NEPHOS_FUNCTION float opacity_c5(float s) {
     return fit_row(s, 2.426292f, -94.490722f, 721.69415f, -1645.7595f, 927.43252f);
 }
 
-// A metaball is seen under all angles within its outline, not only that of its centre: with the square of its
-// angular radius and its opacity as weights, the mean of 1 - cos is larger by this much of that square. A
-// lobe narrower than the metaball then is as bright as its disc, and not one bright dot.
+// The scattering angle varies over the disc of a metaball: weighted by opacity, the mean of 1 - cos exceeds
+// its value at the centre by this factor times the square of the angular radius. A lobe of the phase function
+// narrower than the disc is thus averaged over it instead of making one bright dot.
 NEPHOS_CONST float kDiscSpread = 0.11f;
 
 #ifdef __cplusplus
