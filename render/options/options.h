@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Options of rendering: camera, light, air, ground, precipitation; plain data in world units. Colours are
-// linear RGB (Rec. 709 primaries); radiance 1 is that of a white (Lambertian) surface that faces a sun of
-// colour 1.
+// Options of rendering (D, T, S, P: docs/sources.md): camera, light, air, ground, precipitation; plain data
+// in world units. Colours are linear RGB (Rec. 709 primaries); radiance 1 is that of a white (Lambertian)
+// surface that faces a sun of colour 1.
 
 #include <array>
 #include <optional>
