@@ -77,8 +77,8 @@ BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEl
     anything_ = any_birth_ || any_extinction_;
 }
 
-// On a periodic axis the centre is brought into the box; as many images of it as can reach the box lie to
-// either side.
+// Adds an ellipsoid; on a periodic axis with its centre wrapped into the box and with all periodic images
+// that reach the box.
 void BlockField::add_with_images(const AutomatonOptions& options, const ActiveEllipsoid& active) {
     const auto place = [](double cells, Boundary boundary, int extent) {
         return boundary == Boundary::periodic ? cells - std::floor(cells / extent) * extent : cells;

@@ -197,7 +197,7 @@ struct BlockPoints {
         weight[count] = voxel_weight;
         offset[count++] = std::uint16_t(leaf_voxel);
     }
-    // Up to a multiple of the kernel's lanes; what is added counts for nothing.
+    // Pads the points to a multiple of the kernel's lanes; results of the padding are ignored.
     std::size_t padded() {
         const std::size_t whole = (count + kVeilLanes - 1) / kVeilLanes * kVeilLanes;
         for (std::size_t n = count; n < whole; ++n) {

@@ -91,7 +91,7 @@ openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
     return result;
 }
 
-// The bounds that nephos wrote where they are there and hold all voxels, else those of the active voxels.
+// Returns nephos_bbox where present and valid for all voxels, else the bounds of the active voxels.
 CoordBBox bounds_of(const openvdb::FloatGrid& grid, const openvdb::GridBase& header) {
     CoordBBox active;
     const bool any = grid.tree().evalActiveVoxelBoundingBox(active);
@@ -279,7 +279,8 @@ void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& na
 
 constexpr const char* kStateGrids[] = {"hum", "act", "cld"};
 
-// Without nephos's bounds nobody knows how large the state is: then only its voxels can lie outside.
+// Checks the extent of a state by nephos_bbox_max. Without it the extent is unknown, and only voxels outside
+// of `extent` are errors.
 void check_state_extent(const openvdb::GridBase& header, int refine, const Extent& extent) {
     const auto last = meta_value<openvdb::Vec3i>(header, kMetaBoxMax);
     if (!last) return;

@@ -180,7 +180,7 @@ class Collector {
         return fitted;
     }
 
-    // `reach` times the radius is what the splat covers; no radius is less than `least_pixels`.
+    // Tests the visibility of a splat of `reach` times the radius, at least `least_pixels`.
     bool sees(const Vec3& centre, double radius, double reach, double least_pixels, float& distance_m) const {
         const Vec3 offset = centre - eye_;
         const double distance = std::sqrt(dot(offset, offset));

@@ -98,8 +98,9 @@ struct Seen {
     Floats pixel_m;                  // size of the pixel there, the geometric mean of both directions
 };
 
-// Light that a surface of this roughness reflects from the sky to the eye, behind the air: what arrives from
-// clouds has come through the air before the ground already.
+// Returns the light that a surface of this roughness reflects to the eye. Light of the sky is attenuated by
+// the air in front of the ground; light of clouds in the mirrored view has passed that air, whose own light
+// is subtracted.
 HWY_INLINE Floats3 reflected(const GroundPass& pass, const Seen& seen, const Floats3& direction,
                              Floats blur) {
     const Mirrored view = mirrored(*pass.mirror, direction, blur);

@@ -55,8 +55,8 @@ Sway sway_of(std::size_t i, double diameter_mm, double time_s) {
             0.7 + 0.3 * std::cos(2.3 * angle + start)};
 }
 
-// Real particles per m^3 at a place by drawn ones per m^3: the strongest rain there, less what another pass
-// draws.
+// Returns the ratio of real to drawn particles per m^3 at a point: of the strongest rain there, less the part
+// that another pass draws.
 double real_particles(const ParticlePass& pass, const PrecipitationOptions& p, const Vec3& place,
                       double d_mm) {
     const auto strongest = [&](const std::vector<CurtainTerm>& terms) {
@@ -119,7 +119,7 @@ bool beside_picture(const Ends& e, double margin, const Camera& camera) {
            std::max(e.from.y, e.to.y) < -margin || std::min(e.from.y, e.to.y) > camera.height + margin;
 }
 
-// Velocity of the image of a particle while it is exposed; flakes show as such and not as streaks (S).
+// Returns the velocity of a particle for motion blur; flakes have no streaks (S).
 Vec3 velocity_of(const Pass& p, std::size_t i, const Sway& sway, double width_m) {
     Vec3 v{p.view.wind_x_m_per_s, p.view.wind_y_m_per_s, -double(p.particles.speed[i])};
     if (!p.snow) return p.size * v;
@@ -180,7 +180,7 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     out.push_back(streak);
 }
 
-// s0: see the header. Of a particle of the size that takes the most light, at the eye.
+// Returns s0 (see the header), for a particle of the size with the greatest extinction, at the eye.
 double size_at_eye(const Particles& particles, const ParticlePass& pass, const StreakView& view) {
     const PrecipitationOptions& p = view.options.precipitation;
     double largest = 1;

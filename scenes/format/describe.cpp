@@ -191,7 +191,7 @@ void add_section(std::string& out, const Section& section, const void* owner, co
     }
 }
 
-// Each section once, in the order of the file; tables that occur in several places at the first.
+// Adds each section once, in the order of the file; tables that occur in several places at the first.
 void add_nested(std::string& out, const Section& section, const void* owner, const std::string& path,
                 std::vector<const Section*>& done) {
     for (const Key& key : section.keys) {

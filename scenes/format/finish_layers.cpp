@@ -17,7 +17,8 @@ SectionReader item_of(const SectionReader& scene, const char* array, std::size_t
     return {scene.document, scene.find(array)->value.items[index], indexed(array, index), {}};
 }
 
-// The reader of a table within a table; one of an empty table at the place of its parent when it is missing.
+// Returns the reader of a table within a table; of an empty one at the position of its parent when it is
+// missing.
 SectionReader below(const SectionReader& reader, std::string_view name) {
     static const Node empty;
     const Entry* entry = reader.find(name);
