@@ -19,7 +19,7 @@ double draw(const AutomatonOptions& options, const AirParcel& parcel, ParcelDraw
     return range.min + (range.max - range.min) * unit_interval(words[what % 4u]);
 }
 
-// The parcel of a scatter, at the place and time that its ranges say.
+// Draws a parcel of a scatter: position, time and shape from its ranges.
 AirParcel draw_parcel(const AutomatonOptions& options, int scatter, std::uint32_t index,
                       std::uint32_t generation) {
     const EllipsoidScatter& s = options.field.scatters[std::size_t(scatter)];
@@ -53,8 +53,8 @@ HalfSize half_size(const Ellipsoid& e) {
             std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos)};
 }
 
-// Sum of displacements along one axis. It never overflows: a periodic box repeats, and beyond an open one
-// lies nothing, so that there the sum may stop at 2^29 cells.
+// Adds displacements along one axis without overflow: modulo the box on a periodic axis, clamped to 2^29
+// cells on an open one, beyond which there is nothing.
 std::int64_t carry(std::int64_t sum, std::int64_t step, Boundary boundary, int extent) {
     constexpr std::int64_t kFarAway = std::int64_t{1} << 61;
     sum += step;

@@ -84,8 +84,8 @@ struct Automaton::Impl {
     std::uint64_t steps = 0;
 };
 
-// One step of births on the empty lattice, from its own domain of randomness: a cell at a time, since it
-// happens once and each cell has its own counter.
+// Draws one step of births on the empty lattice, from its own domain of randomness. Cell by cell, because it
+// happens once and each cell has a counter of its own.
 void Automaton::Impl::draw_initial_state() {
     const BlockField field = field_now();
     const Extent& extent = options.extent;

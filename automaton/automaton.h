@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The cellular automaton of D: growth, then extinction and birth, then advection by the wind, in bitwise
-// operations on whole words of cells. Equal options give equal bits, whatever the thread count, SIMD width or
-// interruption.
+// The cellular automaton of D (docs/sources.md): growth, then extinction and birth, then advection by the
+// wind, in bitwise operations on whole words of cells. Equal options give equal bits, whatever the thread
+// count, SIMD width or interruption.
 //
 //     Automaton automaton(options);
 //     automaton.step();

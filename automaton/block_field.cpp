@@ -28,7 +28,7 @@ struct Turned {
     double xx, xy, yx, yy, zz;
 };
 
-// Everything of an ellipsoid but its place.
+// Converts an ellipsoid to cells, without its position.
 FieldEllipsoid field_ellipsoid(const AutomatonOptions& options, const ActiveEllipsoid& active,
                                const Turned& m) {
     FieldEllipsoid f{.xx = m.xx, .xy = m.xy, .yx = m.yx, .yy = m.yy, .zz = m.zz};
@@ -77,8 +77,8 @@ BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEl
     anything_ = any_birth_ || any_extinction_;
 }
 
-// On a periodic axis the centre is brought into the box; as many images of it as can reach the box lie to
-// either side.
+// Adds an ellipsoid; on a periodic axis with its centre wrapped into the box and with all periodic images
+// that reach the box.
 void BlockField::add_with_images(const AutomatonOptions& options, const ActiveEllipsoid& active) {
     const auto place = [](double cells, Boundary boundary, int extent) {
         return boundary == Boundary::periodic ? cells - std::floor(cells / extent) * extent : cells;

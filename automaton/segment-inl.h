@@ -94,7 +94,7 @@ struct BirthScratch {
     std::vector<BlockPlan> plans = std::vector<BlockPlan>(kSegmentBlocks);
 };
 
-// A segment of a row of blocks: where its 64 rows of cells lie, and its planes.
+// A segment of a row of blocks: the offsets of its 64 rows of cells, and its planes.
 struct Segment {
     const StepPlanes& planes;
     const StepRandom& random;

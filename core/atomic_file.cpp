@@ -102,7 +102,7 @@ bool all_digits(std::string_view text) {
 class PieceWriter {
   public:
     explicit PieceWriter(int fd) : fd_(fd) {}
-    // 0, or the number of the error.
+    // Returns 0 or errno.
     int append(std::string_view piece) {
         constexpr std::size_t kGathered = std::size_t(1) << 16;
         if (gathered_.size() + piece.size() <= kGathered) {

@@ -26,7 +26,7 @@ std::optional<std::string> first_line(const std::filesystem::path& path) {
     return line;
 }
 
-// The number at the start of a text; none for "max".
+// Parses the number at the start of a text; nullopt for "max".
 std::optional<std::size_t> number_in(std::string_view text) {
     text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
     std::size_t number = 0;
@@ -40,7 +40,7 @@ std::optional<std::size_t> number_of_file(const std::filesystem::path& path) {
     return line ? number_in(*line) : std::nullopt;
 }
 
-// The number after a key in a file of "key number" or "key: number" lines.
+// Returns the number after a key in a file of "key number" or "key: number" lines.
 std::optional<std::size_t> number_after(const std::filesystem::path& path, std::string_view key) {
     std::ifstream file(path);
     for (std::string line; std::getline(file, line);) {

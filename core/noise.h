@@ -32,7 +32,7 @@ struct NoiseOptions {
 };
 
 // Evaluates N at many points: out[n] = N(x[n], y[n], z[n]), in lattice cells from the origin. Coordinates are
-// finite and within +-2^20, beyond which a float keeps fewer than 3 fractional bits. Throws Error(usage) when
+// finite and within +-2^20, beyond which a float has fewer than 3 fractional bits. Throws Error(usage) when
 // the spans differ in length, or when a coordinate or a period is out of range.
 void gradient_noise(std::span<const float> x, std::span<const float> y, std::span<const float> z,
                     const NoiseOptions& options, std::span<float> out);

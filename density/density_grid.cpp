@@ -32,7 +32,7 @@ void check_placement(const Placement& placement) {
     }
 }
 
-// Number of blocks along an axis of n voxels.
+// Returns the number of blocks along an axis of n voxels.
 int block_count(int n) { return (n + kBlock - 1) / kBlock; }
 
 // Copies the part of a dense array that lies in the block at `origin` into a leaf.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Stage 2 of D: the continuous density between cells. Every cell with q > 0 carries a metaball of effective
-// radius R, whose field falls from 1 at the centre to 0 at R (Wyvill; Nishita):
+// Stage 2 of D (docs/sources.md): the continuous density between cells. Every cell with q > 0 carries a
+// metaball of effective radius R, whose field falls from 1 at the centre to 0 at R (Wyvill; Nishita):
 //
 //     f(a) = 1 - 22/9 a^2 + 17/9 a^4 - 4/9 a^6,   a = distance / R
 //

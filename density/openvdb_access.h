@@ -43,7 +43,7 @@ struct Block {
 class TreeBuilder {
   public:
     TreeBuilder();
-    // The leaf's mask must be set.
+    // Adds a leaf whose mask is set.
     void add(std::unique_ptr<FloatLeaf> leaf);
     void add_tile(const openvdb::Coord& origin, float value);  // value > 0
     // Activates the two corner voxels and returns the grid; leaves the builder empty.

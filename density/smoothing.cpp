@@ -147,7 +147,7 @@ class TileBlocks final : public BlockSink {
     std::vector<openvdb::Coord> saturated_;
 };
 
-// The blocks of two grids by position; where one has none, a tile of 0 stands in.
+// Pairs the blocks of two grids by position, with a tile of 0 for a missing one.
 std::vector<std::pair<Block, Block>> pair_blocks(const std::vector<Block>& a, const std::vector<Block>& b) {
     std::vector<std::pair<Block, Block>> pairs;
     auto left = a.begin(), right = b.begin();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Stage 1 of D: bits to density, the weighted space-time mean
+// Stage 1 of D (docs/sources.md): bits to density, the weighted space-time mean
 //
 //     q(i,j,k,t) = 1/W  sum w(i',j',k',t') cld(i+i', j+j', k+k', t+t')
 //

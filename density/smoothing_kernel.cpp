@@ -37,7 +37,7 @@ std::vector<T> as(const std::vector<std::uint32_t>& weights) {
 template <class T, bool kUnit>
 class TilePass {
   public:
-    // `levels`: how many levels above the present one are asked for before the next advance().
+    // `levels`: number of levels above the present one that are used before the next advance().
     TilePass(const SmoothingPlan& plan, const SmoothingTile& tile, int levels)
         : plan_(plan),
           tile_(tile),
@@ -132,7 +132,7 @@ class TilePass {
     std::size_t plane_size() const { return group_size() * std::size_t(groups_); }
     std::size_t slot(int k) const { return std::size_t((k + k0_) % slots_); }
 
-    // The index that cell `n` of an axis of `size` cells has inside the box, or -1 when it reads as 0.
+    // Returns the index inside the box of cell `n` of an axis of `size` cells, or -1 when it reads as 0.
     static int source(int n, int size, Boundary boundary) {
         if (n >= 0 && n < size) return n;
         if (boundary == Boundary::open) return -1;

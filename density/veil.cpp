@@ -21,7 +21,7 @@ namespace {
 constexpr float kLeastDensity = 0x1p-10f;
 constexpr int kSampleGroups = 64, kSamplesInGroup = 256;
 
-// 0 at an end and 1 from `width` on; a step without width.
+// Rises smoothly from 0 at an end to 1 at `width`; a step if `width` is 0.
 double fade(double from_end, double width) {
     if (from_end <= 0) return 0;
     return width > 0 ? smoothstep(0, width, from_end) : 1;
@@ -197,7 +197,7 @@ struct BlockPoints {
         weight[count] = voxel_weight;
         offset[count++] = std::uint16_t(leaf_voxel);
     }
-    // Up to a multiple of the kernel's lanes; what is added counts for nothing.
+    // Pads the points to a multiple of the kernel's lanes; results of the padding are ignored.
     std::size_t padded() {
         const std::size_t whole = (count + kVeilLanes - 1) / kVeilLanes * kVeilLanes;
         for (std::size_t n = count; n < whole; ++n) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Procedural veils: density as a function of position and time alone, a sum of octaves of noise (S, eq. 4 to
-// 6), for high, thin, wide layers that need no automaton:
+// Procedural veils: density as a function of position and time alone, a sum of octaves of noise (S,
+// docs/sources.md, eq. 4 to 6), for high, thin, wide layers that need no automaton:
 //
 //     q(p, t) = sum_k w_k N_k
 //     N_k     = X_k                      the plain form: stratus, cirrostratus

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A cloud of T: boxes (seeds) in which billboards are scattered, with bounding volumes for culling, and the
-// weights of the boxes while it forms and dissolves.
+// A cloud of T (docs/sources.md): boxes (seeds) in which billboards are scattered, with bounding volumes for
+// culling, and the weights of the boxes while it forms and dissolves.
 //
 // Model space: metres, axes as in the world, origin of the base model; z = 0 is the height of the cloud's
 // base. World position = model position + position of the cloud.

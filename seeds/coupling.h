@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The forcing of the automaton by clouds: every seed box becomes an ellipsoid of the probability field, and
-// every rain area a humid column (rain_area.h). One list a step for Automaton::set_external_ellipsoids:
+// The forcing of the automaton by clouds: every seed box becomes an ellipsoid of the probability field
+// (automaton/field.h), and every rain area a humid column (rain_area.h). Each step needs one list of both for
+// Automaton::set_external_ellipsoids:
 //
 //     auto ellipsoids = ellipsoids_of(sky, coupling);
 //     append_columns(ellipsoids, areas, column);
@@ -29,7 +30,8 @@ struct CouplingOptions {
     double size_scale = 1.24;
     // Lower limit of the semi-axes, >= 0: with about one cell, boxes smaller than a cell are not lost.
     double min_semi_axis_m = 0;
-    // Fraction of their size, 0..1, at which semi-axes begin while a box forms; they grow with its phase.
+    // Size of the semi-axes when a box begins to form, as a fraction of their full size, 0..1; they grow
+    // linearly with the weight of the box.
     double size_at_birth = 0.5;
     Probabilities centre{0.1, 0.001, 0.1};  // as in Ellipsoid
     Probabilities rim{0, 0, 0.1};
@@ -40,7 +42,8 @@ struct CouplingOptions {
 void check(const CouplingOptions& options);
 
 // Appends the ellipsoids of one cloud at a world position, in the order of its boxes, without those of weight
-// 0; weight = strength * seed's strength * phase_weight(box). `softness` as SkyOptions::formation_softness.
+// 0; weight = strength * Seed::strength of the box * phase_weight() of the box. `softness` as
+// SkyOptions::formation_softness.
 void append_ellipsoids(std::vector<ActiveEllipsoid>& out, const BaseModel& model, const Cloud& cloud,
                        const Vec3& position_m, double phase, double softness, const CouplingOptions& options);
 

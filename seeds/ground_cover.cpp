@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPerHour = 1.0 / 3600.0;
 
-// A film that gets `input_mm_per_h` for a while.
+// Returns a film after a duration of `input_mm_per_h`.
 double wetted(double water_mm, double input_mm_per_h, double duration_s, const GroundCoverOptions& options) {
     const double input = input_mm_per_h * kPerHour;
     const double rate = input / options.capacity_mm + 1 / options.drying_s;
@@ -124,7 +124,7 @@ void GroundCover::expose(std::span<const FallingRain> falling) {
     map_.outside_rain_mm_per_h = mean_at_edge(map_);
 }
 
-// The texels in the rectangle around the ellipse.
+// Adds the rain of an area to the texels in the rectangle around its ellipse.
 void GroundCover::rain_on(const RainArea& area, const Vec2& drift) {
     const double a = area.semi_a_m, b = area.semi_b_m;
     const double reach_x = std::sqrt(a * a * area.axis_x * area.axis_x + b * b * area.axis_y * area.axis_y),

@@ -3,9 +3,9 @@
 
 // Water and snow on the ground over time: a map over a rectangle of the world that rain wets and air dries.
 //
-//     GroundCover cover(options, kind, world);    // as it lies at time 0; what falls
-//     cover.expose(falling);                      // the rain areas now; fills map().rain_mm_per_h
-//     cover.advance(step_s); cover.expose(...);   // a step, during which it rained as it was exposed
+//     GroundCover cover(options, kind, world);    // the initial state
+//     cover.expose(falling);                      // the rain areas now; computes map().rain_mm_per_h
+//     cover.advance(step_s); cover.expose(...);   // a step with that rain, then the rain areas after it
 //
 // The exposure map works like a shadow map from above: a texel gets the strongest rain of all areas at the
 // point upwind where its drops left the cloud's base (drift_m()). There are no obstacles.
@@ -39,7 +39,7 @@ struct GroundCoverOptions {
     double drying_s = 5400;           // tau: a film dries to 1/e in this time, > 0, may be infinite
     double melting_mm_per_h = 0;      // M, of water, 0..100
     double edge = 0.5;                // outer fraction of a rain area over which its rain decreases, 0..1
-    double fall_speed_m_per_s = 6.5;  // of drops on their way from the cloud's base, > 0, may be infinite
+    double fall_speed_m_per_s = 6.5;  // of drops below the cloud's base, > 0, may be infinite
     int texels = 256;                 // of the map on each side, 2..1024
     double margin = 0.1;              // by which the map is wider than the world on each side, 0..10
     bool operator==(const GroundCoverOptions&) const = default;

@@ -74,7 +74,7 @@ void check_light(const Light& light) {
     }
 }
 
-// The light as the cloud sees it: what the absorption depends on.
+// Returns the light relative to the cloud, on which the absorption depends.
 Light relative(const Light& light, const Vec3& position_m) {
     if (light.at_infinity) return light;
     const Vec3& v = light.towards;

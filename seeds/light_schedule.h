@@ -23,7 +23,7 @@ namespace nephos {
 
 class LightSchedule {
   public:
-    // clouds_per_frame >= 0; 0: all clouds in every frame.
+    // Computes the period for a layer; clouds_per_frame >= 0, 0 = all clouds in every frame.
     LightSchedule(const SkyOptions& sky, int clouds_per_frame);
 
     int period() const { return period_; }  // in frames, >= 1

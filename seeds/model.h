@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Base models (T, chapter 3.1): boxes (seeds) placed by an artist and the roots by which they reproduce. One
-// model generates any number of different clouds.
+// Base models (T, docs/sources.md, chapter 3.1): boxes (seeds) placed by an artist and the roots by which
+// they reproduce. One model generates any number of different clouds.
 //
 // Reproduction, by T's chapter 3.1 and its figures 10, 12 and 13:
 // - All children of a root descend from the seed that owns the root; children have no roots. ("the remaining

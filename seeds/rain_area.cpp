@@ -132,7 +132,7 @@ std::vector<RainArea> attached_areas(std::span<const AttachedRain> rains, const 
 
 namespace {
 
-// Both describe one area; the axis turns the short way (an axis has no direction).
+// Interpolates one area between two times; the axis rotates by the smaller angle (an axis has no direction).
 RainArea between(const RainArea& a, const RainArea& b, double fraction) {
     const auto lerp = [&](double from, double to) { return from + (to - from) * fraction; };
     const double dx = b.x_m - a.x_m, dy = b.y_m - a.y_m, reach = a.semi_a_m + b.semi_a_m;

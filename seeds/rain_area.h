@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Rain areas (P): ellipses on the ground, (x-x0)^2/a^2 + (y-y0)^2/b^2 = 1 in their own axes, with rain where
-// the left side is below 1. They are placed by hand, attached to clouds of a kind, or found in the automaton
-// (rain_finder.h); each humidifies the column of air above it and so prolongs the life of its cloud.
+// Rain areas (P, docs/sources.md): ellipses on the ground, (x-x0)^2/a^2 + (y-y0)^2/b^2 = 1 in their own axes,
+// with rain where the left side is below 1. They are placed by hand, attached to clouds of a kind, or found
+// in the automaton (rain_finder.h); each humidifies the column of air above it and so prolongs the life of
+// its cloud.
 
 #include <cstdint>
 #include <optional>

@@ -66,7 +66,7 @@ struct WaterMap {
     bool is_wet(std::uint32_t sum) const { return sum >= keep; }
 };
 
-// Index within 0..n-1 or -1 for outside.
+// Wraps an index into 0..n-1; -1 for outside of an open axis.
 int inside(int i, int n, Boundary boundary) {
     if (i >= 0 && i < n) return i;
     return boundary == Boundary::periodic ? (i % n + n) % n : -1;
@@ -216,7 +216,7 @@ RainFinder::RainFinder(const RainFinderOptions& options, Extent extent, const Pl
     require_positive("rain found in the automaton: cell size (m)", placement_.cell_size_m);
 }
 
-// A difference of places, through a periodic side if that is nearer.
+// Returns a difference of positions, across a periodic side if that is nearer.
 double RainFinder::wrapped(double difference_m, bool along_x) const {
     if ((along_x ? boundaries_.x : boundaries_.y) != Boundary::periodic) return difference_m;
     const double period = (along_x ? extent_.x : extent_.y) * placement_.cell_size_m;

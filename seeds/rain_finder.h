@@ -62,7 +62,8 @@ std::vector<RainPatch> find_patches(const BitPlaneView& cld, const Placement& pl
 // Tracks the rain areas of one layer. Not thread-safe.
 class RainFinder {
   public:
-    // `layer` makes ids unique among several finders. Throws Error(usage) on bad options.
+    // Creates a finder without areas; `layer` makes ids unique among several finders. Throws Error(usage) on
+    // bad options.
     RainFinder(const RainFinderOptions& options, Extent extent, const Placement& placement,
                const Boundaries& boundaries, std::uint32_t layer = 0);
 

@@ -39,7 +39,8 @@ void check_skies(const std::string& where, const SkyOptions& options) {
     }
 }
 
-// A sky of enormous clouds would take hours and all memory: it is refused before the first cloud is made.
+// Refuses skies with too many boxes before the first cloud is generated, which would take hours and all
+// memory.
 void check_number_of_boxes(const std::string& where, const SkyOptions& options) {
     std::vector<std::int64_t> generated(options.models.size(), 0);
     for (const Sky& sky : options.skies) {

@@ -180,7 +180,7 @@ void SkySimulation::adjust_number(std::size_t left) {
     assign_slots(first_new);
 }
 
-// To the clouds from index `first_new` on, in their order.
+// Assigns free slots to the clouds from index `first_new` on, in their order.
 void SkySimulation::assign_slots(std::size_t first_new) {
     if (first_new == clouds_.size()) return;
     std::vector<bool> taken(clouds_.size());  // a lower slot is always free
@@ -217,7 +217,7 @@ std::size_t SkySimulation::draw_sky(std::uint32_t word) const {
     return options_.skies[drawn].models.empty() ? other : drawn;
 }
 
-// A cloud of a sky that has models, not yet placed; phase 0 unless formation takes no time.
+// Draws a cloud of a sky that has models, not yet placed; its phase is 0 unless formation_s is 0.
 SkyCloud SkySimulation::new_cloud(std::size_t sky) {
     const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::cloud, born_);
     const std::vector<SkyModel>& models = options_.skies[sky].models;

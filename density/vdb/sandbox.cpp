@@ -72,7 +72,8 @@ void set_limit(int resource, rlim_t value) {
     ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
 }
 
-// In the child: what it must not do to the terminal, to the disk and to the machine.
+// Confines the child: no output to the terminal, no core dump, limits on memory and processor time; it ends
+// with its parent.
 void confine(std::size_t memory_bytes, double seconds) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGPIPE}) ::signal(signal, SIG_DFL);
@@ -104,7 +105,7 @@ void confine(std::size_t memory_bytes, double seconds) {
     ::_exit(0);
 }
 
-// State letter and processor time of a process; '?' when unknown.
+// Returns the state letter and processor time of a process; '?' when unknown.
 std::pair<char, long> process_state(pid_t pid) {
     std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
     std::string line;

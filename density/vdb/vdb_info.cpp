@@ -36,7 +36,7 @@ TextPairs receive_texts(SandboxReader& reader) {
     return texts;
 }
 
-// Active bounds and count: as the file states them, else from the voxels.
+// Sends active bounds and count, from the file's metadata or else from the voxels.
 void send_size(VdbArchive& archive, std::size_t n, SandboxWriter& writer) {
     const openvdb::GridBase& header = *archive.entries()[n].header;
     const auto low = meta_value<openvdb::Vec3i>(header, openvdb::GridBase::META_FILE_BBOX_MIN);

@@ -91,7 +91,7 @@ openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
     return result;
 }
 
-// The bounds that nephos wrote where they are there and hold all voxels, else those of the active voxels.
+// Returns nephos_bbox where present and valid for all voxels, else the bounds of the active voxels.
 CoordBBox bounds_of(const openvdb::FloatGrid& grid, const openvdb::GridBase& header) {
     CoordBBox active;
     const bool any = grid.tree().evalActiveVoxelBoundingBox(active);
@@ -150,7 +150,7 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
     return metadata;
 }
 
-// In the child: header, geometry, blocks, counts.
+// The child's part: sends header, geometry, blocks and counts.
 void send_density(VdbArchive& archive, const VdbReadOptions& options, SandboxWriter& writer) {
     const std::size_t memory_bytes = memory_limit(options.limits);
     const std::size_t n = choose_grid(archive, options.grid);
@@ -202,7 +202,7 @@ Coord receive_origin(SandboxReader& reader, const Extent& extent) {
     return {x, y, z};
 }
 
-// In the parent: builds the grid from what the child sends.
+// The parent's part: builds the grid from the child's stream.
 LoadedDensity receive_density(SandboxReader& reader) {
     LoadedDensity loaded;
     loaded.grid_name = clamp_message(reader.text(), kMaxMetadataText);
@@ -279,7 +279,8 @@ void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& na
 
 constexpr const char* kStateGrids[] = {"hum", "act", "cld"};
 
-// Without nephos's bounds nobody knows how large the state is: then only its voxels can lie outside.
+// Checks the extent of a state by nephos_bbox_max. Without it the extent is unknown, and only voxels outside
+// of `extent` are errors.
 void check_state_extent(const openvdb::GridBase& header, int refine, const Extent& extent) {
     const auto last = meta_value<openvdb::Vec3i>(header, kMetaBoxMax);
     if (!last) return;

@@ -108,7 +108,7 @@ std::uint64_t transpose_bits(std::uint64_t m) {
     return m;
 }
 
-// The 512 bits of the block at cell (x, y, z), x a multiple of 8, in OpenVDB's order.
+// Returns the 512 bits of the block at cell (x, y, z), x a multiple of 8, in OpenVDB's order.
 Mask block_bits(const BitPlaneView& plane, int x, int y, int z) {
     std::uint8_t bytes[8][8] = {};  // [y][z], bit n = cell x + n
     for (int dz = 0; dz < std::min(kBlock, plane.extent.z - z); ++dz) {
@@ -128,7 +128,7 @@ Mask block_bits(const BitPlaneView& plane, int x, int y, int z) {
     return mask;
 }
 
-// The same where one cell is refine^3 voxels.
+// Returns the 512 bits of a block of voxels where one cell is refine^3 voxels.
 Mask refined_block_bits(const BitPlaneView& plane, int refine, int x, int y, int z) {
     Mask mask;
     for (int n = 0; n < kBlockVoxels; ++n) {

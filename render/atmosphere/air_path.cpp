@@ -128,7 +128,7 @@ namespace {
 
 constexpr double kKilometre = 1000;
 
-// A row between two rows of a plane.
+// Interpolates a row between two rows of a plane.
 void mix_rows(const float* plane, std::size_t width, double coordinate, std::size_t rows, float* out) {
     const auto low = std::min(std::size_t(std::max(coordinate, 0.0)), rows - 2);
     const auto share = float(std::clamp(coordinate - double(low), 0.0, 1.0));

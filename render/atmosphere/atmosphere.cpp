@@ -59,7 +59,7 @@ struct Suns {
 
 double mix(double a, double b, double share) { return a + share * (b - a); }
 
-// exp of a plane of logarithms between four of its numbers.
+// Samples a plane of logarithms bilinearly and returns the exponential.
 double between_logs(const float* plane, double column, double row, std::size_t rows) {
     const double x = std::clamp(column, 0.0, double(kSunSines - 1) - 1e-9),
                  y = std::clamp(row, 0.0, double(rows - 1) - 1e-9);

@@ -114,7 +114,7 @@ void SkyLights::mix_tables(const RenderOptions& options, double elevation_deg) {
     ++light_.serial;
 }
 
-// The sun's colour above the air, in units of radiance as the eye has adapted.
+// Returns the sun's colour above the air, in units of radiance, with the adaptation of exposure.
 Rgb SkyLights::adapted_sun(const RenderOptions& options, double elevation_deg) const {
     constexpr Rgb kLuminance{0.2126, 0.7152, 0.0722};  // Rec. 709
     const Rgb sun = atmosphere_->sunlight(0, elevation_deg),

@@ -76,8 +76,8 @@ class Sweeps {
             for (std::size_t o = 0; o < 8; ++o) cover_[b][o] = std::min(most, 2 * depths[b][o]);
     }
 
-    // To and fro until nothing changes: values only fall, from the most that they may be to the largest that
-    // agree with their neighbours, whatever the order of the sweeps.
+    // Sweeps forwards and backwards until nothing changes: values decrease from their upper bounds to the
+    // greatest solution consistent with their neighbours, independent of the order of the sweeps.
     std::vector<OfOctants> run() {
         for (bool changed = true; changed;) {
             changed = false;
@@ -88,7 +88,7 @@ class Sweeps {
     }
 
   private:
-    // True if it changed, and with it what its neighbours have to look at.
+    // Updates a block; returns true if it changed, so that its neighbours must be updated.
     bool visit(std::size_t b) {
         if (due_[b] == 0) return false;
         due_[b] = 0;

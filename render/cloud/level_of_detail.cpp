@@ -116,9 +116,9 @@ struct BlockBalls {
     const VoxelPlace& place(std::uint32_t i) const { return blocks.places[i]; }
     float depth_scale(std::uint32_t i) const { return cloud.depth_scale[i]; }
 
-    // The least optical depths through its octants, each at most kMostOfOctant: those of four of the thinnest
-    // voxel; 0 if a voxel is missing, for then one may see through. `per_scale`: from the depth scale of a
-    // voxel to the depth through four of them.
+    // Returns the least optical depths through its octants, each at most kMostOfOctant: that of four voxels
+    // like the thinnest one; 0 if a voxel is missing, as there is a gap. `per_scale`: ratio of the depth
+    // through four voxels to the depth scale of one.
     OfOctants octant_depths(double per_scale) const {
         std::array<std::uint64_t, 8> filled{};
         OfOctants least;
@@ -140,7 +140,7 @@ struct BlockBalls {
 // The blocks of one block of 8 x 8 x 8 voxels: of 2 voxels on a side, of 4, and the whole.
 class BlockTree {
   public:
-    // `hidden`: how far each octant is to be merged whatever its contrast, 0..1.
+    // `hidden`: weight, 0..1, with which each octant is merged whatever its contrast.
     BlockTree(const Merging& merging, const BlockBalls& balls, const OfOctants& hidden)
         : merging_(merging), balls_(balls) {
         balls.for_each([&](std::uint32_t i) { add_ball(balls.place(i), balls.depth_scale(i)); });
@@ -239,8 +239,8 @@ class BlockTree {
         return squares;
     }
 
-    // The metaball that stands for each block, and how far it does: its children do as far as `least`. Means
-    // nothing where there are no metaballs. Written for vector units: no branches.
+    // Computes the merged metaball of each block and its weight, where the children's least weight is
+    // `least`. Undefined for blocks without metaballs. Branchless, for vectorisation.
     template <std::size_t kSide>
     void finish(Sums<kSide>& sums, const Merging::Level& level, const typename Sums<kSide>::Values& least,
                 const typename Sums<kSide>::Values& hidden) const {

@@ -4,9 +4,10 @@
 // Level of detail (D, S: larger voxels far away, fewer metaballs): a block of 2 x 2 x 2 voxels is merged into
 // one metaball with their optical mass (density * radius^3), centre of gravity and, by its radius, second
 // moment. The part of the second moment that comes from the distances of the centres is multiplied by
-// kSpread: without that, full blocks of metaballs of 1.5 edges would get a radius of 1.08 of their distance,
-// which ripples (density/metaballs.h). Blocks of blocks are merged likewise, up to 8 x 8 x 8. The lattice of
-// blocks is fixed in the world, independent of camera and density.
+// kSpread: without that, full blocks of metaballs with a radius of 1.5 voxels would be merged into metaballs
+// with a radius of 1.08 times their spacing, too little overlap for an even density (density/metaballs.h).
+// Blocks of blocks are merged likewise, up to 8 x 8 x 8. The lattice of blocks is fixed in the world,
+// independent of camera and density.
 //
 // Merging blurs over the size of a block. The error along a ray is about the block's contrast: with t_i the
 // optical depths through the centres of its eight children (0 where there is none),
@@ -25,11 +26,11 @@
 // density: all optical depths are continuous in the eye's position and in the voxels' densities, and nothing
 // pops. The weight of a larger block is at most that of each of its children.
 //
-// Occluded blocks need no contrast: 4 x 4 x 4 voxels are merged, where possible with their neighbours to 8 x
-// 8 x 8, where the least optical depth between them and the outside (block_cover.h) is kHidden, and partially
-// from kVeiled on. An octant occludes by its thinnest voxel, and not at all if one is missing, so that no gap
-// is closed. In Disney's cloud with every voxel opaque that is a twelfth; ragged clouds have hardly any such
-// voxels.
+// Occluded blocks are merged whatever their contrast: 4 x 4 x 4 voxels, where possible with their neighbours
+// to 8 x 8 x 8, where the least optical depth between them and the outside (block_cover.h) is kHidden, and
+// partially from kVeiled on. An octant occludes by its thinnest voxel, and not at all if one is missing, so
+// that no gap is closed. That holds for a twelfth of the voxels of Disney's cloud if each voxel is opaque;
+// ragged clouds have hardly any such voxels.
 //
 // Alternatives that were measured and dropped: a threshold independent of r (three times the difference for
 // as many metaballs; it would let the light of an unchanged cloud be reused when the camera moves, but

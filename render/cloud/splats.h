@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The input of a frame: voxel clouds as metaballs (D) and clouds drawn directly as billboards (T), which are
-// sorted and composited together. Plain data in world metres; the memory behind spans must not change until
-// the frame is finished (Renderer::finish(); draw_splats() finishes it itself).
+// The input of a frame: voxel clouds as metaballs (D) and clouds drawn directly as billboards (T;
+// docs/sources.md), which are sorted and composited together. Plain data in world metres; the memory behind
+// spans must not change until the frame is finished (Renderer::finish(); draw_splats() finishes it itself).
 
 #include <cstdint>
 #include <optional>

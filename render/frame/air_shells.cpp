@@ -163,8 +163,8 @@ class ShadeMap {
         return light;
     }
 
-    // Each metaball goes into the texel of its centre; a texel then takes those around it into account, as
-    // far as metaballs reach.
+    // Adds each metaball to the texel of its centre, then to each texel those around it within the radius of
+    // metaballs.
     std::vector<Span> spans(const PreparedCloud& cloud, const ShadowFrame& frame, const Along& along,
                             int& reach) const {
         std::vector<Span> spans(texels());
@@ -202,7 +202,7 @@ class ShadeMap {
         }
     }
 
-    // The shade grows evenly over the length of an even cloud with the same mean and variance.
+    // Shade increases linearly over the length of a uniform cloud with the same mean and variance.
     std::vector<std::uint32_t> ranges(const PreparedCloud& cloud, const ShadowFrame& frame,
                                       const Along& along, float& first_shade) const {
         int reach = 0;
@@ -249,7 +249,7 @@ double shafts_strength(const RenderOptions& options) {
     return options.light_shafts.strength * daylight(options.sun.elevation_deg).sun;
 }
 
-// The shade map of a cloud: where along the light each of its columns begins and ends to be in shadow.
+// Computes the shade map of a cloud.
 void make_shade(const PreparedCloud& cloud, const ShadowFrame& frame, std::span<const float> shadow,
                 int shadow_size, ShadeCache& kept) {
     if (cloud.visible.empty()) {  // full light
@@ -270,7 +270,7 @@ void make_shade(const PreparedCloud& cloud, const ShadowFrame& frame, std::span<
     ++kept.serial;
 }
 
-// Behind the shade map; without fog nothing looks there.
+// Appends the fog's noise to the shade map; without fog none is read.
 void add_fog_noise(const Fog& fog, FogNoise& noise, ShadeCache& kept) {
     if (!(fog.extinction_per_m > 0) || kept.fog_seed == fog.seed) return;
     const std::vector<std::uint32_t>& words = noise.words(fog.seed);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// D's shells: layers of air around the eye, "interleaved back to front (shell, clouds up to the next shell,
-// next shell ...)" with the clouds. See docs/air.md.
+// D's shells, for light shafts and fog: concentric layers of air around the eye, "interleaved back to front
+// (shell, clouds up to the next shell, next shell ...)". See docs/air.md; D: docs/sources.md.
 //
 // Shell k is the air between the distances ends[k - 1] and ends[k] of every ray, cut off by the ground. It is
 // composited in front of all splats whose centres are at ends[k] or beyond, and behind all others. The air
@@ -10,9 +10,10 @@
 // (render/shading/shells.glsl, shells-inl.h), so that nothing pops when a splat crosses from one shell into
 // another.
 //
-// The shade map gives the light that a shell loses: the mean of the shadow map over a few texels, and for
-// each texel the heights at which its shade begins and is complete (with a low sun: the distances along the
-// light). Air above the clouds is sunlit. Private to the module.
+// The light that clouds remove from a shell is computed by the shade map, a coarser shadow map with depth:
+// each texel has the mean of the shadow map over a few texels, and the heights at which shade begins and is
+// complete (with a low sun: the distances along the light), so that air above the clouds is sunlit. Private
+// to the module.
 
 #include <array>
 #include <cstdint>

@@ -47,7 +47,7 @@ struct Texel {
     double opacity = 0, brightness = 1;
 };
 
-// A ball of haze whose rim is torn a little.
+// Evaluates the soft texture: a ball of haze with a slightly ragged rim.
 Texel soft_billboard(std::uint32_t seed, double x, double y) {
     const double ragged = fractal_noise(seed, 2.2 * x + 9, 2.2 * y + 9, 5) - 0.5;
     const double fine = fractal_noise(seed + 7, 5 * x + 31, 5 * y + 31, 4) - 0.5;
@@ -130,7 +130,7 @@ BillboardLevel finest_level() {
     return level;
 }
 
-// Mean opacity of 2x2 texels.
+// Computes the next level: the mean of 2x2 texels.
 BillboardLevel coarser(const BillboardLevel& fine) {
     BillboardLevel level{fine.side / 2, {}};
     const std::size_t side = std::size_t(fine.side), layers = fine.texels.size() / (2 * side * side);

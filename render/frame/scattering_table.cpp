@@ -14,14 +14,14 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr std::size_t kAngles = shader::kScatterAngles, kDepths = shader::kScatterDepths;
 
-// The inverse of shader::scatter_column().
+// Inverts shader::scatter_column().
 double cosine_of_column(std::size_t column) {
     const double place = double(column) / double(kAngles - 1);
     const double v = 2 * std::min(place, 1 - place);
     return (place <= 0.5 ? 1 : -1) * (1 - v * v * v * v);
 }
 
-// The inverse of shader::scatter_row().
+// Inverts shader::scatter_row().
 double depth_of_row(std::size_t row) {
     return std::exp2(double(row) / double(shader::kScatterRowsPerDoubling)) - 1;
 }

@@ -180,7 +180,7 @@ class Collector {
         return fitted;
     }
 
-    // `reach` times the radius is what the splat covers; no radius is less than `least_pixels`.
+    // Tests the visibility of a splat of `reach` times the radius, at least `least_pixels`.
     bool sees(const Vec3& centre, double radius, double reach, double least_pixels, float& distance_m) const {
         const Vec3 offset = centre - eye_;
         const double distance = std::sqrt(dot(offset, offset));
@@ -212,7 +212,7 @@ class Collector {
         return result;
     }
 
-    // The level with about a texel a pixel.
+    // Returns the mip level with about one texel per pixel.
     int level_of(const Drawn& drawn) const {
         const double pixels =
             2 * std::max(drawn.half_width_m, drawn.half_height_m) * pixels_per_unit_ / drawn.depth_m;
@@ -222,7 +222,7 @@ class Collector {
         return level;
     }
 
-    // One more splat, the next of its kind from far to near.
+    // Extends the runs by the next splat of a kind, from far to near.
     void extend(ViewSortedSplats& order, SplatKind kind) {
         std::uint32_t& next = kind == SplatKind::billboard ? runs_billboards_ : runs_balls_;
         if (order.runs.empty() || order.runs.back().kind != kind) order.runs.push_back({next, next, kind});
@@ -238,7 +238,7 @@ class Collector {
                radius * pixels_per_unit_ <= 60000.0 * depth;
     }
 
-    // Without its light.
+    // Returns a metaball in camera space, without its light.
     shader::ViewBall view_ball(std::uint32_t source) const {
         const Metaball& ball = cloud_.metaballs[cloud_.visible[source]];
         const Vec3 offset = Vec3{ball.x, ball.y, ball.z} - eye_;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// View-sorted splats: metaballs and billboards in one order, farthest from the eye first, the input of every
-// back-end. Private to the module.
+// Culls metaballs and billboards to the view and sorts both into one order, farthest from the eye first: the
+// input of the back-ends. Private to the module.
 //
 // The order is total: equal distances are ordered by index, billboards before metaballs, so images do not
 // depend on the sort algorithm.
@@ -19,8 +19,8 @@
 namespace nephos {
 
 enum class SplatKind {
-    metaball,             // shader::ViewBall, by the attenuation textures
-    integrated_metaball,  // shader::ViewBall with shader::kIntegrate, integrated per pixel
+    metaball,             // shader::ViewBall; `blended` draws it with an attenuation texture
+    integrated_metaball,  // shader::ViewBall with shader::kIntegrate: opacity is integrated per pixel
     billboard,            // shader::ViewBillboard
     shell,                // a shell of air (air_shells.h), not a splat; never in ViewSortedSplats::runs
 };

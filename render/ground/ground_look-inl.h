@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How wet ground, water and snow reflect light, for vectors of pixels; wet_ground.h says what is made of it.
+// Reflectance of wet ground, water and snow, for SIMD vectors of pixels; see wet_ground.h.
 
 #if defined(NEPHOS_RENDER_GROUND_LOOK_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_RENDER_GROUND_LOOK_INL_H_
@@ -31,7 +31,7 @@ HWY_INLINE Floats water_reflectance(Floats cosine, Floats slope_variance) {
                       set(kWaterNormalReflectance));
 }
 
-// wet_albedo() of wet_ground.h without the share of light that gets in and out.
+// soaked_albedo() of wet_ground.h.
 HWY_INLINE Floats3 soaked_albedo(const shader::vec4& dry) {
     const auto of = [](float albedo) { return set(float(nephos::soaked_albedo(double(albedo)))); };
     return {of(dry.x), of(dry.y), of(dry.z)};
@@ -45,7 +45,7 @@ HWY_INLINE Floats covered(Floats film_mm, float half_mm, const ResolvedNoise& no
     const Floats level =
         hn::Mul(hn::Log(Lanes(), hn::Mul(film, set(1.0f / half_mm))), set(1.0f / kFilmSpread));
     const Floats deviation = hn::Sqrt(hn::Add(noise.variance, set(kSharpness * kSharpness)));
-    // As far as exp() goes: a film of nanometres is thousands of deviations away.
+    // Clamped to the range of exp(): a film of nanometres is thousands of deviations away.
     const Floats x = hn::Max(hn::Div(hn::Sub(level, noise.value), deviation), set(-50.0f));
     // The normal distribution's integral, within 0.01.
     const Floats share = hn::Div(set(1.0f), hn::Add(set(1.0f), hn::Exp(Lanes(), hn::Mul(set(-1.702f), x))));
@@ -57,7 +57,7 @@ struct Mirrored {
     Floats transmittance;
 };
 
-// One level of the mirrored view between four texels; u and v are 0..1.
+// Samples one level of the mirrored view bilinearly; u and v are 0..1.
 HWY_INLINE Mirrored mirrored_level(const MirrorView& view, hn::Vec<Ints> first, hn::Vec<Ints> width,
                                    hn::Vec<Ints> height, Floats u, Floats v) {
     const Lanes d;
@@ -85,7 +85,7 @@ HWY_INLINE Mirrored mirrored_level(const MirrorView& view, hn::Vec<Ints> first, 
     return {{channel(0), channel(1), channel(2)}, channel(3)};
 }
 
-// What comes along a mirrored direction (upwards), blurred over a cone of `blur` radians.
+// Samples the mirrored view along a reflected direction (upwards), blurred over a cone of `blur` radians.
 HWY_INLINE Mirrored mirrored(const MirrorView& view, const Floats3& direction, Floats blur) {
     const Lanes d;
     const Ints di;

@@ -32,14 +32,15 @@ HWY_INLINE Floats smooth_step(Floats low, Floats high, Floats x) {
 }
 HWY_INLINE Floats lerp(Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); }
 
-// A floor as a cell's number modulo 2^32; far points, which no octave resolves, have any.
+// Returns a cell's number modulo 2^32 from its floor; undefined for far points, which no octave resolves.
 HWY_INLINE Hash cell_of(Floats floor, std::uint32_t first) {
     const Floats far = set(1.0e9f);
     const auto near = hn::ConvertTo(Ints(), hn::Min(hn::Max(floor, hn::Neg(far)), far));
     return hn::Add(hn::BitCast(Words(), near), hn::Set(Words(), first));
 }
 
-// Gradients, uniform in a square, from the two halves of a hash; times the way from their corner.
+// Returns the dot product of a gradient, uniform in a square by the two halves of a hash, with the offset
+// from its lattice point.
 HWY_INLINE Floats slope_along(Hash hash, Floats x, Floats y) {
     const Ints di;
     const auto component = [&](Hash bits) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What still water mirrors: the view of a camera below the ground, mirrored at its plane. A ray that the
-// water reflects goes on, mirrored, straight through the plane, so this second eye sees clouds just where
-// their mirror images stand, at any distance. Ripples turn reflected rays out of that direction a little, and
-// see what stands there in this view. Private to the module.
+// Planar reflections: the view of the camera mirrored at the plane of the ground. A reflected ray, mirrored,
+// continues straight through the plane, so that this camera sees the mirror images of clouds at their right
+// positions, at any distance. Rays reflected by ripples sample this view in their perturbed direction.
+// Private to the module.
 
 #include <vector>
 
@@ -13,11 +13,11 @@
 
 namespace nephos {
 
-// Wider than the camera's view by a margin for what ripples turn away, with `scale` of its resolution.
+// Returns the mirrored camera, with `scale` of the resolution and a margin for perturbed rays.
 Camera mirrored_camera(const Camera& camera, double ground_m, double scale);
 
-// Its picture in ever coarser levels, each half of the one before, for reflections that are blurred: radiance
-// and the clouds' transmittance, four floats a texel.
+// A mip pyramid of its picture for blurred reflections, each level half of the one before: radiance and the
+// clouds' transmittance, four floats a texel.
 struct MirrorView {
     struct Level {
         int first = 0;  // texel
@@ -29,7 +29,7 @@ struct MirrorView {
     double pixels_per_unit = 1;  // of the first level, at distance 1
 };
 
-// `picture` was drawn with `camera`.
+// Builds the pyramid of `picture`, which was drawn with `camera`.
 MirrorView mirror_view(const Picture& picture, const Camera& camera);
 
 }  // namespace nephos

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// One square of ripples spread over all water without its repetition showing: the plane is cut into hexagons,
-// each has its own piece of the square, drawn by its number, and where three meet their slopes are added with
-// weights whose squares sum to 1, which keeps the variance (Heitz and Neyret 2018). Private to the module.
+// Tiles all water with one square of ripples without visible repetition: the plane is divided into hexagons,
+// each has a random offset into the square, hashed from its number, and where three meet their slopes are
+// blended with weights whose squares sum to 1, which preserves the variance (Heitz and Neyret 2018). Private
+// to the module.
 
 #include <cstdint>
 
@@ -15,10 +16,10 @@ namespace nephos {
 
 struct RippleGrid {
     RippleSlopes slopes;      // empty without ripples
-    float strength = 0;       // of the slopes where it rains as hard as anywhere
-    float most_mm_per_h = 1;  // there
-    // The eye among the hexagons' corners (two skewed axes, whole part modulo 2^32) and in the square
-    // (texels).
+    float strength = 0;       // factor of the slopes at the map's heaviest rain
+    float most_mm_per_h = 1;  // the heaviest rain
+    // Position of the eye on the lattice of hexagons (two skewed axes, integer part modulo 2^32) and in the
+    // square (texels).
     std::uint32_t corner_x = 0, corner_y = 0;
     float from_x = 0, from_y = 0;
     float texel_x = 0, texel_y = 0;

@@ -22,7 +22,7 @@ struct Slopes {
     Floats x, y, variance;
 };
 
-// The square's slopes between four texels, its corner moved by a hash.
+// Samples the square's slopes bilinearly, with an offset by a hash.
 HWY_INLINE Slopes slopes_in_square(const RippleSlopes& slopes, Floats x, Floats y, Hash hash) {
     const Lanes d;
     const Ints di;
@@ -49,7 +49,7 @@ HWY_INLINE Slopes slopes_in_square(const RippleSlopes& slopes, Floats x, Floats 
     return {value(slopes.x), value(slopes.y), hn::Zero(d)};
 }
 
-// At points relative to the eye where pixels have this size and it rains so hard.
+// Returns the slopes at points relative to the eye, by the size of a pixel and the rain there.
 HWY_INLINE Slopes ripples_at(const RippleGrid& grid, const Floats3& point, Floats pixel_m, Floats rain) {
     const Lanes d;
     const Floats zero = hn::Zero(d), one = set(1.0f);

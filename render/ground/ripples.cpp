@@ -27,8 +27,8 @@ void pad(const float* row, PaddedRow& out) {
     out[kSide + 1] = row[0];
 }
 
-// L of a row between its neighbours: 4 of the texels beside it, 1 of those at its corners, -20 of itself,
-// by 6.
+// Computes L of a row: 1/6 of 4 times the four nearest texels, plus the four at the corners, minus 20 times
+// the texel itself.
 void laplacian_row(const std::vector<float>& z, int row, float* out) {
     PaddedRow south, middle, north;
     pad(&z[at(0, row - 1)], south);
@@ -41,14 +41,14 @@ void laplacian_row(const std::vector<float>& z, int row, float* out) {
     }
 }
 
-// Uniform in [0, 1): word `which` of drop `drop` of a step.
+// Returns word `which` of drop `drop` of a step as a uniform number in [0, 1).
 float drawn(std::int64_t step, std::uint32_t drop, std::uint32_t which) {
     std::uint32_t h = mix_bits(std::uint32_t(step) + kAxisStep);
     h = mix_bits(h + std::uint32_t(std::uint64_t(step) >> 32) + drop * kAxisStep);
     return float(mix_bits(h + which * kAxisStep) >> 8) * 0x1p-24f;
 }
 
-// An impulse whose mean is zero: (1 - q) exp(-q), q = r^2 / (2 s^2). It pushes a crown up and its rim down.
+// Adds an impulse of zero mean: (1 - q) exp(-q), q = r^2 / (2 s^2), a crown with a lower rim.
 void push(std::vector<float>& z, float x, float y, float strength) {
     constexpr int kReach = 6;
     constexpr float kWidth = 1.5f;  // s, texels

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The rings that drops make on water (S): a square of its surface that repeats in both directions, on which
+// Ripples of drops on water (S), simulated on a periodic square of its surface by the damped wave equation
 //
 //     y_tt = v^2 (y_xx + y_yy),   z = exp(-d (t - t0)) y
 //
-// for the ring z of each drop from its time t0 on: waves of every length fade alike. Steps have one fixed
-// length, below the limit of Courant, Friedrichs and Lewy, and one fixed place on the axis of time: the
-// surface at a time depends on that time alone, not on the frames drawn before, and no frame can be so long
-// that it becomes unstable. (An exact step per Fourier mode would be as stable, but costs each drop a sum
-// over all modes.) Fading makes its memory short: it is computed from rest kRippleMemory_s before, after
-// which a wave has 1.1e-7 of its height, the rounding of a float.
+// for the ripple z of each drop from its time t0 on: all wavelengths are damped alike. Steps have a fixed
+// length, below the limit of Courant, Friedrichs and Lewy, at fixed times: the surface depends on its time
+// alone, not on earlier frames, and is stable at any frame rate. (An exact step per Fourier mode would be as
+// stable, but costs a sum over all modes per drop.) Damping makes its memory short: it is computed from rest
+// kRippleMemory_s before, after which a wave has 1.1e-7 of its height, the rounding of a float.
 //
 // Leapfrog in time; in space the isotropic Laplacian of nine texels, so that rings are round:
 //
@@ -38,24 +37,25 @@ struct Ripples {
 
 Ripples still_water();
 
-// One step without drops.
+// Advances the surface by one step without drops.
 void step(Ripples& ripples);
 
-// As above, per area of a texel and unit mass; >= 0 up to rounding, and never grows without drops.
+// Returns the energy as defined above, per area of a texel and unit mass; >= 0 up to rounding, and never
+// increasing without drops.
 double energy(const Ripples& ripples);
 
-// Drops that fall within a step, of rain of `rain_mm_per_h`, at places that follow from the step's number
-// alone. Those above 1.5 mm make rings that can be seen; by Marshall and Palmer (1948) their number is
-// 8000 / L exp(-1.5 L) per cubic metre, L = 4.1 R^-0.21 per mm, and they fall at about 6.5 m/s.
+// Adds the drops of a step, of rain of `rain_mm_per_h`, at positions that depend on the step's number alone.
+// Drops above 1.5 mm make visible ripples; by Marshall and Palmer (1948) their number is 8000 / L exp(-1.5 L)
+// per cubic metre, L = 4.1 R^-0.21 per mm, and they fall at about 6.5 m/s.
 void add_drops(Ripples& ripples, std::int64_t step, double rain_mm_per_h);
 
-// The surface at a time, `before` at the step at or before it, `now` at the next one, after steady rain for
-// `history_s`. A pure function.
+// Returns the surface at a time after steady rain for `history_s`: `before` is the step at or before the
+// time, `now` the next one. Pure.
 Ripples ripples_at(double time_s, double rain_mm_per_h, double history_s = kRippleMemory_s);
 
-// What the picture needs: slopes, texel after texel, and the mean of their squares.
+// The slopes of a surface, row after row, and the mean of their squares, for shading.
 struct RippleSlopes {
-    std::vector<float> x, y;  // kRippleTexels^2, of the surface at the time itself
+    std::vector<float> x, y;  // kRippleTexels^2, interpolated to the time itself
     double variance = 0;      // mean of x^2 + y^2
 };
 RippleSlopes ripple_slopes(double time_s, double rain_mm_per_h);

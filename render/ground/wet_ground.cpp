@@ -32,7 +32,7 @@ struct CoverTexels {
     float from_x = 0, from_y = 0, per_x = 0, per_y = 0;
 };
 
-// What all pixels share.
+// The state shared by all pixels.
 struct GroundPass {
     const WetGroundOptions* look = nullptr;
     PictureFrame white;  // of ground with an albedo of 1
@@ -56,7 +56,7 @@ struct Lying {
     Floats water_mm, snow_mm, rain_mm_per_h;
 };
 
-// What lies at points: the map between four texels, towards its edge and beyond it what lies outside.
+// Samples the map bilinearly at points; it fades to the outside values towards its edge.
 HWY_INLINE Lying lying_at(const CoverTexels& texels, const Floats3& point) {
     const Lanes d;
     const Ints di;
@@ -98,8 +98,9 @@ struct Seen {
     Floats pixel_m;                  // size of the pixel there, the geometric mean of both directions
 };
 
-// Light that a surface of this roughness reflects from the sky to the eye, behind the air: what arrives from
-// clouds has come through the air before the ground already.
+// Returns the light that a surface of this roughness reflects to the eye. Light of the sky is attenuated by
+// the air in front of the ground; light of clouds in the mirrored view has passed that air, whose own light
+// is subtracted.
 HWY_INLINE Floats3 reflected(const GroundPass& pass, const Seen& seen, const Floats3& direction,
                              Floats blur) {
     const Mirrored view = mirrored(*pass.mirror, direction, blur);
@@ -130,7 +131,7 @@ struct Surface {
     Floats3 reflected;  // light, behind the air
 };
 
-// Wet soil and puddles.
+// Computes the surface of wet soil and puddles.
 HWY_INLINE Surface wet_surface(const GroundPass& pass, const Seen& seen, const Lying& lying,
                                const ResolvedNoise& hollows) {
     const WetGroundOptions& look = *pass.look;
@@ -182,7 +183,7 @@ HWY_INLINE void lay_snow(const GroundPass& pass, const Seen& seen, const Lying& 
     surface.reflected = times(hn::Sub(one, white), surface.reflected);
 }
 
-// What pixels have more than with dry ground, without the clouds before it.
+// Returns the difference of radiance to dry ground, without the clouds in front.
 HWY_INLINE Floats3 changed(const GroundPass& pass, const Floats3& direction) {
     const Lanes d;
     const Floats squared = dot(direction, direction);
@@ -251,7 +252,7 @@ bool any(std::span<const float> values) {
 
 bool any_water(const GroundCoverView& cover) { return cover.outside_water_mm > 0 || any(cover.water_mm); }
 
-// Whether a corner of the picture, and with it anything, looks below the horizon of the plane.
+// Returns true when a corner of the image, and hence any ray, points below the horizon of the plane.
 bool ground_in_view(const RenderOptions& options) {
     const Camera& camera = options.camera;
     const CameraFrame frame = camera_frame(camera);

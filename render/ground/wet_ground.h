@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Wet and snowy ground in a finished picture. The ground lies behind everything else, so what it looks like
-// can be exchanged afterwards:
+// Wet and snowy ground in a finished picture. The ground is behind everything else, so its light can be
+// replaced afterwards:
 //
 //     beauty += transmittance * (beta * (ground now - dry ground) + reflected light)
 //
-// per pixel that sees ground, with the picture's own transmittance of the clouds and beta of the air. One
-// code on the processor thus serves all ways of drawing, which agree as well as they did before; and what is
-// in front (air, clouds, rain) needs to know nothing of it. The sun's shadow lies on wet ground and on snow
-// as on dry ground: all are lit by the light of the picture's ground, of albedo 1.
+// per pixel on the ground, with the picture's transmittance of the clouds and beta of the air. One
+// implementation on the processor thus serves all back-ends, which agree as well as without it, and is
+// independent of air, clouds and rain in front. Shadows on wet ground and snow are those of dry ground: all
+// are lit by the light of the picture's ground of albedo 1.
 //
 // At a point with a film of V mm of water and W mm of water in the snow:
 //
-//     soaked       by 1 - exp(-V / soaking_mm) from dry to soaked_albedo()
-//     under water  where noise, the depth of the hollows, lies below V: covered_share() on the average
-//     white        where another noise, the height of tufts, lies below W
+//     soaked       interpolates by 1 - exp(-V / soaking_mm) from dry to soaked_albedo()
+//     under water  where noise, the depth of the hollows, is below V: covered_share() in the mean
+//     white        where another noise, the height of tufts, is below W
 //
-// Water reflects the mirrored view (mirror_view.h) by water_reflectance() of its angle, with the slopes of
-// ripples; where these are too small for a pixel they make the surface rough instead. Wet soil does the same
-// weakly and much blurred. Private to the module.
+// Water reflects the mirrored view (mirror_view.h) by water_reflectance() of the angle, with the slopes of
+// ripples; ripples too small for a pixel are roughness instead. Wet soil reflects weakly and much blurred.
+// Internal to this source tree.
 
 #include <optional>
 
@@ -31,42 +31,43 @@
 
 namespace nephos {
 
-// Of water at normal incidence, ((n - 1) / (n + 1))^2 with n = 1.333.
+// Reflectance of water at normal incidence, ((n - 1) / (n + 1))^2 with n = 1.333.
 inline constexpr float kWaterNormalReflectance = 0.0204f;
-inline constexpr float kFilmSpread = 0.6f;  // of the logarithm of the hollows' depths: standard deviation
+inline constexpr float kFilmSpread = 0.6f;  // standard deviation of the logarithm of the hollows' depths
 
-// Fresnel reflectance of water whose slopes have this variance, seen at this cosine from above, averaged over
-// the slopes that can be seen: Bruneton, Neyret and Holzschuch 2010, section 5; Schlick's for variance 0.
+// Returns the Fresnel reflectance of water with a variance of slopes at a cosine of the angle of view from
+// above, averaged over the visible slopes: Bruneton, Neyret and Holzschuch 2010, section 5; Schlick's for
+// variance 0.
 double water_reflectance(double cosine, double slope_variance);
 
-// Light that soaked ground scatters, of what gets through the surface of its film: light on its way out is
-// reflected back down with the probability p = 1 - (1 - 0.066) / n^2 and gets another chance to be absorbed,
-// (1 - p) a / (1 - p a) for the dry albedo a. Lekner and Dorf 1988, with Angstrom's absorption.
+// Returns the albedo of soaked ground for light that has passed the surface of its film: outgoing light is
+// reflected back down with the probability p = 1 - (1 - 0.066) / n^2, which gives (1 - p) a / (1 - p a) for
+// the dry albedo a. Lekner and Dorf 1988, with Angstrom's absorption.
 double soaked_albedo(double dry_albedo);
 
-// Share of level ground below a film, half of which is below `half_mm`.
+// Returns the fraction of level ground that a film covers; one half at `half_mm`.
 double covered_share(double film_mm, double half_mm);
 
-// Whether there is anything to draw: water, snow, and ground in view.
+// Returns true when water or snow and ground are in view.
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover);
-// Whether it needs a mirrored view.
+// Returns true when reflections need a mirrored view.
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover);
 
 struct WetGround {
     const RenderOptions& options;
     const GroundCoverView& cover;
-    const Flash* flash = nullptr;        // null in the dark
+    const Flash* flash = nullptr;        // null without lightning
     double time_s = 0;                   // of the ripples
     const MirrorView* mirror = nullptr;  // null: no reflections
-    const float* shadow = nullptr;       // the map that the ground wears, known where the picture shows it
+    const float* shadow = nullptr;       // shadow map, valid on visible ground
     int shadow_size = 0;
     const SkyLight* sky = nullptr;  // of the picture; null: gradient
 };
 
-// Rows in parallel; the result does not depend on the number of threads.
+// Replaces the light of the ground, rows in parallel; the result does not depend on the number of threads.
 void draw_wet_ground(const WetGround& ground, Picture& picture);
 
-// Throws Error(usage) naming the first value that is not as ground_cover_view.h wants it.
+// Throws Error(usage) naming the first value out of the range in ground_cover_view.h.
 void check(const GroundCoverView& cover);
 
 }  // namespace nephos

@@ -98,7 +98,7 @@ std::string attribute_text(const Imf::Attribute& attribute) {
     return std::string("<") + attribute.typeName() + ">";
 }
 
-// The attributes that every file has and that are told in other fields of ExrPart.
+// Returns true for attributes that other fields of ExrPart contain.
 bool is_structural(const std::string& name) {
     for (const char* known :
          {"channels", "compression", "dataWindow", "displayWindow", "lineOrder", "name", "pixelAspectRatio",

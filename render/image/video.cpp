@@ -48,7 +48,7 @@ class Encoder {
     Encoder(const Encoder&) = delete;
     Encoder& operator=(const Encoder&) = delete;
 
-    // Left without finish(): something failed elsewhere, and the command has nothing more to do.
+    // Without finish() an error has occurred elsewhere: kills the command.
     ~Encoder() {
         if (child_ <= 0) return;
         ::kill(child_, SIGKILL);
@@ -93,7 +93,8 @@ class Encoder {
         ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
         ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
         ::posix_spawn_file_actions_adddup2(&actions, messages_.get(), STDERR_FILENO);
-        // A Ctrl-C at the terminal is for the program that asked for the video, which then ends the command.
+        // A process group of its own: Ctrl-C at the terminal signals the calling program, which then ends
+        // ffmpeg.
         ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
         const int error =
             ::posix_spawnp(&child_, arguments[0], &actions, &attributes, arguments.data(), environ);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Options of rendering: camera, light, air, ground, precipitation; plain data in world units. Colours are
-// linear RGB (Rec. 709 primaries); radiance 1 is that of a white (Lambertian) surface that faces a sun of
-// colour 1.
+// Options of rendering (D, T, S, P: docs/sources.md): camera, light, air, ground, precipitation; plain data
+// in world units. Colours are linear RGB (Rec. 709 primaries); radiance 1 is that of a white (Lambertian)
+// surface that faces a sun of colour 1.
 
 #include <array>
 #include <optional>
@@ -63,7 +63,7 @@ enum class Lighting {
     cfa,         // T's light absorption factor over blocks of voxels (voxel_absorption.h)
 };
 
-// How a cloud scatters light (D: the colour of a metaball). With the defaults a thick cloud top in the sun
+// Scattering of light in clouds (D: the colour of a metaball). With the defaults a thick cloud top in the sun
 // has a radiance of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
     double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker

@@ -19,7 +19,7 @@ double slope_of(PrecipitationKind kind, double rate) {
 
 double drawn_slope(PrecipitationKind kind) { return slope_of(kind, kHeaviest_mm_per_h[int(kind)]); }
 
-// Of exp(-slope D) f(D) over all diameters, by Simpson's rule.
+// Integrates exp(-slope D) f(D) over all diameters by Simpson's rule.
 template <class F>
 double integral(double slope, F&& f) {
     constexpr int kIntervals = 400;
@@ -33,7 +33,7 @@ double integral(double slope, F&& f) {
     return sum * kStep / 3;
 }
 
-// What one particle per m^3 of a size brings to the ground, mm/h: 1 mm^3/m^3 m/s = 3.6e-3 mm/h.
+// Returns the flux of one particle per m^3 of a size, mm/h: 1 mm^3/m^3 m/s = 3.6e-3 mm/h.
 double flux_of(PrecipitationKind kind, double d) {
     return 3.6e-3 * kPi / 6 * d * d * d * fall_speed_m_per_s(kind, d);
 }

@@ -24,19 +24,19 @@ constexpr double kMostSize[2] = {1e6, 1.5};  // s0; flakes are large enough as t
 constexpr double kMostPixels = 2;            // width of a far streak
 constexpr double kOpacityAtEye = 0.5;
 constexpr double kFlicker = 0.25;
-constexpr double kNumberFade = 0.1;  // share of the particles that fade when their number falls
+constexpr double kNumberFade = 0.1;  // fraction of the particles that fade when their number decreases
 
 // Far from overflow, which std::hypot() takes its time to rule out.
 double flat_length(double x, double y) { return std::sqrt(x * x + y * y); }
 
-// What all particles of a pass share.
+// The state shared by all particles of a pass.
 struct Pass {
     const Particles& particles;
     const ParticlePass& pass;
     const StreakView& view;
     double pixels_per_unit = 1;
     double size = 1;      // s0
-    double sunlight = 1;  // share of the sun's light in the container
+    double sunlight = 1;  // transmitted fraction of sunlight at the container
     bool snow = false;
 };
 
@@ -55,8 +55,8 @@ Sway sway_of(std::size_t i, double diameter_mm, double time_s) {
             0.7 + 0.3 * std::cos(2.3 * angle + start)};
 }
 
-// Real particles per m^3 at a place by drawn ones per m^3: the strongest rain there, less what another pass
-// draws.
+// Returns the ratio of real to drawn particles per m^3 at a point: of the strongest rain there, less the part
+// that another pass draws.
 double real_particles(const ParticlePass& pass, const PrecipitationOptions& p, const Vec3& place,
                       double d_mm) {
     const auto strongest = [&](const std::vector<CurtainTerm>& terms) {
@@ -78,7 +78,7 @@ double real_particles(const ParticlePass& pass, const PrecipitationOptions& p, c
 
 double linear(double low, double high, double x) { return std::clamp((x - low) / (high - low), 0.0, 1.0); }
 
-// How much of a particle is there: by its reach, the container's top and bottom, the eye, the number.
+// Returns the fade weight of a particle: by its reach, the container's top and bottom, the eye, the number.
 double presence(const Pass& p, std::size_t i, double d, double z, double distance_m) {
     const double reach = double(p.particles.reach[i]);
     double share = p.pass.share * std::min(1.0, (reach - d) / (kFadeShare * reach));
@@ -95,14 +95,14 @@ struct Ends {
     PixelPosition from, to;
 };
 
-// Shutter open to shutter closed, as the moving camera sees it.
+// Returns the projections of a particle at the opening and closing of the shutter, with the camera's motion.
 Ends ends_of(const Pass& p, const Vec3& place, const Vec3& velocity) {
     const Vec3 half = (0.5 * p.view.options.precipitation.exposure_s) * velocity;
     const Camera& camera = p.view.options.camera;
     return {project(p.view.opening, camera, place - half), project(p.view.closing, camera, place + half)};
 }
 
-// Drawn out from their middle to a length in pixels; upright where they coincide.
+// Extends a streak about its middle to a least length in pixels; vertical where its ends coincide.
 Ends at_least(const Ends& e, double length) {
     double dx = e.to.x - e.from.x, dy = e.to.y - e.from.y;
     const double span = flat_length(dx, dy);
@@ -119,7 +119,7 @@ bool beside_picture(const Ends& e, double margin, const Camera& camera) {
            std::max(e.from.y, e.to.y) < -margin || std::min(e.from.y, e.to.y) > camera.height + margin;
 }
 
-// Velocity of the image of a particle while it is exposed; flakes show as such and not as streaks (S).
+// Returns the velocity of a particle for motion blur; flakes have no streaks (S).
 Vec3 velocity_of(const Pass& p, std::size_t i, const Sway& sway, double width_m) {
     Vec3 v{p.view.wind_x_m_per_s, p.view.wind_y_m_per_s, -double(p.particles.speed[i])};
     if (!p.snow) return p.size * v;
@@ -180,7 +180,7 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     out.push_back(streak);
 }
 
-// s0: see the header. Of a particle of the size that takes the most light, at the eye.
+// Returns s0 (see the header), for a particle of the size with the greatest extinction, at the eye.
 double size_at_eye(const Particles& particles, const ParticlePass& pass, const StreakView& view) {
     const PrecipitationOptions& p = view.options.precipitation;
     double largest = 1;
@@ -201,7 +201,7 @@ double size_at_eye(const Particles& particles, const ParticlePass& pass, const S
 }  // namespace
 
 double drawn_per_m3(std::size_t count, const ParticleBoxes& boxes, double d) {
-    // The integral of 3 e^2 / (4 e^2) from d to 1, where what fades in counts by its share.
+    // The integral of 3 e^2 / (4 e^2) from d to 1, with the fade weights of particles near their reach.
     const double left = d <= 1 - kFadeShare ? 1 - d - 0.5 * kFadeShare / (1 - kFadeShare) * d
                                             : (1 - d) * (1 - d) * (1 - kFadeShare) / (2 * kFadeShare * d);
     return 0.75 * double(count) * std::max(left, 0.01) / (boxes.depth_m * boxes.depth_m * boxes.height_m);

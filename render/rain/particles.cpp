@@ -15,7 +15,7 @@ using Doubles = hn::ScalableTag<double>;
 using Floats = hn::Rebind<float, Doubles>;  // as many
 using DoubleVector = hn::Vec<Doubles>;
 
-// The fraction of a number less a half: -0.5 .. 0.5.
+// Returns the fractional part less a half: -0.5 .. 0.5.
 HWY_INLINE DoubleVector centred_fraction(DoubleVector v) {
     const Doubles d;
     return hn::Sub(hn::Sub(v, hn::Floor(v)), hn::Set(d, 0.5));

@@ -67,7 +67,7 @@ std::vector<ParticlePass> particle_passes(const RenderOptions& options, const Ca
             pass_of(rain_container(*near.front().curtain, camera, p.margin_m, far_depth), p.depth_m, 1));
         passes.back().rain = near;
     }
-    // Where areas overlap it rains as in the strongest, so an area outside adds only what those before lack.
+    // Where areas overlap the strongest rain counts, so an area adds only what exceeds those before it.
     std::vector<CurtainTerm> before = near;
     for (std::size_t i = 0; i < far.size(); ++i) {
         const RainShares shares = rain_shares(p, outside[i].outside_m);

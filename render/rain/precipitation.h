@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Rain and snow in a finished picture (P, S): shafts below distant clouds (rain_shafts.h), and particles near
-// the eye as streaks or flakes (particles.h, streak_overlay.h). What is drawn is a function of options,
-// weather and time alone, and lies over the picture by its depth and transmittance: the same code for all
-// ways of drawing clouds, far rain behind nearer clouds.
+// Rain and snow, composited over a finished picture (P, S, docs/sources.md): shafts below distant clouds
+// (rain_shafts.h), and particles near the eye as streaks or flakes (particles.h, streak_overlay.h). They
+// depend on options, weather and time alone, and use the picture's depth and transmittance, so that all
+// back-ends share the code, and far rain is behind nearer clouds.
 //
-// An area that the eye is in has its particles around the eye. Where the eye leaves it they stay at the
-// perimeter and fade with the distance, while the larger particles of far rain appear, between ground and
-// cloud; their number falls with the distance until the shaft alone is left. All of that is continuous in the
-// place of the eye, and particles have their places in the world: nothing jumps.
+// An area that contains the eye has its particles around the eye. When the eye leaves it they stay at the
+// perimeter and fade with the distance, while the larger particles of far rain appear between ground and
+// cloud; their number falls with the distance until the shaft alone remains. All of that is continuous in the
+// position of the eye, and particles are fixed in the air: nothing pops.
 
 #include <cstdint>
 #include <optional>
@@ -22,27 +22,28 @@
 
 namespace nephos {
 
-// Where it rains at the time of a picture. Plain data.
+// The rain at the time of a frame. Plain data.
 struct Weather {
     std::uint64_t seed = 0;
     std::vector<RainCurtain> curtains;
     double wind_x_m_per_s = 0, wind_y_m_per_s = 0;  // near the ground, times PrecipitationOptions::wind_drift
-    double carried_x_m = 0, carried_y_m = 0;        // the way of the air since time 0, likewise
+    double carried_x_m = 0, carried_y_m = 0;        // displacement of the air since time 0, likewise
 };
 
+// Draws precipitation; caches the particles from frame to frame. Not thread-safe.
 class PrecipitationPainter {
   public:
-    // Draws into the beauty layer; nothing unless options.precipitation.enabled. The picture must be that of
-    // options.camera at the time (camera_at()), with its depth. Throws as check(RenderOptions).
+    // Composites into the beauty layer if options.precipitation.enabled, else does nothing. The picture must
+    // be that of options.camera at the time (camera_at()), with its depth. Throws as check(RenderOptions).
     void draw(Picture& picture, const RenderOptions& options, const Weather& weather, double time_s);
 
-    // Streaks that the last draw() drew.
+    // Returns the number of streaks of the last draw().
     std::size_t streaks() const { return streaks_; }
 
   private:
     const Particles& particles(PrecipitationKind kind, std::uint64_t seed, std::size_t count);
 
-    // Kept from picture to picture.
+    // Cached from frame to frame.
     std::optional<Particles> particles_;
     std::uint64_t seed_ = 0;
     std::size_t streaks_ = 0;

@@ -21,7 +21,7 @@ double particle_phase(PrecipitationKind kind, double cosine) {
 
 constexpr double kSkyShare[2] = {0.68, 0.8};  // of a drop's and a flake's light, the rest is the ground's
 
-// A mean of the picture's pixels, with a share of what the options say, which steps in where there are none.
+// A weighted mean of the picture's pixels and of a value by the options, which replaces missing pixels.
 struct Mean {
     Rgb sum{};
     double weights = 0;

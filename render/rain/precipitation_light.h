@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Light that rain and snow send to the eye. Private to the module.
+// Radiance of rain and snow. Private to the module.
 
 #include "render/image/picture.h"
 #include "render/options/camera.h"
@@ -9,9 +9,9 @@
 
 namespace nephos {
 
-// What lights the particles of one picture.
+// The light on the particles of one frame.
 struct PrecipitationLight {
-    Rgb surroundings{};  // mean radiance of what a particle shows: sky and clouds, and ground
+    Rgb surroundings{};  // mean radiance that a particle refracts: of sky and clouds, and ground
     Rgb sun{};           // radiance of a white surface that faces the sun, without clouds
     Vec3 to_sun{0, 0, 1};
     Rgb flash{};  // of lightning: the same at 1 km from it
@@ -20,28 +20,27 @@ struct PrecipitationLight {
     PrecipitationKind kind = PrecipitationKind::rain;
 };
 
-// The surroundings are taken from the picture itself, before any rain is in it: a drop refracts light of a
-// wide angle, upside down (Garg and Nayar 2007), and shows whatever sky, clouds and ground there are. Sky and
-// ground count by shares that make drops bright before the ground and a little dark before the sky, as
-// seen; where the picture shows little of one of them, the sky of the options and the ground in its light
-// step in.
+// Computes the light from a picture without rain: a drop refracts a wide-angle view of its surroundings
+// upside down (Garg and Nayar 2007). Sky and ground have weights that make drops bright before the ground and
+// a little dark before the sky, as observed; a picture with little of either is complemented by the sky of
+// the options and the ground in its light.
 PrecipitationLight precipitation_light(const Picture& picture, const RenderOptions& options,
                                        const CameraFrame& camera, double time_s);
 
-// That of the picture, or where it has none of the options' gradient.
+// Returns Picture::air, or if there is none the air of the options' gradient.
 PictureAir air_of(const Picture& picture, const RenderOptions& options);
 
-// The share of the sunlight that reaches a place past the clouds: the picture's shadow map, which holds what
-// is in front of all of it; places above the clouds' shadow are taken to be in it, too.
+// Returns the fraction of sunlight that reaches a point, by the picture's shadow map. The map is for points
+// below all clouds; points between or above them count as shaded, too.
 float sunlight_at(const Picture& picture, const Vec3& place_m);
 
-// Drops scatter forward (Henyey and Greenstein 1941) with g = 0.85, flakes with 0.6: kForwardShare of the
-// light, and the rest evenly.
+// Phase function of particles: the fraction kForwardShare is Henyey-Greenstein with g = 0.85 for drops and
+// 0.6 for flakes, the rest isotropic.
 inline constexpr double kForwardShare = 0.8;
 double forward_g(PrecipitationKind kind);
 
-// Radiance of a particle (or of a thick curtain of them) seen along a unit ray, at a place that `sunlight`
-// (0..1) of the sun reaches: brighter against the light.
+// Returns the radiance of a particle, or of an opaque curtain of particles, along a unit ray; `sunlight`
+// (0..1): as of sunlight_at(). Brighter against the light.
 Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Vec3& place_m, double sunlight);
 
 }  // namespace nephos

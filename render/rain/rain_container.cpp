@@ -10,7 +10,7 @@
 namespace nephos {
 namespace {
 
-// A place in the ellipse's own axes.
+// Returns a point in the ellipse's own axes.
 Vec2 own(const Ellipse& e, double x, double y) {
     const double dx = x - e.x_m, dy = y - e.y_m;
     return {dx * e.axis_x + dy * e.axis_y, dy * e.axis_x - dx * e.axis_y};
@@ -50,7 +50,7 @@ Vec2 unit(double x, double y) {
     return length > 0 ? Vec2{x / length, y / length} : Vec2{1, 0};
 }
 
-// How far the ellipse reaches beyond a point of its own in a direction.
+// Returns the distance from a point inside the ellipse to its perimeter in a direction.
 double reach_beyond(const Ellipse& e, const Vec2& from, const Vec2& direction) {
     const double along = direction.x * e.axis_x + direction.y * e.axis_y;
     const double across = direction.y * e.axis_x - direction.x * e.axis_y;
@@ -65,7 +65,7 @@ Vec2 quarter_turn_nearest(double x, double y) {
 
 double on_grid(double value, double step) { return step > 0 ? step * std::round(value / step) : value; }
 
-// Whether a ray of the picture goes behind the plane through the eye across `axis`.
+// Returns true when a ray of the image points behind the plane through the eye across `axis`.
 bool sees_behind(const CameraFrame& f, const Vec2& axis) {
     for (const double right : {-1.0, 1.0}) {
         for (const double up : {-1.0, 1.0}) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Where the particles of a rain area are (P): a container, half a cylinder of elliptic base, that stands
-// around the eye in the area, or at the area's perimeter before an eye outside.
+// The container of a rain area's particles (P): half a cylinder of elliptic base, around an eye inside the
+// area, or at the area's perimeter for an eye outside.
 //
-// Everything here is a pure function of where the eye is and looks. P re-orients its container when the view
-// has turned by more than 90 degrees, which depends on how it got there; here the container takes the nearest
-// of four directions, a quarter turn apart, and as particles have their places in the world, not in the
-// container (particles.h), a turn of the container moves none that can be seen.
+// All functions are pure functions of the camera's pose. P re-orients its container when the view has turned
+// by more than 90 degrees, which depends on the camera's history; here the container has the nearest of four
+// directions, a quarter turn apart. As particles have positions in the world, not in the container
+// (particles.h), a turn of the container moves no visible particle.
 
 #include <cstdint>
 #include <span>
@@ -20,7 +20,7 @@ namespace nephos {
 
 // The curtain of rain of one area, as long as the ellipse on the ground and up to the cloud.
 struct RainCurtain {
-    std::uint64_t id = 0;           // the same area has the same id in every picture
+    std::uint64_t id = 0;           // of the area in every frame
     double x_m = 0, y_m = 0;        // centre of the ellipse on the ground, world
     double semi_a_m = 1000;         // > 0, along the axis
     double semi_b_m = 1000;         // > 0, across it
@@ -28,68 +28,67 @@ struct RainCurtain {
     double ground_m = 0,
            base_m = 0;         // world z of the ground and of the cloud's base; nothing if base <= ground
     double rate_mm_per_h = 0;  // in the middle, >= 0
-    // How far the curtain leans: metres east and north per metre of height.
+    // Inclination: metres east and north per metre of height.
     double lean_x = 0, lean_y = 0;
 };
 
-// A curtain's ellipse at a height.
+// The cross-section of a curtain at one height.
 struct Ellipse {
     double x_m = 0, y_m = 0, semi_a_m = 1, semi_b_m = 1, axis_x = 1, axis_y = 0;
 };
 Ellipse ellipse_at(const RainCurtain& curtain, double z_m);
 
-// The left side of the ellipse's equation: 0 at the centre, 1 on the perimeter.
+// Returns the left side of the ellipse's equation: 0 at the centre, 1 on the perimeter.
 double ellipse_value(const Ellipse& ellipse, double x_m, double y_m);
-// The point of the perimeter nearest to a place, to 1e-9 of the larger axis (Eberly's bisection).
+// Returns the point of the perimeter nearest to a point, to 1e-9 of the larger axis (Eberly's bisection).
 Vec2 nearest_on_perimeter(const Ellipse& ellipse, double x_m, double y_m);
-// Rain at a place as a share of that in the middle: 1, falling as 3 s^2 - 2 s^3 to 0 at the perimeter over
-// the outer `edge` (0..1) of the way.
+// Returns the rain at a point relative to that in the middle: 1, falling as 3 s^2 - 2 s^3 to 0 at the
+// perimeter over the outer fraction `edge` (0..1) of the radius.
 double rain_share(const Ellipse& ellipse, double x_m, double y_m, double edge);
 
-// The half axes of the picture's two sides on the ground: unit vectors left and right of the view, the traces
-// of the frustum's side planes. Looking steeply down or up both sides see all around: `all` is true.
+// The traces of the frustum's side planes on the ground: unit vectors left and right of the view. Where the
+// camera looks so steeply that all directions are in view, `all` is true.
 struct SideLines {
     Vec2 left{}, right{};
     bool all = false;
 };
 SideLines side_lines(const CameraFrame& frame);
 
-// Whether an upright cylinder may lie in the frustum: P's test of the perimeter point, for all of the
-// container, so that nothing of it vanishes at the side of the picture.
+// Returns true when an upright cylinder may intersect the frustum: P's test of the perimeter point, extended
+// to the whole container, so that no visible part is culled.
 bool between_sides(const CameraFrame& frame, const SideLines& lines, const Vec2& centre, double radius_m);
 
-// The part of a line from a place in a unit direction that lies in the ellipse, as distances; nothing
-// (first > last) when it passes by or lies behind.
+// The intersection of a ray with an ellipse, as distances; first > last when there is none.
 struct Crossing {
     double first = 1, last = 0;
 };
 Crossing crossing(const Ellipse& ellipse, const Vec2& from, const Vec2& direction);
 
-// The width of what the eye sees of an area down to `depth_m` behind its nearest point, across the line to
-// that point: to where the frustum's sides leave the ellipse or that depth, or where a side passes by, to the
-// end of the ellipse. It shrinks while the eye approaches.
+// The visible width of an area, across the line from the eye to its nearest point, down to `depth_m` behind
+// that point: to the points where the frustum's sides leave the ellipse or that depth, or for a side that
+// misses the ellipse to its end. It decreases as the eye approaches.
 struct VisibleWidth {
     double left_m = 0, right_m = 0;  // from the nearest point, both >= 0
 };
 VisibleWidth visible_width(const Ellipse& ellipse, const CameraFrame& frame, const Vec2& nearest,
                            double depth_m);
 
-// The container of one area in one picture.
+// The container of one area in one frame.
 struct RainContainer {
     bool near = true;      // the eye is in the area
     double outside_m = 0;  // distance of the eye from the perimeter, 0 inside
     Vec2 nearest{};        // the eye, or the perimeter point nearest to it
-    Vec2 centre;           // of the particles' wrap: `nearest` on a grid of the margin
+    Vec2 centre;           // of the particles' boxes: `nearest` on a grid of the margin
     Vec2 axis{1, 0};       // the container's direction, one of four
-    bool whole = false;    // the view is so steep that the rear half is seen, too
-    bool seen = true;      // far: whether the container passes the frustum test
+    bool whole = false;    // the view is so steep that the rear half is visible, too
+    bool seen = true;      // far: the container passes the frustum test
     VisibleWidth width;    // far
 };
 RainContainer rain_container(const RainCurtain& curtain, const CameraFrame& frame, double margin_m,
                              double radius_m);
 
-// Level of detail (P, equations 2 and 3), d = distance / depth of the container, 0..1: particles per volume
-// and size.
+// Level of detail (P, equations 2 and 3) by d = distance / depth of the container, 0..1: relative number per
+// volume, and size.
 inline double lod_number(double d) { return 1 - d; }
 inline double lod_size(double d) { return d * d; }
 

@@ -30,14 +30,14 @@ HWY_INLINE Floats clamped(Floats v, float low, float high) {
     return hn::Min(hn::Max(v, set(low)), set(high));
 }
 
-// The rays of some pixels of a row, and one curtain's part of them.
+// The intersections of the rays of some pixels of a row with one curtain.
 struct Way {
     Floats begin, end;        // distances; begin > end: none
     Floats x, y;              // of a metre in the curtain's units
     Floats level_x, level_y;  // in metres, without its lean
 };
 
-// Where rays run in the curtain.
+// Intersects rays with a curtain.
 HWY_INLINE Way way_through(const SeenCurtain& c, const Floats3& ray) {
     const Lanes d;
     const Floats zero = hn::Zero(d), one = set(1), nowhere = set(kNowhere);
@@ -46,7 +46,7 @@ HWY_INLINE Way way_through(const SeenCurtain& c, const Floats3& ray) {
     way.level_y = hn::NegMulAdd(set(c.lean_y), ray.z, ray.y);
     way.x = hn::MulAdd(set(c.ax), way.level_x, hn::Mul(set(c.ay), way.level_y));
     way.y = hn::MulAdd(set(c.bx), way.level_x, hn::Mul(set(c.by), way.level_y));
-    // From the point of the ray that is nearest to the axis: exact from far away, too.
+    // Relative to the point of the ray nearest to the axis, which is accurate from far away, too.
     const Floats a = hn::Max(hn::MulAdd(way.x, way.x, hn::Mul(way.y, way.y)), set(1e-16f));
     const Floats nearest = hn::Neg(hn::Div(hn::MulAdd(set(c.eye_x), way.x, hn::Mul(set(c.eye_y), way.y)), a));
     const Floats x = hn::MulAdd(nearest, way.x, set(c.eye_x)), y = hn::MulAdd(nearest, way.y, set(c.eye_y));
@@ -62,7 +62,7 @@ HWY_INLINE Way way_through(const SeenCurtain& c, const Floats3& ray) {
     return way;
 }
 
-// Whether some of the rays pass the circle around a curtain.
+// Returns true when some of the rays pass the circle around a curtain.
 HWY_INLINE bool may_meet(const SeenCurtain& c, const Floats3& ray, Floats level2) {
     const Floats across = hn::MulSub(set(c.centre_x), ray.y, hn::Mul(set(c.centre_y), ray.x));
     return !hn::AllFalse(Lanes(),
@@ -96,7 +96,7 @@ HWY_INLINE Grains grains_at(const SeenCurtain& c, const Way& way, Floats t) {
     return {hn::MulAdd(along, way.level_x, set(c.grain_x)), hn::MulAdd(along, way.level_y, set(c.grain_y))};
 }
 
-// The part of the texture that some steps share: denser falls.
+// Returns the factor of f, the texture's falling parts, which several steps share.
 HWY_INLINE Floats falls_at(const ShaftPass& p, const SeenCurtain& c, const Way& way, Floats rise, Floats t) {
     if (p.contrast <= 0) return set(1);
     const Grains grains = grains_at(c, way, t);
@@ -106,7 +106,7 @@ HWY_INLINE Floats falls_at(const ShaftPass& p, const SeenCurtain& c, const Way& 
     return fast_exp(hn::MulAdd(set(1.5f / 255 * p.contrast), falls, set(-0.75f * p.contrast)));
 }
 
-// Extinction of one curtain at distances along its rays, without its falls.
+// Returns the extinction of one curtain at distances along its rays, without the factor of f.
 HWY_INLINE Floats extinction(const ShaftPass& p, const SeenCurtain& c, const Way& way, Floats rise,
                              Floats t) {
     const Lanes d;
@@ -199,7 +199,7 @@ HWY_INLINE void add(Through& run, Floats depth, const Floats3& light) {
     run.transmittance = hn::Mul(run.transmittance, kept);
 }
 
-// The curtains that some rays meet, room for those of one row.
+// The curtains that some rays intersect; allocated once a row.
 struct MetCurtains {
     static constexpr std::size_t kParts = 7;
     std::vector<const SeenCurtain*> curtains;
@@ -232,8 +232,8 @@ struct MetCurtains {
     }
 };
 
-// The next of the runs that the curtains' ways cover together, after `begin` .. `end`; false when no ray has
-// one.
+// Finds for each ray the next interval of the union of the curtains' intersections after `begin` .. `end`.
+// Returns false when no ray has one.
 HWY_INLINE bool next_run(const MetCurtains& met, Floats& begin, Floats& end) {
     const Lanes d;
     const Floats nowhere = set(kNowhere), last = end;
@@ -251,7 +251,7 @@ HWY_INLINE bool next_run(const MetCurtains& met, Floats& begin, Floats& end) {
     return true;
 }
 
-// Steps along one run of every ray, or the part of it before or behind the pixels' clouds.
+// Marches one interval of every ray, or the part of it before or behind the pixels' clouds.
 HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, const Floats3& sun,
                       Floats begin, Floats end, Floats offset, Through& run) {
     const Lanes d;
@@ -299,7 +299,7 @@ HWY_INLINE Floats shaft_offsets(std::size_t x, std::size_t y) {
     return hn::MulAdd(set(0x1p-25f), fraction, set(0.25f));
 }
 
-// What the picture has at some pixels of a row.
+// The layers of the picture at some pixels of a row.
 struct Pixels {
     float* beauty;
     const float *depth_m, *transmittance;

@@ -59,7 +59,7 @@ glm::vec3 floats(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
 glm::vec3 floats(const Rgb& v) { return {float(v[0]), float(v[1]), float(v[2])}; }
 bool any(const Rgb& v) { return v[0] + v[1] + v[2] > 0; }
 
-// Place of the eye in the texture less whole rounds of the noise, so that floats resolve it.
+// Returns the position of the eye in the texture modulo the period of the noise, for the precision of floats.
 float within_noise(double cells) {
     return float(cells - kShaftNoiseSide * std::floor(cells / kShaftNoiseSide));
 }

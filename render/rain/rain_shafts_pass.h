@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the rays of a picture need of its rain shafts, in floats and relative to the eye. Private to the
-// module.
+// The parameters of a frame's rain shafts for the SIMD kernel, in floats and relative to the eye. Private to
+// the module.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace nephos {
 
-// A curtain as the rays of one picture meet it: in units of its semi-axes, without its lean.
+// A curtain for intersection with rays: in units of its semi-axes, without its lean.
 struct SeenCurtain {
     float eye_x = 0, eye_y = 0, eye_z = 0;            // in units; metres above the ground
     float ax = 1, ay = 0, bx = 0, by = 1;             // from metres to units
@@ -27,7 +27,7 @@ struct SeenCurtain {
     float fall = 0, per_fall = 1 / kShaftFallCell_m;  // of the texture, likewise
 };
 
-// What all rays of a picture share.
+// The parameters shared by all rays of a frame.
 struct ShaftPass {
     glm::vec3 forward{}, right{}, up{};  // of the camera; right and up to the sides of the picture
     std::size_t width = 0;

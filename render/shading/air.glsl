@@ -11,7 +11,8 @@ vec3 sky_layer(vec2 place, float layer) {
     return textureLod(sky_tables, vec3((place * (texels - 1.0) + 0.5) / texels, layer), 0.0).rgb;
 }
 
-// Radiance of the sky along a ray; below the horizon along the ray mirrored in it, with its own angle to the sun.
+// Returns the radiance of the sky along a ray; below the horizon along the ray mirrored at it, with its own angle to
+// the sun.
 vec3 sky_scattered(vec3 ray) {
     vec2 sun = frame.to_sun.xy;
     float across = dot(ray.xy, sun) * inversesqrt(max(dot(ray.xy, ray.xy) * dot(sun, sun), 1.0e-12));
@@ -19,22 +20,22 @@ vec3 sky_scattered(vec3 ray) {
     return sky_layer(place, 0.0) + particle_phase(dot(frame.to_sun.xyz, ray), frame.air.y) * sky_layer(place, 1.0);
 }
 
-// Colour of the unshaded sun at a height above the eye in metres: the radiance of a white surface that faces it.
+// Returns the radiance of a white surface that faces the unshaded sun at a height above the eye in metres.
 vec3 sunlight_at(float height) {
     if (!kPhysicalSky) return frame.sunlight.rgb;
     return sky_layer(vec2(clamp((frame.air.x + height) / kSunlightTop, 0.0, 1.0), 0.0), 2.0);
 }
 
-// Share of the light of a thing that arrives over a distance in metres: D's beta. With tables the air is two layers
-// over a flat Earth.
+// Returns the transmittance of the air over a distance in metres: D's beta. With tables the air is two exponential
+// layers over a flat Earth.
 vec3 air_transmittance(vec3 ray, float distance) {
     if (!kPhysicalSky) return exp(-frame.air_extinction.rgb * distance);
     return exp(-layer_column(frame.air.x, ray.z, distance, frame.rayleigh.w) * frame.rayleigh.rgb -
                layer_column(frame.air.x, ray.z, distance, frame.haze.w) * frame.haze.rgb);
 }
 
-// Radiance that the air along a ray would have if it had no end, in full light. With tables it is the sky's part: far away
-// the air becomes the sky.
+// Returns the radiance of infinitely much sunlit air along a ray. With tables it is the sky's, so that the air becomes
+// the sky far away.
 vec3 endless_air(vec3 ray) {
     if (!kPhysicalSky) return frame.horizon.rgb;
     vec2 heights = vec2(frame.rayleigh.w, frame.haze.w);
@@ -43,7 +44,7 @@ vec3 endless_air(vec3 ray) {
     return sky_scattered(ray) / max(1.0 - beyond, 1.0e-4);
 }
 
-// Radiance of the air itself over a distance, in full light; `beta` is its transmittance.
+// Returns the radiance of sunlit air over a distance; `beta` is its transmittance.
 vec3 air_light(vec3 ray, vec3 beta) { return (1.0 - beta) * endless_air(ray); }
 
 // Gradient: the air is thickest at the horizon; its colour falls off exponentially with height, and reaches zero at the
@@ -54,7 +55,7 @@ vec3 gradient_sky(float height) {
     return mix(frame.zenith.rgb, frame.horizon.rgb, haze);
 }
 
-// The light of the air along a ray: without end, and what clouds can take away of it: sunlight, scattered once.
+// The radiance of the air along a ray: in total, and the part that clouds can shade, single scattering of sunlight.
 struct SunlitAir {
     vec3 endless;
     vec3 most;                   // no more than the air and the sky have, so that none is negative
@@ -72,8 +73,8 @@ SunlitAir sunlit_air(vec3 ray) {
     return SunlitAir(endless, share * min(endless, gradient_sky(max(ray.z, 0.0))), 0.0, 0.0);
 }
 
-// Radiance that the air would have of sunlight scattered once, were it everywhere as at that height above the eye.
-// `sunlight`: sunlight_at() of it.
+// Returns the single-scattering radiance of infinitely much air as at a height above the eye; `sunlight`: its
+// sunlight_at().
 vec3 sunlit_at(SunlitAir air, float height, vec3 sunlight) {
     if (!kPhysicalSky) return air.most;
     vec2 density = exp(-max(frame.air.x + height, 0.0) * vec2(frame.rayleigh.w, frame.haze.w));

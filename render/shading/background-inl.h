@@ -214,7 +214,7 @@ struct ShadowTexels {
     int size = 0;
 };
 
-// The map between the middles of four texels; what lies beyond it is in full light.
+// Samples the shadow map bilinearly; points beyond it are fully lit.
 HWY_INLINE Floats shadow_at(const ShadowTexels& map, Floats u, Floats v) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
@@ -270,7 +270,7 @@ HWY_INLINE Floats3 sky(const PictureFrame& frame, const Floats3& ray) {
     return gradient_sky(frame, height);
 }
 
-// Radiance of the ground at a point relative to the eye, without the air before it.
+// Returns the radiance of the ground at a point relative to the eye, without the air in front of it.
 HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& map, const Floats3& point) {
     const Floats u = hn::Add(dot(set3(frame.shadow_u), point), set(frame.shadow_u.w)),
                  v = hn::Add(dot(set3(frame.shadow_v), point), set(frame.shadow_v.w));
@@ -289,7 +289,7 @@ HWY_INLINE Floats3 ground(const PictureFrame& frame, const ShadowTexels& map, co
     return add(each_times(beta, ground_light(frame, map, times(distance, ray))), air_light(frame, ray, beta));
 }
 
-// What lies behind the clouds along unit rays.
+// Returns the radiance behind the clouds along unit rays: sky or ground, with the air in front of it.
 HWY_INLINE Floats3 background(const PictureFrame& frame, const ShadowTexels& map, const Floats3& ray) {
     const Lanes d;
     const Floats distance = ground_distance(frame, ray.z);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sky, and the ground plane that wears the shadow map; needs ray.glsl and air.glsl.
+// Sky, and the ground plane with the shadow map; needs ray.glsl and air.glsl.
 
 layout(set = 0, binding = 4) uniform sampler2D shadow_map;
 
-// The sun's disc: darker towards its limb, and with an edge as wide as a pixel.
+// Returns the radiance of the sun's disc, with limb darkening and an edge of one pixel.
 vec3 sun_disc(vec3 ray) {
     vec3 apart = ray - frame.to_sun.xyz;
     float angle = sqrt(dot(apart, apart));
@@ -14,7 +14,7 @@ vec3 sun_disc(vec3 ray) {
     return covered * frame.sun_disc.rgb * fade * pow(vec3(cosine), vec3(kLimbDarkeningRed, kLimbDarkeningGreen, kLimbDarkeningBlue));
 }
 
-// Below the horizon the sky is that of the horizon.
+// Returns the radiance of the sky; below the horizon that of the horizon.
 vec3 sky(vec3 ray) {
     float height = max(ray.z, 0.0);
     if (kPhysicalSky) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// T's billboards: their light, and how their texture lies on them; needs frame.glsl, air.glsl and shells.glsl.
+// T's billboards: their light and their texture coordinates; needs frame.glsl, air.glsl and shells.glsl.
 
 // T: clamp(dot(towards the light, outwards from the cloud) * colour - absorbed, 0, 1).
 vec3 billboard_diffuse(vec3 to_light, vec3 outwards, vec3 colour, float absorbed) {
     return clamp(dot(to_light, outwards) * colour - absorbed, 0.0, 1.0);
 }
 
-// Radiance of the cloud at a corner.
+// Returns the radiance of the cloud at a corner.
 vec3 billboard_light_at(vec3 position, ViewBillboard billboard, ViewCloud cloud) {
     vec3 offset = position - vec3(cloud.x, cloud.y, cloud.z);
     vec3 outwards = offset / max(length(offset), 1.0e-6);
@@ -22,7 +22,7 @@ vec3 billboard_light_at(vec3 position, ViewBillboard billboard, ViewCloud cloud)
     return frame.ambient_top.w * light;
 }
 
-// What the air between the eye and a billboard does, times the billboard's opacity.
+// Transmittance and in-scattered light of the air between the eye and a billboard, times the billboard's opacity.
 struct BillboardAir {
     vec3 share;  // of the cloud's light that arrives
     vec3 veil;   // radiance of the air
@@ -48,7 +48,8 @@ BillboardAxes billboard_axes() {
     return BillboardAxes(per_metre.x * frame.right.xyz, per_metre.y * frame.up.xyz, per_metre);
 }
 
-// Texture coordinates of a point of a billboard, -1..1: mirrored, and the axes exchanged, as the bits of `turn` say.
+// Returns the texture coordinates of a point of a billboard, -1..1: mirrored, and with axes exchanged, by the bits of
+// `turn`.
 vec2 billboard_coordinate(vec2 point, uint turn) {
     vec2 mirrored = vec2((turn & 1u) != 0u ? -point.x : point.x, (turn & 2u) != 0u ? point.y : -point.y);
     return 0.5 + 0.5 * ((turn & 4u) != 0u ? mirrored.yx : mirrored);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// render/shared/formulas.h for vectors, one ray a lane: the same text as that of shaders, compiled for each
-// instruction set. And the shape of those vectors.
+// render/shared/formulas.h for SIMD vectors, one ray a lane: the source of the shaders, compiled for each
+// instruction set; and the layout of pixels in those vectors.
 
 #if defined(NEPHOS_RENDER_FORMULAS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_RENDER_FORMULAS_INL_H_
@@ -41,7 +41,7 @@ HWY_INLINE Floats fast_exp(Floats x) {
     return hn::BitCast(d, hn::Add(hn::BitCast(di, power), hn::ShiftLeft<23>(hn::ConvertTo(di, whole))));
 }
 
-// The words of formulas.h, in a namespace of their own: none of them is to be found by accident.
+// The functions that formulas.h needs, in a namespace of their own so that no other code finds them.
 namespace formulas {
 
 using shader::kPi;
@@ -89,8 +89,8 @@ using formulas::sky_upwards;
 
 inline constexpr std::size_t kTilePixels = shader::kTileWidth * shader::kTileHeight;
 
-// Which pixels of a tile, counted row by row, a vector holds: parts of a row or whole rows. A tile is
-// `blocks` vectors wide; going down by one vector is going down by `rows`.
+// The pixels of a tile in one vector, row by row: parts of a row or whole rows. A tile is `blocks` vectors
+// wide; the next vector below begins `rows` rows further down.
 struct Layout {
     std::size_t lanes, blocks, rows;
     Layout()  // here, not at the members: only what stands in a function is compiled for the target

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The data of the picture.
+// The uniforms of the frame.
 
 layout(set = 0, binding = 0) uniform FrameBlock {
     Frame frame;

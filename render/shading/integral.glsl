@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Opacity of a metaball along a ray, without textures and fits; needs ray.glsl.
 
-// The part of the ball between the eye and the ground, for balls that reach beyond either. The cross product keeps the
-// distance from the ray exact where a difference of squares would drown in the distance from the eye.
+// Returns the opacity of the part of a metaball between the eye and the ground, for metaballs that extend beyond
+// either. The distance from the ray is a cross product, because a difference of squares would cancel far from the eye.
 float integrated_opacity(vec3 centre_m, float radius, vec3 ray, float depth_scale) {
     vec3 centre = centre_m / radius;
     vec3 offset = cross(centre, ray);

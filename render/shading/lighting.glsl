@@ -6,7 +6,7 @@ struct Scattered {
     vec3 direct;   // radiance per light that is scattered once
 };
 
-// No branches on what is the same for the whole picture: lavapipe then compiles the shader anew for each draw.
+// There are no branches on uniforms: lavapipe would recompile the shader for each draw.
 Scattered scattered_light(ViewBall ball, float distance) {
     vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, ball.height);
     vec3 ray = vec3(ball.x, ball.y, ball.z) / max(distance, 1.0e-6);
@@ -23,22 +23,22 @@ Scattered scattered_light(ViewBall ball, float distance) {
     return light;
 }
 
-// Radiance towards the eye along `ray`.
+// Returns the radiance towards the eye along `ray`.
 vec3 radiance_along(Scattered light, vec3 ray) {
     return light.diffuse + light.direct * scattered_once(dot(frame.to_sun.xyz, ray));
 }
 
-// The same of a whole metaball; `ray`: to its centre, `ratio`: radius / distance.
+// Returns the mean radiance of a metaball's disc; `ray`: to its centre, `ratio`: radius / distance.
 vec3 radiance_of_disc(Scattered light, vec3 ray, float ratio) {
     return light.diffuse + light.direct * scattered_once(dot(frame.to_sun.xyz, ray) - kDiscSpread * ratio * ratio);
 }
 
-// Radius in metres of what is drawn: widened to a part of a pixel, see kMinRadiusPixels.
+// Returns the drawn radius in metres, at least kMinRadiusPixels on the screen.
 float drawn_radius(ViewBall ball, float distance) {
     return max(ball.radius, kMinRadiusPixels * distance / frame.up.w);
 }
 
-// The light of a metaball as it arrives at the beginning of its shell.
+// Returns the light of a metaball at the beginning of its shell.
 Scattered seen_through_shell(Scattered light, vec3 centre, float distance) {
     AirLayer air = layer_in_front(centre, distance);
     light.diffuse = light.diffuse * air.transmittance + air.light;

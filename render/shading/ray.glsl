@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The ray through a pixel; needs frame.glsl.
 
-// Direction of the ray through a point of the tile of the picture, in pixels; its part along the view axis is 1.
+// Returns the direction of the ray through a point of the tile, in pixels; its component along the view axis is 1.
 vec3 pixel_direction(vec2 point) {
     vec2 pixel = point + frame.picture.zw;
     vec2 plane = vec2(2.0, -2.0) * pixel / frame.picture.xy + vec2(-1.0, 1.0);
@@ -10,7 +10,7 @@ vec3 pixel_direction(vec2 point) {
 
 vec3 pixel_ray(vec2 point) { return normalize(pixel_direction(point)); }
 
-// Distance along a ray at which it meets the ground; a very large number when it does not.
+// Returns the distance at which a ray meets the ground; a very large number when it does not.
 float ground_distance(vec3 ray) {
     bool meets = frame.ground_sun.w > 0.0 && ray.z < 0.0;
     return meets ? min(frame.ground.w / ray.z, 1.0e30) : 1.0e30;

@@ -49,7 +49,7 @@ HWY_INLINE Floats scattering_at(const float* HWY_RESTRICT table, hn::Vec<hn::Reb
     return hn::MulAdd(angle.share, hn::Sub(b, a), a);
 }
 
-// Pi times the phase function of the cosine.
+// Returns pi times the phase function of the cosine.
 HWY_INLINE Floats scattered_once(const PictureFrame& frame, Floats cosine) {
     const hn::RebindToSigned<Lanes> di;
     return scattering_at(frame.scattering, hn::Zero(di), scatter_column(cosine));

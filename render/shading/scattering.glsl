@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// What metaballs scatter of the sunlight, from the table; needs frame.glsl.
+// Sunlight that metaballs scatter, by the scattering table; needs frame.glsl.
 
 // scattering_table.h: kScatterAngles columns.
 layout(set = 0, binding = 12, std430) readonly buffer Scattering {
     float scattering[];
 };
 
-// Between two angles of a row of the table.
+// Interpolates between two angles of a row of the table.
 float scattering_at(uint row, float column) {
     uint below = min(uint(column), kScatterAngles - 2u), at = row * kScatterAngles + below;
     return mix(scattering[at], scattering[at + 1u], column - float(below));
 }
 
-// Pi times the phase function of the cosine. The sunlight travels along -to_sun and goes on along -ray.
+// Returns pi times the phase function. Sunlight travels along -to_sun before and along -ray after scattering.
 float scattered_once(float cosine) { return scattering_at(0u, scatter_column(cosine)); }
 
-// Radiance per colour of the sun.
+// Returns the radiance per colour of the sun.
 float scattered_often(vec3 ray, float sun_depth) {
     float column = scatter_column(dot(frame.to_sun.xyz, ray)), row = scatter_row(sun_depth);
     uint below = min(uint(row), kScatterDepths - 2u);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// render/shading/shells.glsl for vectors of pixels: the shells of air around the eye (air_shells.h, docs/air.md).
+// render/shading/shells.glsl for vectors of pixels: the shells of air around the eye (air_shells.h,
+// docs/air.md).
 
 #if defined(NEPHOS_RENDER_SHELLS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_RENDER_SHELLS_INL_H_
@@ -22,7 +23,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
-// What a part of the air does to the light behind it: light = light * transmittance + light of the layer.
+// The effect of a layer of air on the light behind it: light = light * transmittance + light of the layer.
 struct AirLayer {
     Floats3 light;
     Floats transmittance;
@@ -38,7 +39,7 @@ HWY_INLINE Floats byte_of(Words word, int shift) {
     return hn::ConvertTo(Lanes(), hn::And(hn::ShiftRightSame(word, shift), hn::Set(di, 0xFF)));
 }
 
-// Between the four bytes of words, 0..1: the upper half is the next row.
+// Interpolates the four bytes of words, 0..1, bilinearly; the upper half is the next row.
 HWY_INLINE Floats between_bytes(Words word, Floats share_u, Floats share_v) {
     const auto mix = [](Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); };
     const Floats left = mix(byte_of(word, 0), byte_of(word, 16), share_v),
@@ -110,7 +111,7 @@ HWY_INLINE FogPart fog_part(const AirShells& air, const Floats3& ray, Floats beg
             hn::Mul(set(data.fog.x), dense)};
 }
 
-// `transmittance`: exp(-fog.depth).
+// Returns the distance at which half of the opacity of fog is reached; `transmittance`: exp(-fog.depth).
 HWY_INLINE Floats fog_middle(const AirShells& air, const FogPart& fog, Floats transmittance,
                              const Floats3& ray, Floats begin, Floats end) {
     const Lanes d;
@@ -162,7 +163,7 @@ HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floa
     return decayed(depth.x, depth.y, depth.z);
 }
 
-// What is the same for all shells along rays.
+// The terms common to all shells along rays.
 struct RayAir {
     Floats3 ray;
     SunlitAir sunlit;
@@ -224,7 +225,7 @@ enum class Heights {
     apart,  // splats
 };
 
-// Where a part of the air is looked up.
+// The sample positions of a layer of air.
 struct AirPlaces {
     Floats at, middle;
 };
@@ -281,7 +282,7 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
     return {times_add(hn::Sub(one, transmittance), of_fog, light), transmittance, places.middle};
 }
 
-// Where rays come out of the ground that the eye is below, as those of a mirror image do.
+// Returns the distance at which rays of a mirrored eye, which is below the ground, leave the ground.
 HWY_INLINE Floats air_begin(const PictureFrame& frame, const Floats3& ray) {
     if (!(frame.ground.w > 0)) return hn::Zero(Lanes());
     return hn::Div(set(frame.ground.w), hn::Max(ray.z, set(1.0e-6f)));

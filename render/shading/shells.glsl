@@ -2,7 +2,7 @@
 // The shells of air around the eye (air_shells.h, docs/air.md); needs ray.glsl, air.glsl and
 // scattering.glsl.
 
-// Whether there are shells. Without them shaders are compiled as if they did not know any.
+// Specialisation constants: without shells or fog their code is compiled out.
 layout(constant_id = 6) const bool kShells = false;
 layout(constant_id = 7) const bool kFog = false;
 
@@ -13,7 +13,7 @@ layout(set = 0, binding = 14, std430) readonly buffer Shade {
     uint shade[];
 };
 
-// What a part of the air does to the light behind it: light = light * transmittance + light of the layer.
+// The effect of a layer of air on the light behind it: light = light * transmittance + light of the layer.
 struct AirLayer {
     vec3 light;
     float transmittance;
@@ -23,15 +23,15 @@ struct AirLayer {
 float shell_end(uint k) { return shells.ends[k / 4u][k % 4u]; }
 float shell_begin(uint k) { return k == 0u ? 0.0 : shell_end(k - 1u); }
 
-// Between four texels: of a row in the lower half of the word, of the next row in the upper half.
+// Interpolates between four texels: of a row in the lower half of the word, of the next row in the upper half.
 float between_texels(uint word, vec2 share) {
     vec4 texels = unpackUnorm4x8(word);
     vec2 column = mix(texels.xy, texels.zw, share.y);
     return mix(column.x, column.y, share.x);
 }
 
-// Share of the sunlight that the clouds leave at a point relative to the eye: D's gamma. The shade of a cloud begins at
-// its top and is complete at its base.
+// Returns the fraction of sunlight that passes the clouds to a point relative to the eye: D's gamma. The shade of a
+// cloud begins at its top and is complete at its base.
 float sunlight_left(vec3 point) {
     vec2 place = vec2(dot(shells.shade_u.xyz, point) + shells.shade_u.w, dot(shells.shade_v.xyz, point) + shells.shade_v.w);
     place = clamp(place, vec2(0.0), shells.shade.xy);
@@ -45,7 +45,7 @@ float sunlight_left(vec3 point) {
     return 1.0 - part * (1.0 - gamma);
 }
 
-// Noise of fog at a point relative to the eye, 0..1.
+// Returns the noise of fog at a point relative to the eye, 0..1.
 float fog_noise(vec3 point, vec4 eye) {
     vec3 voxel = fract(eye.xyz + eye.w * point) * float(kFogVoxels);
     vec3 below = floor(voxel), share = voxel - below;
@@ -57,7 +57,7 @@ float fog_noise(vec3 point, vec4 eye) {
     return mix(two.x, two.y, share.x);
 }
 
-// Fog of a ray between two distances, without its patches.
+// Returns the fog of a ray between two distances, without patches.
 struct FogPart {
     float depth;  // optical
     float low;    // extinction at the lower end
@@ -69,8 +69,8 @@ FogPart fog_part(vec3 ray, float begin, float end) {
                    shells.fog.x * exp(min(-low * shells.fog.y, 60.0)));
 }
 
-// Where this fog has taken half of all the light that it takes. Counted from the lower end, so that nothing is lost to
-// rounding where the eye is far above.
+// Returns the distance at which half of the opacity of this fog is reached. Computed from the lower end, without loss
+// of precision where the eye is far above.
 float fog_middle(FogPart fog, vec3 ray, float begin, float end) {
     float taken = -log(0.5 + 0.5 * exp(-fog.depth));
     float rest = ray.z < 0.0 ? fog.depth - taken : taken, per_low = rest / max(fog.low, 1.0e-30);
@@ -80,8 +80,8 @@ float fog_middle(FogPart fog, vec3 ray, float begin, float end) {
     return ray.z < 0.0 ? end - way : begin + way;
 }
 
-// Share of the mean that the fog of a shell has at a place. Over more than a patch it is its mean, and far away it becomes
-// that, as beyond the last shell but one.
+// Returns the density of fog at a point of a shell relative to its mean. In shells thicker than a patch and far away it
+// fades to 1, as beyond the last shell but one.
 float fog_patches(vec3 point, float begin, float end) {
     float reach = shells.shade.w, per_m = shells.fog_coarse.w;
     float varies = shells.fog.w * min(1.0, 0.125 / max(per_m * (end - begin), 1.0e-6)) *
@@ -90,8 +90,8 @@ float fog_patches(vec3 point, float begin, float end) {
     return max(1.0 + varies * (noise - 1.0), 0.0);
 }
 
-// Radiance at opacity 1 that fog at a point scatters towards the eye; lit as the clouds are. `lit`: share of the sunlight
-// that the clouds leave.
+// Returns the radiance that fog of opacity 1 at a point scatters towards the eye; lit as clouds are. `lit`: fraction of
+// the sunlight that passes the clouds.
 vec3 fog_radiance(vec3 ray, float at, vec3 sunlight, float lit) {
     float dense = exp(min(-(shells.fog.z + ray.z * at) * shells.fog.y, 60.0));
     float above = shells.fog.x * dense / shells.fog.y;  // optical depth upwards
@@ -103,10 +103,10 @@ vec3 fog_radiance(vec3 ray, float at, vec3 sunlight, float lit) {
     return frame.ambient_top.w * arriving;
 }
 
-// The air of a ray between two distances. All the light of clear air is in the picture already (air_light()); what clouds
-// shade is taken away: radiance below zero. Shade and patches are looked up at a share, 0..1, of the way, light in the
-// middle: it changes with height so fast that looking it up here and there would show as grain. Where there is much fog,
-// both are looked up in the middle of what is seen of it.
+// Returns the layer of air between two distances of a ray. The light of clear air is in the image already
+// (air_light()); the shaded part of it is subtracted: the radiance is negative. Shade and patches are sampled at the
+// fraction `share`, 0..1, of the interval; light in its middle, because it varies so fast with height that an offset
+// would be visible as grain. In dense fog both are sampled where half of its opacity is reached.
 AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float share) {
     float at = mix(begin, end, share), middle = mix(begin, end, 0.5);
     bool last = begin >= shells.shade.w;  // it has no end
@@ -131,17 +131,17 @@ AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float sha
     return AirLayer(light + (1.0 - transmittance) * of_fog, transmittance, middle);
 }
 
-// Where a ray comes out of the ground that the eye is below, as that of a mirror image is.
+// Returns the distance at which a ray of a mirrored eye, which is below the ground, leaves the ground.
 float air_begin(vec3 ray) { return frame.ground.w > 0.0 ? frame.ground.w / max(ray.z, 1.0e-6) : 0.0; }
 
-// Shell k along the ray of a pixel of the picture, cut off by the ground.
+// Returns shell k along the ray of a pixel, cut off by the ground.
 AirLayer air_shell(uint k, SunlitAir sunlit, vec3 ray, uvec2 pixel) {
     float first = air_begin(ray), last = ground_distance(ray);
     float begin = clamp(shell_begin(k), first, last), end = clamp(shell_end(k), first, last);
     return air_layer(sunlit, ray, begin, end, shell_offset(pixel.x, pixel.y));
 }
 
-// Number of shells that end at a distance or before it.
+// Returns the number of shells that end at a distance or before it.
 uint shells_before(float distance) {
     uint count = uint(shells.settings.x), k = 0u;
     for (uint step = kMaxShells; step > 0u; step /= 2u) {
@@ -150,7 +150,7 @@ uint shells_before(float distance) {
     return k;
 }
 
-// Distances along a ray between which there is something to draw: shade of clouds, fog.
+// Returns the interval of a ray outside of which there is neither shade of clouds nor fog.
 vec2 part_with_air(vec3 ray) {
     vec2 part = vec2(1.0e30, 0.0);
     if (shells.settings.y > 0.0) {
@@ -168,7 +168,7 @@ vec2 part_with_air(vec3 ray) {
     return fog.x < 1.0e30 ? vec2(min(part.x, fog.x), max(part.y, fog.y)) : part;
 }
 
-// The part of a splat's own shell that lies in front of its centre.
+// Returns the layer of a splat's own shell in front of its centre.
 AirLayer layer_in_front(vec3 centre, float distance) {
     if (!kShells) return AirLayer(vec3(0.0), 1.0, 0.0);
     uint k = shells_before(distance);

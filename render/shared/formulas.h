@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Formulas of light and air that one text states for all back-ends. It is compiled three times:
+// Formulas of light and air, one source for all back-ends. It is compiled three times:
 //
 //     as GLSL                      Real = float                        (included by shared.h)
 //     as C++, nephos::shader       Real = float                        (included by shared.h; tests check these)
 //     as C++, per instruction set  Real = a vector, one ray a lane     (included by shading/formulas-inl.h)
 //
-// so it has no include guard. Who includes it defines Real; mul_add(a, b, c), which is a b + c, fused where the
-// instruction set can; select(condition, a, b); min(), max(), sqrt(), exp(), log2() and abs(); and fast_exp(), an
-// exponential that may be wrong by 4e-5 of its value. A parameter of type `float` is the same for all rays.
-// Literals end in f, as C++ wants it and GLSL allows it.
+// and therefore has no include guard. The including file defines Real; mul_add(a, b, c) = a b + c, fused
+// where the instruction set has it; select(condition, a, b); min(), max(), sqrt(), exp(), log2() and abs();
+// and fast_exp(), an exponential with a relative error of up to 4e-5. A parameter of type `float` is the same
+// for all rays. Literals end in f, which C++ needs and GLSL accepts. Pure functions.
 
-// Integral over a line of the field of a metaball, in units of its radius. The field with u = 1 - a^2 is
-// f = u^2 (5 + 4 u) / 9. Along a line at distance b from the centre, with w = 1 - b^2 (square of half the chord) and
-// s from -sqrt(w) to sqrt(w), u = w - s^2 and
+// Returns the line integral of the field of a metaball, in units of its radius. The field with u = 1 - a^2 is
+// f = u^2 (5 + 4 u) / 9. Along a line at distance b from the centre, with w = 1 - b^2 (square of half the
+// chord) and s from -sqrt(w) to sqrt(w), u = w - s^2 and
 //
 //     integral of (w - s^2)^2 = 16/15 w^(5/2),   of (w - s^2)^3 = 32/35 w^(7/2),   so
 //     line_integral(w, sqrt(w)) = w^(5/2) (16/27 + 128/315 w)
@@ -21,7 +21,7 @@ NEPHOS_FUNCTION Real line_integral(Real w, Real root_w) {
     return w * w * root_w * mul_add(Real(0.406349206349206f), w, Real(0.592592592592593f));
 }
 
-// The same from the middle of the chord up to s, |s| <= sqrt(w); odd in s.
+// Returns the line integral from the middle of the chord up to s, |s| <= sqrt(w); odd in s.
 NEPHOS_FUNCTION Real partial_line_integral(Real w, Real s) {
     Real s2 = s * s, w2 = w * w;
     Real square = mul_add(s2, mul_add(Real(-2.0f / 3.0f), w, 0.2f * s2), w2);
@@ -29,14 +29,14 @@ NEPHOS_FUNCTION Real partial_line_integral(Real w, Real s) {
     return s * mul_add(Real(5.0f / 9.0f), square, (4.0f / 9.0f) * cube);
 }
 
-// Irradiance of lightning relative to that at 1 km; it grows no more within 100 m.
+// Returns the irradiance of lightning relative to that at 1 km; constant within 100 m.
 NEPHOS_FUNCTION Real flash_falloff(Real squared_distance_m) {
     return Real(1.0e6f) / max(squared_distance_m, Real(1.0e4f));
 }
 
-// Where the tables of the sky (atmosphere.h) have a direction, 0..1. Across: sine of half the azimuth from the sun's.
-// Up, from the sine of the elevation: q = 1 - sqrt(1 - sine), which is even around the zenith, and half of the rows
-// lie in the lowest quarter of q, where the sky changes fastest.
+// Map a direction to the coordinates, 0..1, of the tables of the sky (atmosphere.h). Across: sine of half the
+// azimuth from the sun's. Upwards, by the sine of the elevation: sqrt(q), q = 1 - sqrt(1 - sine), which is
+// even around the zenith; half of the rows are in the lowest quarter of q, where the sky changes fastest.
 NEPHOS_FUNCTION Real sky_across(Real cos_azimuth) {
     return sqrt(max(mul_add(Real(-0.5f), cos_azimuth, Real(0.5f)), Real(0.0f)));
 }
@@ -44,8 +44,8 @@ NEPHOS_FUNCTION Real sky_upwards(Real sine) {
     return sqrt(sine / (1.0f + sqrt(max(1.0f - sine, Real(0.0f)))));
 }
 
-// Mean of exp(-t) for t from 0 to x: (1 - exp(-x)) / x, x >= -80. By its series where x is small, so that it is as
-// exact as the exponential is.
+// Returns the mean of exp(-t) for t from 0 to x, (1 - exp(-x)) / x, x >= -80; by its series where x is small,
+// with the accuracy of the exponential.
 NEPHOS_FUNCTION Real mean_decay(Real x) {
     Real bounded = max(x, Real(-80.0f));
     Real series =
@@ -54,23 +54,23 @@ NEPHOS_FUNCTION Real mean_decay(Real x) {
     return select(abs(x) < Real(0.1f), series, quotient);
 }
 
-// Integral of exp(-altitude per_height) in metres along rays over a flat Earth that begin at an altitude; `slope` is
-// the sine of their elevation.
+// Returns the integral of exp(-altitude per_height), in metres, along rays over a flat Earth that begin at an
+// altitude; `slope` is the sine of their elevation.
 NEPHOS_FUNCTION Real layer_column(float altitude, Real slope, Real distance, float per_height) {
     return exp(-altitude * per_height) * distance * mean_decay(slope * distance * per_height);
 }
 
-// The same of fog, exp(-height per_height), from the height of each ray's beginning on. Counted from the lower end:
-// no fog is lost to rounding where the eye is far above it.
+// Returns the integral of fog's exp(-height per_height) from the height of each ray's beginning on. Computed
+// from the lower end, without loss of precision where the eye is far above the fog.
 NEPHOS_FUNCTION Real fog_column(Real height_of_begin, Real slope, Real distance, float per_height) {
     Real low = mul_add(min(slope, Real(0.0f)), distance, height_of_begin);
     return fast_exp(min(-low * per_height, Real(60.0f))) * distance *
            mean_decay(abs(slope) * distance * per_height);
 }
 
-// Phase functions of molecules (Rayleigh) and of particles (Cornette and Shanks 1992; Sapronov's F / 4 pi), per
-// steradian; each integrates to 1 over the sphere. cos_theta: between the directions of travel before and after,
-// forward is 1.
+// Phase functions of molecules (Rayleigh) and of particles (Cornette and Shanks 1992; Sapronov's F / 4 pi),
+// per steradian; each integrates to 1 over the sphere. cos_theta: between the directions of travel before and
+// after, forward is 1.
 NEPHOS_FUNCTION Real molecule_phase(Real cos_theta) {
     return (3.0f / (16.0f * kPi)) * mul_add(cos_theta, cos_theta, Real(1.0f));
 }
@@ -80,9 +80,9 @@ NEPHOS_FUNCTION Real particle_phase(Real cos_theta, float g) {
     return factor * mul_add(cos_theta, cos_theta, Real(1.0f)) / (base * sqrt(base));
 }
 
-// Where an angle and an optical depth lie in the scattering table (scattering_table.h), in nodes. With v =
-// (1 - |cos|)^(1/4) nodes are evenly spaced in v, from v = 0 (straight on) over 1 (sideways) back to 0 (back): near
-// both ends the angle itself grows with the square of their number.
+// Map an angle and an optical depth to coordinates of the scattering table (scattering_table.h), in nodes.
+// With v = (1 - |cos|)^(1/4) nodes are evenly spaced in v, from v = 0 (forward) over 1 (sideways) back to 0
+// (backward): near both ends the angle grows with the square of the node's number.
 NEPHOS_FUNCTION Real scatter_column(Real cos_theta) {
     Real v = 0.5f * sqrt(sqrt(max(1.0f - abs(cos_theta), Real(0.0f))));
     return float(kScatterAngles - 1u) * select(cos_theta < Real(0.0f), 1.0f - v, v);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What C++ and the shaders share that make the order from the eye and the lists of the tiles on the device
-// (device_lists.h): cull, sort by distance, boxes on the screen, (tile, splat) pairs, sort by tile.
+// Structs and constants shared by C++ and the shaders that sort splats by view and make the lists of the
+// tiles on the device (device_lists.h): culling, sort by distance, screen-space boxes, (tile, splat) pairs,
+// sort by tile.
 #ifndef NEPHOS_RENDER_SHADERS_ORDER_H
 #define NEPHOS_RENDER_SHADERS_ORDER_H
 
@@ -12,18 +13,18 @@ namespace nephos::shader {
 
 NEPHOS_CONST uint kSortGroup = 256u;      // invocations of a work group, and values of a digit
 NEPHOS_CONST uint kSortBlock = 2048u;     // elements that a work group sorts or sums
-NEPHOS_CONST uint kCulled = 0xffffffffu;  // the key of what is not seen; no distance has these bits
-NEPHOS_CONST float kFarthest_m = 1.0e9f;  // places beyond are left to the host
-NEPHOS_CONST float kCullReach = 1.5f;     // radii that a metaball covers at most, as in view_sorting.cpp
+NEPHOS_CONST uint kCulled = 0xffffffffu;  // key of culled splats; no distance has these bits
+NEPHOS_CONST float kFarthest_m = 1.0e9f;  // positions beyond are sorted by the host
+NEPHOS_CONST float kCullReach = 1.5f;     // largest extent of a metaball in radii, as in view_sorting.cpp
 
-// What a table of numbers is about, and with it its size.
+// The content of a table of numbers, which determines its size.
 NEPHOS_CONST uint kAllBalls = 0u;    // OrderStep::count
 NEPHOS_CONST uint kSeenBalls = 1u;   // OrderCounts::visible
 NEPHOS_CONST uint kSeenDigits = 2u;  // digits of their keys, for each block
 NEPHOS_CONST uint kListDigits = 3u;  // digits of the entries' keys, for each block
 NEPHOS_CONST uint kMapTiles = 4u;    // items of work in the tiles of the shadow map: OrderStep::tiles
 
-// A metaball as it stays on the device; 32 bytes.
+// A metaball in device memory; 32 bytes.
 struct CloudBall {
     float x, y, z;      // world, metres
     float radius;       // metres
@@ -33,11 +34,11 @@ struct CloudBall {
     uint pad0;
 };
 
-// The camera of a picture. Places are sums of two floats, high and low: differences from them are then as
-// exact as floats can be, wherever in the world the eye is.
+// The camera of a frame. Positions are sums of two floats, high and low, so that differences of positions
+// have the full precision of floats anywhere in the world.
 struct OrderFrame {
     vec4 eye_high;   // xyz: the eye, world; w: height of the ground
-    vec4 eye_low;    // what rounding left of it
+    vec4 eye_low;    // the rounding error of eye_high
     vec4 inward[5];  // xyz: normals of the planes of ViewPyramid
     vec4 right;      // xyz: unit; w: pixels per unit of a tangent across
     vec4 up;         // xyz: unit; w: ... upwards
@@ -45,11 +46,11 @@ struct OrderFrame {
     vec4 middle;     // xy: of the picture, pixels; z: 1 = the eye is above the ground; w: 1 = lightning
 };
 
-// The shadow map, for the order from the sun.
+// The shadow map, for sorting by distance from the sun.
 struct SunFrame {
     vec4 corner_high;  // xyz: of texel (0, 0), world
-    vec4 corner_low;   // what rounding left of it
-    vec4 direction;    // xyz: unit; the way the light travels
+    vec4 corner_low;   // the rounding error of corner_high
+    vec4 direction;    // xyz: unit; of the light's travel
     vec4 u, v;         // xyz: from metres to texels along the map's axes; w: metres a texel
 };
 
@@ -71,11 +72,11 @@ struct Groups {
     uint x, y, z;
 };
 
-// What the device counts for itself.
+// Counters in device memory, for indirect dispatch.
 struct OrderCounts {
     uint visible;     // metaballs
-    uint entries;     // of the lists; 0 when there is no room for them
-    uint wanted;      // entries, room or not; at most 2^32 - 1
+    uint entries;     // of the lists; 0 on overflow
+    uint wanted;      // number of entries even on overflow; at most 2^32 - 1
     uint not_fitted;  // 1 = some metaballs are not fitted
     uint total;       // of the last table that was summed
     Groups visible_each, visible_blocks,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What C++ and GLSL both read: the structs in buffers, the constants, and the formulas that tests check in
-// C++. Positions are relative to the eye (view pass) or to the middle of the shadow map (light pass), in
-// metres: single precision keeps millimetres near the camera wherever it stands in the world.
+// Code that C++ and GLSL both compile: structs in buffers, constants, and formulas, which tests check in C++.
+// Positions are relative to the eye (view pass) or to the middle of the shadow map (light pass), in metres:
+// single precision resolves millimetres near the camera anywhere in the world.
 #ifndef NEPHOS_RENDER_SHADERS_SHARED_H
 #define NEPHOS_RENDER_SHADERS_SHARED_H
 
@@ -39,7 +39,7 @@ NEPHOS_CONST uint kTileHeight = 16u;
 NEPHOS_CONST uint kQueriesPerLane = 4u;
 NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
 NEPHOS_CONST float kMaxFittedDepth = 6.0f;    // depth scale; denser metaballs are integrated in the tiles
-NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance at which what lies behind is left out
+NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance below which splats behind are skipped
 NEPHOS_CONST uint kIntegrate = 1u;      // flag: evaluate the integral along the ray, do not use the textures
 NEPHOS_CONST uint kNotFitted = 4u;      // flag: the tiles evaluate the integral, whatever the billboards do
 NEPHOS_CONST uint kBillboardFlag = 8u;  // flag, of no metaball: a ViewBillboard, see project_billboard.glsl
@@ -64,17 +64,17 @@ NEPHOS_CONST float kScatterRowsPerDoubling = 8.0f;  // of 1 + optical depth
 NEPHOS_CONST float kMaxSunDepth = 4095.0f;          // of the last row; beyond it nothing changes
 NEPHOS_CONST float kMinBillboardPixels = 1.0f;      // smaller billboards of T are widened to this half size
 
-// A metaball as the eye sees it; 32 bytes.
+// A metaball in camera space; 32 bytes.
 struct ViewBall {
     float x, y, z;      // centre relative to the eye
     float radius;       // metres
     float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * line_integral()
     float sun_depth;    // optical depth towards the sun: exp(-sun_depth) arrives
     float height;       // in the cloud: 0 base, 1 top
-    uint flags;         // lower half; upper half: share of the lightning that arrives, 0..65535
+    uint flags;         // lower half; upper half: transmitted fraction of the lightning, 0..65535
 };
 
-// One of T's billboards as the eye sees it; 32 bytes.
+// One of T's billboards in camera space; 32 bytes.
 struct ViewBillboard {
     float x, y, z;      // centre relative to the eye
     uint half_size;     // half width, half height in metres as two 16-bit floats
@@ -84,7 +84,7 @@ struct ViewBillboard {
     uint cloud;
 };
 
-// What the billboards of a cloud share; 32 bytes.
+// The cloud of a set of billboards; 32 bytes.
 struct ViewCloud {
     float x, y, z;         // centre relative to the eye
     float base;            // height relative to the eye
@@ -92,8 +92,8 @@ struct ViewCloud {
     uint pad0, pad1, pad2;
 };
 
-// A metaball on the screen, as the tiles draw it; 16 bytes, and 4 more of SplatTail. As small as can be:
-// lavapipe fetches words from a buffer one by one, which costs more than drawing a splat's pixels.
+// A metaball projected to the screen; 16 bytes, and 4 more of SplatTail. As small as possible: lavapipe
+// fetches words from a buffer one by one, which costs more than drawing a splat's pixels.
 struct ViewSplat {
     float x, y;           // of the centre, pixels
     uint size_and_depth;  // halves: radius at the centre's depth, pixels; square root of the depth scale
@@ -103,22 +103,22 @@ struct ViewSplat {
 // ray instead.
 #define SplatTail uint
 
-// A metaball on the shadow map, as the tiles draw it; 16 bytes.
+// A metaball projected to the shadow map; 16 bytes.
 struct LightSplat {
     float x, y;         // of the centre, texels
     uint radii;         // halves: along x and y, texels
     float depth_scale;  // optical depth through the middle = depth_scale * line_integral(1)
 };
-// Its place along the light; 8 bytes.
+// Its position along the light; 8 bytes.
 struct LightPlace {
     float z;           // metres from the first centre
     float per_radius;  // 1 / radius in metres
 };
 
-// A place whose light is asked for; 16 bytes.
+// A point whose light is to be computed; 16 bytes.
 struct LightQuery {
     float x, y, z;  // as in LightSplat
-    float depth;    // optical depth towards the sun; what is found is added to it
+    float depth;    // optical depth towards the sun, accumulated
 };
 
 // Queries that lie in one tile: up to kQueriesPerLane for each invocation.
@@ -139,13 +139,13 @@ struct TileStep {
     uint first_batch, last_batch;  // booleans: clear the sums before; finish them after
     float largest_radius;          // light: metres, of any splat
     uint first, end;               // view: the splats, or shells, that are drawn
-    uint distances;                // view: boolean, whether depth is wanted
+    uint distances;                // view: boolean, depth is requested
     uint listed;  // view: boolean, first is the number of a ViewPart (order.h) that has the splats and shells
 };
 
-// Everything about one picture (or tile of it) that shaders need.
+// Uniforms of one image, or of a tile of it.
 struct Frame {
-    vec4 right;           // xyz: the camera's axis * half the picture's width at distance 1
+    vec4 right;           // xyz: the camera's axis * half the image's width at distance 1
     vec4 up;              // xyz: likewise; w: pixels per unit at distance 1
     vec4 forward;         // xyz: unit
     vec4 picture;         // width, height of the picture; column and row of the tile's corner, pixels
@@ -155,7 +155,7 @@ struct Frame {
     vec4 ambient_top;     // rgb; w: albedo of the cloud
     vec4 ambient_base;    // rgb
     vec4 air_extinction;  // rgb: per metre
-    vec4 horizon;  // gradient: sky at the horizon, and light of the air; w: share of it straight from the sun
+    vec4 horizon;  // gradient: sky at the horizon, and light of the air; w: its fraction of single scattering
     vec4 zenith;   // rgb; w: asymmetry g of the haze
     vec4 ground;  // rgb: radiance of the ground under open sky without the sun; w: height above the eye (< 0)
     vec4 ground_sun;  // rgb: what the unshaded sun adds; w: 1 = there is a ground
@@ -189,14 +189,15 @@ struct Shells {
     vec4 fog_limits;  // x: height above the base beyond which there is no fog worth drawing
 };
 
-// Where in a shell a pixel of the picture samples it, 0..1: an additive recurrence in two dimensions (Roberts
-// 2018, "R2") spreads the samples of neighbouring pixels evenly. In integers: the same on every machine.
+// Returns the position in a shell, 0..1, at which a pixel samples it: an additive recurrence in two
+// dimensions (Roberts 2018, "R2") distributes the samples of neighbouring pixels evenly. In integers: the
+// same on every machine.
 NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
     return float((x * 3242174889u + y * 2447445414u) >> 8) * (1.0f / 16777216.0f);
 }
 
-// 1 - exp(-d line_integral(w, sqrt(w))) as w^2 (c0 + c1 w + ... + c5 w^5), for depth scales d up to kMaxFittedDepth; the
-// coefficients are polynomials of s = d / (d + 4). Largest error 0.0005 min(1, d); from
+// 1 - exp(-d line_integral(w, sqrt(w))) as w^2 (c0 + c1 w + ... + c5 w^5), for depth scales d up to
+// kMaxFittedDepth; the coefficients are polynomials of s = d / (d + 4). Largest error 0.0005 min(1, d); from
 // tests/reference/fit_opacity.py.
 NEPHOS_FUNCTION float fit_parameter(float depth_scale) { return depth_scale / (depth_scale + 4.0f); }
 NEPHOS_FUNCTION float fit_row(float s, float a, float b, float c, float d, float e) {
@@ -221,9 +222,9 @@ NEPHOS_FUNCTION float opacity_c5(float s) {
     return fit_row(s, 2.426292f, -94.490722f, 721.69415f, -1645.7595f, 927.43252f);
 }
 
-// A metaball is seen under all angles within its outline, not only that of its centre: with the square of its
-// angular radius and its opacity as weights, the mean of 1 - cos is larger by this much of that square. A
-// lobe narrower than the metaball then is as bright as its disc, and not one bright dot.
+// The scattering angle varies over the disc of a metaball: weighted by opacity, the mean of 1 - cos exceeds
+// its value at the centre by this factor times the square of the angular radius. A lobe of the phase function
+// narrower than the disc is thus averaged over it instead of making one bright dot.
 NEPHOS_CONST float kDiscSpread = 0.11f;
 
 #ifdef __cplusplus

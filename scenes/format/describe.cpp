@@ -15,14 +15,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The value that a missing key has, as TOML; empty where there is none.
+// Returns the default of a key as TOML; empty where there is none.
 std::string default_of(const Key& key, const void* owner) {
     if (key.required || key.value == nullptr || key.section != nullptr) return {};
     if (!key.default_text.empty()) return key.default_text;
     return value_text(key, key.value(const_cast<void*>(owner)));
 }
 
-// The effect with unit, range, default and source: what an editor shows.
+// Returns the effect with unit, range, default and source, as editors display it.
 std::string description_of(const Key& key, const std::string& otherwise) {
     std::string out = key.effect;
     if (key.section == nullptr) out += " Expects " + expected_text(key) + ".";
@@ -191,7 +191,7 @@ void add_section(std::string& out, const Section& section, const void* owner, co
     }
 }
 
-// Each section once, in the order of the file; tables that occur in several places at the first.
+// Adds each section once, in the order of the file; tables that occur in several places at the first.
 void add_nested(std::string& out, const Section& section, const void* owner, const std::string& path,
                 std::vector<const Section*>& done) {
     for (const Key& key : section.keys) {

@@ -14,8 +14,8 @@
 #define TOML_ASSERT(expr) static_assert(true)
 #define TOML_ENABLE_FORMATTERS 0
 
-// In version 3.3.0 the test for white space declares most letters beyond ASCII "unreachable", which is undefined
-// behaviour for a scene with an accent outside of quotes. The right answer for them is false.
+// In version 3.3.0 the test for white space declares most letters beyond ASCII "unreachable", which is
+// undefined behaviour for a scene with an accent outside of quotes. The right answer for them is false.
 #include <toml++/impl/preprocessor.h>
 #undef TOML_UNREACHABLE
 #define TOML_UNREACHABLE return false
@@ -90,7 +90,7 @@ Place place_of(const toml::source_region& region, int origin) {
     return {origin, int(region.begin.line), int(region.begin.column)};
 }
 
-// The parser's words, which start with "Error while parsing ...".
+// Returns the parser's message without its beginning "Error while ".
 std::string reason_of(const toml::parse_error& error) {
     constexpr std::string_view kOpening = "Error while ";
     std::string_view reason = error.description();

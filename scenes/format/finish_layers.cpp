@@ -17,7 +17,8 @@ SectionReader item_of(const SectionReader& scene, const char* array, std::size_t
     return {scene.document, scene.find(array)->value.items[index], indexed(array, index), {}};
 }
 
-// The reader of a table within a table; one of an empty table at the place of its parent when it is missing.
+// Returns the reader of a table within a table; of an empty one at the position of its parent when it is
+// missing.
 SectionReader below(const SectionReader& reader, std::string_view name) {
     static const Node empty;
     const Entry* entry = reader.find(name);
@@ -98,7 +99,7 @@ void check_layer_name(const SectionReader& reader, const std::string& name) {
         "expected 1 to 64 letters, digits, `-` or `_`, not starting with `-`");
 }
 
-// The skies that a layer names: known, and no two of one state.
+// Checks the skies that a layer names: known, and all states different.
 void check_layer_skies(const SectionReader& reader, const Scene& scene, const LayerOptions& layer) {
     if (reader.find("skies") == nullptr) {
         reader.report("skies", reader.quoted("skies") + " is missing",
@@ -199,7 +200,7 @@ void check_rain(const SectionReader& reader, const Scene& scene, const LayerOpti
     }
 }
 
-// A layer that is a veil: what it leaves to its lattice and wind, and keys that mean nothing to it.
+// Finishes a layer that is a veil: defaults by its lattice and wind, and keys without effect.
 void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
     for (const std::string_view key : keys_of_clouds()) {
         if (reader.find(key) == nullptr) continue;

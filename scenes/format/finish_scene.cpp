@@ -13,7 +13,7 @@
 namespace nephos {
 namespace {
 
-// The reader of a section below the scene, or of the scene itself when the file has no such section.
+// Returns the reader of a section of the scene, or of the scene itself when the file has no such section.
 SectionReader below(const SectionReader& reader, std::string_view name) {
     const Entry* entry = reader.find(name);
     if (entry == nullptr || entry->value.kind != Node::Kind::table) return reader;
@@ -64,8 +64,8 @@ std::optional<TooFar> too_far(const char* axis, double reach_m, int cells, doubl
     return TooFar{axis, reach_m, most_m};
 }
 
-// A periodic axis repeats an ellipsoid, and every image that reaches the box costs time. `horizontal` and
-// `vertical` are the keys that decide how far it reaches; each is reported once.
+// Checks kMaxPeriodicReach: every periodic image of an ellipsoid that reaches the box costs time.
+// `horizontal` and `vertical` are the keys of its size; each is reported once.
 void check_periodic_reach(const SectionReader& item, const AutomatonOptions& o, const Vec3& reach,
                           std::string_view horizontal, std::string_view vertical) {
     const double cell_m = o.placement.cell_size_m;

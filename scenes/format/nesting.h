@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A look at TOML text before the parser sees it. The parser and the destructors of its tree are recursive,
-// and a dotted key makes a table for each dot, so that a small hostile file could exhaust the stack or the
-// time.
+// Limits on TOML text, checked before it is parsed. The parser and the destructors of its tree are recursive,
+// and a dotted key makes a table for each dot, so that a small hostile file could exhaust the stack or take
+// hours (not installed).
 
 #include <cstddef>
 #include <optional>
@@ -22,9 +22,8 @@ struct NestingProblem {
     std::string message;
 };
 
-// The first place where one of the limits is passed. Follows the grammar only as far as valid TOML goes; what
-// comes after the first syntax error does not matter, because the parser never gets there. Linear in the
-// text's length.
+// Returns the first violation of one of the limits. Follows the grammar of valid TOML up to the first syntax
+// error, where the parser stops, too. Time is linear in the text's length. Pure.
 std::optional<NestingProblem> find_excessive_nesting(std::string_view text);
 
 }  // namespace nephos

@@ -128,7 +128,7 @@ class SceneReader {
                          "expected " + expected_text(key));
     }
 
-    // Required keys, keys that need each other, and keys that exclude each other.
+    // Checks required keys, keys that need each other, and keys that exclude each other.
     void check_presence(const Section& section, SectionReader& reader) {
         for (const Key& key : section.keys) {
             const bool present = reader.find(key.name) != nullptr;
@@ -190,7 +190,7 @@ void resolve_initial_state(Scene& scene, const Document& document, const std::fi
     if (from_file) scene.initial_state_file = (folder / *scene.initial_state_file).lexically_normal();
 }
 
-// First those of the scene's own file, then those of other files, then those of options.
+// Throws the problems of the scene's own file first, then those of other files, then those of options.
 [[noreturn]] void throw_problems(std::vector<Problem> problems, const std::string& scene_file) {
     const auto order = [&](const Problem& problem) {
         return std::make_tuple(problem.where.line == 0,
