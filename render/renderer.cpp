@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstring>
 #include <new>
 #include <optional>
 #include <utility>
@@ -12,20 +11,17 @@
 #include "core/available_memory.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "render/blended/attenuation_texture.h"
+#include "render/blended/blended_backend.h"
+#include "render/cpu/cpu_backend.h"
 #include "render/frame/scattering_table.h"
 #include "render/ground/wet_ground.h"
 #include "render/renderer_impl.h"
+#include "render/vulkan/vulkan_backend.h"
 
 namespace nephos {
 namespace {
 
 std::size_t square(std::size_t side) { return side * side; }
-
-// Longest side of a square of elements that a shader may see as one buffer.
-int largest_square(const GpuDevice& gpu, std::size_t element_bytes) {
-    return int(std::sqrt(double(gpu.properties.limits.maxStorageBufferRange / element_bytes)));
-}
 
 // Bytes in main memory while a picture is drawn, on a device that shares it.
 std::size_t memory_needed(const Splats& splats, const RenderOptions& options, int tile_size) {
@@ -47,26 +43,6 @@ void check_memory(const Splats& splats, const RenderOptions& options, int tile_s
                                       std::to_string(options.camera.height) + " pixels needs " +
                                       bytes_text(needed) + " of memory, but the " + available.limit +
                                       " leaves " + bytes_text(available.bytes));
-}
-
-GpuImage upload_attenuation(const GpuDevice& gpu) {
-    const std::vector<float> texels = attenuation_textures();
-    const std::size_t bytes = texels.size() * sizeof(float);
-    constexpr std::uint32_t kSide = shader::kAttenuationTexels;
-    GpuImage image = create_image(gpu, kSide, kSide, shader::kAttenuationLevels, vk::Format::eR32G32Sfloat,
-                                  vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst);
-    const GpuBuffer staging =
-        create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    write(gpu, staging, std::as_bytes(std::span(texels)));
-    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-        begin_image(commands, image, access::copy_to);
-        const vk::BufferImageCopy region(0, 0, 0,
-                                         {vk::ImageAspectFlagBits::eColor, 0, 0, shader::kAttenuationLevels},
-                                         {0, 0, 0}, {kSide, kSide, 1});
-        commands.copyBufferToImage(*staging.buffer, *image.image, vk::ImageLayout::eGeneral, region);
-        image_barrier(commands, image, access::copy_to, access::sample);
-    });
-    return image;
 }
 
 PictureAir air_of(const SkyLight& sky) {
@@ -95,161 +71,103 @@ CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats) {
     return heights;
 }
 
+// The back-end that options ask for.
+std::unique_ptr<Backend> open_backend(const DeviceOptions& options) {
+    switch (options.splatting) {
+        case Splatting::cpu:
+            if (!options.device.empty())
+                throw Error(ErrorCode::usage,
+                            "device: the back-end cpu uses no Vulkan device, but \"" + options.device +
+                                "\" is asked for: leave it out, or choose vulkan or blended");
+            return std::make_unique<CpuBackend>();
+        case Splatting::vulkan:
+            return std::make_unique<VulkanBackend>(open_device(options), options.lists);
+        case Splatting::blended:
+            return std::make_unique<BlendedBackend>(open_device(options));
+        case Splatting::automatic:
+            break;
+    }
+    if (std::optional<GpuDevice> card = open_graphics_card(options))
+        return std::make_unique<VulkanBackend>(std::move(*card), options.lists);
+    return std::make_unique<CpuBackend>();
+}
+
 }  // namespace
 
-Renderer::Impl::Impl(const DeviceOptions& device_options)
-    : tile_size(device_options.tile_size),
-      gpu(open_device(device_options)),
-      layout(create_pipeline_layout(gpu)),
-      clamped(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
-      white_beyond(create_sampler(gpu, vk::SamplerAddressMode::eClampToBorder)),
-      splatting(device_options.splatting),
-      lists(device_options.lists) {
-    const bool software = gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu;
-    if (splatting == Splatting::automatic) splatting = software ? Splatting::processor : Splatting::tiles;
-    const std::string missing = missing_for_lists(gpu);
-    if (lists == TileLists::device && !missing.empty())
-        throw Error(ErrorCode::usage,
-                    "the Vulkan device cannot make the lists of tiles: it lacks " + missing);
-    if (lists == TileLists::automatic)
-        lists = software || !missing.empty() ? TileLists::host : TileLists::device;
-    tile_size = std::min(tile_size, int(std::min(gpu.properties.limits.maxImageDimension2D,
-                                                 gpu.properties.limits.maxFramebufferWidth)));
-    tile_size = std::min(tile_size, largest_square(gpu, 4 * sizeof(float)));  // ViewTiles has its radiance
-}
+Renderer::Impl::Impl(const DeviceOptions& options)
+    : backend(open_backend(options)), tile_size(std::min(options.tile_size, backend->longest_part())) {}
 
-const GpuImage& Renderer::Impl::attenuation_on_device() {
-    if (!attenuation) attenuation.emplace(upload_attenuation(gpu));
-    return *attenuation;
-}
-
-LightTiles& Renderer::Impl::light_on_device() {
-    if (!light_tiles) light_tiles.emplace(gpu, layout, attenuation_on_device(), clamped);
-    return *light_tiles;
-}
-
-// D, step 1, in compute shaders.
-void Renderer::Impl::pass_sunlight(LitCloud& kept) {
-    settle();
-    const LightSortedSplats order = sort_for_light(kept.cloud, kept.frame, kept.shadow_size);
-    if (kept.cloud.visible.empty()) {  // on the device the smallest map will do
-        std::vector<float> small;
-        light_on_device().run(gpu, order, 16, small);
-    } else {
-        const std::vector<float> ordered = light_on_device().run(gpu, order, kept.shadow_size, kept.shadow);
-        for (std::size_t i = 0; i < ordered.size(); ++i) kept.sun_depths[order.source[i]] = ordered[i];
-    }
-    kept.all_known = true;
-    map_on_device = kept.key;
-}
-
-// T's absorption factor in its place.
-void Renderer::Impl::absorb_sunlight(LitCloud& kept, const DensityBlocks& blocks,
+void Renderer::Impl::absorb_sunlight(LitCloud& cloud, const DensityBlocks& blocks,
                                      const RenderOptions& options) {
     const double distance = options.light.light_distance_m;
-    kept.shadow = shadow_by_absorption(blocks, kept.frame, kept.shadow_size, distance);
-    kept.sun_depths = light_by_absorption(kept.cloud, blocks, direction_to_sun(options.sun), distance);
-    to_sun_depths(kept.sun_depths);
-    kept.all_known = true;
+    cloud.shadow = shadow_by_absorption(blocks, cloud.frame, cloud.shadow_size, distance);
+    cloud.sun_depths = light_by_absorption(cloud.cloud, blocks, direction_to_sun(options.sun), distance);
+    to_sun_depths(cloud.sun_depths);
+    cloud.all_known = true;
+    cloud.note_light_pass();
 }
 
-// What is missing of the light that the picture needs, and the lightning.
-std::vector<float> Renderer::Impl::light_up(const Splats& splats, const RenderOptions& options,
-                                            const ViewSortedSplats& order, const VisibleSet* seen) {
+std::vector<float> Renderer::Impl::absorb_light(const Splats& splats, const RenderOptions& options) {
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     const bool absorbs = options.light.lighting == Lighting::cfa && !lit.all_known;
-    std::optional<DensityBlocks> blocks;
-    if (!lit.cloud.visible.empty() && (flash != nullptr || absorbs))
-        blocks.emplace(lit.given, splats.metaballs.extinction_per_m);  // cubes of the voxels' size
-    // A map that is known but is not on the device goes there below; of no cloud at all it is made there.
-    const bool on_device =
-        !on_processor() && (!lit.all_known || (lit.cloud.visible.empty() && map_on_device != lit.key));
-    const std::size_t passes = light_passes;
-    bool listed = false;  // the light is with the cloud on the device
-    if (blocks && absorbs) {
-        absorb_sunlight(lit, *blocks, options);
-        ++light_passes;
-    } else if (on_processor()) {
-        if (light_seen(lit, order.source, seen != nullptr ? &seen->balls : nullptr,
-                       seen != nullptr ? &seen->map_tiles : nullptr, &times)) {
-            ++light_passes;
-            map_on_device.reset();
-        }
-    } else if (on_device && options.light.lighting == Lighting::light_pass) {
-        settle();
-        listed = light_listed(splats.metaballs);
-        if (!listed) pass_sunlight(lit);
-        ++light_passes;
-    }
-    if (light_passes != passes) {
-        light_changed();
-        cloud_on_device = listed;
-    }
-    if (!on_processor() && map_on_device != lit.key) put_map_on_device();
-    if (flash == nullptr || !blocks) return {};
-    return flash_by_absorption(lit.cloud, *blocks, flash->position_m, options.light.light_distance_m);
+    if (lit.cloud.visible.empty() || (flash == nullptr && !absorbs)) return {};
+    const DensityBlocks blocks(lit.given, splats.metaballs.extinction_per_m);  // cubes of the voxels' size
+    if (absorbs) absorb_sunlight(lit, blocks, options);
+    if (flash == nullptr) return {};
+    return flash_by_absorption(lit.cloud, blocks, flash->position_m, options.light.light_distance_m);
 }
 
-void Renderer::Impl::put_map_on_device() {
-    settle();
-    light_on_device().use(gpu, lit.shadow, lit.shadow_size);
-    map_on_device = lit.key;
-}
-
-// Makes the table anew when the light is another one.
 void Renderer::Impl::use_scattering(const CloudLight& light) {
-    if (!scattering.empty() && light == scattering_light) return;
-    settle();
-    scattering = scattering_table(light);
+    if (scattering.version() != 0 && light == scattering_light) return;
+    scattering.set(scattering_table(light));
     scattering_light = light;
-    const std::size_t bytes = scattering.size() * sizeof(float);
-    scattering_buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::write);
-    write(gpu, scattering_buffer, std::as_bytes(std::span(scattering)));
 }
 
 void Renderer::Impl::begin(Drawing& drawing) {
     const Splats& splats = drawing.splats;
     const RenderOptions& options = drawing.options;
-    const CameraFrame camera = camera_frame(options.camera);
     Picture& picture = drawing.picture = blank_picture(options);
     {
         const StageTimer timer(&times, DrawStage::prepare);
-        // The key says nothing of the view, from which others may be merged.
-        if (!cache_cloud(lit, splats.metaballs, options, drawing.detail)) {
-            map_on_device.reset();
-            light_changed();
-            cloud_is_near = lists == TileLists::device && is_near_enough(lit.cloud);
-        }
+        // The key of the light says nothing of the view, from which other metaballs may be merged.
+        cache_cloud(lit, splats.metaballs, options, drawing.detail);
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
     picture.shadow_frame = lit.frame;
     use_scattering(options.light);
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
-    sky = sky_of(splats, options);
-    if (sky != nullptr) picture.air = air_of(*sky);
-    std::vector<PartFrame> parts;
+    FrameDescription frame{.splats = splats,
+                           .options = options,
+                           .camera = camera_frame(options.camera),
+                           .parts = {},
+                           .cloud = lit,
+                           .lightning = absorb_light(splats, options),
+                           .sky = sky_of(splats, options),
+                           .table = scattering,
+                           .air = air,
+                           .times = times,
+                           .overflowed = drawing.overflowed};
+    if (frame.sky != nullptr) picture.air = air_of(*frame.sky);
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {
             const Tile tile{x, y, std::min(tile_size, picture.width - x),
                             std::min(tile_size, picture.height - y)};
-            parts.push_back({tile, frame_data(options, camera, lit.frame, flash, tile, sky)});
-            parts.back().frame.scattering = scattering.data();
+            frame.parts.push_back(
+                {tile, frame_data(options, frame.camera, lit.frame, flash, tile, frame.sky)});
+            frame.parts.back().frame.scattering = scattering.get().data();
         }
     }
-    if (uses_lists(drawing, camera))
-        begin_listed(drawing, camera, parts);
-    else
-        draw_ordered(splats, options, camera, parts, picture);
+    if (backend->begin(frame, picture)) drawing.backend = backend.get();
     if (splats.light) hand_out_light(splats, options, picture);
 }
 
 void Renderer::Impl::finish(Drawing& drawing) {
-    if (drawing.view == nullptr) return;
+    if (drawing.backend == nullptr) return;
     {
         const StageTimer timer(&times, DrawStage::view);
-        if (std::exchange(drawing.view, nullptr)->finish(drawing.picture)) return;
+        if (std::exchange(drawing.backend, nullptr)->finish(drawing.picture)) return;
     }
-    drawing.too_much = true;
+    drawing.overflowed = true;
     begin(drawing);
 }
 
@@ -261,34 +179,19 @@ Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options,
     return std::move(drawing.picture);
 }
 
-void Renderer::Impl::draw_ordered(const Splats& splats, const RenderOptions& options,
-                                  const CameraFrame& camera, const std::vector<PartFrame>& parts,
-                                  Picture& picture) {
-    ViewSortedSplats order;
-    {
-        const StageTimer timer(&times, DrawStage::view_sorting);
-        order =
-            sort_for_view(lit.cloud, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
-    }
-    // Balls are read twice; keys move through memory three times, and back and forth.
-    times[DrawStage::view_sorting].bytes =
-        lit.cloud.metaballs.size_bytes() +
-        order.balls.size() * (sizeof(Metaball) + 7 * 8 + sizeof(shader::ViewBall));
-    if (on_processor())
-        draw_on_processor(splats, options, camera, parts, order, picture);
-    else
-        draw_on_device(splats, options, camera, parts, order, picture);
-}
-
 // At full detail: the light of each metaball is that of its own centre.
 void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& options, Picture& picture) {
+    backend->fetch_light(lit);  // now: the light of another cloud replaces it on a device
     const LitCloud* known = &lit;
     LitCloud whole;
     if (!lit.merged.empty()) {
         RenderOptions given = options;
         given.level_of_detail.pixels = 0;
         cache_cloud(whole, splats.metaballs, given, {});
-        light_all(whole, splats, given);
+        if (options.light.lighting == Lighting::cfa)
+            absorb_sunlight(whole, DensityBlocks(whole.cloud, splats.metaballs.extinction_per_m), given);
+        else
+            backend->light_all(whole, times);
         known = &whole;
     }
     picture.light.assign(splats.metaballs.metaballs.size(), 1.0f);
@@ -296,16 +199,6 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
         picture.light[known->cloud.visible[i]] = std::exp(-known->sun_depths[i]);
     picture.shadow = known->shadow;
     picture.shadow_frame = known->frame;
-}
-
-// All of a cloud's light, whether the picture needs it or not.
-void Renderer::Impl::light_all(LitCloud& cloud, const Splats& splats, const RenderOptions& options) {
-    if (options.light.lighting == Lighting::cfa)
-        absorb_sunlight(cloud, DensityBlocks(cloud.cloud, splats.metaballs.extinction_per_m), options);
-    else if (on_processor())
-        light_seen(cloud, {}, nullptr, nullptr, &times);
-    else
-        pass_sunlight(cloud);
 }
 
 Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptions& options) {
@@ -324,6 +217,7 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
         mirror = mirror_view(draw(mirrored, below, detail), below.camera);
         ground.mirror = &*mirror;
     }
+    backend->fetch_light(lit);
     ground.shadow = lit.shadow.data();  // the mirrored view may have completed it
     ground.shadow_size = lit.shadow_size;
     ground.sky = sky_of(splats, options);  // the mirrored view has another
@@ -331,72 +225,10 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
     return picture;
 }
 
-void Renderer::Impl::draw_on_processor(const Splats& splats, const RenderOptions& options,
-                                       const CameraFrame& camera, const std::vector<PartFrame>& parts,
-                                       ViewSortedSplats& order, Picture& picture) {
-    std::vector<ProcessorView> views;
-    for (const PartFrame& part : parts)
-        views.emplace_back(options, camera, part.frame, part.tile, order, BatchLimits{}, &times);
-    std::optional<VisibleSet> seen;
-    if (!splats.light && !lit.all_known) {
-        seen.emplace(order, lit.shadow_size);
-        for (ProcessorView& view : views) view.find_visible(lit.shadow_size, *seen);
-        if (has_shells(options, lit.cloud)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
-    }
-    const VisibleSet* const known = seen ? &*seen : nullptr;
-    const std::vector<float> lightning = light_up(splats, options, order, known);
-    set_light(order, {lit.sun_depths, lightning});
-    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
-                                        splats.time_s, fog_noise, shade_cache);
-    for (ProcessorView& view : views) view.draw(picture, lit.shadow.data(), lit.shadow_size, shells, known);
-}
-
-void Renderer::Impl::draw_on_device(const Splats& splats, const RenderOptions& options,
-                                    const CameraFrame& camera, const std::vector<PartFrame>& parts,
-                                    ViewSortedSplats& order, Picture& picture) {
-    const std::vector<float> lightning = light_up(splats, options, order, nullptr);
-    set_light(order, {lit.sun_depths, lightning});
-    const GpuImage& map = light_on_device().shadow_map();
-    const AirShells shells = air_shells(options, lit.cloud, lit.frame, lit.shadow, lit.shadow_size,
-                                        splats.time_s, fog_noise, shade_cache);
-    const bool tiles = splatting == Splatting::tiles;
-    const StageTimer timer(&times, DrawStage::view);
-    const auto prepared = [&](auto& passes) -> auto& {
-        const ShaderVariant variant{.physical_sky = sky != nullptr,
-                                    .shells = shells.any(),
-                                    .fog = shells.has_fog(),
-                                    .billboards = tiles && !order.billboards.empty()};
-        auto& pass = passes[variant.physical_sky ? 1 : 0][shells.has_fog() ? 2 : shells.any() ? 1 : 0];
-        if (!pass) pass.emplace(gpu, layout, attenuation_on_device(), clamped, variant);
-        if (sky != nullptr) pass->use_sky(gpu, image_of(*sky), clamped);
-        pass->use_shadow_map(gpu, map, white_beyond);
-        pass->use_scattering(gpu, scattering_buffer);
-        if (shells.any()) pass->use_shells(gpu, shells, order);
-        return *pass;
-    };
-    if (tiles) {
-        ViewTiles& pass = prepared(view_tiles[order.billboards.empty() ? 0 : 1]);
-        for (const PartFrame& part : parts)
-            pass.draw_tile(gpu, options, camera, part.frame, part.tile, order, picture);
-        return;
-    }
-    ViewPass& pass = prepared(view_pass);
-    for (const PartFrame& part : parts) pass.draw_tile(gpu, part.frame, part.tile, order, picture);
-}
-
 // Null: gradient. Until the next call.
 const SkyLight* Renderer::Impl::sky_of(const Splats& splats, const RenderOptions& options) {
     if (options.atmosphere.model == AirModel::gradient) return nullptr;
     return &sky_lights.at(options, heights_of(lit.cloud, splats));
-}
-
-const GpuImage& Renderer::Impl::image_of(const SkyLight& light) {
-    if (!sky_image) sky_image.emplace(gpu);
-    if (!sky_image->has(light)) {
-        settle();
-        sky_image->use(gpu, light);
-    }
-    return sky_image->image();
 }
 
 Renderer::Renderer(const DeviceOptions& options) {
@@ -421,8 +253,7 @@ Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options
 
 PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& options) {
     check(options);
-    int limit = int(impl_->gpu.properties.limits.maxImageDimension2D);
-    if (!impl_->on_processor()) limit = std::min(limit, largest_square(impl_->gpu, sizeof(float)));
+    const int limit = impl_->backend->largest_shadow_map();
     if (options.shadow_map_size > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
     if (splats.ground_cover) check(*splats.ground_cover);
@@ -444,8 +275,7 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
 
 Picture Renderer::finish(PendingPicture&& pending) {
     const std::unique_ptr<PendingPicture::State> state = std::move(pending.state_);
-    assert(state != nullptr &&
-           (state->view == nullptr || (impl_->listed_view && state->view == &*impl_->listed_view)));
+    assert(state != nullptr && (state->backend == nullptr || state->backend == impl_->backend.get()));
     with_drawing_errors([&] { impl_->finish(*state); });
     return std::move(state->picture);
 }
@@ -454,17 +284,22 @@ PendingPicture::PendingPicture(std::unique_ptr<State> state) : state_(std::move(
 PendingPicture::PendingPicture(PendingPicture&&) noexcept = default;
 PendingPicture& PendingPicture::operator=(PendingPicture&&) noexcept = default;
 PendingPicture::~PendingPicture() = default;
-bool PendingPicture::is_pending() const { return state_ && state_->view != nullptr; }
+bool PendingPicture::is_pending() const { return state_ && state_->backend != nullptr; }
 
 const StageTimes& Renderer::times() const { return impl_->times; }
 
-std::string Renderer::device_name() const { return std::string(impl_->gpu.properties.deviceName.data()); }
+std::string Renderer::backend_name() const { return impl_->backend->name(); }
+
+std::string Renderer::device_name() const { return impl_->backend->device_name(); }
+
+void note_renderer(const Renderer& renderer, PictureMetadata& metadata) {
+    metadata.backend = renderer.backend_name();
+    // Vectors and threads of the processor are left out: on them the picture does not depend.
+    metadata.device = metadata.backend == "cpu" ? "" : renderer.device_name();
+}
 
 std::vector<std::string> Renderer::validation_messages() const {
-    const ValidationLog* log = impl_->gpu.log.get();
-    if (log == nullptr) return {};
-    const std::scoped_lock lock(log->mutex);
-    return log->messages;
+    return impl_->backend->validation_messages();
 }
 
 }  // namespace nephos

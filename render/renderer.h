@@ -13,9 +13,10 @@
 //
 // Clouds drawn as billboards cast no shadow on the ground or on other clouds.
 //
-// Offscreen Vulkan 1.3; on a software device (lavapipe) vector code draws what it draws faster. The picture
-// is a function of cloud and options alone: two calls give the same bits on the same device, driver and
-// processor, for any number of threads.
+// Drawn by one of three back-ends (Splatting in device_options.h): vectors on the processor, compute shaders, or
+// D's blended billboards, the latter two offscreen in Vulkan 1.3. The picture is a function of cloud and options
+// alone: two calls give the same bits with the same back-end, device, driver and processor, for any number of
+// threads.
 
 #include <memory>
 #include <string>
@@ -48,9 +49,9 @@ class PendingPicture {
 
 class Renderer {
   public:
-    // Opens a device and builds all that does not depend on a picture. Throws Error(gpu) when there is no
-    // Vulkan loader or no device that can do it, saying what to install; Error(usage) when options name an
-    // unknown device.
+    // Opens the back-end that options ask for. Throws Error(gpu) when a Vulkan device is asked for, by the
+    // back-end or by name, and there is no Vulkan loader or no device that can do it, saying what to install;
+    // Error(usage) when options name an unknown device, or one for the back-end cpu.
     explicit Renderer(const DeviceOptions& options = {});
     ~Renderer();
     Renderer(Renderer&&) noexcept;
@@ -85,6 +86,8 @@ class Renderer {
     PendingPicture begin(const Splats& splats, const RenderOptions& options);
     Picture finish(PendingPicture&& pending);
 
+    std::string backend_name() const;  // what draws: "cpu", "vulkan" or "blended"
+    // On what: the name of the Vulkan device, or as in "cpu (AVX2, 8 threads)".
     std::string device_name() const;
 
     // Where the time went since the last begin() or draw_splats(): also that of finish() for a picture
@@ -99,6 +102,9 @@ class Renderer {
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
+
+// Writes the back-end of a renderer into the metadata of its pictures, and the Vulkan device where it has one.
+void note_renderer(const Renderer& renderer, PictureMetadata& metadata);
 
 // Names of all Vulkan devices of this machine, in the loader's order. Throws Error(gpu) when there is none.
 std::vector<std::string> device_names();

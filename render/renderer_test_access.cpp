@@ -5,10 +5,34 @@
 #include <cstring>
 #include <numeric>
 
+#include "core/error.h"
+#include "render/blended/blended_backend.h"
 #include "render/renderer_impl.h"
+#include "render/vulkan/vulkan_backend.h"
 
 namespace nephos {
+
+VulkanBackend* RendererTestAccess::vulkan(const Renderer& renderer) {
+    return dynamic_cast<VulkanBackend*>(renderer.impl_->backend.get());
+}
+
+GpuDevice& RendererTestAccess::device(const Renderer& renderer) {
+    if (VulkanBackend* backend = vulkan(renderer)) return backend->scene().gpu;
+    if (auto* backend = dynamic_cast<BlendedBackend*>(renderer.impl_->backend.get()))
+        return backend->scene().gpu;
+    throw Error(ErrorCode::usage, "the back-end cpu has no device");
+}
+
 namespace {
+
+ListedView& listed_view(VulkanBackend* backend) {
+    if (backend == nullptr) throw Error(ErrorCode::usage, "only the back-end vulkan has lists on a device");
+    return backend->listed_view();
+}
+
+const ListedView* made_view(const VulkanBackend* backend) {
+    return backend == nullptr ? nullptr : backend->listed_view_if_made();
+}
 
 GpuBuffer storage(const GpuDevice& gpu, std::size_t bytes, std::span<const std::byte> content = {},
                   vk::BufferUsageFlags more = {}) {
@@ -70,18 +94,18 @@ struct SortBench {
 }  // namespace
 
 std::size_t RendererTestAccess::light_passes(const Renderer& renderer) {
-    return renderer.impl_->light_passes;
+    return renderer.impl_->lit.light_passes;
 }
 
 std::uint64_t RendererTestAccess::uploaded_bytes(const Renderer& renderer) {
-    return renderer.impl_->gpu.uploaded_bytes;
+    return device(renderer).uploaded_bytes;
 }
 
-void RendererTestAccess::divide_memory(Renderer& renderer) { renderer.impl_->gpu.unified_memory = false; }
+void RendererTestAccess::divide_memory(Renderer& renderer) { device(renderer).unified_memory = false; }
 
 // Two copies into the same buffer with no barrier between them.
 void RendererTestAccess::provoke_hazard(Renderer& renderer) {
-    const GpuDevice& gpu = renderer.impl_->gpu;
+    const GpuDevice& gpu = device(renderer);
     with_gpu_errors("provoking a hazard", [&] {
         using Usage = vk::BufferUsageFlagBits;
         const GpuBuffer from = create_buffer(gpu, 64, Usage::eTransferSrc, HostAccess::write);
@@ -95,7 +119,7 @@ void RendererTestAccess::provoke_hazard(Renderer& renderer) {
 
 std::vector<std::uint32_t> RendererTestAccess::sorted(Renderer& renderer, std::span<const std::uint32_t> keys,
                                                       std::uint32_t bits) {
-    const SortBench bench(renderer.impl_->gpu, keys, digits_in_table(keys.size()));
+    const SortBench bench(device(renderer), keys, digits_in_table(keys.size()));
     bench.run([&](const OrderRecorder& recorder) {
         recorder.sort({bench.sets.sets[0], bench.sets.sets[1]}, shader::kSeenDigits, bits);
     });
@@ -104,7 +128,7 @@ std::vector<std::uint32_t> RendererTestAccess::sorted(Renderer& renderer, std::s
 
 std::vector<std::uint32_t> RendererTestAccess::prefix_sums(Renderer& renderer,
                                                            std::span<const std::uint32_t> numbers) {
-    const SortBench bench(renderer.impl_->gpu, numbers, numbers.size());
+    const SortBench bench(device(renderer), numbers, numbers.size());
     std::ranges::copy(std::as_bytes(numbers), bench.table.mapped);
     bench.run([&](const OrderRecorder& recorder) {
         shader::OrderStep step{};
@@ -117,28 +141,31 @@ std::vector<std::uint32_t> RendererTestAccess::prefix_sums(Renderer& renderer,
 }
 
 RendererTestAccess::Lists RendererTestAccess::lists(Renderer& renderer, int tile_width, int tile_height) {
-    ListedView::Lists lists = renderer.impl_->lists_on_device().read_lists({0, 0, tile_width, tile_height});
+    ListedView::Lists lists = listed_view(vulkan(renderer)).read_lists({0, 0, tile_width, tile_height});
     return {std::move(lists.balls), std::move(lists.ranges), std::move(lists.list)};
 }
 
 void RendererTestAccess::limit_lists(Renderer& renderer, std::size_t balls, std::size_t entries) {
-    renderer.impl_->lists_on_device().limits = {balls, entries};
+    listed_view(vulkan(renderer)).limits = {balls, entries};
 }
 
 std::size_t RendererTestAccess::listed(const Renderer& renderer) {
-    return renderer.impl_->listed_view ? renderer.impl_->listed_view->drawn : 0;
+    const ListedView* const view = made_view(vulkan(renderer));
+    return view != nullptr ? view->drawn : 0;
 }
 
 std::size_t RendererTestAccess::too_long(const Renderer& renderer) {
-    return renderer.impl_->listed_view ? renderer.impl_->listed_view->too_long : 0;
+    const ListedView* const view = made_view(vulkan(renderer));
+    return view != nullptr ? view->too_long : 0;
 }
 
 std::size_t RendererTestAccess::listed_light(const Renderer& renderer) {
-    return renderer.impl_->listed_view ? renderer.impl_->listed_view->lit : 0;
+    const ListedView* const view = made_view(vulkan(renderer));
+    return view != nullptr ? view->lit : 0;
 }
 
 void RendererTestAccess::limit_storage(Renderer& renderer, std::uint32_t bytes) {
-    renderer.impl_->gpu.properties.limits.maxStorageBufferRange = bytes;
+    device(renderer).properties.limits.maxStorageBufferRange = bytes;
 }
 
 }  // namespace nephos

@@ -13,6 +13,9 @@
 
 namespace nephos {
 
+struct GpuDevice;
+class VulkanBackend;
+
 struct RendererTestAccess {
     // How often light was computed so far.
     static std::size_t light_passes(const Renderer& renderer);
@@ -45,6 +48,10 @@ struct RendererTestAccess {
     static std::size_t listed_light(const Renderer& renderer);
     // As with a device whose shaders see less of a buffer.
     static void limit_storage(Renderer& renderer, std::uint32_t bytes);
+
+  private:
+    static VulkanBackend* vulkan(const Renderer& renderer);  // null: another back-end draws
+    static GpuDevice& device(const Renderer& renderer);      // throws Error(usage) for the back-end cpu
 };
 
 }  // namespace nephos

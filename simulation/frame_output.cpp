@@ -38,6 +38,8 @@ FrameOutput::FrameOutput(const RunSettings& settings, std::function<void(const F
       drawing_(kDrawing, several_threads() && settings.render,
                [this](FrameResult& frame) { draw_next(frame); }) {}
 
+std::string FrameOutput::backend_name() const { return renderer_ ? renderer_->backend_name() : ""; }
+
 std::string FrameOutput::device_name() const { return renderer_ ? renderer_->device_name() : ""; }
 
 void FrameOutput::add(const FrameResult& frame) {
@@ -211,6 +213,7 @@ void FrameOutput::write_picture(const Drawn& drawn) const {
     metadata.scene_hash = settings_.scene_hash;
     metadata.state_hash = frame.hash.hex();
     metadata.version = version();
+    note_renderer(*renderer_, metadata);
     metadata.time_s = frame.time_s;
     metadata.frames_per_second = scene.frames.per_second;
     metadata.time_scale = scene.frames.time_scale;

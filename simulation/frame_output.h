@@ -34,10 +34,12 @@ class FrameOutput {
   public:
     // `done` is called for each frame all of whose files are there, in order, by the thread that writes.
     // `settings` must outlive this object, and the pipeline the next finish() or finish_quietly(). Throws
-    // Error(gpu) when pictures are wanted and there is no device.
+    // Error(gpu) when pictures are wanted and the device that is asked for is not there.
     FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&)> done);
 
-    std::string device_name() const;  // empty without pictures
+    // As those of Renderer; empty without pictures.
+    std::string backend_name() const;
+    std::string device_name() const;
 
     // Hands over the next frame; waits while too many are under way. Throws what making an earlier one threw:
     // Error(io) naming a file, Error(gpu), Error(usage) when a frame does not fit into memory.

@@ -155,8 +155,9 @@ void write_manifest(const RunSettings& settings, const ManifestState& state) {
                                 .dump(-1, ' ', false, Json::error_handler_t::replace));
             separator = ",\n";
         }
-        const Json tail = {{"scene_text", settings.scene_text},
-                           {"timing", {{"wall_s", state.wall_s}, {"device", state.device}}}};
+        const Json tail = {
+            {"scene_text", settings.scene_text},
+            {"timing", {{"wall_s", state.wall_s}, {"backend", state.backend}, {"device", state.device}}}};
         append("\n  ],\n" + members(tail) + "\n}\n");
     });
 }

@@ -32,7 +32,7 @@ struct ManifestState {
     std::map<int, std::string>
         rain;  // frame: its rain areas as JSON, by rain_text(); frames without rain left out
     double wall_s = 0;
-    std::string device;
+    std::string backend, device;  // that drew; empty without pictures
 };
 
 // Writes atomically, frame by frame. As JSON cannot be appended to, every call writes the whole list anew:

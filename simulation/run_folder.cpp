@@ -42,6 +42,7 @@ class Recorder : public PipelineSink {
         : settings_(settings),
           folder_{settings.folder, settings.scene.name},
           output_(settings, [this](const FrameResult& frame) { note(frame); }) {
+        state_.backend = output_.backend_name();
         state_.device = output_.device_name();
     }
 
@@ -371,6 +372,7 @@ RunReport report_of(const Recorder& recorder, const RunSettings& settings, const
     report.frames = int(state.frames.size());
     report.state_hash = state.state_hash;
     report.wall_s = state.wall_s;
+    report.backend = state.backend;
     report.device = state.device;
     report.files = recorder.frame_files();
     const RunFolder& folder = recorder.folder();

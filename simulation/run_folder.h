@@ -53,8 +53,8 @@ struct RunSettings {
     std::string scene_hash;          // of everything in the scene
     std::string simulation_hash;     // of what decides the automaton's bits
     PipelineRange range;
-    bool render = true;      // pictures too; needs a Vulkan device
-    DeviceOptions device{};  // that draws them
+    bool render = true;      // pictures too
+    DeviceOptions device{};  // what draws them, whatever scene.frames says
     std::filesystem::path folder;
     bool resume = false;             // go on from the folder's checkpoint
     bool overwrite = false;          // start anew although the folder holds what would be lost
@@ -87,11 +87,11 @@ struct RunReport {
     int frames = 0;                    // in the folder
     std::string state_hash;            // at the last reported step
     double wall_s = 0;
-    std::string device;  // that drew; empty without pictures
+    std::string backend, device;  // that drew, as Renderer names them; empty without pictures
     std::vector<RunFiles> files;
 };
 
-// What a run of this scene with pictures writes of them: any, which takes a Vulkan device; a video, which
+// What a run of this scene with pictures writes of them: any, which takes a back-end; a video, which
 // takes the ffmpeg command.
 bool wants_pictures(const Scene& scene);
 bool wants_video(const Scene& scene);
@@ -99,7 +99,7 @@ bool wants_video(const Scene& scene);
 // Runs, or goes on. Throws Error(usage) when the settings contradict each other or the folder's checkpoint,
 // or when files would be lost that are not of a complete run; Error(io) naming a file that could not be
 // written or read, or when another run is writing into the folder. Before anything is simulated: Error(gpu)
-// when pictures are wanted and there is no device, Error(io) when a video is wanted and there is no ffmpeg.
+// when pictures are wanted and the device that is asked for is not there, Error(io) when a video is wanted and there is no ffmpeg.
 // After any exception the folder can be resumed from its last checkpoint.
 RunReport run_scene(const RunSettings& settings, const RunObserver& observer);
 

@@ -32,8 +32,10 @@ RENDER_LAYERS = (
     {"cloud"},
     {"frame"},
     {"shading"},
+    {"backend"},
     {"gpu"},
-    {"vulkan", "cpu", "blended"},
+    {"vulkan", "cpu"},
+    {"blended"},
     {"rain", "ground"},
 )
 # render/shared/ is a leaf of plain structs that C++ and GLSL both read.

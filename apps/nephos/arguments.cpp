@@ -40,6 +40,16 @@ std::vector<std::string> split(const std::string& text, char separator) {
     return parts;
 }
 
+Splatting parse_splatting(const std::string& text) {
+    constexpr std::pair<std::string_view, Splatting> kNames[] = {{"auto", Splatting::automatic},
+                                                                 {"cpu", Splatting::cpu},
+                                                                 {"vulkan", Splatting::vulkan},
+                                                                 {"blended", Splatting::blended}};
+    for (const auto& [name, splatting] : kNames)
+        if (text == name) return splatting;
+    refuse(text, "one of auto, cpu, vulkan and blended");
+}
+
 }  // namespace
 
 std::int64_t parse_integer(const std::string& text, std::int64_t min, std::int64_t max) {
@@ -133,6 +143,22 @@ void add_scene_changes(CLI::App& command, SceneArguments& arguments) {
               [&](const std::string& text) {
                   arguments.seed = parse_unsigned(text, 0, std::numeric_limits<std::uint64_t>::max());
               });
+}
+
+void add_device(CLI::App& command, DeviceArguments& arguments) {
+    add_value(
+        command, "--splatting", "BACK-END",
+        "What draws: auto, cpu (takes no Vulkan driver), vulkan (compute shaders), blended (billboards)",
+        [&](const std::string& text) { arguments.splatting = parse_splatting(text); });
+    command.add_option("--device", arguments.device, "Vulkan device: a part of its name, or its number")
+        ->type_name("NAME");
+}
+
+DeviceOptions device_options(const DeviceArguments& arguments, const FrameOptions& frames) {
+    // The scene's device is that of its own back-end.
+    const bool own_device = arguments.splatting == Splatting::cpu && !arguments.device;
+    return {.device = own_device ? std::string() : arguments.device.value_or(frames.device),
+            .splatting = arguments.splatting.value_or(frames.splatting)};
 }
 
 void add_threads(CLI::App& command, WorkArguments& arguments) {

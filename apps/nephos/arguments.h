@@ -34,6 +34,12 @@ struct WorkArguments {
     bool quiet = false;  // no progress bar, no notes
 };
 
+// What draws, where the scene does not say it or shall not.
+struct DeviceArguments {
+    std::optional<Splatting> splatting;
+    std::optional<std::string> device;
+};
+
 // Frames by their number as in file names, counted from 1; both ends belong to the range.
 struct FrameRange {
     int first = 1;
@@ -44,6 +50,7 @@ struct FrameRange {
 // Each adds its options to `command`; the struct must outlive the parse.
 void add_scene_arguments(CLI::App& command, SceneArguments& arguments);  // SCENE --set --seed
 void add_scene_changes(CLI::App& command, SceneArguments& arguments);    // --set --seed
+void add_device(CLI::App& command, DeviceArguments& arguments);          // --splatting --device
 void add_threads(CLI::App& command, WorkArguments& arguments);
 void add_json(CLI::App& command, WorkArguments& arguments);
 void add_quiet(CLI::App& command, WorkArguments& arguments);
@@ -61,6 +68,9 @@ Vec3 parse_point(const std::string& text, double min, double max);  // "X,Y,Z"
 std::vector<double> parse_reals(const std::string& text, std::size_t count, double min, double max);
 FrameRange parse_frames(const std::string& text);         // "A..B", "A..", "..B" or "A"
 std::pair<int, int> parse_size(const std::string& text);  // "WIDTHxHEIGHT"
+
+// The back-end and device of a scene, unless the command line names others.
+DeviceOptions device_options(const DeviceArguments& arguments, const FrameOptions& frames);
 
 // The scene with its changes applied. Throws as read_scene().
 Scene load_scene(const SceneArguments& arguments);

@@ -36,7 +36,7 @@ struct RenderArguments {
     std::optional<double> fov_deg, exposure_ev, extinction_per_m, albedo, g;
     std::optional<std::pair<double, double>> sun_deg;
     std::optional<std::pair<int, int>> size;
-    std::string device;
+    DeviceArguments device;
     WorkArguments work;
 };
 
@@ -258,7 +258,7 @@ int render(const RenderArguments& a) {
     const double time_s = loaded.metadata ? loaded.metadata->time_s : 0;
     RenderOptions options = picture_options(a, scene, grid, time_s);
     options.sun = sun_at(options.sun, time_s);
-    Renderer renderer(DeviceOptions{.device = a.device});
+    Renderer renderer(device_options(a.device, scene ? scene->frames : FrameOptions{}));
     const std::vector<Metaball> balls = metaballs(grid, radius);
     Splats splats;
     splats.metaballs = {balls, extinction_per_m, metaball_normalisation(radius)};
@@ -267,7 +267,9 @@ int render(const RenderArguments& a) {
     splats.light = splats.depth =
         std::ranges::any_of(a.out, [](const std::string& out) { return extension_of(out) == ".exr"; });
     const Picture picture = renderer.draw_splats(splats, options);
-    write_pictures(a, picture, options, picture_metadata(a, loaded, extinction_per_m));
+    PictureMetadata metadata = picture_metadata(a, loaded, extinction_per_m);
+    note_renderer(renderer, metadata);
+    write_pictures(a, picture, options, metadata);
 
     Output output;
     if (a.work.json) {
@@ -276,6 +278,7 @@ int render(const RenderArguments& a) {
         json["metaballs"] = balls.size();
         json["metaball_radius_voxels"] = radius;
         json["extinction_per_m"] = extinction_per_m;
+        json["backend"] = renderer.backend_name();
         json["device"] = renderer.device_name();
         output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     } else {
@@ -301,8 +304,7 @@ void add_render_command(CLI::App& app, Action& action) {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     add_picture_options(*command, *a);
     add_cloud_options(*command, *a);
-    command->add_option("--device", a->device, "Vulkan device: a part of its name, or its number")
-        ->type_name("NAME");
+    add_device(*command, a->device);
     add_threads(*command, a->work);
     add_json(*command, a->work);
     add_quiet(*command, a->work);

@@ -29,6 +29,7 @@ struct RunArguments {
     bool no_render = false, statistics_only = false, video = false, resume = false, overwrite = false,
          needs = false;
     double checkpoint_every_s = 60;
+    DeviceArguments device;
     WorkArguments work;
 };
 
@@ -44,7 +45,10 @@ void print_needs(const RunArguments& a) {
     const Scene scene = scene_of(a);
     Output output;
     const bool render = !a.no_render && !a.statistics_only;
-    if (render && wants_pictures(scene)) output.line("vulkan");
+    const Splatting splatting = device_options(a.device, scene.frames).splatting;
+    if (render && wants_pictures(scene) &&
+        (splatting == Splatting::vulkan || splatting == Splatting::blended))
+        output.line("vulkan");
     if (render && wants_video(scene)) output.line("ffmpeg");
 }
 
@@ -58,6 +62,7 @@ RunSettings settings_of(const RunArguments& a) {
     settings.range = a.frames ? range_of_frames(scene, a.frames->first, a.frames->last) : full_range(scene);
     if (a.statistics_only) settings.range = {settings.range.last_step, 1, 0};
     settings.render = !a.no_render && !a.statistics_only;
+    settings.device = device_options(a.device, scene.frames);
     settings.folder =
         a.out.empty() ? std::filesystem::path("out") / scene.name : std::filesystem::path(a.out);
     settings.resume = a.resume;
@@ -116,12 +121,19 @@ void print_files(Output& output, const RunReport& report) {
     }
 }
 
+// "cpu (AVX2, 8 threads)", or "vulkan on" a device.
+std::string drawn_by(const RunReport& report) {
+    if (report.backend.empty()) return {};
+    return ", drawn by " +
+           (report.backend == "cpu" ? report.device : report.backend + " on " + report.device);
+}
+
 void print_report(const RunReport& report, const RunSettings& settings) {
     Output output;
     output.line(styled(
         fmt::format("{}: {}, {} in {}{}", settings.scene.name, counted(report.steps_reported - 1, "step"),
                     counted(std::uint64_t(report.frames), "frame"), human_duration(report.wall_s),
-                    report.device.empty() ? "" : ", drawn by " + report.device),
+                    drawn_by(report)),
         Style::bold, colours_on(stdout)));
     print_files(output, report);
 }
@@ -144,6 +156,7 @@ void print_json(const RunReport& report, const RunSettings& settings) {
         {"frames", report.frames},
         {"state_hash", report.state_hash},
         {"wall_s", report.wall_s},
+        {"backend", report.backend},
         {"device", report.device},
         {"files", files}};
     Output().line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
@@ -195,8 +208,7 @@ void add_run_command(CLI::App& app, Action& action) {
     add_value(*command, "--frames", "A..B",
               "Write only these frames, counted from 1; A.., ..B and A alone work too",
               [a](const std::string& text) { a->frames = parse_frames(text); });
-    command->add_flag("--no-render", a->no_render,
-                      "No pictures, only density grids and statistics; needs no GPU");
+    command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics");
     command->add_flag("--statistics-only", a->statistics_only,
                       "No frames at all, only statistics of every step, the manifest and the checkpoint");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
@@ -210,6 +222,7 @@ void add_run_command(CLI::App& app, Action& action) {
               [a](const std::string& text) { a->checkpoint_every_s = parse_real(text, 0, 1e9); });
     command->add_flag("--needs", a->needs,
                       "Only print what the run needs of the system, a word a line: vulkan, ffmpeg");
+    add_device(*command, a->device);
     add_threads(*command, a->work);
     add_json(*command, a->work);
     add_quiet(*command, a->work);

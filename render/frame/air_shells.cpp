@@ -251,52 +251,52 @@ double shafts_strength(const RenderOptions& options) {
 
 // Computes the shade map of a cloud.
 void make_shade(const PreparedCloud& cloud, const ShadowFrame& frame, std::span<const float> shadow,
-                int shadow_size, ShadeCache& kept) {
+                int shadow_size, Version light, ShadeCache& cache) {
     if (cloud.visible.empty()) {  // full light
-        kept.columns = 2;
-        kept.words.assign(std::size_t{3} * 4, ~std::uint32_t{0});
+        cache.columns = 2;
+        cache.words.assign(std::size_t{3} * 4, ~std::uint32_t{0});
     } else {
         const Along along = along_axis(cloud, shade_axis(frame.direction));
         const ShadeMap map(shadow, shadow_size);
-        kept.words = map.words(cloud, frame, along, kept.first_shade);
-        kept.columns = map.columns();
-        kept.texels_per_map = map.scale();
-        kept.along = along.row;
-        kept.along_offset = along.offset;
+        cache.words = map.words(cloud, frame, along, cache.first_shade);
+        cache.columns = map.columns();
+        cache.texels_per_map = map.scale();
+        cache.along = along.row;
+        cache.along_offset = along.offset;
     }
-    kept.shade_words = kept.words.size();
-    kept.fog_seed.reset();
-    kept.known = true;
-    ++kept.serial;
+    cache.shade_words = cache.words.size();
+    cache.fog_seed.reset();
+    cache.light = light;
+    ++cache.serial;
 }
 
 // Appends the fog's noise to the shade map; without fog none is read.
-void add_fog_noise(const Fog& fog, FogNoise& noise, ShadeCache& kept) {
-    if (!(fog.extinction_per_m > 0) || kept.fog_seed == fog.seed) return;
+void add_fog_noise(const Fog& fog, FogNoise& noise, ShadeCache& cache) {
+    if (!(fog.extinction_per_m > 0) || cache.fog_seed == fog.seed) return;
     const std::vector<std::uint32_t>& words = noise.words(fog.seed);
-    kept.words.resize(kept.shade_words);
-    kept.words.insert(kept.words.end(), words.begin(), words.end());
-    kept.fog_seed = fog.seed;
-    ++kept.serial;
+    cache.words.resize(cache.shade_words);
+    cache.words.insert(cache.words.end(), words.begin(), words.end());
+    cache.fog_seed = fog.seed;
+    ++cache.serial;
 }
 
-void use_shade(const ShadeCache& kept, const PreparedCloud& cloud, const ShadowFrame& frame, const Vec3& eye,
+void use_shade(const ShadeCache& cache, const PreparedCloud& cloud, const ShadowFrame& frame, const Vec3& eye,
                AirShells& shells) {
     shader::Shells& data = shells.data;
-    shells.shade = kept.words;
-    shells.serial = kept.serial;
-    data.settings.z = float(kept.columns);
-    data.settings.w = float(kept.columns * kept.columns);
+    shells.shade = cache.words;
+    shells.serial = cache.serial;
+    data.settings.z = float(cache.columns);
+    data.settings.w = float(cache.columns * cache.columns);
     if (cloud.visible.empty()) return;
     const auto row = [&](const Vec3& axis) {
-        const Vec3 per_m = (kept.texels_per_map / dot(axis, axis)) * axis;
+        const Vec3 per_m = (cache.texels_per_map / dot(axis, axis)) * axis;
         return to_vec4(per_m, dot(per_m, eye - frame.origin_m) + ShadeMap::shift());
     };
     data.shade_u = row(frame.u_axis_m);
     data.shade_v = row(frame.v_axis_m);
-    data.shade_along = to_vec4(kept.along, dot(kept.along, eye) + kept.along_offset);
-    const float largest = float(kept.columns) - 1.001f;
-    data.shade = {largest, largest, kept.first_shade, 0};
+    data.shade_along = to_vec4(cache.along, dot(cache.along, eye) + cache.along_offset);
+    const float largest = float(cache.columns) - 1.001f;
+    data.shade = {largest, largest, cache.first_shade, 0};
 }
 
 // Number of splats, in falling order of distance, that are at `end` or beyond.
@@ -334,15 +334,15 @@ bool has_shells(const RenderOptions& options, const PreparedCloud& cloud) {
 }
 
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
-                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise,
-                     ShadeCache& kept) {
+                     std::span<const float> shadow, int shadow_size, Version light, double time_s,
+                     FogNoise& noise, ShadeCache& cache) {
     AirShells shells;
     const bool has_fog = options.fog.extinction_per_m > 0;
     if (!has_shells(options, cloud)) return shells;
     shader::Shells& data = shells.data;
-    if (!kept.known) make_shade(cloud, frame, shadow, shadow_size, kept);
-    add_fog_noise(options.fog, noise, kept);
-    use_shade(kept, cloud, frame, options.camera.position_m, shells);
+    if (cache.light != light) make_shade(cloud, frame, shadow, shadow_size, light, cache);
+    add_fog_noise(options.fog, noise, cache);
+    use_shade(cache, cloud, frame, options.camera.position_m, shells);
     set_ends(data, options.shells, has_fog);
     data.settings.x = float(options.shells.count + (has_fog ? 1 : 0));
     data.settings.y = cloud.visible.empty() ? 0.0f : float(shafts_strength(options));

@@ -23,6 +23,7 @@
 
 #include "render/cloud/cloud_preparation.h"
 #include "render/frame/fog.h"
+#include "render/frame/versioned.h"
 #include "render/frame/view_sorting.h"
 #include "render/image/picture.h"
 #include "render/options/camera.h"
@@ -30,9 +31,9 @@
 
 namespace nephos {
 
-// The shade map and what shaders read behind it: kept until the light of the cloud changes.
+// The shade map and what shaders read behind it: cached until the light of the cloud changes.
 struct ShadeCache {
-    bool known = false;        // false: the light has changed
+    Version light = 0;         // of which it was made
     std::uint64_t serial = 0;  // changes when the words do
     std::vector<std::uint32_t> words;
     std::size_t shade_words = 0;            // of them; the others are noise of fog
@@ -76,11 +77,11 @@ std::size_t shells_before(const shader::Shells& data, float distance);
 bool has_shells(const RenderOptions& options, const PreparedCloud& cloud);
 
 // No shells when the options ask for none or when they would draw nothing. `shadow`: the texels of the shadow
-// map; `time_s`: simulated time of the picture. Whoever calls says with `kept.known` whether cloud, frame and
-// shadow are those of the call before; what is returned lives as long as `kept` is not given to another call.
+// map; `light`: number of the state of cloud, frame and shadow; `time_s`: simulated time of the picture. What is
+// returned lives as long as `cache` is not given to another call.
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
-                     std::span<const float> shadow, int shadow_size, double time_s, FogNoise& noise,
-                     ShadeCache& kept);
+                     std::span<const float> shadow, int shadow_size, Version light, double time_s,
+                     FogNoise& noise, ShadeCache& cache);
 
 // Returns for each shell the number of splats in front of it; rising.
 std::vector<std::uint32_t> splats_before_shells(const AirShells& shells, const ViewSortedSplats& order);

@@ -150,11 +150,15 @@ bool is_named(const std::string& wanted, std::size_t number, const std::string& 
     return name.find(wanted) != std::string::npos;
 }
 
-vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevice>& devices,
-                                       std::string wanted) {
-    if (devices.empty()) fail_without_driver();
+// The device that is asked for by name or number; empty: any.
+std::string requested_device(const DeviceOptions& options) {
     const char* environment = std::getenv("NEPHOS_DEVICE");
-    if (wanted.empty() && environment != nullptr) wanted = environment;
+    return options.device.empty() && environment != nullptr ? environment : options.device;
+}
+
+vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevice>& devices,
+                                       const std::string& wanted) {
+    if (devices.empty()) fail_without_driver();
 
     const vk::raii::PhysicalDevice* best = nullptr;
     bool named = wanted.empty();
@@ -219,6 +223,31 @@ bool has_unified_memory(const vk::PhysicalDeviceMemoryProperties& memory) {
                                [&](const vk::MemoryType& type) { return (type.propertyFlags & all) == all; });
 }
 
+// Loads Vulkan and chooses a device, without opening it.
+GpuDevice find_device(const DeviceOptions& options) {
+    GpuDevice gpu{load_vulkan()};
+    if (options.validation) gpu.log = std::make_unique<ValidationLog>();
+    gpu.instance = create_instance(gpu.context, gpu.log.get());
+    if (gpu.log != nullptr)
+        gpu.messenger = vk::raii::DebugUtilsMessengerEXT(gpu.instance, messenger_info(gpu.log.get()));
+    gpu.physical = choose_device(physical_devices(gpu.instance), requested_device(options));
+    gpu.properties = gpu.physical.getProperties();
+    return gpu;
+}
+
+void open(GpuDevice& gpu) {
+    gpu.memory = gpu.physical.getMemoryProperties();
+    gpu.unified_memory = has_unified_memory(gpu.memory);
+    gpu.queue_family = find_queue_family(gpu.physical).value();
+    choose_tile_lanes(gpu);
+    gpu.device = create_device(gpu.physical, gpu.queue_family);
+    gpu.queue = vk::raii::Queue(gpu.device, gpu.queue_family, 0);
+    gpu.pool = vk::raii::CommandPool(
+        gpu.device, vk::CommandPoolCreateInfo(vk::CommandPoolCreateFlagBits::eTransient |
+                                                  vk::CommandPoolCreateFlagBits::eResetCommandBuffer,
+                                              gpu.queue_family));
+}
+
 }  // namespace
 
 void fail_gpu(const std::string& what, vk::Result result) {
@@ -227,23 +256,23 @@ void fail_gpu(const std::string& what, vk::Result result) {
 
 GpuDevice open_device(const DeviceOptions& options) {
     return with_gpu_errors("opening the device", [&] {
-        GpuDevice gpu{load_vulkan()};
-        if (options.validation) gpu.log = std::make_unique<ValidationLog>();
-        gpu.instance = create_instance(gpu.context, gpu.log.get());
-        if (gpu.log != nullptr)
-            gpu.messenger = vk::raii::DebugUtilsMessengerEXT(gpu.instance, messenger_info(gpu.log.get()));
-        gpu.physical = choose_device(physical_devices(gpu.instance), options.device);
-        gpu.properties = gpu.physical.getProperties();
-        gpu.memory = gpu.physical.getMemoryProperties();
-        gpu.unified_memory = has_unified_memory(gpu.memory);
-        gpu.queue_family = find_queue_family(gpu.physical).value();
-        choose_tile_lanes(gpu);
-        gpu.device = create_device(gpu.physical, gpu.queue_family);
-        gpu.queue = vk::raii::Queue(gpu.device, gpu.queue_family, 0);
-        gpu.pool = vk::raii::CommandPool(
-            gpu.device, vk::CommandPoolCreateInfo(vk::CommandPoolCreateFlagBits::eTransient |
-                                                      vk::CommandPoolCreateFlagBits::eResetCommandBuffer,
-                                                  gpu.queue_family));
+        GpuDevice gpu = find_device(options);
+        open(gpu);
+        return gpu;
+    });
+}
+
+std::optional<GpuDevice> open_graphics_card(const DeviceOptions& options) {
+    return with_gpu_errors("opening the device", [&]() -> std::optional<GpuDevice> {
+        std::optional<GpuDevice> gpu;
+        try {
+            gpu = with_gpu_errors("looking for a device", [&] { return find_device(options); });
+        } catch (const Error& error) {
+            if (error.code() != ErrorCode::gpu || !requested_device(options).empty()) throw;
+            return std::nullopt;
+        }
+        if (gpu->properties.deviceType == vk::PhysicalDeviceType::eCpu) return std::nullopt;
+        open(*gpu);
         return gpu;
     });
 }

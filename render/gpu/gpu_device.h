@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,6 +52,9 @@ struct GpuDevice {
 
 // Throws Error(gpu) when there is no loader, no device, or none that can do what the renderer needs.
 GpuDevice open_device(const DeviceOptions& options);
+// Opens the same device unless it is of type CPU; and none, without an error, where there is no loader or no usable
+// device and neither the options nor NEPHOS_DEVICE ask for one by name.
+std::optional<GpuDevice> open_graphics_card(const DeviceOptions& options);
 
 // Records commands with `record`, submits them and waits until they are done.
 void submit_and_wait(const GpuDevice& gpu, const std::function<void(const vk::raii::CommandBuffer&)>& record);

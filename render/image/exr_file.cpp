@@ -42,6 +42,8 @@ void add_metadata(Imf::Header& header, const PictureMetadata& metadata) {
     text("sceneHash", metadata.scene_hash);
     text("stateHash", metadata.state_hash);
     text("nephosVersion", metadata.version);
+    text("backend", metadata.backend);
+    text("device", metadata.device);
     header.insert("time", Imf::DoubleAttribute(metadata.time_s));
     if (metadata.extinction_per_m > 0)
         header.insert("extinctionPerMetre", Imf::DoubleAttribute(metadata.extinction_per_m));

@@ -61,6 +61,8 @@ struct PictureMetadata {
     std::string scene_hash;        // hexadecimal
     std::string state_hash;        // hexadecimal; of the state that is drawn
     std::string version;           // of nephos
+    std::string backend;           // that drew: "cpu", "vulkan" or "blended"
+    std::string device;            // of Vulkan, that drew
     double time_s = 0;             // simulated time
     double frames_per_second = 0;  // of film; 0 = a single picture
     double time_scale = 1;         // simulated seconds per second of film

@@ -122,6 +122,8 @@ Texts text_of(const PictureMetadata& metadata, const RenderOptions& options) {
     add("seed", std::to_string(metadata.seed));
     add("sceneHash", metadata.scene_hash);
     add("stateHash", metadata.state_hash);
+    add("backend", metadata.backend);
+    add("device", metadata.device);
     add("time", exact(metadata.time_s));
     if (metadata.extinction_per_m > 0) add("extinctionPerMetre", exact(metadata.extinction_per_m));
     add("exposure", exact(options.camera.exposure_ev));

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Which device and which back-end draw a picture.
+// Which back-end and which device draw a picture.
 
 #include <string>
 
 namespace nephos {
 
-// How metaballs are drawn; the picture is the same within 1/255.
+// The back-end that draws; the picture is the same within 1/255.
 enum class Splatting {
-    automatic,   // processor on a device of type CPU, else tiles
-    processor,   // vectors on the processor, tile by tile, front to back
-    tiles,       // compute shaders, tile by tile, front to back: fast
-    billboards,  // blended billboards with attenuation textures, back to front, as D has it: the reference
+    automatic,  // vulkan where there is a Vulkan device that is not of type CPU, else cpu
+    cpu,        // vectors on the processor, tile by tile, front to back; takes no Vulkan driver
+    vulkan,     // compute shaders, tile by tile, front to back
+    blended,    // billboards with attenuation textures, blended back to front, as D has it: the reference
 };
 
-// Where Splatting::tiles has the order of the metaballs and the lists of the tiles made; the picture is the
+// Where Splatting::vulkan has the order of the metaballs and the lists of the tiles made; the picture is the
 // same within 1/255, as bounds on the screen are rounded differently. Pictures with billboards, and what is
 // too much for the device at once, take the host's.
 enum class TileLists {
@@ -27,10 +27,10 @@ enum class TileLists {
 struct DeviceOptions {
     // Part of a device's name ("llvmpipe") or its number in device_names(). Empty: the environment variable
     // NEPHOS_DEVICE in the same form; without it a discrete card, then an integrated, a virtual and a
-    // software one.
+    // software one. An error with Splatting::cpu.
     std::string device;
     // Load the Khronos validation layer with synchronization validation and collect what it says. Slow; for
-    // tests.
+    // tests. No effect where the back-end cpu draws.
     bool validation = false;
     // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
     // the picture; memory on the device is about 24 bytes * tile_size^2, and 40 bytes more to read back two

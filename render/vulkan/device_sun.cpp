@@ -91,8 +91,7 @@ void DeviceSun::record(const vk::raii::CommandBuffer& commands, const DeviceList
 }
 
 bool DeviceSun::run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists,
-                    const ListLimits& limits, LightTiles& tiles, std::vector<float>& depths,
-                    std::vector<float>& shadow) {
+                    const ListLimits& limits, LightTiles& tiles) {
     const std::size_t count = request.metaballs;
     const TileGrid grid{request.shadow_size, request.shadow_size};
     const std::uint32_t per_item = shader::kQueriesPerLane * gpu.tile_lanes;
@@ -133,10 +132,11 @@ bool DeviceSun::run(const GpuDevice& gpu, const SunRequest& request, DeviceLists
         wanted = reinterpret_cast<const shader::OrderCounts*>(counts_.mapped)->wanted;
         if (wanted > limits.entries) return false;
     } while (wanted > entries);
-    depths.resize(count);
-    std::memcpy(depths.data(), depths_.mapped, count * sizeof(float));
-    tiles.read_map(shadow);
     return true;
+}
+
+void DeviceSun::read_depths(std::span<float> depths) const {
+    if (!depths.empty()) std::memcpy(depths.data(), depths_.mapped, depths.size_bytes());
 }
 
 }  // namespace nephos

@@ -13,7 +13,7 @@
 //
 // Private to the module.
 
-#include <vector>
+#include <span>
 
 #include "render/cloud/cloud_preparation.h"
 #include "render/vulkan/device_lists.h"
@@ -35,11 +35,12 @@ class DeviceSun {
   public:
     DeviceSun(const GpuDevice& gpu, const DeviceLists& lists);
 
-    // Lights metaballs, on the device and in `depths`, and makes the shadow map, in `tiles` and in `shadow`.
-    // False if the lists would be larger than `limits`: then the light is not there. Nothing else may be on
-    // its way.
+    // Lights metaballs on the device, and makes the shadow map in `tiles`. Returns false if the lists would be
+    // larger than `limits`: then the light is not there. Nothing else may be in flight.
     bool run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists, const ListLimits& limits,
-             LightTiles& tiles, std::vector<float>& depths, std::vector<float>& shadow);
+             LightTiles& tiles);
+    // Copies the optical depths between centres and sun that the last run() computed.
+    void read_depths(std::span<float> depths) const;
 
   private:
     void bind(const GpuDevice& gpu, const DeviceLists& lists);

@@ -44,7 +44,7 @@ struct LightTiles::Queries {
     }
 };
 
-LightTiles::LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+LightTiles::LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
                        const vk::raii::Sampler& sampler)
     : layout_(&layout),
       sampler_(&sampler),
@@ -53,7 +53,7 @@ LightTiles::LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const
       bindings_(create_bindings(gpu, layout)),
       listed_(create_bindings(gpu, layout)) {
     for (const Bindings* each : {&bindings_, &listed_})
-        for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, *each, binding, attenuation, sampler);
+        for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, *each, binding, unused, sampler);
 }
 
 void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
@@ -64,7 +64,8 @@ void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
                         vk::ImageUsageFlagBits::eStorage | vk::ImageUsageFlagBits::eSampled |
                             vk::ImageUsageFlagBits::eTransferDst);
     depths_ = create_buffer(gpu, std::size_t{size} * size * sizeof(float),
-                            vk::BufferUsageFlagBits::eStorageBuffer, HostAccess::read);
+                            vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc,
+                            gpu.unified_memory ? HostAccess::read : HostAccess::none);
     for (const Bindings* each : {&bindings_, &listed_}) {
         bind_image(gpu, *each, 4, map_, *sampler_);
         bind_storage_image(gpu, *each, 10, map_);
@@ -160,13 +161,13 @@ void LightTiles::record_lists(const vk::raii::CommandBuffer& commands, const Til
     commands.dispatchIndirect(*arguments.buffer, offset);
 }
 
-void LightTiles::read_map(std::vector<float>& shadow) const {
+void LightTiles::read_map(const GpuDevice& gpu, std::vector<float>& shadow) {
     shadow.resize(std::size_t(map_.width) * map_.height);
-    std::memcpy(shadow.data(), depths_.mapped, shadow.size() * sizeof(float));
+    const std::size_t bytes = shadow.size() * sizeof(float);
+    std::memcpy(shadow.data(), read_back(gpu, depths_, bytes, depths_copy_), bytes);
 }
 
-std::vector<float> LightTiles::run(const GpuDevice& gpu, const LightSortedSplats& order, int shadow_size,
-                                   std::vector<float>& shadow) {
+std::vector<float> LightTiles::run(const GpuDevice& gpu, const LightSortedSplats& order, int shadow_size) {
     resize_map(gpu, shadow_size);
     const TileGrid grid{shadow_size, shadow_size};
     const std::vector<PixelBox> boxes = light_boxes(order.splats);
@@ -185,7 +186,6 @@ std::vector<float> LightTiles::run(const GpuDevice& gpu, const LightSortedSplats
         begin = end;
     } while (begin < boxes.size());
 
-    read_map(shadow);
     std::vector<float> depths(order.splats.size());
     for (std::size_t i = 0; i < depths.size(); ++i) depths[queries.source[i]] = queries.queries[i].depth;
     return depths;

@@ -23,14 +23,13 @@ namespace nephos {
 
 class LightTiles {
   public:
-    // `attenuation` is not read, but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
-    LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+    // `unused` is not read, but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
+    LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
                const vk::raii::Sampler& sampler);
 
-    // Leaves the shadow map in shadow_map() and `shadow` and returns the optical depth between each
-    // centre and the sun, in the order of `order`.
-    std::vector<float> run(const GpuDevice& gpu, const LightSortedSplats& order, int shadow_size,
-                           std::vector<float>& shadow);
+    // Leaves the shadow map in shadow_map() and returns the optical depth between each centre and the sun, in
+    // the order of `order`.
+    std::vector<float> run(const GpuDevice& gpu, const LightSortedSplats& order, int shadow_size);
 
     // The same from lists on the device (device_sun.h): buffers as bindings 1, 2, 5, 6, 7 and 9 want them.
     struct Lists {
@@ -41,8 +40,8 @@ class LightTiles {
     // say.
     void record_lists(const vk::raii::CommandBuffer& commands, const TileGrid& grid, float largest_radius,
                       std::size_t items, const GpuBuffer& arguments, std::size_t offset) const;
-    // The texels, once these commands are done.
-    void read_map(std::vector<float>& shadow) const;
+    // Copies the texels of the map to the host, once these commands or run() are done.
+    void read_map(const GpuDevice& gpu, std::vector<float>& shadow);
 
     // Takes a shadow map that was made elsewhere: shadow_size^2 texels.
     void use(const GpuDevice& gpu, std::span<const float> shadow, int shadow_size);
@@ -63,7 +62,7 @@ class LightTiles {
     Bindings bindings_;
     Bindings listed_;  // of lists on the device
     GpuBuffer queries_, splats_, places_, ranges_, list_, items_, depths_;
-    GpuBuffer queries_copy_;  // where the processor reads the device's memory slowly
+    GpuBuffer queries_copy_, depths_copy_;  // where the processor reads the device's memory slowly
     GpuImage map_;
 };
 

@@ -92,12 +92,12 @@ struct ListedView::Slot {
     std::size_t wanted() const { return reinterpret_cast<const shader::OrderCounts*>(counts.mapped)->wanted; }
 };
 
-ListedView::ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+ListedView::ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
                        const vk::raii::Sampler& clamped, const vk::raii::Sampler& white_beyond)
     : limits(limits_of(gpu)),
       gpu_(gpu),
       layout_(layout),
-      attenuation_(attenuation),
+      unused_(unused),
       clamped_(clamped),
       white_beyond_(white_beyond),
       lists_(gpu),
@@ -155,30 +155,28 @@ void ListedView::upload(const GpuBuffer& to, std::span<const std::byte> bytes) {
 }
 
 void ListedView::use_cloud(std::span<const shader::CloudBall> balls) {
-    settle();
+    flush();
     balls_ = balls.size();
     lists_.reserve(gpu_, balls_, 1, std::min(4 * balls_, limits.entries));
     upload(lists_.cloud(), std::as_bytes(balls));
 }
 
-bool ListedView::light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles,
-                       std::vector<float>& depths, std::vector<float>& shadow) {
-    settle();
+bool ListedView::light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles) {
+    flush();
     if (!sun_) sun_.emplace(gpu_, lists_);
-    if (!sun_->run(gpu_, {balls_, frame, shadow_size, largest_radius}, lists_, limits, tiles, depths, shadow))
-        return false;
+    if (!sun_->run(gpu_, {balls_, frame, shadow_size, largest_radius}, lists_, limits, tiles)) return false;
     ++lit;
     return true;
 }
 
 void ListedView::use_flash(std::span<const shader::uint> shares) {
-    settle();
+    flush();
     upload(lists_.flash(), std::as_bytes(shares));
 }
 
 void ListedView::use_shade(std::span<const std::uint32_t> words, std::uint64_t serial) {
     if (shade_.bytes != 0 && serial == shade_serial_) return;
-    settle();
+    flush();
     const std::size_t bytes = std::max<std::size_t>(words.size_bytes(), 4);
     if (shade_.bytes < bytes) {
         shade_ = {};
@@ -199,9 +197,9 @@ void ListedView::bind(Slot& slot) {
         {6, &lists_.list(tiles)}, {7, &lists_.tails()}, {8, &radiance_},       {9, &depth_},
         {12, what.scattering},    {13, &slot.shells},   {14, &shade_},         {15, &lists_.parts()}};
     for (const auto& [binding, buffer] : buffers) bind_buffer(gpu_, slot.bindings, binding, *buffer);
-    bind_image(gpu_, slot.bindings, 3, attenuation_, clamped_);
+    bind_image(gpu_, slot.bindings, 3, unused_, clamped_);
     bind_image(gpu_, slot.bindings, 4, *what.shadow_map, white_beyond_);
-    bind_image(gpu_, slot.bindings, 11, what.sky != nullptr ? *what.sky : attenuation_, clamped_);
+    bind_image(gpu_, slot.bindings, 11, what.sky != nullptr ? *what.sky : unused_, clamped_);
 }
 
 // Splats up to the next shell, that shell and those that follow at once, splats again; the device knows how
@@ -316,7 +314,7 @@ ListedView::Lists ListedView::read_lists(const Tile& tile) {
     return lists;
 }
 
-void ListedView::settle(Slot& slot) noexcept {
+void ListedView::flush(Slot& slot) noexcept {
     const Picture* const picture = slot.picture;
     try {
         complete(slot);
@@ -325,13 +323,13 @@ void ListedView::settle(Slot& slot) noexcept {
     }
 }
 
-void ListedView::settle() noexcept {
-    for (const std::unique_ptr<Slot>& slot : slots_) settle(*slot);
+void ListedView::flush() noexcept {
+    for (const std::unique_ptr<Slot>& slot : slots_) flush(*slot);
 }
 
 bool ListedView::finish(const Picture& picture) {
     for (const std::unique_ptr<Slot>& slot : slots_)
-        if (slot->picture == &picture) settle(*slot);
+        if (slot->picture == &picture) flush(*slot);
     const auto failed = std::ranges::find(failures_, &picture, &Failure::picture);
     if (failed != failures_.end()) {
         const std::exception_ptr what = failed->what;
@@ -362,10 +360,10 @@ void ListedView::begin_tile(const ListedPicture& what, const shader::Frame& fram
                             Picture& picture, bool first) {
     Slot& slot = *slots_[next_];
     next_ = (next_ + 1) % slots_.size();
-    settle(slot);
+    flush(slot);
     slot.wait(gpu_);  // of a picture that nobody wants
     too_many_.reserve(too_many_.size() + slots_.size());
-    failures_.reserve(failures_.size() + slots_.size());  // settle() may not throw
+    failures_.reserve(failures_.size() + slots_.size());  // flush() may not throw
     reserve(tile, slot);
     pipelines_for(what.variant).prepare(gpu_, layout_, what.depth);
     slot.what = what;

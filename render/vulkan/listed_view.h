@@ -38,22 +38,22 @@ struct ListedPicture {
 class ListedView {
   public:
     // Samplers for tables of the sky, whose edge goes on, and for the shadow map, beyond which there is
-    // light; they and the rest must outlive this. `attenuation` is not read, but lavapipe (Mesa 22.3) wants
-    // every sampler of a set to be bound.
-    ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+    // light; they and the rest must outlive this. `unused` is not read, but lavapipe (Mesa 22.3) wants every
+    // sampler of a set to be bound.
+    ListedView(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
                const vk::raii::Sampler& clamped, const vk::raii::Sampler& white_beyond);
     ~ListedView();
     ListedView(const ListedView&) = delete;
     ListedView& operator=(const ListedView&) = delete;
 
-    // What is drawn from now on; what is on its way is settled first.
+    // What is drawn from now on; waits for frames in flight.
     void use_cloud(std::span<const shader::CloudBall> balls);
-    // Gives the metaballs of use_cloud() their light, and makes the shadow map (device_sun.h): in `depths`
-    // the optical depth between the centre of each and the sun, in `shadow` the transmittance of
-    // shadow_size^2 texels. `largest_radius`: of any metaball, metres. False if the lists would be too long:
+    // Gives the metaballs of use_cloud() their light on the device, and makes the shadow map in `tiles`
+    // (device_sun.h). `largest_radius`: of any metaball, metres. Returns false if the lists would be too long:
     // then the light on the device is not to be used.
-    bool light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles,
-               std::vector<float>& depths, std::vector<float>& shadow);
+    bool light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles);
+    // Copies the optical depths between the centres of the metaballs and the sun that the last light() computed.
+    void read_depths(std::span<float> depths) const { sun_->read_depths(depths); }
     // Share of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> shares);
     // Shade map of the shells and noise of the fog (air_shells.h), unless these are there already.
@@ -65,9 +65,9 @@ class ListedView {
     // Waits for the tiles of a picture and stores their pixels. False if one of them has more entries than
     // the lists may have: nothing of that tile is drawn. Throws what failed while the picture was on its way.
     bool finish(const Picture& picture);
-    // Does so for all tiles that are on their way; what fails is kept for finish(). Before anything changes
-    // that they look at.
-    void settle() noexcept;
+    // Waits for all tiles in flight and stores their pixels; what fails is kept for finish(). To be called
+    // before anything changes that they read.
+    void flush() noexcept;
     // Waits for the tiles of a picture that nobody wants any more.
     void abandon(const Picture& picture) noexcept;
 
@@ -92,7 +92,7 @@ class ListedView {
     void wait();
     void reserve(const Tile& tile, Slot& slot);
     void complete(Slot& slot);
-    void settle(Slot& slot) noexcept;
+    void flush(Slot& slot) noexcept;
     void submit(Slot& slot);
     void record(const vk::raii::CommandBuffer& commands, Slot& slot);
     void record_view(const vk::raii::CommandBuffer& commands, Slot& slot);
@@ -103,7 +103,7 @@ class ListedView {
 
     const GpuDevice& gpu_;
     const PipelineLayout& layout_;
-    const GpuImage& attenuation_;
+    const GpuImage& unused_;
     const vk::raii::Sampler &clamped_, &white_beyond_;
     DeviceLists lists_;
     OrderSets sets_;

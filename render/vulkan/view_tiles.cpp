@@ -31,7 +31,7 @@ std::size_t groups(std::size_t invocations) {
 
 }  // namespace
 
-ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
                      const vk::raii::Sampler& sampler, const ShaderVariant& variant)
     : layout_(&layout),
       variant_(variant),
@@ -47,7 +47,7 @@ ViewTiles::ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const G
       shells_(gpu, bindings_) {
     bind_buffer(gpu, bindings_, 0, frame_);
     bind_buffer(gpu, bindings_, 15, no_parts_);
-    for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
+    for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, unused, sampler);
     if (!variant.billboards) return;
     billboard_textures_ = upload_billboard_textures(gpu);
     bind_image(gpu, bindings_, 3, billboard_textures_, sampler);

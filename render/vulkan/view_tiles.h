@@ -17,9 +17,9 @@ namespace nephos {
 
 class ViewTiles {
   public:
-    // For orders with billboards if `variant` has billboards, else for those without. `attenuation` is not read,
-    // but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
-    ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
+    // For orders with billboards if `variant` has billboards, else for those without. `unused` is not read, but
+    // lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
+    ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
               const vk::raii::Sampler& sampler, const ShaderVariant& variant);
 
     // Tables of the physical sky; readable by shaders.

@@ -12,6 +12,7 @@
 
 #include "automaton/options.h"
 #include "density/options.h"
+#include "render/options/device_options.h"
 #include "render/options/options.h"
 #include "scenes/format/layers.h"
 #include "seeds/ground_cover.h"
@@ -30,6 +31,9 @@ struct FrameOptions {
     bool png = true;           // a tone-mapped picture of each frame
     bool exr = false;          // a linear picture of each frame with its layers
     bool video = false;        // an MP4 of all frames
+    // What draws the pictures; no part of what is simulated.
+    Splatting splatting = Splatting::automatic;
+    std::string device;  // of Vulkan, as DeviceOptions::device
     bool operator==(const FrameOptions&) const = default;
 };
 

@@ -899,14 +899,51 @@ class Vulkan(Case):
 
     NONE = {"VK_ICD_FILENAMES": "/nonexistent", "VK_DRIVER_FILES": "/nonexistent"}
 
-    def test_no_device_is_status_4_and_says_what_to_install(self):
+    def without_loader(self):
+        """An environment in which no libvulkan.so.1 can be opened."""
+        if "NO_LOADER" not in os.environ:
+            self.skipTest("NO_LOADER does not say where the library lies that hides the loader")
+        sanitizer = os.environ.get("LD_PRELOAD", "")
+        return {"LD_PRELOAD": f"{sanitizer} {os.environ['NO_LOADER']}".strip()}
+
+    def test_the_processor_draws_without_a_driver_and_without_a_loader(self):
+        self.call("run", self.scene, "--splatting", "cpu", "--out", "whole")
+        for name, env in (("driver", self.NONE), ("loader", self.without_loader())):
+            for splatting in ("auto", "cpu"):
+                out = f"{name}_{splatting}"
+                result = self.call("run", self.scene, "--splatting", splatting, "--out", out, "--json", env=env)
+                self.assertEqual(result.stderr, "")
+                report = json.loads(result.stdout)
+                self.assertEqual(report["backend"], "cpu")
+                self.assertTrue(report["device"].startswith("cpu ("), report["device"])
+                self.assertEqual(len(report["files"]["png"]), 5)
+                for picture in report["files"]["png"]:
+                    self.assertEqual((self.folder / picture).read_bytes(),
+                                     (self.folder / "whole/frames" / pathlib.Path(picture).name).read_bytes())
+                timing = json.loads((self.folder / out / "manifest.json").read_text())["timing"]
+                self.assertEqual((timing["backend"], timing["device"]), ("cpu", report["device"]))
+            self.call("render", "whole/density/tiny_0005.vdb", "--out", f"{name}.png", env=env)
+
+    def test_a_device_that_is_asked_for_and_missing_is_status_4_and_says_what_to_install(self):
         self.call("run", self.scene, "--no-render", "--out", "out", env=self.NONE)
-        for arguments in (["run", self.scene, "--out", "other"],
-                          ["render", "out/density/tiny_0005.vdb", "--out", "x.png", "--quiet"]):
-            result = self.refused(4, *arguments, says="mesa-vulkan-drivers", env=self.NONE)
-            self.assertNotIn("unexpected", result.stderr)
+        render = ["render", "out/density/tiny_0005.vdb", "--out", "x.png", "--quiet"]
+        for env in (self.NONE, self.without_loader()):
+            for wish in (["--splatting", "vulkan"], ["--splatting", "blended"], ["--device", "llvmpipe"]):
+                for arguments in (["run", self.scene, "--out", "other", *wish], [*render, *wish]):
+                    result = self.refused(4, *arguments, says="mesa-vulkan-drivers", env=env)
+                    self.assertNotIn("unexpected", result.stderr)
+            self.refused(4, "run", self.scene, "--out", "other", "--set", 'frames.splatting="blended"',
+                         says="mesa-vulkan-drivers", env=env)
+            self.refused(4, *render, says="mesa-vulkan-drivers", env={**env, "NEPHOS_DEVICE": "llvmpipe"})
         self.assertFalse((self.folder / "other").exists(), "nothing was done")
         self.assertFalse((self.folder / "x.png").exists())
+
+    def test_back_ends_that_contradict_each_other(self):
+        self.refused(2, "run", self.scene, "--splatting", "gpu", says="one of auto, cpu, vulkan and blended")
+        self.refused(2, "run", self.scene, "--splatting", "cpu", "--device", "llvmpipe",
+                     says='uses no Vulkan device, but "llvmpipe" is asked for')
+        result = self.call("validate", self.scene, "--set", 'frames.splatting="cpu"', "--set", 'frames.device="x"', status=2)
+        self.assertIn("uses no Vulkan device", result.stderr)
 
     def test_a_missing_ffmpeg_is_found_before_anything_is_computed(self):
         video = self.write("video.toml", SCENE.replace("[frames]", "[frames]\nvideo = true"))
@@ -979,6 +1016,27 @@ class Pictures(Case):
         self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(struct.unpack(">II", png[16:24]), (64, 48))
         self.assertNotEqual(png, (self.folder / result["files"]["png"][0]).read_bytes())
+
+    def test_every_back_end_can_be_asked_for_and_says_its_name(self):
+        pixels = {}
+        for splatting in ("cpu", "vulkan", "blended"):
+            out = self.folder / splatting
+            options = ["--splatting", splatting] if splatting != "vulkan" else ["--set", 'frames.splatting="vulkan"']
+            result = self.call("run", self.scene, *options, "--out", out, "--set", "frames.exr=true", "--json")
+            report = json.loads(result.stdout)
+            self.assertEqual(report["backend"], splatting)
+            timing = json.loads((out / "manifest.json").read_text())["timing"]
+            self.assertEqual((timing["backend"], timing["device"]), (splatting, report["device"]))
+            exr = json.loads(self.call("info", "--json", report["files"]["exr"][4]).stdout)["parts"][0]["attributes"]
+            self.assertEqual(exr["backend"], splatting)
+            self.assertEqual(exr.get("device"), None if splatting == "cpu" else report["device"])
+            render = json.loads(self.call("render", out / "density/tiny_0005.vdb", "--out", out / "x.png", "--json",
+                                          *options[:2 if splatting != "vulkan" else 0]).stdout)
+            if splatting != "vulkan":
+                self.assertEqual((render["backend"], render["device"]), (splatting, report["device"]))
+            pixels[splatting] = png_pixels(out / "frames/tiny_0005.png")
+        for splatting in ("vulkan", "blended"):
+            self.assertLessEqual(max(abs(a - b) for a, b in zip(pixels["cpu"], pixels[splatting])), 1)
 
     def test_interrupted_pictures_are_the_same(self):
         changes = ["--set", "time.steps=40", "--set", "frames.time_scale=20", "--set", "frames.exr=true"]
@@ -1175,9 +1233,11 @@ class SetUp(Case):
 
     def test_what_a_run_needs(self):
         video = self.write("video.toml", SCENE.replace("[frames]", "[frames]\nvideo = true"))
-        for arguments, needs in (([self.scene], "vulkan\n"), ([video], "vulkan\nffmpeg\n"), ([video, "--no-render"], ""),
-                                 ([self.scene, "--video"], "vulkan\nffmpeg\n"),
-                                 ([self.scene, "--set", "frames.video=true"], "vulkan\nffmpeg\n"),
+        for arguments, needs in (([self.scene], ""), ([video], "ffmpeg\n"), ([video, "--no-render"], ""),
+                                 ([self.scene, "--splatting", "vulkan"], "vulkan\n"),
+                                 ([self.scene, "--video", "--splatting", "blended"], "vulkan\nffmpeg\n"),
+                                 ([self.scene, "--set", 'frames.splatting="vulkan"'], "vulkan\n"),
+                                 ([self.scene, "--set", "frames.video=true"], "ffmpeg\n"),
                                  ([self.scene, "--set", "frames.png=false"], "")):
             self.assertEqual(self.call("run", *arguments, "--needs").stdout, needs)
         self.assertFalse((self.folder / "out").exists(), "nothing was done")

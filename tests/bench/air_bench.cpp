@@ -16,7 +16,7 @@ namespace {
 constexpr int kRounds = 15;
 
 const char* name_of(Splatting splatting) {
-    return splatting == Splatting::processor ? "processor" : "compute tiles on lavapipe";
+    return splatting == Splatting::cpu ? "processor" : "compute tiles on lavapipe";
 }
 
 // What shells add to a picture whose light is known, against copies of a float frame buffer.
@@ -48,7 +48,7 @@ BenchRow shells_row(const Subject& subject, Splatting splatting) {
 }
 
 BenchRow frame_row(Subject subject) {
-    Renderer renderer({.splatting = Splatting::processor});
+    Renderer renderer({.splatting = Splatting::cpu});
     std::vector<double> times;
     for (int round = -1; round < kRounds; ++round) {
         subject.change();
@@ -88,8 +88,8 @@ std::vector<BenchRow> air_rows(const std::filesystem::path& source) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 2);
     const Subject shafts = last_frame_of(source / "scenes/shafts.toml");
     const std::filesystem::path fog = source / "scenes/fog.toml";
-    return {shells_row(shafts, Splatting::processor), shells_row(shafts, Splatting::tiles), frame_row(shafts),
-            atmosphere_row(fog, Splatting::processor), atmosphere_row(fog, Splatting::tiles)};
+    return {shells_row(shafts, Splatting::cpu), shells_row(shafts, Splatting::vulkan), frame_row(shafts),
+            atmosphere_row(fog, Splatting::cpu), atmosphere_row(fog, Splatting::vulkan)};
 }
 
 }  // namespace nephos::bench

@@ -54,9 +54,9 @@ struct Way {
     Splatting splatting;
     const char* name;
 };
-constexpr std::array kWays{Way{Splatting::processor, "vectors on the processor"},
-                           Way{Splatting::tiles, "compute tiles"},
-                           Way{Splatting::billboards, "compute light and blended billboards"}};
+constexpr std::array kWays{Way{Splatting::cpu, "vectors on the processor"},
+                           Way{Splatting::vulkan, "compute tiles"},
+                           Way{Splatting::blended, "compute light and blended billboards"}};
 
 // Of the last picture: from the sorted splats to the pixels.
 double splatting_ms(const Renderer& renderer) {
@@ -104,7 +104,7 @@ std::vector<BenchRow> compare_backends(Subject subject, int rounds) {
 }
 
 void print_stages_of(Subject subject, int rounds) {
-    Renderer renderer(DeviceOptions{.device = {}, .splatting = Splatting::processor});
+    Renderer renderer(DeviceOptions{.device = {}, .splatting = Splatting::cpu});
     const std::string what = fmt::format("{}, {} metaballs", subject.name, subject.balls.size());
     print_stages(what, renderer, rounds, [&] {
         subject.change();
@@ -129,7 +129,7 @@ void print_growth() {
             subject.balls.push_back({x, y, z, radius, 0.2f + 0.8f * random()});
         }
         subject.options.camera.position_m = {0, -4000, 800};
-        Renderer renderer(DeviceOptions{.device = {}, .splatting = Splatting::processor});
+        Renderer renderer(DeviceOptions{.device = {}, .splatting = Splatting::cpu});
         std::vector<double> times;
         for (int round = -1; round < (count < 1e6 ? 5 : 1); ++round) {
             subject.change();

@@ -21,7 +21,7 @@ class BackendsAgree : public test::AllBackends {};
 
 // Each way against the reference: the same picture within 1/255, from everywhere and at every thickness.
 TEST_P(BackendsAgree, AgreesWithBillboards) {
-    Renderer reference_renderer(test::validated(Splatting::billboards));
+    Renderer reference_renderer(test::validated(Splatting::blended));
     float beauty = 0, transmittance = 0;
     for (const test::View& each : test::views()) {
         const double radius = test::smallest_radius_m(each.options.camera);
@@ -79,7 +79,7 @@ std::vector<NamedLight> every_light() {
 // and with the sun behind, and lit by lightning. Before the sun radiances are above 1: there the difference
 // is relative, and the aureole of droplets is outside of the picture: there an opacity of 0.0005 shows.
 TEST_P(BackendsAgree, AgreesWithBillboardsInEveryLight) {
-    Renderer reference_renderer(test::validated(Splatting::billboards));
+    Renderer reference_renderer(test::validated(Splatting::blended));
     const std::vector<Metaball> balls = reference::random_metaballs(9, 300);
     Splats splats;
     splats.metaballs = {balls, 0.01, 0.7};
@@ -106,7 +106,7 @@ TEST_P(BackendsAgree, AgreesWithBillboardsInEveryLight) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, BackendsAgree,
-                         ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
+                         ::testing::Values(Splatting::cpu, Splatting::vulkan, Splatting::blended),
                          test::way_name);
 
 }  // namespace

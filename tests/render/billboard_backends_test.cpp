@@ -38,7 +38,7 @@ class BillboardWays : public test::AllBackends {
         EXPECT_EQ(renderer_.draw_splats(splats, options).beauty, fast.beauty);
     }
 
-    Renderer reference_{test::validated(Splatting::billboards)};
+    Renderer reference_{test::validated(Splatting::blended)};
 };
 
 RenderOptions view(Vec3 from, Vec3 to, int width = 65, int height = 65, double fov = 40) {
@@ -132,7 +132,7 @@ TEST_P(BillboardWays, PartsOfThePictureDoNotShow) {
     test::expect_no_messages(parts);
 }
 
-INSTANTIATE_TEST_SUITE_P(Ways, BillboardWays, ::testing::Values(Splatting::processor, Splatting::tiles),
+INSTANTIATE_TEST_SUITE_P(Ways, BillboardWays, ::testing::Values(Splatting::cpu, Splatting::vulkan),
                          test::way_name);
 
 }  // namespace

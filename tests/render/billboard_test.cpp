@@ -302,7 +302,7 @@ TEST_P(BillboardTest, BadBillboardsAreRefusedByNumber) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, BillboardTest,
-                         ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
+                         ::testing::Values(Splatting::cpu, Splatting::vulkan, Splatting::blended),
                          test::way_name);
 
 // Every level is dark in its outermost texels, hides as much as the finest, and is no brighter than opaque.

@@ -146,7 +146,7 @@ TEST_P(CachedLight, OtherMergedMetaballsHaveAnotherShadow) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, CachedLight,
-                         ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
+                         ::testing::Values(Splatting::cpu, Splatting::vulkan, Splatting::blended),
                          test::way_name);
 
 }  // namespace

@@ -29,7 +29,7 @@ namespace nephos {
 namespace {
 
 DeviceOptions with_lists(TileLists lists, int tile_size = 2048) {
-    return {{}, true, tile_size, Splatting::tiles, lists};
+    return {{}, true, tile_size, Splatting::vulkan, lists};
 }
 
 struct HostLists {
@@ -247,7 +247,7 @@ TEST_F(ListedPictures, LongListsOfTheHostComeInBatches) {
     RenderOptions options = test::view({-2000, -40000, 1000}, {-2000, 0, 1000}, 12, 16, 16, 16);
     options.sun.elevation_deg = 90;
     const Splats splats = splats_of(balls, 0.1);
-    Renderer processor{DeviceOptions{.device = {}, .splatting = Splatting::processor}};
+    Renderer processor{DeviceOptions{.device = {}, .splatting = Splatting::cpu}};
     const Picture expected = processor.draw_splats(splats, options),
                   picture = reference_.draw_splats(splats, options);
     EXPECT_LE(difference(picture, expected), kClose);
@@ -447,13 +447,13 @@ TEST_F(ListedPictures, NoLargerShadowMapThanTheDeviceAllows) {
 
 // The shade of shells is kept with the light; another cloud has another.
 TEST_F(ListedPictures, ShadeIsThatOfTheCloud) {
-    Renderer processor{DeviceOptions{.device = {}, .splatting = Splatting::processor}};
+    Renderer processor{DeviceOptions{.device = {}, .splatting = Splatting::cpu}};
     RenderOptions options = test::view({0, -4000, 800}, {0, 0, 1000});
     options.light_shafts.strength = 1;
     for (const unsigned seed : {16u, 17u, 16u}) {
         const std::vector<Metaball> balls = reference::random_metaballs(seed, 400);
-        for (const Splatting way : {Splatting::processor, Splatting::tiles}) {
-            Renderer& kept = way == Splatting::processor ? processor : listed_;
+        for (const Splatting way : {Splatting::cpu, Splatting::vulkan}) {
+            Renderer& kept = way == Splatting::cpu ? processor : listed_;
             Renderer fresh{DeviceOptions{.device = {}, .splatting = way, .lists = TileLists::device}};
             const Splats splats = splats_of(balls, 0.02);
             test::expect_same_bits(kept.draw_splats(splats, options), fresh.draw_splats(splats, options));

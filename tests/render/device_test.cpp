@@ -33,7 +33,7 @@ bool in_child(const std::function<bool()>& works) {
 }
 
 TEST(Device, ValidationSeesASeededHazard) {
-    Renderer renderer({{}, true, 2048});
+    Renderer renderer({.validation = true, .splatting = Splatting::blended});
     EXPECT_TRUE(renderer.validation_messages().empty());
     RendererTestAccess::provoke_hazard(renderer);
     const std::vector<std::string> messages = renderer.validation_messages();
@@ -44,8 +44,10 @@ TEST(Device, ValidationSeesASeededHazard) {
 TEST(Device, IsFoundByNameAndNumber) {
     const std::vector<std::string> names = device_names();
     ASSERT_FALSE(names.empty());
-    EXPECT_EQ(Renderer({names[0], false, 2048}).device_name(), names[0]);
-    EXPECT_EQ(Renderer({"0", false, 2048}).device_name(), names[0]);
+    for (const Splatting splatting : {Splatting::vulkan, Splatting::blended}) {
+        EXPECT_EQ(Renderer({.device = names[0], .splatting = splatting}).device_name(), names[0]);
+        EXPECT_EQ(Renderer({.device = "0", .splatting = splatting}).device_name(), names[0]);
+    }
 }
 
 TEST(Device, UnknownNameListsWhatThereIs) {
@@ -70,18 +72,66 @@ TEST(Device, EnvironmentChooses) {
     }));
 }
 
-TEST(Device, NoDriverSaysWhatToInstall) {
-    EXPECT_TRUE(in_child([] {
+// Runs in a process whose loader finds no driver.
+bool without_driver(const std::function<bool()>& works) {
+    return in_child([&] {
         ::setenv("VK_ICD_FILENAMES", "/nonexistent/driver.json", 1);
         ::setenv("VK_DRIVER_FILES", "/nonexistent/driver.json", 1);
-        try {
-            Renderer renderer;
-        } catch (const Error& error) {
-            return error.code() == ErrorCode::gpu &&
-                   std::string(error.what()).find("mesa-vulkan-drivers") != std::string::npos;
-        }
-        return false;
+        return works();
+    });
+}
+
+bool says_what_to_install(const DeviceOptions& options) {
+    try {
+        Renderer renderer(options);
+    } catch (const Error& error) {
+        return error.code() == ErrorCode::gpu &&
+               std::string(error.what()).find("mesa-vulkan-drivers") != std::string::npos;
+    }
+    return false;
+}
+
+TEST(Device, NoDriverSaysWhatToInstallWhereOneIsAskedFor) {
+    for (const DeviceOptions& options :
+         {DeviceOptions{.splatting = Splatting::vulkan}, DeviceOptions{.splatting = Splatting::blended},
+          DeviceOptions{.device = "llvmpipe"}, DeviceOptions{.device = "0"}}) {
+        EXPECT_TRUE(without_driver([&] { return says_what_to_install(options); }))
+            << int(options.splatting) << " " << options.device;
+    }
+    EXPECT_TRUE(without_driver([] {
+        ::setenv("NEPHOS_DEVICE", "llvmpipe", 1);
+        return says_what_to_install({});
     }));
+}
+
+TEST(Device, CpuTakesNoDriver) {
+    for (const Splatting splatting : {Splatting::automatic, Splatting::cpu}) {
+        EXPECT_TRUE(without_driver([&] {
+            Renderer renderer({.splatting = splatting});
+            const Picture picture = renderer.draw({}, {});
+            return renderer.backend_name() == "cpu" && renderer.device_name().starts_with("cpu (") &&
+                   !picture.beauty.empty();
+        })) << int(splatting);
+    }
+}
+
+// lavapipe is a device of type CPU: what draws there without being asked for is the processor itself.
+TEST(Device, AutomaticTakesVulkanOnGraphicsCardsAlone) {
+    Renderer automatic, vulkan({.splatting = Splatting::vulkan});
+    const bool software = vulkan.device_name().starts_with("llvmpipe");
+    EXPECT_EQ(automatic.backend_name(), software ? "cpu" : "vulkan");
+    EXPECT_EQ(vulkan.backend_name(), "vulkan");
+    EXPECT_EQ(Renderer({.splatting = Splatting::blended}).backend_name(), "blended");
+}
+
+TEST(Device, OneForTheProcessorIsAnError) {
+    try {
+        Renderer renderer({.device = "llvmpipe", .splatting = Splatting::cpu});
+        FAIL() << "the device would go unused";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::usage);
+        EXPECT_NE(std::string(error.what()).find("\"llvmpipe\""), std::string::npos) << error.what();
+    }
 }
 
 TEST(Device, BadTileSizeIsAnError) { EXPECT_THROW(Renderer({{}, false, 1}), Error); }

@@ -48,8 +48,8 @@ std::vector<RenderOptions> views() {
 }
 
 TEST(Fog, BackendsAgree) {
-    Renderer reference(test::validated(Splatting::billboards));
-    Renderer tiles(test::validated(Splatting::tiles)), processor(test::validated(Splatting::processor));
+    Renderer reference(test::validated(Splatting::blended));
+    Renderer tiles(test::validated(Splatting::vulkan)), processor(test::validated(Splatting::cpu));
     const std::vector<Metaball> some = clouds(3);
     float worst = 0;
     for (const RenderOptions& options : views()) {
@@ -78,7 +78,7 @@ TEST(Fog, BackendsAgree) {
 TEST(Fog, PartsOfThePictureDoNotShow) {
     const std::vector<Metaball> balls = clouds(5);
     const MetaballCloud cloud{balls, 0.02, 0.7};
-    for (const Splatting way : {Splatting::processor, Splatting::tiles}) {
+    for (const Splatting way : {Splatting::cpu, Splatting::vulkan}) {
         Renderer whole(test::validated(way)), parts(test::validated(way, 16));
         EXPECT_LE(test::largest_difference(whole.draw(cloud, views()[0]).beauty,
                                            parts.draw(cloud, views()[0]).beauty),
@@ -89,7 +89,7 @@ TEST(Fog, PartsOfThePictureDoNotShow) {
 // Without patches: the integral of an exponential along each ray, near and far, also seen from far above,
 // where exp(-height) is below the smallest number.
 TEST(Fog, TransmittanceIsThatOfTheExponentialLayer) {
-    Renderer renderer(test::validated(Splatting::processor));
+    Renderer renderer(test::validated(Splatting::cpu));
     for (RenderOptions options : {view({0, 0, 40}, {0, 1000, 60}), view({0, 0, 900}, {0, 1000, 60}),
                                   view({0, 0, 9000}, {0, 9000, 60})}) {
         options.fog = {0.004, 30, 60, 0, 300, {}, 1};
@@ -152,7 +152,7 @@ class Patches {
 };
 
 TEST(Fog, PatchesAreThoseOfTheNoise) {
-    Renderer renderer(test::validated(Splatting::processor));
+    Renderer renderer(test::validated(Splatting::cpu));
     RenderOptions options = view({100, -300, 20}, {100, 1000, 0}, 40, 64, 48);
     options.fog.patchiness = 1;
     options.fog.patch_m = 400;
@@ -197,7 +197,7 @@ TEST(Fog, PatchesAreThoseOfTheNoise) {
 // Fog that hides everything has the light of a cloud: not black, not brighter than white in the sun behind
 // the eye; darker below a cloud, and dark at night.
 TEST(Fog, IsLitAsCloudsAre) {
-    Renderer renderer(test::validated(Splatting::processor));
+    Renderer renderer(test::validated(Splatting::cpu));
     RenderOptions options = view({0, 0, 1}, {0, -100, 1}, 20, 8, 8);
     options.fog = {0.05, 0, 50, 0, 300, {}, 1};
     const auto green = [&](std::span<const Metaball> balls) {
@@ -219,7 +219,7 @@ TEST(Fog, IsLitAsCloudsAre) {
 // Fog beyond the shells has the light, the shadows of clouds and the distance of where it is, and not of
 // where the last shell begins.
 TEST(Fog, BeyondTheShellsIsLitWhereItIs) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer({{}, true, 2048, Splatting::cpu});
     const std::vector<Metaball> balls = clouds(3);
     for (const Vec3& eye : {Vec3{0, -3000, 9000}, Vec3{0, -9000, 600}}) {
         RenderOptions options = view(eye, {0, 0, 0}, 30);
@@ -248,7 +248,7 @@ TEST(Fog, BeyondTheShellsIsLitWhereItIs) {
 
 // In shells much thicker than one sees far, distances are those of the fog, alike for neighbours.
 TEST(Fog, DistanceIsThatOfTheFogAndHasNoGrain) {
-    for (const Splatting way : {Splatting::processor, Splatting::tiles, Splatting::billboards}) {
+    for (const Splatting way : {Splatting::cpu, Splatting::vulkan, Splatting::blended}) {
         Renderer renderer({{}, true, 2048, way});
         RenderOptions options = view({0, 0, 5}, {0, -100, 15}, 20, 32, 32);
         options.fog = {0.1, 0, 1e5, 0, 300, {}, 1};
@@ -259,8 +259,8 @@ TEST(Fog, DistanceIsThatOfTheFogAndHasNoGrain) {
 }
 
 TEST(Fog, LightningLightsIt) {
-    Renderer reference({{}, true, 2048, Splatting::billboards});
-    Renderer tiles({{}, true, 2048, Splatting::tiles}), processor({{}, true, 2048, Splatting::processor});
+    Renderer reference({{}, true, 2048, Splatting::blended});
+    Renderer tiles({{}, true, 2048, Splatting::vulkan}), processor({{}, true, 2048, Splatting::cpu});
     RenderOptions options = view({0, 0, 20}, {0, 1000, 60});
     options.sun.elevation_deg = -18;
     Splats splats;
@@ -281,7 +281,7 @@ TEST(Fog, LightningLightsIt) {
 
 // A walk through fog, in steps of half a metre: nothing appears at once.
 TEST(Fog, WalkingThroughItDoesNotPop) {
-    Renderer renderer(test::validated(Splatting::processor));
+    Renderer renderer(test::validated(Splatting::cpu));
     const std::vector<Metaball> balls = clouds(9);
     const MetaballCloud cloud{balls, 0.02, 0.7};
     std::vector<float> before;
@@ -297,7 +297,7 @@ TEST(Fog, WalkingThroughItDoesNotPop) {
 }
 
 TEST(Fog, BadOptionsAreErrors) {
-    Renderer renderer({{}, false, 2048, Splatting::processor});
+    Renderer renderer({{}, false, 2048, Splatting::cpu});
     for (auto change :
          {+[](Fog& fog) { fog.extinction_per_m = -1; }, +[](Fog& fog) { fog.height_m = 0; },
           +[](Fog& fog) { fog.patchiness = 2; }, +[](Fog& fog) { fog.patch_m = NAN; },

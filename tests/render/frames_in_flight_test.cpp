@@ -17,7 +17,7 @@ namespace nephos {
 namespace {
 
 DeviceOptions with_lists(TileLists lists, int tile_size = 2048) {
-    return {{}, true, tile_size, Splatting::tiles, lists};
+    return {{}, true, tile_size, Splatting::vulkan, lists};
 }
 
 // Pictures that are begun before others are finished, of moving cameras, of one cloud and of others, with and

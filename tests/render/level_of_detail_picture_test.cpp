@@ -75,7 +75,7 @@ TEST_P(LevelOfDetailPicture, IsCloseToFullDetail) {
 }
 
 TEST_P(LevelOfDetailPicture, AgreesWithBillboards) {
-    Renderer reference(test::validated(Splatting::billboards));
+    Renderer reference(test::validated(Splatting::blended));
     for (const Vec3& eye : eyes()) {
         const Picture fast = draw(from(eye)), slow = draw(reference, from(eye));
         EXPECT_LE(difference(fast.beauty, slow.beauty).largest, 1.0 / 255);
@@ -140,7 +140,7 @@ TEST_P(LevelOfDetailPicture, MovingEyeDoesNotPop) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, LevelOfDetailPicture,
-                         ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
+                         ::testing::Values(Splatting::cpu, Splatting::vulkan, Splatting::blended),
                          test::way_name);
 
 }  // namespace

@@ -55,7 +55,7 @@ class AllBackends : public ::testing::TestWithParam<Splatting> {
 };
 
 inline std::string way_name(const ::testing::TestParamInfo<Splatting>& way) {
-    const char* const names[] = {"automatic", "processor", "tiles", "billboards"};
+    const char* const names[] = {"automatic", "cpu", "vulkan", "blended"};
     return names[std::size_t(way.param)];
 }
 

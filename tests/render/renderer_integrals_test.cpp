@@ -176,7 +176,7 @@ TEST_P(RendererIntegrals, LightAtTheCentresEqualsNumericalIntegration) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, RendererIntegrals,
-                         ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
+                         ::testing::Values(Splatting::cpu, Splatting::vulkan, Splatting::blended),
                          test::way_name);
 
 }  // namespace

@@ -288,7 +288,7 @@ TEST_P(RendererTest, OnePixelAndExtremeShapes) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, RendererTest,
-                         ::testing::Values(Splatting::processor, Splatting::tiles, Splatting::billboards),
+                         ::testing::Values(Splatting::cpu, Splatting::vulkan, Splatting::blended),
                          test::way_name);
 
 }  // namespace

@@ -50,8 +50,8 @@ std::vector<RenderOptions> views() {
 }
 
 TEST(Shells, BackendsAgree) {
-    Renderer reference(test::validated(Splatting::billboards));
-    Renderer tiles(test::validated(Splatting::tiles)), processor(test::validated(Splatting::processor));
+    Renderer reference(test::validated(Splatting::blended));
+    Renderer tiles(test::validated(Splatting::vulkan)), processor(test::validated(Splatting::cpu));
     const std::vector<Metaball> balls = broken_layer(7);
     const MetaballCloud cloud{balls, 0.02, 0.7};
     float worst = 0;
@@ -71,7 +71,7 @@ TEST(Shells, BackendsAgree) {
 
 // Under the physical sky, shade takes away light that the air has: neither more than all of it, nor none.
 TEST(Shells, ShadeUnderThePhysicalSkyLeavesNoNegativeLight) {
-    Renderer renderer(test::validated(Splatting::processor));
+    Renderer renderer(test::validated(Splatting::cpu));
     const std::vector<Metaball> balls = broken_layer(7);
     const MetaballCloud cloud{balls, 0.02, 0.7};
     for (const double elevation : {1.0, 8.0, 40.0, 90.0}) {
@@ -98,7 +98,7 @@ TEST(Shells, PartsOfThePictureDoNotShow) {
     const std::vector<Metaball> balls = broken_layer(3);
     const MetaballCloud cloud{balls, 0.02, 0.7};
     const RenderOptions options = views()[0];
-    for (const Splatting way : {Splatting::processor, Splatting::tiles, Splatting::billboards}) {
+    for (const Splatting way : {Splatting::cpu, Splatting::vulkan, Splatting::blended}) {
         Renderer whole(test::validated(way)), parts(test::validated(way, 16));
         EXPECT_LE(
             test::largest_difference(whole.draw(cloud, options).beauty, parts.draw(cloud, options).beauty),
@@ -232,7 +232,7 @@ Shafts compare(Renderer& renderer, const MetaballCloud& cloud, RenderOptions opt
 
 // Under clouds so far above that no ray meets them: D's sum through the same shadow map.
 TEST(Shells, ShaftsEqualMarchedSingleScatteringThroughTheSameMap) {
-    Renderer renderer(test::validated(Splatting::processor));
+    Renderer renderer(test::validated(Splatting::cpu));
     std::vector<Metaball> balls = broken_layer(11, 700);
     for (Metaball& ball : balls) ball.z += 5000;
     const MetaballCloud cloud{balls, 0.02, 0.7};
@@ -255,7 +255,7 @@ TEST(Shells, ShaftsEqualMarchedSingleScatteringThroughTheSameMap) {
 // cloud is hidden by it, and shade begins at the cloud's top. Against the integral with the cloud's own
 // extinction, not the map.
 TEST(Shells, ShaftsBetweenCloudsEqualMarchedSingleScattering) {
-    Renderer renderer(test::validated(Splatting::processor));
+    Renderer renderer(test::validated(Splatting::cpu));
     std::vector<Metaball> balls;
     for (int i = 0; i < 48; ++i)
         balls.push_back(
@@ -296,7 +296,7 @@ TEST(Shells, ShaftsBetweenCloudsEqualMarchedSingleScattering) {
 // Radiance of fog at the eye below clouds that let no light through: black, whatever the shadow map's texels,
 // the metaballs' size, and what else there is above.
 TEST(Shells, AirBelowClosedCloudsIsInFullShade) {
-    Renderer renderer({{}, true, 2048, Splatting::processor});
+    Renderer renderer({{}, true, 2048, Splatting::cpu});
     const auto layer = [](double z, double spacing, double radius, float density) {
         std::vector<Metaball> balls;
         for (double y = -6000; y <= 6000; y += spacing)
@@ -331,7 +331,7 @@ TEST(Shells, AirBelowClosedCloudsIsInFullShade) {
 
 // Shaded air never has less than no light, and nothing changes where nothing is shaded.
 TEST(Shells, ShaftsOnlyDarkenAndNeverBelowZero) {
-    Renderer renderer(test::validated(Splatting::processor));
+    Renderer renderer(test::validated(Splatting::cpu));
     const std::vector<Metaball> balls = broken_layer(5, 2000);
     const MetaballCloud cloud{balls, 0.2, 0.7};
     for (RenderOptions options : views()) {

@@ -30,8 +30,8 @@ RenderOptions under_sky(double elevation_deg, Vec3 from = {0, -4000, 800}, Vec3 
 
 // From the side, from below, down from above, and towards the sun; some metaballs are integrated.
 TEST(Sky, IsTheSameInEveryBackend) {
-    Renderer processor(test::validated(Splatting::processor)), tiles(test::validated(Splatting::tiles)),
-        billboards(test::validated(Splatting::billboards));
+    Renderer processor(test::validated(Splatting::cpu)), tiles(test::validated(Splatting::vulkan)),
+        billboards(test::validated(Splatting::blended));
     const std::vector<Metaball> balls = reference::random_metaballs(7, 150, 80, 250);
     const MetaballCloud cloud{balls, 0.01, 0.7};
     float of_processor = 0, of_tiles = 0;
@@ -55,7 +55,7 @@ TEST(Sky, IsTheSameInEveryBackend) {
 
 // The ground melts into the sky: up a column of pixels across the horizon nothing jumps.
 TEST(Sky, HasNoSeamAtTheHorizon) {
-    Renderer renderer({{}, false, 2048, Splatting::processor});
+    Renderer renderer({{}, false, 2048, Splatting::cpu});
     for (const double elevation : {-4.0, 3.0, 50.0}) {
         RenderOptions options = under_sky(elevation, {0, 0, 200}, {0, 1000, 200});
         options.sun.azimuth_deg = 120;
@@ -75,7 +75,7 @@ TEST(Sky, HasNoSeamAtTheHorizon) {
 
 // A disc of the sun's size where the sun stands, and none when it is switched off.
 TEST(Sky, ShowsTheDiscOfTheSun) {
-    Renderer renderer({{}, false, 2048, Splatting::processor});
+    Renderer renderer({{}, false, 2048, Splatting::cpu});
     RenderOptions options = under_sky(10, {0, 0, 100}, {});
     const Vec3 sun = direction_to_sun(options.sun);
     options.camera.target_m = {1000 * sun.x, 1000 * sun.y, 100 + 1000 * sun.z};

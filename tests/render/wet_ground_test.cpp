@@ -20,15 +20,15 @@
 namespace nephos {
 namespace {
 
-Renderer& renderer(Splatting splatting = Splatting::processor) {
+Renderer& renderer(Splatting splatting = Splatting::cpu) {
     const auto make = [](Splatting way) {
         DeviceOptions options;
         options.splatting = way;
         return Renderer(options);
     };
-    static Renderer processor = make(Splatting::processor), tiles = make(Splatting::tiles),
-                    billboards = make(Splatting::billboards);
-    return splatting == Splatting::processor ? processor : splatting == Splatting::tiles ? tiles : billboards;
+    static Renderer processor = make(Splatting::cpu), tiles = make(Splatting::vulkan),
+                    billboards = make(Splatting::blended);
+    return splatting == Splatting::cpu ? processor : splatting == Splatting::vulkan ? tiles : billboards;
 }
 
 // The same everywhere.
@@ -52,7 +52,7 @@ RenderOptions small_options() {
 }
 
 Picture draw(const RenderOptions& options, const std::optional<GroundCoverView>& cover,
-             const MetaballCloud& cloud = {}, Splatting way = Splatting::processor,
+             const MetaballCloud& cloud = {}, Splatting way = Splatting::cpu,
              std::optional<Flash> flash = {}) {
     Splats splats;
     splats.metaballs = cloud;
@@ -252,8 +252,8 @@ TEST(WetGroundTest, BackendsAgree) {
     const MetaballCloud cloud{balls, 0.02, 1};
     const Flash flash{{300, 1200, 700}, {0.8, 0.8, 1}, 0.15};
     const GroundCoverView cover = everywhere(1.8, 0.8, 15);
-    const Picture reference = draw(options, cover, cloud, Splatting::processor, flash);
-    for (const Splatting way : {Splatting::tiles, Splatting::billboards}) {
+    const Picture reference = draw(options, cover, cloud, Splatting::cpu, flash);
+    for (const Splatting way : {Splatting::vulkan, Splatting::blended}) {
         const Picture other = draw(options, cover, cloud, way, flash);
         for (std::size_t i = 0; i < reference.beauty.size(); ++i)
             ASSERT_NEAR(reference.beauty[i], other.beauty[i], 1.0 / 255) << i;

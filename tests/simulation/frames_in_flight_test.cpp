@@ -30,7 +30,7 @@ class FramesInFlight : public test::SmallRun {
         scene.render.camera.height = 90;
         scene.render.shadow_map_size = 64;
         RunSettings s = settings_of(scene, folder);
-        s.device.splatting = Splatting::tiles;
+        s.device.splatting = Splatting::vulkan;
         s.device.lists = TileLists::device;
         return s;
     }

@@ -63,10 +63,10 @@ struct Comparison : PipelineSink {
     }
 
     const Scene& scene;
-    Renderer renderers[4] = {Renderer({.splatting = Splatting::billboards}),
-                             Renderer({.splatting = Splatting::processor}),
-                             Renderer({.splatting = Splatting::tiles, .lists = TileLists::host}),
-                             Renderer({.splatting = Splatting::tiles, .lists = TileLists::device})};
+    Renderer renderers[4] = {Renderer({.splatting = Splatting::blended}),
+                             Renderer({.splatting = Splatting::cpu}),
+                             Renderer({.splatting = Splatting::vulkan, .lists = TileLists::host}),
+                             Renderer({.splatting = Splatting::vulkan, .lists = TileLists::device})};
     SkyPainter painters[4];
     float apart[4] = {}, clearest = 1;
     std::size_t given = 0;  // metaballs, before any are merged

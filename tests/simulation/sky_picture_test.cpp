@@ -200,7 +200,7 @@ TEST(SkyPainter, BackendsAgree) {
         options.fog.extinction_per_m = fog;
         options.fog.height_m = 800;
         std::vector<Picture> pictures;
-        for (const Splatting way : {Splatting::billboards, Splatting::processor, Splatting::tiles}) {
+        for (const Splatting way : {Splatting::blended, Splatting::cpu, Splatting::vulkan}) {
             Renderer renderer(DeviceOptions{.splatting = way});
             pictures.push_back(SkyPainter().draw(renderer, {}, {&layer, 1}, options, 0));
         }

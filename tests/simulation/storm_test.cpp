@@ -65,9 +65,9 @@ struct Comparison : PipelineSink {
     }
 
     const Scene& scene;
-    Renderer renderers[3] = {Renderer({.validation = true, .splatting = Splatting::processor}),
-                             Renderer({.validation = true, .splatting = Splatting::tiles}),
-                             Renderer({.validation = true, .splatting = Splatting::billboards})};
+    Renderer renderers[3] = {Renderer({.validation = true, .splatting = Splatting::cpu}),
+                             Renderer({.validation = true, .splatting = Splatting::vulkan}),
+                             Renderer({.validation = true, .splatting = Splatting::blended})};
     SkyPainter painters[3];
     int compared = 0;
 };

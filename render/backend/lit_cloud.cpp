@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/backend/lit_cloud.h"
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+#include <xxhash.h>
+
+#include "render/frame/tile_bins.h"
+
+namespace nephos {
+namespace {
+
+XXH128_hash_t hash_of(std::span<const std::byte> bytes) {
+    constexpr std::size_t kPart = std::size_t{1} << 19;
+    std::vector<XXH128_hash_t> parts((bytes.size() + kPart - 1) / kPart);
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
+        const std::span part = bytes.subspan(p * kPart, std::min(kPart, bytes.size() - p * kPart));
+        parts[p] = XXH3_128bits(part.data(), part.size());
+    });
+    return XXH3_128bits_withSeed(parts.data(), parts.size() * sizeof(XXH128_hash_t), bytes.size());
+}
+
+// Puts what is drawn in the place of the given metaballs. True if that is what `cached` has already.
+bool draw_merged(LitCloud& cached, std::optional<MergedCloud> merged) {
+    const bool same = merged ? merged->metaballs == cached.merged : cached.merged.empty();
+    if (!merged) {
+        cached.merged.clear();
+        cached.cloud = cached.given;
+        return same;
+    }
+    cached.merged = std::move(merged->metaballs);
+    cached.cloud.metaballs = cached.merged;
+    cached.cloud.depth_scale = std::move(merged->depth_scale);
+    cached.cloud.visible.resize(cached.merged.size());
+    std::iota(cached.cloud.visible.begin(), cached.cloud.visible.end(), 0u);
+    cached.cloud.base_m = cached.given.base_m;
+    cached.cloud.top_m = cached.given.top_m;
+    return same;
+}
+
+CacheKey key_of(const XXH128_hash_t& base, std::span<const double> rest) {
+    const XXH128_hash_t hash =
+        XXH3_128bits_withSeed(rest.data(), rest.size_bytes(), base.low64 ^ base.high64 << 1);
+    return {base.low64 ^ hash.low64, base.high64 ^ hash.high64};
+}
+
+CacheKey metaballs_key(const MetaballCloud& cloud) {
+    const double rest[] = {cloud.extinction_per_m, cloud.normalisation};
+    return key_of(hash_of(std::as_bytes(cloud.metaballs)), rest);
+}
+
+CacheKey light_key(const CacheKey& metaballs, const RenderOptions& options) {
+    const Vec3 to_sun = direction_to_sun(options.sun);
+    const double rest[] = {to_sun.x,
+                           to_sun.y,
+                           to_sun.z,
+                           double(options.shadow_map_size),
+                           double(int(options.light.lighting)),
+                           options.light.light_distance_m,
+                           options.level_of_detail.pixels};
+    return key_of({metaballs[0], metaballs[1]}, rest);
+}
+
+}  // namespace
+
+void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options,
+                 const DetailView& view) {
+    const CacheKey metaballs = metaballs_key(cloud), light = light_key(metaballs, options);
+    const bool was_cached = cached.shadow_size != 0;
+    const bool is_known = was_cached && light == cached.light_key;
+    if (is_known) cached.given.metaballs = cloud.metaballs;  // the same values, perhaps elsewhere
+    if (is_known && (view == cached.view || !cached.blocks)) {
+        if (cached.merged.empty()) cached.cloud.metaballs = cloud.metaballs;
+        cached.drawn_again = true;
+        return;
+    }
+    const bool was_given = was_cached && cached.merged.empty() && metaballs == cached.metaballs_key;
+    cached.shadow_size = 0;  // nothing is cached if prepare() throws
+    if (!is_known) {
+        cached.given = prepare(cloud);
+        cached.blocks.reset();
+        if (options.level_of_detail.pixels > 0) cached.blocks = detail_blocks(cached.given, cloud);
+        // The frame is that of the given metaballs, as are base and top: level of detail does not move it.
+        cached.frame = shadow_frame(cached.given, direction_to_sun(options.sun), options.shadow_map_size);
+    }
+    std::optional<MergedCloud> merged;
+    if (cached.blocks)
+        merged = merge_voxels(cached.given, cloud, *cached.blocks, view, options.level_of_detail);
+    cached.view = view;
+    cached.metaballs_key = metaballs;
+    cached.light_key = light;
+    const bool is_same = draw_merged(cached, std::move(merged));
+    if (is_same && is_known) {
+        cached.drawn_again = true;
+        cached.shadow_size = options.shadow_map_size;
+        return;
+    }
+    if (!was_given || !cached.merged.empty()) cached.metaballs = next_version();
+    const TileGrid grid{options.shadow_map_size, options.shadow_map_size};
+    cached.sun_depths.assign(cached.cloud.visible.size(), 0.0f);
+    cached.shadow.assign(std::size_t(grid.width) * std::size_t(grid.height), 1.0f);
+    cached.known_light.assign(cached.sun_depths.size(), 0);
+    cached.known_tiles.assign(grid.tiles(), 0);
+    cached.all_known = cached.cloud.visible.empty();  // the map is white
+    cached.drawn_again = false;
+    cached.light = cached.host_light = next_version();
+    cached.shadow_size = options.shadow_map_size;
+}
+
+}  // namespace nephos

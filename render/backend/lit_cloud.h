@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A cloud and the sun's light on it, cached from picture to picture: a moving camera needs neither anew.
+// Private to the module.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "render/cloud/cloud_preparation.h"
+#include "render/cloud/level_of_detail.h"
+#include "render/frame/versioned.h"
+#include "render/image/picture.h"
+#include "render/options/options.h"
+
+namespace nephos {
+
+// Hash of 128 bits of what a cached value was computed from. A few 10 microseconds per 10,000 metaballs.
+using CacheKey = std::array<std::uint64_t, 2>;
+
+struct LitCloud {
+    CacheKey metaballs_key{};  // of the given metaballs, extinction and normalisation
+    // Of what the sun's light depends on: the above, direction to the sun, size of the shadow map, how the
+    // light finds its way, and level of detail.
+    CacheKey light_key{};
+    PreparedCloud given;
+    std::optional<DetailBlocks> blocks;  // of `given`; none where nothing is merged
+    std::vector<Metaball> merged;        // drawn instead of the given metaballs; empty: those are drawn
+    DetailView view;                     // from which they were merged
+    PreparedCloud cloud;                 // what is drawn: `merged` or the given metaballs
+    ShadowFrame frame;
+    int shadow_size = 0;
+    std::vector<float> sun_depths;          // optical depth to the sun, one for each of cloud.visible
+    std::vector<float> shadow;              // shadow_size^2 texels of the shadow map
+    std::vector<std::uint8_t> known_light;  // 1 for each of `sun_depths` that is computed
+    std::vector<std::uint8_t> known_tiles;  // 1 for each tile of `shadow` that is computed
+    bool all_known = false;
+    bool drawn_again = false;  // this is not the first picture of the cloud
+
+    Version metaballs = 0;  // of `cloud`: what is drawn, without its light
+    Version light = 0;      // of the light of `cloud` and its shadow map
+    // Of `sun_depths` and `shadow`. Where it is not `light`, these are on a device (Backend::fetch_light()).
+    Version host_light = 0;
+    std::size_t light_passes = 0;  // so far
+
+    // Notes that a pass has changed sun_depths or shadow.
+    void note_light_pass() {
+        light = host_light = next_version();
+        ++light_passes;
+    }
+};
+
+// Makes `cached` that of a cloud as it is drawn from a view, without its light, unless it is already. `cloud`
+// must live as long as `cached` is read. Another view keeps the light if it merges the same metaballs, as it
+// does without level of detail.
+void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options,
+                 const DetailView& view);
+
+}  // namespace nephos

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/blended/blended_backend.h"
+
+#include <span>
+#include <vector>
+
+#include "render/blended/attenuation_texture.h"
+
+namespace nephos {
+namespace {
+
+GpuImage upload_attenuation(const GpuDevice& gpu) {
+    const std::vector<float> texels = attenuation_textures();
+    const std::size_t bytes = texels.size() * sizeof(float);
+    constexpr std::uint32_t kSide = shader::kAttenuationTexels;
+    GpuImage image = create_image(gpu, kSide, kSide, shader::kAttenuationLevels, vk::Format::eR32G32Sfloat,
+                                  vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst);
+    const GpuBuffer staging =
+        create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    write(gpu, staging, std::as_bytes(std::span(texels)));
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        begin_image(commands, image, access::copy_to);
+        const vk::BufferImageCopy region(0, 0, 0,
+                                         {vk::ImageAspectFlagBits::eColor, 0, 0, shader::kAttenuationLevels},
+                                         {0, 0, 0}, {kSide, kSide, 1});
+        commands.copyBufferToImage(*staging.buffer, *image.image, vk::ImageLayout::eGeneral, region);
+        image_barrier(commands, image, access::copy_to, access::sample);
+    });
+    return image;
+}
+
+}  // namespace
+
+void BlendedBackend::light_all(LitCloud& cloud, StageTimes&) {
+    scene_.light(cloud);
+    scene_.fetch_map(cloud);
+}
+
+bool BlendedBackend::begin(const FrameDescription& frame, Picture& picture) {
+    LitCloud& cloud = frame.cloud;
+    ViewSortedSplats order = frame.view_sorted();
+    scene_.light(cloud);
+    set_light(order, {cloud.sun_depths, frame.lightning});
+    if (has_shells(frame.options, cloud.cloud)) scene_.fetch_map(cloud);
+    const AirShells shells = frame.shells();
+    if (!attenuation_) attenuation_.emplace(upload_attenuation(scene_.gpu));
+    const StageTimer timer(&frame.times, DrawStage::view);
+    ViewPass& pass = prepared_pass(passes_, scene_, *attenuation_, frame, order, shells, false);
+    for (const FramePart& part : frame.parts)
+        pass.draw_tile(scene_.gpu, part.frame, part.tile, order, picture);
+    return false;
+}
+
+}  // namespace nephos

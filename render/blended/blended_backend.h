@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The back-end that draws as D does: billboards with 64 textures of attenuation, blended back to front by the
+// graphics pipeline (view_pass.h), with the light pass in compute shaders (light_tiles.h). The reference of the
+// others. Private to the module.
+
+#include <memory>
+#include <optional>
+
+#include "render/blended/view_pass.h"
+#include "render/vulkan/gpu_scene.h"
+
+namespace nephos {
+
+class BlendedBackend : public Backend {
+  public:
+    explicit BlendedBackend(GpuDevice device) : scene_(std::move(device)) {}
+
+    std::string name() const override { return "blended"; }
+    std::string device_name() const override { return scene_.gpu.properties.deviceName.data(); }
+    int longest_part() const override { return scene_.longest_part(); }
+    int largest_shadow_map() const override { return scene_.largest_shadow_map(); }
+
+    void light_all(LitCloud& cloud, StageTimes& times) override;
+    void fetch_light(LitCloud& cloud) override { scene_.fetch_map(cloud); }
+    // Draws at once.
+    bool begin(const FrameDescription& frame, Picture& picture) override;
+    std::vector<std::string> validation_messages() const override { return scene_.validation_messages(); }
+
+    GpuScene& scene() { return scene_; }
+
+  private:
+    GpuScene scene_;
+    std::optional<GpuImage> attenuation_;  // made when it is needed
+    PassVariants<ViewPass> passes_;
+};
+
+}  // namespace nephos

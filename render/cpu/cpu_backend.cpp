@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/cpu/cpu_backend.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include <hwy/highway.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include "render/cpu/processor_light.h"
+#include "render/cpu/processor_view.h"
+#include "render/frame/view_sorting.h"
+
+namespace nephos {
+namespace {
+
+// Whether any that is requested is not known yet.
+bool any_missing(const std::vector<std::uint8_t>& requested, const std::vector<std::uint8_t>& known) {
+    for (std::size_t i = 0; i < requested.size(); ++i)
+        if (requested[i] != 0 && known[i] == 0) return true;
+    return false;
+}
+
+// Leaves those out of `requested` that are known, and notes the others as known.
+void take_missing(std::vector<std::uint8_t>& requested, std::vector<std::uint8_t>& known) {
+    for (std::size_t i = 0; i < requested.size(); ++i) {
+        requested[i] = requested[i] != 0 && known[i] == 0 ? 1 : 0;
+        known[i] |= requested[i];
+    }
+}
+
+// Computes what is missing of the light of the balls numbered `source` and of the tiles of the shadow map where
+// `seen` has them; of all light if `seen` is null, or if anything is missing in a second picture. What one ball
+// gets has the same bits whatever else is computed.
+void complete_light(LitCloud& cloud, const std::vector<std::uint32_t>& source, const VisibleSet* seen,
+                    StageTimes& times) {
+    if (cloud.all_known) return;
+    std::vector<std::uint8_t> balls(cloud.sun_depths.size(), seen == nullptr ? 1 : 0);
+    std::vector<std::uint8_t> tiles(cloud.known_tiles.size(), 1);
+    if (seen != nullptr) {
+        for (std::size_t i = 0; i < source.size(); ++i) balls[source[i]] = seen->balls[i];
+        tiles = seen->map_tiles;
+        if (!any_missing(balls, cloud.known_light) && !any_missing(tiles, cloud.known_tiles)) return;
+        if (cloud.drawn_again) {  // a camera that moves: it will see the rest, too
+            std::ranges::fill(balls, std::uint8_t{1});
+            std::ranges::fill(tiles, std::uint8_t{1});
+        }
+    }
+    take_missing(balls, cloud.known_light);
+    take_missing(tiles, cloud.known_tiles);
+    cloud.all_known =
+        std::ranges::count(cloud.known_light, 0) == 0 && std::ranges::count(cloud.known_tiles, 0) == 0;
+
+    LightSortedSplats order;
+    {
+        const StageTimer timer(&times, DrawStage::sun_order);
+        order = sort_for_light(cloud.cloud, cloud.frame, cloud.shadow_size);
+    }
+    // Balls are read twice; keys move through memory three times, and back and forth.
+    times[DrawStage::sun_order].bytes = order.splats.size() * (2 * sizeof(Metaball) + 7 * 8 + 28);
+    std::vector<std::uint8_t> centres(order.source.size());
+    for (std::size_t i = 0; i < centres.size(); ++i) centres[i] = balls[order.source[i]];
+    std::vector<float> depths;
+    light_by_processor(order, cloud.shadow_size, {centres, tiles}, depths, cloud.shadow, {}, &times);
+    for (std::size_t i = 0; i < centres.size(); ++i)
+        if (centres[i] != 0) cloud.sun_depths[order.source[i]] = depths[i];
+    cloud.note_light_pass();
+}
+
+}  // namespace
+
+std::string CpuBackend::device_name() const {
+    // Highway takes the best of the targets that were compiled: the one with the lowest bit.
+    const auto targets = std::int64_t(hwy::SupportedTargets()) & std::int64_t(HWY_TARGETS);
+    const std::size_t threads =
+        std::min(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism),
+                 std::size_t(tbb::this_task_arena::max_concurrency()));
+    return std::string("cpu (") + hwy::TargetName(targets & -targets) + ", " + std::to_string(threads) +
+           (threads == 1 ? " thread)" : " threads)");
+}
+
+int CpuBackend::longest_part() const { return std::numeric_limits<int>::max(); }
+int CpuBackend::largest_shadow_map() const { return std::numeric_limits<int>::max(); }
+
+void CpuBackend::light_all(LitCloud& cloud, StageTimes& times) { complete_light(cloud, {}, nullptr, times); }
+
+bool CpuBackend::begin(const FrameDescription& frame, Picture& picture) {
+    LitCloud& cloud = frame.cloud;
+    ViewSortedSplats order = frame.view_sorted();
+    std::vector<ProcessorView> views;
+    for (const FramePart& part : frame.parts)
+        views.emplace_back(frame.options, frame.camera, part.frame, part.tile, order, BatchLimits{},
+                           &frame.times);
+    std::optional<VisibleSet> seen;
+    if (!frame.splats.light && !cloud.all_known) {
+        seen.emplace(order, cloud.shadow_size);
+        for (ProcessorView& view : views) view.find_visible(cloud.shadow_size, *seen);
+        if (has_shells(frame.options, cloud.cloud)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
+    }
+    const VisibleSet* const known = seen ? &*seen : nullptr;
+    complete_light(cloud, order.source, known, frame.times);
+    set_light(order, {cloud.sun_depths, frame.lightning});
+    const AirShells shells = frame.shells();
+    for (ProcessorView& view : views)
+        view.draw(picture, cloud.shadow.data(), cloud.shadow_size, shells, known);
+    return false;
+}
+
+}  // namespace nephos

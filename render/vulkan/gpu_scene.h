@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the Vulkan and the blended back-end share: the device, and the copies there of what the renderer hands over -
+// shadow map, scattering table, tables of the sky - each replaced when its version is another than the one that was
+// copied. Private to the module.
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "render/backend/backend.h"
+#include "render/gpu/gpu_pipeline.h"
+#include "render/gpu/sky_image.h"
+#include "render/vulkan/light_tiles.h"
+
+namespace nephos {
+
+class GpuScene {
+  public:
+    explicit GpuScene(GpuDevice device);
+    GpuScene(const GpuScene&) = delete;
+    GpuScene& operator=(const GpuScene&) = delete;
+
+    GpuDevice gpu;
+    PipelineLayout layout;
+    vk::raii::Sampler clamped, white_beyond;  // beyond the edge: the edge's texel; white
+    // Waits for frames in flight, before anything that they read is replaced. Empty: there are none.
+    std::function<void()> wait_idle;
+
+    int longest_part() const;
+    int largest_shadow_map() const;
+    std::vector<std::string> validation_messages() const;
+
+    // For bindings that no shader reads and that lavapipe (Mesa 22.3) wants to be bound. It stays where it is.
+    const GpuImage& unused();
+    LightTiles& light_tiles();
+    const GpuImage& sky_image(const SkyLight& sky);
+    const GpuBuffer& scattering(const Versioned<std::vector<float>>& table);
+    // The shadow map of a cloud whose light is complete, and on the host unless has_map().
+    const GpuImage& shadow_map(const LitCloud& cloud);
+    bool has_map(const LitCloud& cloud) const { return map_ == cloud.light; }
+    // Notes that the shadow map in light_tiles() is that of the cloud.
+    void note_map(const LitCloud& cloud) { map_ = cloud.light; }
+
+    // D, step 1, in compute shaders, from an order that the host makes: completes the light of a cloud. The
+    // shadow map stays on the device until fetch_map().
+    void light(LitCloud& cloud);
+    void fetch_map(LitCloud& cloud);
+
+  private:
+    void wait() const {
+        if (wait_idle) wait_idle();
+    }
+    std::optional<GpuImage> unused_;
+    std::optional<LightTiles> light_tiles_;
+    std::optional<SkyImage> sky_image_;
+    GpuBuffer scattering_;
+    Version scattering_version_ = 0;
+    Version map_ = 0;  // LitCloud::light of the map in light_tiles_
+};
+
+// Passes of one kind, made when they are needed: without and with the physical sky; without shells of air, with
+// them, and with fog in them.
+template <class Pass>
+using PassVariants = std::optional<Pass>[2][3];
+
+// Returns the pass for a picture, with all that it reads bound; `image` is what its constructor takes.
+template <class Pass>
+Pass& prepared_pass(PassVariants<Pass>& passes, GpuScene& scene, const GpuImage& image,
+                    const FrameDescription& frame, const ViewSortedSplats& order, const AirShells& shells,
+                    bool billboards) {
+    const ShaderVariant variant{.physical_sky = frame.sky != nullptr,
+                                .shells = shells.any(),
+                                .fog = shells.has_fog(),
+                                .billboards = billboards};
+    auto& pass = passes[variant.physical_sky ? 1 : 0][variant.fog ? 2 : variant.shells ? 1 : 0];
+    if (!pass) pass.emplace(scene.gpu, scene.layout, image, scene.clamped, variant);
+    if (frame.sky != nullptr) pass->use_sky(scene.gpu, scene.sky_image(*frame.sky), scene.clamped);
+    pass->use_shadow_map(scene.gpu, scene.shadow_map(frame.cloud), scene.white_beyond);
+    pass->use_scattering(scene.gpu, scene.scattering(frame.table));
+    if (shells.any()) pass->use_shells(scene.gpu, shells, order);
+    return *pass;
+}
+
+}  // namespace nephos
