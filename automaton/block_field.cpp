@@ -68,13 +68,13 @@ BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEl
     }
 
     const auto can_be_born = [](const std::array<float, 3>& p) { return p[kHum] > 0 || p[kAct] > 0; };
-    any_birth_ = can_be_born(background_);
+    bool any_birth = can_be_born(background_);
     for (const FieldEllipsoid& e : ellipsoids_) {
         const std::array<float, 3> centre{e.rim[0] + e.span[0], e.rim[1] + e.span[1], 0};
-        any_birth_ = any_birth_ || can_be_born(e.rim) || can_be_born(centre);
+        any_birth = any_birth || can_be_born(e.rim) || can_be_born(centre);
     }
     any_extinction_ = background_[kExt] > 0;  // ellipsoids can only lower it
-    anything_ = any_birth_ || any_extinction_;
+    anything_ = any_birth || any_extinction_;
 }
 
 // Adds an ellipsoid; on a periodic axis with its centre wrapped into the box and with all periodic images

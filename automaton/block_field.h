@@ -68,7 +68,6 @@ class BlockField {
     const std::array<float, 3>& background() const { return background_; }
     // False when no cell of the lattice can change by chance.
     bool anything() const { return anything_; }
-    bool any_birth() const { return any_birth_; }
     bool any_extinction() const { return any_extinction_; }
     // Writes the ellipsoids that can touch blocks of row (by, bz) to `out`.
     void collect(int by, int bz, std::vector<const FieldEllipsoid*>& out) const;
@@ -82,7 +81,7 @@ class BlockField {
 
     std::array<float, 3> background_{};
     std::array<DrawPlan, 3> background_plan_;
-    bool anything_ = false, any_birth_ = false, any_extinction_ = false;
+    bool anything_ = false, any_extinction_ = false;
     std::vector<FieldEllipsoid> ellipsoids_;
     std::vector<std::vector<std::uint32_t>> by_slab_;  // indices into ellipsoids_, rising
 };

@@ -7,10 +7,10 @@
 #include <xxhash.h>
 
 #include "core/atomic_file.h"
-#include "core/available_memory.h"
 #include "core/bytes.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/memory.h"
 #include "core/random.h"
 #include "core/text.h"
 

@@ -16,7 +16,6 @@
 #include <limits>
 #include <vector>
 
-#include "core/range.h"
 #include "core/vec.h"
 
 namespace nephos {

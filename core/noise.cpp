@@ -3,16 +3,72 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <string>
 
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
 #include "core/noise_hash.h"
-#include "core/noise_kernel.h"
 #include "core/text.h"
 
+// As density/smoothing_kernel.cpp.
+#ifndef HWY_DISABLED_TARGETS
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
+#endif
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/noise.cpp"
+#include <hwy/foreach_target.h>
+//
+#include <hwy/highway.h>
+
+#include "core/noise_vectors-inl.h"
+
+HWY_BEFORE_NAMESPACE();
 namespace nephos {
+namespace HWY_NAMESPACE {
+namespace {
+
+template <bool kPeriodic>
+void points(const float* x, const float* y, const float* z, const NoiseOptions& options, std::size_t count,
+            float* out) {
+    const NoiseFloats d;
+    const std::size_t lanes = hn::Lanes(d);
+    const std::array<std::uint32_t, 3> seeds = axis_seeds(options.seed);
+    const float period[] = {float(options.period[0]), float(options.period[1]), float(options.period[2])};
+    const auto vector = [&](const float* px, const float* py, const float* pz, float* result) HWY_ATTR {
+        hn::StoreU(noise(axis_point<kPeriodic>(hn::LoadU(d, px), 0, seeds[0], period[0]),
+                         axis_point<kPeriodic>(hn::LoadU(d, py), 0, seeds[1], period[1]),
+                         axis_point<kPeriodic>(hn::LoadU(d, pz), 0, seeds[2], period[2])),
+                   d, result);
+    };
+    std::size_t n = 0;
+    for (; n + lanes <= count; n += lanes) vector(x + n, y + n, z + n, out + n);
+    if (n == count) return;
+    HWY_ALIGN float rest[4][hn::MaxLanes(d)] = {};
+    const float* const from[] = {x, y, z};
+    for (int axis = 0; axis < 3; ++axis) std::memcpy(rest[axis], from[axis] + n, (count - n) * sizeof(float));
+    vector(rest[0], rest[1], rest[2], rest[3]);
+    std::memcpy(out + n, rest[3], (count - n) * sizeof(float));
+}
+
+}  // namespace
+
+void noise_of_points(const float* x, const float* y, const float* z, const NoiseOptions& options,
+                     std::size_t count, float* out) {
+    const bool periodic = options.period != std::array{0, 0, 0};
+    (periodic ? points<true> : points<false>)(x, y, z, options, count, out);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace nephos
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephos {
+HWY_EXPORT(noise_of_points);
+
 namespace {
 
 constexpr float kFarthest = 0x1p20f;
@@ -42,6 +98,12 @@ void check_volume(const NoiseVolumeOptions& o) {
             "a number whose last octave has cells of at least 2 voxels");
     require(o.persistence > 0 && o.persistence <= 1, "`persistence` of a volume of noise", o.persistence,
             "a number above 0, at most 1");
+}
+
+// As gradient_noise(), of `count` points, without checks.
+void noise_points(const float* x, const float* y, const float* z, const NoiseOptions& options,
+                  std::size_t count, float* out) {
+    HWY_DYNAMIC_DISPATCH(noise_of_points)(x, y, z, options, count, out);
 }
 
 // Adds one octave to a level of voxels.
@@ -97,3 +159,4 @@ std::vector<float> noise_volume(const NoiseVolumeOptions& options) {
 }
 
 }  // namespace nephos
+#endif

@@ -14,7 +14,7 @@
 
 #include <hwy/highway.h>
 
-#include "core/noise_hash-inl.h"
+#include "core/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos {

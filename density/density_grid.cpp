@@ -243,9 +243,4 @@ std::vector<float> DensityGrid::to_dense() const {
 
 std::size_t DensityGrid::memory_bytes() const { return impl_->grid->memUsage(); }
 
-DensityGrid DensityGrid::with_placement(const Placement& placement) const {
-    check_placement(placement);
-    return OpenvdbAccess::wrap(impl_->grid, impl_->extent, placement);
-}
-
 }  // namespace nephos

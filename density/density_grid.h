@@ -61,9 +61,6 @@ class DensityGrid {
     // Returns the bytes that the voxels and the tree above them take.
     std::size_t memory_bytes() const;
 
-    // Returns a grid with another placement that shares the voxels.
-    DensityGrid with_placement(const Placement& placement) const;
-
   private:
     struct Impl;
     friend struct OpenvdbAccess;

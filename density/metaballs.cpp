@@ -193,14 +193,6 @@ double metaball_field(double a) {
     return w * w * (5 + 4 * w) / 9;
 }
 
-// With s the position along the line, f is a polynomial in w = h^2 - s^2; the integrals of w^2 and w^3 over
-// -h..h are 16/15 h^5 and 32/35 h^7.
-double metaball_line_integral(double b) {
-    if (!(b < 1)) return 0;
-    const double h2 = 1 - b * b;
-    return h2 * h2 * std::sqrt(h2) * (16.0 / 27.0 + 128.0 / 315.0 * h2);
-}
-
 double metaball_normalisation(double radius_cells) {
     return 2835.0 / (736.0 * std::numbers::pi * radius_cells * radius_cells * radius_cells);
 }
@@ -228,35 +220,6 @@ std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells) {
         }
     });
     return balls;
-}
-
-double density_at(const DensityGrid& grid, const Vec3& position_m, double radius_cells,
-                  const Boundaries& boundaries) {
-    check_radius(radius_cells);
-    const Placement& placement = grid.placement();
-    const Extent extent = grid.extent();
-    const auto in_cells = [&](double at_m, double origin_m, int cells, Boundary boundary) {
-        const double at = (at_m - origin_m) / placement.cell_size_m;
-        return boundary == Boundary::periodic ? at - std::floor(at / cells) * cells : at;
-    };
-    const Vec3 point{in_cells(position_m.x, placement.origin_m.x, extent.x, boundaries.x),
-                     in_cells(position_m.y, placement.origin_m.y, extent.y, boundaries.y),
-                     in_cells(position_m.z, placement.origin_m.z, extent.z, boundaries.z)};
-    // Also catches NaN, and keeps the conversion to integers in range.
-    const double reach = radius_cells + 1;
-    const bool near = point.x > -reach && point.x < extent.x + reach && point.y > -reach &&
-                      point.y < extent.y + reach && point.z > -reach && point.z < extent.z + reach;
-    if (!near) return 0;
-    const auto taps = taps_around(point, radius_cells);
-    openvdb::FloatGrid::ConstAccessor voxels = OpenvdbAccess::grid(grid).getConstAccessor();
-    double sum = 0;
-    for (const Tap& tap : taps) {
-        const openvdb::Coord cell(repeated(tap.i, extent.x, boundaries.x),
-                                  repeated(tap.j, extent.y, boundaries.y),
-                                  repeated(tap.k, extent.z, boundaries.z));
-        sum += double(voxels.getValue(cell)) * tap.field;
-    }
-    return sum / sum_of_fields(taps);
 }
 
 DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells, const Boundaries& boundaries) {

@@ -7,7 +7,7 @@
 //     f(a) = 1 - 22/9 a^2 + 17/9 a^4 - 4/9 a^6,   a = distance / R
 //
 // Two normalisations, for two uses:
-// - density_at() and resample() divide by the sum of f over all lattice points in reach, cloud or not:
+// - resample() divides by the sum of f over all lattice points in reach, cloud or not:
 //   D(x) = sum q f / sum f. Both sums run in the same order, so a saturated neighbourhood gives 1 exactly,
 //   everywhere.
 // - a renderer that adds up metaballs has no such sum at hand. It scales every metaball by
@@ -44,25 +44,17 @@ struct Metaball {
 // Returns f above for a >= 0; 0 from a = 1 on.
 double metaball_field(double a);
 
-// Returns the line integral of f along a straight line that passes the centre at distance b R, in units of R;
-// 0 from b = 1 on. Closed form with h = sqrt(1 - b^2) (half the chord).
-double metaball_line_integral(double b);
-
-// Returns the volume of one voxel divided by the volume integral of f: 2835 / (736 pi R^3), R in voxel edges.
-// Then extinction_per_m * metaball_normalisation(R) * sum q f is extinction_per_m on average in a saturated
-// region.
+// One cell's volume over the integral of f over its ball: 2835 / (736 pi R^3), R in voxel edges. With it, the
+// extinction extinction_per_m * metaball_normalisation(R) * sum q f along a ray through a saturated region is
+// extinction_per_m on average.
 double metaball_normalisation(double radius_cells);
 
 // Returns one metaball per voxel with q > 0, ordered by block of 8x8x8 voxels (by z, y, x) and inside a block
 // x fastest, an order that depends on the voxels alone. Throws Error(usage) when the radius is out of range.
 std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells);
 
-// Returns D at any point of the world, periodic images of the grid included; 0 far from all cloud. Throws as
-// metaballs().
-double density_at(const DensityGrid& grid, const Vec3& position_m, double radius_cells,
-                  const Boundaries& boundaries = {});
-
-// Returns D sampled at the centres of voxels `refine` times smaller than the grid's. Throws Error(usage) when
+// D sampled at the centres of voxels `refine` times smaller than the grid's, images of the grid along
+// periodic axes included. Throws Error(usage) when
 // refine is outside 1..8, the radius is out of range, or the result would have more than 2^31 - 1 voxels on
 // an axis.
 DensityGrid resample(const DensityGrid& grid, int refine, double radius_cells,

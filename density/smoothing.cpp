@@ -18,8 +18,6 @@ namespace {
 
 constexpr int kMaxRadius = 16;
 constexpr int kGaussianPeak = 64;
-constexpr std::size_t kStreamBytes = std::size_t{8}
-                                     << 20;  // results above this do not fit beside their input
 
 void check_radius(int radius, const char* name) {
     if (radius < 0 || radius > kMaxRadius) {
@@ -198,19 +196,6 @@ DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& o
     TreeBuilder builder;
     for (TileBlocks& tile : blocks) tile.move_to(builder);
     return builder.finish(plan.extent, placement);
-}
-
-void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& options,
-                  const Boundaries& boundaries, std::span<float> out) {
-    const SmoothingPlan plan = make_plan(planes, options, boundaries);
-    if (out.size() != plan.extent.cells()) {
-        throw Error(ErrorCode::usage, "room for " + std::to_string(out.size()) + " values, but the box has " +
-                                          std::to_string(plan.extent.cells()) + " cells");
-    }
-    const bool stream = out.size_bytes() > kStreamBytes;
-    const auto tiles = make_tiles(plan);
-    tbb::parallel_for(std::size_t{0}, tiles.size(),
-                      [&](std::size_t n) { smooth_tile(plan, tiles[n], out.data(), stream); });
 }
 
 DensityGrid mix(const DensityGrid& a, const DensityGrid& b, double fraction) {

@@ -46,13 +46,8 @@ std::vector<std::uint32_t> kernel_weights(SmoothingKernel kernel, int radius);
 DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& options,
                    const Placement& placement, const Boundaries& boundaries);
 
-// Writes the values of smooth() to a dense array of extent.cells() floats, x fastest.
-// Throws as smooth(), and Error(usage) when out.size() is not extent.cells().
-void smooth_dense(std::span<const TimedPlane> planes, const SmoothingOptions& options,
-                  const Boundaries& boundaries, std::span<float> out);
-
-// Interpolates linearly in time: each voxel is a + (b - a) * fraction (D: frames between steps). Throws
-// Error(usage) when extents or placements differ, or when fraction is outside 0..1.
+// The grid at `fraction` of the way from a (0) to b (1), each voxel a + (b - a) * fraction (D: frames between
+// steps). Throws Error(usage) when extents or placements differ, or when fraction is outside 0..1.
 DensityGrid mix(const DensityGrid& a, const DensityGrid& b, double fraction);
 
 }  // namespace nephos

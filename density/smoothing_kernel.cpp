@@ -14,7 +14,6 @@
 #include <hwy/foreach_target.h>
 //
 #include <hwy/aligned_allocator.h>
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include "density/smoothing_vectors-inl.h"
@@ -37,8 +36,7 @@ std::vector<T> as(const std::vector<std::uint32_t>& weights) {
 template <class T, bool kUnit>
 class TilePass {
   public:
-    // `levels`: number of levels above the present one that are used before the next advance().
-    TilePass(const SmoothingPlan& plan, const SmoothingTile& tile, int levels)
+    TilePass(const SmoothingPlan& plan, const SmoothingTile& tile)
         : plan_(plan),
           tile_(tile),
           wx_(as<T>(plan.wx)),
@@ -49,7 +47,7 @@ class TilePass {
           k0_(int(wz_.size()) / 2),
           width_(tile.words * kWord),
           groups_(tile.rows / 8),
-          slots_(levels + 2 * k0_),
+          slots_(8 + 2 * k0_),
           next_(-k0_) {
         x_rows_ = hwy::AllocateAligned<T>(std::size_t(width_) * std::size_t(tile.rows + 2 * j0_));
         expanded_ = hwy::AllocateAligned<T>(kLag * std::size_t(width_ + 2 * kWord));
@@ -63,52 +61,9 @@ class TilePass {
     int groups() const { return groups_; }
     std::size_t group_size() const { return 8 * std::size_t(width_); }
 
-    // Makes the levels below `end` ready.
+    // Makes the levels below `end` ready; at most 8 of them are asked for before the next call.
     void advance(int end) {
-        while (next_ < end + k0_) {
-            begin_plane();
-            finish_plane();
-        }
-    }
-
-    // The same in small steps, to be done between others' stores: begins the next plane ...
-    void begin_plane() {
-        full_now_ = &full_[slot(next_) * std::size_t(groups_)];
-        std::fill_n(full_now_, groups_, std::uint8_t{0});
-        source_level_ = source(next_, plan_.extent.z, plan_.boundaries.z);
-        row_ = 0;
-        any_row_ = false;
-    }
-
-    // ... takes one of its rows further. A row is summed kLag steps after it was expanded: unaligned loads of
-    // what still waits in the store queue, behind floats on their way to memory, would wait with it.
-    void step() {
-        const int count = tile_.rows + 2 * j0_;
-        if (source_level_ < 0 || row_ >= count + kLag) return;
-        const int ready = row_ - kLag;
-        if (ready >= 0) lines_[ready] = sum_row(lines_[ready], ready);
-        if (row_ < count) {
-            const int j = source(tile_.first_row + row_ - j0_, plan_.extent.y, plan_.boundaries.y);
-            T* row = expanded_.get() + std::ptrdiff_t(row_ % kLag) * (width_ + 2 * kWord);
-            lines_[row_] = j >= 0 && expand_row(j, source_level_, row) ? row : nullptr;
-            any_row_ = any_row_ || lines_[row_] != nullptr;
-        }
-        ++row_;
-    }
-
-    // ... and completes it.
-    void finish_plane() {
-        const int count = tile_.rows + 2 * j0_;
-        while (source_level_ >= 0 && row_ < count + kLag) step();
-        T* plane = ring_.get() + slot(next_) * plane_size();
-        for (int group = 0; any_row_ && group < groups_; ++group) {
-            const T* const* first = lines_ + 8 * group;
-            if (std::all_of(first, first + 8 + 2 * j0_, [&](const T* line) { return line == zero_.get(); }))
-                continue;
-            full_now_[group] = 1;
-            sum_rows(first, group, plane + std::size_t(group) * group_size());
-        }
-        ++next_;
+        for (; next_ < end + k0_; ++next_) fill_plane();
     }
 
     // The 8 S rows of a group at level k, s[row][x]; rows and cells beyond the extent are 0. Returns false,
@@ -138,6 +93,33 @@ class TilePass {
         if (boundary == Boundary::open) return -1;
         const int wrapped = n % size;
         return wrapped < 0 ? wrapped + size : wrapped;
+    }
+
+    // Makes the plane `next_`. A row is summed kLag steps after it was expanded: unaligned loads of what still
+    // waits in the store queue would wait with it.
+    void fill_plane() {
+        std::uint8_t* full = &full_[slot(next_) * std::size_t(groups_)];
+        std::fill_n(full, groups_, std::uint8_t{0});
+        const int level = source(next_, plan_.extent.z, plan_.boundaries.z);
+        const int count = tile_.rows + 2 * j0_;
+        bool any_row = false;
+        for (int row = 0; level >= 0 && row < count + kLag; ++row) {
+            const int ready = row - kLag;
+            if (ready >= 0) lines_[ready] = sum_row(lines_[ready], ready);
+            if (row >= count) continue;
+            const int j = source(tile_.first_row + row - j0_, plan_.extent.y, plan_.boundaries.y);
+            T* expanded = expanded_.get() + std::ptrdiff_t(row % kLag) * (width_ + 2 * kWord);
+            lines_[row] = j >= 0 && expand_row(j, level, expanded) ? expanded : nullptr;
+            any_row = any_row || lines_[row] != nullptr;
+        }
+        T* plane = ring_.get() + slot(next_) * plane_size();
+        for (int group = 0; any_row && group < groups_; ++group) {
+            const T* const* first = lines_ + 8 * group;
+            if (std::all_of(first, first + 8 + 2 * j0_, [&](const T* line) { return line == zero_.get(); }))
+                continue;
+            full[group] = 1;
+            sum_rows(first, group, plane + std::size_t(group) * group_size());
+        }
     }
 
     // Words first_word - 1 .. first_word + words of row (j, k) of a plane, with what lies beyond the box's
@@ -229,11 +211,7 @@ class TilePass {
     const int width_;   // cells in a row
     const int groups_;  // of 8 rows
     const int slots_;
-    int next_;  // the plane to be filled next, or being filled: a level, which may lie beyond the box
-    int source_level_ = 0;              // where its bits come from; -1: they are 0
-    int row_ = 0;                       // its rows below this are expanded, those below row_ - kLag summed
-    bool any_row_ = false;              // one of them was not 0
-    std::uint8_t* full_now_ = nullptr;  // its part of full_
+    int next_;  // the plane to be filled next: a level, which may lie beyond the box
     const T* lines_[kMaxRows + 2 * kMaxRadius];
     hwy::AlignedFreeUniquePtr<T[]> x_rows_, expanded_, ring_, zero_;
     std::vector<std::uint8_t>
@@ -259,7 +237,7 @@ HWY_INLINE void emit_block(const SmoothingPlan& plan, const T* s, std::size_t wi
 
 template <class T, bool kUnit>
 void blocks_of_tile(const SmoothingPlan& plan, const SmoothingTile& tile, BlockSink& sink) {
-    TilePass<T, kUnit> pass(plan, tile, 8);
+    TilePass<T, kUnit> pass(plan, tile);
     const std::size_t width = std::size_t(pass.width());
     const auto s = hwy::AllocateAligned<T>(8 * pass.group_size());
     for (int z = 0; z < plan.extent.z; z += 8) {
@@ -282,66 +260,6 @@ void blocks_of_tile(const SmoothingPlan& plan, const SmoothingTile& tile, BlockS
     }
 }
 
-void stream_zeros(int count, float* out) {
-    const hn::CappedTag<float, kWord> d;
-    const int lanes = int(hn::Lanes(d));
-    int n = std::min(count, floats_to_line(out));
-    std::fill_n(out, n, 0.0f);
-    for (; n + lanes <= count; n += lanes) hn::Stream(hn::Zero(d), d, out + n);
-    std::fill(out + n, out + count, 0.0f);
-}
-
-// Floats of the tile's part of one row. sums == nullptr: all 0.
-template <class T>
-HWY_INLINE void write_row(const T* sums, int count, float reciprocal, bool stream, float* out) {
-    if (sums != nullptr && stream) {
-        to_floats<T, true>(sums, count, reciprocal, out);
-    } else if (sums != nullptr) {
-        to_floats<T, false>(sums, count, reciprocal, out);
-    } else if (stream) {
-        stream_zeros(count, out);
-    } else {
-        std::fill_n(out, count, 0.0f);
-    }
-}
-
-template <class T, bool kUnit>
-void rows_of_tile(const SmoothingPlan& plan, const SmoothingTile& tile, float* out, bool stream) {
-    TilePass<T, kUnit> pass(plan, tile, 2);
-    const auto s = hwy::AllocateAligned<T>(2 * pass.group_size());
-    const int first_cell = tile.first_word * kWord;
-    const std::ptrdiff_t width = pass.width();
-    const int cells = std::min(pass.width(), plan.extent.x - first_cell);
-    const bool whole_rows = width == plan.extent.x;
-    pass.advance(1);
-    for (int z = 0; z < plan.extent.z; ++z) {
-        // While the memory takes the floats of one group, the sums of the next and the rows of the next plane
-        // are made.
-        bool any = pass.sum_group(z, 0, s.get());
-        pass.begin_plane();
-        for (int group = 0; group < pass.groups(); ++group) {
-            const T* now = any ? s.get() + std::size_t(group & 1) * pass.group_size() : nullptr;
-            if (group + 1 < pass.groups()) {
-                any = pass.sum_group(z, group + 1, s.get() + std::size_t(~group & 1) * pass.group_size());
-            }
-            const int first_row = tile.first_row + 8 * group;
-            const int rows = std::min(8, plan.extent.y - first_row);
-            float* first = out + linear_index(plan.extent, first_cell, first_row, z);
-            // Rows that follow each other without a gap are cut at cache lines instead of at their ends.
-            const std::ptrdiff_t shift = whole_rows && rows > 0 ? floats_to_line(first) : 0;
-            for (std::ptrdiff_t n = 0; n < rows; ++n) {
-                const std::ptrdiff_t begin = n * width + (n > 0 ? shift : 0);
-                const std::ptrdiff_t end = n * width + (n + 1 < rows ? cells + shift : cells);
-                write_row(now ? now + begin : nullptr, int(end - begin), plan.reciprocal, stream,
-                          first + n * (plan.extent.x - width) + begin);
-                pass.step();
-            }
-        }
-        pass.finish_plane();
-    }
-    if (stream) hwy::FlushStream();
-}
-
 }  // namespace
 
 void tile_to_blocks(const SmoothingPlan& plan, const SmoothingTile& tile, BlockSink& sink) {
@@ -357,19 +275,6 @@ void tile_to_blocks(const SmoothingPlan& plan, const SmoothingTile& tile, BlockS
     }
 }
 
-void tile_to_rows(const SmoothingPlan& plan, const SmoothingTile& tile, float* out, bool stream) {
-    switch (plan.type) {
-        case SumType::u8:
-            return rows_of_tile<std::uint8_t, true>(plan, tile, out, stream);
-        case SumType::u16:
-            return rows_of_tile<std::uint16_t, false>(plan, tile, out, stream);
-        case SumType::u32:
-            return rows_of_tile<std::uint32_t, false>(plan, tile, out, stream);
-        case SumType::f64:
-            return rows_of_tile<double, false>(plan, tile, out, stream);
-    }
-}
-
 }  // namespace HWY_NAMESPACE
 }  // namespace nephos
 HWY_AFTER_NAMESPACE();
@@ -378,14 +283,9 @@ HWY_AFTER_NAMESPACE();
 namespace nephos {
 
 HWY_EXPORT(tile_to_blocks);
-HWY_EXPORT(tile_to_rows);
 
 void smooth_tile(const SmoothingPlan& plan, const SmoothingTile& tile, BlockSink& sink) {
     HWY_DYNAMIC_DISPATCH(tile_to_blocks)(plan, tile, sink);
-}
-
-void smooth_tile(const SmoothingPlan& plan, const SmoothingTile& tile, float* out, bool stream) {
-    HWY_DYNAMIC_DISPATCH(tile_to_rows)(plan, tile, out, stream);
 }
 
 }  // namespace nephos

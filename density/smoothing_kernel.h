@@ -6,8 +6,8 @@
 // cells deep, and the full height:
 //
 //     bits of a row  --expand, sum over t'-->  integers of a row  --sum over i'-->  X row
-//     X rows         --sum over j'-->  Y plane, in a ring buffer of 8 + 2 k0 planes
-//     Y planes       --sum over k'-->  S rows  --* r-->  floats: dense rows, or blocks in OpenVDB's order
+//     X rows         --sum over j'-->  Y plane, kept in a ring of 8 + 2 k0 planes
+//     Y planes       --sum over k'-->  S rows  --* r-->  blocks of floats in OpenVDB's order
 //
 // Integers are as narrow as the window's total weight allows: 8 bit (a box of up to 255 cells), 16, 32 bit,
 // else double, which is exact up to 2^53, more than any window can reach. Planes without a bit in reach of a
@@ -59,9 +59,5 @@ class BlockSink {
 
 // Computes a tile and passes its blocks with a value above 0 to the sink.
 void smooth_tile(const SmoothingPlan& plan, const SmoothingTile& tile, BlockSink& sink);
-
-// Computes a tile into the dense array `out` (x fastest). `stream`: non-temporal stores, for results larger
-// than the caches.
-void smooth_tile(const SmoothingPlan& plan, const SmoothingTile& tile, float* out, bool stream);
 
 }  // namespace nephos

@@ -30,14 +30,6 @@ constexpr int kWord = 64;  // cells per word
 template <class T>
 using Tag = hn::CappedTag<T, kWord>;
 
-// Returns the number of floats before the next cache line: streaming stores fill whole lines, so that the
-// write-combining buffers empty at once.
-HWY_INLINE int floats_to_line(const float* out) {
-    constexpr std::uintptr_t kLine = 64;  // bytes
-    const std::uintptr_t misfit = reinterpret_cast<std::uintptr_t>(out) % kLine;
-    return int((kLine - misfit) % kLine / sizeof(float));
-}
-
 // out[n] = sum over d of weights[d] * lines[d][n]; weights are symmetric; kUnit: all 1. kRadius < 0:
 // `radius`.
 template <class T, bool kUnit, int kRadius>
@@ -147,36 +139,7 @@ HWY_INLINE hn::Vec<FloatTag<T>> converted(const T* HWY_RESTRICT sums, float reci
     return hn::Min(hn::Mul(value, hn::Set(d, reciprocal)), hn::Set(d, 1.0f));
 }
 
-// out[n] = min(1, float(sums[n]) * reciprocal). kStream: non-temporal stores.
-template <class T, bool kStream>
-HWY_INLINE void to_floats(const T* HWY_RESTRICT sums, int count, float reciprocal, float* HWY_RESTRICT out) {
-    const FloatTag<T> d;
-    const int lanes = int(hn::Lanes(d));
-    const auto up_to = [&](int n, int end) {
-        for (; n + lanes <= end; n += lanes) hn::StoreU(converted(sums + n, reciprocal), d, out + n);
-        for (; n < end; ++n) out[n] = std::min(float(sums[n]) * reciprocal, 1.0f);
-    };
-    const auto store = [&](int n) {
-        const auto value = converted(sums + n, reciprocal);
-        if constexpr (kStream) {
-            hn::Stream(value, d, out + n);
-        } else {
-            hn::StoreU(value, d, out + n);
-        }
-    };
-    int n = kStream ? std::min(count, floats_to_line(out)) : 0;
-    up_to(0, n);
-    for (; n + 4 * lanes <= count; n += 4 * lanes) {
-        store(n);
-        store(n + lanes);
-        store(n + 2 * lanes);
-        store(n + 3 * lanes);
-    }
-    for (; n + lanes <= count; n += lanes) store(n);
-    up_to(n, count);
-}
-
-// The same for the 512 values of a block.
+// out[n] = min(1, float(sums[n]) * reciprocal) for the 512 values of a block.
 template <class T>
 HWY_INLINE void block_to_floats(const T* HWY_RESTRICT sums, float reciprocal, float* HWY_RESTRICT out) {
     const FloatTag<T> d;

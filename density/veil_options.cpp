@@ -2,7 +2,6 @@
 
 // Derived octaves and validation of a veil's options.
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>

@@ -8,8 +8,8 @@
 #include <optional>
 #include <utility>
 
-#include "core/available_memory.h"
 #include "core/error.h"
+#include "core/memory.h"
 #include "core/text.h"
 #include "render/blended/blended_backend.h"
 #include "render/cpu/cpu_backend.h"

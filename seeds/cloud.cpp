@@ -97,12 +97,4 @@ bool may_see(const Frustum& frustum, const Sphere& sphere) {
     });
 }
 
-std::vector<std::uint32_t> cull(const Frustum& frustum, std::span<const Sphere> spheres) {
-    std::vector<std::uint32_t> seen;
-    for (std::uint32_t i = 0; i < spheres.size(); ++i) {
-        if (may_see(frustum, spheres[i])) seen.push_back(i);
-    }
-    return seen;
-}
-
 }  // namespace nephos

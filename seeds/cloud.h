@@ -81,7 +81,4 @@ Frustum frustum_of(const FrustumView& view);
 // the sphere is entirely outside the frustum; near edges true for some spheres just outside. Pure.
 bool may_see(const Frustum& frustum, const Sphere& sphere);
 
-// Returns the indices of the spheres that pass may_see(), rising. Pure.
-std::vector<std::uint32_t> cull(const Frustum& frustum, std::span<const Sphere> spheres);
-
 }  // namespace nephos

@@ -16,20 +16,19 @@ constexpr Range kLow{0, 2000};
 constexpr Range kNs{900, 3000};
 constexpr Range kCb{700, 1500};
 
-using enum HeightGroup;
 constexpr std::array<GenusFacts, kGenusCount> kGenera{{
-    {Genus::Ci, "Ci", "cirrus", high, {6000, 18000}, {5000, 13000}, {3000, 8000}, {}},
-    {Genus::Cs, "Cs", "cirrostratus", high, {6000, 11000}, {5000, 11000}, {5000, 8000}, {}},
-    {Genus::Cc, "Cc", "cirrocumulus", high, {6000, 11000}, {5000, 11000}, {5000, 8000}, {}},
-    {Genus::As, "As", "altostratus", middle, {2000, 6000}, {2000, 6000}, {2000, 4000}, {}},
-    {Genus::Ac, "Ac", "altocumulus", middle, {2000, 6000}, {2000, 6000}, {2000, 4000}, {}},
-    {Genus::Ns, "Ns", "nimbostratus", middle, kNs, kNs, kNs, {}},
-    {Genus::St, "St", "stratus", low, kLow, kLow, kLow, {}},
-    {Genus::Sc, "Sc", "stratocumulus", low, kLow, kLow, kLow, {}},
-    {Genus::Cu, "Cu", "cumulus", low, kLow, kLow, kLow, {}},
-    {Genus::Cb, "Cb", "cumulonimbus", low, kCb, kCb, kCb, Range{9000, 12000}},
-    {Genus::StFra, "St fra", "fractostratus", low, kLow, kLow, kLow, {}},
-    {Genus::CuFra, "Cu fra", "fractocumulus", low, kLow, kLow, kLow, {}},
+    {Genus::Ci, "Ci", "cirrus", {6000, 18000}, {5000, 13000}, {3000, 8000}, {}},
+    {Genus::Cs, "Cs", "cirrostratus", {6000, 11000}, {5000, 11000}, {5000, 8000}, {}},
+    {Genus::Cc, "Cc", "cirrocumulus", {6000, 11000}, {5000, 11000}, {5000, 8000}, {}},
+    {Genus::As, "As", "altostratus", {2000, 6000}, {2000, 6000}, {2000, 4000}, {}},
+    {Genus::Ac, "Ac", "altocumulus", {2000, 6000}, {2000, 6000}, {2000, 4000}, {}},
+    {Genus::Ns, "Ns", "nimbostratus", kNs, kNs, kNs, {}},
+    {Genus::St, "St", "stratus", kLow, kLow, kLow, {}},
+    {Genus::Sc, "Sc", "stratocumulus", kLow, kLow, kLow, {}},
+    {Genus::Cu, "Cu", "cumulus", kLow, kLow, kLow, {}},
+    {Genus::Cb, "Cb", "cumulonimbus", kCb, kCb, kCb, Range{9000, 12000}},
+    {Genus::StFra, "St fra", "fractostratus", kLow, kLow, kLow, {}},
+    {Genus::CuFra, "Cu fra", "fractocumulus", kLow, kLow, kLow, {}},
 }};
 
 std::string lower(std::string_view text) {
@@ -75,15 +74,6 @@ Range base_height_m(Genus genus, Region region) {
     return facts.base_polar_m;
 }
 
-Range group_height_m(HeightGroup group, Region region) {
-    constexpr std::array<std::array<Range, 3>, 3> kHeights{{
-        {{{0, 2000}, {0, 2000}, {0, 2000}}},
-        {{{2000, 8000}, {2000, 7000}, {2000, 4000}}},
-        {{{6000, 18000}, {5000, 13000}, {3000, 8000}}},
-    }};
-    return kHeights[std::size_t(group)][std::size_t(region)];
-}
-
 Genus genus_from_name(std::string_view text) {
     const std::string wanted = lower(text).substr(0, 64);
     const GenusFacts* nearest = nullptr;
@@ -107,15 +97,6 @@ Genus genus_from_name(std::string_view text) {
                 "unknown cloud genus \"" + std::string(text.substr(0, 64)) + "\"" +
                     (nearest ? ", did you mean \"" + std::string(nearest_name) + "\"?" : "") +
                     " (known: " + all + ")");
-}
-
-Region region_from_name(std::string_view text) {
-    const std::string wanted = lower(text);
-    if (wanted == "tropical") return Region::tropical;
-    if (wanted == "temperate") return Region::temperate;
-    if (wanted == "polar") return Region::polar;
-    throw Error(ErrorCode::usage, "unknown region \"" + std::string(text.substr(0, 64)) +
-                                      "\" (known: tropical, temperate, polar)");
 }
 
 }  // namespace nephos

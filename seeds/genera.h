@@ -20,14 +20,10 @@ inline constexpr int kGenusCount = 12;
 // The climatic belts of T's table 2.
 enum class Region { tropical, temperate, polar };
 
-// Groups of genera by the height of their bases: up to 2 km, 2-8 km, 3-18 km, depending on the region.
-enum class HeightGroup { low, middle, high };
-
 struct GenusFacts {
     Genus genus;
     std::string_view abbreviation;  // WMO: "Cu", "Cb", ...; the fractus forms are "St fra" and "Cu fra"
     std::string_view name;          // "cumulus"
-    HeightGroup group;
     Range base_tropical_m, base_temperate_m, base_polar_m;  // of the base, above ground
     std::optional<Range> top_m;                             // usual top above ground, where T gives one
 };
@@ -38,14 +34,8 @@ std::span<const GenusFacts> genera();
 const GenusFacts& facts_of(Genus genus);
 Range base_height_m(Genus genus, Region region);
 
-// Returns the range of heights of a group in a region (T, table 2).
-Range group_height_m(HeightGroup group, Region region);
-
-// Parses an abbreviation ("Cb", "St fra") or name ("cumulonimbus"), ignoring case. Throws Error(usage) that
-// lists the abbreviations and suggests the nearest one.
+// By abbreviation ("Cb", "St fra") or name ("cumulonimbus"), whatever the case.
+// Throws Error(usage) that lists the abbreviations and names the nearest one.
 Genus genus_from_name(std::string_view text);
-
-// Parses "tropical", "temperate" or "polar", ignoring case. Throws Error(usage).
-Region region_from_name(std::string_view text);
 
 }  // namespace nephos

@@ -15,6 +15,7 @@
 // computes the clouds that enter (once, with the light of their slot), and the first frame of a run computes
 // all.
 
+#include <algorithm>
 #include <cstdint>
 
 #include "seeds/sky.h"
@@ -23,13 +24,22 @@ namespace nephos {
 
 class LightSchedule {
   public:
-    // Computes the period for a layer; clouds_per_frame >= 0, 0 = all clouds in every frame.
-    LightSchedule(const SkyOptions& sky, int clouds_per_frame);
+    // clouds_per_frame >= 0; 0: all clouds in every frame.
+    LightSchedule(const SkyOptions& sky, int clouds_per_frame) {
+        if (clouds_per_frame == 0) return;
+        int most = 0;
+        for (const Sky& one : sky.skies) most = std::max(most, one.clouds);
+        const int room = most + (most + 3) / 4;
+        period_ = std::max(1, room / clouds_per_frame + (room % clouds_per_frame != 0 ? 1 : 0));
+    }
 
     int period() const { return period_; }  // in frames, >= 1
 
-    // Returns the frame, 0..frame, whose light the cloud in `slot` has in `frame`; frames count from 0.
-    int frame_of_light(std::uint32_t slot, int frame) const;
+    // The frame, 0..frame, whose light the cloud in `slot` has in `frame`; frames count from 0.
+    int frame_of_light(std::uint32_t slot, int frame) const {
+        const int first = int(slot % std::uint32_t(period_));
+        return frame < first ? 0 : frame - (frame - first) % period_;
+    }
 
   private:
     int period_ = 1;

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "render/image/line_overlay.h"
+#include "render/image/overlay.h"
 #include "seeds/light_absorption.h"
 #include "seeds/sky_simulation.h"
 

@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-#include "core/available_memory.h"
+#include "core/memory.h"
 #include "scenes/format/scene.h"
 
 namespace nephos {

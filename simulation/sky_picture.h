@@ -14,14 +14,14 @@
 #include <vector>
 
 #include "render/cloud/splats.h"
-#include "render/image/line_overlay.h"
+#include "render/image/overlay.h"
 #include "render/options/options.h"
 #include "render/rain/precipitation.h"
 #include "render/renderer.h"
 #include "scenes/format/scene.h"
-#include "seeds/billboards.h"
 #include "seeds/ground_cover.h"
 #include "seeds/light_absorption.h"
+#include "seeds/model.h"
 #include "seeds/sky_simulation.h"
 
 namespace nephos {

@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "apps/nephos/help.h"
 #include "core/random.h"
 #include "simulation/version.h"
 

@@ -5,6 +5,7 @@
 // parsing leaves in `action` what main() is to do. The action returns the exit status, or throws.
 
 #include <functional>
+#include <string>
 
 #include <CLI/CLI.hpp>
 
@@ -22,5 +23,36 @@ void add_completion_command(CLI::App& app, Action& action);
 
 // All of them, with --help and --version.
 void add_commands(CLI::App& app, Action& action);
+
+// The text of --help: one page a command, wrapped to the terminal.
+class HelpPage : public CLI::FormatterBase {
+  public:
+    std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;
+};
+
+// "-o, --out DIR" for an option, "SCENE" for a positional.
+std::string option_label(const CLI::Option& option);
+
+// "nephos run SCENE [options]"
+std::string usage_line(const CLI::App& app);
+
+// Completion scripts for shells, generated from the parser itself, so that they cannot drift from it.
+
+// `shell` is "bash", "zsh" or "fish"; throws Error(usage) on any other.
+std::string completion_script(const CLI::App& app, const std::string& shell);
+
+// Ctrl-C and SIGTERM: the first asks for an orderly end (finish the step, leave a checkpoint), the second,
+// unless it comes within 0.3 s, ends the process at once. Also makes failed writes visible as errors where the default is a silent death.
+
+// Installs the handlers; call once at the start of main(). SIGPIPE and SIGXFSZ are ignored, so that a closed
+// pipe and a file-size limit appear as EPIPE and EFBIG at the write that met them.
+void install_signal_handlers();
+
+// From now on the first SIGINT or SIGTERM is only remembered; until this is called it ends the process at
+// once, since there is nothing to save.
+void defer_signals();
+
+// The signal that asked for an end, or 0. Async-signal-safe and thread-safe.
+int pending_signal();
 
 }  // namespace nephos

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/nephos/completion.h"
 
 #include <memory>
 #include <vector>

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/nephos/help.h"
-
 #include <algorithm>
 #include <sstream>
 #include <utility>
 #include <vector>
 
+#include "apps/nephos/commands.h"
 #include "apps/nephos/terminal.h"
 
 namespace nephos {

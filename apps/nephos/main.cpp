@@ -15,11 +15,9 @@
 
 #include "apps/nephos/arguments.h"
 #include "apps/nephos/commands.h"
-#include "apps/nephos/help.h"
-#include "apps/nephos/signals.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
-#include "core/freed_memory.h"
+#include "core/memory.h"
 #include "scenes/format/errors.h"
 
 namespace nephos {

@@ -10,7 +10,6 @@
 
 #include "apps/nephos/arguments.h"
 #include "apps/nephos/commands.h"
-#include "apps/nephos/signals.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
 #include "core/text.h"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/nephos/signals.h"
-
 #include <atomic>
 #include <cstdint>
 #include <ctime>
 
 #include <signal.h>
 #include <unistd.h>
+
+#include "apps/nephos/commands.h"
 
 namespace nephos {
 namespace {

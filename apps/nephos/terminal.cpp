@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include <fmt/color.h>
 #include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -71,23 +72,10 @@ bool colours_on(std::FILE* stream) {
 }
 
 std::string styled(std::string_view text, Style style, bool colours) {
-    if (!colours) return std::string(text);
-    const char* code = "";
-    switch (style) {
-        case Style::bold:
-            code = "1";
-            break;
-        case Style::dim:
-            code = "2";
-            break;
-        case Style::red:
-            code = "1;31";
-            break;
-        case Style::cyan:
-            code = "36";
-            break;
-    }
-    return fmt::format("\033[{}m{}\033[0m", code, text);
+    static const fmt::text_style kLooks[] = {fmt::emphasis::bold, fmt::emphasis::faint,
+                                             fmt::emphasis::bold | fmt::fg(fmt::terminal_color::red),
+                                             fmt::fg(fmt::terminal_color::cyan)};
+    return colours ? fmt::format(kLooks[std::size_t(style)], "{}", text) : std::string(text);
 }
 
 void print_message(std::string_view text) {

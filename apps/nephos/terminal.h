@@ -32,7 +32,7 @@ class Output {
 // Whether colours may be used on stdout or stderr.
 bool colours_on(std::FILE* stream);
 
-// Text between escape sequences when colours are on: "\033[1;31m" ... "\033[0m".
+// Text between escape sequences (ECMA-48) when colours are on.
 enum class Style { bold, dim, red, cyan };
 std::string styled(std::string_view text, Style style, bool colours);
 

@@ -18,9 +18,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "core/available_memory.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/memory.h"
 #include "core/text.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

@@ -12,7 +12,6 @@
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_metadata.h"
-#include "density/vdb/vdb_sandbox.h"
 
 namespace nephos {
 namespace {

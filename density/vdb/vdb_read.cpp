@@ -14,7 +14,6 @@
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_foreign.h"
 #include "density/vdb/vdb_metadata.h"
-#include "density/vdb/vdb_sandbox.h"
 
 namespace nephos {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "density/vdb/vdb_sandbox.h"
-
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -11,6 +9,8 @@
 #include <openvdb/openvdb.h>
 
 #include "core/error.h"
+#include "density/vdb/sandbox.h"
+#include "density/vdb/vdb_archive.h"
 
 namespace nephos {
 namespace {

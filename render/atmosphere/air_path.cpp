@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numbers>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/atmosphere/air_path.cpp"
@@ -13,8 +12,8 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
-#include "core/smoothstep-inl.h"
 #include "core/smoothstep.h"
+#include "core/vectors-inl.h"
 #include "render/shared/shared.h"
 
 #ifndef NEPHOS_AIR_PATH_TYPES_
@@ -331,24 +330,6 @@ void scatter_along(const SphericalAir& air, const AirTables& tables, const AirPa
 
 double visible_sun(double sine, double horizon_sine) {
     return smoothstep(0, 1, 0.5 + 0.5 * (sine - horizon_sine) / double(shader::kSunRadius));
-}
-
-GaussRule::GaussRule(int count) : nodes(std::size_t(count)), weights(std::size_t(count)) {
-    for (int i = 0; i < count; ++i) {
-        double x = std::cos(std::numbers::pi * (i + 0.75) / (count + 0.5)), slope = 1;
-        for (int round = 0; round < 20; ++round) {
-            double before = 1, value = x;
-            for (int n = 2; n <= count; ++n) {
-                const double next = ((2 * n - 1) * x * value - (n - 1) * before) / n;
-                before = value;
-                value = next;
-            }
-            slope = count * (x * value - before) / (x * x - 1);
-            x -= value / slope;
-        }
-        nodes[std::size_t(i)] = 0.5 * (1 - x);
-        weights[std::size_t(i)] = 1 / ((1 - x * x) * slope * slope);
-    }
 }
 
 }  // namespace nephos

@@ -83,10 +83,4 @@ void scatter_along(const SphericalAir& air, const AirTables& tables, const AirPa
 // Returns the fraction of the sun's disc above the horizon.
 double visible_sun(double sine, double horizon_sine);
 
-// Nodes and weights of the Gauss-Legendre rule on 0..1.
-struct GaussRule {
-    std::vector<double> nodes, weights;
-    explicit GaussRule(int count);
-};
-
 }  // namespace nephos

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include <boost/math/special_functions/legendre.hpp>
 #include <tbb/parallel_for.h>
 
 #include "render/atmosphere/air_path.h"
@@ -21,8 +22,28 @@ constexpr std::size_t kDayParts = 56, kTwilightParts = 96, kPsiParts = 48;
 constexpr std::size_t kIrradianceRows = 8;
 constexpr double kIrradianceTop_km = 16;
 
-// Quadrature over directions: elevations with weights of solid angle / 2 pi, dense around the horizon, where
-// radiance varies fastest.
+// Nodes and weights of the Gauss-Legendre rule on 0..1.
+struct GaussRule {
+    std::vector<double> nodes, weights;
+
+    explicit GaussRule(int count) {
+        const std::vector<double> zeros =
+            boost::math::legendre_p_zeros<double>(count);  // those from 0 on, rising
+        for (auto zero = zeros.rbegin(); zero != zeros.rend(); ++zero) add(count, *zero);
+        for (const double zero : zeros)
+            if (zero > 0) add(count, -zero);
+    }
+
+  private:
+    void add(int count, double zero) {
+        const double slope = boost::math::legendre_p_prime(count, zero);
+        nodes.push_back(0.5 * (1 - zero));
+        weights.push_back(1 / ((1 - zero * zero) * slope * slope));
+    }
+};
+
+// Directions from a point: elevations with their share of the sphere's solid angle / 2 pi. They are dense
+// around the horizon, where light changes fastest.
 struct Elevations {
     struct One {
         double sine, weight;
@@ -386,22 +407,6 @@ SkyTable Atmosphere::sky(double eye_altitude_m, double sun_elevation_deg) const 
         }
     });
     return sky;
-}
-
-Rgb sky_radiance(const SkyTable& table, double sine, double cos_azimuth, double cos_to_sun, double mie_g) {
-    constexpr std::size_t kColumns = shader::kSkyColumns, kRows = shader::kSkyRows;
-    const double x = double(shader::sky_across(float(cos_azimuth))) * double(kColumns - 1),
-                 y = double(shader::sky_upwards(float(sine))) * double(kRows - 1);
-    const auto i = std::min(std::size_t(x), kColumns - 2), j = std::min(std::size_t(y), kRows - 2);
-    const auto at = [&](const std::vector<float>& texels, std::size_t c) {
-        const float *a = &texels[4 * (j * kColumns + i) + c], *b = a + 4 * kColumns;
-        return mix(mix(double(a[0]), double(a[4]), x - double(i)),
-                   mix(double(b[0]), double(b[4]), x - double(i)), y - double(j));
-    };
-    const double phase = double(shader::particle_phase(float(cos_to_sun), float(mie_g)));
-    Rgb radiance{};
-    for (std::size_t c = 0; c < 3; ++c) radiance[c] = at(table.scattered, c) + phase * at(table.haze, c);
-    return radiance;
 }
 
 }  // namespace nephos

@@ -97,8 +97,4 @@ class Atmosphere {
     std::unique_ptr<const Tables> tables_;
 };
 
-// Returns the radiance along a ray: `sine` of its elevation (0..1), cosine of its azimuth from the sun's,
-// cosine of the angle to the sun. The scalar form of render/shading/air.glsl.
-Rgb sky_radiance(const SkyTable& table, double sine, double cos_azimuth, double cos_to_sun, double mie_g);
-
 }  // namespace nephos

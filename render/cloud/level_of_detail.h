@@ -46,7 +46,7 @@
 #include "render/cloud/cloud_preparation.h"
 #include "render/cloud/splats.h"
 #include "render/cloud/voxel_blocks.h"
-#include "render/options/level_of_detail_options.h"
+#include "render/options/options.h"
 
 namespace nephos {
 

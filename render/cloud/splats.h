@@ -11,10 +11,23 @@
 
 #include "core/weather.h"
 #include "density/metaballs.h"
-#include "render/cloud/ground_cover_view.h"
 #include "render/options/options.h"
 
 namespace nephos {
+
+// Water and snow on the ground at the moment of a picture, as the renderer reads them. Texel (column, row) is
+// the rectangle of texel_x_m by texel_y_m whose lower corner is at (x_m + column texel_x_m, y_m + row
+// texel_y_m); rows from south to north, x fastest. Beyond the map, and towards its edge, the values outside
+// take over.
+struct GroundCoverView {
+    double x_m = 0, y_m = 0;               // south-western corner, world
+    double texel_x_m = 1, texel_y_m = 1;   // > 0
+    int columns = 0, rows = 0;             // both 0: the values outside everywhere
+    std::span<const float> water_mm;       // columns * rows, >= 0: film of water
+    std::span<const float> snow_mm;        // likewise, of water in the snow
+    std::span<const float> rain_mm_per_h;  // likewise: rain that falls into the water
+    double outside_water_mm = 0, outside_snow_mm = 0, outside_rain_mm_per_h = 0;
+};
 
 // A cloud made of metaballs. Along a ray, extinction (per metre) is
 //     extinction_per_m * normalisation * sum_i density_i f(|x - x_i| / radius_i),

@@ -9,7 +9,7 @@
 
 #include "core/vec.h"
 #include "render/frame/billboard_textures.h"
-#include "render/frame/pixel_rounding.h"
+#include "render/frame/tile_bins.h"
 #include "render/shared/half_floats.h"
 
 namespace nephos {

@@ -5,7 +5,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "render/frame/pixel_rounding.h"
+#include "render/frame/tile_bins.h"
 #include "render/shared/half_floats.h"
 
 namespace nephos {

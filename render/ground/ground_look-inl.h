@@ -31,13 +31,13 @@ HWY_INLINE Floats water_reflectance(Floats cosine, Floats slope_variance) {
                       set(kWaterNormalReflectance));
 }
 
-// soaked_albedo() of wet_ground.h.
+// soaked_albedo() of wet_ground.h without the share of light that gets in and out.
 HWY_INLINE Floats3 soaked_albedo(const shader::vec4& dry) {
     const auto of = [](float albedo) { return set(float(nephos::soaked_albedo(double(albedo)))); };
     return {of(dry.x), of(dry.y), of(dry.z)};
 }
 
-// Share of the ground that lies below a film (covered_share() of wet_ground.h), where noise is the height of
+// Share of the ground that lies below a film (see wet_ground.h), where noise is the height of
 // the hollows and tufts in standard deviations.
 HWY_INLINE Floats covered(Floats film_mm, float half_mm, const ResolvedNoise& noise) {
     constexpr float kSharpness = 0.1f;  // of edges: a tenth of a standard deviation

@@ -14,8 +14,7 @@
 
 #include <hwy/highway.h>
 
-#include "core/noise_hash-inl.h"
-#include "core/smoothstep-inl.h"
+#include "core/vectors-inl.h"
 #include "render/ground/ground_noise.h"
 #include "render/shading/background-inl.h"
 

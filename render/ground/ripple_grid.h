@@ -9,7 +9,7 @@
 #include <cstdint>
 
 #include "core/vec.h"
-#include "render/cloud/ground_cover_view.h"
+#include "render/cloud/splats.h"
 #include "render/ground/ripples.h"
 
 namespace nephos {

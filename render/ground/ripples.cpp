@@ -89,22 +89,6 @@ void step(Ripples& ripples) {
     ripples.before.swap(ripples.now);
 }
 
-double energy(const Ripples& ripples) {
-    const double grown = std::exp(kRippleDamping_per_s * kRippleStep_s);
-    double moving = 0, bent = 0;
-    float curved[kSide];
-    for (int row = 0; row < kSide; ++row) {
-        laplacian_row(ripples.before, row, curved);
-        for (int i = 0; i < kSide; ++i) {
-            const double now = grown * ripples.now[at(i, row)], way = now - ripples.before[at(i, row)];
-            moving += way * way;
-            bent -= double(curved[i]) * now;
-        }
-    }
-    const double per_texel = kRippleSpeed_m_per_s / kTexel_m;
-    return 0.5 * (moving / (kRippleStep_s * kRippleStep_s) + per_texel * per_texel * bent);
-}
-
 void add_drops(Ripples& ripples, std::int64_t step, double rain_mm_per_h) {
     constexpr float kHeight_m = 1.0e-3f;  // of the crown of an average drop
     const double number =

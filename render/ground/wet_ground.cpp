@@ -279,11 +279,6 @@ double soaked_albedo(double dry_albedo) {
     return (1 - kBack) * dry_albedo / (1 - kBack * dry_albedo);
 }
 
-double covered_share(double film_mm, double half_mm) {
-    if (!(film_mm > 0)) return 0;
-    return 1 / (1 + std::exp(-1.702 * std::log(film_mm / half_mm) / kFilmSpread));
-}
-
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover) {
     return (any_water(cover) || cover.outside_snow_mm > 0 || any(cover.snow_mm)) && ground_in_view(options);
 }

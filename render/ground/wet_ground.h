@@ -13,9 +13,9 @@
 //
 // At a point with a film of V mm of water and W mm of water in the snow:
 //
-//     soaked       interpolates by 1 - exp(-V / soaking_mm) from dry to soaked_albedo()
-//     under water  where noise, the depth of the hollows, is below V: covered_share() in the mean
-//     white        where another noise, the height of tufts, is below W
+//     soaked       by 1 - exp(-V / soaking_mm) from dry to soaked_albedo()
+//     under water  where noise, the depth of the hollows, lies below V: half of it at V = wet_ground.half_mm
+//     white        where another noise, the height of tufts, lies below W
 //
 // Water reflects the mirrored view (mirror_view.h) by water_reflectance() of the angle, with the slopes of
 // ripples; ripples too small for a pixel are roughness instead. Wet soil reflects weakly and much blurred.
@@ -24,7 +24,7 @@
 #include <optional>
 
 #include "render/atmosphere/sky_light.h"
-#include "render/cloud/ground_cover_view.h"
+#include "render/cloud/splats.h"
 #include "render/ground/mirror_view.h"
 #include "render/image/picture.h"
 #include "render/options/options.h"
@@ -45,10 +45,7 @@ double water_reflectance(double cosine, double slope_variance);
 // the dry albedo a. Lekner and Dorf 1988, with Angstrom's absorption.
 double soaked_albedo(double dry_albedo);
 
-// Returns the fraction of level ground that a film covers; one half at `half_mm`.
-double covered_share(double film_mm, double half_mm);
-
-// Returns true when water or snow and ground are in view.
+// Whether there is anything to draw: water, snow, and ground in view.
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover);
 // Returns true when reflections need a mirrored view.
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover);
@@ -67,7 +64,7 @@ struct WetGround {
 // Replaces the light of the ground, rows in parallel; the result does not depend on the number of threads.
 void draw_wet_ground(const WetGround& ground, Picture& picture);
 
-// Throws Error(usage) naming the first value out of the range in ground_cover_view.h.
+// Throws Error(usage) naming the first value that is not as a GroundCoverView wants it.
 void check(const GroundCoverView& cover);
 
 }  // namespace nephos

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <cmath>
 #include <locale>
 #include <sstream>
 #include <string>
@@ -11,13 +9,10 @@
 #include <OpenEXR/ImfCompressionAttribute.h>
 #include <OpenEXR/ImfDoubleAttribute.h>
 #include <OpenEXR/ImfFloatAttribute.h>
-#include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
-#include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRationalAttribute.h>
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfVecAttribute.h>
@@ -27,8 +22,6 @@
 
 namespace nephos {
 namespace {
-
-constexpr int kMaxSide = 65536;  // no file of ours is larger; a damaged header often claims to be
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
     throw Error(ErrorCode::io, path.string() + ": cannot read OpenEXR: " + reason.substr(0, 300));
@@ -125,77 +118,6 @@ ExrPart describe(const Imf::Header& header) {
     return part;
 }
 
-// Checked before anything is allocated for the pixels.
-void require_layers(const std::filesystem::path& path, const Imf::MultiPartInputFile& file) {
-    if (file.parts() < 2) fail(path, "expected the parts \"picture\" and \"shadow\"");
-    const auto require = [&](int part, const char* channel) {
-        const Imf::Channel* found = file.header(part).channels().findChannel(channel);
-        if (found == nullptr || found->type != Imf::FLOAT || found->xSampling != 1 || found->ySampling != 1)
-            fail(path, std::string("no 32-bit channel ") + channel);
-    };
-    for (const char* channel : {"beauty.R", "beauty.G", "beauty.B", "transmittance.Y", "depth.Z"})
-        require(0, channel);
-    require(1, "shadow.Y");
-    for (int part = 0; part < 2; ++part) {
-        if (file.header(part).type() != Imf::SCANLINEIMAGE) fail(path, "expected scan lines, not tiles");
-        if (!file.partComplete(part)) fail(path, "incomplete file");
-        const Imath::Box2i window = file.header(part).dataWindow();
-        const Imath::V2i size = window.size();
-        if (window.min != Imath::V2i(0, 0) || size.x < 0 || size.y < 0 || size.x >= kMaxSide ||
-            size.y >= kMaxSide)
-            fail(path, "unexpected data window");
-        if (part == 1 && size.x != size.y) fail(path, "the shadow map is not square");
-    }
-}
-
-void read_part(Imf::MultiPartInputFile& file, int number, const Imf::FrameBuffer& buffer, int height) {
-    Imf::InputPart part(file, number);
-    part.setFrameBuffer(buffer);
-    part.readPixels(0, height - 1);
-}
-
-char* base_of(float* values) { return reinterpret_cast<char*>(values); }
-
-Vec3 vector_attribute(const Imf::Header& header, const char* name) {
-    const auto* attribute = header.findTypedAttribute<Imf::V3fAttribute>(name);
-    if (attribute == nullptr) return {};
-    return {attribute->value().x, attribute->value().y, attribute->value().z};
-}
-
-Picture read_layers(const std::filesystem::path& path) {
-    Imf::MultiPartInputFile file(path.c_str());
-    require_layers(path, file);
-    Picture picture;
-    const Imath::V2i size = file.header(0).dataWindow().size();
-    picture.width = size.x + 1;
-    picture.height = size.y + 1;
-    picture.shadow_size = file.header(1).dataWindow().size().x + 1;
-    picture.beauty.resize(3 * picture.pixels());
-    picture.transmittance.resize(picture.pixels());
-    picture.depth_m.resize(picture.pixels());
-    picture.shadow.resize(std::size_t(picture.shadow_size) * std::size_t(picture.shadow_size));
-
-    const std::size_t row = sizeof(float) * std::size_t(picture.width);
-    Imf::FrameBuffer buffer;
-    const char* names[3] = {"beauty.R", "beauty.G", "beauty.B"};
-    for (std::size_t c = 0; c < 3; ++c)
-        buffer.insert(names[c],
-                      Imf::Slice(Imf::FLOAT, base_of(picture.beauty.data() + c), 3 * sizeof(float), 3 * row));
-    buffer.insert("transmittance.Y",
-                  Imf::Slice(Imf::FLOAT, base_of(picture.transmittance.data()), sizeof(float), row));
-    buffer.insert("depth.Z", Imf::Slice(Imf::FLOAT, base_of(picture.depth_m.data()), sizeof(float), row));
-    read_part(file, 0, buffer, picture.height);
-
-    Imf::FrameBuffer shadow;
-    shadow.insert("shadow.Y", Imf::Slice(Imf::FLOAT, base_of(picture.shadow.data()), sizeof(float),
-                                         sizeof(float) * std::size_t(picture.shadow_size)));
-    read_part(file, 1, shadow, picture.shadow_size);
-    const Imf::Header& header = file.header(1);
-    picture.shadow_frame = {vector_attribute(header, "shadowOrigin"), vector_attribute(header, "shadowU"),
-                            vector_attribute(header, "shadowV"), vector_attribute(header, "shadowDirection")};
-    return picture;
-}
-
 }  // namespace
 
 ExrInfo read_exr_info(const std::filesystem::path& path) {
@@ -207,16 +129,6 @@ ExrInfo read_exr_info(const std::filesystem::path& path) {
             info.parts.back().complete = file.partComplete(i);
         }
         return info;
-    } catch (const Error&) {
-        throw;
-    } catch (const std::exception& reason) {
-        fail(path, reason.what());
-    }
-}
-
-Picture read_exr(const std::filesystem::path& path) {
-    try {
-        return read_layers(path);
     } catch (const Error&) {
         throw;
     } catch (const std::exception& reason) {

@@ -41,11 +41,10 @@ void write_png(const std::filesystem::path& path, const Picture& picture, const 
 // A decoded 8-bit RGB image; row 0 at the top.
 struct Rgb8Image {
     int width = 0, height = 0;
-    std::vector<std::uint8_t> rgb;                              // 3 * width * height
-    std::vector<std::pair<std::string, std::string>> metadata;  // text chunks in file order
+    std::vector<std::uint8_t> rgb;  // 3 * width * height
 };
 
-// Reads a PNG of any kind as 8-bit RGB (alpha dropped, grey and palette expanded), up to 16384 on a side.
+// Reads a PNG of any kind as 8-bit RGB in sRGB (what is transparent over black), up to 16384 on a side.
 Rgb8Image read_png(const std::filesystem::path& path);
 
 struct ExrChannel {
@@ -68,9 +67,5 @@ struct ExrInfo {
 };
 // Reads the headers alone.
 ExrInfo read_exr_info(const std::filesystem::path& path);
-
-// Reads a file of write_exr(); throws Error(io) when layers are missing. Picture::light is not stored and is
-// empty.
-Picture read_exr(const std::filesystem::path& path);
 
 }  // namespace nephos

@@ -2,15 +2,31 @@
 #include "render/options/options.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 
+#include "core/error.h"
 #include "render/options/camera.h"
-#include "render/options/option_checks.h"
 #include "render/options/sun_position.h"
+#include "render/shared/shared.h"
 
 namespace nephos {
 namespace {
+
+// Throws Error(usage) unless `good`.
+void require(bool good, const char* key, const char* expected) {
+    if (!good) throw Error(ErrorCode::usage, std::string(key) + ": expected " + expected);
+}
+
+// NaN fails every comparison, so it is out of every range.
+bool within(double value, double min, double max) { return value >= min && value <= max; }
+bool within(const std::array<double, 3>& values, double min, double max) {
+    return std::ranges::all_of(values, [&](double value) { return within(value, min, max); });
+}
+
+bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 void check_colour(const Rgb& colour, const char* name) {
     require(within(colour, 0, 1e6), name, "three numbers from 0 to 1e6");
@@ -37,7 +53,62 @@ void check(const AtmosphereOptions& atmosphere) {
     check_colour(atmosphere.night, "atmosphere.night");
 }
 
+void check(const LevelOfDetailOptions& options) {
+    require(within(options.pixels, 0, 1000), "level_of_detail.pixels", "0..1000 pixels");
+}
+
+void check(const WetGroundOptions& options) {
+    require(within(options.soaking_mm, 1e-3, 100), "wet_ground.soaking_mm", "0.001..100 mm");
+    require(within(options.puddle_film_mm, 1e-3, 100), "wet_ground.puddle_film_mm", "0.001..100 mm");
+    require(within(options.puddle_size_m, 0.1, 1000), "wet_ground.puddle_size_m", "0.1..1000 metres");
+    require(within(options.reflection, 0, 1), "wet_ground.reflection", "0..1");
+    require(within(options.reflection_scale, 0.1, 1), "wet_ground.reflection_scale", "0.1..1");
+    require(within(options.sheen, 0, 1), "wet_ground.sheen", "0..1");
+    require(within(options.ripples, 0, 10), "wet_ground.ripples", "0..10");
+    require(within(options.snow_cover_mm, 1e-3, 1000), "wet_ground.snow_cover_mm", "0.001..1000 mm");
+    require(within(options.snow_albedo, 0, 1), "wet_ground.snow_albedo", "three numbers from 0 to 1");
+}
+
 }  // namespace
+
+void check(const PrecipitationOptions& p) {
+    require(within(p.particles, 0, 2e6), "precipitation.particles", "0..2,000,000");
+    require(within(p.exposure_s, 0, 1), "precipitation.exposure_s", "0..1 seconds");
+    require(within(p.visibility, 0, 1000), "precipitation.visibility", "0..1000");
+    require(within(p.intensity_scale, 0, 100), "precipitation.intensity_scale", "0..100");
+    require(within(p.wind_drift, 0, 10), "precipitation.wind_drift", "0..10");
+    require(within(p.depth_m, 1, 1000), "precipitation.depth_m", "1..1000 metres");
+    require(within(p.margin_m, 0, 100), "precipitation.margin_m", "0..100 metres");
+    require(within(p.reach_m, 1, 1e5), "precipitation.reach_m", "1..100,000 metres");
+    require(within(p.edge, 0, 1), "precipitation.edge", "0..1");
+    require(within(p.shafts, 0, 100), "precipitation.shafts", "0..100");
+    require(within(p.shaft_texture, 0, 1), "precipitation.shaft_texture", "0..1");
+    require(within(p.evaporation, 0, 1), "precipitation.evaporation", "0..1");
+}
+
+void check(const Shells& shells) {
+    require(shells.count >= 1 && shells.count <= int(shader::kMaxShells), "shells.count", "1..128 shells");
+    require(within(shells.spacing_m, 0.1, 1e5), "shells.spacing_m", "0.1..1e5 metres");
+    require(within(shells.growth, 1, 2), "shells.growth", "1..2");
+    require(reach_m(shells) <= 1e6, "shells.growth", "shells that end within 1000 km");
+}
+
+void check(const LightShafts& shafts) {
+    require(within(shafts.strength, 0, 1), "light_shafts.strength", "0..1");
+    require(within(shafts.g, -0.99, 0.99), "light_shafts.g", "-0.99..0.99");
+    require(within(shafts.sun_share, 0, 1), "light_shafts.sun_share", "0..1");
+}
+
+void check(const Fog& fog) {
+    require(within(fog.extinction_per_m, 0, 10), "fog.extinction_per_m", "0..10 per metre");
+    require(within(fog.base_m, -1e5, 1e5), "fog.base_m", "-1e5..1e5 metres");
+    require(within(fog.height_m, 0.1, 1e5), "fog.height_m", "0.1..1e5 metres");
+    require(within(fog.patchiness, 0, 1), "fog.patchiness", "0..1");
+    require(within(fog.patch_m, 1, 1e6), "fog.patch_m", "1..1e6 metres");
+    const Vec3& v = fog.velocity_m_per_s;
+    require(within({v.x, v.y, v.z}, -1e3, 1e3), "fog.velocity_m_per_s",
+            "three numbers, -1000..1000 metres per second");
+}
 
 void check(const RenderOptions& options) {
     const Camera& camera = options.camera;

@@ -13,19 +13,23 @@
 
 #include "core/vec.h"
 #include "render/options/atmosphere_options.h"
-#include "render/options/camera_path.h"
-#include "render/options/level_of_detail_options.h"
 #include "render/options/phase_function.h"
 #include "render/options/precipitation_options.h"
-#include "render/options/scattering_options.h"
 #include "render/options/shell_options.h"
-#include "render/options/wet_ground_options.h"
 
 namespace nephos {
 
 using Rgb = std::array<double, 3>;
 
-// A perspective camera. World z is up in the image; y (north) is when it looks straight up or down.
+// A key frame of a camera that moves.
+struct CameraKey {
+    double time_s = 0;  // simulated; keys rise strictly
+    Vec3 position_m{0, -4000, 300};
+    Vec3 target_m{0, 0, 1200};  // differs from position_m
+    bool operator==(const CameraKey&) const = default;
+};
+
+// Perspective camera. World z is up in the picture; looking straight up or down, y (north) is.
 struct Camera {
     Vec3 position_m{0, -4000, 300};
     Vec3 target_m{0, 0, 1200};       // must differ from position_m
@@ -63,7 +67,27 @@ enum class Lighting {
     cfa,         // T's light absorption factor over blocks of voxels (voxel_absorption.h)
 };
 
-// Scattering of light in clouds (D: the colour of a metaball). With the defaults a thick cloud top in the sun
+// How sunlight that was scattered many times is found.
+enum class MultipleScattering {
+    // One term without direction that decays with the optical depth tau towards the sun like diffusion
+    // through a slab: 1 / (1 + 1.5 (1 - mean cosine) tau). It reaches farthest.
+    diffusion,
+    // Octaves of the direct light, each weaker, less attenuated and less directed than the one before.
+    octaves,
+};
+
+// Wrenninge, Kulla and Lundqvist 2013, "Oz: The Great and Volumetric": the light scattered towards the eye is
+//     sum over o = 0 .. count-1 of scattering^o exp(-extinction^o tau) p(theta, directed by asymmetry^o)
+// Octave 0 is the light that was scattered once, exact; the others stand for ever longer paths.
+struct ScatteringOctaves {
+    int count = 8;             // 1..8; 1 = single scattering
+    double scattering = 0.65;  // 0..1: larger is brighter
+    double extinction = 0.5;   // 0..1: smaller reaches deeper
+    double asymmetry = 0.6;    // 0..1: smaller looks the same from all sides sooner
+    bool operator==(const ScatteringOctaves&) const = default;
+};
+
+// How a cloud scatters light (D: the colour of a metaball). With the defaults a thick cloud top in the sun
 // has a radiance of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
     double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker
@@ -105,8 +129,35 @@ struct Ground {
     bool operator==(const Ground&) const = default;
 };
 
-// A flash of lightning: a point light for clouds and ground. Its intensity is greatest at its begin and fades
-// as (1 - t / duration)^2; of several simultaneous ones the brightest is used.
+// How wet and snowy ground looks; how much lies where is for a GroundCoverView to say (render/cloud/splats.h).
+struct WetGroundOptions {
+    // Film at which soil has darkened by 1 - 1/e of the way from dry to soaked, mm, > 0.
+    double soaking_mm = 0.25;
+    // Film at which half of the ground is under water, mm, > 0: larger means fewer puddles.
+    double puddle_film_mm = 2.0;
+    double puddle_size_m = 5.0;  // size of the largest puddles, 0.1..1000
+    // Strength of the mirror, 0..1: 0 means no reflections and no second view of the sky.
+    double reflection = 1.0;
+    double reflection_scale = 0.5;  // resolution of that second view relative to the picture, 0.1..1
+    // Reflectance of wet ground that is not under water, relative to still water, 0..1.
+    double sheen = 0.25;
+    double ripples = 1.0;        // height of the rings that drops make, 0..10; 0: still water
+    double snow_cover_mm = 2.0;  // snow, in mm of water, that covers half of the ground, > 0
+    std::array<double, 3> snow_albedo{0.86, 0.88, 0.90};  // 0..1
+    bool operator==(const WetGroundOptions&) const = default;
+};
+
+// When voxels are drawn together as one larger metaball (render/cloud/level_of_detail.h).
+struct LevelOfDetailOptions {
+    // Radius in the picture, pixels, at which the metaballs of a block of 2 x 2 x 2 voxels are drawn as one
+    // if their optical depths spread by less than 1; at n times that radius they must spread n^2 times less.
+    // 0..1000; larger is faster and softer, 0: every voxel is drawn for itself.
+    double pixels = 2.5;
+    bool operator==(const LevelOfDetailOptions&) const = default;
+};
+
+// A flash of lightning: it lights clouds and ground from its place. At its begin it is brightest and then
+// fades as (1 - t / duration)^2; of several that burn at one moment the brightest lights the picture.
 struct LightningFlash {
     Vec3 position_m{0, 0, 1000};
     double time_s = 0;           // simulated time at which it begins, >= 0

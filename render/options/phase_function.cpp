@@ -36,8 +36,6 @@ double draine(double cos_theta, double g, double alpha) {
            (1 + alpha * mean_squared_cosine(g));
 }
 
-double cornette_shanks(double cos_theta, double g) { return draine(cos_theta, g, 1); }
-
 HgDraine hg_draine_fit(double droplet_diameter_um) {
     const double d = droplet_diameter_um;
     assert(d >= kMinDroplet_um && d <= kMaxDroplet_um);

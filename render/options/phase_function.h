@@ -32,12 +32,10 @@ double henyey_greenstein(double cos_theta, double g);
 // 3 / (16 pi) (1 + cos^2)
 double rayleigh(double cos_theta);
 
-// S; Cornette and Shanks 1992, equation 8:
-//     3 (1 - g^2) / (8 pi (2 + g^2)) (1 + cos^2) / (1 + g^2 - 2 g cos)^1.5
-double cornette_shanks(double cos_theta, double g);
-
-// Draine 2003, equation 5; alpha >= 0. alpha = 0 is Henyey-Greenstein, alpha = 1 Cornette-Shanks:
+// Draine 2003, equation 5; alpha >= 0. alpha = 0 is Henyey-Greenstein:
 //     (1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^1.5) (1 + alpha cos^2) / (1 + alpha (1 + 2 g^2) / 3)
+// alpha = 1 is that of S; Cornette and Shanks 1992, equation 8:
+//     3 (1 - g^2) / (8 pi (2 + g^2)) (1 + cos^2) / (1 + g^2 - 2 g cos)^1.5
 double draine(double cos_theta, double g, double alpha);
 
 // Jendersie and d'Eon 2023, "An Approximate Mie Scattering Function for Fog and Cloud Rendering", equations

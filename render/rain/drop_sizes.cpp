@@ -70,14 +70,6 @@ double shadow_mm2(PrecipitationKind kind, double diameter_mm) {
     return kPi / 4 * width * width * cover;
 }
 
-double flux_mm_per_h(const SizeLaw& law) {
-    return law.n0 * integral(law.slope, [&](double d) { return flux_of(law.kind, d); });
-}
-
-double particles_per_m3(const SizeLaw& law) {
-    return law.n0 * integral(law.slope, [](double) { return 1.0; });
-}
-
 double shadow_per_m(const SizeLaw& law) {
     return law.n0 * 1e-6 * integral(law.slope, [&](double d) { return shadow_mm2(law.kind, d); });
 }

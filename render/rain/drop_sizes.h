@@ -44,10 +44,8 @@ double width_mm(PrecipitationKind kind, double diameter_mm);
 // flake three tenths of its circle (the area ratio of aggregates; Heymsfield and Miloshevich 2003).
 double shadow_mm2(PrecipitationKind kind, double diameter_mm);
 
-// Integrate over the distribution: rate in mm/h, particles per m^3, and geometric extinction per metre
-// (cross-sections per volume; with diffraction, seen from afar, twice that: van de Hulst 1957).
-double flux_mm_per_h(const SizeLaw& law);
-double particles_per_m3(const SizeLaw& law);
+// Geometric extinction per metre: the integral of the shadows over the law (with diffraction, seen from afar,
+// twice that: van de Hulst 1957).
 double shadow_per_m(const SizeLaw& law);
 
 // Returns the quantile u (0..1) of the diameters of drawn particles.

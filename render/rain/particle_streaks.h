@@ -16,8 +16,8 @@
 #include <span>
 #include <vector>
 
+#include "render/image/overlay.h"
 #include "render/image/picture.h"
-#include "render/image/streak_overlay.h"
 #include "render/options/camera.h"
 #include "render/options/options.h"
 #include "render/rain/drop_sizes.h"

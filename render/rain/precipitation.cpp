@@ -10,7 +10,7 @@
 #include "core/smoothstep.h"
 #include "core/vec.h"
 #include "render/frame/frame_data.h"
-#include "render/image/streak_overlay.h"
+#include "render/image/overlay.h"
 #include "render/rain/drop_sizes.h"
 #include "render/rain/particle_streaks.h"
 #include "render/rain/precipitation_light.h"

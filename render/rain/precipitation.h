@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Rain and snow, composited over a finished picture (P, S, docs/sources.md): shafts below distant clouds
-// (rain_shafts.h), and particles near the eye as streaks or flakes (particles.h, streak_overlay.h). They
-// depend on options, weather and time alone, and use the picture's depth and transmittance, so that all
-// back-ends share the code, and far rain is behind nearer clouds.
+// Rain and snow in a finished picture (P, S): shafts below distant clouds (rain_shafts.h), and particles near
+// the eye as streaks or flakes (particles.h, overlay.h). What is drawn is a function of options,
+// weather and time alone, and lies over the picture by its depth and transmittance: the same code for all
+// ways of drawing clouds, far rain behind nearer clouds.
 //
 // An area that contains the eye has its particles around the eye. When the eye leaves it they stay at the
 // perimeter and fade with the distance, while the larger particles of far rain appear between ground and

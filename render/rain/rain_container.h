@@ -87,9 +87,8 @@ struct RainContainer {
 RainContainer rain_container(const RainCurtain& curtain, const CameraFrame& frame, double margin_m,
                              double radius_m);
 
-// Level of detail (P, equations 2 and 3) by d = distance / depth of the container, 0..1: relative number per
-// volume, and size.
-inline double lod_number(double d) { return 1 - d; }
+// Level of detail (P, equation 3): growth of a particle's size at d = distance / depth of the container,
+// 0..1.
 inline double lod_size(double d) { return d * d; }
 
 }  // namespace nephos

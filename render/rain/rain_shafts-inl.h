@@ -16,7 +16,7 @@
 
 #include <hwy/highway.h>
 
-#include "core/smoothstep-inl.h"
+#include "core/vectors-inl.h"
 #include "render/rain/rain_shafts_pass.h"
 #include "render/shading/background-inl.h"
 
@@ -288,7 +288,7 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
     }
 }
 
-// shaft_offset() of pixels of a row.
+// The displacements (kShaftOffset) of the pixels of a row.
 HWY_INLINE Floats shaft_offsets(std::size_t x, std::size_t y) {
     const Lanes d;
     const hn::RebindToUnsigned<Lanes> du;

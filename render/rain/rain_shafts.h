@@ -58,11 +58,7 @@ double shaft_grain_m(const RainCurtain& curtain);
 // Offset of a pixel's steps, 0.25..0.75 of a step: interleaved gradient noise (Jimenez 2014),
 // frac(53 frac(0.06711056 x + 0.00583715 y)), in integers.
 inline constexpr std::uint32_t kShaftOffset[3] = {288'237'660, 25'070'368, 13'564};
-inline double shaft_offset(std::uint32_t x, std::uint32_t y) {
-    const std::uint32_t sum = x * kShaftOffset[0] + y * kShaftOffset[1];
-    return 0.25 + 0.5 * double((sum >> 8) * kShaftOffset[2] >> 8) / (1 << 24);
-}
-// Returns the lattice of the noise, kShaftNoiseSide^2 values, x fastest, periodic.
+// The lattice of the noise, kShaftNoiseSide^2, x fastest; it repeats.
 std::vector<std::uint8_t> shaft_noise(std::uint64_t seed);
 
 // Composites the curtains over the picture by ray marching, before or behind the picture's clouds by

@@ -2,12 +2,10 @@
 #include "scenes/format/layers.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/error.h"
 #include "core/random.h"
 #include "scenes/format/scene.h"
-#include "scenes/format/text.h"
 
 namespace nephos {
 namespace {
@@ -128,22 +126,6 @@ VeilOptions veil_options(const Scene& scene, std::size_t layer) {
     VeilOptions options = scene.layers[layer].veil;
     options.seed = layer_seed(scene.automaton.seed, layer);
     return options;
-}
-
-SkiesAtTime skies_at(const Scene& scene, double time_s) {
-    if (!(time_s >= 0) || !std::isfinite(time_s)) {
-        throw Error(ErrorCode::usage,
-                    "no sky at " + number_text(time_s) + " s, expected a time of 0 s or later");
-    }
-    const double step_s = scene.automaton.time_step_s;
-    const Moment moment = moment_of(time_s, step_s);
-    SkiesAtTime result{{}, moment.fraction * step_s};
-    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
-        if (scene.layers[n].is_veil) continue;
-        SkySimulation& sky = result.skies.emplace_back(sky_options(scene, n));
-        while (sky.steps() < moment.step) sky.step();
-    }
-    return result;
 }
 
 }  // namespace nephos

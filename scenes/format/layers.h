@@ -122,17 +122,4 @@ WorldRectangle whole_world(const Scene& scene);
 // Returns the wind of a layer: its own, or the scene's if it has none.
 const Wind& layer_wind(const Scene& scene, std::size_t layer);
 
-// The skies of the layers that have one, in the order of the layers, at the last step not after a time;
-// `since_step_s` is the remainder. SkySimulation::ahead(cloud, time_s(), since_step_s) extrapolates a cloud
-// to the time itself.
-struct SkiesAtTime {
-    std::vector<SkySimulation> skies;
-    double since_step_s = 0;
-};
-
-// Simulates the skies from step 0 to a time, microseconds a step. For images of clouds without an automaton;
-// a run has the skies in its frames. Throws Error(usage) when time_s is negative or not finite, and as
-// SkySimulation.
-SkiesAtTime skies_at(const Scene& scene, double time_s);
-
 }  // namespace nephos

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scenes/format/model_files.h"
-
 #include <algorithm>
 #include <iterator>
 #include <system_error>
 
+#include "scenes/format/document.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
-#include "scenes/format/text_file.h"
 
 namespace nephos {
 namespace {

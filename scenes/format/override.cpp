@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The --set options: "key.path=value" on top of the scene file.
 
-#include <algorithm>
 #include <charconv>
 
 #include "scenes/format/document.h"

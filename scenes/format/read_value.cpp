@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scenes/format/read_value.h"
-
-#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <optional>
 
+#include "scenes/format/schema.h"
 #include "scenes/format/text.h"
 
 namespace nephos {

@@ -5,11 +5,8 @@
 #include <tuple>
 
 #include "scenes/format/document.h"
-#include "scenes/format/model_files.h"
-#include "scenes/format/read_value.h"
 #include "scenes/format/schema.h"
 #include "scenes/format/text.h"
-#include "scenes/format/text_file.h"
 
 namespace nephos {
 namespace {

@@ -2,7 +2,6 @@
 // The section of the sky and its light.
 
 #include "scenes/format/schema_build.h"
-#include "scenes/format/schema_render_key.h"
 #include "scenes/format/schema_sections.h"
 
 namespace nephos {

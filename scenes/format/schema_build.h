@@ -226,4 +226,12 @@ constexpr Limits or_infinite(Limits limits) {
     return limits;
 }
 
+// A key of Scene::render. `Members`: the way from RenderOptions to the option.
+template <auto... Members>
+Key render_key(std::string name, std::string unit, Limits limits, std::string effect,
+               std::string source = {}) {
+    return key<&Scene::render, Members...>(std::move(name), std::move(unit), limits, std::move(effect),
+                                           std::move(source));
+}
+
 }  // namespace nephos::schema_build

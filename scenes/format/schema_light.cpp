@@ -2,7 +2,6 @@
 // The section on light in clouds.
 
 #include "scenes/format/schema_build.h"
-#include "scenes/format/schema_render_key.h"
 #include "scenes/format/schema_sections.h"
 
 namespace nephos {

@@ -2,7 +2,6 @@
 // Rain and snow, and the camera's way.
 
 #include "scenes/format/schema_build.h"
-#include "scenes/format/schema_render_key.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
 

@@ -48,7 +48,7 @@ const Section& veil_section();
 // Returns the keys of a layer that have no effect beside `veil`.
 std::span<const std::string_view> keys_of_clouds();
 
-// Returns the key `models`, the files of base models (model_files.h); it has no value of its own.
+// The key `models`: files that base models are taken from (document.h); it has no value of its own.
 Key model_files_key();
 inline constexpr int kMaxModels = 10'000;
 

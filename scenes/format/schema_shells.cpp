@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "scenes/format/schema_build.h"
-#include "scenes/format/schema_render_key.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
 

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scenes/format/text.h"
 
-#include <charconv>
-#include <cmath>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+#include "core/descriptor.h"
+#include "core/error.h"
 
 namespace nephos {
 namespace {
@@ -73,19 +78,6 @@ std::string shortened(std::string_view text, std::size_t limit) {
     return out;
 }
 
-std::string number_text(double value) {
-    if (std::isnan(value)) return "nan";
-    if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
-    constexpr double kLargestPlain = 1e15, kSmallestPlain = 1e-4;  // beyond, an exponent reads better
-    const double size = std::abs(value);
-    const bool plain = size < kLargestPlain && (size >= kSmallestPlain || size == 0);
-    char buffer[32];
-    char* const limit = buffer + sizeof buffer;
-    const auto end = plain ? std::to_chars(buffer, limit, value, std::chars_format::fixed)
-                           : std::to_chars(buffer, limit, value);
-    return std::string(buffer, end.ptr);
-}
-
 std::string toml_number(double value) {
     std::string text = number_text(value);
     if (text.find_first_of(".en") == std::string::npos) text += ".0";
@@ -133,6 +125,28 @@ std::string joined(const std::vector<std::string>& items, std::string_view last_
         out += items[n];
     }
     return out;
+}
+
+std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) {
+        throw Error(ErrorCode::io, path.string() + ": is a folder, expected a scene in TOML");
+    }
+    if (is_named_pipe(path)) {
+        throw Error(ErrorCode::io, path.string() + ": is a named pipe, expected a scene in TOML");
+    }
+    errno = 0;
+    std::ifstream file(path, std::ios::binary);
+    const auto failed = [&] {
+        const std::string reason = errno != 0 ? std::strerror(errno) : "unknown error";
+        return Error(ErrorCode::io, path.string() + ": cannot read the scene: " + reason);
+    };
+    if (!file) throw failed();
+    std::string text(most_bytes + 1, '\0');
+    file.read(text.data(), std::streamsize(text.size()));
+    if (file.bad()) throw failed();
+    text.resize(std::size_t(file.gcount()));
+    return text;
 }
 
 }  // namespace nephos

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Text in messages: UTF-8, numbers, quoting. Pure functions, independent of the locale.
+// Small helpers for text: UTF-8, numbers and quoting in messages, files of a user. Independent of the locale.
 
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "core/text.h"
 
 namespace nephos {
 
@@ -32,10 +35,7 @@ std::string printable(std::string_view text);
 // Returns printable(text), cut to `limit` characters with an ellipsis.
 std::string shortened(std::string_view text, std::size_t limit = 60);
 
-// Returns the shortest decimal that reads back as the same double: "0.1", "40", "1e-07", "inf".
-std::string number_text(double value);
-
-// Returns number_text() as a TOML float: always with a point, an exponent or a word.
+// The shortest decimal of number_text() (core/text.h) as a TOML float: always with a point, an exponent or a word.
 std::string toml_number(double value);
 
 // Returns a TOML basic string with its quotes.
@@ -49,5 +49,9 @@ std::string indexed(std::string_view path, std::size_t index);
 
 // Returns the items as a list: "a, b or c".
 std::string joined(const std::vector<std::string>& items, std::string_view last_separator = " or ");
+
+// The first `most_bytes` + 1 bytes of a file, so that the caller sees when it is larger. Throws Error(io)
+// naming the path when it is a folder or cannot be read.
+std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes);
 
 }  // namespace nephos

@@ -9,8 +9,6 @@
 
 #include "apps/nephos/arguments.h"
 #include "apps/nephos/commands.h"
-#include "apps/nephos/completion.h"
-#include "apps/nephos/help.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
 #include "simulation/framing.h"

@@ -4,7 +4,6 @@
 // with them the orientation of the neighbourhood (two cells below feed a cell, two cells above do not).
 
 #include <fstream>
-#include <sstream>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,6 @@
 // Whole steps of the kernels against the naive twin, bit for bit, on random scenes of any size and boundary;
 // and the promise that threads and instruction sets do not change them.
 
-#include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>

@@ -13,7 +13,7 @@
 #include <fmt/core.h>
 
 #include "automaton/kernels.h"
-#include "core/freed_memory.h"
+#include "core/memory.h"
 #include "tests/bench/air_bench.h"
 #include "tests/bench/atmosphere_bench.h"
 #include "tests/bench/automaton_bench.h"

@@ -116,7 +116,7 @@ TEST(DensityGrid, MixesLinearlyInTime) {
     EXPECT_EQ(mix(from, to, 1).to_dense(), b);
     EXPECT_THROW(mix(from, to, -0.1), Error);
     EXPECT_THROW(mix(from, to, 1.1), Error);
-    EXPECT_THROW(mix(from, to.with_placement({{}, 3}), 0.5), Error);
+    EXPECT_THROW(mix(from, DensityGrid::from_dense(b, extent, {{}, 3}), 0.5), Error);
     EXPECT_THROW(mix(from, DensityGrid(), 0.5), Error);
 }
 

@@ -3,8 +3,6 @@
 // Files as OpenVDB itself sees them: voxels, transform, class, bounds and metadata of every grid; and what
 // happens when the disk is full.
 
-#include <algorithm>
-#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <iterator>

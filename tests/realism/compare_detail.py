@@ -16,7 +16,7 @@ import tempfile
 
 import numpy
 
-import png_image
+import flip
 
 GOAL = 1.0  # mean difference, in 1/255
 
@@ -31,7 +31,7 @@ def picture(nephos, source, frame, folder, settings):
     sets = [word for setting in settings for word in ("--set", setting)]
     subprocess.run([str(word) for word in command + sets], check=True)
     (drawn,) = folder.glob("**/*.png")
-    return png_image.read(drawn)[..., :3].astype(float)
+    return flip.pixels_of(drawn).astype(float)
 
 
 def differences(nephos, source, frame, settings):

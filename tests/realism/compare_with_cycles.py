@@ -20,9 +20,9 @@ import subprocess
 import sys
 
 import numpy
+from PIL import Image
 
 import flip
-import png_image
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -50,7 +50,7 @@ def tone_mapped(linear):
 
 
 def save(path, picture):
-    png_image.write(path, (255 * picture).round().astype(numpy.uint8))
+    Image.fromarray((255 * picture).round().astype(numpy.uint8)).save(path)
 
 
 def run(*words):
@@ -109,7 +109,7 @@ def by_nephos(name, cloud, volume, options):
     words += [each for setting in options.set for each in ("--set", setting)]
     run(options.nephos, "render", volume, "--scene", ROOT / "scenes/cumulus.toml", "--up", cloud.get("up", "z"),
         "--extinction", cloud["extinction_per_m"], "--quiet", "--out", path, *words)
-    return png_image.read(path)[..., :3] / 255
+    return flip.pixels_of(path) / 255
 
 
 def by_vdb_render(name, cloud, volume, options, truth):

@@ -12,8 +12,7 @@ import math
 import sys
 
 import numpy
-
-import png_image
+from PIL import Image
 
 # An observer 0.7 m before a screen 0.7 m and 3840 pixels wide.
 PIXELS_PER_DEGREE = 0.7 * 3840 / 0.7 * math.pi / 180
@@ -23,6 +22,12 @@ CONTRAST = (((1.0, 0.0047), (0.0, 1e-5)), ((1.0, 0.0053), (0.0, 1e-5)), ((34.1, 
 COLOUR_EXPONENT, FEATURE_EXPONENT = 0.7, 0.5  # q_c, q_f
 SPLIT, SPLIT_TARGET = 0.4, 0.95               # p_c, p_t: redistribution of errors
 FEATURE_DEGREES = 0.082                       # width of the features that the eye finds
+
+
+def pixels_of(path):
+    """The picture of a file: height x width x 3, bytes."""
+    with Image.open(path) as picture:
+        return numpy.asarray(picture.convert("RGB"))
 
 
 def _rgb_to_xyz():
@@ -157,10 +162,10 @@ def heat(values):
 def main():
     if len(sys.argv) not in (3, 4):
         sys.exit(__doc__)
-    values = flip(*(png_image.read(path)[..., :3] / 255 for path in sys.argv[1:3]))
+    values = flip(*(pixels_of(path) / 255 for path in sys.argv[1:3]))
     print(f"{values.mean():.6f}")
     if len(sys.argv) == 4:
-        png_image.write(sys.argv[3], heat(values))
+        Image.fromarray(heat(values)).save(sys.argv[3])
 
 
 if __name__ == "__main__":

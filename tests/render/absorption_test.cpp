@@ -113,7 +113,7 @@ TEST(VoxelAbsorption, BoundsAreExact) {
 class AbsorptionPictureTest : public ::testing::Test {
   protected:
     void TearDown() override { test::expect_no_messages(renderer_); }
-    Renderer renderer_{DeviceOptions{{}, true, 2048}};
+    Renderer renderer_{DeviceOptions{.device = {}, .validation = true}};
 };
 
 RenderOptions options_of(Lighting lighting) {

@@ -129,6 +129,24 @@ class TwinPsi {
     double logs_[3][kHeights][kSines] = {};
 };
 
+// Radiance along a ray: `sine` of its elevation (0..1), cosine of its azimuth from the sun's, cosine of the
+// angle to the sun. The twin of sky_scattered() in render/shading/air.glsl.
+Rgb sky_radiance(const SkyTable& table, double sine, double cos_azimuth, double cos_to_sun, double mie_g) {
+    constexpr std::size_t kColumns = shader::kSkyColumns, kRows = shader::kSkyRows;
+    const double x = double(shader::sky_across(float(cos_azimuth))) * double(kColumns - 1),
+                 y = double(shader::sky_upwards(float(sine))) * double(kRows - 1);
+    const auto i = std::min(std::size_t(x), kColumns - 2), j = std::min(std::size_t(y), kRows - 2);
+    const auto at = [&](const std::vector<float>& texels, std::size_t c) {
+        const float *a = &texels[4 * (j * kColumns + i) + c], *b = a + 4 * kColumns;
+        return mix(mix(double(a[0]), double(a[4]), x - double(i)),
+                   mix(double(b[0]), double(b[4]), x - double(i)), y - double(j));
+    };
+    const double phase = double(shader::particle_phase(float(cos_to_sun), float(mie_g)));
+    Rgb radiance{};
+    for (std::size_t c = 0; c < 3; ++c) radiance[c] = at(table.scattered, c) + phase * at(table.haze, c);
+    return radiance;
+}
+
 // 200 directions, a fifth of them near the horizon, and 12 heights of the sun. The error is relative to the
 // radiance of each channel, or where that is less, to a hundredth of the brightest for that sun or to 3e-8 of
 // the sun's irradiance, less than a thousandth of the default night sky.

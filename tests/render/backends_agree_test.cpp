@@ -23,6 +23,7 @@ class BackendsAgree : public test::AllBackends {};
 TEST_P(BackendsAgree, AgreesWithBillboards) {
     Renderer reference_renderer(test::validated(Splatting::blended));
     float beauty = 0, transmittance = 0;
+    std::size_t depths = 0, pixels = 0;
     for (const test::View& each : test::views()) {
         const double radius = test::smallest_radius_m(each.options.camera);
         const std::vector<Metaball> balls =
@@ -31,6 +32,7 @@ TEST_P(BackendsAgree, AgreesWithBillboards) {
             const MetaballCloud cloud{balls, extinction, 0.7};
             const Picture fast = renderer_.draw(cloud, each.options);
             const Picture slow = reference_renderer.draw(cloud, each.options);
+            pixels += slow.pixels();
             EXPECT_LE(test::largest_difference(fast.shadow, slow.shadow), 1e-4f) << each.name;
             EXPECT_LE(test::largest_difference(fast.light, slow.light), 1e-4f) << each.name;
             beauty = std::max(beauty, test::largest_difference(fast.beauty, slow.beauty));
@@ -38,15 +40,12 @@ TEST_P(BackendsAgree, AgreesWithBillboards) {
                 std::max(transmittance, test::largest_difference(fast.transmittance, slow.transmittance));
             EXPECT_LE(beauty, 1.0f / 255.0f) << each.name << ", extinction " << extinction;
             EXPECT_LE(transmittance, 1.0f / 255.0f) << each.name << ", extinction " << extinction;
-            for (std::size_t i = 0; i < fast.depth_m.size(); ++i) {
-                if (slow.transmittance[i] > 0.99f || fast.transmittance[i] > 0.99f) continue;
-                const float opacity = 1.0f - slow.transmittance[i];
-                ASSERT_NEAR(fast.depth_m[i] / slow.depth_m[i], 1.0f, 0.005f / opacity) << each.name;
-            }
+            depths += test::expect_same_depths(fast, slow, 0.01f, 0.005f);
         }
     }
-    std::printf("against billboards: beauty %.5f, transmittance %.5f\n", double(beauty),
-                double(transmittance));
+    std::printf("against billboards: beauty %.5f, transmittance %.5f, %zu depths of %zu pixels\n",
+                double(beauty), double(transmittance), depths, pixels);
+    EXPECT_GT(depths, pixels / 4);
     test::expect_no_messages(reference_renderer);
 }
 
@@ -105,8 +104,7 @@ TEST_P(BackendsAgree, AgreesWithBillboardsInEveryLight) {
     test::expect_no_messages(reference_renderer);
 }
 
-INSTANTIATE_TEST_SUITE_P(Ways, BackendsAgree,
-                         ::testing::Values(Splatting::cpu, Splatting::vulkan, Splatting::blended),
+INSTANTIATE_TEST_SUITE_P(Backends, BackendsAgree, ::testing::Values(Splatting::cpu, Splatting::vulkan),
                          test::way_name);
 
 }  // namespace

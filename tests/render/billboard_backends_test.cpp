@@ -2,7 +2,6 @@
 // Each way of drawing T's billboards against the blended reference: alone, among metaballs, and in air.
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -29,11 +28,9 @@ class BillboardWays : public test::AllBackends {
         const float brightest = std::max(1.0f, *std::ranges::max_element(slow.beauty));
         EXPECT_LE(test::largest_difference(fast.beauty, slow.beauty), brightest / 255.0f);
         EXPECT_LE(test::largest_difference(fast.transmittance, slow.transmittance), 1.0f / 255.0f);
-        for (std::size_t i = 0; i < fast.depth_m.size(); ++i) {
-            if (slow.transmittance[i] > 0.9f || fast.transmittance[i] > 0.9f) continue;
-            const float opacity = 1.0f - slow.transmittance[i];
-            ASSERT_NEAR(fast.depth_m[i] / slow.depth_m[i], 1.0f, 0.01f / opacity) << i;
-        }
+        const std::size_t depths = test::expect_same_depths(fast, slow, 0.1f, 0.01f);
+        std::printf("%zu depths of %zu\n", depths, slow.pixels());
+        EXPECT_GT(depths, slow.pixels() / 20);
         splats.light = splats.depth = false;
         EXPECT_EQ(renderer_.draw_splats(splats, options).beauty, fast.beauty);
     }

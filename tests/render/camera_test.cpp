@@ -3,9 +3,7 @@
 
 #include "render/options/camera.h"
 
-#include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <gtest/gtest.h>
 

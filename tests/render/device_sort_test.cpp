@@ -29,7 +29,8 @@ class DeviceSort : public ::testing::Test {
         EXPECT_EQ(RendererTestAccess::sorted(renderer_, keys, bits), expected) << keys.size() << " keys";
     }
 
-    Renderer renderer_{DeviceOptions{{}, true, 2048, Splatting::vulkan, TileLists::device}};
+    Renderer renderer_{DeviceOptions{
+        .device = {}, .validation = true, .splatting = Splatting::vulkan, .lists = TileLists::device}};
 };
 
 // None, one, around a work group and a block of it, and so many that the sums have several blocks; random

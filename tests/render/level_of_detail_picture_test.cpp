@@ -67,10 +67,13 @@ TEST_P(LevelOfDetailPicture, IsCloseToFullDetail) {
                     255 * beauty.largest, 255 * through.mean);
         EXPECT_LT(beauty.mean, 1.5 / 255) << "rougher than what the automaton grows";
         EXPECT_LT(through.mean, 1.0 / 255);
+        std::size_t opaque = 0;
         for (std::size_t i = 0; i < full.pixels(); ++i) {
             if (full.transmittance[i] > 0.5f) continue;
             ASSERT_NEAR(less.depth_m[i], full.depth_m[i], 80) << "a block";
+            ++opaque;
         }
+        EXPECT_GT(opaque, full.pixels() / 50);
     }
 }
 

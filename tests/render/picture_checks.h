@@ -45,7 +45,9 @@ inline void expect_no_messages(const Renderer& renderer) {
 }
 
 // With the validation layer on.
-inline DeviceOptions validated(Splatting way, int tile_size = 2048) { return {{}, true, tile_size, way}; }
+inline DeviceOptions validated(Splatting way, int tile_size = 2048) {
+    return {.device = {}, .validation = true, .tile_size = tile_size, .splatting = way};
+}
 
 // Tests that draw in every way, with the validation layer on, and fail when it says anything.
 class AllBackends : public ::testing::TestWithParam<Splatting> {
@@ -68,6 +70,21 @@ inline float largest_difference(const std::vector<float>& a, const std::vector<f
         largest = std::max(largest, difference);
     }
     return largest;
+}
+
+// Expects equal depths wherever both pictures have an opacity above `least_opacity`, within a relative `tolerance`
+// divided by the opacity. Returns the number of pixels compared.
+inline std::size_t expect_same_depths(const Picture& picture, const Picture& reference, float least_opacity,
+                                      float tolerance) {
+    EXPECT_EQ(picture.depth_m.size(), reference.depth_m.size());
+    std::size_t compared = 0;
+    for (std::size_t i = 0; i < picture.depth_m.size(); ++i) {
+        const float opacity = 1.0f - reference.transmittance[i];
+        if (opacity < least_opacity || 1.0f - picture.transmittance[i] < least_opacity) continue;
+        EXPECT_NEAR(picture.depth_m[i] / reference.depth_m[i], 1.0f, tolerance / opacity) << "pixel " << i;
+        ++compared;
+    }
+    return compared;
 }
 
 inline void expect_same_bits(const std::vector<float>& a, const std::vector<float>& b, const char* what) {

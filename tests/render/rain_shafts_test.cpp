@@ -4,8 +4,6 @@
 #include "render/rain/rain_shafts.h"
 
 #include <cmath>
-#include <functional>
-#include <limits>
 #include <random>
 
 #include <gtest/gtest.h>

@@ -156,6 +156,12 @@ inline void march(const Shafts& s, const Vec3& ray, double offset, const Stretch
     }
 }
 
+// By how much of a step the steps of a pixel are displaced: see kShaftOffset.
+inline double shaft_offset(std::uint32_t x, std::uint32_t y) {
+    const std::uint32_t sum = x * kShaftOffset[0] + y * kShaftOffset[1];
+    return 0.25 + 0.5 * double((sum >> 8) * kShaftOffset[2] >> 8) / (1 << 24);
+}
+
 // A pixel of the picture with the shafts over it.
 inline Rgb pixel_with_shafts(const Shafts& s, int x, int y) {
     const Vec3 ray = pixel_ray(s.camera, s.options.camera, x + 0.5, y + 0.5);

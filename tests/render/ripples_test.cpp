@@ -70,6 +70,28 @@ TEST(RipplesTest, RingsAreRound) {
     EXPECT_NEAR(straight.second, diagonal.second, 0.1 * straight.second);
 }
 
+// The discrete energy of the head of ripples.h, per area of a texel and unit mass.
+double energy(const Ripples& ripples) {
+    constexpr int kSide = kRippleTexels;
+    const auto old = [&](int i, int j) {
+        return double(ripples.before[at((i + kSide) % kSide, (j + kSide) % kSide)]);
+    };
+    const double grown = std::exp(kRippleDamping_per_s * kRippleStep_s);
+    double moving = 0, bent = 0;
+    for (int j = 0; j < kSide; ++j) {
+        for (int i = 0; i < kSide; ++i) {
+            const double now = grown * double(ripples.now[at(i, j)]), change = now - old(i, j);
+            const double beside = old(i - 1, j) + old(i + 1, j) + old(i, j - 1) + old(i, j + 1);
+            const double corners =
+                old(i - 1, j - 1) + old(i + 1, j - 1) + old(i - 1, j + 1) + old(i + 1, j + 1);
+            moving += change * change;
+            bent -= (4 * beside + corners - 20 * old(i, j)) / 6 * now;
+        }
+    }
+    const double per_texel = kRippleSpeed_m_per_s * kSide / kRippleSize_m;
+    return 0.5 * (moving / (kRippleStep_s * kRippleStep_s) + per_texel * per_texel * bent);
+}
+
 // Whatever a frame's time: between frames of any length the energy only falls once no drop falls any more.
 TEST(RipplesTest, EnergyNeverGrowsForAnyFrameTime) {
     for (const double frame_s : {1e-4, 3e-3, 0.02, 0.05, 0.7, 10.0}) {

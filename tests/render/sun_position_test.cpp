@@ -3,8 +3,6 @@
 
 #include "render/options/sun_position.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 #include "render/options/options.h"

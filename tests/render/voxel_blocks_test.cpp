@@ -4,7 +4,6 @@
 #include "render/cloud/voxel_blocks.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <random>

@@ -7,8 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <string>
 
 #include <gtest/gtest.h>
 
@@ -88,13 +86,6 @@ TEST(WaterTest, DarkensTheGroundAndKeepsItsBounds) {
         EXPECT_GT(soaked_albedo(albedo), 0.4 * albedo);
     }
     EXPECT_NEAR(soaked_albedo(0.15) / 0.15, 0.56, 0.02) << "about half, as wet sand";
-}
-
-TEST(WaterTest, CoversMoreOfTheGroundTheDeeperItIs) {
-    EXPECT_EQ(covered_share(0, 2), 0);
-    EXPECT_NEAR(covered_share(2, 2), 0.5, 1e-12);
-    EXPECT_LT(covered_share(0.2, 2), 0.01);
-    EXPECT_GT(covered_share(20, 2), 0.99);
 }
 
 TEST(WetGroundTest, DryGroundStaysAsItIs) {

@@ -186,19 +186,6 @@ TEST(Layers, HaveSeedsThatNeverRepeat) {
     }
     std::sort(seeds.begin(), seeds.end());
     EXPECT_EQ(std::adjacent_find(seeds.begin(), seeds.end()), seeds.end());
-    EXPECT_EQ(layer_seed(77, 1), layer_seed(77, 1));
-}
-
-TEST(Layers, SkiesAtATimeAreThoseOfTheSteps) {
-    const Scene scene = read_scene_text(kTwoLayers, "two.toml");
-    const SkiesAtTime at = skies_at(scene, 127.5);
-    ASSERT_EQ(at.skies.size(), 2u);
-    EXPECT_EQ(at.since_step_s, 7.5);
-    SkySimulation stepped(sky_options(scene, 1));
-    for (int n = 0; n < 12; ++n) stepped.step();
-    EXPECT_EQ(at.skies[1].save(), stepped.save());
-    EXPECT_THROW(skies_at(scene, -1), Error);
-    EXPECT_THROW(skies_at(scene, std::numeric_limits<double>::infinity()), Error);
 }
 
 // Between two steps a cloud moves on a straight line that ends where the step puts it.

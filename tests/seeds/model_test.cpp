@@ -3,10 +3,8 @@
 
 #include <cmath>
 #include <set>
-#include <utility>
 
 #include "core/trigonometry.h"
-#include "seeds/billboards.h"
 #include "seeds/draw.h"
 #include "tests/seeds/fixtures.h"
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Density files of lattices with periodic sides: finer voxels and the grid of all layers go on across them.
 
-#include <filesystem>
 #include <string>
 
 #include <gtest/gtest.h>

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include <gtest/gtest.h>
 
@@ -104,7 +103,7 @@ TEST(SkyBillboards, StandInTheirBoxesAndAbsorbWhatTheirBoxesDo) {
 // What the frustum leaves out cannot be seen: the same picture without, bit for bit, from inside of the sky.
 TEST(SkyBillboards, CullingChangesNoBitOfAPicture) {
     SkySimulation sky(sky_of(150));
-    Renderer renderer{DeviceOptions{{}, true, 2048}};
+    Renderer renderer{DeviceOptions{.device = {}, .validation = true}};
     for (const Vec3 target : {Vec3{0, 0, 1200}, Vec3{500, -300, 900}, Vec3{-4000, 1000, 4000}}) {
         RenderOptions options = from_the_edge();
         options.camera.position_m = {300, -1200, 700};
@@ -175,7 +174,7 @@ TEST(SkyPainter, DrawsTheSameTwiceAndLightningInItsTime) {
     RenderOptions options = from_the_edge();
     options.sun.elevation_deg = -10;
     options.lightning = {{{0, 0, 800}, 5, 0.5, {0.7, 0.8, 1}, 10}};
-    Renderer renderer{DeviceOptions{{}, true, 2048}};
+    Renderer renderer{DeviceOptions{.device = {}, .validation = true}};
     SkyPainter painter, other;
     const auto mean = [](const Picture& picture) {
         double sum = 0;
@@ -221,7 +220,7 @@ TEST(SkyPainter, MovesTheSunWithTime) {
     options.sun.date = "2026-06-21";
     options.sun.time = "10:00";
     options.sun.latitude_deg = 50;
-    Renderer renderer{DeviceOptions{{}, true, 2048}};
+    Renderer renderer{DeviceOptions{.device = {}, .validation = true}};
     SkyPainter painter;
     const auto at = [&](double time_s) {
         return painter.draw(renderer, {}, {&layer, 1}, options, time_s).beauty;

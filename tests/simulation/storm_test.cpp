@@ -3,7 +3,6 @@
 // same picture of it, whatever was drawn before and by however many threads.
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <string>
 #include <vector>

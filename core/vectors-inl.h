@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// mix_bits() of noise_hash.h for SIMD vectors of 32-bit words (not installed).
+// mix_bits() of core/noise_hash.h for vectors of 32-bit words, smooth_blend() of core/smoothstep.h for vectors of
+// floats (not installed).
 
-#if defined(NEPHOS_DENSITY_NOISE_HASH_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef NEPHOS_DENSITY_NOISE_HASH_INL_H_
-#undef NEPHOS_DENSITY_NOISE_HASH_INL_H_
+#if defined(NEPHOS_CORE_VECTORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_CORE_VECTORS_INL_H_
+#undef NEPHOS_CORE_VECTORS_INL_H_
 #else
-#define NEPHOS_DENSITY_NOISE_HASH_INL_H_
+#define NEPHOS_CORE_VECTORS_INL_H_
 #endif
 
 #include <hwy/highway.h>
@@ -23,6 +24,12 @@ HWY_INLINE Words mixed(Words h) {
     h = hn::Mul(hn::Xor(h, hn::ShiftRight<16>(h)), hn::Set(d, kMixFirst));
     h = hn::Mul(hn::Xor(h, hn::ShiftRight<15>(h)), hn::Set(d, kMixSecond));
     return hn::Xor(h, hn::ShiftRight<16>(h));
+}
+
+template <class Floats>
+HWY_INLINE Floats smooth_blend(Floats t) {
+    const hn::DFromV<Floats> d;
+    return hn::Mul(hn::Mul(t, t), hn::NegMulAdd(hn::Set(d, 2.0f), t, hn::Set(d, 3.0f)));
 }
 
 }  // namespace nephos::HWY_NAMESPACE

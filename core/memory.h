@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The memory that this process may still allocate; queried before a large allocation.
+// How much memory this process may still take, asked before something large is allocated, and what it keeps.
 
 #include <cstddef>
 #include <filesystem>
@@ -20,5 +20,12 @@ struct AvailableMemory {
 // the root of the file system that /proc and /sys are read from, for tests. A limit that cannot be read does
 // not count; if none can, bytes is the largest std::size_t. Thread-safe.
 AvailableMemory available_memory(const std::filesystem::path& root = "/");
+
+// Memory that is freed stays with the process, up to 256 MiB in each arena of malloc, instead of going back
+// to the system at once: every picture and step asks for the same vectors again, and pages that the system
+// has to clear take time (docs/speed.md). available_memory() counts it as free. For programs, not for
+// libraries: it changes malloc for the whole process. Call it first. Does nothing where malloc is not that of
+// the GNU C library.
+void keep_freed_memory();
 
 }  // namespace nephos

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/available_memory.h"
+#include "core/memory.h"
 
 #include <algorithm>
 #include <charconv>
@@ -11,6 +11,8 @@
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
+#include <cstdlib>
+
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -125,6 +127,13 @@ AvailableMemory available_memory(const std::filesystem::path& root) {
     tighten(available, left_of_address_space(root), "address space limit of the process (ulimit -v)");
     if (root == "/" && available.bytes != kUnlimited) available.bytes += kept_by_malloc();
     return available;
+}
+
+void keep_freed_memory() {
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the largest that it takes: larger blocks are mapped, and go back
+    mallopt(M_TRIM_THRESHOLD, 256 << 20);
+#endif
 }
 
 }  // namespace nephos

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lines over a picture: where they fall, how wide they are, what is left of those behind the eye.
 
-#include "render/image/line_overlay.h"
+#include "render/image/overlay.h"
 
 #include <cmath>
 

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`nephos hash` and `nephos state`."""
+
+import json
+import unittest
+
+from case import Case, rows_of, SCENE, SOURCE, voxels
+
+
+class Hash(Case):
+    def test_hash_prints_a_line_for_each_step(self):
+        lines = self.hashes(self.scene, "--steps", "5").splitlines()
+        self.assertEqual([line.split()[0] for line in lines], list("012345"))
+        for line in lines:
+            self.assertRegex(line, r"^\d [0-9a-f]{32}$")
+        self.assertEqual(len(set(line.split()[1] for line in lines)), 6)
+        self.assertEqual(len(self.hashes(self.scene).splitlines()), 7)  # the scene's own six steps
+
+    def test_threads_do_not_change_a_bit(self):
+        one = self.hashes(SOURCE / "scenes/cumulus.toml", "--steps", "12", "--threads", "1")
+        for threads in (2, 3, 8):
+            self.assertEqual(one, self.hashes(SOURCE / "scenes/cumulus.toml", "--steps", "12", "--threads", threads))
+
+    def test_check_compares(self):
+        self.write("golden.txt", "# comment\n" + self.hashes(self.scene, "--steps", "4"))
+        self.call("hash", self.scene, "--steps", "4", "--check", "golden.txt")
+        self.refused(1, "hash", self.scene, "--steps", "4", "--check", "golden.txt", "--seed", "9", says="step 0")
+        self.refused(1, "hash", self.scene, "--steps", "5", "--check", "golden.txt", says="step 5")
+        self.refused(1, "hash", self.scene, "--steps", "3", "--check", "golden.txt", says="4 steps")
+
+
+class State(Case):
+    def test_state_goes_round(self):
+        all_steps = self.hashes(self.scene, "--steps", "6").splitlines()
+        result = self.call("state", self.scene, "--steps", "6", "--out", "state.vdb")
+        self.assertEqual(result.stdout.strip(), all_steps[6])
+        # The file holds that very state: starting from it, step 0 has its hash.
+        again = self.hashes(self.scene, "--steps", "0", "--from", "state.vdb")
+        self.assertEqual(again.split()[1], all_steps[6].split()[1])
+        as_json = json.loads(self.call("state", self.scene, "--steps", "6", "--out", "state.vdb", "--json").stdout)
+        self.assertEqual(as_json["hash"], all_steps[6].split()[1])
+        content, _ = voxels(self.folder / "state.vdb")
+        self.assertEqual(sorted(content), ["act", "cld", "hum"])
+        # A state of another size is refused, a smaller scene as well as a larger one.
+        for cells in ("[8,8,8]", "[32,24,13]"):
+            result = self.refused(3, "hash", self.scene, "--from", "state.vdb", "--set", f"lattice.cells={cells}",
+                                  says="state.vdb")
+            self.assertIn("32 x 24 x 12", result.stderr)
+
+    def test_a_state_of_another_place_is_refused(self):
+        self.call("state", self.scene, "--steps", "2", "--out", "state.vdb")
+        scene = self.write("from.toml", SCENE.replace("[time]", 'initial_state = "state.vdb"\n[time]'))
+        for setting, says in (("lattice.cell_size_m=25", "cells of 50 m, but the scene's lattice has cells of 25 m"),
+                              ("lattice.origin_m=[10,0,1000]", "but the scene's lattice at (10, 0, 1000) m")):
+            for command in (["hash", self.scene, "--from", "state.vdb"],
+                            ["state", self.scene, "--from", "state.vdb", "--out", "next.vdb"],
+                            ["run", scene, "--no-render", "--out", "out"]):
+                with self.subTest(setting=setting, command=command):
+                    result = self.refused(3, *command, "--set", setting, says="state.vdb")
+                    self.assertIn(says, result.stderr)
+
+    def test_a_run_starts_from_a_state(self):
+        self.call("state", self.scene, "--steps", "4", "--out", "state.vdb")
+        scene = self.write("from.toml", SCENE.replace("[time]", 'initial_state = "state.vdb"\n[time]'))
+        self.call("run", scene, "--no-render", "--out", "out")
+        expected = self.hashes(self.scene, "--from", "state.vdb").splitlines()
+        self.assertEqual([row["hash"] for row in rows_of(self.folder / "out/statistics.csv")],
+                         [line.split()[1] for line in expected])
+        self.assertEqual(expected[0].split()[1], self.hashes(self.scene, "--steps", "4").splitlines()[4].split()[1])
+        # Another state is another simulation.
+        manifest = json.loads((self.folder / "out/manifest.json").read_text())
+        self.call("state", self.scene, "--steps", "5", "--out", "state.vdb")
+        self.refused(2, "run", scene, "--no-render", "--out", "out", "--resume", says="the simulation itself differs")
+        self.call("run", scene, "--no-render", "--out", "out")
+        again = json.loads((self.folder / "out/manifest.json").read_text())
+        self.assertNotEqual(manifest["scene"]["simulation_hash"], again["scene"]["simulation_hash"])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

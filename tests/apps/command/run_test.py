@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`nephos run`: its files, its memory, and how it is interrupted and resumed."""
+
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+from case import Case, LONG, NEPHOS, rows_of, SCENE, voxels
+
+
+class Run(Case):
+    def test_run_writes_what_it_lists(self):
+        result = self.call("run", self.scene, "--no-render")
+        self.assertEqual(result.stderr, "", "no bar and no notes without a terminal")
+        out = self.folder / "out/tiny"
+        for part in ("density/tiny_0001.vdb", "statistics.csv", "manifest.json", "checkpoint.nephos"):
+            self.assertTrue((out / part).exists(), part)
+            self.assertIn(part, result.stdout)
+        rows = rows_of(out / "statistics.csv")
+        self.assertEqual([row["step"] for row in rows], [str(n) for n in range(7)])
+        expected = [line.split()[1] for line in self.hashes(self.scene).splitlines()]
+        self.assertEqual([row["hash"] for row in rows], expected)
+        self.assertGreater(float(rows[-1]["mean_density"]), 0)
+        manifest = json.loads((out / "manifest.json").read_text())
+        self.assertEqual(sorted(p.name for p in (out / "density").iterdir()),
+                         [pathlib.Path(f["density"]).name for f in manifest["frames"]])
+        # The film rate is the same wherever it is named.
+        self.assertEqual((manifest["frames_per_second"], manifest["time_scale"]), (1, 15))
+        metadata = json.loads(self.call("info", "--json", out / "density/tiny_0001.vdb").stdout)["metadata"]
+        self.assertEqual((float(metadata["nephos_frames_per_second"]), float(metadata["nephos_time_scale"])), (1, 15))
+
+    def test_all_json_parses(self):
+        run = json.loads(self.call("run", self.scene, "--no-render", "--json").stdout)
+        self.assertTrue(run["complete"])
+        for kind in ("density", "statistics", "manifest", "checkpoint"):
+            for file in run["files"][kind]:
+                self.assertTrue((self.folder / file).exists(), file)
+        hashes = json.loads(self.call("hash", self.scene, "--json").stdout)
+        self.assertEqual(run["state_hash"], hashes["hashes"][6])
+        info = json.loads(self.call("info", "--json", run["files"]["density"][4]).stdout)
+        self.assertEqual(info["kind"], "vdb")
+        self.assertEqual([grid["name"] for grid in info["grids"]][0], "density")
+        self.assertEqual(info["metadata"]["nephos_state_hash"], run["state_hash"])
+        checkpoint = json.loads(self.call("info", "--json", run["files"]["checkpoint"][0]).stdout)
+        self.assertEqual(checkpoint["kind"], "checkpoint")
+        self.assertEqual(checkpoint["simulation_hash"], run["simulation_hash"])
+        both = json.loads(self.call("info", "--json", run["files"]["density"][0], run["files"]["checkpoint"][0]).stdout)
+        self.assertEqual([entry["kind"] for entry in both], ["vdb", "checkpoint"])
+
+    def test_frames_writes_only_these(self):
+        self.call("run", self.scene, "--no-render", "--out", "all")
+        self.call("run", self.scene, "--no-render", "--out", "some", "--frames", "2..3")
+        names = sorted(p.name for p in (self.folder / "some/density").iterdir())
+        self.assertEqual(names, ["tiny_0002.vdb", "tiny_0003.vdb"])
+        for name in names:
+            self.assertEqual(voxels(self.folder / "some/density" / name), voxels(self.folder / "all/density" / name))
+
+    def test_statistics_only_writes_the_same_statistics_and_no_frames(self):
+        self.call("run", self.scene, "--no-render", "--out", "all")
+        result = self.call("run", self.scene, "--statistics-only", "--out", "some", "--quiet")
+        self.assertEqual((result.stdout, result.stderr), ("", ""))
+        self.assertEqual((self.folder / "some/statistics.csv").read_bytes(),
+                         (self.folder / "all/statistics.csv").read_bytes())
+        self.assertEqual(list(self.folder.glob("some/**/*.vdb")) + list(self.folder.glob("some/**/*.png")), [])
+
+    def test_names_of_files_do_not_matter_to_info(self):
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        shutil.copy(self.folder / "out/density/tiny_0001.vdb", self.folder / "a.exr")
+        self.assertEqual(json.loads(self.call("info", "--json", "a.exr").stdout)["kind"], "vdb")
+
+
+class Memory(Case):
+    SKIES = {"overcast": (0.9, 0.6, 0), "fair": (0.1, 0.0005, 0.3)}
+    OUTPUTS = {"plain": "", "state": "write_state = true", "refined": "refine = 2",
+               "all": "write_state = true\nrefine = 2\nwrite_velocity = true\nhalf = true"}
+
+    def peak(self, *arguments):
+        """Bytes of main memory that a command took at its peak."""
+        out = os.open("/dev/null", os.O_WRONLY)
+        self.addCleanup(os.close, out)
+        child = os.posix_spawn(NEPHOS, [NEPHOS, *map(str, arguments)], self.environment,
+                               file_actions=[(os.POSIX_SPAWN_DUP2, out, 1)])
+        _, status, usage = os.wait4(child, 0)
+        self.assertEqual(status, 0)
+        return usage.ru_maxrss * 1024
+
+    @unittest.skipIf("asan" in NEPHOS or "tsan" in NEPHOS, "sanitizers take memory of their own")
+    def test_a_run_stays_below_its_estimate(self):
+        for sky, (hum, act, ext) in self.SKIES.items():
+            for output, keys in self.OUTPUTS.items():
+                scene = self.write(f"{sky} {output}.toml", f"[lattice]\ncells = [192, 200, 60]\n[time]\nsteps = 5\n"
+                                   f"[field.background]\nhum = {hum}\nact = {act}\next = {ext}\n[density]\n{keys}\n"
+                                   f"[frames]\nper_second = 1\ntime_scale = 13\n")
+                estimate = json.loads(self.call("validate", scene, "--json").stdout)[0]["memory_bytes_without_pictures"]
+                peak = self.peak("run", scene, "--no-render", "--out", self.folder / f"{sky} {output}")
+                with self.subTest(sky=sky, output=output):
+                    self.assertLess(peak, estimate)
+                    self.assertLess(estimate, 2 * peak, "so large that it would refuse what fits")
+
+
+class Signals(Case):
+    def setUp(self):
+        super().setUp()
+        self.long = self.write("long.toml", LONG)
+
+    def start(self, *arguments):
+        return subprocess.Popen([NEPHOS, *map(str, arguments)], cwd=self.folder, stdout=subprocess.PIPE,
+                                stderr=subprocess.PIPE, text=True, env=self.environment)
+
+    def wait_for(self, path):
+        end = time.monotonic() + 60
+        while not (self.folder / path).exists():
+            self.assertLess(time.monotonic(), end, f"{path} never appeared")
+            time.sleep(0.002)
+
+    def interrupt(self, number, *arguments):
+        """Starts a run, sends a signal when the first frame is there, and returns what it said."""
+        process = self.start("run", *arguments)
+        self.wait_for("stopped/density/long_0002.vdb")
+        process.send_signal(number)
+        output, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 128 + number, errors)
+        self.assertTrue((self.folder / "stopped/checkpoint.nephos").exists())
+        return output, errors
+
+    def test_the_first_signal_leaves_a_checkpoint(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            shutil.rmtree(self.folder / "stopped", ignore_errors=True)
+            output, errors = self.interrupt(number, self.long, "--no-render", "--out", "stopped")
+            self.assertEqual(output, "")
+            self.assertIn("--resume", errors)
+            info = json.loads(self.call("info", "--json", "stopped/checkpoint.nephos").stdout)
+            self.assertGreater(info["steps"], 0)
+            self.assertLess(info["steps"], 10000)
+            rows = rows_of(self.folder / "stopped/statistics.csv")
+            self.assertEqual([int(row["step"]) for row in rows], list(range(len(rows))))
+
+    def test_a_resumed_run_is_the_uninterrupted_one(self):
+        changes = ["--set", "time.steps=400", "--no-render"]
+        whole = self.start("run", self.long, *changes, "--out", "whole", "--threads", "1")
+        _, errors = whole.communicate(timeout=120)
+        self.assertEqual(whole.returncode, 0, errors)
+        self.interrupt(signal.SIGINT, self.long, *changes, "--out", "stopped")
+        # Without --resume it is not thrown away.
+        self.refused(2, "run", self.long, *changes, "--out", "stopped", says="--resume")
+        # Stopped once more, while it is resumed.
+        done = len(list((self.folder / "stopped/density").iterdir()))
+        again = self.start("run", self.long, *changes, "--out", "stopped", "--resume")
+        self.wait_for(f"stopped/density/long_{done + 2:04}.vdb")
+        again.send_signal(signal.SIGTERM)
+        again.communicate(timeout=60)
+        self.assertIn(again.returncode, (0, 128 + signal.SIGTERM))
+        self.call("run", self.long, *changes, "--out", "stopped", "--resume")
+        manifest = self.same_runs("whole", "stopped")
+        self.assertEqual(len(manifest["frames"]), 41)
+        # What is complete stays so.
+        self.call("run", self.long, *changes, "--out", "stopped", "--resume")
+        self.same_runs("whole", "stopped")
+
+    def test_another_scene_cannot_be_resumed(self):
+        self.interrupt(signal.SIGINT, self.long, "--no-render", "--out", "stopped")
+        for change in (["--seed", "77"], ["--set", "time.steps=9000"], ["--set", "density.half=true"]):
+            self.refused(2, "run", self.long, "--no-render", "--out", "stopped", "--resume", *change,
+                         says="another scene")
+        self.refused(2, "run", self.long, "--no-render", "--out", "stopped", "--resume", "--frames", "1..3",
+                     says="--frames")
+
+    def test_the_second_signal_stops_at_once(self):
+        # A scene whose single step takes seconds: the second signal must not wait for it.
+        slow = self.write("slow.toml", SCENE.replace("[32, 24, 12]", "[1024, 1024, 256]")
+                          .replace("hum = 0.15", "hum = 0.45").replace("ext = 0.05", "ext = 0.45"))
+        process = self.start("run", slow, "--no-render", "--out", "slow", "--threads", "1")
+        self.wait_for("slow/manifest.json")
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.4)
+        begin = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130)
+        self.assertLess(time.monotonic() - begin, 1.0)
+
+    def test_a_signal_that_comes_twice_is_one(self):
+        # As from the terminal and from a program between, like timeout.
+        process = self.start("run", self.long, "--no-render", "--out", "stopped")
+        self.wait_for("stopped/density/long_0002.vdb")
+        for _ in range(3):
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.02)
+        process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130)
+        self.assertTrue((self.folder / "stopped/checkpoint.nephos").exists())
+
+    def test_two_runs_do_not_share_a_folder(self):
+        process = self.start("run", self.long, "--no-render", "--out", "stopped")
+        self.wait_for("stopped/density/long_0002.vdb")
+        for more in ([], ["--overwrite"]):
+            self.refused(3, "run", self.long, "--no-render", "--out", "stopped", *more, says="another run")
+        process.send_signal(signal.SIGKILL)
+        process.communicate(timeout=60)
+        # The lock ends with its owner, however that ends; so do the files that it was writing.
+        (self.folder / "stopped/density/.long_0003.part1-2.vdb").write_text("half")
+        self.call("run", self.long, "--no-render", "--out", "stopped", "--overwrite", "--set", "time.steps=20")
+        self.assertFalse([p for p in (self.folder / "stopped").rglob(".*")])
+
+    def test_a_signal_with_json(self):
+        output, errors = self.interrupt(signal.SIGTERM, self.long, "--no-render", "--out", "stopped", "--json")
+        report = json.loads(output)
+        self.assertFalse(report["complete"])
+        self.assertIn("--resume", errors)
+        rows = rows_of(self.folder / "stopped/statistics.csv")
+        self.assertEqual((len(rows) - 1, rows[-1]["hash"]), (report["steps"], report["state_hash"]))
+        self.assertEqual(len(report["files"]["density"]), report["frames"])
+        # The frames of the manifest are those of the folder.
+        manifest = json.loads((self.folder / "stopped/manifest.json").read_text())
+        self.assertFalse(manifest["complete"])
+        self.assertEqual([f["number"] for f in manifest["frames"]], list(range(1, report["frames"] + 1)))
+
+    def test_commands_without_a_checkpoint_stop_at_once(self):
+        process = self.start("hash", self.long, "--steps", "1000000000", "--json")
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=10)
+        self.assertEqual(process.returncode, 130)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What concerns every subcommand: options, help, terminals, completion."""
+
+import os
+import pty
+import re
+import select
+import shutil
+import struct
+import subprocess
+import termios
+import unittest
+
+from case import BAD, Case, NEPHOS
+
+
+class Usage(Case):
+    def test_help_goes_to_stdout(self):
+        for arguments in (["--help"], ["run", "--help"], ["render", "-h"], ["validate", "--help"], ["info", "--help"],
+                          ["hash", "--help"], ["state", "--help"], ["completion", "--help"]):
+            result = self.call(*arguments)
+            self.assertIn("Usage: nephos", result.stdout)
+            self.assertEqual(result.stderr, "")
+        for command in ("run", "render", "validate", "info", "hash", "state", "completion"):
+            self.assertIn(f"\n  {command}", self.call("--help").stdout)
+
+    def test_version(self):
+        self.assertRegex(self.call("--version").stdout, r"^nephos \d+\.\d+\.\d+ \(random stream \d+\)\n$")
+
+    def test_bad_arguments_are_status_2(self):
+        for arguments, says in (
+            ([], "a command is missing"),
+            (["rum"], "did you mean `run`"),
+            (["run"], "SCENE is missing"),
+            (["run", self.scene, "--oot", "x"], "did you mean `--out`"),
+            (["run", self.scene, "surplus"], "surplus"),
+            (["run", self.scene, "--out"], "--out"),
+            (["run", self.scene, "--threads", "0"], "--threads '0'"),
+            (["run", self.scene, "--threads", "many"], "--threads 'many'"),
+            (["run", self.scene, "--seed", "-1"], "--seed '-1'"),
+            (["run", self.scene, "--frames", "5..2"], "--frames '5..2'"),
+            (["run", self.scene, "--frames", "0..2"], "--frames '0..2'"),
+            (["run", self.scene, "--frames", "90"], "1 to 5"),
+            (["run", self.scene, "--frames", "2..6"], "1 to 5"),
+            (["run", self.scene, "--statistics-only", "--frames", "2..3"], "--statistics-only"),
+            (["run", self.scene, "--checkpoint-every", "soon"], "--checkpoint-every 'soon'"),
+            (["run", self.scene, "--resume", "--overwrite"], "--overwrite"),
+            (["hash", self.scene, "--steps", "1e3"], "--steps '1e3'"),
+            (["hash", self.scene, "--steps", "99999999999999999999999"], "--steps"),
+            (["state", self.scene], "--out"),
+            (["render", "x.vdb"], "--out"),
+            (["render", "x.vdb", "--out", "x.jpg"], ".png or .exr"),
+            (["render", "x.vdb", "--out", "x.png", "--size", "0x0"], "--size '0x0'"),
+            (["render", "x.vdb", "--out", "x.png", "--camera", "1,2"], "--camera '1,2'"),
+            (["render", "x.vdb", "--out", "x.png", "--sun", "95,0"], "--sun '95,0'"),
+            (["render", "x.vdb", "--out", "x.png", "--set", "a=1"], "--scene"),
+            (["completion", "tcsh"], "tcsh"),
+        ):
+            with self.subTest(arguments=arguments):
+                self.refused(2, *arguments, says=says)
+
+    def test_values_may_be_given_twice_only_where_it_makes_sense(self):
+        self.refused(2, "run", self.scene, "--out", "a", "--out", "b", says="--out")
+        self.hashes(self.scene, "--steps", "0", "--set", "seed=1", "--set", "time.steps=2")
+
+
+class Terminal(Case):
+    def on_terminal(self, *arguments, columns=100, env=None):
+        """Runs with stderr (and stdout) on a terminal; returns all that appeared there."""
+        leader, follower = pty.openpty()
+        termios.tcsetwinsize(follower, (24, columns)) if hasattr(termios, "tcsetwinsize") else \
+            __import__("fcntl").ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        process = subprocess.Popen([NEPHOS, *map(str, arguments)], cwd=self.folder, stdin=follower, stdout=follower,
+                                   stderr=follower, env={**self.environment, **(env or {})})
+        os.close(follower)
+        shown = b""
+        while True:
+            ready, _, _ = select.select([leader], [], [], 60)
+            self.assertTrue(ready, "nothing happens")
+            try:
+                piece = os.read(leader, 65536)
+            except OSError:
+                break
+            if not piece:
+                break
+            shown += piece
+        os.close(leader)
+        return process.wait(timeout=60), shown.decode()
+
+    def test_progress_only_on_a_terminal(self):
+        status, shown = self.on_terminal("run", self.scene, "--no-render", "--set", "time.steps=300")
+        self.assertEqual(status, 0)
+        self.assertRegex(shown, r"step \d+/301 .*\d+%.*steps/s")
+        self.assertRegex(shown, r"left")
+        self.assertIn("━", shown)
+        for line in re.split(r"[\r\n]+", shown):
+            visible = re.sub(r"\x1b\[[0-9;]*[mK]", "", line)
+            if visible.startswith("step "):
+                self.assertLess(len(visible), 100)
+        for env, arguments in (({"TERM": "dumb"}, []), ({}, ["--quiet"])):
+            _, shown = self.on_terminal("run", self.scene, "--no-render", *arguments, env=env)
+            self.assertNotIn("steps/s", shown)
+
+    def test_colours(self):
+        _, shown = self.on_terminal("run", "no.toml")
+        self.assertIn("\x1b[1m\x1b[31merror:\x1b[0m", shown)
+        _, shown = self.on_terminal("run", "no.toml", env={"NO_COLOR": "1"})
+        self.assertIn("error: ", shown)
+        self.assertNotIn("\x1b", shown)
+        _, shown = self.on_terminal("run", self.scene, "--no-render", env={"NO_COLOR": "1"})
+        self.assertNotIn("\x1b[1m", shown)
+        bad = self.write("bad.toml", BAD)
+        _, shown = self.on_terminal("validate", bad)
+        self.assertEqual(shown.count("\x1b[1m\x1b[31merror:\x1b[0m"), 3)
+        self.assertNotIn("\x1b", self.call("validate", bad, status=2).stderr)
+
+    def test_a_reader_that_goes_away_is_no_error(self):
+        script = f'set -o pipefail; "{NEPHOS}" hash "{self.scene}" --steps 20000 | head -n 1'
+        result = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=60, env=self.environment)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertRegex(result.stdout, r"^0 [0-9a-f]{32}\n$")
+
+    def test_a_full_stdout_is_an_error(self):
+        with open("/dev/full", "w") as full:
+            for arguments in (["hash", self.scene], ["--help"], ["completion", "bash"]):
+                result = subprocess.run([NEPHOS, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+                self.assertEqual(result.returncode, 3)
+                self.assertIn("standard output", result.stderr)
+
+
+class Completion(Case):
+    def completed(self, *words):
+        """What bash offers for the last word."""
+        script = f"""
+            source <("{NEPHOS}" completion bash) || exit 9
+            COMP_WORDS=(nephos {' '.join(f"'{w}'" for w in words)}); COMP_CWORD={len(words)}
+            _nephos
+            printf '%s\\n' "${{COMPREPLY[@]}}"
+        """
+        result = subprocess.run(["bash", "--norc", "-u", "-c", script], cwd=self.folder, capture_output=True, text=True,
+                                timeout=60)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        return [line for line in result.stdout.split("\n") if line]
+
+    def test_bash(self):
+        self.assertIn("run", self.completed("r"))
+        self.assertIn("render", self.completed("r"))
+        self.assertEqual(self.completed("val"), ["validate"])
+        self.assertIn("--resume", self.completed("run", "--re"))
+        self.assertEqual(self.completed("run", "ti"), ["tiny.toml"])
+        self.assertEqual(self.completed("completion", "z"), ["zsh"])
+        self.assertEqual(self.completed("run", "--json", "--no-r"), ["--no-render"])  # after a flag
+        self.assertEqual(self.completed("run", "--seed", ""), [])  # a value that nobody can guess
+        (self.folder / "a folder").mkdir()
+        self.assertEqual(self.completed("run", "tiny.toml", "--out", "a"), ["a folder"])
+
+    def test_other_shells_accept_theirs(self):
+        for shell, arguments in (("zsh", ["-n"]), ("fish", ["--no-execute"])):
+            script = self.call("completion", shell).stdout
+            self.assertIn("nephos", script)
+            if shutil.which(shell):
+                path = self.write(shell, script)
+                subprocess.run([shell, *arguments, path], check=True, timeout=60)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`nephos validate`, and what every subcommand says of a scene."""
+
+import json
+import unittest
+
+from case import BAD, Case, SOURCE
+
+
+class Scenes(Case):
+    def test_every_problem_at_once_with_its_place(self):
+        bad = self.write("bad.toml", BAD)
+        for command in (["validate", bad], ["run", bad, "--no-render"], ["hash", bad]):
+            result = self.call(*command, status=2)
+            self.assertEqual(result.stdout, "")
+            for place in (":2:", ":3:", ":5:"):
+                self.assertIn("bad.toml" + place, result.stderr)
+            self.assertEqual(result.stderr.count("error:"), 3, result.stderr)
+            self.assertIn("cell_size_m", result.stderr)  # did you mean
+
+    def test_json(self):
+        bad = self.write("bad.toml", BAD)
+        result = self.call("validate", self.scene, bad, "--json", status=2)
+        good, wrong = json.loads(result.stdout)
+        self.assertTrue(good["valid"])
+        self.assertEqual(good["cells"], [32, 24, 12])
+        self.assertFalse(wrong["valid"])
+        self.assertEqual([p["line"] for p in wrong["problems"]], [2, 3, 5])
+
+    def test_the_printed_scene_is_the_scene(self):
+        text = self.call("validate", self.scene, "--print").stdout
+        self.write("again/tiny.toml", text)
+        hashes = [json.loads(self.call("validate", p, "--json").stdout)[0]["scene_hash"]
+                  for p in (self.scene, "again/tiny.toml")]
+        self.assertEqual(*hashes)
+
+    def test_set_and_seed_change_the_scene(self):
+        base = self.hashes(self.scene, "--steps", "3")
+        self.assertNotEqual(base, self.hashes(self.scene, "--steps", "3", "--seed", "4"))
+        self.assertEqual(self.hashes(self.scene, "--steps", "3", "--set", "seed=4"),
+                         self.hashes(self.scene, "--steps", "3", "--seed", "4"))
+        self.assertNotEqual(base, self.hashes(self.scene, "--steps", "3", "--set", "field.background.hum=0.5"))
+        self.refused_set("field.background.hun=0.5", "hum")
+        self.refused_set("field.background.hum=7", "0 to 1")
+        self.refused_set("nonsense", "nonsense")
+
+    def refused_set(self, change, says):
+        result = self.call("hash", self.scene, "--set", change, status=2)
+        self.assertIn(says, result.stderr)
+
+    def test_shipped_scenes_are_valid(self):
+        scenes = sorted((SOURCE / "scenes").glob("*.toml"))
+        self.assertGreaterEqual(len(scenes), 4)
+        self.call("validate", *scenes)
+
+    def test_base_models_without_a_layer_are_noted(self):
+        lonely = self.write("lonely.toml", f'name = "lonely"\nmodels = ["{SOURCE}/scenes/genera/Cb.toml"]\n')
+        self.assertIn("no [[layer]]", self.call("validate", lonely).stderr)
+        self.assertEqual(self.call("validate", SOURCE / "scenes/genera/Cb.toml").stderr, "")
+
+    def test_quiet_runs_say_nothing(self):
+        lonely = self.write("lonely.toml", f'name = "lonely"\nmodels = ["{SOURCE}/scenes/genera/Cb.toml"]\n')
+        for scene in self.scene, lonely:
+            command = ["run", scene, "--no-render", "--set", "time.steps=2", "--set", "lattice.cells=[16,16,8]"]
+            self.assertNotEqual(self.call(*command, "--overwrite", "--out", "loud").stdout, "")
+            quiet = self.call(*command, "--overwrite", "--out", "quiet", "--quiet")
+            self.assertEqual((quiet.stdout, quiet.stderr), ("", ""))
+
+    def test_a_lattice_beyond_memory_is_refused(self):
+        result = self.call("run", self.scene, "--no-render", "--set", "lattice.cells=[65536,65536,65536]", status=2)
+        self.assertIn("TiB", result.stderr)
+        self.call("hash", self.scene, "--set", "lattice.cells=[65536,65536,65536]", status=2)
+        self.call("state", self.scene, "--out", "x.vdb", "--set", "lattice.cells=[65536,65536,65536]", status=2)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
