@@ -69,6 +69,9 @@ struct Automaton::Impl {
     }
     double time_s() const { return double(steps) * options.time_step_s; }
 
+    StepPlanes planes_of(BitPlane& act_out);
+    template <class Work>
+    void for_parts(const Work& work);
     void draw_initial_state();
     void grow_and_draw();
     void advect();
@@ -84,58 +87,41 @@ struct Automaton::Impl {
     std::uint64_t steps = 0;
 };
 
-// Draws one step of births on the empty lattice, from its own domain of randomness. Cell by cell, because it
-// happens once and each cell has a counter of its own.
-void Automaton::Impl::draw_initial_state() {
-    const BlockField field = field_now();
-    const Extent& extent = options.extent;
-    tbb::parallel_for(0, blocks(extent.z), [&](int bz) {
-        std::vector<const FieldEllipsoid*> row;
-        BlockPlan plan;
-        for (int by = 0; by < blocks(extent.y); ++by) {
-            field.collect(by, bz, row);
-            for (int bx = 0; bx < blocks(extent.x); ++bx) {
-                field.plan_blocks(bx, by, bz, row, std::span(&plan, 1));
-                if (plan.draws[kHum].kind == DrawPlan::Kind::none &&
-                    plan.draws[kAct].kind == DrawPlan::Kind::none) {
-                    continue;
-                }
-                for (int cell = 0; cell < kBlockCells; ++cell) {
-                    const int dx = cell % 8, dy = cell / 8 % 8, dz = cell / 64;
-                    const int i = bx * kBlockEdge + dx, j = by * kBlockEdge + dy, k = bz * kBlockEdge + dz;
-                    if (i >= extent.x || j >= extent.y || k >= extent.z) continue;
-                    const auto words =
-                        philox(options.seed, block_counter(Domain::initial_state, Draw::counts, 0, bx, by, bz,
-                                                           std::uint32_t(cell)));
-                    const auto happens = [&](int draw) {
-                        const auto t = probability_threshold(probability_at(field, plan, draw, dx, dy, dz));
-                        return t == kCertain || words[std::size_t(draw)] < t;
-                    };
-                    if (happens(kHum)) lattice.hum.set(i, j, k, true);
-                    if (happens(kAct)) lattice.act.set(i, j, k, true);
-                }
-            }
-        }
-    });
+StepPlanes Automaton::Impl::planes_of(BitPlane& act_out) {
+    return {.extent = options.extent,
+            .words_per_row = lattice.hum.words_per_row(),
+            .boundaries = options.boundaries,
+            .act = lattice.act.words().data(),
+            .act_next = act_out.words().data(),
+            .hum = lattice.hum.words().data(),
+            .cld = lattice.cld.words().data(),
+            .zero_row = zero_row.data() + 8};
 }
 
-void Automaton::Impl::grow_and_draw() {
-    const BlockField field = field_now();
-    const StepPlanes planes{.extent = options.extent,
-                            .words_per_row = lattice.hum.words_per_row(),
-                            .boundaries = options.boundaries,
-                            .act = lattice.act.words().data(),
-                            .act_next = act_next.words().data(),
-                            .hum = lattice.hum.words().data(),
-                            .cld = lattice.cld.words().data(),
-                            .zero_row = zero_row.data() + 8};
-    const StepRandom random{options.seed, std::uint32_t(steps), &field, &ladder};
+// Calls `work` with each slab of blocks and a range of its rows, in parallel.
+template <class Work>
+void Automaton::Impl::for_parts(const Work& work) {
     const int rows = rows_per_task(lattice.hum), all_rows = blocks(options.extent.y);
     const int parts = (all_rows + rows - 1) / rows;
     tbb::parallel_for(0, blocks(options.extent.z) * parts, [&](int task) {
         const int begin = task % parts * rows;
-        step_part(planes, random, task / parts, begin, std::min(begin + rows, all_rows));
+        work(task / parts, begin, std::min(begin + rows, all_rows));
     });
+}
+
+void Automaton::Impl::draw_initial_state() {
+    const BlockField field = field_now();
+    if (!field.anything()) return;
+    const StepPlanes planes = planes_of(lattice.act);
+    const StepRandom random{options.seed, 0, &field, &ladder};
+    for_parts([&](int bz, int begin, int end) { draw_initial_part(planes, random, bz, begin, end); });
+}
+
+void Automaton::Impl::grow_and_draw() {
+    const BlockField field = field_now();
+    const StepPlanes planes = planes_of(act_next);
+    const StepRandom random{options.seed, std::uint32_t(steps), &field, &ladder};
+    for_parts([&](int bz, int begin, int end) { step_part(planes, random, bz, begin, end); });
     std::swap(lattice.act, act_next);
 }
 
@@ -192,14 +178,16 @@ BitPlaneView Automaton::hum() const { return impl_->lattice.hum.view(); }
 BitPlaneView Automaton::act() const { return impl_->lattice.act.view(); }
 BitPlaneView Automaton::cld() const { return impl_->lattice.cld.view(); }
 
-StateHash Automaton::hash() const {
+StateHash Automaton::hash() const { return hash_of(impl_->lattice); }
+
+StateHash hash_of(const Lattice& lattice) {
     const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
     if (!state) throw std::bad_alloc();
     XXH3_128bits_reset(state.get());
-    const Extent& e = impl_->options.extent;
+    const Extent& e = lattice.hum.extent();
     const std::array<std::uint32_t, 3> extent{std::uint32_t(e.x), std::uint32_t(e.y), std::uint32_t(e.z)};
     XXH3_128bits_update(state.get(), extent.data(), sizeof extent);
-    for (const BitPlane* plane : {&impl_->lattice.hum, &impl_->lattice.act, &impl_->lattice.cld}) {
+    for (const BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) {
         XXH3_128bits_update(state.get(), plane->words().data(), plane->words().size_bytes());
     }
     const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
@@ -228,10 +216,15 @@ std::vector<std::byte> Automaton::save() const {
     out.put(impl_->steps);
     for (const Displacement& d : impl_->fraction) out.put(d);
     impl_->parcels.save(out);
-    for (const BitPlane* plane : {&impl_->lattice.hum, &impl_->lattice.act, &impl_->lattice.cld}) {
-        out.put_bytes(std::as_bytes(plane->words()));
+    // The planes at their exact size: a growing buffer would hold them several times.
+    std::vector<std::byte> bytes = out.take();
+    const std::array planes{&impl_->lattice.hum, &impl_->lattice.act, &impl_->lattice.cld};
+    bytes.reserve(bytes.size() + planes.size() * impl_->lattice.hum.words().size_bytes());
+    for (const BitPlane* plane : planes) {
+        const std::span<const std::byte> words = std::as_bytes(plane->words());
+        bytes.insert(bytes.end(), words.begin(), words.end());
     }
-    return out.take();
+    return bytes;
 }
 
 void Automaton::restore(std::span<const std::byte> bytes) {

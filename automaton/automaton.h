@@ -32,6 +32,9 @@ struct StateHash {
     bool operator==(const StateHash&) const = default;
 };
 
+// Returns the hash of a state; its three planes have one extent.
+StateHash hash_of(const Lattice& lattice);
+
 // An ellipsoid of the field at one time, with its position and fade weight.
 struct ActiveEllipsoid {
     Ellipsoid ellipsoid;  // centre_m is the present centre

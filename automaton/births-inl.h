@@ -97,8 +97,10 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
     merge_events(g, s);
 }
 
-// Draws the events of rows of blocks by_begin..by_end (end excluded) of slab bz.
-inline void draw_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
+// Calls `draw` with every segment of the rows of blocks by_begin..by_end of slab bz.
+template <class DrawSegment>
+inline void draw_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end,
+                      const DrawSegment& draw) {
     const PhiloxKeys keys(random.seed);
     const auto scratch = std::make_unique<BirthScratch>();
     const int all_blocks = (planes.extent.x + kBlockEdge - 1) / kBlockEdge;
@@ -114,7 +116,7 @@ inline void draw_part(const StepPlanes& planes, const StepRandom& random, int bz
         random.field->collect(by, bz, scratch->row);
         for (segment.bx0 = 0; segment.bx0 < all_blocks; segment.bx0 += kSegmentBlocks) {
             segment.blocks = std::min(kSegmentBlocks, all_blocks - segment.bx0);
-            draw_segment(segment, *scratch);
+            draw(segment, *scratch);
         }
     }
 }

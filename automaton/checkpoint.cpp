@@ -3,6 +3,9 @@
 
 #include <array>
 #include <fstream>
+#include <memory>
+#include <new>
+#include <string_view>
 
 #include <xxhash.h>
 
@@ -131,22 +134,33 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
     if (checkpoint.simulation_hash.size() != kHashDigits) {
         throw Error(ErrorCode::usage, "a checkpoint needs a simulation hash of 32 digits");
     }
-    ByteWriter out;
-    out.put(kMagic);
-    out.put(kFormatVersion);
-    out.put(kRandomStreamVersion);
-    out.put_bytes(std::as_bytes(std::span(checkpoint.simulation_hash)));
-    out.put(checkpoint.state.high);
-    out.put(checkpoint.state.low);
-    out.put(checkpoint.steps);
-    for (const auto* block : {&checkpoint.automaton, &checkpoint.history}) {
-        out.put(std::uint64_t(block->size()));
-        out.put_bytes(*block);
-    }
-    const XXH128_hash_t hash = hash_of(out.bytes());
-    out.put(std::uint64_t(hash.high64));
-    out.put(std::uint64_t(hash.low64));
-    write_atomically(path, out.bytes());
+    const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+    if (!state) throw std::bad_alloc();
+    XXH3_128bits_reset(state.get());
+    // Piece by piece: the planes are large, and there is no room for a copy of them.
+    write_pieces_atomically(path, [&](const AppendPiece& append) {
+        const auto put = [&](std::span<const std::byte> bytes) {
+            XXH3_128bits_update(state.get(), bytes.data(), bytes.size());
+            append(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+        };
+        ByteWriter head;
+        head.put(kMagic);
+        head.put(kFormatVersion);
+        head.put(kRandomStreamVersion);
+        head.put_bytes(std::as_bytes(std::span(checkpoint.simulation_hash)));
+        head.put(checkpoint.state.high);
+        head.put(checkpoint.state.low);
+        head.put(checkpoint.steps);
+        put(head.bytes());
+        for (const auto* block : {&checkpoint.automaton, &checkpoint.history}) {
+            const std::uint64_t size = block->size();
+            put(std::as_bytes(std::span(&size, 1)));
+            put(*block);
+        }
+        const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+        put(std::as_bytes(std::span(&hash.high64, 1)));
+        put(std::as_bytes(std::span(&hash.low64, 1)));
+    });
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {

@@ -11,6 +11,7 @@
 
 #include "automaton/births-inl.h"
 #include "automaton/growth-inl.h"
+#include "automaton/initial-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -29,7 +30,12 @@ void step_part_target(const StepPlanes& planes, const StepRandom& random, int bz
     } else {
         grow<false>(planes, z0, z1, y0, y1);
     }
-    if (!quiet) draw_part(planes, random, bz, by_begin, by_end);
+    if (!quiet) draw_part(planes, random, bz, by_begin, by_end, draw_segment);
+}
+
+void draw_initial_part_target(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin,
+                              int by_end) {
+    draw_part(planes, random, bz, by_begin, by_end, draw_initial_segment);
 }
 
 const char* target_name() { return hwy::TargetName(HWY_TARGET); }
@@ -41,6 +47,7 @@ HWY_AFTER_NAMESPACE();
 namespace nephos {
 
 HWY_EXPORT(step_part_target);
+HWY_EXPORT(draw_initial_part_target);
 HWY_EXPORT(target_name);
 
 float sparse_rate_bound(const BlockPlan& plan, unsigned draws) {
@@ -55,6 +62,10 @@ float sparse_rate_bound(const BlockPlan& plan, unsigned draws) {
 
 void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
     HWY_DYNAMIC_DISPATCH(step_part_target)(planes, random, bz, by_begin, by_end);
+}
+
+void draw_initial_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
+    HWY_DYNAMIC_DISPATCH(draw_initial_part_target)(planes, random, bz, by_begin, by_end);
 }
 
 const char* kernel_target() { return HWY_DYNAMIC_DISPATCH(target_name)(); }

@@ -53,6 +53,9 @@ struct StepRandom {
 // may be cut by the extent.
 void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end);
 
+// Draws the first hum and act, into planes.hum and planes.act_next, of the same part of an empty lattice.
+void draw_initial_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end);
+
 // Returns the name of the instruction set in use, for tests and reports.
 const char* kernel_target();
 

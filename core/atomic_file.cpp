@@ -56,39 +56,12 @@ std::string temporary_name(const std::filesystem::path& path, const std::string&
     return "." + path.stem().string() + std::string(kPart) + numbers + path.extension().string();
 }
 
-// A file that this process created: where it is, and which one it is, whatever is found under its name later.
-struct CreatedFile {
-    std::filesystem::path path;
-    dev_t device = 0;
-    ino_t inode = 0;
-};
-
-// Creates an empty file beside `path` under a name that holds this process' number and 64 random bits. O_EXCL: in a
-// folder that others may write to, a file or link that waits under that name is never opened.
-CreatedFile create_temporary(const std::filesystem::path& folder, const std::filesystem::path& path) {
-    constexpr int kAttempts = 100;
-    std::random_device random;
-    for (int attempt = 1;; ++attempt) {
-        const std::uint64_t number = std::uint64_t{random()} << 32 | random();
-        CreatedFile file{folder /
-                         temporary_name(path, std::to_string(::getpid()) + "-" + std::to_string(number))};
-        const Descriptor descriptor(
-            ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
-        if (descriptor.get() < 0 && errno == EEXIST && attempt < kAttempts) continue;
-        struct stat status {};
-        if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0)
-            fail(path, "cannot create", errno);
-        file.device = status.st_dev;
-        file.inode = status.st_ino;
-        return file;
-    }
-}
-
-// Throws Error(io) unless `file` still has its name.
-void require_same_file(const CreatedFile& file, const std::filesystem::path& reported) {
+// Throws Error(io) unless the file that was created is still there under its name.
+void require_same_file(const std::filesystem::path& temporary, dev_t device, ino_t inode,
+                       const std::filesystem::path& reported) {
     struct stat status {};
-    if (::lstat(file.path.c_str(), &status) != 0) fail(reported, "its temporary file is gone", errno);
-    if (status.st_dev != file.device || status.st_ino != file.inode || !S_ISREG(status.st_mode))
+    if (::lstat(temporary.c_str(), &status) != 0) fail(reported, "its temporary file is gone", errno);
+    if (status.st_dev != device || status.st_ino != inode || !S_ISREG(status.st_mode))
         throw Error(ErrorCode::io,
                     reported.string() + ": another file was put in the place of its temporary one");
 }
@@ -126,26 +99,55 @@ class PieceWriter {
 
 }  // namespace
 
-void write_atomically(const std::filesystem::path& given,
-                      const std::function<void(const std::filesystem::path& temporary)>& write) {
+AtomicFile::AtomicFile(const std::filesystem::path& given) : path_(target_of(given)) {
     std::error_code error;
-    const std::filesystem::path path = target_of(given);
-    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+    const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
     std::filesystem::create_directories(folder, error);
     if (error) fail(folder, "cannot create the folder", error.value());
+    create_temporary(folder);
+}
 
-    const CreatedFile temporary = create_temporary(folder, path);
-    try {
-        write(temporary.path);
-        require_same_file(temporary, path);
-        flush_to_device(temporary.path, path, O_RDONLY | O_NOFOLLOW);
-        std::filesystem::rename(temporary.path, path, error);
-        if (error) fail(path, "cannot rename into place", error.value());
-        flush_to_device(folder, path, O_RDONLY | O_DIRECTORY);
-    } catch (...) {
-        std::filesystem::remove(temporary.path, error);
-        throw;
+// A name of this process' number and 64 random bits, and O_EXCL: in a folder that others may write to, a file or link
+// that waits under that name is never opened.
+void AtomicFile::create_temporary(const std::filesystem::path& folder) {
+    constexpr int kAttempts = 100;
+    std::random_device random;
+    for (int attempt = 1;; ++attempt) {
+        const std::uint64_t number = std::uint64_t{random()} << 32 | random();
+        temporary_ =
+            folder / temporary_name(path_, std::to_string(::getpid()) + "-" + std::to_string(number));
+        const Descriptor descriptor(
+            ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+        if (descriptor.get() < 0 && errno == EEXIST && attempt < kAttempts) continue;
+        struct stat status {};
+        if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0)
+            fail(path_, "cannot create", errno);
+        device_ = status.st_dev;
+        inode_ = status.st_ino;
+        return;
     }
+}
+
+AtomicFile::~AtomicFile() {
+    std::error_code error;
+    if (!published_) std::filesystem::remove(temporary_, error);
+}
+
+void AtomicFile::publish() {
+    require_same_file(temporary_, device_, inode_, path_);
+    flush_to_device(temporary_, path_, O_RDONLY | O_NOFOLLOW);
+    std::error_code error;
+    std::filesystem::rename(temporary_, path_, error);
+    if (error) fail(path_, "cannot rename into place", error.value());
+    published_ = true;
+    flush_to_device(temporary_.parent_path(), path_, O_RDONLY | O_DIRECTORY);
+}
+
+void write_atomically(const std::filesystem::path& path,
+                      const std::function<void(const std::filesystem::path& temporary)>& write) {
+    AtomicFile file(path);
+    write(file.temporary());
+    file.publish();
 }
 
 void write_pieces_atomically(const std::filesystem::path& path,

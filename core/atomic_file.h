@@ -11,13 +11,40 @@
 #include <string>
 #include <string_view>
 
+#include <sys/types.h>
+
 namespace nephos {
 
-// Creates an empty temporary file whose name nobody can foresee, calls `write` with its path, which `write` must
-// open, fill and close; then publishes it. A file or link that somebody else put in its place meanwhile is refused.
-// Missing parent folders are created. A symbolic link keeps pointing to the new file; a device, a pipe or a
-// folder in the place of the file is refused. On any failure the temporary file is removed and Error(io)
-// names `path` and the reason; what `write` throws passes through.
+// A file that is written under a temporary name until it is complete. write_atomically() and the functions below it use
+// one.
+class AtomicFile {
+  public:
+    // Creates an empty temporary file whose name nobody can foresee beside `path`, and missing parent folders. A symbolic
+    // link keeps pointing to the new file; a device, a pipe or a folder in the place of the file is refused. Throws
+    // Error(io) naming `path`.
+    explicit AtomicFile(const std::filesystem::path& path);
+    // Without publish(): removes the temporary file.
+    ~AtomicFile();
+    AtomicFile(const AtomicFile&) = delete;
+    AtomicFile& operator=(const AtomicFile&) = delete;
+
+    // Returns the path of the temporary file, which the caller opens, fills and closes.
+    const std::filesystem::path& temporary() const { return temporary_; }
+    // Flushes the temporary file to the device and renames it to its path. Throws Error(io) naming the path, also
+    // when another file or a link was put in the place of the temporary one.
+    void publish();
+
+  private:
+    void create_temporary(const std::filesystem::path& folder);
+
+    std::filesystem::path path_, temporary_;
+    dev_t device_ = 0;
+    ino_t inode_ = 0;
+    bool published_ = false;
+};
+
+// Calls `write` with the path of an empty temporary file, which `write` must open, fill and close; then publishes it.
+// Throws as AtomicFile; exceptions of `write` pass through. Every failure removes the temporary file.
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write);
 

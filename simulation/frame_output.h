@@ -3,37 +3,39 @@
 
 // The files of a run's frames, made beside the simulation:
 //
-//     simulation --(a frame)--> drawing --(a frame and its picture)--> density files, EXR, PNG
+//     simulation --(a frame)--> drawing --(a frame and its picture)--> density files, EXR, PNG, video
 //
 // Drawing and writing have a thread each, so that the next step is simulated and the next picture drawn while
-// files are compressed and flushed to the device. Frames keep their order. At most kDrawing + kWriting frames
-// are under way (kWriting without pictures); simulation/memory.h reckons with them. Where oneTBB is limited to
-// one thread, everything happens in add(). While a graphics card draws a picture the next is prepared, if its
-// frame is there; that is one frame more.
+// files are compressed and flushed to the device. Frames keep their order. Where oneTBB is limited to one
+// thread, everything happens in add(). While a graphics card draws a picture the next is prepared, if its frame
+// is there.
 //
 // When a frame fails, those before it are still drawn to their end and written, those after it are dropped.
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "density/metaballs.h"
-#include "density/vdb/vdb_file.h"
 #include "render/image/picture.h"
-#include "render/renderer.h"
-#include "simulation/pipeline.h"
+#include "simulation/frame_painter.h"
+#include "simulation/frame_writer.h"
 #include "simulation/run_folder.h"
-#include "simulation/sky_picture.h"
+#include "simulation/run_video.h"
+#include "simulation/simulation.h"
 #include "simulation/stage.h"
 
 namespace nephos {
 
+// Frames under way at most, which memory_estimate() reckons with: in the stage that writes, and, with pictures,
+// in the stage that draws; with a graphics card one more is prepared while it draws.
+inline constexpr std::size_t kFramesWritten = 2, kFramesDrawn = 1, kFramesPrepared = 1;
+
 class FrameOutput {
   public:
     // `done` is called for each frame all of whose files are there, in order, by the thread that writes.
-    // `settings` must outlive this object, and the pipeline the next finish() or finish_quietly(). Throws
+    // `settings` must outlive this object, and the simulation the next finish() or finish_quietly(). Throws
     // Error(gpu) when pictures are wanted and the device that is asked for is not there.
     FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&)> done);
 
@@ -51,41 +53,30 @@ class FrameOutput {
     // Waits until all frames are written that can be: after an exception, those before the one that failed.
     void finish_quietly() noexcept;
 
+    // Makes the video of the frames from now on (run_video.h); call it before the first add().
+    void start_video() { video_.emplace(settings_); }
+    bool makes_video() const { return video_.has_value(); }
+    // Completes the video, if one was started. Precondition: finish(). Throws Error(io).
+    void finish_video();
+
   private:
     struct Drawn {
         FrameResult frame;
         Picture picture;  // empty without pictures
     };
 
-    // A frame whose picture was begun.
-    struct Begun {
-        FrameResult frame;
-        std::vector<Metaball> balls;
-        PendingSkyPicture picture;
-    };
-
     void draw_next(FrameResult& frame);
-    Begun begin(FrameResult& frame);
     void finish_begun();
-    std::vector<Metaball> metaballs_of(const FrameResult& frame) const;
-    void write(const Drawn& drawn) const;
-    void write_density(const FrameResult& frame) const;
-    void write_layers(const FrameResult& frame) const;
-    void write_picture(const Drawn& drawn) const;
-    DensityGrid refined(const DensityGrid& density, const Boundaries& boundaries) const;
-    VdbMetadata metadata_of(const FrameResult& frame, const StateHash& hash) const;
+    void write(const Drawn& drawn);
 
     const RunSettings& settings_;
-    RunFolder folder_;
     std::function<void(const FrameResult&)> done_;
-    std::unique_ptr<Renderer> renderer_;
-    SkyPainter painter_;
-    std::optional<Begun> begun_;  // of the thread that draws
+    FrameWriter writer_;
+    std::optional<RunVideo> video_;  // of the thread that writes
+    std::unique_ptr<FramePainter> painter_;
+    std::optional<PendingFrame> begun_;  // of the thread that draws
     Stage<Drawn> writing_;
     Stage<FrameResult> drawing_;  // after writing_: ends before it
 };
-
-// Whether a scene's pictures are written as PNG: for themselves, or to make the video of.
-bool wants_png(const Scene& scene);
 
 }  // namespace nephos

@@ -3,11 +3,15 @@
 
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "automaton/checkpoint.h"
 #include "core/bytes.h"
 #include "core/error.h"
+#include "density/vdb/vdb_file.h"
 #include "scenes/format/writer.h"
 #include "seeds/coupling.h"
+#include "simulation/memory.h"
 
 namespace nephos {
 namespace {
@@ -49,8 +53,11 @@ std::string text_of_veil(const Scene& scene, std::size_t layer) {
 
 }  // namespace
 
-LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::optional<Lattice> initial)
+LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::optional<Lattice> initial,
+                                 LayerParts parts)
     : number_(std::uint32_t(layer)), time_step_s_(scene.automaton.time_step_s) {
+    const AutomatonOptions lattice = automaton_options(scene, layer);
+    box_ = {lattice.extent, lattice.placement};
     if (!scene.layers.empty()) {
         options_ = scene.layers[layer];
         if (options_.is_veil) {
@@ -62,8 +69,7 @@ LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::opt
         attached_ = attached_rain(scene, layer);
         sky_.emplace(sky_options(scene, layer));
     }
-    if (!options_.automaton) return;
-    const AutomatonOptions lattice = automaton_options(scene, layer);
+    if (!options_.automaton || (parts == LayerParts::weather && !options_.rain.find)) return;
     if (initial) {
         automaton_.emplace(lattice, std::move(*initial));
     } else {
@@ -75,7 +81,7 @@ LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::opt
 }
 
 std::uint64_t LayerSimulation::steps() const {
-    if (is_veil()) return steps_;
+    if (!automaton_ && !sky_) return steps_;
     return automaton_ ? automaton_->steps() : sky_->steps();
 }
 
@@ -83,17 +89,14 @@ DensityGrid LayerSimulation::veil_at(double time_s) const {
     return scaled(veil_density(veil_, wind_, options_.extent, options_.placement, time_s), options_.opacity);
 }
 
-GridBox LayerSimulation::box() const {
-    if (is_veil()) return {options_.extent, options_.placement};
-    return {automaton_->options().extent, automaton_->options().placement};
-}
+GridBox LayerSimulation::box() const { return box_; }
 
 Boundaries LayerSimulation::boundaries() const {
     return automaton_ ? automaton_->options().boundaries : Boundaries{};
 }
 
 void LayerSimulation::step() {
-    if (is_veil()) {
+    if (!automaton_ && !sky_) {
         ++steps_;
         return;
     }
@@ -127,7 +130,7 @@ std::vector<RainArea> LayerSimulation::rain() const {
 }
 
 StateHash LayerSimulation::hash() const {
-    if (is_veil()) {
+    if (!automaton_ && !sky_) {
         ByteWriter writer;
         writer.put_bytes(std::as_bytes(std::span(veil_text_)));
         writer.put(steps_);
@@ -137,7 +140,7 @@ StateHash LayerSimulation::hash() const {
 }
 
 std::vector<std::byte> LayerSimulation::save() const {
-    if (is_veil()) {
+    if (!automaton_ && !sky_) {
         ByteWriter writer;
         writer.put(steps_);
         return writer.take();
@@ -151,7 +154,7 @@ std::vector<std::byte> LayerSimulation::save() const {
 }
 
 void LayerSimulation::restore(std::span<const std::byte> bytes) {
-    if (is_veil()) {
+    if (!automaton_ && !sky_) {
         ByteReader reader(bytes);
         steps_ = reader.get<std::uint64_t>();
         if (!reader.rest().empty()) throw Error(ErrorCode::io, "the saved state is not of this layer");
@@ -170,13 +173,50 @@ void LayerSimulation::restore(std::span<const std::byte> bytes) {
     }
 }
 
-std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial) {
+std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial,
+                                         LayerParts parts) {
     std::vector<LayerSimulation> layers;
     layers.reserve(lattice_count(scene));
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
-        layers.emplace_back(scene, n, scene.layers.empty() ? std::move(initial) : std::nullopt);
+        layers.emplace_back(scene, n, scene.layers.empty() ? std::move(initial) : std::nullopt, parts);
     }
     return layers;
+}
+
+std::optional<Lattice> initial_state(const Scene& scene, const std::string& from) {
+    const AutomatonOptions& lattice = scene.automaton;
+    if (!from.empty()) return read_state(from, lattice.extent, lattice.placement);
+    if (scene.initial_state_file) {
+        return read_state(*scene.initial_state_file, lattice.extent, lattice.placement);
+    }
+    return {};
+}
+
+SimulationStart simulation_start(const Scene& scene) {
+    SimulationStart start;
+    start.initial = initial_state(scene);
+    start.simulation_hash =
+        simulation_hash(scene, start.initial ? hash_of(*start.initial).hex() : std::string());
+    return start;
+}
+
+std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string& scene_file,
+                                          const std::string& from) {
+    if (!from.empty() && !scene.layers.empty()) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: has layers, but --from gives the state of one lattice", scene_file));
+    }
+    std::size_t bytes = 0;
+    for (std::size_t n = 0; n < lattice_count(scene); ++n) {
+        if (!scene.layers.empty() && scene.layers[n].is_veil) continue;  // holds nothing
+        bytes += Automaton::memory_bytes(automaton_options(scene, n));
+    }
+    const Extent& extent = scene.automaton.extent;
+    require_memory(bytes, scene.layers.empty()
+                              ? fmt::format("{}: a lattice of {} x {} x {} cells", scene_file, extent.x,
+                                            extent.y, extent.z)
+                              : fmt::format("{}: {} layers", scene_file, scene.layers.size()));
+    return make_layers(scene, initial_state(scene, from));
 }
 
 StateHash combined_hash(std::span<const StateHash> hashes) {

@@ -29,11 +29,18 @@
 
 namespace nephos {
 
+// Most steps of one run: every step number stays exact in a double and in a 32-bit counter of randomness.
+inline constexpr std::uint64_t kMaxSteps = 1'000'000'000;
+
+// Selects the parts of a layer that are simulated: all, or an automaton only where rain is looked for in it.
+enum class LayerParts { all, weather };
+
 class LayerSimulation {
   public:
     // At step 0; `layer` < lattice_count(scene). With `initial` the automaton starts from it. Throws as
     // Automaton and SkySimulation.
-    LayerSimulation(const Scene& scene, std::size_t layer, std::optional<Lattice> initial = {});
+    LayerSimulation(const Scene& scene, std::size_t layer, std::optional<Lattice> initial = {},
+                    LayerParts parts = LayerParts::all);
 
     void step();
 
@@ -46,7 +53,7 @@ class LayerSimulation {
     bool is_veil() const { return options_.is_veil; }
     DensityGrid veil_at(double time_s) const;
     // Whether there is a density, and the box that it fills.
-    bool has_density() const { return automaton_ || options_.is_veil; }
+    bool has_density() const { return options_.automaton || options_.is_veil; }
     GridBox box() const;
     // What lies beyond the box of its density; a veil ends at its sides.
     Boundaries boundaries() const;
@@ -69,7 +76,8 @@ class LayerSimulation {
     VeilOptions veil_;
     Wind wind_;                // of a veil
     std::string veil_text_;    // what its hash is made of
-    std::uint64_t steps_ = 0;  // of a veil
+    std::uint64_t steps_ = 0;  // of a layer without automaton and sky
+    GridBox box_;              // of its density
     std::vector<AttachedRain> attached_;
     std::optional<Automaton> automaton_;
     std::optional<SkySimulation> sky_;
@@ -77,7 +85,24 @@ class LayerSimulation {
 };
 
 // Every layer of a scene at step 0. `initial` only for a scene without layers.
-std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial = {});
+std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial = {},
+                                         LayerParts parts = LayerParts::all);
+
+// Reads the state that the simulation starts from: the file `from`, else the scene's initial_state_file; none
+// where the scene names no file (its own start). Throws as read_state().
+std::optional<Lattice> initial_state(const Scene& scene, const std::string& from = {});
+
+// The state at step 0 and the hash that identify a simulation.
+struct SimulationStart {
+    std::optional<Lattice> initial;  // as initial_state()
+    std::string simulation_hash;     // of the scene with that state (scenes/format/writer.h)
+};
+SimulationStart simulation_start(const Scene& scene);
+
+// Makes every layer at step 0, after a check of memory. `scene_file` names the scene in errors. Throws
+// Error(usage) when a scene with layers is to start from a file.
+std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string& scene_file,
+                                          const std::string& from);
 
 // The hash of a state of all layers: that of the only one, otherwise XXH3-128 of theirs in order.
 StateHash combined_hash(std::span<const StateHash> hashes);

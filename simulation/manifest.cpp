@@ -2,6 +2,7 @@
 #include "simulation/manifest.h"
 
 #include <array>
+#include <charconv>
 #include <fstream>
 #include <string_view>
 
@@ -30,6 +31,33 @@ std::string relative(const RunSettings& settings, const std::filesystem::path& p
     return path.lexically_relative(settings.folder).generic_string();
 }
 
+Json rain_json(const RainRecord& area) {
+    constexpr std::array kSources{"placed", "attached", "found"};
+    return {{"id", fmt::format("{:016x}", area.id)},
+            {"layer", area.layer},
+            {"source", kSources.at(std::size_t(area.id >> 62))},
+            {"centre_m", {area.x_m, area.y_m}},
+            {"semi_axes_m", {area.semi_a_m, area.semi_b_m}},
+            {"yaw_deg", area.yaw_deg},
+            {"intensity_mm_per_h", area.intensity_mm_per_h}};
+}
+
+RainRecord rain_record(const Json& json) {
+    RainRecord area;
+    const auto id = json.at("id").get<std::string>();
+    const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), area.id, 16);
+    if (error != std::errc() || end != id.data() + id.size())
+        throw Error(ErrorCode::io, "'" + id + "' is not the number of a rain area");
+    area.layer = json.at("layer").get<std::string>();
+    area.x_m = json.at("centre_m").at(0).get<double>();
+    area.y_m = json.at("centre_m").at(1).get<double>();
+    area.semi_a_m = json.at("semi_axes_m").at(0).get<double>();
+    area.semi_b_m = json.at("semi_axes_m").at(1).get<double>();
+    area.yaw_deg = json.at("yaw_deg").get<double>();
+    area.intensity_mm_per_h = json.at("intensity_mm_per_h").get<double>();
+    return area;
+}
+
 Json frame_json(const RunSettings& settings, const FrameRecord& frame, const ManifestState& state,
                 const RunFolder& folder) {
     const FrameOptions& frames = settings.scene.frames;
@@ -50,19 +78,11 @@ Json frame_json(const RunSettings& settings, const FrameRecord& frame, const Man
     }
     if (!layers.empty()) entry["layers"] = std::move(layers);
     const auto rain = state.rain.find(frame.number);
-    if (rain != state.rain.end()) entry["rain"] = Json::parse(rain->second);
+    if (rain == state.rain.end()) return entry;
+    Json areas = Json::array();
+    for (const RainRecord& area : rain->second) areas.push_back(rain_json(area));
+    entry["rain"] = std::move(areas);
     return entry;
-}
-
-Json area_json(const RainArea& area, const std::string& layer) {
-    constexpr std::array kSources{"placed", "attached", "found"};
-    return {{"id", fmt::format("{:016x}", area.id)},
-            {"layer", layer},
-            {"source", kSources.at(std::size_t(area.id >> 62))},
-            {"centre_m", {area.x_m, area.y_m}},
-            {"semi_axes_m", {area.semi_a_m, area.semi_b_m}},
-            {"yaw_deg", degrees_of_vector(area.axis_x, area.axis_y)},
-            {"intensity_mm_per_h", area.intensity_mm_per_h}};
 }
 
 Json bounds_json(const Scene& scene, const GridBox& box) {
@@ -116,7 +136,8 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
                      {"file", settings.scene_file},
                      {"hash", settings.scene_hash},
                      {"simulation_hash", settings.simulation_hash},
-                     {"seed", std::to_string(scene.automaton.seed)}};
+                     {"seed", std::to_string(scene.automaton.seed)},
+                     {"steps", scene.steps}};
     json["range"] = {{"last_step", settings.range.last_step},
                      {"first_frame", settings.range.first_frame},
                      {"last_frame", settings.range.last_frame},
@@ -162,24 +183,31 @@ void write_manifest(const RunSettings& settings, const ManifestState& state) {
     });
 }
 
-std::string rain_text(const FrameResult& frame) {
-    Json areas = Json::array();
+std::vector<RainRecord> rain_of(const FrameResult& frame) {
+    std::vector<RainRecord> areas;
     for (const LayerFrame& layer : frame.layers) {
-        for (const RainArea& area : layer.rain) areas.push_back(area_json(area, layer.name));
+        for (const RainArea& area : layer.rain) {
+            areas.push_back({area.id, layer.name, area.x_m, area.y_m, area.semi_a_m, area.semi_b_m,
+                             degrees_of_vector(area.axis_x, area.axis_y), area.intensity_mm_per_h});
+        }
     }
-    return areas.empty() ? std::string() : areas.dump();
+    return areas;
 }
 
-std::map<int, std::string> read_rain(const std::filesystem::path& path) {
+std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& path) {
     require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
     try {
-        std::map<int, std::string> rain;
+        std::map<int, std::vector<RainRecord>> rain;
         const Json json = Json::parse(stream);
         for (const Json& frame : json.at("frames")) {
-            if (frame.contains("rain")) rain[frame.at("number").get<int>()] = frame.at("rain").dump();
+            if (!frame.contains("rain")) continue;
+            std::vector<RainRecord>& areas = rain[frame.at("number").get<int>()];
+            for (const Json& area : frame.at("rain")) areas.push_back(rain_record(area));
         }
         return rain;
+    } catch (const Error& error) {
+        throw Error(ErrorCode::io, path.string() + ": " + error.what());
     } catch (const nlohmann::json::exception&) {
         throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
     }
@@ -203,6 +231,8 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
         run.simulation_hash = json.at("scene").at("simulation_hash").get<std::string>();
         run.render = json.at("range").at("pictures").get<bool>();
         run.range.last_step = json.at("range").at("last_step").get<std::uint64_t>();
+        // Manifests of earlier versions do not name the scene's steps; without --frames they are the last step.
+        run.scene_steps = json.at("scene").value("steps", run.range.last_step);
         run.range.first_frame = json.at("range").at("first_frame").get<int>();
         run.range.last_frame = json.at("range").at("last_frame").get<int>();
         run.steps_reported = json.at("steps").at("reported").get<std::uint64_t>();

@@ -23,14 +23,23 @@ struct FrameRecord {
     StateHash state_hash;
 };
 
+// A rain area of a frame, as the manifest lists it.
+struct RainRecord {
+    std::uint64_t id = 0;  // as RainArea::id
+    std::string layer;
+    double x_m = 0, y_m = 0;            // centre, world
+    double semi_a_m = 0, semi_b_m = 0;  // semi-axes of the ellipse
+    double yaw_deg = 0;                 // of the first, counter-clockwise from east
+    double intensity_mm_per_h = 0;
+};
+
 // What a run tells its manifest.
 struct ManifestState {
     bool complete = false;
     std::uint64_t steps_reported = 0;
     std::string state_hash;  // at the last reported step
     std::vector<FrameRecord> frames;
-    std::map<int, std::string>
-        rain;  // frame: its rain areas as JSON, by rain_text(); frames without rain left out
+    std::map<int, std::vector<RainRecord>> rain;  // by number of the frame; frames without rain left out
     double wall_s = 0;
     std::string backend, device;  // that drew; empty without pictures
 };
@@ -39,19 +48,20 @@ struct ManifestState {
 // some 200 bytes a frame, against seconds between two checkpoints. Throws Error(io).
 void write_manifest(const RunSettings& settings, const ManifestState& state);
 
-// The rain areas of a frame as the manifest lists them; empty without any.
-std::string rain_text(const FrameResult& frame);
+// Returns the rain areas of all layers of a frame.
+std::vector<RainRecord> rain_of(const FrameResult& frame);
 
-// Those that the manifest of an earlier run lists, for ManifestState::rain. Throws Error(io) as
+// Reads those that the manifest of an earlier run lists, exactly as they were. Throws Error(io) as
 // read_manifest().
-std::map<int, std::string> read_rain(const std::filesystem::path& path);
+std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& path);
 
 // What a later run must know about an earlier one.
 struct EarlierRun {
     bool complete = false;
     std::string name, scene_hash, simulation_hash;
+    std::uint64_t scene_steps = 0;  // `time.steps` of its scene
     bool render = true;
-    PipelineRange range;
+    SimulationRange range;
     std::uint64_t steps_reported = 0;
 };
 

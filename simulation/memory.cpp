@@ -5,23 +5,25 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/format.h>
+
 #include "automaton/automaton.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "simulation/frame_output.h"
 
 namespace nephos {
 namespace {
 
 constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
+// Of the state and the history, while a checkpoint is made or read: of layers a growing buffer and the file's content;
+// of one lattice the file's content and its parts.
 constexpr double kCheckpointCopies = 3;
+constexpr double kCheckpointCopiesOfLattice = 2;
 // 43 MiB on two cores; threads have heaps of their own.
 constexpr std::size_t kProgram = std::size_t(64) << 20;
-constexpr double kGrids = 3;  // two steps and the frame between them
-// Frames under way in simulation/frame_output.h: one that is written and one that waits for it; before them, with
-// pictures, one that a graphics card draws and one that is prepared for it.
-constexpr double kFramesWritten = 2;
-constexpr double kFramesDrawn = 2;
+constexpr double kGrids = 3;              // two steps and the frame between them
 constexpr double kBytesPerVoxel = 4.5;    // a float, and the masks and nodes of the tree above it
 constexpr double kBytesPerVelocity = 13;  // three floats and the same
 constexpr double kBytesPerBits = 1;       // hum, act and cld with their masks and nodes
@@ -70,6 +72,15 @@ namespace {
 double voxels_of_size(const AutomatonOptions& lattice, double voxel_m) {
     const double per_cell = lattice.placement.cell_size_m / voxel_m;
     return voxels_in_blocks(lattice.extent, 1) * per_cell * per_cell * per_cell;
+}
+
+// Planes of bits alone: nothing of earlier states is remembered.
+MemoryEstimate statistics_estimate(const Scene& scene, const AutomatonOptions& lattice) {
+    const double copies = scene.layers.empty() ? kCheckpointCopiesOfLattice : kCheckpointCopies;
+    MemoryEstimate estimate;
+    estimate.automaton = sum(Automaton::memory_bytes(lattice),
+                             saturated(copies * 3 * double(BitPlane::bytes(lattice.extent))));
+    return estimate;
 }
 
 MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& lattice, double under_way) {
@@ -135,40 +146,43 @@ double mirror_bytes(const Scene& scene, double pixels) {
 
 }  // namespace
 
-MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures) {
+MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
     MemoryEstimate estimate;
     estimate.program = kProgram;
-    const double under_way = kFramesWritten + (with_pictures ? kFramesDrawn : 0);
+    const bool frames = parts != RunParts::statistics, pictures = parts == RunParts::pictures;
+    const double under_way =
+        (frames ? double(kFramesWritten) : 0) + (pictures ? double(kFramesDrawn + kFramesPrepared) : 0);
     double cells = 0;
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
         if (!scene.layers.empty() && !has_density(scene.layers[n])) continue;
         const AutomatonOptions options = automaton_options(scene, n);
         const bool veil = !scene.layers.empty() && scene.layers[n].is_veil;
-        const MemoryEstimate lattice =
-            veil ? veil_estimate(scene, options, under_way) : lattice_estimate(scene, options, under_way);
+        const MemoryEstimate lattice = veil     ? veil_estimate(scene, options, under_way)
+                                       : frames ? lattice_estimate(scene, options, under_way)
+                                                : statistics_estimate(scene, options);
         estimate.automaton = sum(estimate.automaton, lattice.automaton);
         estimate.density = sum(estimate.density, lattice.density);
         cells += double(options.extent.x) * options.extent.y * options.extent.z;
     }
-    estimate.density =
-        sum(estimate.density, saturated(combined_bytes(scene, under_way) + ground_bytes(scene, under_way)));
-    if (!with_pictures) return estimate;
+    const double combined = frames ? combined_bytes(scene, under_way) : 0;
+    estimate.density = sum(estimate.density, saturated(combined + ground_bytes(scene, under_way)));
+    if (!pictures) return estimate;
     const double pixels = double(scene.render.camera.width) * scene.render.camera.height;
     const double texels = double(scene.render.shadow_map_size) * scene.render.shadow_map_size;
     const double metaballs = cells * kPlannedCover;
     estimate.pictures =
         saturated(metaballs * kBytesPerMetaball + pixels * kBytesPerPixel + texels * kBytesPerShadowTexel +
                   mirror_bytes(scene, pixels) +
-                  kFramesWritten * (pixels * kBytesPerPictureWritten + texels * sizeof(float)));
+                  double(kFramesWritten) * (pixels * kBytesPerPictureWritten + texels * sizeof(float)));
     return estimate;
 }
 
-std::size_t memory_estimate_bytes(const Scene& scene, bool with_pictures) {
-    return memory_estimate(scene, with_pictures).total();
+std::size_t memory_estimate_bytes(const Scene& scene, RunParts parts) {
+    return memory_estimate(scene, parts).total();
 }
 
-void check_memory(const Scene& scene, const AvailableMemory& available, bool with_pictures) {
-    const MemoryEstimate estimate = memory_estimate(scene, with_pictures);
+void check_memory(const Scene& scene, const AvailableMemory& available, RunParts parts) {
+    const MemoryEstimate estimate = memory_estimate(scene, parts);
     if (estimate.total() <= available.bytes) return;
     const Extent& extent = scene.automaton.extent;
     const auto text = [](int number) { return std::to_string(number); };
@@ -182,8 +196,14 @@ void check_memory(const Scene& scene, const AvailableMemory& available, bool wit
                                       bytes_text(available.bytes) + ": expected " + advice(estimate));
 }
 
-void check_memory(const Scene& scene, bool with_pictures) {
-    check_memory(scene, available_memory(), with_pictures);
+void check_memory(const Scene& scene, RunParts parts) { check_memory(scene, available_memory(), parts); }
+
+void require_memory(std::size_t bytes, const std::string& what) {
+    const AvailableMemory available = available_memory();
+    if (bytes <= available.bytes) return;
+    throw Error(ErrorCode::usage,
+                fmt::format("{} takes about {}, but {} ({}) are all there is", what, bytes_text(bytes),
+                            bytes_text(available.bytes), available.limit));
 }
 
 }  // namespace nephos

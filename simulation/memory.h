@@ -5,11 +5,19 @@
 // with both figures, instead of being killed half-way.
 
 #include <cstddef>
+#include <string>
 
 #include "core/memory.h"
 #include "scenes/format/scene.h"
 
 namespace nephos {
+
+// Parts of a run that take memory; each includes those before it.
+enum class RunParts {
+    statistics,  // from the bits alone
+    density,     // and density files
+    pictures,
+};
 
 // Bytes that a run of a scene takes at its peak, by part; the largest std::size_t when they exceed it. Planes
 // of bits are exact. Grids are reckoned with some cloud in every one of their blocks, as an overcast sky and
@@ -24,14 +32,17 @@ struct MemoryEstimate {
     std::size_t total() const;
 };
 
-MemoryEstimate memory_estimate(const Scene& scene, bool with_pictures = true);
+MemoryEstimate memory_estimate(const Scene& scene, RunParts parts = RunParts::pictures);
 
 // memory_estimate().total()
-std::size_t memory_estimate_bytes(const Scene& scene, bool with_pictures = true);
+std::size_t memory_estimate_bytes(const Scene& scene, RunParts parts = RunParts::pictures);
 
 // Throws Error(usage) that names both figures, the largest part and the keys that it depends on, when the
 // scene needs more than is available.
-void check_memory(const Scene& scene, const AvailableMemory& available, bool with_pictures = true);
-void check_memory(const Scene& scene, bool with_pictures = true);
+void check_memory(const Scene& scene, const AvailableMemory& available, RunParts parts = RunParts::pictures);
+void check_memory(const Scene& scene, RunParts parts = RunParts::pictures);
+
+// Throws Error(usage) unless `bytes` of memory are available; `what` starts the sentence.
+void require_memory(std::size_t bytes, const std::string& what);
 
 }  // namespace nephos

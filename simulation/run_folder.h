@@ -25,7 +25,7 @@
 
 #include "render/renderer.h"
 #include "scenes/format/scene.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 
@@ -47,19 +47,26 @@ struct RunFolder {
 
 struct RunSettings {
     Scene scene;
-    std::optional<Lattice> initial;  // the state at step 0, when it is not the scene's own
+    std::optional<Lattice> initial;  // the state at step 0, when it is not the scene's own; taken by the run
     std::string scene_file;          // as the manifest names it
     std::string scene_text;          // canonical
     std::string scene_hash;          // of everything in the scene
     std::string simulation_hash;     // of what decides the automaton's bits
-    PipelineRange range;
-    bool render = true;      // pictures too
-    DeviceOptions device{};  // what draws them, whatever scene.frames says
+    SimulationRange range;
+    bool statistics_only = false;  // no frames: statistics of every step (SimulationResults::statistics)
+    bool render = true;            // pictures too
+    DeviceOptions device{};        // what draws them, whatever scene.frames says
     std::filesystem::path folder;
     bool resume = false;             // go on from the folder's checkpoint
     bool overwrite = false;          // start anew although the folder holds what would be lost
     double checkpoint_every_s = 60;  // wall time between checkpoints; 0 = after every piece of work
+
+    SimulationResults results() const;
 };
+
+// Returns the settings of a run of the whole scene into out/NAME: its first state, text and hashes. `scene_file`
+// is where the scene comes from. Throws as read_state().
+RunSettings run_settings(Scene scene, const std::string& scene_file);
 
 struct RunProgress {
     std::uint64_t steps = 0, steps_in_all = 0;
@@ -80,6 +87,9 @@ struct RunFiles {
 };
 
 struct RunReport {
+    std::string scene, scene_hash, simulation_hash;  // as in RunSettings
+    std::filesystem::path folder;
+    std::uint64_t last_step = 0;  // that the run has or will have
     bool complete = false;
     std::uint64_t first_step = 0;      // 0, or where it was resumed
     std::uint64_t steps_taken = 0;     // by the automaton, those ahead of the results included
@@ -91,8 +101,9 @@ struct RunReport {
     std::vector<RunFiles> files;
 };
 
-// What a run of this scene with pictures writes of them: any, which takes a back-end; a video, which
-// takes the ffmpeg command.
+// What a run of this scene with pictures writes of them: PNG files, for themselves or beside the video; any, which
+// takes a back-end; a video, which takes the ffmpeg command.
+bool wants_png(const Scene& scene);
 bool wants_pictures(const Scene& scene);
 bool wants_video(const Scene& scene);
 
@@ -101,6 +112,6 @@ bool wants_video(const Scene& scene);
 // written or read, or when another run is writing into the folder. Before anything is simulated: Error(gpu)
 // when pictures are wanted and the device that is asked for is not there, Error(io) when a video is wanted and there is no ffmpeg.
 // After any exception the folder can be resumed from its last checkpoint.
-RunReport run_scene(const RunSettings& settings, const RunObserver& observer);
+RunReport run_scene(RunSettings settings, const RunObserver& observer);
 
 }  // namespace nephos

@@ -1,49 +1,392 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/simulation.h"
 
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
 #include <fmt/format.h>
 
 #include "core/error.h"
-#include "core/text.h"
-#include "density/vdb/vdb_file.h"
-#include "simulation/memory.h"
+#include "density/combine.h"
+#include "density/smoothing.h"
 
 namespace nephos {
+namespace {
 
-void require_memory(std::size_t bytes, const std::string& what) {
-    const AvailableMemory available = available_memory();
-    if (bytes <= available.bytes) return;
-    throw Error(ErrorCode::usage,
-                fmt::format("{} takes about {}, but {} ({}) are all there is", what, bytes_text(bytes),
-                            bytes_text(available.bytes), available.limit));
-}
-
-std::optional<Lattice> initial_state(const Scene& scene, const std::string& from) {
-    const AutomatonOptions& lattice = scene.automaton;
-    if (!from.empty()) return read_state(from, lattice.extent, lattice.placement);
-    if (scene.initial_state_file) {
-        return read_state(*scene.initial_state_file, lattice.extent, lattice.placement);
-    }
-    return {};
-}
-
-std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string& scene_file,
-                                          const std::string& from) {
-    if (!from.empty() && !scene.layers.empty()) {
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: has layers, but --from gives the state of one lattice", scene_file));
-    }
-    std::size_t bytes = 0;
+// Layers whose state is about to be replaced: empty lattices are the cheapest to make.
+std::vector<LayerSimulation> blank_layers(const Scene& scene, LayerParts parts) {
+    std::vector<LayerSimulation> layers;
+    layers.reserve(lattice_count(scene));
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
-        if (!scene.layers.empty() && scene.layers[n].is_veil) continue;  // holds nothing
-        bytes += Automaton::memory_bytes(automaton_options(scene, n));
+        const Extent extent = automaton_options(scene, n).extent;
+        layers.emplace_back(scene, n, Lattice{BitPlane(extent), BitPlane(extent), BitPlane(extent)}, parts);
     }
-    const Extent& extent = scene.automaton.extent;
-    require_memory(bytes, scene.layers.empty()
-                              ? fmt::format("{}: a lattice of {} x {} x {} cells", scene_file, extent.x,
-                                            extent.y, extent.z)
-                              : fmt::format("{}: {} layers", scene_file, scene.layers.size()));
-    return make_layers(scene, initial_state(scene, from));
+    return layers;
+}
+
+BitPlane copy_of(const BitPlaneView& view) {
+    BitPlane plane(view.extent);
+    std::copy_n(view.words, view.word_count(), plane.words().begin());
+    return plane;
+}
+
+// Cells of a box in all, and the volume that they fill.
+double volume_m3(const GridBox& box) {
+    const double edge = box.placement.cell_size_m;
+    return double(box.extent.cells()) * edge * edge * edge;
+}
+
+// Statistics of several layers as those of the whole sky (StepResult).
+class TotalStatistics {
+  public:
+    void add(const CloudStatistics& layer, double volume_m3) {
+        total_.hum += layer.hum;
+        total_.act += layer.act;
+        total_.cld += layer.cld;
+        clear_ *= 1 - layer.cover;
+        base_ = std::fmin(base_, layer.base_m);
+        top_ = std::fmax(top_, layer.top_m);
+        density_ += layer.mean_density * volume_m3;
+        volume_ += volume_m3;
+    }
+    CloudStatistics result() const {
+        CloudStatistics total = total_;
+        total.cover = 1 - clear_;
+        total.base_m = base_;
+        total.top_m = top_;
+        total.mean_density = volume_ > 0 ? density_ / volume_ : 0;
+        return total;
+    }
+
+  private:
+    CloudStatistics total_;
+    double clear_ = 1, density_ = 0, volume_ = 0;
+    double base_ = std::numeric_limits<double>::quiet_NaN(), top_ = base_;
+};
+
+std::optional<GroundCover> dry_or_covered(const Scene& scene) {
+    if (!scene.ground_cover.enabled) return {};
+    return GroundCover(scene.ground_cover, scene.render.precipitation.kind, whole_world(scene));
+}
+
+LayerParts parts_for(SimulationResults results) {
+    return results == SimulationResults::weather ? LayerParts::weather : LayerParts::all;
+}
+
+CloudStatistics no_automaton() {
+    CloudStatistics none;
+    none.base_m = none.top_m = std::numeric_limits<double>::quiet_NaN();
+    return none;
+}
+
+}  // namespace
+
+SimulationRange full_range(const Scene& scene) { return {scene.steps, 1, frame_count(scene)}; }
+
+SimulationRange range_of_frames(const Scene& scene, int first, int last) {
+    const int count = frame_count(scene);
+    if (last == kLastFrame) last = count;
+    if (first < 1 || last < first || last > count) {
+        throw Error(ErrorCode::usage,
+                    count == 0
+                        ? fmt::format("the scene '{}' has no frames", scene.name)
+                        : fmt::format("no such frame: the scene '{}' has frames 1 to {}", scene.name, count));
+    }
+    return {steps_up_to(moment_of_frame(scene, last - 1)), first, last};
+}
+
+Simulation::Simulation(const Scene& scene) : Simulation(scene, simulation_start(scene)) {}
+
+Simulation::Simulation(const Scene& scene, SimulationStart start)
+    : Simulation(scene, full_range(scene), std::move(start.simulation_hash), std::move(start.initial)) {}
+
+Simulation::Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
+                       std::optional<Lattice> initial, SimulationResults results)
+    : scene_(scene),
+      range_(range),
+      results_(results),
+      simulation_hash_(std::move(simulation_hash)),
+      layers_(make_layers(scene, std::move(initial), parts_for(results))),
+      ground_(dry_or_covered(scene)),
+      next_frame_(range.first_frame) {
+    if (results_ == SimulationResults::statistics && range_.last_frame >= range_.first_frame)
+        throw Error(ErrorCode::usage, "statistics alone have no frames");
+    if (range_.last_frame >= range_.first_frame &&
+        steps_up_to(moment_of_number(range_.last_frame)) > range_.last_step) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("frame {} shows {:g} s, but the simulation ends at {:g} s", range_.last_frame,
+                                frame_time_s(scene_.frames, range_.last_frame - 1),
+                                double(range_.last_step) * scene_.automaton.time_step_s));
+    }
+    remember();
+}
+
+Simulation::Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
+                       const Checkpoint& checkpoint, SimulationResults results)
+    : scene_(scene),
+      range_(range),
+      results_(results),
+      simulation_hash_(std::move(simulation_hash)),
+      layers_(blank_layers(scene, parts_for(results))),
+      ground_(dry_or_covered(scene)) {
+    if (checkpoint.simulation_hash != simulation_hash_) {
+        throw Error(ErrorCode::usage, "the checkpoint belongs to another simulation");
+    }
+    restore_layers(checkpoint);
+    if (steps_taken() != checkpoint.steps || combined_hash(layers_) != checkpoint.state) {
+        throw Error(ErrorCode::io, "the checkpoint's state does not have the hash that it names");
+    }
+    restore_history(checkpoint);
+}
+
+std::uint64_t Simulation::steps_in_all() const { return range_.last_step + window(); }
+
+// Steps on either side of a step that its density is smoothed over.
+std::uint64_t Simulation::window() const {
+    return results_ == SimulationResults::everything ? std::uint64_t(scene_.density.smoothing.t0) : 0;
+}
+
+bool Simulation::makes_density(std::size_t layer) const {
+    if (results_ == SimulationResults::everything) return layers_[layer].has_density();
+    return results_ == SimulationResults::statistics && layers_[layer].is_veil();
+}
+
+bool Simulation::remembers_planes(std::size_t layer) const {
+    return results_ == SimulationResults::everything && layers_[layer].automaton() != nullptr;
+}
+
+bool Simulation::finished() const { return next_step_ > range_.last_step && next_frame_ > range_.last_frame; }
+
+Moment Simulation::moment_of_number(int number) const { return moment_of_frame(scene_, number - 1); }
+
+bool Simulation::density_is_due(std::uint64_t step) const { return steps_taken() >= step + window(); }
+
+// The lowest step whose density a result still needs, also one of a longer range: all frames that the scene's
+// steps hold are then followed by more.
+std::uint64_t Simulation::lowest_needed() const {
+    const bool frames_follow = scene_.frames.count == 0 && range_ == full_range(scene_);
+    std::uint64_t lowest = next_step_;
+    if (next_frame_ <= range_.last_frame || (frames_follow && next_frame_ <= kMaxFrames))
+        lowest = std::min(lowest, moment_of_number(next_frame_).step);
+    return lowest;
+}
+
+void Simulation::advance(SimulationSink& sink) {
+    assert(!finished());
+    const bool frames_left = next_frame_ <= range_.last_frame;
+    const std::uint64_t frame_needs = frames_left ? steps_up_to(moment_of_number(next_frame_)) : 0;
+    if (frames_left && frame_needs < next_step_ && density_is_due(frame_needs)) {
+        report_frame(sink);
+    } else if (next_step_ <= range_.last_step && density_is_due(next_step_)) {
+        report_step(sink);
+    } else {
+        step();
+    }
+}
+
+void Simulation::step() {
+    for (LayerSimulation& layer : layers_) layer.step();
+    if (ground_) ground_->advance(scene_.automaton.time_step_s);
+    remember();
+}
+
+void Simulation::report_step(SimulationSink& sink) {
+    const std::vector<DensityGrid>& densities = densities_at_step(next_step_);
+    const Past& state = past(next_step_);
+    StepResult result;
+    result.step = state.step;
+    result.time_s = double(state.step) * scene_.automaton.time_step_s;
+    result.hash = state.hash;
+    TotalStatistics total;
+    for (std::size_t n = 0; n < layers_.size(); ++n) {
+        const PastLayer& past = state.layers[n];
+        LayerStep layer{layers_[n].name(), past.state, past.clouds.size(), past.rain.size(), 0,
+                        past.statistics,   past.hash};
+        for (const RainArea& area : past.rain) {
+            layer.rain_mm_per_h = std::max(layer.rain_mm_per_h, area.intensity_mm_per_h);
+        }
+        if (layers_[n].has_density()) {
+            const GridBox box = layers_[n].box();
+            if (layers_[n].is_veil() && makes_density(n)) layer.statistics = cloud_statistics(densities[n]);
+            layer.statistics.mean_density = makes_density(n) ? densities[n].sum() / double(box.extent.cells())
+                                                             : std::numeric_limits<double>::quiet_NaN();
+            total.add(layer.statistics, volume_m3(box));
+        }
+        result.layers.push_back(std::move(layer));
+    }
+    result.statistics = layers_.size() == 1 ? result.layers.front().statistics : total.result();
+    if (scene_.layers.empty()) result.layers.clear();
+    sink.step(result);
+    ++next_step_;
+    forget();
+}
+
+double Simulation::time_s(const Moment& moment) const {
+    return (double(moment.step) + moment.fraction) * scene_.automaton.time_step_s;
+}
+
+DensityGrid Simulation::density_at(std::size_t layer, const Moment& moment) {
+    if (moment.fraction != 0 && layers_[layer].is_veil()) return layers_[layer].veil_at(time_s(moment));
+    const DensityGrid before = densities_at_step(moment.step)[layer];
+    if (moment.fraction == 0 || !layers_[layer].automaton()) return before;
+    return mix(before, densities_at_step(moment.step + 1)[layer], moment.fraction);
+}
+
+// A layer at a moment between two steps.
+LayerFrame Simulation::layer_frame(std::size_t layer, const Moment& moment) {
+    LayerFrame frame;
+    frame.name = layers_[layer].name();
+    if (makes_density(layer)) frame.density = density_at(layer, moment);
+    frame.boundaries = layers_[layer].boundaries();
+    const PastLayer& state = past(moment.step).layers[layer];
+    frame.hash = state.hash;
+    frame.direct = !layers_[layer].has_density();
+    frame.sky = layers_[layer].sky();
+    frame.rain = state.rain;
+    if (scene_.density.write_state && remembers_planes(layer)) {
+        frame.planes = state.planes;
+        frame.hum = state.planes->hum.view();
+        frame.act = state.planes->act.view();
+        frame.cld = state.planes->cld.view();
+    }
+    const double step_s = scene_.automaton.time_step_s, at_s = double(moment.step) * step_s;
+    for (const SkyCloud& cloud : state.clouds) {
+        frame.clouds.push_back(frame.sky->ahead(cloud, at_s, moment.fraction * step_s));
+    }
+    if (moment.fraction > 0) {
+        frame.rain = mix(state.rain, past(moment.step + 1).layers[layer].rain, moment.fraction);
+    }
+    return frame;
+}
+
+std::shared_ptr<const GroundCoverMap> Simulation::ground_at(const Moment& moment) const {
+    const std::shared_ptr<const GroundCoverMap>& before = past(moment.step).ground;
+    if (moment.fraction == 0 || !before) return before;
+    return std::make_shared<const GroundCoverMap>(
+        mix(*before, *past(moment.step + 1).ground, moment.fraction));
+}
+
+void Simulation::report_frame(SimulationSink& sink) {
+    const Moment moment = moment_of_number(next_frame_);
+    FrameResult result;
+    result.number = next_frame_;
+    result.time_s = frame_time_s(scene_.frames, next_frame_ - 1);
+    result.step = moment.step;
+    result.hash = past(moment.step).hash;
+    std::vector<DensityGrid> densities;
+    std::vector<Boundaries> boundaries;
+    for (std::size_t n = 0; n < layers_.size(); ++n) {
+        result.layers.push_back(layer_frame(n, moment));
+        if (!makes_density(n)) continue;
+        densities.push_back(result.layers.back().density);
+        boundaries.push_back(result.layers.back().boundaries);
+    }
+    if (!densities.empty()) result.density = combine(densities, boundaries);
+    result.ground = ground_at(moment);
+    if (scene_.layers.empty()) {
+        result.hum = result.layers.front().hum;
+        result.act = result.layers.front().act;
+        result.cld = result.layers.front().cld;
+        result.planes = result.layers.front().planes;
+        result.layers.clear();
+    }
+    sink.frame(result);
+    ++next_frame_;
+    forget();
+}
+
+Simulation::PastLayer Simulation::past_of(std::size_t number) const {
+    const LayerSimulation& layer = layers_[number];
+    PastLayer state;
+    state.hash = layer.hash();
+    state.statistics = no_automaton();
+    Lattice planes;
+    if (const Automaton* automaton = layer.automaton()) {
+        state.statistics = cloud_statistics(automaton->hum(), automaton->act(), automaton->cld(),
+                                            automaton->options().placement);
+    }
+    if (remembers_planes(number)) {
+        planes.cld = copy_of(layer.automaton()->cld());
+        if (scene_.density.write_state) {
+            planes.hum = copy_of(layer.automaton()->hum());
+            planes.act = copy_of(layer.automaton()->act());
+        }
+    }
+    state.planes = std::make_shared<const Lattice>(std::move(planes));
+    if (const SkySimulation* sky = layer.sky()) {
+        state.state = sky->state();
+        state.clouds.assign(sky->clouds().begin(), sky->clouds().end());
+        state.rain = layer.rain();
+    }
+    return state;
+}
+
+void Simulation::remember() {
+    Past state;
+    state.step = steps_taken();
+    std::vector<StateHash> hashes;
+    for (std::size_t n = 0; n < layers_.size(); ++n) {
+        state.layers.push_back(past_of(n));
+        hashes.push_back(state.layers.back().hash);
+    }
+    state.hash = combined_hash(hashes);
+    if (ground_) expose_ground(state);
+    history_.push_back(std::move(state));
+    forget();
+}
+
+// The rain areas of a new state fall onto the ground, which lies as it does now.
+void Simulation::expose_ground(Past& state) {
+    const double time_s = double(state.step) * scene_.automaton.time_step_s;
+    std::vector<FallingRain> falling;
+    for (std::size_t n = 0; n < scene_.layers.size(); ++n) {
+        const Range& base_m = scene_.layers[n].base_height_m;
+        falling.push_back({state.layers[n].rain,
+                           drift_m(layer_wind(scene_, n), time_s, (base_m.min + base_m.max) / 2,
+                                   scene_.render.ground.height_m, scene_.ground_cover.fall_speed_m_per_s)});
+    }
+    ground_->expose(falling);
+    state.ground = std::make_shared<const GroundCoverMap>(ground_->map());
+}
+
+void Simulation::forget() {
+    const std::uint64_t lowest = lowest_needed();
+    while (history_.size() > 1 && history_.front().step + window() < lowest) history_.pop_front();
+    std::erase_if(densities_, [&](const auto& entry) { return entry.step < lowest; });
+}
+
+const Simulation::Past& Simulation::past(std::uint64_t step) const {
+    assert(!history_.empty() && step >= history_.front().step && step <= history_.back().step);
+    return history_[std::size_t(step - history_.front().step)];
+}
+
+DensityGrid Simulation::density_of(std::size_t layer, std::uint64_t step) const {
+    if (layers_[layer].is_veil()) return layers_[layer].veil_at(time_s({step, 0}));
+    const Automaton* automaton = layers_[layer].automaton();
+    if (automaton == nullptr) return {};
+    const std::uint64_t reach = window();
+    std::vector<TimedPlane> planes;
+    for (std::uint64_t at = step > reach ? step - reach : 0; at <= step + reach; ++at) {
+        planes.push_back(
+            {past(at).layers[layer].planes->cld.view(), int(std::int64_t(at) - std::int64_t(step))});
+    }
+    const AutomatonOptions& lattice = automaton->options();
+    return scaled(smooth(planes, scene_.density.smoothing, lattice.placement, lattice.boundaries),
+                  layers_[layer].opacity());
+}
+
+const std::vector<DensityGrid>& Simulation::densities_at_step(std::uint64_t step) {
+    for (const Densities& known : densities_) {
+        if (known.step == step) return known.layers;
+    }
+    Densities made{step, {}};
+    for (std::size_t n = 0; n < layers_.size(); ++n)
+        made.layers.push_back(makes_density(n) ? density_of(n, step) : DensityGrid());
+    densities_.push_back(std::move(made));
+    return densities_.back().layers;
 }
 
 }  // namespace nephos

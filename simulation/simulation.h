@@ -1,33 +1,218 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What hash, state and run share: a simulation that fits into memory and starts where the user says.
+// From a scene to its frames, without files, devices or a command line:
+//
+//     step of every layer -> history of the last states -> density q at steps -> frames between steps
+//
+// q at step s needs the states s-t0 .. s+t0, and a frame between two steps needs q at both. The history keeps
+// exactly the states that something still needs; so the automaton runs up to t0 steps ahead of the results,
+// also beyond the scene's last step. A frame therefore never depends on where the run ends.
+//
+//     Simulation simulation(scene);
+//     while (!simulation.finished()) simulation.advance(sink);
+//
+// Between any two calls of advance() the simulation can be saved; one that is restored goes on with the same
+// results.
 
-#include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <limits>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "automaton/automaton.h"
+#include "automaton/checkpoint.h"
+#include "density/density_grid.h"
+#include "density/statistics.h"
 #include "scenes/format/scene.h"
+#include "seeds/ground_cover.h"
 #include "simulation/layer_simulation.h"
 
 namespace nephos {
 
-// Most steps of one run: every step number stays exact in a double and in a 32-bit counter of randomness.
-inline constexpr std::uint64_t kMaxSteps = 1'000'000'000;
+class ByteReader;
 
-// Throws Error(usage) unless `bytes` of memory are available; `what` starts the sentence.
-void require_memory(std::size_t bytes, const std::string& what);
+// One layer after a step; a row of its own file of statistics.
+struct LayerStep {
+    std::string name;
+    double state = 0;        // of the atmosphere, 0..1
+    std::size_t clouds = 0;  // in the sky, those that form or dissolve included
+    std::size_t rain_areas = 0;
+    double rain_mm_per_h = 0;    // the strongest of them
+    CloudStatistics statistics;  // of a veil, of its voxels; all 0 of clouds drawn directly
+    StateHash hash;
+};
 
-// The state that the simulation starts from: the file `from`, else the scene's initial_state_file, else
-// nothing (the scene's own start). Throws as read_state().
-std::optional<Lattice> initial_state(const Scene& scene, const std::string& from = {});
+// One row of statistics.csv: the state after `step` steps.
+struct StepResult {
+    std::uint64_t step = 0;
+    double time_s = 0;
+    // mean_density is that of q at this step, NaN where no density is made (SimulationResults). Of several layers: sums of cells, the cover of layers that
+    // overlap at random (1 - product of 1 - cover), lowest base, highest top, mean density of all their boxes
+    // together.
+    CloudStatistics statistics;
+    StateHash hash;
+    std::vector<LayerStep> layers;  // none in a scene without layers
+};
 
-// Every layer at step 0, after a check of memory. `scene_file` names the scene in errors. Throws Error(usage)
-// when a scene with layers is to start from a file.
-std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string& scene_file,
-                                          const std::string& from);
+// One layer in a frame.
+struct LayerFrame {
+    std::string name;
+    DensityGrid density;    // one voxel a cell; without automaton there are no voxels
+    Boundaries boundaries;  // of the density's box
+    StateHash hash;
+    std::optional<BitPlaneView> hum, act, cld;  // as in FrameResult
+    std::shared_ptr<const Lattice> planes;      // what they look at
+    // Clouds at the frame's time; their shapes and models are those of `sky`, which itself stands at a later
+    // step.
+    const SkySimulation* sky = nullptr;  // null without clouds of its own; lives as long as the simulation
+    std::vector<SkyCloud> clouds;
+    bool direct = false;         // there is no density: clouds are drawn as billboards
+    std::vector<RainArea> rain;  // at the frame's time
+};
+
+// One frame: density at a moment that need not be a step. A copy is cheap, shares voxels and planes, and
+// stays valid while the simulation lives; another thread may use it while the simulation advances.
+struct FrameResult {
+    int number = 1;  // as in file names, counted from 1; 0: a moment that is no frame of the scene
+    double time_s = 0;
+    DensityGrid density;  // one voxel a cell (not refined); of layers, all together (density/combine.h)
+    std::uint64_t step =
+        0;  // the last step at or before time_s, whose state the three planes and the hash are
+    StateHash hash;
+    // Only when the scene writes the state. A scene with layers has them in these.
+    std::optional<BitPlaneView> hum, act, cld;
+    std::shared_ptr<const Lattice> planes;         // what they look at
+    std::vector<LayerFrame> layers;                // none in a scene without layers
+    std::shared_ptr<const GroundCoverMap> ground;  // at time_s; null when the scene does not ask for it
+};
+
+// Selects what a simulation computes from the states.
+enum class SimulationResults {
+    everything,  // the density of every step and frame
+    statistics,  // rows of statistics from the bits alone: no density but that of veils, and no frames
+    // Frames without density: clouds of the skies, rain and ground. Automata are stepped only where rain is
+    // looked for in them; statistics and state hashes are those of what is left.
+    weather,
+};
+
+// Receives results in the order of time; a step comes before the frames at or after it.
+class SimulationSink {
+  public:
+    virtual ~SimulationSink() = default;
+    virtual void step(const StepResult& result) = 0;
+    virtual void frame(const FrameResult& result) = 0;
+};
+
+// Which part of the scene is produced. Frames by their number, counted from 1; an empty range (last < first)
+// means no frame at all.
+struct SimulationRange {
+    std::uint64_t last_step = 0;  // steps 0..last_step are reported
+    int first_frame = 1, last_frame = 0;
+    bool operator==(const SimulationRange&) const = default;
+};
+
+// Everything that the scene names; with a range of frames, these and the steps up to the last of them.
+// `last` = kLastFrame is the last that there is; throws Error(usage) when the scene has no such frame.
+inline constexpr int kLastFrame = std::numeric_limits<int>::max();
+SimulationRange full_range(const Scene& scene);
+SimulationRange range_of_frames(const Scene& scene, int first, int last);
+
+class Simulation {
+  public:
+    // Everything of the scene, from its first state on. Throws as Automaton and read_state().
+    explicit Simulation(const Scene& scene);
+    // At step 0: from the scene's own initial state, or from `initial`. Throws as Automaton; Error(usage) when
+    // a frame of the range lies after its last step, or frames are wanted of SimulationResults::statistics.
+    Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
+               std::optional<Lattice> initial = {},
+               SimulationResults results = SimulationResults::everything);
+    // Where `checkpoint` was saved. The range may end later than that of the simulation that saved it, with
+    // frames that follow those it had. Throws Error(usage) when the checkpoint belongs to another simulation,
+    // other results, another smoothing window or another range, or does not hold the states that a longer
+    // range goes on from; Error(io) when its content is damaged.
+    Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
+               const Checkpoint& checkpoint, SimulationResults results = SimulationResults::everything);
+
+    bool finished() const;
+
+    // Does the smallest piece of work that is due: reports one step or one frame, or lets the automaton take
+    // a step. Precondition: not finished().
+    void advance(SimulationSink& sink);
+
+    // Gives back the densities, to make room for the copy; they are computed again when they are needed.
+    Checkpoint save();
+
+    std::uint64_t steps_taken() const { return layers_.front().steps(); }
+    std::uint64_t next_step() const { return next_step_; }  // the first that was not reported yet
+    int next_frame() const { return next_frame_; }          // the first that was not reported yet
+    // Steps that the automaton takes in all, those ahead included.
+    std::uint64_t steps_in_all() const;
+
+  private:
+    Simulation(const Scene& scene, SimulationStart start);
+
+    // A past state of a layer, as much of it as is still needed.
+    struct PastLayer {
+        CloudStatistics statistics;
+        StateHash hash;
+        double state = 0;
+        // Never null; all are empty without an automaton or its density, hum and act unless the scene writes
+        // the state.
+        std::shared_ptr<const Lattice> planes;
+        std::vector<SkyCloud> clouds;
+        std::vector<RainArea> rain;
+    };
+    struct Past {
+        std::uint64_t step = 0;
+        StateHash hash;
+        std::vector<PastLayer> layers;
+        std::shared_ptr<const GroundCoverMap> ground;  // null without ground cover
+    };
+    // q of all layers at a step; empty grids where there is no automaton.
+    struct Densities {
+        std::uint64_t step = 0;
+        std::vector<DensityGrid> layers;
+    };
+
+    void step();
+    void remember();
+    void expose_ground(Past& state);
+    PastLayer past_of(std::size_t layer) const;
+    void forget();
+    bool density_is_due(std::uint64_t step) const;
+    const std::vector<DensityGrid>& densities_at_step(std::uint64_t step);
+    DensityGrid density_of(std::size_t layer, std::uint64_t step) const;
+    double time_s(const Moment& moment) const;
+    DensityGrid density_at(std::size_t layer, const Moment& moment);
+    const Past& past(std::uint64_t step) const;
+    void report_step(SimulationSink& sink);
+    void report_frame(SimulationSink& sink);
+    LayerFrame layer_frame(std::size_t layer, const Moment& moment);
+    std::shared_ptr<const GroundCoverMap> ground_at(const Moment& moment) const;
+    Moment moment_of_number(int number) const;
+    std::uint64_t window() const;
+    bool makes_density(std::size_t layer) const;
+    bool remembers_planes(std::size_t layer) const;
+    std::uint64_t lowest_needed() const;
+    void restore_layers(const Checkpoint& checkpoint);
+    void restore_history(const Checkpoint& checkpoint);
+    void restore_ground(ByteReader& reader);
+
+    Scene scene_;
+    SimulationRange range_;
+    SimulationResults results_;
+    std::string simulation_hash_;
+    std::vector<LayerSimulation> layers_;  // never empty; the one of a scene without layers has no sky
+    std::optional<GroundCover> ground_;    // at the last step taken
+    std::deque<Past> history_;             // consecutive steps, the newest last; never empty
+    std::vector<Densities> densities_;     // q at steps that are still needed
+    std::uint64_t next_step_ = 0;
+    int next_frame_ = 1;
+};
 
 }  // namespace nephos

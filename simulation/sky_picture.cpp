@@ -12,7 +12,7 @@
 #include "render/options/camera.h"
 #include "seeds/light_schedule.h"
 #include "simulation/debug_view.h"
-#include "simulation/simulation.h"
+#include "simulation/memory.h"
 
 namespace nephos {
 namespace {

@@ -2,7 +2,8 @@
 #pragma once
 
 // statistics.csv: one row a step, in the order of steps, without gaps. Numbers are written so that they read
-// back exactly; a field without a value (base and top of no cloud) is empty.
+// back exactly; a field without a value (base and top of no cloud, the mean density where no density is made) is
+// empty.
 
 #include <cstdint>
 #include <filesystem>
@@ -12,7 +13,7 @@
 #include <string_view>
 
 #include "core/descriptor.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 

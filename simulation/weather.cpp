@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
+#include "density/veil.h"
 #include "scenes/format/layers.h"
 
 namespace nephos {
@@ -34,21 +34,6 @@ void lean(RainCurtain& curtain, const Wind& wind, const PrecipitationOptions& p,
 
 }  // namespace
 
-Vec2 path_m(const Wind& wind, double height_m, double time_s) {
-    std::vector<double> times{0, time_s};
-    for (const WindKeyframe& key : wind.keyframes)
-        if (key.time_s > 0 && key.time_s < time_s) times.push_back(key.time_s);
-    std::sort(times.begin(), times.end());
-    Vec2 sum{};
-    for (std::size_t i = 1; i < times.size(); ++i) {
-        const Velocity a = wind_at(wind, height_m, times[i - 1]), b = wind_at(wind, height_m, times[i]);
-        const double half = 0.5 * (times[i] - times[i - 1]);
-        sum.x += half * (a.east_m_per_s + b.east_m_per_s);
-        sum.y += half * (a.north_m_per_s + b.north_m_per_s);
-    }
-    return sum;
-}
-
 Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, double time_s) {
     const PrecipitationOptions& p = scene.render.precipitation;
     Weather weather;
@@ -57,7 +42,7 @@ Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, doubl
     const double ground_m = scene.render.ground.height_m;
     const Wind& wind = common_wind(scene);
     const Velocity now = wind_at(wind, ground_m + kAboveGround_m, time_s);
-    const Vec2 path = path_m(wind, ground_m + kAboveGround_m, time_s);
+    const Vec3 path = wind_displacement_m(wind, ground_m + kAboveGround_m, time_s);
     weather.wind_x_m_per_s = p.wind_drift * now.east_m_per_s;
     weather.wind_y_m_per_s = p.wind_drift * now.north_m_per_s;
     weather.carried_x_m = p.wind_drift * path.x;

@@ -5,16 +5,11 @@
 
 #include <span>
 
-#include "core/wind.h"
 #include "render/rain/precipitation.h"
 #include "scenes/format/scene.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
-
-// The way of the air at a height from time 0 to a time >= 0, metres east and north: the integral of the wind,
-// exact for its linear pieces. Pure.
-Vec2 path_m(const Wind& wind, double height_m, double time_s);
 
 // The curtains of all layers, from the ground of the picture to the middle of a layer's base heights, with
 // the wind 50 m above the ground: the scene's, or that of the first layer when the scene has none. A curtain

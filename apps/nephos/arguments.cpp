@@ -175,8 +175,8 @@ void add_quiet(CLI::App& command, WorkArguments& arguments) {
     command.add_flag("-q,--quiet", arguments.quiet, "No progress bar, notes or summary");
 }
 
-Scene load_scene(const SceneArguments& arguments) {
-    Scene scene = read_scene(arguments.file, arguments.overrides);
+Scene load_scene(const SceneArguments& arguments, SceneUse use) {
+    Scene scene = read_scene(arguments.file, arguments.overrides, use);
     if (arguments.seed) scene.automaton.seed = *arguments.seed;
     return scene;
 }

@@ -16,6 +16,7 @@
 
 #include "core/vec.h"
 #include "scenes/format/errors.h"
+#include "scenes/format/reader.h"
 #include "scenes/format/scene.h"
 
 namespace nephos {
@@ -73,7 +74,7 @@ std::pair<int, int> parse_size(const std::string& text);  // "WIDTHxHEIGHT"
 DeviceOptions device_options(const DeviceArguments& arguments, const FrameOptions& frames);
 
 // The scene with its changes applied. Throws as read_scene().
-Scene load_scene(const SceneArguments& arguments);
+Scene load_scene(const SceneArguments& arguments, SceneUse use = SceneUse::everything);
 
 // Every problem on standard error, "error:" in colour on a terminal.
 void print_scene_errors(const SceneErrors& errors);

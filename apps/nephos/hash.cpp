@@ -16,7 +16,7 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/random.h"
-#include "simulation/simulation.h"
+#include "simulation/layer_simulation.h"
 
 namespace nephos {
 namespace {
@@ -44,7 +44,7 @@ std::vector<std::string> expected_lines(const std::string& path) {
 
 int hash(const HashArguments& a) {
     const ThreadLimit limit(a.work.threads);
-    const Scene scene = load_scene(a.scene);
+    const Scene scene = load_scene(a.scene, SceneUse::without_frames);
     std::vector<std::string> expected;
     if (!a.check.empty()) expected = expected_lines(a.check);
     std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);

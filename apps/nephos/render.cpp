@@ -13,13 +13,9 @@
 #include "apps/nephos/commands.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
-#include "density/metaballs.h"
 #include "density/vdb/vdb_file.h"
 #include "render/image/image_file.h"
-#include "render/renderer.h"
-#include "simulation/framing.h"
-#include "simulation/simulation.h"
-#include "simulation/version.h"
+#include "simulation/volume_picture.h"
 
 namespace nephos {
 namespace {
@@ -31,11 +27,7 @@ struct RenderArguments {
     std::vector<std::string> out;
     VdbReadOptions read;
     SceneArguments scene;
-    std::optional<View> view;
-    std::optional<Vec3> camera_m, target_m;
-    std::optional<double> fov_deg, exposure_ev, extinction_per_m, albedo, g;
-    std::optional<std::pair<double, double>> sun_deg;
-    std::optional<std::pair<int, int>> size;
+    VolumePictureOptions picture;
     DeviceArguments device;
     WorkArguments work;
 };
@@ -48,7 +40,10 @@ std::string extension_of(const std::string& path) {
 
 void add_picture_options(CLI::App& command, RenderArguments& a) {
     const char* group = "Picture";
-    command.add_option("--scene", a.scene.file, "Take camera, sun, air, ground and extinction from a scene")
+    command
+        .add_option("--scene", a.scene.file,
+                    "Draw as a frame of a scene at the file's time: its camera, sun, air, ground, rain and "
+                    "extinction")
         ->type_name("SCENE")
         ->group(group);
     command.add_option("--set", a.scene.overrides, "Change a key of that scene; may be repeated")
@@ -64,7 +59,7 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
         })->group(group);
     };
     add_value(command, "--size", "WxH", "Width and height in pixels (default: 1280x720)",
-              [&](const std::string& text) { a.size = parse_size(text); })
+              [&](const std::string& text) { a.picture.size = parse_size(text); })
         ->group(group);
     add_value(command, "--view", "VIEW",
               "Where to look from: side, below or above (default: side, or the scene's camera)",
@@ -73,18 +68,18 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
                       throw Error(ErrorCode::usage,
                                   fmt::format("'{}' is not one of side, below and above", text));
                   }
-                  a.view = text == "side" ? View::side : text == "below" ? View::below : View::above;
+                  a.picture.view = text == "side" ? View::side : text == "below" ? View::below : View::above;
               })
         ->group(group);
     add_value(command, "--camera", "X,Y,Z", "Position of the eye in metres, instead of that of --view",
-              [&](const std::string& text) { a.camera_m = parse_point(text, -kFar_m, kFar_m); })
+              [&](const std::string& text) { a.picture.camera_m = parse_point(text, -kFar_m, kFar_m); })
         ->group(group);
     add_value(command, "--target", "X,Y,Z", "Point to look at in metres (default: middle of the cloud)",
-              [&](const std::string& text) { a.target_m = parse_point(text, -kFar_m, kFar_m); })
+              [&](const std::string& text) { a.picture.target_m = parse_point(text, -kFar_m, kFar_m); })
         ->group(group);
-    real("--fov", "DEG", "Vertical field of view, 1 to 170 degrees (default: 50)", a.fov_deg, 1, 170);
-    real("--exposure", "EV", "Stops by which the PNG is brighter, -20 to 20 (default: 0)", a.exposure_ev, -20,
-         20);
+    real("--fov", "DEG", "Vertical field of view, 1 to 170 degrees (default: 50)", a.picture.fov_deg, 1, 170);
+    real("--exposure", "EV", "Stops by which the PNG is brighter, -20 to 20 (default: 0)",
+         a.picture.exposure_ev, -20, 20);
     add_value(command, "--sun", "ELEV,AZIM",
               "Where the sun stands: degrees above the horizon (-18 to 90), and clockwise from north "
               "(default: 40,135)",
@@ -94,7 +89,7 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
                       throw Error(ErrorCode::usage,
                                   fmt::format("'{}': the elevation is not from -18 to 90", text));
                   }
-                  a.sun_deg = {sun[0], sun[1]};
+                  a.picture.sun_deg = {sun[0], sun[1]};
               })
         ->group(group);
 }
@@ -113,7 +108,7 @@ void add_cloud_options(CLI::App& command, RenderArguments& a) {
     real("--extinction", "PER_M",
          "Extinction per metre at density 1 (default: what the file says, else chosen so that the cloud is "
          "visible)",
-         a.extinction_per_m, 0, 1e9);
+         a.picture.extinction_per_m, 0, 1e9);
     add_value(command, "--up", "AXIS",
               "Axis of the file that points up: z or y (default: what the file says, else z)",
               [&](const std::string& text) {
@@ -127,50 +122,8 @@ void add_cloud_options(CLI::App& command, RenderArguments& a) {
               [&](const std::string& text) { a.read.metres_per_unit = parse_real(text, 1e-9, 1e9); })
         ->group(group);
     real("--albedo", "A", "Part of the light that is scattered and not absorbed, 0 to 1 (default: 1)",
-         a.albedo, 0, 1);
-    real("--g", "G", "Forward scattering of light, -0.99 to 0.99 (default: 0.5)", a.g, -0.99, 0.99);
-}
-
-// What the picture is drawn with: the scene's options, or defaults that fit the cloud, changed by the command
-// line.
-RenderOptions picture_options(const RenderArguments& a, const std::optional<Scene>& scene,
-                              const DensityGrid& grid, double time_s) {
-    RenderOptions options;
-    const WorldBox box = cloud_box(grid);
-    if (scene) {
-        options = scene->render;
-        options.camera = camera_at(options.camera, time_s);
-    } else {
-        options.camera.width = 1280;
-        options.camera.height = 720;
-        options.ground.height_m = ground_below(box);
-    }
-    if (a.size) std::tie(options.camera.width, options.camera.height) = *a.size;
-    if (a.fov_deg) options.camera.vertical_fov_deg = *a.fov_deg;
-    if (a.exposure_ev) options.camera.exposure_ev = *a.exposure_ev;
-    if (a.sun_deg) {
-        std::tie(options.sun.elevation_deg, options.sun.azimuth_deg) = *a.sun_deg;
-        options.sun.date.clear();
-        options.sun.time.clear();
-    }
-    if (a.albedo) options.light.albedo = *a.albedo;
-    if (a.g) options.light.phase.g = *a.g;
-    if (a.view || !scene) frame(options.camera, box, a.view.value_or(View::side), options.ground.height_m);
-    if (a.camera_m) options.camera.position_m = *a.camera_m;
-    if (a.target_m) options.camera.target_m = *a.target_m;
-    if (options.camera.position_m == options.camera.target_m) {
-        throw Error(ErrorCode::usage, "--camera and --target are the same point");
-    }
-    return options;
-}
-
-// What lies on the scene's ground at its start: a file of density knows no rain.
-std::optional<GroundCoverView> initial_cover(const std::optional<Scene>& scene) {
-    if (!scene || !scene->ground_cover.enabled) return {};
-    GroundCoverView cover;
-    cover.outside_water_mm = scene->ground_cover.initial_water_mm;
-    cover.outside_snow_mm = scene->ground_cover.initial_snow_mm;
-    return cover;
+         a.picture.albedo, 0, 1);
+    real("--g", "G", "Forward scattering of light, -0.99 to 0.99 (default: 0.5)", a.picture.g, -0.99, 0.99);
 }
 
 void check_outputs(const RenderArguments& a) {
@@ -180,64 +133,42 @@ void check_outputs(const RenderArguments& a) {
     }
 }
 
-// In voxels of the file: a scene's radius is in cells of the lattice, and a refined grid has several voxels a
-// cell.
-double radius_in_voxels(const std::optional<Scene>& scene, const LoadedDensity& loaded) {
-    const double cells =
-        scene ? scene->density.metaball_radius_cells : DensityOptions().metaball_radius_cells;
-    return std::min(cells * loaded.refine, kMaxMetaballRadius);
-}
-
-double extinction_of(const RenderArguments& a, const std::optional<Scene>& scene,
-                     const LoadedDensity& loaded) {
-    if (a.extinction_per_m) return *a.extinction_per_m;
-    if (scene) return scene->density.extinction_per_m;
-    if (loaded.metadata) return loaded.metadata->extinction_per_m;
-    const double visible = visible_extinction_per_m(loaded.density);
-    if (!a.work.quiet) {
-        print_note(
-            fmt::format("{}: names no extinction; {:.4g} per metre at density 1 is taken, so that the "
-                        "cloud is visible (--extinction changes it)",
-                        a.file, visible));
-    }
-    return visible;
-}
-
-PictureMetadata picture_metadata(const RenderArguments& a, const LoadedDensity& loaded,
-                                 double extinction_per_m) {
-    PictureMetadata metadata;
-    metadata.scene = std::filesystem::path(a.file).filename().string();
-    metadata.version = version();
-    metadata.extinction_per_m = extinction_per_m;
-    if (loaded.metadata) {
-        metadata.seed = loaded.metadata->seed;
-        metadata.scene_hash = loaded.metadata->scene_hash;
-        metadata.state_hash = loaded.metadata->state_hash;
-        metadata.time_s = loaded.metadata->time_s;
-        metadata.frames_per_second = loaded.metadata->frames_per_second;
-        metadata.time_scale = loaded.metadata->time_scale;
-    }
-    return metadata;
-}
-
-void write_pictures(const RenderArguments& a, const Picture& picture, const RenderOptions& options,
-                    const PictureMetadata& metadata) {
+void write_pictures(const RenderArguments& a, const VolumePicture& drawn) {
     for (const std::string& out : a.out) {
         if (extension_of(out) == ".exr") {
-            write_exr(out, picture, options, metadata);
+            write_exr(out, drawn.picture, drawn.options, drawn.metadata);
         } else {
-            write_png(out, picture, options, metadata);
+            write_png(out, drawn.picture, drawn.options, drawn.metadata);
         }
     }
 }
 
-nlohmann::ordered_json render_json(const RenderArguments& a, const RenderOptions& options) {
-    const Vec3 &eye = options.camera.position_m, &target = options.camera.target_m;
-    return {{"files", a.out},
-            {"width", options.camera.width},
-            {"height", options.camera.height},
-            {"camera_m", {eye.x, eye.y, eye.z}},
-            {"target_m", {target.x, target.y, target.z}}};
+void report(const RenderArguments& a, const LoadedDensity& loaded, const VolumePicture& drawn) {
+    if (drawn.extinction_was_guessed && !a.work.quiet) {
+        print_note(
+            fmt::format("{}: names no extinction; {:.4g} per metre at density 1 is taken, so that the "
+                        "cloud is visible (--extinction changes it)",
+                        a.file, drawn.extinction_per_m));
+    }
+    Output output;
+    if (!a.work.json) {
+        for (const std::string& out : a.out) output.line(out);
+        return;
+    }
+    const Camera& camera = drawn.options.camera;
+    const Vec3 &eye = camera.position_m, &target = camera.target_m;
+    const nlohmann::ordered_json json = {{"files", a.out},
+                                         {"width", camera.width},
+                                         {"height", camera.height},
+                                         {"camera_m", {eye.x, eye.y, eye.z}},
+                                         {"target_m", {target.x, target.y, target.z}},
+                                         {"grid", loaded.grid_name},
+                                         {"metaballs", drawn.metaballs},
+                                         {"metaball_radius_voxels", drawn.metaball_radius_voxels},
+                                         {"extinction_per_m", drawn.extinction_per_m},
+                                         {"backend", drawn.backend},
+                                         {"device", drawn.device}};
+    output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
 int render(const RenderArguments& a) {
@@ -246,44 +177,16 @@ int render(const RenderArguments& a) {
     std::optional<Scene> scene;
     if (!a.scene.file.empty()) scene = load_scene(a.scene);
     const LoadedDensity loaded = load_density(a.file, a.read);
-    const DensityGrid& grid = loaded.density;
     if (!a.work.quiet) {
         for (const std::string& note : loaded.notes) print_note(a.file + ": " + note);
     }
-    require_memory(grid.active_voxels() * 4 * sizeof(Metaball),
-                   fmt::format("{}: drawing its voxels", a.file));
-
-    const double radius = radius_in_voxels(scene, loaded);
-    const double extinction_per_m = extinction_of(a, scene, loaded);
-    const double time_s = loaded.metadata ? loaded.metadata->time_s : 0;
-    RenderOptions options = picture_options(a, scene, grid, time_s);
-    options.sun = sun_at(options.sun, time_s);
-    Renderer renderer(device_options(a.device, scene ? scene->frames : FrameOptions{}));
-    const std::vector<Metaball> balls = metaballs(grid, radius);
-    Splats splats;
-    splats.metaballs = {balls, extinction_per_m, metaball_normalisation(radius)};
-    splats.ground_cover = initial_cover(scene);
-    splats.time_s = time_s;
-    splats.light = splats.depth =
+    VolumePictureOptions options = a.picture;
+    options.depth =
         std::ranges::any_of(a.out, [](const std::string& out) { return extension_of(out) == ".exr"; });
-    const Picture picture = renderer.draw_splats(splats, options);
-    PictureMetadata metadata = picture_metadata(a, loaded, extinction_per_m);
-    note_renderer(renderer, metadata);
-    write_pictures(a, picture, options, metadata);
-
-    Output output;
-    if (a.work.json) {
-        nlohmann::ordered_json json = render_json(a, options);
-        json["grid"] = loaded.grid_name;
-        json["metaballs"] = balls.size();
-        json["metaball_radius_voxels"] = radius;
-        json["extinction_per_m"] = extinction_per_m;
-        json["backend"] = renderer.backend_name();
-        json["device"] = renderer.device_name();
-        output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
-    } else {
-        for (const std::string& out : a.out) output.line(out);
-    }
+    const VolumePicture drawn = draw_volume(a.file, loaded, scene, options,
+                                            device_options(a.device, scene ? scene->frames : FrameOptions{}));
+    write_pictures(a, drawn);
+    report(a, loaded, drawn);
     return 0;
 }
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -13,10 +14,8 @@
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "scenes/format/writer.h"
 #include "simulation/memory.h"
 #include "simulation/run_folder.h"
-#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {
@@ -33,7 +32,7 @@ struct RunArguments {
 };
 
 Scene scene_of(const RunArguments& a) {
-    Scene scene = load_scene(a.scene);
+    Scene scene = load_scene(a.scene, a.statistics_only ? SceneUse::without_frames : SceneUse::everything);
     if (!a.needs && !a.work.quiet) note_unused_models(scene);
     if (a.video) scene.frames.video = true;
     return scene;
@@ -52,26 +51,19 @@ void print_needs(const RunArguments& a) {
 }
 
 RunSettings settings_of(const RunArguments& a) {
-    RunSettings settings;
-    Scene& scene = settings.scene;
-    scene = scene_of(a);
-    settings.scene_file = std::filesystem::path(a.scene.file).filename().string();
-    settings.scene_text = to_toml(scene);
-    settings.scene_hash = scene_hash(scene);
-    settings.range = a.frames ? range_of_frames(scene, a.frames->first, a.frames->last) : full_range(scene);
-    if (a.statistics_only) settings.range = {settings.range.last_step, 1, 0};
+    Scene scene = scene_of(a);
+    check_memory(scene, a.statistics_only ? RunParts::statistics
+                        : a.no_render     ? RunParts::density
+                                          : RunParts::pictures);
+    RunSettings settings = run_settings(std::move(scene), a.scene.file);
+    if (a.frames) settings.range = range_of_frames(settings.scene, a.frames->first, a.frames->last);
+    if (!a.out.empty()) settings.folder = a.out;
+    settings.statistics_only = a.statistics_only;
     settings.render = !a.no_render && !a.statistics_only;
-    settings.device = device_options(a.device, scene.frames);
-    settings.folder =
-        a.out.empty() ? std::filesystem::path("out") / scene.name : std::filesystem::path(a.out);
+    settings.device = device_options(a.device, settings.scene.frames);
     settings.resume = a.resume;
     settings.overwrite = a.overwrite;
     settings.checkpoint_every_s = a.checkpoint_every_s;
-    check_memory(scene, settings.render);
-    settings.initial = initial_state(scene);
-    const std::string initial_hash =
-        settings.initial ? Automaton(scene.automaton, *settings.initial).hash().hex() : std::string();
-    settings.simulation_hash = simulation_hash(scene, initial_hash);
     return settings;
 }
 
@@ -127,17 +119,17 @@ std::string drawn_by(const RunReport& report) {
            (report.backend == "cpu" ? report.device : report.backend + " on " + report.device);
 }
 
-void print_report(const RunReport& report, const RunSettings& settings) {
+void print_report(const RunReport& report) {
     Output output;
-    output.line(styled(
-        fmt::format("{}: {}, {} in {}{}", settings.scene.name, counted(report.steps_reported - 1, "step"),
-                    counted(std::uint64_t(report.frames), "frame"), human_duration(report.wall_s),
-                    drawn_by(report)),
-        Style::bold, colours_on(stdout)));
+    output.line(
+        styled(fmt::format("{}: {}, {} in {}{}", report.scene, counted(report.steps_reported - 1, "step"),
+                           counted(std::uint64_t(report.frames), "frame"), human_duration(report.wall_s),
+                           drawn_by(report)),
+               Style::bold, colours_on(stdout)));
     print_files(output, report);
 }
 
-void print_json(const RunReport& report, const RunSettings& settings) {
+void print_json(const RunReport& report) {
     nlohmann::ordered_json files = nlohmann::ordered_json::object();
     for (const RunFiles& entry : report.files) {
         nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -145,10 +137,10 @@ void print_json(const RunReport& report, const RunSettings& settings) {
         files[entry.kind] = list;
     }
     const nlohmann::ordered_json json = {
-        {"scene", settings.scene.name},
-        {"scene_hash", settings.scene_hash},
-        {"simulation_hash", settings.simulation_hash},
-        {"folder", settings.folder.string()},
+        {"scene", report.scene},
+        {"scene_hash", report.scene_hash},
+        {"simulation_hash", report.simulation_hash},
+        {"folder", report.folder.string()},
         {"complete", report.complete},
         {"resumed_at_step", report.first_step},
         {"steps", report.steps_reported == 0 ? 0 : report.steps_reported - 1},
@@ -183,17 +175,17 @@ int run(const RunArguments& a) {
     };
     observer.stop = [] { return pending_signal() != 0; };
     defer_signals();
-    const RunReport report = run_scene(settings, observer);
+    const RunReport report = run_scene(std::move(settings), observer);
     bar.reset();
     if (a.work.json) {
-        print_json(report, settings);
+        print_json(report);
     } else if (report.complete && !a.work.quiet) {
-        print_report(report, settings);
+        print_report(report);
     }
     if (report.complete) return 0;
     print_note(fmt::format("stopped after {} of {} steps and {}; the same command with --resume goes on",
-                           report.steps_reported == 0 ? 0 : report.steps_reported - 1,
-                           settings.range.last_step, counted(std::uint64_t(report.frames), "frame")));
+                           report.steps_reported == 0 ? 0 : report.steps_reported - 1, report.last_step,
+                           counted(std::uint64_t(report.frames), "frame")));
     return 128 + pending_signal();
 }
 
@@ -209,9 +201,11 @@ void add_run_command(CLI::App& app, Action& action) {
               [a](const std::string& text) { a->frames = parse_frames(text); });
     command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics");
     command->add_flag("--statistics-only", a->statistics_only,
-                      "No frames at all, only statistics of every step, the manifest and the checkpoint");
+                      "No frames at all, only statistics of every step, the manifest and the checkpoint; no "
+                      "density is made, so mean_density is empty");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
-    command->add_flag("--resume", a->resume, "Go on where an interrupted run stopped");
+    command->add_flag("--resume", a->resume,
+                      "Go on where an interrupted run stopped, or with more time.steps where a run ended");
     command->add_flag(
         "--overwrite", a->overwrite,
         "Start anew although the folder holds an interrupted run, a run of another scene or seed, or files "

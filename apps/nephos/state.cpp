@@ -12,13 +12,12 @@
 #include "apps/nephos/commands.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
-#include "core/random.h"
 #include "density/statistics.h"
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/errors.h"
 #include "scenes/format/writer.h"
-#include "simulation/simulation.h"
-#include "simulation/version.h"
+#include "simulation/frame_writer.h"
+#include "simulation/layer_simulation.h"
 
 namespace nephos {
 namespace {
@@ -51,7 +50,7 @@ std::size_t chosen_layer(const StateArguments& a, const std::vector<LayerSimulat
 
 int state(const StateArguments& a) {
     const ThreadLimit limit(a.work.threads);
-    const Scene scene = load_scene(a.scene);
+    const Scene scene = load_scene(a.scene, SceneUse::without_frames);
     std::vector<LayerSimulation> layers = start_layers(scene, a.scene.file, a.from);
     const Automaton& automaton = *layers[chosen_layer(a, layers)].automaton();
     const std::uint64_t steps = a.steps.value_or(scene.steps);
@@ -67,17 +66,8 @@ int state(const StateArguments& a) {
     content.act = automaton.act();
     content.cld = automaton.cld();
     content.cells = automaton.options().placement;
-    VdbMetadata metadata;
-    metadata.extinction_per_m = scene.density.extinction_per_m;
-    metadata.time_s = automaton.time_s();
-    metadata.time_step_s = scene.automaton.time_step_s;
-    metadata.frames_per_second = scene.frames.per_second;
-    metadata.time_scale = scene.frames.time_scale;
-    metadata.seed = scene.automaton.seed;
-    metadata.scene_hash = scene_hash(scene);
-    metadata.state_hash = automaton.hash().hex();
-    metadata.nephos_version = version();
-    metadata.random_stream_version = int(kRandomStreamVersion);
+    const VdbMetadata metadata =
+        density_metadata(scene, scene_hash(scene), automaton.time_s(), automaton.hash());
     write_vdb(a.out, content, metadata);
 
     const CloudStatistics statistics =

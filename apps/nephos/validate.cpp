@@ -14,8 +14,8 @@
 #include "core/text.h"
 #include "scenes/format/errors.h"
 #include "scenes/format/writer.h"
+#include "simulation/layer_simulation.h"
 #include "simulation/memory.h"
-#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {
@@ -54,7 +54,8 @@ Json scene_json(const std::string& file, const Scene& scene) {
             {"frames", frame_count(scene)},
             {"scene_hash", scene_hash(scene)},
             {"memory_bytes", memory_estimate_bytes(scene)},
-            {"memory_bytes_without_pictures", memory_estimate_bytes(scene, false)}};
+            {"memory_bytes_without_pictures", memory_estimate_bytes(scene, RunParts::density)},
+            {"memory_bytes_statistics_only", memory_estimate_bytes(scene, RunParts::statistics)}};
 }
 
 std::string cells_text(const Extent& cells) {

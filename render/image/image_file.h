@@ -34,15 +34,24 @@ namespace nephos {
 void write_exr(const std::filesystem::path& path, const Picture& picture, const RenderOptions& options,
                const PictureMetadata& metadata);
 
-// Writes the tone-mapped beauty with options.camera.exposure_ev.
+// Writes the tone-mapped beauty with options.camera.exposure_ev. Throws Error(usage) on a picture whose layers
+// do not have its size.
 void write_png(const std::filesystem::path& path, const Picture& picture, const RenderOptions& options,
                const PictureMetadata& metadata);
 
-// A decoded 8-bit RGB image; row 0 at the top.
+// An 8-bit RGB image; row 0 at the top.
 struct Rgb8Image {
     int width = 0, height = 0;
     std::vector<std::uint8_t> rgb;  // 3 * width * height
 };
+
+// The same of a picture that has been encoded already: the 3 * width * height bytes of to_srgb8(). The image's own
+// text chunks are not written.
+void write_png(const std::filesystem::path& path, const Rgb8Image& image, const RenderOptions& options,
+               const PictureMetadata& metadata);
+
+// Encodes the beauty layer as write_png() does. Throws Error(usage) as it.
+Rgb8Image srgb8_image(const Picture& picture, const RenderOptions& options);
 
 // Reads a PNG of any kind as 8-bit RGB in sRGB (what is transparent over black), up to 16384 on a side.
 Rgb8Image read_png(const std::filesystem::path& path);

@@ -27,7 +27,6 @@ struct Exchange {
     std::string error;
     std::string file;  // written
     int width = 0, height = 0;
-    std::vector<std::uint8_t> rgb;
     std::vector<png_text> chunks;
     std::vector<png_bytep> rows;
 };
@@ -69,10 +68,12 @@ bool encode(Exchange& exchange, png_structp png, png_infop info) {
     return true;
 }
 
-void point_rows(Exchange& exchange) {
-    exchange.rows.resize(std::size_t(exchange.height));
-    const std::size_t row = 3 * std::size_t(exchange.width);
-    for (std::size_t y = 0; y < exchange.rows.size(); ++y) exchange.rows[y] = exchange.rgb.data() + y * row;
+void point_rows(Exchange& exchange, std::uint8_t* rgb, int width, int height) {
+    exchange.width = width;
+    exchange.height = height;
+    exchange.rows.resize(std::size_t(height));
+    const std::size_t row = 3 * std::size_t(width);
+    for (std::size_t y = 0; y < exchange.rows.size(); ++y) exchange.rows[y] = rgb + y * row;
 }
 
 std::string exact(double value) { return number_text(value, 17); }
@@ -101,15 +102,22 @@ Texts text_of(const PictureMetadata& metadata, const RenderOptions& options) {
 
 }  // namespace
 
-void write_png(const std::filesystem::path& path, const Picture& picture, const RenderOptions& options,
-               const PictureMetadata& metadata) {
+Rgb8Image srgb8_image(const Picture& picture, const RenderOptions& options) {
     if (picture.width < 1 || picture.height < 1 || picture.beauty.size() != 3 * picture.pixels())
         throw Error(ErrorCode::usage, "picture: its layers do not have the size that it states");
+    return {picture.width, picture.height, to_srgb8(picture, options.camera.exposure_ev)};
+}
+
+void write_png(const std::filesystem::path& path, const Picture& picture, const RenderOptions& options,
+               const PictureMetadata& metadata) {
+    write_png(path, srgb8_image(picture, options), options, metadata);
+}
+
+void write_png(const std::filesystem::path& path, const Rgb8Image& image, const RenderOptions& options,
+               const PictureMetadata& metadata) {
     Exchange exchange;
-    exchange.width = picture.width;
-    exchange.height = picture.height;
-    exchange.rgb = to_srgb8(picture, options.camera.exposure_ev);
-    point_rows(exchange);
+    // libpng does not write to the rows that it takes as changeable.
+    point_rows(exchange, const_cast<std::uint8_t*>(image.rgb.data()), image.width, image.height);
     Texts texts = text_of(metadata, options);
     for (auto& [key, value] : texts) {
         png_text chunk{};

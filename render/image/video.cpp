@@ -21,7 +21,6 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "render/image/image_file.h"
 
 extern char** environ;
 
@@ -172,43 +171,47 @@ void require_ffmpeg() {
     }
 }
 
-void write_mp4(const std::filesystem::path& path, const VideoOptions& options,
-               const std::function<bool(std::span<std::uint8_t> rgb)>& next_frame) {
-    check(options);
-    std::vector<std::uint8_t> frame(3 * std::size_t(options.width) * std::size_t(options.height));
-    if (!next_frame(frame))
-        throw Error(ErrorCode::usage, path.string() + ": a video needs at least one frame");
-    write_atomically(path, [&](const std::filesystem::path& temporary) {
-        Encoder encoder(command_line(options, temporary));
-        bool reading = encoder.write(frame);
-        while (reading && next_frame(frame)) reading = encoder.write(frame);
+struct VideoWriter::Impl {
+    Impl(const std::filesystem::path& to, const VideoOptions& o)
+        : path(to), options(o), file(to), encoder(command_line(o, file.temporary())) {}
+
+    // Throws Error(io), with ffmpeg's message where it left one.
+    void finish_encoder() {
         try {
             encoder.finish();
         } catch (const Error& error) {
             throw Error(ErrorCode::io, path.string() + ": " + error.what());
         }
-        if (!reading)
-            throw Error(ErrorCode::io, path.string() + ": ffmpeg stopped reading before the last frame");
-    });
+    }
+
+    std::filesystem::path path;
+    VideoOptions options;
+    AtomicFile file;
+    Encoder encoder;  // after the file: ends before it is removed
+    std::size_t frames = 0;
+};
+
+VideoWriter::VideoWriter(const std::filesystem::path& path, const VideoOptions& options) {
+    check(options);
+    impl_ = std::make_unique<Impl>(path, options);
 }
 
-void encode_mp4(const std::filesystem::path& path, std::span<const std::filesystem::path> png_files,
-                double frames_per_second) {
-    if (png_files.empty())
-        throw Error(ErrorCode::usage, path.string() + ": a video needs at least one frame");
-    Rgb8Image image = read_png(png_files.front());
-    const VideoOptions options{image.width, image.height, frames_per_second, VideoOptions{}.quality};
-    std::size_t next = 0;
-    write_mp4(path, options, [&](std::span<std::uint8_t> rgb) {
-        if (next == png_files.size()) return false;
-        if (next > 0) image = read_png(png_files[next]);
-        if (image.width != options.width || image.height != options.height)
-            throw Error(ErrorCode::usage,
-                        png_files[next].string() + ": the frames of a video must have one size");
-        std::memcpy(rgb.data(), image.rgb.data(), rgb.size());
-        ++next;
-        return true;
-    });
+VideoWriter::~VideoWriter() = default;
+
+void VideoWriter::add(std::span<const std::uint8_t> rgb) {
+    if (rgb.size() != 3 * std::size_t(impl_->options.width) * std::size_t(impl_->options.height))
+        throw Error(ErrorCode::usage, impl_->path.string() + ": the frames of a video must have one size");
+    ++impl_->frames;
+    if (impl_->encoder.write(rgb)) return;
+    impl_->finish_encoder();
+    throw Error(ErrorCode::io, impl_->path.string() + ": ffmpeg stopped reading before the last frame");
+}
+
+void VideoWriter::finish() {
+    if (impl_->frames == 0)
+        throw Error(ErrorCode::usage, impl_->path.string() + ": a video needs at least one frame");
+    impl_->finish_encoder();
+    impl_->file.publish();
 }
 
 }  // namespace nephos

@@ -6,7 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
+#include <memory>
 #include <span>
 
 namespace nephos {
@@ -21,14 +21,27 @@ struct VideoOptions {
 // before a long run that ends with a video.
 void require_ffmpeg();
 
-// Calls `next_frame` with a buffer for one frame (3 * width * height bytes, RGB, row 0 at the top) until it
-// returns false, and encodes the frames. Writing is atomic. Throws Error(usage) on bad options or no frame,
-// Error(io) when ffmpeg is missing or fails (with its message); exceptions of `next_frame` pass through.
-void write_mp4(const std::filesystem::path& path, const VideoOptions& options,
-               const std::function<bool(std::span<std::uint8_t> rgb)>& next_frame);
+// A video that is written frame by frame. The file appears with finish() and complete, or not at all.
+class VideoWriter {
+  public:
+    // Starts ffmpeg. Throws Error(usage) on bad options, Error(io) when ffmpeg is missing or the file cannot be
+    // written.
+    VideoWriter(const std::filesystem::path& path, const VideoOptions& options);
+    // Without finish(): ends ffmpeg and removes what it has written.
+    ~VideoWriter();
+    VideoWriter(const VideoWriter&) = delete;
+    VideoWriter& operator=(const VideoWriter&) = delete;
 
-// Encodes PNG files of equal size, in the given order. Errors as above.
-void encode_mp4(const std::filesystem::path& path, std::span<const std::filesystem::path> png_files,
-                double frames_per_second);
+    // Takes one frame: 3 * width * height bytes, RGB, row 0 at the top. Waits while ffmpeg is behind. Throws
+    // Error(usage) on another size, Error(io) with ffmpeg's message when it has failed.
+    void add(std::span<const std::uint8_t> rgb);
+    // Waits for ffmpeg and gives the file its name. Throws Error(usage) when there was no frame, Error(io) as
+    // add().
+    void finish();
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace nephos

@@ -52,11 +52,11 @@ void check_names_differ(const SectionReader& reader, const char* array, const st
     }
 }
 
-// Returns true when one of the items has this name; otherwise reports it with the closest name.
+// Reports a name that none of the items has, with the closest name.
 template <typename Item>
-bool check_known(const SectionReader& reader, const Node& node, const std::string& name,
+void check_known(const SectionReader& reader, const Node& node, const std::string& name,
                  const std::string& key, const std::vector<Item>& items, const char* what) {
-    if (std::ranges::find(items, name, &Item::name) != items.end()) return true;
+    if (std::ranges::find(items, name, &Item::name) != items.end()) return;
     std::vector<std::string_view> names;
     std::vector<std::string> quoted;
     for (const Item& item : items) {
@@ -71,14 +71,52 @@ bool check_known(const SectionReader& reader, const Node& node, const std::strin
     reader.document.report(
         node.place, reader.quoted(key) + ": there is no " + what + " " + enclosed(shortened(name), '"'),
         std::move(expected));
-    return false;
 }
 
-void check_sky(const SectionReader& reader, const Scene& scene, const NamedSky& sky) {
-    for (std::size_t m = 0; m < sky.models.size() && !reader.document.models_missing; ++m) {
-        check_known(reader, text_item(reader, "models", m), sky.models[m], "models", scene.models,
-                    "base model");
+// Reports those of the texts of a key that no item is called by. Only what was read whole is looked at.
+template <typename Item>
+void check_all_known(const SectionReader& reader, const char* key, const std::vector<std::string>& names,
+                     const std::vector<Item>& items, const char* what) {
+    const Entry* entry = reader.find(key);
+    if (entry == nullptr) return;
+    const Node& node = entry->value;
+    if (names.size() != (node.kind == Node::Kind::array ? node.items.size() : 1)) return;
+    for (std::size_t n = 0; n < names.size(); ++n)
+        check_known(reader, text_item(reader, key, n), names[n], key, items, what);
+}
+
+// Names of base models and skies that are not in the scene: also beside other problems, as long as all models, or
+// skies, have names that could be read.
+void check_references(const SectionReader& reader, const Scene& scene) {
+    const auto all_named = [&](const char* array, const auto& items) {
+        const Entry* entry = reader.find(array);
+        return (entry == nullptr || entry->value.items.size() == items.size()) &&
+               std::ranges::all_of(items, [](const auto& item) { return !item.name.empty(); });
+    };
+    const bool skies_known = all_named("sky", scene.skies);
+    const bool models_known = !reader.document.models_missing && all_named("model", scene.models);
+    for (std::size_t s = 0; models_known && s < scene.skies.size(); ++s)
+        check_all_known(item_of(reader, "sky", s), "models", scene.skies[s].models, scene.models,
+                        "base model");
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        const LayerOptions& layer = scene.layers[n];
+        const SectionReader item = item_of(reader, "layer", n);
+        if (layer.is_veil) continue;
+        if (skies_known) check_all_known(item, "skies", layer.skies, scene.skies, "sky");
+        const SectionReader rain = below(item, "rain");
+        for (std::size_t r = 0; models_known && r < layer.rain.attached.size(); ++r) {
+            const std::string& model = layer.rain.attached[r].model;
+            if (model.empty()) continue;
+            const SectionReader rule{reader.document,
+                                     rain.find("attached")->value.items[r],
+                                     indexed(rain.path + ".attached", r),
+                                     {}};
+            check_known(rule, rule.find("model")->value, model, "model", scene.models, "base model");
+        }
     }
+}
+
+void check_sky(const SectionReader& reader, const NamedSky& sky) {
     if (sky.clouds > 0 && sky.models.empty()) {
         reader.report("models",
                       "the sky " + enclosed(sky.name, '"') + " has " + std::to_string(sky.clouds) +
@@ -99,7 +137,7 @@ void check_layer_name(const SectionReader& reader, const std::string& name) {
         "expected 1 to 64 letters, digits, `-` or `_`, not starting with `-`");
 }
 
-// Checks the skies that a layer names: known, and all states different.
+// Checks the skies that a layer names: at least one, and no two of one state.
 void check_layer_skies(const SectionReader& reader, const Scene& scene, const LayerOptions& layer) {
     if (reader.find("skies") == nullptr) {
         reader.report("skies", reader.quoted("skies") + " is missing",
@@ -113,8 +151,9 @@ void check_layer_skies(const SectionReader& reader, const Scene& scene, const La
     std::vector<const NamedSky*> known;
     for (std::size_t s = 0; s < layer.skies.size(); ++s) {
         const Node& node = text_item(reader, "skies", s);
-        if (!check_known(reader, node, layer.skies[s], "skies", scene.skies, "sky")) continue;
-        const NamedSky& sky = *std::ranges::find(scene.skies, layer.skies[s], &NamedSky::name);
+        const auto found = std::ranges::find(scene.skies, layer.skies[s], &NamedSky::name);
+        if (found == scene.skies.end()) continue;  // check_references()
+        const NamedSky& sky = *found;
         const auto twin = std::ranges::find(known, sky.state, [](const NamedSky* k) { return k->state; });
         if (twin != known.end()) {
             reader.document.report(node.place,
@@ -178,15 +217,8 @@ void fill_in_base_height(const SectionReader& reader, const Scene& scene, LayerO
     }
 }
 
-void check_rain(const SectionReader& reader, const Scene& scene, const LayerOptions& layer) {
+void check_rain(const SectionReader& reader, const LayerOptions& layer) {
     const SectionReader rain = below(reader, "rain");
-    for (std::size_t r = 0; r < layer.rain.attached.size(); ++r) {
-        const AttachedRainRule& rule = layer.rain.attached[r];
-        if (rule.model.empty() || reader.document.models_missing) continue;
-        const SectionReader item{
-            reader.document, rain.find("attached")->value.items[r], indexed(rain.path + ".attached", r), {}};
-        check_known(item, item.find("model")->value, rule.model, "model", scene.models, "base model");
-    }
     if (layer.rain.find && !layer.automaton) {
         rain.report("find", rain.quoted("find") + " is true in a layer without automaton",
                     "expected `automaton` = true, or rain that is placed or attached");
@@ -266,12 +298,12 @@ void check_layers_or_field(const SectionReader& reader, const Scene& scene) {
 
 void finish_layers(const SectionReader& reader, Scene& scene) {
     if (reader.sound({"model"})) check_names_differ(reader, "model", scene.models, "base model");
+    check_references(reader, scene);
     if (!reader.sound({"model", "models", "sky", "climate", "layer", "lattice", "field"})) return;
     check_layers_or_field(reader, scene);
     check_names_differ(reader, "sky", scene.skies, "sky");
     check_names_differ(reader, "layer", scene.layers, "layer");
-    for (std::size_t s = 0; s < scene.skies.size(); ++s)
-        check_sky(item_of(reader, "sky", s), scene, scene.skies[s]);
+    for (std::size_t s = 0; s < scene.skies.size(); ++s) check_sky(item_of(reader, "sky", s), scene.skies[s]);
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         const SectionReader item = item_of(reader, "layer", n);
         LayerOptions& layer = scene.layers[n];
@@ -284,7 +316,7 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
         check_layer_skies(item, scene, layer);
         fill_in(item, scene, layer);
         fill_in_base_height(item, scene, layer);
-        check_rain(item, scene, layer);
+        check_rain(item, layer);
     }
     if (!reader.document.problems.empty()) return;
     for (std::size_t n = 0; n < scene.layers.size(); ++n)

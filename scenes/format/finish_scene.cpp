@@ -107,7 +107,7 @@ void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
 }
 
 void check_frames(const SectionReader& reader, const Scene& scene) {
-    if (!reader.sound({"time", "frames"})) return;
+    if (!reader.document.frames_wanted || !reader.sound({"time", "frames"})) return;
     const SectionReader frames = below(reader, "frames");
     const double end_s = simulated_time_s(scene);
     const std::string simulated =

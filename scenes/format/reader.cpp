@@ -218,18 +218,19 @@ void resolve_initial_state(Scene& scene, const Document& document, const std::fi
 
 }  // namespace
 
-Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides) {
-    return read_scene_text(read_text_file(path, kMaxSceneBytes), path.string(), path.parent_path(),
-                           overrides);
+Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides, SceneUse use) {
+    return read_scene_text(read_text_file(path, kMaxSceneBytes), path.string(), path.parent_path(), overrides,
+                           use);
 }
 
 Scene read_scene_text(std::string_view text, const std::string& label, const std::filesystem::path& folder,
-                      std::span<const std::string> overrides) {
+                      std::span<const std::string> overrides, SceneUse use) {
     if (text.size() > kMaxSceneBytes) {
         throw_problem(label, "the file is larger than " + std::to_string(kMaxSceneBytes >> 20) + " MiB",
                       "expected a scene in TOML");
     }
     Document document;
+    document.frames_wanted = use == SceneUse::everything;
     const int file = document.add_origin(label, std::string(text), true);
     if (std::optional<Node> root = document.parse(file)) {
         if (root->entries.empty() && overrides.empty()) {

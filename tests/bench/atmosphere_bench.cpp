@@ -47,8 +47,8 @@ std::vector<BenchRow> atmosphere_rows() {
         {"sky tables for a new sun by day, both neighbours, all cores", new_sun_ms(5), 0, "<= 20 ms", ""},
         {"the same in twilight", new_sun_ms(-14), 0, "<= 20 ms", ""},
         {"tables that depend on the air alone", median(made), 0, "", "once for each haze, ozone and ground"},
-        {"whole sky and ground without clouds, 640x480, processor", picture_ms(Splatting::cpu), 0,
-         "<= 50 ms", ""},
+        {"whole sky and ground without clouds, 640x480, processor", picture_ms(Splatting::cpu), 0, "<= 50 ms",
+         ""},
         {"the same in compute shaders", picture_ms(Splatting::vulkan), 0, "<= 50 ms on lavapipe", ""}};
 }
 

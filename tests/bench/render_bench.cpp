@@ -21,7 +21,7 @@
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/reader.h"
 #include "simulation/framing.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 #include "tests/bench/stage_table.h"
 #include "tests/bench/subject.h"
 
@@ -146,7 +146,7 @@ void print_growth() {
 // Simulation, density, light and picture of each frame, as a run makes them, on the wall.
 BenchRow film_row(const std::filesystem::path& file, int frames) {
     const Scene scene = read_scene(file);
-    struct Film : PipelineSink {
+    struct Film : SimulationSink {
         const Scene* scene = nullptr;
         Renderer renderer;
         std::size_t drawn = 0, frames = 0;
@@ -168,8 +168,8 @@ BenchRow film_row(const std::filesystem::path& file, int frames) {
         }
     } film;
     film.scene = &scene;
-    Pipeline pipeline(scene, range_of_frames(scene, 1, frames), {});
-    while (!pipeline.finished()) pipeline.advance(film);
+    Simulation simulation(scene, range_of_frames(scene, 1, frames), {});
+    while (!simulation.finished()) simulation.advance(film);
     const std::chrono::duration<double, std::milli> all = film.last - film.first;
     const double ms = all.count() / double(film.frames - 1);
     return {fmt::format("{}: simulate, density, light and view, 640x480, {}", file.filename().string(),

@@ -2,13 +2,13 @@
 #include "tests/bench/subject.h"
 
 #include "scenes/format/reader.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 
 namespace nephos::bench {
 namespace {
 
-// The last density that a pipeline hands out.
-struct LastFrame : PipelineSink {
+// The last density that a simulation hands out.
+struct LastFrame : SimulationSink {
     DensityGrid density;
     void step(const StepResult&) override {}
     void frame(const FrameResult& result) override { density = result.density; }
@@ -19,9 +19,9 @@ struct LastFrame : PipelineSink {
 Subject last_frame_of(const std::filesystem::path& file) {
     const Scene scene = read_scene(file);
     const int last = full_range(scene).last_frame;
-    Pipeline pipeline(scene, range_of_frames(scene, last, last), {});
+    Simulation simulation(scene, range_of_frames(scene, last, last), {});
     LastFrame frame;
-    while (!pipeline.finished()) pipeline.advance(frame);
+    while (!simulation.finished()) simulation.advance(frame);
     const double radius = scene.density.metaball_radius_cells;
     Subject subject{file.filename().string(), metaballs(frame.density, radius),
                     scene.density.extinction_per_m, scene.render, radius};

@@ -23,8 +23,8 @@
 #include "scenes/format/reader.h"
 #include "scenes/format/writer.h"
 #include "simulation/layer_simulation.h"
-#include "simulation/pipeline.h"
 #include "simulation/run_folder.h"
+#include "simulation/simulation.h"
 #include "tests/reference/with_threads.h"
 #include "tests/simulation/file_content.h"
 
@@ -123,7 +123,7 @@ TEST(Climate, LayerZeroHasTheStreamOfASceneWithoutLayers) {
 }
 
 // Everything that a run writes of a result, as text.
-class Listing : public PipelineSink {
+class Listing : public SimulationSink {
   public:
     void step(const StepResult& r) override {
         std::ostringstream out;
@@ -154,43 +154,44 @@ TEST(Climate, GoesOnWithTheSameResultsAfterAnyInterruption) {
     // A frame every 7 s, so that most lie between two steps; rain is there from the start.
     const Scene scene = climate({"time.steps=12", "climate.schedule=[{ time_s = 0, state = 1 }]",
                                  "frames.per_second=1", "frames.time_scale=7", "density.write_state=true"});
-    const PipelineRange range = full_range(scene);
+    const SimulationRange range = full_range(scene);
     const std::string hash(32, '0');
     Listing whole;
-    for (Pipeline pipeline(scene, range, hash); !pipeline.finished();) pipeline.advance(whole);
+    for (Simulation simulation(scene, range, hash); !simulation.finished();) simulation.advance(whole);
     ASSERT_GT(whole.events.size(), 25u);
     Listing first;
-    Pipeline pipeline(scene, range, hash);
+    Simulation simulation(scene, range, hash);
     for (std::size_t restarts = 0;; ++restarts) {
         Listing joined = first;
-        for (Pipeline again(scene, range, hash, pipeline.save()); !again.finished();) again.advance(joined);
+        for (Simulation again(scene, range, hash, simulation.save()); !again.finished();)
+            again.advance(joined);
         ASSERT_EQ(joined.events, whole.events) << "restart " << restarts;
-        if (pipeline.finished()) break;
-        pipeline.advance(first);
+        if (simulation.finished()) break;
+        simulation.advance(first);
     }
 }
 
 TEST(Climate, ACheckpointOfOtherLayersIsRefused) {
     const Scene scene = climate({"time.steps=3"});
     const std::string hash(32, '0');
-    Pipeline pipeline(scene, full_range(scene), hash);
-    const Checkpoint good = pipeline.save();
+    Simulation simulation(scene, full_range(scene), hash);
+    const Checkpoint good = simulation.save();
     Scene fewer = scene;
     fewer.layers.resize(2);
-    EXPECT_THROW(Pipeline(fewer, full_range(scene), hash, good), Error);
+    EXPECT_THROW(Simulation(fewer, full_range(scene), hash, good), Error);
     for (std::size_t size = 0; size < good.automaton.size(); size += 997) {
         Checkpoint cut = good;
         cut.automaton.resize(size);
-        EXPECT_THROW(Pipeline(scene, full_range(scene), hash, cut), Error) << size;
+        EXPECT_THROW(Simulation(scene, full_range(scene), hash, cut), Error) << size;
     }
     for (std::size_t size = 0; size < good.history.size(); size += 997) {
         Checkpoint cut = good;
         cut.history.resize(size);
-        EXPECT_THROW(Pipeline(scene, full_range(scene), hash, cut), Error) << size;
+        EXPECT_THROW(Simulation(scene, full_range(scene), hash, cut), Error) << size;
     }
 }
 
-class FrameKeeper : public PipelineSink {
+class FrameKeeper : public SimulationSink {
   public:
     void step(const StepResult&) override {}
     void frame(const FrameResult& r) override { frames.push_back(r); }
@@ -200,9 +201,9 @@ class FrameKeeper : public PipelineSink {
 TEST(Climate, FramesHoldTheLayersTogether) {
     const Scene scene = climate({"time.steps=20", "frames.start_s=195", "frames.count=1",
                                  "climate.schedule=[{ time_s = 0, state = 0.5 }]"});
-    Pipeline pipeline(scene, full_range(scene), std::string(32, '0'));
+    Simulation simulation(scene, full_range(scene), std::string(32, '0'));
     FrameKeeper sink;
-    while (!pipeline.finished()) pipeline.advance(sink);
+    while (!simulation.finished()) simulation.advance(sink);
     ASSERT_EQ(sink.frames.size(), 1u);
     const FrameResult& frame = sink.frames[0];
     ASSERT_EQ(frame.layers.size(), 3u);
@@ -321,9 +322,9 @@ TEST(Climate, ALayerWithoutAutomatonIsASkyAlone) {
         layer.rain.find = false;
     }
     EXPECT_FALSE(has_density(scene));
-    Pipeline pipeline(scene, full_range(scene), std::string(32, '0'));
+    Simulation simulation(scene, full_range(scene), std::string(32, '0'));
     FrameKeeper sink;
-    while (!pipeline.finished()) pipeline.advance(sink);
+    while (!simulation.finished()) simulation.advance(sink);
     ASSERT_EQ(sink.frames.size(), 1u);
     EXPECT_EQ(sink.frames[0].density.active_voxels(), 0u);
     const LayerFrame& low = sink.frames[0].layers[0];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A frame of a pipeline as a run draws it, for tests.
+// A frame of a simulation as a run draws it, for tests.
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include "density/metaballs.h"
 #include "scenes/format/scene.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 #include "simulation/sky_picture.h"
 #include "simulation/weather.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The ground under a scene's rain: state of the pipeline like the clouds, between steps, after a restart.
+// The ground under a scene's rain: state of the simulation like the clouds, between steps, after a restart.
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "scenes/format/writer.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {
@@ -45,25 +45,25 @@ Scene showery_scene() {
     return scene;
 }
 
-struct Grounds : PipelineSink {
+struct Grounds : SimulationSink {
     void step(const StepResult&) override {}
     void frame(const FrameResult& result) override { maps.push_back(result.ground); }
     std::vector<std::shared_ptr<const GroundCoverMap>> maps;
 };
 
-Grounds run_to_end(Pipeline& pipeline) {
+Grounds run_to_end(Simulation& simulation) {
     Grounds grounds;
-    while (!pipeline.finished()) pipeline.advance(grounds);
+    while (!simulation.finished()) simulation.advance(grounds);
     return grounds;
 }
 
 Grounds run(const Scene& scene) {
-    Pipeline pipeline(scene, full_range(scene), std::string(32, '0'));
-    return run_to_end(pipeline);
+    Simulation simulation(scene, full_range(scene), std::string(32, '0'));
+    return run_to_end(simulation);
 }
 
 // Step by step with the rain areas that the scene places, the second way to the same maps.
-TEST(PipelineGroundTest, IsTheCoverUnderTheScenesRain) {
+TEST(SimulationGroundTest, IsTheCoverUnderTheScenesRain) {
     const Scene scene = showery_scene();
     const Grounds found = run(scene);
     ASSERT_EQ(int(found.maps.size()), frame_count(scene));
@@ -96,33 +96,33 @@ TEST(PipelineGroundTest, IsTheCoverUnderTheScenesRain) {
     EXPECT_GT(wettest, 0.3) << "a dry scene proves nothing";
 }
 
-TEST(PipelineGroundTest, RestartsAnywhereWithTheSameBits) {
+TEST(SimulationGroundTest, RestartsAnywhereWithTheSameBits) {
     const Scene scene = showery_scene();
     const Grounds whole = run(scene);
-    Pipeline pipeline(scene, full_range(scene), std::string(32, '0'));
+    Simulation simulation(scene, full_range(scene), std::string(32, '0'));
     Grounds first;
     while (true) {
-        Pipeline again(scene, full_range(scene), std::string(32, '0'), pipeline.save());
+        Simulation again(scene, full_range(scene), std::string(32, '0'), simulation.save());
         Grounds rest = run_to_end(again);
         ASSERT_EQ(first.maps.size() + rest.maps.size(), whole.maps.size());
         for (std::size_t i = 0; i < rest.maps.size(); ++i)
             ASSERT_EQ(*rest.maps[i], *whole.maps[first.maps.size() + i]) << first.maps.size() << ' ' << i;
-        if (pipeline.finished()) break;
-        pipeline.advance(first);
+        if (simulation.finished()) break;
+        simulation.advance(first);
     }
 }
 
-TEST(PipelineGroundTest, ARangeOfFramesIsThatPartOfTheWhole) {
+TEST(SimulationGroundTest, ARangeOfFramesIsThatPartOfTheWhole) {
     const Scene scene = showery_scene();
     const Grounds whole = run(scene);
-    Pipeline pipeline(scene, range_of_frames(scene, 5, 7), std::string(32, '0'));
-    const Grounds part = run_to_end(pipeline);
+    Simulation simulation(scene, range_of_frames(scene, 5, 7), std::string(32, '0'));
+    const Grounds part = run_to_end(simulation);
     ASSERT_EQ(part.maps.size(), 3u);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(*part.maps[i], *whole.maps[4 + i]);
 }
 
 // Off by default: nothing is computed, no text or hash of a scene changes; on, it belongs to the simulation.
-TEST(PipelineGroundTest, IsOffUnlessAskedFor) {
+TEST(SimulationGroundTest, IsOffUnlessAskedFor) {
     Scene scene = showery_scene();
     const std::string with = simulation_hash(scene);
     EXPECT_NE(to_toml(scene).find("[wet_ground]"), std::string::npos);
@@ -136,7 +136,7 @@ TEST(PipelineGroundTest, IsOffUnlessAskedFor) {
 }
 
 // The scene says once what falls; for the ground it need not be drawn.
-TEST(PipelineGroundTest, TurnsWhiteWhereThePrecipitationIsSnow) {
+TEST(SimulationGroundTest, TurnsWhiteWhereThePrecipitationIsSnow) {
     Scene scene = showery_scene();
     scene.ground_cover.initial_snow_mm = scene.ground_cover.melting_mm_per_h = 0;
     const std::string rainy = simulation_hash(scene);
@@ -152,7 +152,7 @@ TEST(PipelineGroundTest, TurnsWhiteWhereThePrecipitationIsSnow) {
 }
 
 // Without rain areas, and without layers, it dries from what lay there at the start.
-TEST(PipelineGroundTest, DriesInASceneWithoutLayers) {
+TEST(SimulationGroundTest, DriesInASceneWithoutLayers) {
     Scene scene;
     scene.automaton.extent = {16, 16, 8};
     scene.steps = 4;

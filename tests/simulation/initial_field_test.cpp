@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "simulation/layer_simulation.h"
 #include "scenes/format/reader.h"
 #include "seeds/coupling.h"
+#include "simulation/layer_simulation.h"
 
 namespace nephos {
 namespace {

@@ -108,7 +108,7 @@ TEST(MemoryEstimate, GrowsWithItsPartsAndNeverOverflows) {
     EXPECT_EQ(plain.automaton, Automaton::memory_bytes(scene.automaton));
     EXPECT_GT(plain.density, scene.automaton.extent.cells()) << "floats for a good part of the cells";
     EXPECT_GT(plain.pictures, 640u * 480u * 4u);
-    EXPECT_EQ(memory_estimate(scene, false).pictures, 0u);
+    EXPECT_EQ(memory_estimate(scene, RunParts::density).pictures, 0u);
     EXPECT_EQ(memory_estimate_bytes(scene), plain.program + plain.automaton + plain.density + plain.pictures);
     scene.density.write_velocity = true;
     EXPECT_GT(memory_estimate(scene).density, plain.density + 12 * scene.automaton.extent.cells());
@@ -117,6 +117,17 @@ TEST(MemoryEstimate, GrowsWithItsPartsAndNeverOverflows) {
     scene.automaton.extent = {kMaxExtent, kMaxExtent, kMaxExtent};
     scene.density.refine = 8;
     EXPECT_GT(memory_estimate_bytes(scene), std::size_t(1) << 60);
+}
+
+// Statistics come from the bits: the lattice and a checkpoint of it, no grid.
+TEST(MemoryEstimate, OfStatisticsHoldsNoGrids) {
+    Scene scene;
+    scene.automaton.extent = {8192, 8192, 64};
+    const MemoryEstimate estimate = memory_estimate(scene, RunParts::statistics);
+    EXPECT_EQ(estimate.density, 0u);
+    EXPECT_EQ(estimate.pictures, 0u);
+    EXPECT_LT(estimate.total(), 3 * Automaton::memory_bytes(scene.automaton));
+    EXPECT_GT(memory_estimate_bytes(scene, RunParts::density), 5 * estimate.total());
 }
 
 TEST(CheckMemory, NamesBothFiguresAndWhatToChange) {
@@ -135,9 +146,9 @@ TEST(CheckMemory, NamesBothFiguresAndWhatToChange) {
             EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
         }
     }
-    const std::size_t needed = memory_estimate_bytes(scene, false);
-    EXPECT_NO_THROW(check_memory(scene, {needed, "limit"}, false));
-    EXPECT_THROW(check_memory(scene, {needed - 1, "limit"}, false), Error);
+    const std::size_t needed = memory_estimate_bytes(scene, RunParts::density);
+    EXPECT_NO_THROW(check_memory(scene, {needed, "limit"}, RunParts::density));
+    EXPECT_THROW(check_memory(scene, {needed - 1, "limit"}, RunParts::density), Error);
 }
 
 TEST(BytesText, PicksTheUnit) {

@@ -316,6 +316,66 @@ TEST_F(RunFolderTest, AResumeThatDiffersInTheVideoSaysSo) {
     EXPECT_NE(message.find("the first call was without --video"), std::string::npos) << message;
 }
 
+// Complete or interrupted anywhere, a run goes on with more steps: every step, frame and saved state is that of a
+// run which had them from the start. Only frames that were there name the hash of the shorter scene.
+TEST_F(RunFolderTest, GoesOnWithMoreStepsAsIfItHadHadThem) {
+    RunSettings whole = settings("whole");
+    ASSERT_TRUE(run_scene(whole, {}).complete);
+    for (int pieces = 3; pieces < 40; pieces += 4) {
+        SCOPED_TRACE(pieces);
+        RunSettings s = settings("longer");
+        s.overwrite = true;
+        s.scene.steps = 4;
+        s.scene_text = to_toml(s.scene);
+        s.scene_hash = scene_hash(s.scene);
+        s.range = full_range(s.scene);
+        ASSERT_LT(s.range.last_frame, whole.range.last_frame);
+        const RunReport first = run_scene(s, stop_after(pieces));
+        RunSettings longer = settings("longer");
+        longer.resume = true;
+        ASSERT_TRUE(run_scene(longer, {}).complete);
+        for (const char* name : {"statistics.csv", "checkpoint.nephos"})
+            EXPECT_EQ(content(whole.folder / name), content(s.folder / name)) << name;
+        for (int frame = 1; frame <= whole.range.last_frame; ++frame) {
+            const RunFolder a{whole.folder, "small"}, b{s.folder, "small"};
+            const DensityGrid one = read_density(a.density(frame)), other = read_density(b.density(frame));
+            EXPECT_EQ(one.sum(), other.sum()) << frame;
+            EXPECT_EQ(one.active_voxels(), other.active_voxels()) << frame;
+        }
+        if (!first.complete) continue;
+        s.overwrite = false;
+        s.resume = true;
+        EXPECT_NE(error_of(s, ErrorCode::usage).find("another scene"), std::string::npos) << "shorter again";
+        return;
+    }
+    FAIL() << "the shorter run never came to its end";
+}
+
+// Statistics come from the bits: all columns but the density's mean.
+TEST_F(RunFolderTest, StatisticsAloneAreThoseOfTheBits) {
+    RunSettings whole = settings("whole");
+    ASSERT_TRUE(run_scene(whole, {}).complete);
+    RunSettings s = settings("statistics");
+    s.statistics_only = true;
+    s.scene.frames.count = 1000;  // more than fit: none is written
+    s.scene_hash = scene_hash(s.scene);
+    ASSERT_FALSE(run_scene(s, stop_after(5)).complete);
+    s.resume = true;
+    ASSERT_TRUE(run_scene(s, {}).complete);
+    std::istringstream all(content(whole.folder / "statistics.csv")),
+        alone(content(s.folder / "statistics.csv"));
+    int rows = 0;
+    for (std::string expected, row; std::getline(all, expected); ++rows) {
+        ASSERT_TRUE(std::getline(alone, row));
+        if (rows > 0) {
+            const std::size_t hash = expected.rfind(','), mean = expected.rfind(',', hash - 1);
+            expected.erase(mean + 1, hash - mean - 1);
+        }
+        EXPECT_EQ(row, expected);
+    }
+    EXPECT_EQ(rows, 1 + 7);
+}
+
 TEST_F(RunFolderTest, AFolderThatCannotBeMadeIsFoundBeforeAnything) {
     RunSettings s = settings("file");
     std::ofstream(s.folder) << "a file";

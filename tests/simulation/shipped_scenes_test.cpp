@@ -12,7 +12,7 @@
 
 #include "render/renderer_test_access.h"
 #include "scenes/format/reader.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 #include "tests/simulation/drawn_frame.h"
 
 namespace nephos {
@@ -46,7 +46,7 @@ std::size_t metaball_count(const FrameResult& frame) {
     return count;
 }
 
-struct Comparison : PipelineSink {
+struct Comparison : SimulationSink {
     explicit Comparison(const Scene& s) : scene(s) {}
     void step(const StepResult&) override {}
     void frame(const FrameResult& frame) override {
@@ -78,8 +78,8 @@ TEST_P(ShippedScenes, AreTheSameInEveryBackend) {
     const Scene scene = small_pictures_of(GetParam());
     Comparison comparison(scene);
     const int middle = (frame_count(scene) + 1) / 2;
-    Pipeline pipeline(scene, range_of_frames(scene, middle, middle), std::string(32, '0'));
-    while (!pipeline.finished()) pipeline.advance(comparison);
+    Simulation simulation(scene, range_of_frames(scene, middle, middle), std::string(32, '0'));
+    while (!simulation.finished()) simulation.advance(comparison);
     EXPECT_LT(comparison.clearest, 0.99f) << "nothing to see";
     for (std::size_t way = 1; way < 4; ++way) EXPECT_LE(comparison.apart[way], 1.0f / 255) << "way " << way;
     const bool direct = std::ranges::any_of(scene.layers, [](const auto& layer) { return !layer.automaton; });

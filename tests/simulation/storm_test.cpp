@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "scenes/format/reader.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 #include "tests/reference/with_threads.h"
 #include "tests/simulation/drawn_frame.h"
 
@@ -37,7 +37,7 @@ std::vector<float> drawn(const Scene& scene, const FrameResult& frame, Renderer&
     return test::drawn_frame(scene, frame, renderer, painter, true).beauty;
 }
 
-struct Comparison : PipelineSink {
+struct Comparison : SimulationSink {
     explicit Comparison(const Scene& s) : scene(s) {}
     void step(const StepResult&) override {}
     void frame(const FrameResult& frame) override {
@@ -74,8 +74,8 @@ struct Comparison : PipelineSink {
 TEST(Storm, IsTheSameInEveryBackend) {
     const Scene scene = coarse_storm();
     Comparison comparison(scene);
-    Pipeline pipeline(scene, full_range(scene), std::string(32, '0'));
-    while (!pipeline.finished()) pipeline.advance(comparison);
+    Simulation simulation(scene, full_range(scene), std::string(32, '0'));
+    while (!simulation.finished()) simulation.advance(comparison);
     EXPECT_EQ(comparison.compared, 3);
     for (const Renderer& renderer : comparison.renderers)
         for (const std::string& message : renderer.validation_messages()) ADD_FAILURE() << message;

@@ -19,8 +19,8 @@
 #include "scenes/format/writer.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/memory.h"
-#include "simulation/pipeline.h"
 #include "simulation/run_folder.h"
+#include "simulation/simulation.h"
 #include "tests/reference/with_threads.h"
 #include "tests/simulation/file_content.h"
 
@@ -70,7 +70,7 @@ Scene scene_of(const std::vector<std::string>& overrides = {}) {
 }
 
 // All results in order, as text, and the frames themselves.
-class Listing : public PipelineSink {
+class Listing : public SimulationSink {
   public:
     void step(const StepResult& r) override {
         std::string text = "step " + std::to_string(r.step) + " " + r.hash.hex();
@@ -94,9 +94,9 @@ class Listing : public PipelineSink {
     std::vector<FrameResult> frames;
 };
 
-Listing listing_of(const Scene& scene, const PipelineRange& range) {
+Listing listing_of(const Scene& scene, const SimulationRange& range) {
     Listing listing;
-    for (Pipeline p(scene, range, std::string(32, '0')); !p.finished();) p.advance(listing);
+    for (Simulation p(scene, range, std::string(32, '0')); !p.finished();) p.advance(listing);
     return listing;
 }
 
@@ -161,18 +161,19 @@ TEST(VeilLayer, GoesOnWithTheSameResultsAfterAnyInterruption) {
     for (const std::vector<std::string>& overrides :
          {std::vector<std::string>{"density.write_state=true"}, std::vector<std::string>{}}) {
         const Scene scene = scene_of(overrides);
-        const PipelineRange range = full_range(scene);
+        const SimulationRange range = full_range(scene);
         const Listing whole = listing_of(scene, range);
         Listing first;
-        Pipeline pipeline(scene, range, std::string(32, '0'));
+        Simulation simulation(scene, range, std::string(32, '0'));
         for (std::size_t restarts = 0;; ++restarts) {
             Listing joined = first;
-            for (Pipeline again(scene, range, std::string(32, '0'), pipeline.save()); !again.finished();) {
+            for (Simulation again(scene, range, std::string(32, '0'), simulation.save());
+                 !again.finished();) {
                 again.advance(joined);
             }
             ASSERT_EQ(joined.events, whole.events) << "restart " << restarts;
-            if (pipeline.finished()) break;
-            pipeline.advance(first);
+            if (simulation.finished()) break;
+            simulation.advance(first);
         }
     }
 }

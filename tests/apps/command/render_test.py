@@ -12,7 +12,7 @@ import unittest
 
 from PIL import Image
 
-from case import Case, NEPHOS, SCENE
+from case import Case, NEPHOS, SCENE, SOURCE
 
 
 class Vulkan(Case):
@@ -167,6 +167,8 @@ class Pictures(Case):
 
     def test_interrupted_pictures_are_the_same(self):
         changes = ["--set", "time.steps=40", "--set", "frames.time_scale=20", "--set", "frames.exr=true"]
+        if shutil.which("ffmpeg"):
+            changes.append("--video")  # frames of before the interruption are read back for it
         self.call("run", self.scene, *changes, "--out", "whole")
         process = subprocess.Popen([NEPHOS, "run", self.scene, *changes, "--out", "stopped"], cwd=self.folder,
                                    env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -181,6 +183,19 @@ class Pictures(Case):
         for name in sorted(p.name for p in (self.folder / "whole/frames").iterdir()):
             self.assertEqual((self.folder / "whole/frames" / name).read_bytes(),
                              (self.folder / "stopped/frames" / name).read_bytes(), name)
+
+    def test_render_with_a_scene_draws_the_runs_frame(self):
+        """Rain, wet ground and clouds included, at the time of the file."""
+        for name in ("rain", "wet-ground"):
+            scene = SOURCE / f"scenes/{name}.toml"
+            changes = ["--set", "camera.width=80", "--set", "camera.height=60"]
+            self.call("run", scene, *changes, "--frames", "3", "--out", name)
+            self.call("render", f"{name}/density/{name}_0003.vdb", "--scene", scene, *changes, "--out", f"{name}.png")
+            self.assertEqual(png_pixels(self.folder / f"{name}.png"),
+                             png_pixels(self.folder / f"{name}/frames/{name}_0003.png"), name)
+            dry = ["--set", "precipitation.enabled=false", "--set", "wet_ground.enabled=false"]
+            self.call("render", f"{name}/density/{name}_0003.vdb", "--scene", scene, *changes, *dry, "--out", "dry.png")
+            self.assertNotEqual(png_pixels(self.folder / "dry.png"), png_pixels(self.folder / f"{name}.png"), name)
 
     def test_render_draws_what_run_wrote(self):
         self.call("run", self.scene, "--no-render", "--out", "out")
@@ -252,6 +267,23 @@ class Pictures(Case):
     def test_video(self):
         self.call("run", self.scene, "--out", "out", "--video")
         self.assertGreater((self.folder / "out/frames/tiny.mp4").stat().st_size, 500)
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_a_video_that_failed_is_made_by_resuming(self):
+        """A failing ffmpeg does not end the run; nor does a run that goes on with more steps keep the old video."""
+        broken = self.folder / "broken"
+        broken.mkdir()
+        (broken / "ffmpeg").write_text("#!/bin/sh\necho 'disk full' >&2\nexit 3\n")
+        (broken / "ffmpeg").chmod(0o700)
+        self.refused(3, "run", self.scene, "--video", "--out", "out", "--quiet", says="disk full",
+                     env={"PATH": f"{broken}:{os.environ['PATH']}"})
+        self.assertEqual(len(list((self.folder / "out/frames").iterdir())), 5, "pictures and no video")
+        video = self.folder / "out/frames/tiny.mp4"
+        for steps in (6, 9):
+            change = ["--set", f"time.steps={steps}"]
+            self.call("run", self.scene, "--video", "--out", "out", "--resume", *change)
+            self.call("run", self.scene, "--video", "--out", f"whole{steps}", *change)
+            self.assertEqual(video.read_bytes(), (self.folder / f"whole{steps}/frames/tiny.mp4").read_bytes())
 
 
 if __name__ == "__main__":

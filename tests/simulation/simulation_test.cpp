@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The pipeline against a plain second way to the same frames, and a pipeline that was saved at every possible
+// The simulation against a plain second way to the same frames, and a simulation that was saved at every possible
 // moment against one that was not.
 
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 
 #include <algorithm>
 #include <bit>
@@ -36,7 +36,7 @@ Scene small_scene() {
 }
 
 // All results as text, so that two sequences can be compared and shown.
-class Listing : public PipelineSink {
+class Listing : public SimulationSink {
   public:
     void step(const StepResult& r) override {
         const CloudStatistics& s = r.statistics;
@@ -72,15 +72,15 @@ class Listing : public PipelineSink {
     std::vector<int> numbers;
 };
 
-Listing run_to_end(Pipeline& pipeline) {
+Listing run_to_end(Simulation& simulation) {
     Listing listing;
-    while (!pipeline.finished()) pipeline.advance(listing);
+    while (!simulation.finished()) simulation.advance(listing);
     return listing;
 }
 
-Listing uninterrupted(const Scene& scene, const PipelineRange& range) {
-    Pipeline pipeline(scene, range, std::string(32, '0'));
-    return run_to_end(pipeline);
+Listing uninterrupted(const Scene& scene, const SimulationRange& range) {
+    Simulation simulation(scene, range, std::string(32, '0'));
+    return run_to_end(simulation);
 }
 
 TEST(Moment, SplitsTimeIntoStepAndFraction) {
@@ -113,7 +113,7 @@ TEST(Moment, SplitsTimeIntoStepAndFraction) {
 }
 
 // The same frames from all states kept in memory: q by smooth() over the window, then mix().
-TEST(Pipeline, FramesAreTheSmoothedAndMixedStates) {
+TEST(Simulation, FramesAreTheSmoothedAndMixedStates) {
     for (const int t0 : {0, 1, 3}) {
         Scene scene = small_scene();
         scene.density.smoothing.t0 = t0;
@@ -162,29 +162,29 @@ TEST(Pipeline, FramesAreTheSmoothedAndMixedStates) {
     }
 }
 
-void expect_same_after_restart_anywhere(const Scene& scene, const PipelineRange& range) {
+void expect_same_after_restart_anywhere(const Scene& scene, const SimulationRange& range) {
     const Listing whole = uninterrupted(scene, range);
     Listing dummy;
-    Pipeline pipeline(scene, range, std::string(32, '0'));
+    Simulation simulation(scene, range, std::string(32, '0'));
     std::size_t restarts = 0;
     for (;; ++restarts) {
-        Pipeline again(scene, range, std::string(32, '0'), pipeline.save());
-        ASSERT_EQ(again.steps_taken(), pipeline.steps_taken());
+        Simulation again(scene, range, std::string(32, '0'), simulation.save());
+        ASSERT_EQ(again.steps_taken(), simulation.steps_taken());
         const Listing rest = run_to_end(again);
         std::vector<std::string> joined = dummy.events;
         joined.insert(joined.end(), rest.events.begin(), rest.events.end());
-        ASSERT_EQ(joined, whole.events) << "restart " << restarts << " at step " << pipeline.steps_taken();
-        if (pipeline.finished()) break;
-        pipeline.advance(dummy);
+        ASSERT_EQ(joined, whole.events) << "restart " << restarts << " at step " << simulation.steps_taken();
+        if (simulation.finished()) break;
+        simulation.advance(dummy);
     }
     EXPECT_GT(restarts, scene.steps);
 }
 
-TEST(Pipeline, RestartsAnywhereWithTheSameResults) {
+TEST(Simulation, RestartsAnywhereWithTheSameResults) {
     expect_same_after_restart_anywhere(small_scene(), full_range(small_scene()));
 }
 
-TEST(Pipeline, RestartsAnywhereWithAndWithoutATimeWindow) {
+TEST(Simulation, RestartsAnywhereWithAndWithoutATimeWindow) {
     Scene scene = small_scene();
     scene.steps = 6;
     for (const int t0 : {0, 2}) {
@@ -194,7 +194,7 @@ TEST(Pipeline, RestartsAnywhereWithAndWithoutATimeWindow) {
     }
 }
 
-TEST(Pipeline, RestartsAnywhereWithManyFramesAStepAndFewAndNone) {
+TEST(Simulation, RestartsAnywhereWithManyFramesAStepAndFewAndNone) {
     Scene scene = small_scene();
     scene.steps = 5;
     for (const double time_scale : {1.7, 23.0}) {
@@ -204,10 +204,10 @@ TEST(Pipeline, RestartsAnywhereWithManyFramesAStepAndFewAndNone) {
     expect_same_after_restart_anywhere(scene, {scene.steps, 1, 0});
 }
 
-TEST(Pipeline, ARangeOfFramesIsThatPartOfTheWhole) {
+TEST(Simulation, ARangeOfFramesIsThatPartOfTheWhole) {
     const Scene scene = small_scene();
     const Listing whole = uninterrupted(scene, full_range(scene));
-    const PipelineRange range = range_of_frames(scene, 5, 8);
+    const SimulationRange range = range_of_frames(scene, 5, 8);
     EXPECT_EQ(range.last_step, 5u);  // frame 8 shows 49 s
     const Listing part = uninterrupted(scene, range);
     ASSERT_EQ(part.numbers, (std::vector<int>{5, 6, 7, 8}));
@@ -217,14 +217,14 @@ TEST(Pipeline, ARangeOfFramesIsThatPartOfTheWhole) {
     EXPECT_EQ(part.steps.back().statistics.mean_density, whole.steps[5].statistics.mean_density);
 }
 
-TEST(Pipeline, RefusesFramesThatAreNotThere) {
+TEST(Simulation, RefusesFramesThatAreNotThere) {
     Scene scene = small_scene();
     EXPECT_THROW(range_of_frames(scene, 19, 20), Error);
     EXPECT_THROW(range_of_frames(scene, 0, 1), Error);
     EXPECT_THROW(range_of_frames(scene, 17, 19), Error);
     EXPECT_EQ(range_of_frames(scene, 17, kLastFrame).last_frame, 18);
     scene.frames.count = 100;  // more than the simulated time holds
-    EXPECT_THROW(Pipeline(scene, full_range(scene), std::string(32, '0')), Error);
+    EXPECT_THROW(Simulation(scene, full_range(scene), std::string(32, '0')), Error);
 }
 
 ErrorCode code_of(const std::function<void()>& action) {
@@ -237,15 +237,15 @@ ErrorCode code_of(const std::function<void()>& action) {
     return ErrorCode::check;
 }
 
-TEST(Pipeline, RefusesForeignAndDamagedCheckpoints) {
+TEST(Simulation, RefusesForeignAndDamagedCheckpoints) {
     const Scene scene = small_scene();
-    const PipelineRange range = full_range(scene);
-    Pipeline pipeline(scene, range, std::string(32, '0'));
+    const SimulationRange range = full_range(scene);
+    Simulation simulation(scene, range, std::string(32, '0'));
     Listing dummy;
-    for (int n = 0; n < 9; ++n) pipeline.advance(dummy);
-    const Checkpoint good = pipeline.save();
-    const auto restart = [&](const Scene& s, const PipelineRange& r, const std::string& hash,
-                             const Checkpoint& c) { return code_of([&] { Pipeline(s, r, hash, c); }); };
+    for (int n = 0; n < 9; ++n) simulation.advance(dummy);
+    const Checkpoint good = simulation.save();
+    const auto restart = [&](const Scene& s, const SimulationRange& r, const std::string& hash,
+                             const Checkpoint& c) { return code_of([&] { Simulation(s, r, hash, c); }); };
     EXPECT_EQ(restart(scene, range, std::string(32, '1'), good), ErrorCode::usage);
     EXPECT_EQ(restart(scene, range_of_frames(scene, 1, 3), std::string(32, '0'), good), ErrorCode::usage);
     Scene wider = scene;

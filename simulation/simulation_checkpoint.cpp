@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The part of Pipeline that saves and restores it.
+// The part of Simulation that saves and restores it.
 
 #include <algorithm>
 #include <array>
@@ -11,20 +11,37 @@
 
 #include "core/bytes.h"
 #include "core/error.h"
-#include "simulation/pipeline.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {
 
 constexpr std::uint32_t kHistoryVersion = 3;
 
-// What decides whether a saved history fits: the range, and what the history holds of each state.
-void put_settings(ByteWriter& writer, const Scene& scene, const PipelineRange& range) {
+// The range of a simulation, in the order of a checkpoint.
+void put_range(ByteWriter& writer, const SimulationRange& range) {
     writer.put(range.last_step);
     writer.put(std::int32_t(range.first_frame));
     writer.put(std::int32_t(range.last_frame));
-    writer.put(std::int32_t(scene.density.smoothing.t0));
-    writer.put(std::uint8_t(scene.density.write_state));
+}
+
+SimulationRange get_range(ByteReader& reader) {
+    SimulationRange range;
+    range.last_step = reader.get<std::uint64_t>();
+    range.first_frame = reader.get<std::int32_t>();
+    range.last_frame = reader.get<std::int32_t>();
+    return range;
+}
+
+// Whether `after` is `before` or goes on from it.
+bool continues(const SimulationRange& before, const SimulationRange& after) {
+    return after.first_frame == before.first_frame && after.last_step >= before.last_step &&
+           after.last_frame >= before.last_frame;
+}
+
+// What a history holds of each state: bit 0 for hum and act, from bit 1 on the results.
+std::uint8_t content_bits(const Scene& scene, SimulationResults results) {
+    return std::uint8_t(unsigned(scene.density.write_state) | unsigned(results) << 1);
 }
 
 void append_plane(std::vector<std::byte>& bytes, const BitPlane& plane) {
@@ -115,13 +132,15 @@ BitPlane get_plane(ByteReader& reader, Extent extent) {
 
 }  // namespace
 
-Checkpoint Pipeline::save() {
+Checkpoint Simulation::save() {
     densities_.clear();
     // Hands the small blocks that the densities lay in back to the system; the planes below need large ones.
     ::malloc_trim(0);
     ByteWriter writer;
     writer.put(kHistoryVersion);
-    put_settings(writer, scene_, range_);
+    put_range(writer, range_);
+    writer.put(std::int32_t(window()));
+    writer.put(content_bits(scene_, results_));
     writer.put(next_step_);
     writer.put(std::int32_t(next_frame_));
     writer.put(std::uint32_t(history_.size()));
@@ -154,7 +173,7 @@ Checkpoint Pipeline::save() {
 }
 
 // The layers' states one after the other, each with its length before it.
-void Pipeline::restore_layers(const Checkpoint& checkpoint) {
+void Simulation::restore_layers(const Checkpoint& checkpoint) {
     if (ByteReader(checkpoint.history).get<std::uint32_t>() != kHistoryVersion) {
         throw Error(ErrorCode::io, "the checkpoint was written by another version of nephos");
     }
@@ -175,7 +194,7 @@ void Pipeline::restore_layers(const Checkpoint& checkpoint) {
         throw Error(ErrorCode::io, "the checkpoint's layers are damaged");
 }
 
-void Pipeline::restore_ground(ByteReader& reader) {
+void Simulation::restore_ground(ByteReader& reader) {
     GroundCoverMap map = ground_->map();
     for (Past& state : history_) {
         get_ground(reader, map);
@@ -184,15 +203,13 @@ void Pipeline::restore_ground(ByteReader& reader) {
     ground_->restore(std::move(map));
 }
 
-void Pipeline::restore_history(const Checkpoint& checkpoint) {
+void Simulation::restore_history(const Checkpoint& checkpoint) {
     ByteReader reader(checkpoint.history);
     reader.skip(sizeof kHistoryVersion);  // read by restore_layers()
-    ByteWriter expected;
-    put_settings(expected, scene_, range_);
-    const std::vector<std::byte> settings = expected.take();
-    std::vector<std::byte> found(settings.size());
-    reader.get_bytes(found);
-    if (found != settings) {
+    const SimulationRange before = get_range(reader);
+    const bool same_window = std::uint64_t(reader.get<std::int32_t>()) == window();
+    const bool same_content = reader.get<std::uint8_t>() == content_bits(scene_, results_);
+    if (!continues(before, range_) || !same_window || !same_content) {
         throw Error(ErrorCode::usage,
                     "the checkpoint belongs to a run with other frames or another smoothing window");
     }
@@ -217,26 +234,32 @@ void Pipeline::restore_history(const Checkpoint& checkpoint) {
     for (Past& state : history_) {
         for (std::size_t layer = 0; layer < layers_.size(); ++layer) {
             Lattice planes;
-            if (const Automaton* automaton = layers_[layer].automaton()) {
-                planes.cld = get_plane(reader, automaton->options().extent);
+            if (remembers_planes(layer)) {
+                const Extent& extent = layers_[layer].automaton()->options().extent;
+                planes.cld = get_plane(reader, extent);
                 if (scene_.density.write_state) {
-                    planes.hum = get_plane(reader, automaton->options().extent);
-                    planes.act = get_plane(reader, automaton->options().extent);
+                    planes.hum = get_plane(reader, extent);
+                    planes.act = get_plane(reader, extent);
                 }
             }
             state.layers[layer].planes = std::make_shared<const Lattice>(std::move(planes));
         }
     }
     // past() relies on these.
-    const auto reach = std::uint64_t(scene_.density.smoothing.t0);
     const std::uint64_t lowest = lowest_needed();
-    bool good = reader.rest().empty() && !history_.empty() && next_step_ <= range_.last_step + 1 &&
+    const bool reaches_back =
+        !history_.empty() && history_.front().step <= (lowest > window() ? lowest - window() : 0);
+    bool good = reader.rest().empty() && !history_.empty() && next_step_ <= before.last_step + 1 &&
                 next_frame_ >= range_.first_frame &&
-                next_frame_ <= std::max(range_.last_frame, range_.first_frame - 1) + 1 &&
-                history_.back().step == steps_taken() && history_.back().hash == combined_hash(layers_) &&
-                (finished() || history_.front().step <= (lowest > reach ? lowest - reach : 0));
+                next_frame_ <= std::max(before.last_frame, before.first_frame - 1) + 1 &&
+                history_.back().step == steps_taken() && history_.back().hash == combined_hash(layers_);
     for (std::size_t n = 1; good && n < history_.size(); ++n)
         good = history_[n].step == history_[n - 1].step + 1;
+    if (good && !reaches_back && !finished() && before != range_) {
+        throw Error(ErrorCode::usage,
+                    "the checkpoint does not hold the states that further steps go on from: start anew");
+    }
+    good = good && (finished() || reaches_back);
     if (!good) throw Error(ErrorCode::io, "the checkpoint's history is damaged");
 }
 

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/earlier_run.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "automaton/checkpoint.h"
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "scenes/format/writer.h"
+#include "simulation/manifest.h"
+#include "simulation/statistics_file.h"
+
+namespace nephos {
+namespace {
+
+bool is_frame_of(const std::string& file, const std::string& name) {
+    if (!file.starts_with(name + "_")) return false;
+    const std::size_t dot = file.rfind('.');
+    const std::string extension = dot == file.npos ? "" : file.substr(dot);
+    if (extension != ".vdb" && extension != ".png" && extension != ".exr") return false;
+    const std::string number = file.substr(name.size() + 1, dot - name.size() - 1);
+    return number.size() >= 4 &&
+           std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+void remove_file(const std::filesystem::path& path) {
+    std::error_code error;
+    std::filesystem::remove(path, error);
+    if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
+}
+
+// Names of the files in a part of the folder ("." for itself); none when it is not there.
+std::vector<std::string> names_in(const RunFolder& folder, const std::string& part) {
+    std::vector<std::string> names;
+    std::error_code error;
+    for (std::filesystem::directory_iterator at(folder.folder / part, error), end; !error && at != end;
+         at.increment(error)) {
+        names.push_back(at->path().filename().string());
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+// Parts of the folder that hold frames: a folder of its own for the densities of each layer.
+std::vector<std::string> frame_parts(const RunFolder& folder) {
+    std::vector<std::string> parts{"density", "frames"};
+    for (const std::string& name : names_in(folder, "density")) {
+        std::error_code error;
+        const auto type = std::filesystem::symlink_status(folder.folder / "density" / name, error).type();
+        if (type == std::filesystem::file_type::directory) parts.push_back("density/" + name);
+    }
+    return parts;
+}
+
+// What a run of this name writes and finds there already, the manifest last: as long as it is there, the rest
+// is known to be of a run.
+std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
+    std::vector<std::filesystem::path> files;
+    for (const std::string& part : frame_parts(folder)) {
+        for (const std::string& name : names_in(folder, part)) {
+            if (is_frame_of(name, folder.name)) files.push_back(folder.folder / part / name);
+        }
+    }
+    for (const std::string& name : names_in(folder, "statistics")) {
+        const std::filesystem::path path = folder.folder / "statistics" / name;
+        if (is_statistics(path, kLayerStatisticsHeader)) files.push_back(path);
+    }
+    for (const std::filesystem::path& path :
+         {folder.checkpoint(), folder.statistics(), folder.video(), folder.manifest()}) {
+        std::error_code error;
+        if (std::filesystem::symlink_status(path, error).type() != std::filesystem::file_type::not_found) {
+            files.push_back(path);
+        }
+    }
+    return files;
+}
+
+[[noreturn]] void refuse(const RunFolder& folder, const std::string& reason) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: nothing was written, because {}: choose another --out, or give --overwrite",
+                            folder.folder.string(), reason));
+}
+
+std::string range_text(const EarlierRun& run) {
+    return fmt::format("frames {}..{}{}", run.range.first_frame, run.range.last_frame,
+                       run.render ? "" : ", without pictures");
+}
+
+// What makes the scene another one than that of the earlier run.
+std::string difference(const EarlierRun& earlier, const RunSettings& settings) {
+    Scene other_video = settings.scene;
+    other_video.frames.video = !other_video.frames.video;
+    if (earlier.scene_hash == scene_hash(other_video)) {
+        return settings.scene.frames.video ? "only the video differs: the first call was without --video"
+                                           : "only the video differs: the first call was with --video";
+    }
+    return earlier.simulation_hash == settings.simulation_hash
+               ? "the simulation is the same, density, frames or pictures differ"
+               : "the simulation itself differs";
+}
+
+// The range that the same command line gives for the scene as it was.
+SimulationRange range_before(const RunSettings& settings, const Scene& before) {
+    if (settings.range.last_frame < settings.range.first_frame) return {before.steps, 1, 0};
+    return settings.range == full_range(settings.scene) ? full_range(before) : settings.range;
+}
+
+}  // namespace
+
+void remove_earlier_run(const RunFolder& folder) {
+    for (const std::filesystem::path& path : earlier_files(folder)) remove_file(path);
+}
+
+void remove_leftovers(const RunFolder& folder) {
+    const auto remove_if = [&](const std::string& part, const auto& is_ours) {
+        for (const std::string& name : names_in(folder, part)) {
+            const std::string published = published_name(name);
+            if (!published.empty() && is_ours(published)) remove_file(folder.folder / part / name);
+        }
+    };
+    remove_if(".", [&](const std::string& name) {
+        return name == folder.manifest().filename() || name == folder.checkpoint().filename();
+    });
+    const auto is_frame = [&](const std::string& name) {
+        return is_frame_of(name, folder.name) || name == folder.video().filename();
+    };
+    for (const std::string& part : frame_parts(folder)) remove_if(part, is_frame);
+}
+
+void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
+    const std::vector<std::filesystem::path> files = earlier_files(folder);
+    if (files.empty()) return;
+    if (files.back() != folder.manifest()) {
+        refuse(folder, fmt::format("there is {}, but no manifest.json that says that it is of a run",
+                                   files.back().lexically_relative(folder.folder).string()));
+    }
+    EarlierRun earlier;
+    try {
+        earlier = read_manifest(folder.manifest());
+    } catch (const Error& reason) {
+        refuse(folder,
+               fmt::format("the folder holds a manifest.json that is not of a run ({})", reason.what()));
+    }
+    const auto is_there = [&](const std::filesystem::path& file) {
+        return std::ranges::count(files, file) > 0;
+    };
+    if (is_there(folder.statistics()) && !is_statistics(folder.statistics())) {
+        refuse(folder, "the folder holds a statistics.csv that is not of a run");
+    }
+    if (earlier.scene_hash != scene_hash) {
+        refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed", earlier.name));
+    }
+    if (!is_there(folder.checkpoint())) return;
+    if (!is_checkpoint(folder.checkpoint())) {
+        refuse(folder, "the folder holds a checkpoint.nephos that is not of a run");
+    }
+    if (earlier.complete) return;
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("{}: holds an interrupted run of '{}' ({} of {} steps): give --resume to go on, or "
+                    "--overwrite to start anew",
+                    folder.folder.string(), earlier.name,
+                    earlier.steps_reported == 0 ? 0 : earlier.steps_reported - 1, earlier.range.last_step));
+}
+
+void require_checkpoint(const RunFolder& folder) {
+    if (std::filesystem::exists(folder.checkpoint())) return;
+    throw Error(ErrorCode::io, folder.checkpoint().string() +
+                                   ": is not there, so there is nothing to resume: run without --resume");
+}
+
+Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder) {
+    const EarlierRun earlier = read_manifest(folder.manifest());
+    Scene before = settings.scene;
+    before.steps = std::min(earlier.scene_steps, settings.scene.steps);
+    if (earlier.simulation_hash != settings.simulation_hash || earlier.scene_hash != scene_hash(before)) {
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: was started with another scene (hash {}, now {}; {}). Resume with the scene, "
+                        "--seed, --set and --video of the first call (manifest.json has the scene under "
+                        "\"scene_text\"; only time.steps may be larger), or start anew with --overwrite",
+                        folder.folder.string(), earlier.scene_hash, settings.scene_hash,
+                        difference(earlier, settings)));
+    }
+    const SimulationRange range = range_before(settings, before);
+    const EarlierRun now{.render = settings.render, .range = range};
+    if (earlier.range != range || earlier.render != settings.render) {
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: was started for {}, now it is {}: resume with the same --frames and --no-render",
+                        folder.folder.string(), range_text(earlier), range_text(now)));
+    }
+    const Checkpoint checkpoint = read_checkpoint(folder.checkpoint());
+    try {
+        return Simulation(settings.scene, settings.range, settings.simulation_hash, checkpoint,
+                          settings.results());
+    } catch (const Error& error) {
+        throw Error(error.code(), folder.checkpoint().string() + ": " + error.what());
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What a folder holds of earlier runs: what must not be lost, what is in the way, and what a run goes on from.
+
+#include <string>
+
+#include "simulation/run_folder.h"
+#include "simulation/simulation.h"
+
+namespace nephos {
+
+// Removes an earlier run's files of the same name, which must not stay between those of a new one; nothing else is
+// touched. Throws Error(io).
+void remove_earlier_run(const RunFolder& folder);
+
+// Removes the temporary files of a run that was killed. Only for the holder of the folder's lock: to nobody else
+// are they leftovers. Throws Error(io).
+void remove_leftovers(const RunFolder& folder);
+
+// Throws Error(usage) when a new run would overwrite something that it cannot make again: an interrupted run,
+// which may hold hours of work, a run of another scene, or a file that no run wrote.
+void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash);
+
+// Throws Error(io) when there is no checkpoint to go on from.
+void require_checkpoint(const RunFolder& folder);
+
+// Returns the simulation of the folder's checkpoint. The scene may be that of the first call with a larger
+// `time.steps`; frames that were written before then name the hash of that scene. Throws Error(usage) when it is
+// another scene, or other frames were asked for, and as Simulation, naming the file.
+Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder);
+
+}  // namespace nephos

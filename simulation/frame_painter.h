@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Draws the frames of a scene:
+//
+//     FramePainter painter(scene);
+//     const Picture picture = painter.draw(frame);    // in a SimulationSink's frame()
+//
+// A picture shows the metaballs of the frame's density, the billboards of clouds that are drawn directly, rain
+// or snow, what lies on the ground, lightning, and the debug view, as scene.render asks for them and as camera
+// and sun stand at the frame's time.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "density/metaballs.h"
+#include "render/image/picture.h"
+#include "render/renderer.h"
+#include "scenes/format/scene.h"
+#include "simulation/simulation.h"
+#include "simulation/sky_picture.h"
+
+namespace nephos {
+
+// A frame whose picture was begun: all that the picture refers to. Must not outlive its painter.
+struct PendingFrame {
+    FrameResult frame;
+    std::vector<Metaball> balls;
+    PendingSkyPicture picture;
+
+    // Whether a device is still drawing it, as far as is known.
+    bool is_pending() const { return picture.picture.is_pending(); }
+};
+
+// Keeps what pictures have in common. Not thread-safe; different painters may work in different threads.
+class FramePainter {
+  public:
+    // Opens the back-end. Throws as Renderer.
+    explicit FramePainter(const Scene& scene, const DeviceOptions& device = {});
+
+    // Draws a frame. One without a density in its layers is drawn from FrameResult::density. Pictures have depth
+    // and light where scene.frames.exr asks for files that hold them, or it rains. Throws as
+    // Renderer::draw_splats(), and Error(usage) when the frame does not fit into memory.
+    Picture draw(const FrameResult& frame);
+
+    // The same in two steps, as Renderer::begin() and finish(). Pictures are finished in the order in which they
+    // were begun.
+    PendingFrame begin(FrameResult frame);
+    Picture finish(PendingFrame&& pending);
+
+    // As those of Renderer.
+    std::string backend_name() const { return renderer_.backend_name(); }
+    std::string device_name() const { return renderer_.device_name(); }
+    // Adds back-end and device to the metadata of a picture that this painter drew.
+    void note_renderer(PictureMetadata& metadata) const { nephos::note_renderer(renderer_, metadata); }
+
+  private:
+    std::vector<Metaball> metaballs_of(const FrameResult& frame) const;
+
+    Scene scene_;
+    Renderer renderer_;
+    SkyPainter painter_;
+};
+
+}  // namespace nephos

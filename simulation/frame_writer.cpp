@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/frame_writer.h"
+
+#include <utility>
+#include <vector>
+
+#include "core/random.h"
+#include "density/combine.h"
+#include "scenes/format/writer.h"
+#include "simulation/version.h"
+
+namespace nephos {
+
+FrameWriter::FrameWriter(const Scene& scene, RunFolder folder)
+    : scene_(scene), folder_(std::move(folder)), scene_hash_(scene_hash(scene)) {}
+
+VdbMetadata density_metadata(const Scene& scene, std::string scene_hash, double time_s,
+                             const StateHash& hash) {
+    VdbMetadata metadata;
+    metadata.extinction_per_m = scene.density.extinction_per_m;
+    metadata.time_s = time_s;
+    metadata.time_step_s = scene.automaton.time_step_s;
+    metadata.frames_per_second = scene.frames.per_second;
+    metadata.time_scale = scene.frames.time_scale;
+    metadata.seed = scene.automaton.seed;
+    metadata.scene_hash = std::move(scene_hash);
+    metadata.state_hash = hash.hex();
+    metadata.nephos_version = version();
+    metadata.random_stream_version = int(kRandomStreamVersion);
+    return metadata;
+}
+
+DensityGrid FrameWriter::refined(const DensityGrid& density, const Boundaries& boundaries) const {
+    const DensityOptions& options = scene_.density;
+    if (options.refine == 1) return density;
+    return resample(density, options.refine, options.metaball_radius_cells, boundaries);
+}
+
+VdbMetadata FrameWriter::metadata_of(const FrameResult& frame, const StateHash& hash) const {
+    return density_metadata(scene_, scene_hash_, frame.time_s, hash);
+}
+
+void FrameWriter::write_density(const FrameResult& frame) const {
+    if (!scene_.layers.empty()) {
+        write_layers(frame);
+        return;
+    }
+    const DensityGrid written = refined(frame.density, scene_.automaton.boundaries);
+    VdbContent content;
+    content.density = &written;
+    content.half = scene_.density.half;
+    content.hum = frame.hum;
+    content.act = frame.act;
+    content.cld = frame.cld;
+    content.cells = scene_.automaton.placement;
+    if (scene_.density.write_velocity) content.wind = &scene_.automaton.wind;
+    write_vdb(folder_.density(frame.number), content, metadata_of(frame, frame.hash));
+}
+
+// A file for each layer, with its own voxels, bits and wind, and one of their densities together.
+void FrameWriter::write_layers(const FrameResult& frame) const {
+    std::vector<DensityGrid> grids;
+    std::vector<Boundaries> boundaries;
+    for (std::size_t n = 0; n < frame.layers.size(); ++n) {
+        const LayerFrame& layer = frame.layers[n];
+        if (layer.direct) continue;
+        grids.push_back(refined(layer.density, layer.boundaries));
+        boundaries.push_back(layer.boundaries);
+        VdbContent content;
+        content.density = &grids.back();
+        content.half = scene_.density.half;
+        content.hum = layer.hum;
+        content.act = layer.act;
+        content.cld = layer.cld;
+        content.cells = scene_.layers[n].placement;
+        if (scene_.density.write_velocity) content.wind = &layer_wind(scene_, n);
+        write_vdb(folder_.density(frame.number, layer.name), content, metadata_of(frame, layer.hash));
+    }
+    if (grids.empty()) return;
+    const DensityGrid whole = scene_.density.refine > 1 ? combine(grids, boundaries) : frame.density;
+    VdbContent content;
+    content.density = &whole;
+    content.half = scene_.density.half;
+    content.cells = whole.placement();
+    write_vdb(folder_.density(frame.number), content, metadata_of(frame, frame.hash));
+}
+
+Rgb8Image FrameWriter::write_picture(const FrameResult& frame, const Picture& picture,
+                                     const FramePainter& painter) const {
+    PictureMetadata metadata;
+    metadata.scene = scene_.name;
+    metadata.seed = scene_.automaton.seed;
+    metadata.scene_hash = scene_hash_;
+    metadata.state_hash = frame.hash.hex();
+    metadata.version = version();
+    painter.note_renderer(metadata);
+    metadata.time_s = frame.time_s;
+    metadata.frames_per_second = scene_.frames.per_second;
+    metadata.time_scale = scene_.frames.time_scale;
+    metadata.extinction_per_m = scene_.density.extinction_per_m;
+    RenderOptions options = scene_.render;
+    options.camera = camera_at(options.camera, frame.time_s);
+    if (scene_.frames.exr) write_exr(folder_.picture(frame.number, ".exr"), picture, options, metadata);
+    if (!wants_png(scene_)) return {};
+    Rgb8Image image = srgb8_image(picture, options);
+    write_png(folder_.picture(frame.number, ".png"), image, options, metadata);
+    return image;
+}
+
+}  // namespace nephos

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Writes the files of a scene's frames into the folder of a run, under the names of RunFolder. Every file is
+// either complete or not there.
+
+#include <string>
+
+#include "density/vdb/vdb_file.h"
+#include "render/image/image_file.h"
+#include "scenes/format/scene.h"
+#include "simulation/frame_painter.h"
+#include "simulation/run_folder.h"
+#include "simulation/simulation.h"
+
+namespace nephos {
+
+class FrameWriter {
+  public:
+    FrameWriter(const Scene& scene, RunFolder folder);
+
+    // Writes a density file, refined as the scene asks for; of a scene with layers one for each layer, with its
+    // own voxels, bits and wind, and one of their densities together. Throws Error(io) naming the file.
+    void write_density(const FrameResult& frame) const;
+
+    // Writes the EXR and PNG files that the scene asks for of a picture of `painter`, whose back-end they name. Returns what the PNG shows; empty without one.
+    // Throws Error(io) naming the file.
+    Rgb8Image write_picture(const FrameResult& frame, const Picture& picture,
+                            const FramePainter& painter) const;
+
+  private:
+    void write_layers(const FrameResult& frame) const;
+    DensityGrid refined(const DensityGrid& density, const Boundaries& boundaries) const;
+    VdbMetadata metadata_of(const FrameResult& frame, const StateHash& hash) const;
+
+    Scene scene_;
+    RunFolder folder_;
+    std::string scene_hash_;
+};
+
+// Returns the metadata of a density file of a scene, of the moment `time_s` whose state has this hash.
+VdbMetadata density_metadata(const Scene& scene, std::string scene_hash, double time_s,
+                             const StateHash& hash);
+
+}  // namespace nephos

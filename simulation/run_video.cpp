@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/run_video.h"
+
+#include "core/error.h"
+
+namespace nephos {
+
+RunVideo::RunVideo(const RunSettings& settings)
+    : folder_{settings.folder, settings.scene.name},
+      frames_per_second_(settings.scene.frames.per_second),
+      first_(settings.range.first_frame),
+      next_(settings.range.first_frame),
+      last_(settings.range.last_frame) {}
+
+void RunVideo::write(const Rgb8Image& image) {
+    if (!writer_) {
+        VideoOptions options;
+        options.width = image.width;
+        options.height = image.height;
+        options.frames_per_second = frames_per_second_;
+        writer_.emplace(folder_.video(), options);
+    }
+    writer_->add(image.rgb);
+    ++next_;
+}
+
+void RunVideo::read_back(int end) {
+    while (next_ < end) write(read_png(folder_.picture(next_, ".png")));
+}
+
+void RunVideo::add(int number, const Rgb8Image& image) {
+    if (failed_) return;
+    try {
+        read_back(number);
+        write(image);
+    } catch (const Error&) {
+        writer_.reset();
+        next_ = first_;
+        failed_ = true;
+    }
+}
+
+void RunVideo::finish() {
+    read_back(last_ + 1);
+    writer_->finish();
+    writer_.reset();
+}
+
+}  // namespace nephos
