@@ -1,16 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/frame_painter.h"
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "core/wind.h"
+#include "density/veil.h"
+#include "scenes/format/layers.h"
 #include "simulation/memory.h"
-#include "simulation/weather.h"
 
 namespace nephos {
+namespace {
+
+constexpr double kAboveGround_m = 50;
+constexpr double kMostLean = 1;
+
+const Wind& common_wind(const Scene& scene) {
+    return scene.automaton.wind.keyframes.empty() && !scene.layers.empty() ? layer_wind(scene, 0)
+                                                                           : scene.automaton.wind;
+}
+
+// Relative to its cloud, rain falls back with the wind's difference below it.
+void lean(RainCurtain& curtain, const Wind& wind, const PrecipitationOptions& p, double time_s) {
+    const double fall = p.kind == PrecipitationKind::snow ? 1 : 6;
+    const double height = curtain.base_m - curtain.ground_m;
+    const Velocity cloud = wind_at(wind, curtain.base_m, time_s),
+                   below = wind_at(wind, curtain.ground_m + 0.5 * height, time_s);
+    curtain.lean_x = p.wind_drift * (cloud.east_m_per_s - below.east_m_per_s) / fall;
+    curtain.lean_y = p.wind_drift * (cloud.north_m_per_s - below.north_m_per_s) / fall;
+    const double most = std::hypot(curtain.lean_x, curtain.lean_y) / kMostLean;
+    if (most <= 1) return;
+    curtain.lean_x /= most;
+    curtain.lean_y /= most;
+}
+
+}  // namespace
 
 FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
     : scene_(scene), renderer_(device) {}
@@ -58,5 +86,39 @@ Picture FramePainter::finish(PendingFrame&& pending) {
 }
 
 Picture FramePainter::draw(const FrameResult& frame) { return finish(begin(frame)); }
+
+Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, double time_s) {
+    const PrecipitationOptions& p = scene.render.precipitation;
+    Weather weather;
+    weather.seed = scene.automaton.seed;
+    if (!p.enabled) return weather;
+    const double ground_m = scene.render.ground.height_m;
+    const Wind& wind = common_wind(scene);
+    const Velocity now = wind_at(wind, ground_m + kAboveGround_m, time_s);
+    const Vec3 path = wind_displacement_m(wind, ground_m + kAboveGround_m, time_s);
+    weather.wind_x_m_per_s = p.wind_drift * now.east_m_per_s;
+    weather.wind_y_m_per_s = p.wind_drift * now.north_m_per_s;
+    weather.carried_x_m = p.wind_drift * path.x;
+    weather.carried_y_m = p.wind_drift * path.y;
+    for (std::size_t n = 0; n < layers.size(); ++n) {
+        const Range& base = scene.layers[n].base_height_m;
+        for (const RainArea& area : layers[n].rain) {
+            RainCurtain curtain;
+            curtain.id = area.id;
+            curtain.x_m = area.x_m;
+            curtain.y_m = area.y_m;
+            curtain.semi_a_m = area.semi_a_m;
+            curtain.semi_b_m = area.semi_b_m;
+            curtain.axis_x = area.axis_x;
+            curtain.axis_y = area.axis_y;
+            curtain.ground_m = ground_m;
+            curtain.base_m = 0.5 * (base.min + base.max);
+            curtain.rate_mm_per_h = area.intensity_mm_per_h;
+            lean(curtain, layer_wind(scene, n), p, time_s);
+            weather.curtains.push_back(curtain);
+        }
+    }
+    return weather;
+}
 
 }  // namespace nephos

@@ -10,12 +10,13 @@
 // or snow, what lies on the ground, lightning, and the debug view, as scene.render asks for them and as camera
 // and sun stand at the frame's time.
 
-#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "density/metaballs.h"
 #include "render/image/picture.h"
+#include "render/rain/precipitation.h"
 #include "render/renderer.h"
 #include "scenes/format/scene.h"
 #include "simulation/simulation.h"
@@ -62,5 +63,11 @@ class FramePainter {
     Renderer renderer_;
     SkyPainter painter_;
 };
+
+// Returns the rain or snow of a frame as the renderer draws it: the curtains of all layers, from the ground of
+// the picture to the middle of a layer's base heights, with the wind 50 m above the ground: the scene's, or that
+// of the first layer when the scene has none. A curtain leans as rain of 6 m/s (snow of 1 m/s) falls through air
+// that moves otherwise than its cloud, by at most 1. Pure.
+Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, double time_s);
 
 }  // namespace nephos

@@ -4,6 +4,8 @@
 // The skies, the rain and the ground of a scene at any moment, without its density: what a picture of a density
 // file of that scene shows beside the file's voxels.
 
+#include <optional>
+
 #include "scenes/format/scene.h"
 #include "simulation/simulation.h"
 

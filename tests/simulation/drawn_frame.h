@@ -10,9 +10,9 @@
 
 #include "density/metaballs.h"
 #include "scenes/format/scene.h"
+#include "simulation/frame_painter.h"
 #include "simulation/simulation.h"
 #include "simulation/sky_picture.h"
-#include "simulation/weather.h"
 
 namespace nephos::test {
 
