@@ -197,7 +197,7 @@ NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
 }
 
 // 1 - exp(-d line_integral(w, sqrt(w))) as w^2 (c0 + c1 w + ... + c5 w^5), for depth scales d up to
-// kMaxFittedDepth; the coefficients are polynomials of s = d / (d + 4). Largest error 0.0005 min(1, d); from
+// kMaxFittedDepth; the coefficients are polynomials of s = d / (d + 4). Largest error 0.0006 min(1, d); from
 // tests/reference/fit_opacity.py.
 NEPHOS_FUNCTION float fit_parameter(float depth_scale) { return depth_scale / (depth_scale + 4.0f); }
 NEPHOS_FUNCTION float fit_row(float s, float a, float b, float c, float d, float e) {

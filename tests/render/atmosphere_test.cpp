@@ -138,8 +138,8 @@ Rgb sky_radiance(const SkyTable& table, double sine, double cos_azimuth, double 
     const auto i = std::min(std::size_t(x), kColumns - 2), j = std::min(std::size_t(y), kRows - 2);
     const auto at = [&](const std::vector<float>& texels, std::size_t c) {
         const float *a = &texels[4 * (j * kColumns + i) + c], *b = a + 4 * kColumns;
-        return mix(mix(double(a[0]), double(a[4]), x - double(i)),
-                   mix(double(b[0]), double(b[4]), x - double(i)), y - double(j));
+        return std::lerp(std::lerp(double(a[0]), double(a[4]), x - double(i)),
+                         std::lerp(double(b[0]), double(b[4]), x - double(i)), y - double(j));
     };
     const double phase = double(shader::particle_phase(float(cos_to_sun), float(mie_g)));
     Rgb radiance{};

@@ -286,10 +286,13 @@ TEST(LevelOfDetail, IsOffForNoPixelsAndWithoutVoxels) {
 }
 
 TEST(LevelOfDetail, OptionsOutOfRangeAreErrors) {
-    EXPECT_NO_THROW(check(LevelOfDetailOptions{}));
-    EXPECT_THROW(check(LevelOfDetailOptions{.pixels = -0.1}), Error);
-    EXPECT_THROW(check(LevelOfDetailOptions{.pixels = std::nan("")}), Error);
-    EXPECT_THROW(check(LevelOfDetailOptions{.pixels = 1001}), Error);
+    const auto check_pixels = [](double pixels) {
+        RenderOptions options;
+        options.level_of_detail.pixels = pixels;
+        check(options);
+    };
+    EXPECT_NO_THROW(check(RenderOptions{}));
+    for (const double wrong : {-0.1, std::nan(""), 1001.0}) EXPECT_THROW(check_pixels(wrong), Error) << wrong;
 }
 
 }  // namespace
