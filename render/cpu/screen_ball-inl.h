@@ -81,7 +81,8 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
             each_times(times(hn::Mul(albedo, light), beta), sunlight)};
 }
 
-// Where the shells of metaballs begin; beyond the last shell, the distance of the metaball.
+// Returns the distances at which the metaballs' own shells begin; beyond the last shell, those of the
+// metaballs.
 HWY_INLINE Floats shell_begins(const shader::Shells& data, Floats distance) {
     const Lanes d;
     HWY_ALIGN float at[kMaxLanes];
