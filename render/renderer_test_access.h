@@ -32,7 +32,7 @@ struct RendererTestAccess {
     // Sums of the numbers before each, and of all at the end.
     static std::vector<std::uint32_t> prefix_sums(Renderer& renderer, std::span<const std::uint32_t> numbers);
 
-    // What the device listed for the last tile of the picture before (listed_view.h).
+    // The device's lists for the last tile of the previous picture (listed_view.h).
     struct Lists {
         std::vector<shader::ViewBall> balls;  // nearest first
         std::vector<shader::TileRange> ranges;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// From a metaball as the eye sees it to what is drawn of it: place, shape, fit and light, a vector of balls
+// Projects metaballs from camera space to the screen: position, shape, fit and light, a vector of metaballs
 // at a time (render/vulkan/view_project.comp and lighting.glsl).
 
 #if defined(NEPHOS_RENDER_SCREEN_BALL_INL_H_) == defined(HWY_TARGET_TOGGLE)

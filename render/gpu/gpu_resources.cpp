@@ -16,8 +16,8 @@ using Memory = vk::MemoryPropertyFlagBits;
 // Kinds that want a feature of the device that nobody has switched on.
 constexpr MemoryFlags kForbidden = Memory::eDeviceCoherentAMD | Memory::eDeviceUncachedAMD;
 
-// From the first kind of memory that has one of `wishes`, the most wanted first, and is not full: what the
-// processor sees of a card's own memory may be small.
+// Allocates from the first kind of memory with one of `wishes`, best first, that is not full: the part of a
+// card's memory that the processor can access may be small.
 vk::raii::DeviceMemory allocate(const GpuDevice& gpu, const vk::MemoryRequirements& needs,
                                 std::initializer_list<MemoryFlags> wishes, bool* cached = nullptr) {
     std::exception_ptr full;

@@ -76,7 +76,7 @@ class DeviceLists {
     void record_bins(const vk::raii::CommandBuffer& commands, const Sets& sets, const Tile& tile,
                      std::size_t shells) const;
 
-    // What both consist of, for other orders (device_sun.h).
+    // The steps of both, for other sorts (device_sun.h).
     OrderRecorder recorder(const vk::raii::CommandBuffer& commands) const {
         return {commands, pipelines_, counts_};
     }
