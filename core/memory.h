@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How much memory this process may still take, asked before something large is allocated, and what it keeps.
+// The memory that this process may still allocate, queried before a large allocation, and the memory that it
+// retains.
 
 #include <cstddef>
 #include <filesystem>
@@ -21,10 +22,10 @@ struct AvailableMemory {
 // not count; if none can, bytes is the largest std::size_t. Thread-safe.
 AvailableMemory available_memory(const std::filesystem::path& root = "/");
 
-// Memory that is freed stays with the process, up to 256 MiB in each arena of malloc, instead of going back
-// to the system at once: every picture and step asks for the same vectors again, and pages that the system
-// has to clear take time (docs/speed.md). available_memory() counts it as free. For programs, not for
-// libraries: it changes malloc for the whole process. Call it first. Does nothing where malloc is not that of
+// Raises malloc's trim threshold, so that up to 256 MiB of freed memory in each arena stay with the process:
+// every frame and step allocates the same vectors again, and the kernel clears each page that it hands out
+// (docs/speed.md). available_memory() counts this memory as free. For programs, not for libraries: it changes
+// malloc for the whole process. Call it before any other function. Does nothing where malloc is not that of
 // the GNU C library.
 void keep_freed_memory();
 

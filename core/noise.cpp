@@ -12,7 +12,7 @@
 #include "core/noise_hash.h"
 #include "core/text.h"
 
-// As density/smoothing_kernel.cpp.
+// Compiled once for each SIMD target of Highway and dispatched at run time.
 #ifndef HWY_DISABLED_TARGETS
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
 #endif
@@ -100,7 +100,7 @@ void check_volume(const NoiseVolumeOptions& o) {
             "a number above 0, at most 1");
 }
 
-// As gradient_noise(), of `count` points, without checks.
+// Evaluates gradient_noise() at `count` points without checking the arguments.
 void noise_points(const float* x, const float* y, const float* z, const NoiseOptions& options,
                   std::size_t count, float* out) {
     HWY_DYNAMIC_DISPATCH(noise_of_points)(x, y, z, options, count, out);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradient noise in SIMD vectors of any width, for core/noise_kernel.cpp and density/veil_kernel.cpp (not
+// Gradient noise in SIMD vectors of any width, for core/noise.h and density/veil.h (not
 // installed). Included once for each target of Highway. Sums and products are never fused, so that every
 // lane has the bits of the scalar formula.
 

@@ -12,10 +12,10 @@ namespace nephos {
 // "inf".
 std::string number_text(double value, int digits);
 
-// The shortest decimal that reads back as the same double: "0.1", "40", "1e-07", "inf".
+// Returns the shortest decimal that reads back as the same double: "0.1", "40", "1e-07", "inf".
 std::string number_text(double value);
 
-// An amount of memory, three digits or so: "12 bytes", "3.2 GiB", "300 MiB".
+// Formats an amount of memory with binary units and about three digits: "12 bytes", "3.2 GiB", "300 MiB".
 std::string bytes_text(std::size_t bytes);
 
 }  // namespace nephos

@@ -44,9 +44,9 @@ struct Metaball {
 // Returns f above for a >= 0; 0 from a = 1 on.
 double metaball_field(double a);
 
-// One cell's volume over the integral of f over its ball: 2835 / (736 pi R^3), R in voxel edges. With it, the
-// extinction extinction_per_m * metaball_normalisation(R) * sum q f along a ray through a saturated region is
-// extinction_per_m on average.
+// Returns the volume of one voxel divided by the volume integral of f: 2835 / (736 pi R^3), R in voxel edges.
+// Then extinction_per_m * metaball_normalisation(R) * sum q f is extinction_per_m on average in a saturated
+// region.
 double metaball_normalisation(double radius_cells);
 
 // Returns one metaball per voxel with q > 0, ordered by block of 8x8x8 voxels (by z, y, x) and inside a block

@@ -46,8 +46,8 @@ std::vector<std::uint32_t> kernel_weights(SmoothingKernel kernel, int radius);
 DensityGrid smooth(std::span<const TimedPlane> planes, const SmoothingOptions& options,
                    const Placement& placement, const Boundaries& boundaries);
 
-// The grid at `fraction` of the way from a (0) to b (1), each voxel a + (b - a) * fraction (D: frames between
-// steps). Throws Error(usage) when extents or placements differ, or when fraction is outside 0..1.
+// Interpolates linearly in time: each voxel is a + (b - a) * fraction (D: frames between steps). Throws
+// Error(usage) when extents or placements differ, or when fraction is outside 0..1.
 DensityGrid mix(const DensityGrid& a, const DensityGrid& b, double fraction);
 
 }  // namespace nephos

@@ -6,7 +6,7 @@
 // cells deep, and the full height:
 //
 //     bits of a row  --expand, sum over t'-->  integers of a row  --sum over i'-->  X row
-//     X rows         --sum over j'-->  Y plane, kept in a ring of 8 + 2 k0 planes
+//     X rows         --sum over j'-->  Y plane, in a ring buffer of 8 + 2 k0 planes
 //     Y planes       --sum over k'-->  S rows  --* r-->  blocks of floats in OpenVDB's order
 //
 // Integers are as narrow as the window's total weight allows: 8 bit (a box of up to 255 cells), 16, 32 bit,

@@ -213,7 +213,7 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
             mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
         Splats mirrored = splats;
         mirrored.depth = mirrored.light = false;
-        // What is merged stays, and with it the light.
+        // The merged metaballs are reused, and with them the light.
         mirror = mirror_view(draw(mirrored, below, detail), below.camera);
         ground.mirror = &*mirror;
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a Renderer consists of: a back-end, and what all back-ends share. Private to the module.
+// The implementation of Renderer: a back-end, and the state common to all back-ends. Private to the module.
 
 #include <cstddef>
 #include <memory>
@@ -44,8 +44,8 @@ struct Renderer::Impl {
     Picture draw_with_ground(const Splats& splats, const RenderOptions& options);
     // T's absorption factor instead of the light pass.
     void absorb_sunlight(LitCloud& cloud, const DensityBlocks& blocks, const RenderOptions& options);
-    // Absorbs the sunlight where the options say so, and returns the fraction of the lightning at each metaball:
-    // empty without.
+    // Absorbs the sunlight where the options say so, and returns the fraction of the lightning at each
+    // metaball: empty without.
     std::vector<float> absorb_light(const Splats& splats, const RenderOptions& options);
     void hand_out_light(const Splats& splats, const RenderOptions& options, Picture& picture);
     void use_scattering(const CloudLight& light);

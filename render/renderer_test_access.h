@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What only the tests may do to a Renderer (not installed).
+// Access of the tests to a Renderer's internals (not installed).
 
 #include <cstddef>
 #include <cstdint>
@@ -17,11 +17,11 @@ struct GpuDevice;
 class VulkanBackend;
 
 struct RendererTestAccess {
-    // How often light was computed so far.
+    // Returns the number of light passes so far.
     static std::size_t light_passes(const Renderer& renderer);
-    // What was copied to the device so far.
+    // Returns the bytes uploaded to the device so far.
     static std::uint64_t uploaded_bytes(const Renderer& renderer);
-    // From now on as with a card whose memory the processor reads slowly; before the first picture.
+    // Simulates a card whose memory the processor reads slowly; to be called before the first picture.
     static void divide_memory(Renderer& renderer);
     // Submits a deliberate write-after-write hazard, which the synchronization validation must report.
     static void provoke_hazard(Renderer& renderer);
@@ -32,7 +32,7 @@ struct RendererTestAccess {
     // Sums of the numbers before each, and of all at the end.
     static std::vector<std::uint32_t> prefix_sums(Renderer& renderer, std::span<const std::uint32_t> numbers);
 
-    // What the device listed for the last tile of the picture before (listed_view.h).
+    // The device's lists for the last tile of the previous picture (listed_view.h).
     struct Lists {
         std::vector<shader::ViewBall> balls;  // nearest first
         std::vector<shader::TileRange> ranges;

@@ -34,8 +34,8 @@ std::span<const GenusFacts> genera();
 const GenusFacts& facts_of(Genus genus);
 Range base_height_m(Genus genus, Region region);
 
-// By abbreviation ("Cb", "St fra") or name ("cumulonimbus"), whatever the case.
-// Throws Error(usage) that lists the abbreviations and names the nearest one.
+// Parses an abbreviation ("Cb", "St fra") or name ("cumulonimbus"), ignoring case. Throws Error(usage) that
+// lists the abbreviations and suggests the nearest one.
 Genus genus_from_name(std::string_view text);
 
 }  // namespace nephos

@@ -24,7 +24,7 @@ namespace nephos {
 
 class LightSchedule {
   public:
-    // clouds_per_frame >= 0; 0: all clouds in every frame.
+    // Computes the period for a layer; clouds_per_frame >= 0, 0 = all clouds in every frame.
     LightSchedule(const SkyOptions& sky, int clouds_per_frame) {
         if (clouds_per_frame == 0) return;
         int most = 0;
@@ -35,7 +35,7 @@ class LightSchedule {
 
     int period() const { return period_; }  // in frames, >= 1
 
-    // The frame, 0..frame, whose light the cloud in `slot` has in `frame`; frames count from 0.
+    // Returns the frame, 0..frame, whose light the cloud in `slot` has in `frame`; frames count from 0.
     int frame_of_light(std::uint32_t slot, int frame) const {
         const int first = int(slot % std::uint32_t(period_));
         return frame < first ? 0 : frame - (frame - first) % period_;

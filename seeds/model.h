@@ -111,7 +111,7 @@ struct Billboard {
     bool operator==(const Billboard&) const = default;
 };
 
-// All billboards of the cloud that reproduce() made from the same arguments, box by box; a pure function.
+// Returns all billboards, box by box, of the cloud that reproduce() makes from the same arguments. Pure.
 std::vector<Billboard> scatter_billboards(const BaseModel& model, const Cloud& cloud,
                                           std::uint64_t scene_seed, std::uint32_t model_index,
                                           std::uint32_t number);

@@ -26,7 +26,7 @@ namespace nephos {
 
 class VdbArchive;
 
-// The child's end: a stream of plain values.
+// The child's end of the pipe: a stream of plain values.
 class SandboxWriter {
   public:
     explicit SandboxWriter(int fd) : fd_(fd) {}
@@ -75,14 +75,13 @@ std::size_t memory_limit(const VdbReadLimits& limits);
 // Returns `text` without control characters, cut to `length`.
 std::string clamp_message(std::string_view text, std::size_t length = 300);
 
-// How every reader of OpenVDB files begins: a child process opens the archive and sends what it finds, this process
-// never parses the file.
+// Common start of all readers of OpenVDB files: a child process opens the archive and sends the results, so
+// that this process never parses the file.
 
 inline constexpr std::size_t kMaxMetadataText = 1000;  // characters of one text that the child sends
 
-// Runs the child's part on the opened archive and, in this process, the parent's on what the child sends.
-// Throws Error(io) naming the path when it is not a readable OpenVDB file, with what the child threw, and
-// with stream errors put into words.
+// Runs `child` on the opened archive in the child process and `parent` here on the values that it sends.
+// Throws Error(io) naming the path when it is not a readable OpenVDB file, with the child's message.
 void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
                 const std::function<void(VdbArchive&, SandboxWriter&)>& child,
                 const std::function<void(SandboxReader&)>& parent);

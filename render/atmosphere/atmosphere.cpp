@@ -42,8 +42,8 @@ struct GaussRule {
     }
 };
 
-// Directions from a point: elevations with their share of the sphere's solid angle / 2 pi. They are dense
-// around the horizon, where light changes fastest.
+// Quadrature over directions: elevations with weights of solid angle / 2 pi, dense around the horizon, where
+// radiance varies fastest.
 struct Elevations {
     struct One {
         double sine, weight;

@@ -23,14 +23,14 @@ using CacheKey = std::array<std::uint64_t, 2>;
 
 struct LitCloud {
     CacheKey metaballs_key{};  // of the given metaballs, extinction and normalisation
-    // Of what the sun's light depends on: the above, direction to the sun, size of the shadow map, how the
-    // light finds its way, and level of detail.
+    // Key of the sun's light: the above, direction to the sun, size of the shadow map, Lighting, and level of
+    // detail.
     CacheKey light_key{};
     PreparedCloud given;
     std::optional<DetailBlocks> blocks;  // of `given`; none where nothing is merged
     std::vector<Metaball> merged;        // drawn instead of the given metaballs; empty: those are drawn
     DetailView view;                     // from which they were merged
-    PreparedCloud cloud;                 // what is drawn: `merged` or the given metaballs
+    PreparedCloud cloud;                 // the drawn metaballs: `merged` or the given ones
     ShadowFrame frame;
     int shadow_size = 0;
     std::vector<float> sun_depths;          // optical depth to the sun, one for each of cloud.visible
@@ -40,9 +40,10 @@ struct LitCloud {
     bool all_known = false;
     bool drawn_again = false;  // this is not the first picture of the cloud
 
-    Version metaballs = 0;  // of `cloud`: what is drawn, without its light
+    Version metaballs = 0;  // of `cloud` without its light
     Version light = 0;      // of the light of `cloud` and its shadow map
-    // Of `sun_depths` and `shadow`. Where it is not `light`, these are on a device (Backend::fetch_light()).
+    // Version of `sun_depths` and `shadow`. If it differs from `light`, they are on a device
+    // (Backend::fetch_light()).
     Version host_light = 0;
     std::size_t light_passes = 0;  // so far
 

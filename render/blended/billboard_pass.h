@@ -27,12 +27,12 @@ class BillboardPass {
     // The air between the billboards; see shell_buffers.h.
     void use_shells(const GpuDevice& gpu, const AirShells& shells) { shells_.use(gpu, bindings_, shells); }
 
-    // What following draws refer to. The textures are made when the first billboard is.
+    // Sets the clouds of later draws. Textures are generated with the first billboard.
     void use_clouds(const GpuDevice& gpu, std::span<const shader::ViewCloud> clouds);
     void use_billboards(const GpuDevice& gpu, std::span<const shader::ViewBillboard> billboards);
 
-    // Draws some of the billboards in use; inside of a rendering into the attachments. Without `depth` only the
-    // first attachment is drawn to.
+    // Draws some of the billboards in use; inside of a rendering into the attachments. Without `depth` only
+    // the first attachment is drawn to.
     void draw(const vk::raii::CommandBuffer& commands, std::uint32_t first, std::uint32_t count,
               bool depth) const;
 

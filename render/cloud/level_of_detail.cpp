@@ -239,8 +239,8 @@ class BlockTree {
         return squares;
     }
 
-    // Computes the merged metaball of each block and its weight, where the children's least weight is
-    // `least`. Undefined for blocks without metaballs. Branchless, for vectorisation.
+    // Computes the merged metaball of each block and its weight, at most `least`, the least of its children's
+    // weights. Undefined for blocks without metaballs. Branchless, for vectorisation.
     template <std::size_t kSide>
     void finish(Sums<kSide>& sums, const Merging::Level& level, const typename Sums<kSide>::Values& least,
                 const typename Sums<kSide>::Values& hidden) const {

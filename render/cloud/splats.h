@@ -15,10 +15,10 @@
 
 namespace nephos {
 
-// Water and snow on the ground at the moment of a picture, as the renderer reads them. Texel (column, row) is
-// the rectangle of texel_x_m by texel_y_m whose lower corner is at (x_m + column texel_x_m, y_m + row
-// texel_y_m); rows from south to north, x fastest. Beyond the map, and towards its edge, the values outside
-// take over.
+// The renderer's view of the map of water and snow on the ground (seeds/ground_cover.h) at the time of a
+// frame. Texel (column, row) is the rectangle of texel_x_m by texel_y_m whose south-western corner is at (x_m
+// + column texel_x_m, y_m + row texel_y_m); rows from south to north, x fastest. Towards its edge the map
+// fades to the outside values.
 struct GroundCoverView {
     double x_m = 0, y_m = 0;               // south-western corner, world
     double texel_x_m = 1, texel_y_m = 1;   // > 0

@@ -16,7 +16,7 @@
 namespace nephos {
 namespace {
 
-// Whether any that is requested is not known yet.
+// Returns true when any requested element is not known yet.
 bool any_missing(const std::vector<std::uint8_t>& requested, const std::vector<std::uint8_t>& known) {
     for (std::size_t i = 0; i < requested.size(); ++i)
         if (requested[i] != 0 && known[i] == 0) return true;
@@ -31,9 +31,9 @@ void take_missing(std::vector<std::uint8_t>& requested, std::vector<std::uint8_t
     }
 }
 
-// Computes what is missing of the light of the balls numbered `source` and of the tiles of the shadow map where
-// `seen` has them; of all light if `seen` is null, or if anything is missing in a second picture. What one ball
-// gets has the same bits whatever else is computed.
+// Computes what is missing of the light of the balls numbered `source` and of the tiles of the shadow map
+// where `seen` has them; of all light if `seen` is null, or if anything is missing in a second picture. What
+// one ball gets has the same bits whatever else is computed.
 void complete_light(LitCloud& cloud, const std::vector<std::uint32_t>& source, const VisibleSet* seen,
                     StageTimes& times) {
     if (cloud.all_known) return;

@@ -144,7 +144,7 @@ Floats depth_of_centres(const LightTile& tile, Floats x, Floats y, Floats z, flo
     return depth;
 }
 
-// How many pairs of a ball and a centre it took.
+// Adds a tile's metaballs to its centres. Returns the number of evaluated pairs.
 std::size_t add_to_centres(const LightTile& tile, const LightCentres& centres) {
     const Lanes d;
     const std::size_t lanes = hn::Lanes(d);
@@ -282,7 +282,7 @@ void gather(std::span<const LightBall> balls, const TileBins& bins, std::size_t 
     }
 }
 
-// What some of the balls, consecutive in the order from the sun, take from the light; pairs evaluated.
+// Adds the optical depths of consecutive light-sorted metaballs. Returns the number of evaluated pairs.
 std::size_t add_balls(std::span<const LightBall> balls, const TileBins& bins, float largest_radius,
                       LightSums& light) {
     const TileGrid& grid = light.grid;
@@ -320,7 +320,7 @@ void clear_map(LightSums& light) {
     }
 }
 
-// From optical depths to the light of the map.
+// Converts the optical depths of the map to transmittances.
 void finish(LightSums& light) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, light.tiles.size(), 64), [&](const auto& range) {
         for (std::size_t t = range.begin(); t != range.end(); ++t) {

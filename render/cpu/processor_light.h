@@ -16,7 +16,7 @@
 
 namespace nephos {
 
-// What is asked for; an empty span asks for all.
+// The requested light; an empty span requests all.
 struct LightWanted {
     std::span<const std::uint8_t> centres;    // one for each of LightSortedSplats::splats: not 0 if wanted
     std::span<const std::uint8_t> map_tiles;  // one for each tile of the map: not 0 if wanted

@@ -54,7 +54,7 @@ HWY_INLINE Rows rows_of(const ScreenBall& ball, const ViewTile& tile, const Layo
     return {std::size_t(begin) / layout.rows * layout.rows, std::size_t(end)};
 }
 
-// Of a look, which only wants to know what is seen, the transmittance.
+// Composites a vector of pixels of a splat; the visibility pre-pass (!kColours) updates transmittance alone.
 template <bool kColours>
 HWY_INLINE void add_opacity(TileSums& sums, std::size_t at, Floats opacity, const Floats3& radiance,
                             Floats distance) {
@@ -273,7 +273,7 @@ ProcessorView::ProcessorView(const RenderOptions& options, const CameraFrame& ca
     boxes_ = screen_boxes(order, camera, options.camera, part, source_);
 }
 
-// Of a splat, counted from the nearest: as splats_near_to_far().
+// Returns the element of splats_near_to_far() for a splat counted from the nearest.
 std::uint32_t ProcessorView::source(std::size_t splat) const {
     return source_.empty() ? std::uint32_t(boxes_.size() - 1 - splat) : source_[splat];
 }
@@ -333,7 +333,7 @@ ProcessorView::Batch ProcessorView::prepare_batch(std::size_t begin, std::size_t
     return batch;
 }
 
-// Where there are no billboards, none are made.
+// Returns the billboards' texels; null without billboards, so that they are not generated.
 const BillboardTexels* ProcessorView::texels() const {
     return source_.empty() ? nullptr : &billboard_texels();
 }

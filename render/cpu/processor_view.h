@@ -22,8 +22,9 @@
 
 namespace nephos {
 
-// What a picture shows of the light: 1 = some pixel does. Where nearly everything is seen, all is 1. Light is
-// computed for nothing else: whoever reads the shadow map for more than the ground must mark its tiles, too.
+// The visible set: flags of the metaballs and of the shadow map's tiles that some pixel needs, 1 = visible.
+// If nearly everything is visible, all are 1. Light is computed for nothing else: stages that read the shadow
+// map beside the ground must mark its tiles, too.
 struct VisibleSet {
     std::vector<std::uint8_t> balls;      // one for each of ViewSortedSplats::balls
     std::vector<std::uint8_t> map_tiles;  // one for each tile of the shadow map: the ground wears it

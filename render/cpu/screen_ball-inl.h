@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// From a metaball as the eye sees it to what is drawn of it: place, shape, fit and light, a vector of balls
+// Projects metaballs from camera space to the screen: position, shape, fit and light, a vector of metaballs
 // at a time (render/vulkan/view_project.comp and lighting.glsl).
 
 #if defined(NEPHOS_RENDER_SCREEN_BALL_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -81,7 +81,8 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
             each_times(times(hn::Mul(albedo, light), beta), sunlight)};
 }
 
-// Where the shells of metaballs begin; beyond the last shell, the distance of the metaball.
+// Returns the distances at which the metaballs' own shells begin; beyond the last shell, those of the
+// metaballs.
 HWY_INLINE Floats shell_begins(const shader::Shells& data, Floats distance) {
     const Lanes d;
     HWY_ALIGN float at[kMaxLanes];

@@ -30,7 +30,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
-// Where a vector of billboards is, turned from rows into columns.
+// Positions of a vector of billboards, transposed from rows to columns.
 struct BillboardPlaces {
     HWY_ALIGN float x[kMaxLanes], y[kMaxLanes], z[kMaxLanes], half_width[kMaxLanes], half_height[kMaxLanes];
 
@@ -48,7 +48,7 @@ struct BillboardPlaces {
     }
 };
 
-// What lights them.
+// Their light.
 struct BillboardColumns : BillboardPlaces {
     HWY_ALIGN float sun_absorbed[kMaxLanes], flash_absorbed[kMaxLanes], opacity[kMaxLanes],
         cloud_x[kMaxLanes], cloud_y[kMaxLanes], cloud_z[kMaxLanes], base[kMaxLanes],
@@ -246,7 +246,7 @@ HWY_INLINE Words pairs_times(Words pairs, Words weights) {
 #endif
 }
 
-// How a billboard's texture lies on it.
+// Maps points of a billboard to texture coordinates.
 struct BillboardSampler {
     static constexpr int kWhole = 32767;             // of a weight of two columns
     static constexpr float kUnit = 255.0f * kWhole;  // of what sample() gives

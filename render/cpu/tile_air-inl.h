@@ -51,7 +51,7 @@ struct TileRays {
     }
 };
 
-// Where the pixels of a tile sample shells of air.
+// Sets the positions at which the pixels of a tile sample shells of air.
 inline void set_shell_offsets(const PictureFrame& frame, const ViewTile& tile, TileRays& rays) {
     const Layout layout;
     const auto x = shader::uint(frame.picture.z) + shader::uint(tile.x),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the kernels of processor_view.h work on. Private to the module.
+// The input and the accumulators of the kernels of processor_view.h. Private to the module.
 
 #include <algorithm>
 #include <atomic>
@@ -25,7 +25,7 @@ struct TileSums {
     TileSums() { std::fill_n(transmittance, kPixels, 1.0f); }
 };
 
-// What all tiles of a part of the picture share.
+// The data shared by all tiles of a part of the picture.
 struct ViewScene {
     const PictureFrame* frame = nullptr;
     std::span<const ScreenBall> balls;  // splats, nearest first; some are ScreenBillboards
@@ -35,10 +35,10 @@ struct ViewScene {
     std::span<const std::uint32_t> before_shells;  // splats_before_shells() of frame->shells
     std::size_t first_ball = 0;                    // number of balls[0], nearest first
     const BillboardTexels* texels = nullptr;       // for ScreenBillboards
-    bool distances = true;                         // whether depth is wanted
+    bool distances = true;                         // depth is requested
 };
 
-// Many threads may.
+// Sets a flag; several threads may set the same one.
 inline void mark(std::uint8_t& byte) {
     const std::atomic_ref<std::uint8_t> shared(byte);
     if (shared.load(std::memory_order_relaxed) == 0) shared.store(1, std::memory_order_relaxed);
@@ -49,7 +49,7 @@ struct ViewTile {
     std::span<const std::uint32_t> list;  // of splats, nearest first
 };
 
-// What a tile took.
+// The work done for a tile, for measurements.
 struct TileWork {
     std::size_t splats = 0;  // of its list, until it was opaque
     std::size_t pairs = 0;   // of a splat and a pixel

@@ -18,7 +18,7 @@
 
 namespace nephos {
 
-// What the validation layer says, from whatever thread it says it.
+// Messages of the validation layer, from any thread.
 struct ValidationLog {
     mutable std::mutex mutex;
     std::vector<std::string> messages;
@@ -38,8 +38,8 @@ struct GpuDevice {
     vk::PhysicalDeviceMemoryProperties memory;
     vk::raii::Device device{nullptr};
     std::uint32_t queue_family = 0;
-    // Invocations that draw a tile (render/vulkan/tiles.glsl): one whole subgroup where the device has ones of 8 to
-    // 128.
+    // Invocations that draw a tile (render/vulkan/tiles.glsl): one whole subgroup where the device has ones
+    // of 8 to 128.
     std::uint32_t tile_lanes = 8;
     bool tiles_are_subgroups = false;
     bool subgroup_size_varies = false;  // and must be asked for
@@ -52,8 +52,8 @@ struct GpuDevice {
 
 // Throws Error(gpu) when there is no loader, no device, or none that can do what the renderer needs.
 GpuDevice open_device(const DeviceOptions& options);
-// Opens the same device unless it is of type CPU; and none, without an error, where there is no loader or no usable
-// device and neither the options nor NEPHOS_DEVICE ask for one by name.
+// Opens the same device unless it is of type CPU; and none, without an error, where there is no loader or no
+// usable device and neither the options nor NEPHOS_DEVICE ask for one by name.
 std::optional<GpuDevice> open_graphics_card(const DeviceOptions& options);
 
 // Records commands with `record`, submits them and waits until they are done.

@@ -48,7 +48,7 @@ enum class Blend {
     over,  // dst = src + dst * alpha of src; alpha of dst = alpha of both multiplied
 };
 
-// What shaders are compiled for: specialization constants of those that know them.
+// Specialization constants of the shaders that have them.
 struct ShaderVariant {
     bool exact = false;         // 0, fragment shaders of metaballs: integrate along each ray
     bool physical_sky = false;  // 5, whatever includes air.glsl
@@ -67,8 +67,8 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
 vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                            ShaderCode code, ShaderVariant variant = {});
 
-// One whose work groups are tiles (render/vulkan/tiles.glsl): one subgroup each, where the device has subgroups
-// that fit. `switches` become specialization constants 3 and 4.
+// One whose work groups are tiles (render/vulkan/tiles.glsl): one subgroup each, where the device has
+// subgroups that fit. `switches` become specialization constants 3 and 4.
 vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
                                         std::array<bool, 2> switches = {}, ShaderVariant variant = {});
 

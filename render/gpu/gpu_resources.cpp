@@ -16,8 +16,8 @@ using Memory = vk::MemoryPropertyFlagBits;
 // Kinds that want a feature of the device that nobody has switched on.
 constexpr MemoryFlags kForbidden = Memory::eDeviceCoherentAMD | Memory::eDeviceUncachedAMD;
 
-// From the first kind of memory that has one of `wishes`, the most wanted first, and is not full: what the
-// processor sees of a card's own memory may be small.
+// Allocates from the first kind of memory with one of `wishes`, best first, that is not full: the part of a
+// card's memory that the processor can access may be small.
 vk::raii::DeviceMemory allocate(const GpuDevice& gpu, const vk::MemoryRequirements& needs,
                                 std::initializer_list<MemoryFlags> wishes, bool* cached = nullptr) {
     std::exception_ptr full;
@@ -38,7 +38,7 @@ vk::raii::DeviceMemory allocate(const GpuDevice& gpu, const vk::MemoryRequiremen
     throw Error(ErrorCode::gpu, "the Vulkan device has no memory of the kind that is needed");
 }
 
-// What is only copied from need not lie on the card.
+// Returns the kinds of memory for a buffer, best first; one that is only copied from need not be on the card.
 std::initializer_list<MemoryFlags> wishes_for(HostAccess access, vk::BufferUsageFlags usage) {
     static constexpr MemoryFlags kSeen = Memory::eHostVisible | Memory::eHostCoherent;
     static constexpr std::initializer_list<MemoryFlags> kWrite{kSeen | Memory::eDeviceLocal, kSeen},
@@ -64,7 +64,7 @@ GpuBuffer create_buffer(const GpuDevice& gpu, std::size_t bytes, vk::BufferUsage
     buffer.memory = allocate(gpu, needs, wishes_for(access, usage), &cached);
     buffer.buffer.bindMemory(*buffer.memory, 0);
     if (access == HostAccess::none) return buffer;
-    // What is for writing may lie in a card's memory, which the processor reads without a cache.
+    // A buffer for writing may be in a card's memory, which the processor reads uncached.
     buffer.readable = access == HostAccess::read || (gpu.unified_memory && cached);
     buffer.mapped = static_cast<std::byte*>(buffer.memory.mapMemory(0, VK_WHOLE_SIZE));
     return buffer;

@@ -79,9 +79,9 @@ inline constexpr Access compute{
 inline constexpr Access host{vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead};
 }  // namespace access
 
-// From UNDEFINED to GENERAL: what was in the image is lost.
+// Transitions an image from UNDEFINED to GENERAL and discards its content.
 void begin_image(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& after);
-// What `before` did to the image is done and visible when `after` begins.
+// Makes the accesses `before` to an image complete and visible to those `after`.
 void image_barrier(const vk::raii::CommandBuffer& commands, const GpuImage& image, const Access& before,
                    const Access& after);
 void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& buffer, const Access& before,

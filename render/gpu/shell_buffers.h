@@ -13,7 +13,7 @@ class ShellBuffers {
     // Binds both, still without shells: descriptors must be bound, used or not.
     ShellBuffers(const GpuDevice& gpu, const Bindings& bindings);
 
-    // What the shaders read from now on.
+    // Sets the data that shaders read in later draws.
     void use(const GpuDevice& gpu, const Bindings& bindings, const AirShells& shells);
 
   private:

@@ -40,9 +40,9 @@ Ripples still_water();
 // Advances the surface by one step without drops.
 void step(Ripples& ripples);
 
-// Drops that fall within a step, of rain of `rain_mm_per_h`, at places that follow from the step's number
-// alone. Those above 1.5 mm make rings that can be seen; by Marshall and Palmer (1948) their number is
-// 8000 / L exp(-1.5 L) per cubic metre, L = 4.1 R^-0.21 per mm, and they fall at about 6.5 m/s.
+// Adds the drops of a step, of rain of `rain_mm_per_h`, at positions that depend on the step's number alone.
+// Drops above 1.5 mm make visible ripples; by Marshall and Palmer (1948) their number is 8000 / L exp(-1.5 L)
+// per cubic metre, L = 4.1 R^-0.21 per mm, and they fall at about 6.5 m/s.
 void add_drops(Ripples& ripples, std::int64_t step, double rain_mm_per_h);
 
 // Returns the surface at a time after steady rain for `history_s`: `before` is the step at or before the

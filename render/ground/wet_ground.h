@@ -45,7 +45,7 @@ double water_reflectance(double cosine, double slope_variance);
 // the dry albedo a. Lekner and Dorf 1988, with Angstrom's absorption.
 double soaked_albedo(double dry_albedo);
 
-// Whether there is anything to draw: water, snow, and ground in view.
+// Returns true when water or snow and ground are in view.
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover);
 // Returns true when reflections need a mirrored view.
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover);

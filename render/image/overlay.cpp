@@ -30,7 +30,7 @@ bool clip(double a, double b, double& begin, double& end) {
     return begin < end;
 }
 
-// The part of a line before the eye and inside of the picture with a margin.
+// Projects a line and clips it at the eye's plane and at the picture's sides with a margin.
 std::optional<Segment> projected(const WorldLine& line, const CameraFrame& frame, const Camera& camera) {
     Vec3 from = line.from_m, to = line.to_m;
     double begin = 0, end = 1;
@@ -61,7 +61,7 @@ double distance(const Vec2& point, const Segment& segment) {
     return std::hypot(px - t * dx, py - t * dy);
 }
 
-// Along the longer axis, in each row or column the pixels near the line.
+// Draws along the longer axis: in each row or column the pixels near the line.
 void draw(Picture& picture, const Segment& segment, const Rgb& colour, double width) {
     const bool steep = std::abs(segment.to.y - segment.from.y) > std::abs(segment.to.x - segment.from.x);
     const auto along = [&](const Vec2& p) { return steep ? p.y : p.x; };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What is drawn over a finished picture: straight lines in the foreground, for views that explain what is in it, and
-// streaks, what a particle leaves while it is exposed. The same code for all ways of drawing clouds.
+// Overlays on finished pictures, for all back-ends: lines without occlusion, for debug views, and streaks,
+// which are motion-blurred particles.
 
 #include <span>
 
@@ -17,8 +17,8 @@ struct WorldLine {
     double width_pixels = 1.25;  // > 0
 };
 
-// Draws the lines in their order into the beauty layer; the part of a line behind the eye is left out. Smooth
-// edges. `camera` is that of the picture. Pure but for the picture; throws as camera_frame().
+// Draws the lines in their order into the beauty layer, antialiased and clipped at the eye's plane. `camera`
+// is that of the picture. Throws as camera_frame(). Thread-safe for different pictures.
 void draw_lines(Picture& picture, const Camera& camera, std::span<const WorldLine> lines);
 
 struct Streak {
@@ -30,9 +30,9 @@ struct Streak {
 };
 
 // Blends the streaks into the beauty layer, in their order: pixel = pixel + opacity * cover * seen *
-// (radiance - pixel), where `seen` is 1 before the cloud of the pixel (Picture::depth_m) and the cloud's transmittance
-// behind it. Edges and ends are smooth; a streak covers its length times its width in pixels, at least one
-// either way. Bands of rows in parallel; the same bits for any number of threads.
+// (radiance - pixel), where `seen` is 1 before the cloud of the pixel (Picture::depth_m) and the cloud's
+// transmittance behind it. Edges and ends are smooth; a streak covers its length times its width in pixels,
+// at least one either way. Bands of rows in parallel; the same bits for any number of threads.
 void draw_streaks(Picture& picture, std::span<const Streak> streaks);
 
 }  // namespace nephos

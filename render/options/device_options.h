@@ -15,9 +15,9 @@ enum class Splatting {
     blended,    // billboards with attenuation textures, blended back to front, as D has it: the reference
 };
 
-// Where Splatting::vulkan has the order of the metaballs and the lists of the tiles made; the picture is the
-// same within 1/255, as bounds on the screen are rounded differently. Pictures with billboards, and what is
-// too much for the device at once, take the host's.
+// The place where Splatting::vulkan sorts metaballs and bins them into tiles. The picture is the same within
+// 1/255, because screen-space bounds are rounded differently. Frames with billboards, or beyond the device's
+// limits, use the host.
 enum class TileLists {
     automatic,  // host on a device of type CPU, else device
     host,       // sorted by the processor and uploaded for each picture

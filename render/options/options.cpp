@@ -20,7 +20,7 @@ void require(bool good, const char* key, const char* expected) {
     if (!good) throw Error(ErrorCode::usage, std::string(key) + ": expected " + expected);
 }
 
-// NaN fails every comparison, so it is out of every range.
+// Returns true when min <= value <= max; false for NaN.
 bool within(double value, double min, double max) { return value >= min && value <= max; }
 bool within(const std::array<double, 3>& values, double min, double max) {
     return std::ranges::all_of(values, [&](double value) { return within(value, min, max); });

@@ -29,7 +29,7 @@ struct CameraKey {
     bool operator==(const CameraKey&) const = default;
 };
 
-// Perspective camera. World z is up in the picture; looking straight up or down, y (north) is.
+// A perspective camera. World z is up in the image; y (north) is when it looks straight up or down.
 struct Camera {
     Vec3 position_m{0, -4000, 300};
     Vec3 target_m{0, 0, 1200};       // must differ from position_m
@@ -67,27 +67,27 @@ enum class Lighting {
     cfa,         // T's light absorption factor over blocks of voxels (voxel_absorption.h)
 };
 
-// How sunlight that was scattered many times is found.
+// The approximation of multiply scattered sunlight.
 enum class MultipleScattering {
-    // One term without direction that decays with the optical depth tau towards the sun like diffusion
-    // through a slab: 1 / (1 + 1.5 (1 - mean cosine) tau). It reaches farthest.
+    // One isotropic term that decays with the optical depth tau towards the sun like diffusion through a
+    // slab: 1 / (1 + 1.5 (1 - mean cosine) tau). It reaches deepest.
     diffusion,
-    // Octaves of the direct light, each weaker, less attenuated and less directed than the one before.
+    // Octaves of the direct light, each weaker, less attenuated and more isotropic than the one before.
     octaves,
 };
 
 // Wrenninge, Kulla and Lundqvist 2013, "Oz: The Great and Volumetric": the light scattered towards the eye is
 //     sum over o = 0 .. count-1 of scattering^o exp(-extinction^o tau) p(theta, directed by asymmetry^o)
-// Octave 0 is the light that was scattered once, exact; the others stand for ever longer paths.
+// Octave 0 is single scattering and exact; the others approximate longer and longer paths.
 struct ScatteringOctaves {
     int count = 8;             // 1..8; 1 = single scattering
     double scattering = 0.65;  // 0..1: larger is brighter
     double extinction = 0.5;   // 0..1: smaller reaches deeper
-    double asymmetry = 0.6;    // 0..1: smaller looks the same from all sides sooner
+    double asymmetry = 0.6;    // 0..1: smaller is more isotropic
     bool operator==(const ScatteringOctaves&) const = default;
 };
 
-// How a cloud scatters light (D: the colour of a metaball). With the defaults a thick cloud top in the sun
+// Scattering of light in clouds (D: the colour of a metaball). With the defaults a thick cloud top in the sun
 // has a radiance of about 1, white at exposure 0, and its base is a bluish grey.
 struct CloudLight {
     double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker
@@ -129,14 +129,15 @@ struct Ground {
     bool operator==(const Ground&) const = default;
 };
 
-// How wet and snowy ground looks; how much lies where is for a GroundCoverView to say (render/cloud/splats.h).
+// Options of the appearance of wet and snowy ground; a GroundCoverView has the amounts
+// (render/cloud/splats.h).
 struct WetGroundOptions {
-    // Film at which soil has darkened by 1 - 1/e of the way from dry to soaked, mm, > 0.
+    // Film at which soil has darkened by 1 - 1/e of the difference between dry and soaked, mm, > 0.
     double soaking_mm = 0.25;
-    // Film at which half of the ground is under water, mm, > 0: larger means fewer puddles.
+    // Film at which puddles cover half of the ground, mm, > 0: larger means fewer puddles.
     double puddle_film_mm = 2.0;
     double puddle_size_m = 5.0;  // size of the largest puddles, 0.1..1000
-    // Strength of the mirror, 0..1: 0 means no reflections and no second view of the sky.
+    // Strength of reflections, 0..1; 0: none, and no mirrored view is rendered.
     double reflection = 1.0;
     double reflection_scale = 0.5;  // resolution of that second view relative to the picture, 0.1..1
     // Reflectance of wet ground that is not under water, relative to still water, 0..1.
@@ -149,15 +150,15 @@ struct WetGroundOptions {
 
 // When voxels are drawn together as one larger metaball (render/cloud/level_of_detail.h).
 struct LevelOfDetailOptions {
-    // Radius in the picture, pixels, at which the metaballs of a block of 2 x 2 x 2 voxels are drawn as one
-    // if their optical depths spread by less than 1; at n times that radius they must spread n^2 times less.
-    // 0..1000; larger is faster and softer, 0: every voxel is drawn for itself.
+    // Projected radius in pixels, 0..1000, at which the metaballs of a block of 2 x 2 x 2 voxels are merged
+    // if their optical depths differ by less than 1; at n times that radius they must differ by n^2 times
+    // less. Larger is faster and softer; 0: no merging.
     double pixels = 2.5;
     bool operator==(const LevelOfDetailOptions&) const = default;
 };
 
-// A flash of lightning: it lights clouds and ground from its place. At its begin it is brightest and then
-// fades as (1 - t / duration)^2; of several that burn at one moment the brightest lights the picture.
+// A flash of lightning: a point light for clouds and ground. Its intensity is greatest at its begin and fades
+// as (1 - t / duration)^2; of several simultaneous ones the brightest is used.
 struct LightningFlash {
     Vec3 position_m{0, 0, 1000};
     double time_s = 0;           // simulated time at which it begins, >= 0

@@ -58,7 +58,7 @@ double shaft_grain_m(const RainCurtain& curtain);
 // Offset of a pixel's steps, 0.25..0.75 of a step: interleaved gradient noise (Jimenez 2014),
 // frac(53 frac(0.06711056 x + 0.00583715 y)), in integers.
 inline constexpr std::uint32_t kShaftOffset[3] = {288'237'660, 25'070'368, 13'564};
-// The lattice of the noise, kShaftNoiseSide^2, x fastest; it repeats.
+// Returns the lattice of the noise, kShaftNoiseSide^2 values, x fastest, periodic.
 std::vector<std::uint8_t> shaft_noise(std::uint64_t seed);
 
 // Composites the curtains over the picture by ray marching, before or behind the picture's clouds by

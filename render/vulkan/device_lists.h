@@ -13,9 +13,9 @@
 //     sort      by tile; stable, so that each tile has its splats nearest first
 //     ranges    of each tile
 //
-// Distances are the host's floats but for one of some 10^6 (render/vulkan/exact_distance.glsl); boxes may be larger
-// or smaller by what rounding leaves, which is far less than the half pixel that would show. Private to the
-// module.
+// Distances are the host's floats but for one of some 10^6 (render/vulkan/exact_distance.glsl); boxes may be
+// larger or smaller by what rounding leaves, which is far less than the half pixel that would show. Private
+// to the module.
 
 #include <cstdint>
 #include <span>
@@ -28,7 +28,7 @@
 
 namespace nephos {
 
-// What is on the device at once; more is drawn from lists that the host makes, in batches.
+// Limits of the lists in device memory; beyond them the host makes the lists, in batches.
 struct ListLimits {
     std::size_t balls = std::size_t{1} << 22;
     std::size_t entries = std::size_t{1} << 24;
@@ -41,7 +41,7 @@ ListLimits limits_of(const GpuDevice& gpu);
 // Bits that the numbers of tiles take: 0 to `tiles` - 1. `tiles`: 1 at least.
 std::uint32_t bits_of(std::size_t tiles);
 
-// Whether places are near enough for sums of two floats.
+// Returns true when all positions are near enough to be sums of two floats.
 bool is_near_enough(const PreparedCloud& cloud);
 bool is_near_enough(const Vec3& eye);
 
@@ -76,7 +76,7 @@ class DeviceLists {
     void record_bins(const vk::raii::CommandBuffer& commands, const Sets& sets, const Tile& tile,
                      std::size_t shells) const;
 
-    // What both consist of, for other orders (device_sun.h).
+    // The steps of both, for other sorts (device_sun.h).
     OrderRecorder recorder(const vk::raii::CommandBuffer& commands) const {
         return {commands, pipelines_, counts_};
     }

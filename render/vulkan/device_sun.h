@@ -23,7 +23,7 @@ namespace nephos {
 
 shader::SunFrame sun_frame(const ShadowFrame& frame, int shadow_size);
 
-// What is to be lit by which sun.
+// The input of the light pass: metaballs and sun.
 struct SunRequest {
     std::size_t metaballs = 0;  // the first of lists.cloud()
     ShadowFrame frame;
@@ -35,8 +35,8 @@ class DeviceSun {
   public:
     DeviceSun(const GpuDevice& gpu, const DeviceLists& lists);
 
-    // Lights metaballs on the device, and makes the shadow map in `tiles`. Returns false if the lists would be
-    // larger than `limits`: then the light is not there. Nothing else may be in flight.
+    // Lights metaballs on the device, and makes the shadow map in `tiles`. Returns false if the lists would
+    // be larger than `limits`: then the light is not there. Nothing else may be in flight.
     bool run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists, const ListLimits& limits,
              LightTiles& tiles);
     // Copies the optical depths between centres and sun that the last run() computed.

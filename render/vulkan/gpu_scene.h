@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the Vulkan and the blended back-end share: the device, and the copies there of what the renderer hands over -
-// shadow map, scattering table, tables of the sky - each replaced when its version is another than the one that was
-// copied. Private to the module.
+// Shared by the Vulkan and the blended back-end: the device, and in its memory the shadow map, the scattering
+// table and the tables of the sky, each uploaded again when its version changes. Private to the module.
 
 #include <functional>
 #include <optional>
@@ -32,7 +31,8 @@ class GpuScene {
     int largest_shadow_map() const;
     std::vector<std::string> validation_messages() const;
 
-    // For bindings that no shader reads and that lavapipe (Mesa 22.3) wants to be bound. It stays where it is.
+    // For bindings that no shader reads and that lavapipe (Mesa 22.3) wants to be bound. It stays where it
+    // is.
     const GpuImage& unused();
     LightTiles& light_tiles();
     const GpuImage& sky_image(const SkyLight& sky);
@@ -60,8 +60,8 @@ class GpuScene {
     Version map_ = 0;  // LitCloud::light of the map in light_tiles_
 };
 
-// Passes of one kind, made when they are needed: without and with the physical sky; without shells of air, with
-// them, and with fog in them.
+// Passes of one kind, made when they are needed: without and with the physical sky; without shells of air,
+// with them, and with fog in them.
 template <class Pass>
 using PassVariants = std::optional<Pass>[2][3];
 

@@ -23,7 +23,7 @@
 
 namespace nephos {
 
-// What all tiles of a picture share. Images and buffers must stay as they are until the picture is finished.
+// The data shared by all tiles of a frame. Images and buffers must not change until the frame is finished.
 struct ListedPicture {
     ShaderVariant variant;
     shader::OrderFrame order;
@@ -46,13 +46,14 @@ class ListedView {
     ListedView(const ListedView&) = delete;
     ListedView& operator=(const ListedView&) = delete;
 
-    // What is drawn from now on; waits for frames in flight.
+    // Sets the metaballs of later frames; waits for frames in flight.
     void use_cloud(std::span<const shader::CloudBall> balls);
     // Gives the metaballs of use_cloud() their light on the device, and makes the shadow map in `tiles`
-    // (device_sun.h). `largest_radius`: of any metaball, metres. Returns false if the lists would be too long:
-    // then the light on the device is not to be used.
+    // (device_sun.h). `largest_radius`: of any metaball, metres. Returns false if the lists would be too
+    // long: then the light on the device is not to be used.
     bool light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles);
-    // Copies the optical depths between the centres of the metaballs and the sun that the last light() computed.
+    // Copies the optical depths between the centres of the metaballs and the sun that the last light()
+    // computed.
     void read_depths(std::span<float> depths) const { sun_->read_depths(depths); }
     // Share of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> shares);
@@ -76,7 +77,7 @@ class ListedView {
     // For tests: tiles that were begun, and of those the ones with too many entries; passes of light.
     std::size_t drawn = 0, too_long = 0, lit = 0;
 
-    // What the device has listed for the last tile that was drawn: for tests.
+    // The lists of the last tile that was drawn, for tests.
     struct Lists {
         std::vector<shader::ViewBall> balls;  // nearest first
         std::vector<shader::TileRange> ranges;

@@ -8,7 +8,7 @@
 
 layout(local_size_x = kSortGroup) in;
 
-// Whether the tiles can draw it as an ellipse with a polynomial.
+// Returns true when the tiles can draw it as an ellipse with a polynomial.
 bool is_fitted(CloudBall ball, FromEye place) {
     float radius = widened_radius(ball.radius, place.distance), depth = dot(place.offset, frame.forward.xyz);
     return ball.depth_scale <= kMaxFittedDepth && depth >= 1.01 * radius && radius * frame.forward.w <= 60000.0 * depth;

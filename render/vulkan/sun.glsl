@@ -21,7 +21,7 @@ layout(set = 0, binding = 13, std430) writeonly buffer Items {
     LightItem items[];
 };
 
-// From the corner of the shadow map.
+// Returns the offset of a metaball from the corner of the shadow map.
 vec3 offset_from_corner(CloudBall ball) {
     return vec3(offset_from(ball.x, sun.corner_high.x, sun.corner_low.x).high,
                 offset_from(ball.y, sun.corner_high.y, sun.corner_low.y).high,

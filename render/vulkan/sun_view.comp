@@ -31,7 +31,7 @@ void main() {
     CloudBall ball = cloud[i];
     vec3 offset = offset_from_corner(ball);
     vec2 centre = vec2(dot(sun.u.xyz, offset), dot(sun.v.xyz, offset)), texel_m = vec2(sun.u.w, sun.v.w);
-    // What is smaller than a texel is widened and thinned out: its optical depth times area stays.
+    // A metaball smaller than a texel is widened, with the same product of optical depth and area.
     vec2 radii = max(ball.radius / texel_m, vec2(kMinRadiusPixels)), thinning = ball.radius / (radii * texel_m);
     uint packed = packHalf2x16(radii);
     splats[k] = LightSplat(centre.x, centre.y, packed, ball.depth_scale * thinning.x * thinning.y);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the compute passes cut a picture into tiles of kTileWidth x kTileHeight pixels, one work group each. An
+// Tiling of a picture for the compute passes: kTileWidth x kTileHeight pixels, one work group each. An
 // invocation has one column of pixels, kRows of them below each other; further invocations share the tile's rows. Where
 // a work group is one subgroup, its lanes fetch splats together and hand them round (kShared): on a processor without
 // graphics hardware that is far cheaper than fetching each splat in every lane.

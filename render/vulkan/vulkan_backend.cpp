@@ -40,7 +40,7 @@ ListedView& VulkanBackend::listed_view() {
     return *listed_view_;
 }
 
-// Whether the device can sort and list the metaballs of a cloud.
+// Returns true when the device can sort and bin the metaballs of a cloud.
 bool VulkanBackend::can_list(const LitCloud& cloud) {
     if (!lists_on_device_ || cloud.cloud.visible.empty() ||
         cloud.cloud.visible.size() > listed_view().limits.balls)
@@ -54,7 +54,7 @@ bool VulkanBackend::uses_lists(const FrameDescription& frame) {
            is_near_enough(frame.camera.position_m);
 }
 
-// From lists of the device. False if that is too much for them.
+// Computes light with lists made on the device. Returns false on overflow.
 bool VulkanBackend::light_listed(LitCloud& cloud) {
     if (!can_list(cloud)) return false;
     if (held_metaballs_ != cloud.metaballs) {

@@ -31,7 +31,7 @@ struct FrameOptions {
     bool png = true;           // a tone-mapped picture of each frame
     bool exr = false;          // a linear picture of each frame with its layers
     bool video = false;        // an MP4 of all frames
-    // What draws the pictures; no part of what is simulated.
+    // The back-end that draws the pictures; without effect on the simulation.
     Splatting splatting = Splatting::automatic;
     std::string device;  // of Vulkan, as DeviceOptions::device
     bool operator==(const FrameOptions&) const = default;

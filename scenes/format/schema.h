@@ -137,11 +137,11 @@ std::string limits_text(const Limits& limits);
 // Returns a unit in words: "degrees" for "deg".
 std::string unit_text(std::string_view unit);
 
-// Reads `node` into `value` as `key` says; `path` names the key in messages. On a problem, which is reported,
-// the value stays as it was. For every kind but table and tables.
+// Reads `node` into `value` by the description `key`; `path` names the key in messages. Reports problems, and
+// then leaves the value unchanged. For every kind but table and tables.
 void read_value(Document& document, const Key& key, const Node& node, const std::string& path, void* value);
 
-// The number of the text form of a seed: decimal, or hexadecimal after "0x"; false when it is neither or too
+// Parses the text form of a seed, decimal or hexadecimal after "0x". Returns false when it is neither, or too
 // large.
 bool parse_seed(std::string_view text, std::uint64_t& seed);
 

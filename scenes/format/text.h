@@ -35,7 +35,8 @@ std::string printable(std::string_view text);
 // Returns printable(text), cut to `limit` characters with an ellipsis.
 std::string shortened(std::string_view text, std::size_t limit = 60);
 
-// The shortest decimal of number_text() (core/text.h) as a TOML float: always with a point, an exponent or a word.
+// The shortest decimal of number_text() (core/text.h) as a TOML float: always with a point, an exponent or a
+// word.
 std::string toml_number(double value);
 
 // Returns a TOML basic string with its quotes.
@@ -50,8 +51,8 @@ std::string indexed(std::string_view path, std::size_t index);
 // Returns the items as a list: "a, b or c".
 std::string joined(const std::vector<std::string>& items, std::string_view last_separator = " or ");
 
-// The first `most_bytes` + 1 bytes of a file, so that the caller sees when it is larger. Throws Error(io)
-// naming the path when it is a folder or cannot be read.
+// Returns at most the first `most_bytes` + 1 bytes of a file, so that the caller can detect a larger one.
+// Throws Error(io) naming the path when it is a folder or cannot be read.
 std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes);
 
 }  // namespace nephos
