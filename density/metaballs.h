@@ -53,7 +53,7 @@ double metaball_normalisation(double radius_cells);
 // x fastest, an order that depends on the voxels alone. Throws Error(usage) when the radius is out of range.
 std::vector<Metaball> metaballs(const DensityGrid& grid, double radius_cells);
 
-// D sampled at the centres of voxels `refine` times smaller than the grid's, images of the grid along
+// Returns D sampled at the centres of voxels `refine` times smaller than the grid's, images of the grid along
 // periodic axes included. Throws Error(usage) when
 // refine is outside 1..8, the radius is out of range, or the result would have more than 2^31 - 1 voxels on
 // an axis.

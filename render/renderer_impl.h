@@ -38,11 +38,11 @@ struct Renderer::Impl {
     using Drawing = PendingPicture::State;
     void begin(Drawing& drawing);
     void finish(Drawing& drawing);
-    // Both at once.
+    // Begins and finishes a frame.
     Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail);
-    // The same, and what lies on the ground.
+    // Draws a frame with wet or snowy ground.
     Picture draw_with_ground(const Splats& splats, const RenderOptions& options);
-    // T's absorption factor instead of the light pass.
+    // Computes light by T's absorption factor instead of the light pass.
     void absorb_sunlight(LitCloud& cloud, const DensityBlocks& blocks, const RenderOptions& options);
     // Absorbs the sunlight where the options say so, and returns the fraction of the lightning at each
     // metaball: empty without.

@@ -2,8 +2,8 @@
 #pragma once
 
 // The back-end of machines without a graphics card: vectors on the processor, tile by tile, front to back
-// (processor_view.h). Opens no Vulkan device and loads no library for one. Light is computed where the picture
-// shows it; a second picture of the same cloud computes the rest. Private to the module.
+// (processor_view.h). Opens no Vulkan device and loads no library for one. Light is computed where the
+// picture shows it; a second picture of the same cloud computes the rest. Private to the module.
 
 #include "render/backend/backend.h"
 
@@ -12,7 +12,8 @@ namespace nephos {
 class CpuBackend : public Backend {
   public:
     std::string name() const override { return "cpu"; }
-    // As in "cpu (AVX2, 8 threads)": Highway's name of the vectors in use, and how many threads draw now.
+    // Returns a name such as "cpu (AVX2, 8 threads)": Highway's name of the instruction set, and how many
+    // threads draw now.
     std::string device_name() const override;
     int longest_part() const override;
     int largest_shadow_map() const override;

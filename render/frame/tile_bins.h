@@ -60,8 +60,8 @@ TileBins bin_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size
 // Far beyond any picture, and far from the limits of int.
 inline constexpr double kFarthestPixel = 1e6;
 
-// Round to whole pixels: four times for each splat, for which calls of std::floor take too long where the processor
-// that is compiled for has no instruction for it.
+// Round to whole pixels, four times per splat, for which calls of std::floor take too long where the
+// processor that is compiled for has no instruction for it.
 inline int floor_to_pixel(double value) {
     const double near = std::clamp(value, -kFarthestPixel, kFarthestPixel);
     const int towards_zero = int(near);

@@ -7,7 +7,7 @@
 
 namespace nephos {
 
-// The pictures of billboard_textures.h; all levels, readable by shaders.
+// Uploads the textures of billboard_textures.h with all levels, readable by shaders.
 GpuImage upload_billboard_textures(const GpuDevice& gpu);
 
 }  // namespace nephos

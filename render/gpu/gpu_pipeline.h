@@ -67,8 +67,8 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
 vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                            ShaderCode code, ShaderVariant variant = {});
 
-// One whose work groups are tiles (render/vulkan/tiles.glsl): one subgroup each, where the device has
-// subgroups that fit. `switches` become specialization constants 3 and 4.
+// Creates a pipeline whose work groups are tiles (render/vulkan/tiles.glsl): one subgroup each, where the
+// device has subgroups that fit. `switches` become specialization constants 3 and 4.
 vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
                                         std::array<bool, 2> switches = {}, ShaderVariant variant = {});
 
@@ -99,7 +99,7 @@ void begin_compute(const vk::raii::CommandBuffer& commands, const PipelineLayout
 // Work groups that run `groups` times; a shader reads their number with work_group() of tiles.glsl.
 void dispatch_groups(const vk::raii::CommandBuffer& commands, std::size_t groups);
 
-// Everything that was written by compute shaders before is seen by those after.
+// Makes all writes of earlier compute shaders visible to later ones.
 void compute_barrier(const vk::raii::CommandBuffer& commands);
 
 // For imageStore; the image is in the layout GENERAL.

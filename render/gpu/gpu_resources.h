@@ -39,8 +39,8 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, const T& value) {
 // is lost when it grows.
 void reserve_copy(const GpuDevice& gpu, GpuBuffer& copy, std::size_t bytes);
 
-// The first bytes of a buffer that the device has written: itself where it is readable, else `copy`, which
-// grows; then the buffer must allow to be copied from.
+// Returns the first bytes of a buffer that the device has written: itself where it is readable, else `copy`,
+// which grows; then the buffer must allow to be copied from.
 const std::byte* read_back(const GpuDevice& gpu, const GpuBuffer& buffer, std::size_t bytes, GpuBuffer& copy);
 
 // A 2D image (or array of them) in device memory, always in the layout GENERAL once it was cleared: images

@@ -44,8 +44,8 @@ double width_mm(PrecipitationKind kind, double diameter_mm);
 // flake three tenths of its circle (the area ratio of aggregates; Heymsfield and Miloshevich 2003).
 double shadow_mm2(PrecipitationKind kind, double diameter_mm);
 
-// Geometric extinction per metre: the integral of the shadows over the law (with diffraction, seen from afar,
-// twice that: van de Hulst 1957).
+// Returns the geometric extinction per metre: the integral of the cross-sections over the distribution (with
+// diffraction, seen from afar, twice that: van de Hulst 1957).
 double shadow_per_m(const SizeLaw& law);
 
 // Returns the quantile u (0..1) of the diameters of drawn particles.

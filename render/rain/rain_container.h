@@ -87,8 +87,8 @@ struct RainContainer {
 RainContainer rain_container(const RainCurtain& curtain, const CameraFrame& frame, double margin_m,
                              double radius_m);
 
-// Level of detail (P, equation 3): growth of a particle's size at d = distance / depth of the container,
-// 0..1.
+// Returns the level of detail (P, equation 3): growth of a particle's size at d = distance / depth of the
+// container, 0..1.
 inline double lod_size(double d) { return d * d; }
 
 }  // namespace nephos

@@ -11,12 +11,12 @@
 
 namespace nephos {
 
-// The first in the low bits; rounds to nearest.
+// Packs two half floats, the first in the low bits; rounds to nearest.
 inline shader::uint pack_halves(float low, float high) {
     return shader::uint(Imath::half(low).bits()) | shader::uint(Imath::half(high).bits()) << 16;
 }
 
-// 0..1 as 0..65535; rounds to nearest.
+// Returns 0..1 as 0..65535; rounds to nearest.
 inline shader::uint unorm16(float value) {
     return shader::uint(std::clamp(value, 0.0f, 1.0f) * 65535.0f + 0.5f);
 }

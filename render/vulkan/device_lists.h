@@ -34,8 +34,8 @@ struct ListLimits {
     std::size_t entries = std::size_t{1} << 24;
 };
 
-// The limits of a device: no storage buffer is larger than it allows, and no list longer than what the loops
-// of a device of type CPU go through.
+// Returns the limits of a device: no storage buffer is larger than it allows, and no list longer than what
+// the loops of a device of type CPU go through.
 ListLimits limits_of(const GpuDevice& gpu);
 
 // Bits that the numbers of tiles take: 0 to `tiles` - 1. `tiles`: 1 at least.
@@ -45,7 +45,7 @@ std::uint32_t bits_of(std::size_t tiles);
 bool is_near_enough(const PreparedCloud& cloud);
 bool is_near_enough(const Vec3& eye);
 
-// A cloud as it stays on the device.
+// Converts a cloud to its form in device memory.
 std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span<const float> sun_depths);
 
 shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options, const Ground& ground,
@@ -81,7 +81,7 @@ class DeviceLists {
         return {commands, pipelines_, counts_};
     }
     shader::OrderStep step_of(const Tile& tile, std::size_t shells) const;
-    // From boxes and their sizes in the table on.
+    // Records the passes after the boxes and their sizes in the table.
     void record_lists(const OrderRecorder& recorder, const Sets& sets, const shader::OrderStep& step) const;
 
     const GpuBuffer& list(std::size_t tiles) const;

@@ -55,7 +55,7 @@ struct OrderPipelines {
     std::vector<vk::raii::Pipeline> passes;  // as OrderPass numbers them
 };
 
-// Why this device cannot make orders and lists; empty if it can.
+// Returns the reason why this device cannot sort and make lists; empty if it can.
 std::string missing_for_lists(const GpuDevice& gpu);
 
 OrderPipelines create_order_pipelines(const GpuDevice& gpu);
@@ -78,9 +78,9 @@ std::size_t digits_in_table(std::size_t elements);
 // Blocks of a table, and so numbers in the buffer of their sums.
 std::size_t blocks_of(std::size_t numbers);
 
-// Work groups in the members of shader::OrderCounts.
+// Returns the work groups for the members of shader::OrderCounts.
 shader::Groups groups_for(std::size_t elements, std::size_t per_group);
-// As order_plan.comp and bins_plan.comp write them for `visible` and `entries` elements.
+// Returns the counts that order_plan.comp and bins_plan.comp write for `visible` and `entries` elements.
 shader::OrderCounts counts_for(std::size_t visible, std::size_t entries);
 
 // Writes commands of passes. All commands before a pass are done and visible when it begins.
@@ -92,10 +92,10 @@ class OrderRecorder {
         : commands_(commands), pipelines_(pipelines), counts_(counts) {}
 
     void run(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step, std::size_t groups) const;
-    // As many groups as a member of OrderCounts says.
+    // Dispatches the number of groups in a member of OrderCounts.
     void run_indirect(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step,
                       std::size_t offset) const;
-    // Prefix sums of the table that step.table names; the sum of all goes to OrderCounts::total.
+    // Computes prefix sums of the table step.table; the sum of all goes to OrderCounts::total.
     void scan(vk::DescriptorSet set, const shader::OrderStep& step) const;
     // Sorts by the lower `bits` of the keys what is in buffers 0; it ends in buffers passes(bits) % 2.
     // `sets`: from buffers 0 to 1, and from 1 to 0. `table`: kSeenDigits or kListDigits.

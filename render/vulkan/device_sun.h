@@ -44,7 +44,7 @@ class DeviceSun {
 
   private:
     void bind(const GpuDevice& gpu, const DeviceLists& lists);
-    // The set that reads the centres in the order of their tiles.
+    // Returns the descriptor set that reads the centres in the order of their tiles.
     vk::DescriptorSet centres_of(const TileGrid& grid) const;
     void record(const vk::raii::CommandBuffer& commands, const DeviceLists& lists, std::size_t count,
                 const TileGrid& grid, std::uint32_t per_item) const;

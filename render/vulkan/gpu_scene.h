@@ -37,7 +37,7 @@ class GpuScene {
     LightTiles& light_tiles();
     const GpuImage& sky_image(const SkyLight& sky);
     const GpuBuffer& scattering(const Versioned<std::vector<float>>& table);
-    // The shadow map of a cloud whose light is complete, and on the host unless has_map().
+    // Returns the shadow map of a cloud whose light is complete, and on the host unless has_map().
     const GpuImage& shadow_map(const LitCloud& cloud);
     bool has_map(const LitCloud& cloud) const { return map_ == cloud.light; }
     // Notes that the shadow map in light_tiles() is that of the cloud.

@@ -55,9 +55,10 @@ class ListedView {
     // Copies the optical depths between the centres of the metaballs and the sun that the last light()
     // computed.
     void read_depths(std::span<float> depths) const { sun_->read_depths(depths); }
-    // Share of the lightning at each metaball, 0..65535.
+    // Sets the transmitted fraction of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> shares);
-    // Shade map of the shells and noise of the fog (air_shells.h), unless these are there already.
+    // Uploads the shade map of the shells and the noise of the fog (air_shells.h), unless these are there
+    // already.
     void use_shade(std::span<const std::uint32_t> words, std::uint64_t serial);
 
     // Begins to draw a tile into `picture`, which must stay where it is until it is finished. `first`: of it.

@@ -17,17 +17,17 @@ namespace nephos {
 
 class ViewTiles {
   public:
-    // For orders with billboards if `variant` has billboards, else for those without. `unused` is not read, but
-    // lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
+    // For orders with billboards if `variant` has billboards, else for those without. `unused` is not read,
+    // but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
     ViewTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
               const vk::raii::Sampler& sampler, const ShaderVariant& variant);
 
     // Tables of the physical sky; readable by shaders.
     void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
-    // The map that the ground wears; in the layout GENERAL and readable by compute shaders.
+    // Sets the shadow map of the ground; in the layout GENERAL and readable by compute shaders.
     void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
 
-    // The air between the metaballs of `order`; for a pass made for shells.
+    // Sets the air between the metaballs of `order`; for a pass made for shells.
     void use_shells(const GpuDevice& gpu, const AirShells& shells, const ViewSortedSplats& order);
     // scattering_table.h
     void use_scattering(const GpuDevice& gpu, const GpuBuffer& table);
@@ -39,7 +39,7 @@ class ViewTiles {
 
   private:
     const vk::raii::Pipeline& tiles_for(const GpuDevice& gpu, const ViewSortedSplats& order);
-    // `begin`, `end`: splats, nearest first.
+    // Draws splats `begin` .. `end`, nearest first.
     void draw_batch(const GpuDevice& gpu, const TileGrid& grid, const ViewSortedSplats& order,
                     std::size_t begin, std::size_t end);
     // Metaballs and billboards of a batch, and the clouds of the latter, in one buffer.

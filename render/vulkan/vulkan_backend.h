@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The back-end of graphics cards: compute shaders, tile by tile, front to back. The cloud stays on the device, with
-// its light, and the device itself sorts it and makes the lists of the tiles (listed_view.h), so that of a picture
-// nothing but the camera is sent. Pictures with billboards, and what is too much for these lists, are drawn from
-// lists that the host makes (view_tiles.h). Private to the module.
+// The back-end of graphics cards: compute shaders, tile by tile, front to back. The cloud stays on the
+// device, with its light, and the device itself sorts it and makes the lists of the tiles (listed_view.h), so
+// that of a picture nothing but the camera is sent. Pictures with billboards, and what is too much for these
+// lists, are drawn from lists that the host makes (view_tiles.h). Private to the module.
 
 #include <optional>
 
@@ -32,7 +32,7 @@ class VulkanBackend : public Backend {
     std::vector<std::string> validation_messages() const override { return scene_.validation_messages(); }
 
     GpuScene& scene() { return scene_; }
-    // The view from lists of the device, made by the first call.
+    // Returns the view by lists of the device, created by the first call.
     ListedView& listed_view();
     const ListedView* listed_view_if_made() const { return listed_view_ ? &*listed_view_ : nullptr; }
 

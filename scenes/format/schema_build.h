@@ -206,7 +206,8 @@ inline Key together(Key key, std::vector<std::string> with) {
     return key;
 }
 
-// A key that the canonical scene leaves out, so that its hash is that of a scene without it, unless `is_written`.
+// Builds a key that the canonical scene omits, so that its hash is that of a scene without it, unless
+// `is_written`.
 inline Key written_if(Key key, bool (*is_written)(const void* owner)) {
     key.written = is_written;
     return key;

@@ -48,7 +48,7 @@ const Section& veil_section();
 // Returns the keys of a layer that have no effect beside `veil`.
 std::span<const std::string_view> keys_of_clouds();
 
-// The key `models`: files that base models are taken from (document.h); it has no value of its own.
+// Returns the key `models`, the files of base models (document.h); it has no value of its own.
 Key model_files_key();
 inline constexpr int kMaxModels = 10'000;
 
@@ -61,7 +61,7 @@ void check_wind_times(const SectionReader& owner, const Wind& wind);
 // Reports key frames of the camera unless their times rise strictly; the reader is that of [camera].
 void check_camera_path(const SectionReader& reader, const Camera& camera);
 
-// The part of finish_scene() on models, skies, climate and layers.
+// Performs the part of finish_scene() on models, skies, climate and layers.
 void finish_layers(const SectionReader& reader, Scene& scene);
 
 }  // namespace nephos

@@ -35,8 +35,8 @@ std::string printable(std::string_view text);
 // Returns printable(text), cut to `limit` characters with an ellipsis.
 std::string shortened(std::string_view text, std::size_t limit = 60);
 
-// The shortest decimal of number_text() (core/text.h) as a TOML float: always with a point, an exponent or a
-// word.
+// Returns the shortest decimal of number_text() (core/text.h) as a TOML float: always with a point, an
+// exponent or a word.
 std::string toml_number(double value);
 
 // Returns a TOML basic string with its quotes.
