@@ -126,14 +126,17 @@ TEST(SkyBillboards, ABoundedNumberOfCloudsIsLitAnewInAFrame) {
     const SkySimulation sky(sky_of(10));
     RenderOptions options = from_the_edge();
     options.light.cfa_clouds_per_frame = 4;
-    FilmFrame film{0, {.per_second = 1, .time_scale = 120}, options.sun};
-    film.sun.date = "2026-06-21";
-    film.sun.time = "16:00";
-    film.sun.latitude_deg = 50;
-    film.sun.moves = true;
+    std::optional<FilmFrame> film(std::in_place);
+    film->frames.per_second = 1;
+    film->frames.time_scale = 120;
+    film->sun = options.sun;
+    film->sun.date = "2026-06-21";
+    film->sun.time = "16:00";
+    film->sun.latitude_deg = 50;
+    film->sun.moves = true;
     const auto absorption = [&](SkyBillboards& billboards, int frame, std::size_t* computed = nullptr) {
-        film.index = frame;
-        options.sun = sun_at(film.sun, frame_time_s(film.frames, frame));
+        film->index = frame;
+        options.sun = sun_at(film->sun, frame_time_s(film->frames, frame));
         DrawnClouds drawn;
         const std::size_t anew = billboards.append(sky, sky.clouds(), options, {}, drawn, false, {}, film);
         if (computed != nullptr) *computed = anew;
