@@ -34,8 +34,7 @@ RENDER_LAYERS = (
     {"shading"},
     {"backend"},
     {"gpu"},
-    {"vulkan", "cpu"},
-    {"blended"},
+    {"vulkan", "cpu", "blended"},
     {"rain", "ground"},
 )
 # render/shared/ is a leaf of plain structs that C++ and GLSL both read.

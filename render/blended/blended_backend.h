@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "render/blended/view_pass.h"
-#include "render/vulkan/gpu_scene.h"
+#include "render/gpu/gpu_scene.h"
 
 namespace nephos {
 

@@ -38,7 +38,7 @@ struct GpuDevice {
     vk::PhysicalDeviceMemoryProperties memory;
     vk::raii::Device device{nullptr};
     std::uint32_t queue_family = 0;
-    // Invocations that draw a tile (render/vulkan/tiles.glsl): one whole subgroup where the device has ones
+    // Invocations that draw a tile (render/gpu/tiles.glsl): one whole subgroup where the device has ones
     // of 8 to 128.
     std::uint32_t tile_lanes = 8;
     bool tiles_are_subgroups = false;

@@ -67,7 +67,7 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
 vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
                                            ShaderCode code, ShaderVariant variant = {});
 
-// Creates a pipeline whose work groups are tiles (render/vulkan/tiles.glsl): one subgroup each, where the
+// Creates a pipeline whose work groups are tiles (render/gpu/tiles.glsl): one subgroup each, where the
 // device has subgroups that fit. `switches` become specialization constants 3 and 4.
 vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
                                         std::array<bool, 2> switches = {}, ShaderVariant variant = {});

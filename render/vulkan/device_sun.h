@@ -16,8 +16,8 @@
 #include <span>
 
 #include "render/cloud/cloud_preparation.h"
+#include "render/gpu/light_tiles.h"
 #include "render/vulkan/device_lists.h"
-#include "render/vulkan/light_tiles.h"
 
 namespace nephos {
 

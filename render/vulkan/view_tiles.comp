@@ -12,7 +12,7 @@
 #include "render/shading/scattering.glsl"
 #include "render/shading/shells.glsl"
 #include "render/shading/lighting.glsl"
-#include "render/vulkan/tiles.glsl"
+#include "render/gpu/tiles.glsl"
 #include "render/vulkan/parts.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Balls {

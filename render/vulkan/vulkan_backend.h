@@ -8,7 +8,7 @@
 
 #include <optional>
 
-#include "render/vulkan/gpu_scene.h"
+#include "render/gpu/gpu_scene.h"
 #include "render/vulkan/listed_view.h"
 #include "render/vulkan/view_tiles.h"
 

@@ -4,7 +4,7 @@
 #include "render/shared/shared.h"
 // Light at the centres of metaballs: the optical depth of the part of every metaball that lies between a centre and the
 // sun, exact for each (partial_line_integral). A work group has centres of one tile; splats and centres come in order from the sun.
-#include "render/vulkan/tiles.glsl"
+#include "render/gpu/tiles.glsl"
 
 layout(set = 0, binding = 1, std430) buffer Queries {
     vec4 queries[];  // LightQuery

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "render/shared/shared.h"
 // The shadow map: optical depth of all metaballs along the light through each texel. A sum, so order does not matter.
-#include "render/vulkan/tiles.glsl"
+#include "render/gpu/tiles.glsl"
 
 layout(set = 0, binding = 2, std430) readonly buffer Splats {
     uvec4 splats[];  // LightSplat

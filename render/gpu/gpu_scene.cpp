@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/vulkan/gpu_scene.h"
+#include "render/gpu/gpu_scene.h"
 
 #include <algorithm>
 #include <cmath>

@@ -10,8 +10,8 @@
 
 #include "render/backend/backend.h"
 #include "render/gpu/gpu_pipeline.h"
+#include "render/gpu/light_tiles.h"
 #include "render/gpu/sky_image.h"
-#include "render/vulkan/light_tiles.h"
 
 namespace nephos {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/vulkan/light_tiles.h"
+#include "render/gpu/light_tiles.h"
 
 #include <algorithm>
 #include <array>
