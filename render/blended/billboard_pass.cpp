@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/blended/billboard_pass.h"
 
-#include "render/gpu/billboard_image.h"
+#include "render/gpu/frame_uploads.h"
 
 namespace nephos {
 

@@ -6,8 +6,8 @@
 
 #include <span>
 
+#include "render/gpu/frame_uploads.h"
 #include "render/gpu/gpu_pipeline.h"
-#include "render/gpu/shell_buffers.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
@@ -24,7 +24,7 @@ class BillboardPass {
     void use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
         bind_buffer(gpu, bindings_, 12, table);
     }
-    // The air between the billboards; see shell_buffers.h.
+    // The air between the billboards; see frame_uploads.h.
     void use_shells(const GpuDevice& gpu, const AirShells& shells) { shells_.use(gpu, bindings_, shells); }
 
     // Sets the clouds of later draws. Textures are generated with the first billboard.

@@ -8,8 +8,8 @@
 #include "render/blended/billboard_pass.h"
 #include "render/frame/frame_data.h"
 #include "render/frame/view_sorting.h"
+#include "render/gpu/frame_uploads.h"
 #include "render/gpu/gpu_pipeline.h"
-#include "render/gpu/shell_buffers.h"
 #include "render/image/picture.h"
 
 namespace nephos {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "render/backend/backend.h"
+#include "render/gpu/frame_uploads.h"
 #include "render/gpu/gpu_pipeline.h"
 #include "render/gpu/light_tiles.h"
-#include "render/gpu/sky_image.h"
 
 namespace nephos {
 

@@ -15,8 +15,8 @@
 #include <span>
 #include <vector>
 
+#include "render/gpu/frame_uploads.h"
 #include "render/gpu/gpu_pipeline.h"
-#include "render/gpu/shell_buffers.h"
 #include "render/image/picture.h"
 #include "render/vulkan/device_lists.h"
 #include "render/vulkan/device_sun.h"

@@ -8,7 +8,7 @@
 
 #include "render/frame/frame_data.h"
 #include "render/frame/screen_box.h"
-#include "render/gpu/billboard_image.h"
+#include "render/gpu/frame_uploads.h"
 
 namespace nephos {
 namespace {

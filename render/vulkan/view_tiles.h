@@ -9,8 +9,8 @@
 #include "render/frame/frame_data.h"
 #include "render/frame/tile_bins.h"
 #include "render/frame/view_sorting.h"
+#include "render/gpu/frame_uploads.h"
 #include "render/gpu/gpu_pipeline.h"
-#include "render/gpu/shell_buffers.h"
 #include "render/options/camera.h"
 
 namespace nephos {

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What shaders of both Vulkan back-ends read of a frame beside its splats: the tables of the sky, the textures of
+// T's billboards, the shells of air. Private to the module.
+
+#include <cstdint>
+
+#include "render/atmosphere/sky_light.h"
+#include "render/frame/air_shells.h"
+#include "render/gpu/gpu_pipeline.h"
+#include "render/gpu/gpu_resources.h"
+
+namespace nephos {
+
+// The tables of the sky as an image.
+class SkyImage {
+  public:
+    explicit SkyImage(const GpuDevice& gpu);
+    bool has(const SkyLight& light) const { return serial_ == light.serial; }
+    // Copies the tables unless they are there already.
+    void use(const GpuDevice& gpu, const SkyLight& light);
+    const GpuImage& image() const { return image_; }  // readable by shaders
+
+  private:
+    GpuImage image_;
+    GpuBuffer staging_;
+    std::uint64_t serial_ = 0;
+};
+
+// Uploads the textures of billboard_textures.h with all levels, readable by shaders.
+GpuImage upload_billboard_textures(const GpuDevice& gpu);
+
+// The shells of air: bindings 13 and 14.
+class ShellBuffers {
+  public:
+    // Binds both, still without shells: descriptors must be bound, used or not.
+    ShellBuffers(const GpuDevice& gpu, const Bindings& bindings);
+
+    // Sets the data that shaders read in later draws.
+    void use(const GpuDevice& gpu, const Bindings& bindings, const AirShells& shells);
+
+  private:
+    GpuBuffer shells_, shade_;
+    std::uint64_t serial_ = 0;  // of what is in shade_
+};
+
+}  // namespace nephos
