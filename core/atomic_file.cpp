@@ -120,8 +120,12 @@ void AtomicFile::create_temporary(const std::filesystem::path& folder) {
             ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
         if (descriptor.get() < 0 && errno == EEXIST && attempt < kAttempts) continue;
         struct stat status {};
-        if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0)
-            fail(path_, "cannot create", errno);
+        if (descriptor.get() < 0) fail(path_, "cannot create", errno);
+        if (::fstat(descriptor.get(), &status) != 0) {
+            const int error = errno;
+            ::unlink(temporary_.c_str());
+            fail(path_, "cannot examine its temporary file", error);
+        }
         device_ = status.st_dev;
         inode_ = status.st_ino;
         return;

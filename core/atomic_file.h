@@ -19,9 +19,9 @@ namespace nephos {
 // one.
 class AtomicFile {
   public:
-    // Creates an empty temporary file whose name nobody can foresee beside `path`, and missing parent folders. A symbolic
-    // link keeps pointing to the new file; a device, a pipe or a folder in the place of the file is refused. Throws
-    // Error(io) naming `path`.
+    // Creates an empty temporary file whose name nobody can foresee beside `path`, and missing parent folders. A
+    // symbolic link keeps pointing to the new file; a device, a pipe or a folder in the place of the file is
+    // refused. Throws Error(io) naming `path`.
     explicit AtomicFile(const std::filesystem::path& path);
     // Without publish(): removes the temporary file.
     ~AtomicFile();

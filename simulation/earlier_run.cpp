@@ -87,6 +87,7 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
 }
 
 std::string range_text(const EarlierRun& run) {
+    if (run.range.last_frame < run.range.first_frame) return "statistics alone";
     return fmt::format("frames {}..{}{}", run.range.first_frame, run.range.last_frame,
                        run.render ? "" : ", without pictures");
 }
@@ -177,7 +178,9 @@ void require_checkpoint(const RunFolder& folder) {
 Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder) {
     const EarlierRun earlier = read_manifest(folder.manifest());
     Scene before = settings.scene;
-    before.steps = std::min(earlier.scene_steps, settings.scene.steps);
+    // A run of the very same scene may have been written before manifests named the scene's steps.
+    if (earlier.scene_hash != settings.scene_hash)
+        before.steps = std::min(earlier.scene_steps, settings.scene.steps);
     if (earlier.simulation_hash != settings.simulation_hash || earlier.scene_hash != scene_hash(before)) {
         throw Error(
             ErrorCode::usage,
@@ -192,8 +195,10 @@ Simulation resumed_simulation(const RunSettings& settings, const RunFolder& fold
     if (earlier.range != range || earlier.render != settings.render) {
         throw Error(
             ErrorCode::usage,
-            fmt::format("{}: was started for {}, now it is {}: resume with the same --frames and --no-render",
-                        folder.folder.string(), range_text(earlier), range_text(now)));
+            fmt::format(
+                "{}: was started for {}, now it is {}: resume with the same --frames, --no-render and "
+                "--statistics-only",
+                folder.folder.string(), range_text(earlier), range_text(now)));
     }
     const Checkpoint checkpoint = read_checkpoint(folder.checkpoint());
     try {

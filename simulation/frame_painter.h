@@ -50,7 +50,7 @@ class FramePainter {
     PendingFrame begin(FrameResult frame);
     Picture finish(PendingFrame&& pending);
 
-    // As those of Renderer.
+    // As those of Renderer. They never change: any thread may call these three while another draws.
     std::string backend_name() const { return renderer_.backend_name(); }
     std::string device_name() const { return renderer_.device_name(); }
     // Adds back-end and device to the metadata of a picture that this painter drew.

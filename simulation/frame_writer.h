@@ -23,8 +23,8 @@ class FrameWriter {
     // own voxels, bits and wind, and one of their densities together. Throws Error(io) naming the file.
     void write_density(const FrameResult& frame) const;
 
-    // Writes the EXR and PNG files that the scene asks for of a picture of `painter`, whose back-end they name. Returns what the PNG shows; empty without one.
-    // Throws Error(io) naming the file.
+    // Writes the EXR and PNG files that the scene asks for of a picture of `painter`, whose back-end they name.
+    // Returns what the PNG shows; empty without one. Throws Error(io) naming the file.
     Rgb8Image write_picture(const FrameResult& frame, const Picture& picture,
                             const FramePainter& painter) const;
 

@@ -141,8 +141,9 @@ class Recorder : public SimulationSink {
     void start_video(const Simulation& simulation) {
         if (!settings_.render || !wants_video(settings_.scene)) return;
         std::error_code error;
-        if (simulation.next_frame() <= settings_.range.last_frame)
-            std::filesystem::remove(folder_.video(), error);
+        if (simulation.next_frame() <= settings_.range.last_frame &&
+            !std::filesystem::remove(folder_.video(), error) && error)
+            throw Error(ErrorCode::io, folder_.video().string() + ": cannot remove: " + error.message());
         if (!std::filesystem::exists(folder_.video())) output_.start_video();
     }
     bool makes_video() const { return output_.makes_video(); }
@@ -315,6 +316,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     const std::uint64_t first_step = simulation.steps_taken();
     if (settings.resume) {
         recorder.take_over(simulation);
+        if (!simulation.finished()) recorder.write_manifest(false, seconds_since(begin));
     } else {
         remove_earlier_run(folder);
         recorder.begin();

@@ -71,7 +71,7 @@ RunSettings run_settings(Scene scene, const std::string& scene_file);
 struct RunProgress {
     std::uint64_t steps = 0, steps_in_all = 0;
     int frames = 0, frames_in_all = 0;
-    std::string_view phase;  // "simulating", "drawing", "encoding"
+    std::string_view phase;  // "simulating", "encoding"
 };
 
 struct RunObserver {
@@ -110,7 +110,8 @@ bool wants_video(const Scene& scene);
 // Runs, or goes on. Throws Error(usage) when the settings contradict each other or the folder's checkpoint,
 // or when files would be lost that are not of a complete run; Error(io) naming a file that could not be
 // written or read, or when another run is writing into the folder. Before anything is simulated: Error(gpu)
-// when pictures are wanted and the device that is asked for is not there, Error(io) when a video is wanted and there is no ffmpeg.
+// when pictures are wanted and the device that is asked for is not there, Error(io) when a video is wanted and
+// there is no ffmpeg.
 // After any exception the folder can be resumed from its last checkpoint.
 RunReport run_scene(RunSettings settings, const RunObserver& observer);
 

@@ -33,7 +33,7 @@ void RunVideo::add(int number, const Rgb8Image& image) {
     try {
         read_back(number);
         write(image);
-    } catch (const Error&) {
+    } catch (const std::exception&) {
         writer_.reset();
         next_ = first_;
         failed_ = true;

@@ -51,9 +51,9 @@ struct LayerStep {
 struct StepResult {
     std::uint64_t step = 0;
     double time_s = 0;
-    // mean_density is that of q at this step, NaN where no density is made (SimulationResults). Of several layers: sums of cells, the cover of layers that
-    // overlap at random (1 - product of 1 - cover), lowest base, highest top, mean density of all their boxes
-    // together.
+    // mean_density is that of q at this step, NaN where no density is made (SimulationResults). Of several
+    // layers: sums of cells, the cover of layers that overlap at random (1 - product of 1 - cover), lowest base,
+    // highest top, mean density of all their boxes together.
     CloudStatistics statistics;
     StateHash hash;
     std::vector<LayerStep> layers;  // none in a scene without layers

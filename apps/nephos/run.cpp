@@ -43,9 +43,7 @@ void print_needs(const RunArguments& a) {
     const Scene scene = scene_of(a);
     Output output;
     const bool render = !a.no_render && !a.statistics_only;
-    const Splatting splatting = device_options(a.device, scene.frames).splatting;
-    if (render && wants_pictures(scene) &&
-        (splatting == Splatting::vulkan || splatting == Splatting::blended))
+    if (render && wants_pictures(scene) && needs_vulkan(device_options(a.device, scene.frames)))
         output.line("vulkan");
     if (render && wants_video(scene)) output.line("ffmpeg");
 }

@@ -150,12 +150,6 @@ bool is_named(const std::string& wanted, std::size_t number, const std::string& 
     return name.find(wanted) != std::string::npos;
 }
 
-// The device that is asked for by name or number; empty: any.
-std::string requested_device(const DeviceOptions& options) {
-    const char* environment = std::getenv("NEPHOS_DEVICE");
-    return options.device.empty() && environment != nullptr ? environment : options.device;
-}
-
 vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevice>& devices,
                                        const std::string& wanted) {
     if (devices.empty()) fail_without_driver();
@@ -271,7 +265,8 @@ std::optional<GpuDevice> open_graphics_card(const DeviceOptions& options) {
             if (error.code() != ErrorCode::gpu || !requested_device(options).empty()) throw;
             return std::nullopt;
         }
-        if (gpu->properties.deviceType == vk::PhysicalDeviceType::eCpu) return std::nullopt;
+        if (gpu->properties.deviceType == vk::PhysicalDeviceType::eCpu && requested_device(options).empty())
+            return std::nullopt;
         open(*gpu);
         return gpu;
     });

@@ -52,7 +52,7 @@ struct GpuDevice {
 
 // Throws Error(gpu) when there is no loader, no device, or none that can do what the renderer needs.
 GpuDevice open_device(const DeviceOptions& options);
-// Opens the same device unless it is of type CPU; and none, without an error, where there is no loader or no
+// Opens the same device unless it is of type CPU and not requested by name; and none, without an error, where there is no loader or no
 // usable device and neither the options nor NEPHOS_DEVICE ask for one by name.
 std::optional<GpuDevice> open_graphics_card(const DeviceOptions& options);
 

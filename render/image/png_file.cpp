@@ -115,6 +115,9 @@ void write_png(const std::filesystem::path& path, const Picture& picture, const 
 
 void write_png(const std::filesystem::path& path, const Rgb8Image& image, const RenderOptions& options,
                const PictureMetadata& metadata) {
+    if (image.width < 1 || image.height < 1 ||
+        image.rgb.size() != std::size_t(3) * std::size_t(image.width) * std::size_t(image.height))
+        throw Error(ErrorCode::usage, "image: its pixels do not have the size that it states");
     Exchange exchange;
     // libpng does not write to the rows that it takes as changeable.
     point_rows(exchange, const_cast<std::uint8_t*>(image.rgb.data()), image.width, image.height);

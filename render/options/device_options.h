@@ -9,7 +9,7 @@ namespace nephos {
 
 // The back-end that draws; the picture is the same within 1/255.
 enum class Splatting {
-    automatic,  // vulkan where there is a Vulkan device that is not of type CPU, else cpu
+    automatic,  // vulkan where there is a Vulkan device that is not of type CPU, or one is requested; else cpu
     cpu,        // vectors on the processor, tile by tile, front to back; takes no Vulkan driver
     vulkan,     // compute shaders, tile by tile, front to back
     blended,    // billboards with attenuation textures, blended back to front, as D has it: the reference
@@ -39,5 +39,13 @@ struct DeviceOptions {
     Splatting splatting = Splatting::automatic;
     TileLists lists = TileLists::automatic;
 };
+
+// Returns the device that is requested by name or number, by the options or by NEPHOS_DEVICE; empty: any. Reads the
+// environment.
+std::string requested_device(const DeviceOptions& options);
+
+// Returns true when drawing with these options fails without a Vulkan driver: a Vulkan back-end or, for the automatic
+// choice, a device is requested.
+bool needs_vulkan(const DeviceOptions& options);
 
 }  // namespace nephos

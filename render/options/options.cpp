@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <string>
 
 #include "core/error.h"
 #include "render/options/camera.h"
+#include "render/options/device_options.h"
 #include "render/options/sun_position.h"
 #include "render/shared/shared.h"
 
@@ -194,6 +196,16 @@ std::optional<Flash> flash_at(std::span<const LightningFlash> lightning, double 
             brightest = Flash{flash.position_m, flash.colour, intensity};
     }
     return brightest;
+}
+
+std::string requested_device(const DeviceOptions& options) {
+    const char* environment = std::getenv("NEPHOS_DEVICE");
+    return options.device.empty() && environment != nullptr ? environment : options.device;
+}
+
+bool needs_vulkan(const DeviceOptions& options) {
+    if (options.splatting == Splatting::automatic) return !requested_device(options).empty();
+    return options.splatting != Splatting::cpu;
 }
 
 }  // namespace nephos

@@ -122,6 +122,8 @@ TEST(Device, AutomaticTakesVulkanOnGraphicsCardsAlone) {
     EXPECT_EQ(automatic.backend_name(), software ? "cpu" : "vulkan");
     EXPECT_EQ(vulkan.backend_name(), "vulkan");
     EXPECT_EQ(Renderer({.splatting = Splatting::blended}).backend_name(), "blended");
+    const Renderer named({.device = vulkan.device_name()});
+    EXPECT_EQ(named.backend_name(), "vulkan") << "a device that is asked for is used";
 }
 
 TEST(Device, OneForTheProcessorIsAnError) {

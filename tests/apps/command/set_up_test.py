@@ -48,6 +48,7 @@ class SetUp(Case):
         video = self.write("video.toml", SCENE.replace("[frames]", "[frames]\nvideo = true"))
         for arguments, needs in (([self.scene], ""), ([video], "ffmpeg\n"), ([video, "--no-render"], ""),
                                  ([self.scene, "--splatting", "vulkan"], "vulkan\n"),
+                                 ([self.scene, "--device", "llvmpipe"], "vulkan\n"),
                                  ([self.scene, "--video", "--splatting", "blended"], "vulkan\nffmpeg\n"),
                                  ([self.scene, "--set", 'frames.splatting="vulkan"'], "vulkan\n"),
                                  ([self.scene, "--set", "frames.video=true"], "ffmpeg\n"),
