@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include "automaton/automaton.h"
 #include "core/error.h"
@@ -26,7 +27,10 @@ constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
 // A file system of the kernel's files, made by hand.
 class FakeSystem {
   public:
-    FakeSystem() : root_(fs::path(testing::TempDir()) / "nephos_memory_test") { fs::remove_all(root_); }
+    FakeSystem()
+        : root_(fs::path(testing::TempDir()) / ("nephos_memory_test_" + std::to_string(::getpid()))) {
+        fs::remove_all(root_);
+    }
     ~FakeSystem() { fs::remove_all(root_); }
     FakeSystem& file(const std::string& path, const std::string& text) {
         fs::create_directories((root_ / path).parent_path());
