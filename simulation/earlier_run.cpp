@@ -57,7 +57,7 @@ std::vector<std::string> frame_parts(const RunFolder& folder) {
     return parts;
 }
 
-// What a run of this name writes and finds there already, the manifest last: as long as it is there, the rest
+// Lists the files of a run of this name that are there already, the manifest last: as long as it is there, the rest
 // is known to be of a run.
 std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     std::vector<std::filesystem::path> files;
@@ -92,7 +92,7 @@ std::string range_text(const EarlierRun& run) {
                        run.render ? "" : ", without pictures");
 }
 
-// What makes the scene another one than that of the earlier run.
+// Describes what makes the scene another one than that of the earlier run.
 std::string difference(const EarlierRun& earlier, const RunSettings& settings) {
     Scene other_video = settings.scene;
     other_video.frames.video = !other_video.frames.video;

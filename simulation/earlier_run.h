@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a folder holds of earlier runs: what must not be lost, what is in the way, and what a run goes on from.
+// Examines what a folder holds of earlier runs: what must not be lost, what is in the way, and what a run goes on from.
 
 #include <string>
 

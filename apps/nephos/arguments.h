@@ -35,7 +35,7 @@ struct WorkArguments {
     bool quiet = false;  // no progress bar, no notes
 };
 
-// What draws, where the scene does not say it or shall not.
+// Selects what draws, instead of the keys of the scene.
 struct DeviceArguments {
     std::optional<Splatting> splatting;
     std::optional<std::string> device;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What shaders of both Vulkan back-ends read of a frame beside its splats: the tables of the sky, the textures of
+// Uploads what shaders of both Vulkan back-ends read of a frame beside its splats: the tables of the sky, the textures of
 // T's billboards, the shells of air. Private to the module.
 
 #include <cstdint>
