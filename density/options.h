@@ -23,6 +23,19 @@ struct SmoothingOptions {
     bool operator==(const SmoothingOptions&) const = default;
 };
 
+// Detail below the voxel: an edge of a cloud that noise erodes, from bumps of `size_m` down to half a metre, while
+// the mean density stays that of the metaballs (density/detail.h).
+struct DetailOptions {
+    bool enabled = true;
+    double strength = 1;           // of the erosion, 0..1.4; 0: smooth as the metaballs, only with a crisp edge
+    double size_m = 160;           // of the largest bumps, 20..5000
+    double stretch = 1;            // of the bumps along the wind, 1..50: fibres
+    double wisps = 1;              // 0..1: hanging shreds at the base instead of round bumps
+    double thermals = 0.5;         // 0..1: strength of towers and hollows of two and four times size_m
+    double mean_free_path_m = 30;  // of light where half of the space is cloud, 1..10000: less is crisper
+    bool operator==(const DetailOptions&) const = default;
+};
+
 struct DensityOptions {
     SmoothingOptions smoothing;
     double extinction_per_m = 0.02;      // extinction coefficient at density 1; > 0
@@ -31,6 +44,7 @@ struct DensityOptions {
     bool half = false;  // 16-bit floats in the file
     bool write_state = false;     // also the bool grids hum, act, cld
     bool write_velocity = false;  // also `vel`, the wind in m/s
+    DetailOptions detail;         // of pictures, and of files that are refined
     bool operator==(const DensityOptions&) const = default;
 };
 

@@ -124,6 +124,7 @@ void Renderer::Impl::use_scattering(const CloudLight& light) {
 }
 
 void Renderer::Impl::begin(Drawing& drawing) {
+    if (!backend->marches()) drawing.splats.metaballs.detailed = {};
     const Splats& splats = drawing.splats;
     const RenderOptions& options = drawing.options;
     Picture& picture = drawing.picture = blank_picture(options);
@@ -131,6 +132,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
         const StageTimer timer(&times, DrawStage::prepare);
         // The key of the light says nothing of the view, from which other metaballs may be merged.
         cache_cloud(lit, splats.metaballs, options, drawing.detail);
+        cache_volumes(lit, splats.metaballs, options);
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
     picture.shadow_frame = lit.frame;
@@ -197,7 +199,7 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
     picture.light.assign(splats.metaballs.metaballs.size(), 1.0f);
     for (std::size_t i = 0; i < known->sun_depths.size(); ++i)
         picture.light[known->cloud.visible[i]] = std::exp(-known->sun_depths[i]);
-    picture.shadow = known->shadow;
+    picture.shadow = lit.volumes.empty() ? known->shadow : lit.shadow;
     picture.shadow_frame = known->frame;
 }
 

@@ -43,8 +43,28 @@ void lean(RainCurtain& curtain, const Wind& wind, const PrecipitationOptions& p,
 FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
     : scene_(scene), renderer_(device) {}
 
+void FramePainter::add_detail(const DensityGrid& density, const DetailOptions& detail, const Wind& wind,
+                              double time_s, std::size_t first, std::size_t count,
+                              std::vector<DetailedVoxels>& to) const {
+    if (!detail.enabled || count == 0) return;
+    // The wind in the middle of the lattice carries all detail alike.
+    const Placement& placement = density.placement();
+    const double height = placement.origin_m.z + 0.5 * density.extent().z * placement.cell_size_m;
+    DetailedVoxels& part = to.emplace_back();
+    part.density = density;
+    part.detail = detail;
+    part.metaball_radius_cells = scene_.density.metaball_radius_cells;
+    part.drift_m = wind_displacement_m(wind, height, time_s);
+    const Velocity now = wind_at(wind, height, time_s);
+    const double speed = std::hypot(now.east_m_per_s, now.north_m_per_s);
+    if (speed > 0) part.along = Vec2(now.east_m_per_s, now.north_m_per_s) / speed;
+    part.first = first;
+    part.count = count;
+}
+
 // The metaballs of every lattice, each with the size of its own cells.
-std::vector<Metaball> FramePainter::metaballs_of(const FrameResult& frame) const {
+std::vector<Metaball> FramePainter::metaballs_of(const FrameResult& frame,
+                                                 std::vector<DetailedVoxels>& detailed) const {
     const double radius = scene_.density.metaball_radius_cells;
     std::uint64_t count = 0;
     for (const LayerFrame& layer : frame.layers) count += layer.density.active_voxels();
@@ -53,20 +73,30 @@ std::vector<Metaball> FramePainter::metaballs_of(const FrameResult& frame) const
     require_memory(count * 4 * sizeof(Metaball),
                    frame.number > 0 ? fmt::format("{}: drawing frame {}", scene_.name, frame.number)
                                     : scene_.name + ": drawing its voxels");
-    if (!of_layers) return metaballs(frame.density, radius);
+    if (!of_layers) {
+        std::vector<Metaball> balls = metaballs(frame.density, radius);
+        add_detail(frame.density, scene_.density.detail, common_wind(scene_), frame.time_s, 0, balls.size(),
+                   detailed);
+        return balls;
+    }
     std::vector<Metaball> balls;
-    for (const LayerFrame& layer : frame.layers) {
+    for (std::size_t n = 0; n < frame.layers.size(); ++n) {
+        const LayerFrame& layer = frame.layers[n];
         if (layer.direct) continue;
         const std::vector<Metaball> more = metaballs(layer.density, radius);
+        if (!scene_.layers[n].is_veil)
+            add_detail(layer.density, scene_.density.detail, layer_wind(scene_, n), frame.time_s, balls.size(),
+                       more.size(), detailed);
         balls.insert(balls.end(), more.begin(), more.end());
     }
     return balls;
 }
 
 PendingFrame FramePainter::begin(FrameResult frame) {
-    std::vector<Metaball> balls = metaballs_of(frame);
+    std::vector<DetailedVoxels> detailed;
+    std::vector<Metaball> balls = metaballs_of(frame, detailed);
     const double radius = scene_.density.metaball_radius_cells;
-    const MetaballCloud cloud{balls, scene_.density.extinction_per_m, metaball_normalisation(radius)};
+    const MetaballCloud cloud{balls, scene_.density.extinction_per_m, metaball_normalisation(radius), detailed};
     std::vector<SkyLayer> layers;
     for (const LayerFrame& layer : frame.layers) {
         if (layer.sky != nullptr) layers.push_back({layer.sky, layer.clouds, layer.direct});
@@ -78,7 +108,7 @@ PendingFrame FramePainter::begin(FrameResult frame) {
     PendingSkyPicture picture =
         painter_.begin(renderer_, cloud, layers, scene_.render, frame.time_s, scene_.frames.exr, ground,
                        weather_of(scene_, frame.layers, frame.time_s), film);
-    return {std::move(frame), std::move(balls), std::move(picture)};
+    return {std::move(frame), std::move(balls), std::move(detailed), std::move(picture)};
 }
 
 Picture FramePainter::finish(PendingFrame&& pending) {

@@ -28,6 +28,7 @@ namespace nephos {
 struct PendingFrame {
     FrameResult frame;
     std::vector<Metaball> balls;
+    std::vector<DetailedVoxels> detailed;  // of these
     PendingSkyPicture picture;
 
     // Whether a device is still drawing it, as far as is known.
@@ -57,7 +58,10 @@ class FramePainter {
     void note_renderer(PictureMetadata& metadata) const { nephos::note_renderer(renderer_, metadata); }
 
   private:
-    std::vector<Metaball> metaballs_of(const FrameResult& frame) const;
+    std::vector<Metaball> metaballs_of(const FrameResult& frame, std::vector<DetailedVoxels>& detailed) const;
+    // Adds the voxels of metaballs from `first` on, whose air moves with `wind`.
+    void add_detail(const DensityGrid& density, const DetailOptions& detail, const Wind& wind, double time_s,
+                    std::size_t first, std::size_t count, std::vector<DetailedVoxels>& to) const;
 
     Scene scene_;
     Renderer renderer_;

@@ -56,7 +56,8 @@ struct FrameDescription {
     ViewSortedSplats view_sorted() const {
         const StageTimer timer(&times, DrawStage::view_sorting);
         ViewSortedSplats order = sort_for_view(cloud.cloud, splats, camera,
-                                               pixels_per_unit(options.camera, camera), options.ground);
+                                               pixels_per_unit(options.camera, camera), options.ground,
+                                               !cloud.volumes.empty());
         // Balls are read twice; keys move through memory three times, and back and forth.
         times[DrawStage::view_sorting].bytes =
             cloud.cloud.metaballs.size_bytes() +
@@ -95,6 +96,9 @@ class Backend {
     virtual bool finish(Picture&) { return true; }
     // Waits for a picture in flight and throws it away.
     virtual void abandon(const Picture&) noexcept {}
+
+    // Whether it marches through clouds with detail (LitCloud::volumes); otherwise it draws their metaballs.
+    virtual bool marches() const { return false; }
 
     virtual std::vector<std::string> validation_messages() const { return {}; }
 };

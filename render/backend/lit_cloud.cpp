@@ -36,6 +36,7 @@ bool draw_merged(LitCloud& cached, std::optional<MergedCloud> merged) {
     cached.merged = std::move(merged->metaballs);
     cached.cloud.metaballs = cached.merged;
     cached.cloud.depth_scale = std::move(merged->depth_scale);
+    cached.cloud.detailed = std::move(merged->detailed);
     cached.cloud.visible.resize(cached.merged.size());
     std::iota(cached.cloud.visible.begin(), cached.cloud.visible.end(), 0u);
     cached.cloud.base_m = cached.given.base_m;
@@ -66,11 +67,47 @@ CacheKey light_key(const CacheKey& metaballs, const RenderOptions& options) {
     return key_of({metaballs[0], metaballs[1]}, rest);
 }
 
+// Of the parts with detail, whose densities are those of their metaballs.
+CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, const RenderOptions& options) {
+    std::vector<double> rest{mean_cosine(options.light.phase)};
+    for (const DetailedVoxels& part : cloud.detailed) {
+        const DetailOptions& o = part.detail;
+        const Vec3 origin = part.density.placement().origin_m;
+        for (const double number : {double(part.first), double(part.count), part.metaball_radius_cells, part.drift_m.x,
+                                    part.drift_m.y, part.drift_m.z, part.along.x, part.along.y, o.strength, o.size_m,
+                                    o.stretch, o.wisps, o.thermals, o.mean_free_path_m, origin.x, origin.y, origin.z,
+                                    part.density.placement().cell_size_m, part.growth ? part.growth->sum() : -1.0})
+            rest.push_back(number);
+    }
+    return key_of({metaballs[0], metaballs[1]}, rest);
+}
+
 }  // namespace
+
+void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options) {
+    if (cloud.detailed.empty() && cached.volumes.empty()) return;
+    const CacheKey key = volumes_key(cached.metaballs_key, cloud, options);
+    if (key != cached.volumes_key) {
+        cached.volumes.clear();
+        cached.volumes_key = {};
+        for (const DetailedVoxels& part : cloud.detailed) {
+            CloudVolume& volume = cached.volumes.emplace_back(part, cloud.extinction_per_m);
+            see_surroundings(volume, mean_cosine(options.light.phase));
+        }
+        cached.volumes_key = key;
+        cached.volumes_light_key = {};
+        cached.volumes_version = next_version();
+    }
+    if (cached.light_key == cached.volumes_light_key) return;
+    light_volumes(cached.volumes, direction_to_sun(options.sun), options.light);
+    cached.volumes_light_key = cached.light_key;
+    cached.volumes_light = next_version();
+}
 
 void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options,
                  const DetailView& view) {
-    const CacheKey metaballs = metaballs_key(cloud), light = light_key(metaballs, options);
+    const CacheKey metaballs = metaballs_key(cloud),
+                   light = light_key(cloud.detailed.empty() ? metaballs : volumes_key(metaballs, cloud, options), options);
     const bool was_cached = cached.shadow_size != 0;
     const bool is_known = was_cached && light == cached.light_key;
     if (is_known) cached.given.metaballs = cloud.metaballs;  // the same values, perhaps elsewhere

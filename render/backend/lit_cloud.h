@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "render/cloud/cloud_preparation.h"
+#include "render/cloud/cloud_volume.h"
 #include "render/cloud/level_of_detail.h"
 #include "render/frame/versioned.h"
 #include "render/image/picture.h"
@@ -47,6 +48,11 @@ struct LitCloud {
     Version host_light = 0;
     std::size_t light_passes = 0;  // so far
 
+    // The parts with detail, in their order, with their light. See DetailedVoxels.
+    std::vector<CloudVolume> volumes;
+    CacheKey volumes_key{}, volumes_light_key{};
+    Version volumes_version = 0, volumes_light = 0;
+
     // Notes that a pass has changed sun_depths or shadow.
     void note_light_pass() {
         light = host_light = next_version();
@@ -59,5 +65,8 @@ struct LitCloud {
 // does without level of detail.
 void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options,
                  const DetailView& view);
+
+// Makes cached.volumes those of the same cloud, with their light. After cache_cloud().
+void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options);
 
 }  // namespace nephos

@@ -131,6 +131,12 @@ PreparedCloud prepare(const MetaballCloud& cloud) {
                                     part.depth_scale.end());
         height.add(part.height.min, part.height.max);
     }
+    if (!cloud.detailed.empty()) {
+        prepared.detailed.resize(prepared.visible.size(), 0);
+        for (std::size_t i = 0; i < prepared.visible.size(); ++i)
+            for (const DetailedVoxels& part : cloud.detailed)
+                if (prepared.visible[i] - part.first < part.count) prepared.detailed[i] = 1;
+    }
     if (!prepared.visible.empty()) {
         prepared.base_m = height.min;
         prepared.top_m = height.max;

@@ -22,6 +22,8 @@ struct PreparedCloud {
     std::span<const Metaball> metaballs;
     std::vector<std::uint32_t> visible;  // indices into metaballs, rising
     std::vector<float> depth_scale;      // one for each of `visible`: extinction at the centre * radius
+    std::vector<std::uint8_t> detailed;  // likewise: 1 if it stands for DetailedVoxels; empty: none does
+    bool is_detailed(std::size_t i) const { return !detailed.empty() && detailed[i] != 0; }
     double base_m = 0, top_m = 0;        // world z of the lowest and highest centre
 };
 

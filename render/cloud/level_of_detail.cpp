@@ -302,6 +302,8 @@ MergedCloud joined(const std::vector<MergedPart>& parts) {
     MergedCloud all;
     all.metaballs.resize(begin.back());
     all.depth_scale.resize(begin.back());
+    for (const MergedPart& part : parts)
+        all.detailed.insert(all.detailed.end(), part.cloud.detailed.begin(), part.cloud.detailed.end());
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
         std::ranges::copy(parts[p].cloud.metaballs, all.metaballs.begin() + std::ptrdiff_t(begin[p]));
         std::ranges::copy(parts[p].cloud.depth_scale, all.depth_scale.begin() + std::ptrdiff_t(begin[p]));
@@ -360,6 +362,8 @@ std::optional<MergedCloud> merge_voxels(const PreparedCloud& given, const Metaba
             const BlockBalls balls(given, blocks.voxels, b);
             const BlockTree tree(merging, balls, blocks.hidden[b]);
             tree.emit(parts[p].cloud);
+            if (!given.detailed.empty())
+                parts[p].cloud.detailed.resize(parts[p].cloud.metaballs.size(), balls.lattice.detailed ? 1 : 0);
             parts[p].merges = parts[p].merges || tree.merges();
         }
     });

@@ -60,7 +60,8 @@ struct DetailView {
 // The metaballs that replace those of a cloud.
 struct MergedCloud {
     std::vector<Metaball> metaballs;
-    std::vector<float> depth_scale;  // of each, as PreparedCloud::depth_scale
+    std::vector<float> depth_scale;      // of each, as PreparedCloud::depth_scale
+    std::vector<std::uint8_t> detailed;  // of each, as PreparedCloud::detailed
 };
 
 // The view-independent part: the blocks of a cloud, and the occlusion of their octants, 0..1.

@@ -10,7 +10,9 @@
 #include <span>
 
 #include "core/weather.h"
+#include "density/density_grid.h"
 #include "density/metaballs.h"
+#include "density/options.h"
 #include "render/options/options.h"
 
 namespace nephos {
@@ -29,6 +31,18 @@ struct GroundCoverView {
     double outside_water_mm = 0, outside_snow_mm = 0, outside_rain_mm_per_h = 0;
 };
 
+// Voxels of a cloud that are drawn with detail (density/detail.h): near the eye rays march through them, and farther
+// away, where a pixel covers 15 to 25 m, the metaballs that stand for them take over.
+struct DetailedVoxels {
+    DensityGrid density;
+    std::optional<DensityGrid> growth;   // as CoverageField takes it
+    DetailOptions detail;
+    double metaball_radius_cells = 2;
+    Vec3 drift_m{};                      // as in DetailSetting
+    Vec2 along{1, 0};
+    std::size_t first = 0, count = 0;    // of MetaballCloud::metaballs
+};
+
 // A cloud made of metaballs. Along a ray, extinction (per metre) is
 //     extinction_per_m * normalisation * sum_i density_i f(|x - x_i| / radius_i),
 //     f(a) = 1 - 22/9 a^2 + 17/9 a^4 - 4/9 a^6 for a < 1, else 0 (Wyvill)
@@ -36,6 +50,7 @@ struct MetaballCloud {
     std::span<const Metaball> metaballs;  // metres; metaballs of density <= 0 draw nothing
     double extinction_per_m = 0.02;       // at density 1; >= 0
     double normalisation = 1.0;           // such that a saturated lattice has density 1; >= 0
+    std::span<const DetailedVoxels> detailed{};  // of these metaballs; by `first`, without overlap
 };
 
 // One of T's billboards, facing the eye, lit per corner as by T's vertex shader:

@@ -26,16 +26,21 @@ double phase_of(double coordinate_in_voxels) {
     return (steps >= 64 ? 0 : steps / 64) - 0.5;
 }
 
-// The first metaball of each radius, by index; no more than are of use.
+// The first metaball of each radius, with and without detail, by its place in `visible`; no more than are of use.
 std::vector<std::uint32_t> first_of_radii(const PreparedCloud& cloud, std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> first;
     float last = -1;
+    bool last_detailed = false;
     for (std::size_t i = begin; i < end && first.size() <= kMostLattices; ++i) {
         const float radius = cloud.metaballs[cloud.visible[i]].radius;
-        if (radius == last) continue;
+        const bool detailed = cloud.is_detailed(i);
+        if (radius == last && detailed == last_detailed) continue;
         last = radius;
-        const auto has_radius = [&](std::uint32_t index) { return cloud.metaballs[index].radius == radius; };
-        if (std::ranges::none_of(first, has_radius)) first.push_back(cloud.visible[i]);
+        last_detailed = detailed;
+        const auto is_alike = [&](std::uint32_t n) {
+            return cloud.metaballs[cloud.visible[n]].radius == radius && cloud.is_detailed(n) == detailed;
+        };
+        if (std::ranges::none_of(first, is_alike)) first.push_back(std::uint32_t(i));
     }
     return first;
 }
@@ -51,7 +56,7 @@ RunPart runs_of_part(const PreparedCloud& cloud, std::span<const VoxelLattice> l
     std::size_t lattice = 0;
     for (std::size_t i = begin; i < end; ++i) {
         const Metaball& ball = cloud.metaballs[cloud.visible[i]];
-        while (lattices[lattice].radius != ball.radius) lattice = (lattice + 1) % lattices.size();
+        while (lattices[lattice].radius != ball.radius || lattices[lattice].detailed != cloud.is_detailed(i)) lattice = (lattice + 1) % lattices.size();
         const VoxelLattice& of = lattices[lattice];
         const double x = ball.x * of.per_edge - of.phase[0], y = ball.y * of.per_edge - of.phase[1],
                      z = ball.z * of.per_edge - of.phase[2];
@@ -84,11 +89,16 @@ std::vector<VoxelLattice> voxel_lattices(const PreparedCloud& cloud, double radi
     });
     std::vector<VoxelLattice> lattices;
     for (const std::vector<std::uint32_t>& part : found) {
-        for (const std::uint32_t index : part) {
-            const Metaball& ball = cloud.metaballs[index];
-            if (std::ranges::find(lattices, ball.radius, &VoxelLattice::radius) != lattices.end()) continue;
+        for (const std::uint32_t n : part) {
+            const Metaball& ball = cloud.metaballs[cloud.visible[n]];
+            const bool detailed = cloud.is_detailed(n);
+            if (std::ranges::any_of(lattices, [&](const VoxelLattice& known) {
+                    return known.radius == ball.radius && known.detailed == detailed;
+                }))
+                continue;
             if (lattices.size() == kMostLattices) return {};
             VoxelLattice lattice;
+            lattice.detailed = detailed;
             lattice.radius = ball.radius;
             lattice.edge_m = ball.radius / radius_voxels;
             lattice.per_edge = radius_voxels / ball.radius;

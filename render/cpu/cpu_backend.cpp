@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include <hwy/highway.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include "render/cpu/processor_light.h"
@@ -31,6 +33,32 @@ void take_missing(std::vector<std::uint8_t>& requested, std::vector<std::uint8_t
     }
 }
 
+// With volumes: they take the light away, and those metaballs that do not stand for them. All tiles are computed at
+// once, or none.
+void complete_light_of_volumes(LitCloud& cloud, std::span<const std::uint8_t> balls,
+                               std::span<const std::uint8_t> tiles, StageTimes& times) {
+    const StageTimer timer(&times, DrawStage::light);
+    if (std::ranges::count(cloud.cloud.detailed, 1) < std::ptrdiff_t(cloud.cloud.visible.size())) {
+        PreparedCloud others = cloud.cloud;
+        for (std::size_t i = 0; i < others.visible.size(); ++i)
+            if (others.is_detailed(i)) others.depth_scale[i] = 0;
+        const LightSortedSplats order = sort_for_light(others, cloud.frame, cloud.shadow_size);
+        std::vector<std::uint8_t> centres(order.source.size());
+        for (std::size_t i = 0; i < centres.size(); ++i) centres[i] = balls[order.source[i]];
+        std::vector<float> depths;
+        light_by_processor(order, cloud.shadow_size, {centres, tiles}, depths, cloud.shadow, {}, &times);
+        for (std::size_t i = 0; i < centres.size(); ++i)
+            if (centres[i] != 0) cloud.sun_depths[order.source[i]] = depths[i];
+    }
+    tbb::parallel_for(std::size_t{0}, cloud.sun_depths.size(), [&](std::size_t i) {
+        if (balls[i] == 0) return;
+        const Metaball& ball = cloud.cloud.metaballs[cloud.cloud.visible[i]];
+        for (const CloudVolume& volume : cloud.volumes)
+            cloud.sun_depths[i] += sun_depth_at(volume, Vec3(ball.x, ball.y, ball.z));
+    });
+    if (std::ranges::count(tiles, 1) > 0) cast_shadows(cloud.volumes, cloud.frame, cloud.shadow_size, cloud.shadow);
+}
+
 // Computes what is missing of the light of the balls numbered `source` and of the tiles of the shadow map
 // where `seen` has them; of all light if `seen` is null, or if anything is missing in a second picture. What
 // one ball gets has the same bits whatever else is computed.
@@ -48,11 +76,17 @@ void complete_light(LitCloud& cloud, const std::vector<std::uint32_t>& source, c
             std::ranges::fill(tiles, std::uint8_t{1});
         }
     }
+    if (!cloud.volumes.empty()) std::ranges::fill(tiles, std::uint8_t{1});
     take_missing(balls, cloud.known_light);
     take_missing(tiles, cloud.known_tiles);
     cloud.all_known =
         std::ranges::count(cloud.known_light, 0) == 0 && std::ranges::count(cloud.known_tiles, 0) == 0;
 
+    if (!cloud.volumes.empty()) {
+        complete_light_of_volumes(cloud, balls, tiles, times);
+        cloud.note_light_pass();
+        return;
+    }
     LightSortedSplats order;
     {
         const StageTimer timer(&times, DrawStage::sun_order);
@@ -103,8 +137,10 @@ bool CpuBackend::begin(const FrameDescription& frame, Picture& picture) {
     complete_light(cloud, order.source, known, frame.times);
     set_light(order, {cloud.sun_depths, frame.lightning});
     const AirShells shells = frame.shells();
+    const MarchedScene march(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera));
     for (ProcessorView& view : views)
-        view.draw(picture, cloud.shadow.data(), cloud.shadow_size, shells, known);
+        view.draw(picture, cloud.shadow.data(), cloud.shadow_size, shells, known,
+                  march.volumes.empty() ? nullptr : &march);
     return false;
 }
 

@@ -18,6 +18,7 @@ class CpuBackend : public Backend {
     int longest_part() const override;
     int largest_shadow_map() const override;
 
+    bool marches() const override { return true; }
     void light_all(LitCloud& cloud, StageTimes& times) override;
     // Draws at once.
     bool begin(const FrameDescription& frame, Picture& picture) override;

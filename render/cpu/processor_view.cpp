@@ -28,6 +28,7 @@
 
 #include "render/cpu/screen_ball-inl.h"
 #include "render/cpu/screen_billboard-inl.h"
+#include "render/cpu/march-inl.h"
 #include "render/cpu/tile_air-inl.h"
 #include "render/cpu/visibility-inl.h"
 #include "render/shading/background-inl.h"
@@ -134,16 +135,22 @@ bool is_opaque(const TileSums& sums, std::size_t lanes) {
     return hn::AllTrue(d, hn::Lt(most, set(shader::kOpaque)));
 }
 
-// Front to back, until the tile is opaque; what it took.
+HWY_INLINE float distance_of(const ScreenBall& ball, const ViewScene& scene) {
+    return ball.distance != 0 ? std::abs(ball.distance)
+                              : scene.exact[std::bit_cast<std::uint32_t>(ball.x)].distance;
+}
+
+// Front to back, until the tile is opaque; what it took. Clouds with detail are marched meanwhile, if there are any.
 template <bool kColours>
-HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileSums& sums,
+                             MarchState* march = nullptr) {
     constexpr std::size_t kAtOnce = 8;  // between two looks at the sums
     const Layout layout;
     if (tile.list.empty() || is_opaque(sums, layout.lanes)) return {};
     for (const std::uint32_t splat : tile.list.first(std::min(kAtOnce, tile.list.size())))
         hwy::Prefetch(&scene.balls[splat]);
     const bool shells = kColours && !scene.before_shells.empty();
-    TileRays rays(*scene.frame, tile, shells || !scene.exact.empty());
+    TileRays rays(*scene.frame, tile, shells || march != nullptr || !scene.exact.empty());
     if (shells) set_shell_offsets(*scene.frame, tile, rays);
     FirstPixels first[shader::kTileWidth] = {{layout, 0}, {layout, 1}, {layout, 2}, {layout, 3},
                                              {layout, 4}, {layout, 5}, {layout, 6}, {layout, 7}};
@@ -153,7 +160,8 @@ HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileS
         for (std::size_t i = begin; i < end; ++i) {
             if (i + kAtOnce < tile.list.size()) hwy::Prefetch(&scene.balls[tile.list[i + kAtOnce]]);
             const ScreenBall& ball = scene.balls[tile.list[i]];
-            if (shells) add_shells_before(scene, rays, scene.first_ball + tile.list[i], sums);
+            if (shells) add_shells_before(scene, rays, scene.first_ball + tile.list[i], sums, march);
+            if (march != nullptr) march_to(scene, rays, distance_of(ball, scene), *march, sums);
             const Rows of_ball = rows_of(ball, tile, layout);
             rows += of_ball.end - std::min(of_ball.begin, of_ball.end);
             if (ball.distance > 0) {
@@ -171,22 +179,24 @@ HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileS
     return {end, rows * shader::kTileWidth};
 }
 
-TileWork add_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
-    return add_some<true>(scene, tile, sums);
+TileWork add_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums, MarchState* march) {
+    return add_some<true>(scene, tile, sums, march);
 }
 TileWork find_visible_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
     return add_some<false>(scene, tile, sums);
 }
 
 // Adds what is seen of the background behind the clouds; distances become means.
-void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
+void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& sums, MarchState* march) {
     const Lanes d;
     const Layout layout;
     const ShadowTexels map{scene.shadow, scene.shadow_size};
-    if (sums.next_shell < scene.before_shells.size() && !is_opaque(sums, layout.lanes)) {
+    const bool shells = sums.next_shell < scene.before_shells.size();
+    if ((shells || march != nullptr) && !is_opaque(sums, layout.lanes)) {
         TileRays rays(*scene.frame, tile, true);
-        set_shell_offsets(*scene.frame, tile, rays);
-        add_shells_before(scene, rays, SIZE_MAX, sums);
+        if (shells) set_shell_offsets(*scene.frame, tile, rays);
+        if (shells) add_shells_before(scene, rays, SIZE_MAX, sums, march);
+        if (march != nullptr) march_to(scene, rays, kNowhere, *march, sums);
     }
     for (std::size_t block = 0; block < layout.blocks; ++block) {
         const FirstPixels first(layout, block);
@@ -427,11 +437,12 @@ void ProcessorView::find_visible_ground(int shadow_size, VisibleSet& seen) const
 }
 
 void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size, const AirShells& shells,
-                         const VisibleSet* seen) {
+                         const VisibleSet* seen, const MarchedScene* march) {
     frame_.shells = shells.any() ? &shells : nullptr;
     const std::vector<std::uint32_t> before_shells = splats_before_shells(shells, *order_);
     const TileGrid grid{part_.width, part_.height};
     std::vector<TileSums> sums_between;  // batches
+    std::vector<MarchState> march_between;
     std::size_t begin = 0;
     do {  // once even without any ball, for the background
         const std::size_t end = kept_.empty()
@@ -448,17 +459,25 @@ void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size,
                               .before_shells = before_shells,
                               .first_ball = begin,
                               .texels = texels(),
-                              .distances = order_->depth};
+                              .distances = order_->depth,
+                              .march = march};
         const bool last = end == boxes_.size();
-        if (begin == 0 && !last) sums_between.resize(grid.tiles());
+        if (begin == 0 && !last) {
+            sums_between.resize(grid.tiles());
+            if (march != nullptr) march_between.resize(grid.tiles());
+        }
         std::atomic<std::size_t> pairs = 0;
         tbb::parallel_for(std::size_t{0}, grid.tiles(), [&](std::size_t t) {
             const ViewTile tile = tile_at(t, grid, batch.bins);
             TileSums own;
             TileSums& sums = sums_between.empty() ? own : sums_between[t];
-            pairs += HWY_DYNAMIC_DISPATCH(add_balls)(scene, tile, sums).pairs;
+            MarchState own_march;
+            MarchState* const state = march == nullptr         ? nullptr
+                                      : march_between.empty() ? &own_march
+                                                              : &march_between[t];
+            pairs += HWY_DYNAMIC_DISPATCH(add_balls)(scene, tile, sums, state).pairs;
             if (!last) return;
-            HWY_DYNAMIC_DISPATCH(finish_tile)(scene, tile, sums);
+            HWY_DYNAMIC_DISPATCH(finish_tile)(scene, tile, sums, state);
             store(sums, tile, part_, order_->depth, picture);
         });
         if (times_ != nullptr) (*times_)[DrawStage::view].pairs += pairs;

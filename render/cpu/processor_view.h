@@ -12,6 +12,7 @@
 
 #include "render/cloud/stage_times.h"
 #include "render/cpu/billboard_texels.h"
+#include "render/cpu/marched_scene.h"
 #include "render/cpu/screen_ball.h"
 #include "render/frame/air_shells.h"
 #include "render/frame/frame_data.h"
@@ -46,9 +47,10 @@ class ProcessorView {
     void find_visible(int shadow_size, VisibleSet& seen);
 
     // Draws splats, the air between them and what lies behind; the ground wears `shadow`, shadow_size^2
-    // texels. The light of balls that are not `seen` is not looked at; without it all are.
+    // texels. The light of balls that are not `seen` is not looked at; without it all are. Clouds with detail
+    // are marched through `march`.
     void draw(Picture& picture, const float* shadow, int shadow_size, const AirShells& shells,
-              const VisibleSet* seen = nullptr);
+              const VisibleSet* seen = nullptr, const MarchedScene* march = nullptr);
 
   private:
     struct Batch {

@@ -119,14 +119,22 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
     hn::Store(sum.z, d, sums.blue + at);
 }
 
-// All shells in front of a ball that are not in the sums yet.
-inline void add_shells_before(const ViewScene& scene, const TileRays& rays, std::size_t ball,
-                              TileSums& sums) {
-    const std::size_t first = sums.next_shell, count = scene.before_shells.size();
-    while (sums.next_shell < count && scene.before_shells[sums.next_shell] <= ball) ++sums.next_shell;
-    if (first == sums.next_shell) return;
-    for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(Lanes()))
-        add_shells_to(scene, rays, at, first, sums.next_shell, sums);
+inline void march_to(const ViewScene& scene, const TileRays& rays, float limit_m, MarchState& state, TileSums& sums);
+
+// All shells in front of a ball that are not in the sums yet; before each, the clouds with detail in front of its end.
+inline void add_shells_before(const ViewScene& scene, const TileRays& rays, std::size_t ball, TileSums& sums,
+                              MarchState* march) {
+    const std::size_t count = scene.before_shells.size();
+    while (sums.next_shell < count && scene.before_shells[sums.next_shell] <= ball) {
+        const std::size_t first = sums.next_shell++;
+        if (march != nullptr && !march->done) {
+            march_to(scene, rays, shell_end(scene.frame->shells->data, first), *march, sums);
+        } else {
+            while (sums.next_shell < count && scene.before_shells[sums.next_shell] <= ball) ++sums.next_shell;
+        }
+        for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(Lanes()))
+            add_shells_to(scene, rays, at, first, sums.next_shell, sums);
+    }
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -10,6 +10,7 @@
 #include <span>
 
 #include "render/cpu/billboard_texels.h"
+#include "render/cpu/marched_scene.h"
 #include "render/cpu/screen_ball.h"
 #include "render/frame/frame_data.h"
 #include "render/shared/shared.h"
@@ -36,6 +37,7 @@ struct ViewScene {
     std::size_t first_ball = 0;                    // number of balls[0], nearest first
     const BillboardTexels* texels = nullptr;       // for ScreenBillboards
     bool distances = true;                         // depth is requested
+    const MarchedScene* march = nullptr;           // clouds with detail; null: none
 };
 
 // Sets a flag; several threads may set the same one.

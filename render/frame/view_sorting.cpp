@@ -63,8 +63,9 @@ shader::ViewCloud billboard_cloud(const BillboardCloud& cloud, std::size_t index
 class Collector {
   public:
     Collector(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
-              double pixels_per_unit, const Ground& ground)
+              double pixels_per_unit, const Ground& ground, bool marched)
         : cloud_(cloud),
+          marched_(marched),
           splats_(splats),
           camera_(camera),
           eye_(camera.position_m),
@@ -80,7 +81,8 @@ class Collector {
             if (above_ground_ && ball.z + ball.radius < ground_m_) return false;
             // Metaballs reach up to 1.35 radii (view_splat.vert), and never less than part of a pixel.
             return sees({ball.x, ball.y, ball.z}, ball.radius, 1.5, double(shader::kMinRadiusPixels),
-                        distance);
+                        distance) &&
+                   weight_of(i, double(distance)) > 0;
         });
     }
 
@@ -137,6 +139,11 @@ class Collector {
         order.balls.resize(first_ball_[parts]);
         order.source.resize(first_ball_[parts]);
         order.billboards.resize(count - first_ball_[parts]);
+    }
+
+    // Weight of the ball with an index in `visible`, beside what is marched in its place.
+    float weight_of(std::uint32_t index, double distance) const {
+        return marched_ && cloud_.is_detailed(index) ? splatted_weight(float(distance / pixels_per_unit_)) : 1.0f;
     }
 
     bool is_ball(std::uint32_t index) const { return index < cloud_.visible.size(); }
@@ -242,19 +249,20 @@ class Collector {
         const Metaball& ball = cloud_.metaballs[cloud_.visible[source]];
         const Vec3 offset = Vec3{ball.x, ball.y, ball.z} - eye_;
         const double distance = length(offset);
+        const float depth_scale = cloud_.depth_scale[source] * weight_of(source, distance);
         shader::uint flags = 0;
         if (distance < double(shader::kNearDistance) * ball.radius)
             flags |= shader::kAround | shader::kIntegrate;
         if (above_ground_ && ball.z - ball.radius < ground_m_) flags |= shader::kIntegrate;
-        if (cloud_.depth_scale[source] > shader::kMaxDepthScale) flags |= shader::kIntegrate;
-        if (flags != 0 || !is_fitted(offset, distance, ball.radius, cloud_.depth_scale[source]))
+        if (depth_scale > shader::kMaxDepthScale) flags |= shader::kIntegrate;
+        if (flags != 0 || !is_fitted(offset, distance, ball.radius, depth_scale))
             flags |= shader::kNotFitted;
         const double scale = cloud_.top_m > cloud_.base_m ? 1.0 / (cloud_.top_m - cloud_.base_m) : 0.0;
         return {float(offset.x),
                 float(offset.y),
                 float(offset.z),
                 ball.radius,
-                cloud_.depth_scale[source],
+                depth_scale,
                 1.0f,
                 float((ball.z - cloud_.base_m) * scale),
                 flags};
@@ -276,6 +284,7 @@ class Collector {
     }
 
     const PreparedCloud& cloud_;
+    const bool marched_;
     const Splats& splats_;
     const CameraFrame& camera_;
     Vec3 eye_{};
@@ -302,12 +311,12 @@ bool ViewPyramid::may_see(const Vec3& offset, double radius) const {
 }
 
 ViewSortedSplats sort_for_view(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
-                               double pixels_per_unit, const Ground& ground) {
+                               double pixels_per_unit, const Ground& ground, bool marched) {
     if (splats.billboards.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
         throw Error(ErrorCode::usage, "more than 2^31 billboards");
     if (splats.clouds.size() >> 28 != 0)  // a shader::ViewBillboard has 28 bits for its cloud
         throw Error(ErrorCode::usage, "more than 2^28 clouds of billboards");
-    Collector collector(cloud, splats, camera, pixels_per_unit, ground);
+    Collector collector(cloud, splats, camera, pixels_per_unit, ground, marched);
     collector.add_metaballs();
     collector.add_billboards();
     return collector.order();

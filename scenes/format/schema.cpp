@@ -171,6 +171,10 @@ const Section& scene_section() {
         precipitation.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->render.precipitation == PrecipitationOptions{});
         };
+        Key detail = group("detail", detail_section());
+        detail.written = [](const void* scene) {
+            return !(static_cast<const Scene*>(scene)->density.detail == DetailOptions{});
+        };
         Key level_of_detail = group("level_of_detail", level_of_detail_section());
         level_of_detail.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->render.level_of_detail == LevelOfDetailOptions{});
@@ -191,6 +195,7 @@ const Section& scene_section() {
              std::move(climate),
              tables<&Scene::layers>("layer", layer_section(), 0, int(kMaxLayers)),
              group("density", density_section()),
+             std::move(detail),
              group("frames", frames_section()),
              group("camera", camera_section()),
              group("sun", sun_section()),

@@ -29,6 +29,7 @@ const Section& light_shafts_section();
 const Section& fog_section();
 const Section& wet_ground_section();
 const Section& precipitation_section();
+const Section& detail_section();
 const Section& level_of_detail_section();
 
 // Owner: CameraKey.

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Detail below the voxel: one definition of density for pictures, light and files.
+//
+//     density(x) = mask(C(x) - e(x)) D(x) / G(C(x))
+//
+// D is the density of the metaballs (metaballs.h), C = D^2 / (D^2 + half^2) its coverage, half = 1 / (2 extinction
+// mean_free_path) the density at which half of the space is cloud. e is noise of mean 1/2: Worley noise of 160, 80
+// and 40 m (DetailOptions::size_m), with a medium one of 21 to 5 m and a fine one of 2.5 to 0.6 m near the eye, and
+// mask(u) = clamp(u / softness + 1/2, 0, 1). G(C) is the fraction of the noise below C, so that the mean over the
+// noise is D again: mass is conserved in closed form (cloudy_fraction() in detail_formulas.h), but for the thinnest
+// fringe, which holds no cloud; the rest is denser by CoverageField::gain() for it.
+//
+// The noise lies fixed in air that drifts with the wind. It varies with the height above the base (billows above,
+// wisps below) and with the growth of the cloud, -1 where it dissolves (shreds) to 1 where it grows (crisp bumps).
+// Detail smaller than a footprint, the size of a pixel or a voxel, fades.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/vec.h"
+#include "density/density_grid.h"
+#include "density/options.h"
+
+namespace nephos {
+
+// What detail depends on beside the density.
+struct DetailSetting {
+    DetailOptions options;
+    double extinction_per_m = 0.02;      // at density 1
+    double metaball_radius_cells = 2.0;  // 1..8
+    Vec3 drift_m{};                      // how far the wind has carried the air
+    Vec2 along{1, 0};                    // unit direction of DetailOptions::stretch
+};
+
+// The constants of the erosion, as kernels and shaders read them.
+struct ErosionConstants {
+    float half_density = 0.1f;
+    float cap = 0.7f;  // the erosion makes nothing denser than this
+    float base_width = 0.5f, top_width = 0.62f, dissolving_width = 0.9f, medium_width = 0.17f,
+          fine_width = 0.03f;
+    float wisps = 1;
+    float base_m = 0;              // of the cloud, above the field's corner
+    std::array<float, 2> gain{};   // for footprints up to 13 m, and from 25 m on
+    // Rows that turn a place relative to the field's corner into one in the large noise, in tiles; the fourth
+    // numbers are its offset.
+    std::array<std::array<float, 4>, 3> to_noise{};
+    float medium_scale = 15.42f, fine_scale = 128;  // tiles of the small noise in one of the large
+    float medium_per_m = 1, fine_per_m = 1;         // voxels of the small noise per metre, at its level 0
+    bool operator==(const ErosionConstants&) const = default;
+};
+
+// The density of a grid's metaballs, sampled at the corners of half cells, in bricks of 8 x 8 x 8 of them. An
+// immutable value after build; const functions are thread-safe.
+class CoverageField {
+  public:
+    static constexpr int kBrickNodes = 9;  // on an edge; those of a face belong to both bricks
+    static constexpr int kBrickCells = 4;  // cells of the lattice on an edge
+    static constexpr std::size_t kBrickBytes = 1460;  // two for each node, and two more
+
+    // Samples D at all nodes where it is above 0; with `growth`, of the same extent, -1..1 as 0..1, also how much
+    // the cloud grows there. Beyond the grid there is none. Throws Error(usage) when options are out of range, and
+    // when the field has more than 2^31 bytes.
+    CoverageField(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* growth = nullptr);
+
+    // World place of the first node, and the distance between nodes (half a cell), metres.
+    const Vec3& corner_m() const { return corner_m_; }
+    double node_m() const { return node_m_; }
+    // Bricks on each axis.
+    const std::array<int, 3>& bricks() const { return bricks_; }
+    // For each brick, x fastest: its number among those that hold cloud; or -n where there is none within less
+    // than n bricks in any direction, at most -127.
+    const std::vector<std::int32_t>& table() const { return table_; }
+    // Index in table() of each brick that holds cloud, rising.
+    const std::vector<std::int32_t>& places() const { return places_; }
+    // kBrickBytes of each of these: t of each node, x fastest (detail_formulas.h; 0..255 for 0..1), each followed by
+    // its growth (1..255 for -1..1).
+    const std::vector<std::uint8_t>& nodes() const { return nodes_; }
+    // kBrickCells^3 of each of these, x fastest: the number of cells to the next that may hold cloud, at most 4.
+    const std::vector<std::uint8_t>& clearance() const { return clearance_; }
+
+    const ErosionConstants& erosion() const { return erosion_; }
+    double extinction_per_m() const { return extinction_per_m_; }
+    std::size_t memory_bytes() const;
+
+  private:
+    void find_bricks(const DensityGrid& grid, int reach);
+    void measure_clearance();
+    void set_distances();
+    void set_erosion(const DetailSetting& setting, double base_m);
+    float gain_at(double footprint_m) const;
+
+    Vec3 corner_m_{};
+    double node_m_ = 1, extinction_per_m_ = 0;
+    std::array<int, 3> bricks_{};
+    std::vector<std::int32_t> table_, places_;
+    std::vector<std::uint8_t> nodes_, clearance_;
+    std::array<double, 256> histogram_{};  // of t over the nodes
+    double mass_ = 0;                      // sum of D over the nodes, before thermals
+    ErosionConstants erosion_;
+};
+
+// Returns the detailed density at the middles of count[0] x count[1] x count[2] boxes of edge `footprint_m`, x
+// fastest; the first box begins at `corner_m` in the world.
+std::vector<float> detailed_density(const CoverageField& field, const Vec3& corner_m,
+                                    const std::array<int, 3>& count, double footprint_m);
+
+// The same for one place, in double-free scalar code: the reference of the kernels.
+float detailed_density_at(const CoverageField& field, const Vec3& place_m, float footprint_m);
+
+// Samples detailed density at the centres of voxels `refine` times smaller than those of the grid that `field` was
+// made of, whose extent and placement are given. Throws as resample() in metaballs.h.
+DensityGrid resample_with_detail(const CoverageField& field, Extent extent, const Placement& placement, int refine);
+
+// Throws Error(usage) naming the first option that is out of its range.
+void check(const DetailOptions& options);
+
+}  // namespace nephos

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the kernels of detail-inl.h read of a CoverageField and of the noise. Internal to the engine.
+
+#include <array>
+#include <cstdint>
+
+#include "density/detail.h"
+#include "density/detail_noise.h"
+
+namespace nephos {
+
+// Coverage below this holds no cloud, whatever the noise.
+inline constexpr float kLeastCoverage = 0.03f;
+
+struct DetailKernel {
+    const std::uint8_t* nodes = nullptr;
+    const std::int32_t* table = nullptr;
+    const std::uint8_t* clearance = nullptr;
+    const std::uint32_t *large_noise = nullptr, *small_noise = nullptr;
+    const ErosionConstants* erosion = nullptr;
+    std::array<int, 3> bricks{};
+    float node_m = 1, extinction_per_m = 0;
+    std::array<double, 3> corner_m{};
+
+    DetailKernel() = default;
+    // `field` must outlive it.
+    explicit DetailKernel(const CoverageField& field);
+};
+
+}  // namespace nephos

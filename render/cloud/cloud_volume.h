@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A voxel cloud with detail (density/detail.h) as back-ends march it, and the light in it: optical depths towards
+// the sun and how much of sky and ground is seen, at the corners of the lattice's cells. Private to the module.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "density/detail.h"
+#include "render/cloud/light_sweep.h"
+#include "render/cloud/splats.h"
+#include "render/image/picture.h"
+#include "render/options/options.h"
+
+namespace nephos {
+
+// Depths of more are all alike: nothing arrives.
+inline constexpr float kMostMarchedDepth = 64;
+
+struct CloudVolume {
+    explicit CloudVolume(const DetailedVoxels& voxels, double extinction_per_m);
+
+    CoverageField field;
+    // Mean extinction of each cell of each brick that holds cloud, per metre.
+    std::vector<float> extinction;
+    // kLightNodesOfBrick numbers for each such brick and one more: 65535 sqrt(depth / kMostMarchedDepth), and the
+    // fractions of the sky (lower byte) and of the ground (upper byte) that are seen, 0..255.
+    std::vector<std::uint16_t> sun_depths, surroundings;
+    LightFront front;  // of the sunlight that leaves it
+
+    std::size_t memory_bytes() const;
+};
+
+// Computes the surroundings, which do not depend on the sun. `mean_cosine`: of the phase function.
+void see_surroundings(CloudVolume& volume, double mean_cosine);
+
+// Computes the sunlight in all volumes; they shade each other. With Lighting::cfa its absorption is that of T.
+void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light);
+
+// Returns the optical depth of a volume towards the sun at a place: that of its nodes in bricks that hold cloud, all
+// of it beyond the volume, and 0 elsewhere.
+float sun_depth_at(const CloudVolume& volume, const Vec3& place_m);
+
+// Multiplies the texels of a shadow map by the light that the volumes leave.
+void cast_shadows(std::span<const CloudVolume> volumes, const ShadowFrame& frame, int size, std::span<float> shadow);
+
+}  // namespace nephos

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/cloud/light_sweep.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace nephos {
+namespace {
+
+constexpr int kCells = CoverageField::kBrickCells;
+
+// Linear between four numbers of a row-major table; 0 beyond it.
+float bilinear(const std::vector<float>& values, int width, int height, double u, double v) {
+    const double u0 = std::floor(u), v0 = std::floor(v);
+    const int i = int(u0), j = int(v0);
+    const auto fu = float(u - u0), fv = float(v - v0);
+    const auto at = [&](int x, int y) {
+        return x < 0 || y < 0 || x >= width || y >= height ? 0.0f
+                                                           : values[std::size_t(y) * std::size_t(width) + std::size_t(x)];
+    };
+    const float low = at(i, j) + fu * (at(i + 1, j) - at(i, j)),
+                high = at(i, j + 1) + fu * (at(i + 1, j + 1) - at(i, j + 1));
+    return low + fv * (high - low);
+}
+
+}  // namespace
+
+float LightFront::at(double u, double v) const {
+    return bilinear(depth_, lines_[0], lines_[1], u - first_[0], v - first_[1]);
+}
+
+float LightFront::depth_at(const Vec3& point_m) const {
+    if (depth_.empty()) return 0;
+    const Vec3 cells = (point_m - corner_m_) / cell_m_;
+    // Number of the line: where it crosses the plane at which the light enters.
+    const double along = downwards_ ? plane_ - cells[axes_[2]] : cells[axes_[2]];
+    return at(cells[axes_[0]] - shift_[0] * along, cells[axes_[1]] - shift_[1] * along);
+}
+
+LightFront sweep(const CoverageField& field, std::span<const float> extinction, const Vec3& to_light,
+                 std::span<float> depths, const std::function<float(const Vec3&)>& arriving) {
+    LightFront front;
+    int along = 2;
+    for (int axis = 0; axis < 2; ++axis)
+        if (std::abs(to_light[axis]) > std::abs(to_light[along]) * (along == 2 ? 1.0001 : 1)) along = axis;
+    const int axes[3] = {along == 0 ? 1 : 0, along == 2 ? 1 : 2, along};
+    std::copy_n(axes, 3, front.axes_);
+    const auto& bricks = field.bricks();
+    const int size[3] = {bricks[std::size_t(axes[0])] * kCells, bricks[std::size_t(axes[1])] * kCells,
+                         bricks[std::size_t(along)] * kCells};
+    front.corner_m_ = field.corner_m();
+    front.to_light_ = to_light;
+    front.cell_m_ = 2 * field.node_m();
+    front.downwards_ = to_light[along] > 0;
+    front.plane_ = size[2];
+    const double slope = std::abs(to_light[along]);
+    for (int n = 0; n < 2; ++n) {
+        front.shift_[n] = -to_light[axes[n]] / slope;
+        front.first_[n] = std::floor(std::min(0.0, -front.shift_[n] * size[2])) - 1;
+        front.lines_[n] = size[n] + int(std::ceil(std::abs(front.shift_[n]) * size[2])) + 4;
+    }
+    const auto width = std::size_t(front.lines_[0]);
+    front.depth_.assign(width * std::size_t(front.lines_[1]), 0.0f);
+    if (arriving) {
+        for (std::size_t n = 0; n < front.depth_.size(); ++n) {
+            Vec3 at{};
+            at[axes[0]] = double(n % width) + front.first_[0];
+            at[axes[1]] = double(n / width) + front.first_[1];
+            at[along] = front.downwards_ ? size[2] : 0;
+            front.depth_[n] = arriving(front.corner_m_ + front.cell_m_ * at);
+        }
+    }
+    const auto length = float(front.cell_m_ / slope);
+
+    // The bricks of each layer along the light.
+    std::vector<std::vector<std::int32_t>> layers(std::size_t(size[2] / kCells));
+    struct Place {
+        int across[2];
+    };
+    std::vector<Place> places(field.places().size());
+    for (std::size_t n = 0; n < places.size(); ++n) {
+        const std::int32_t at = field.places()[n];
+        const int b[3] = {at % bricks[0], at / bricks[0] % bricks[1], at / bricks[0] / bricks[1]};
+        places[n] = {{b[axes[0]] * kCells, b[axes[1]] * kCells}};
+        layers[std::size_t(b[along])].push_back(std::int32_t(n));
+    }
+    constexpr int kCellStride[3] = {1, kCells, kCells * kCells},
+                  kNodeStride[3] = {1, kLightNodes, kLightNodes * kLightNodes};
+    std::vector<float> slice(std::size_t(size[0]) * std::size_t(size[1])), across(slice.size() + 1);
+    const auto store_nodes = [&](int plane) {  // its depths, into the bricks on both sides
+        const double b = front.downwards_ ? size[2] - plane : plane;
+        for (const int layer : {plane / kCells, plane / kCells - 1}) {
+            const int local = plane - layer * kCells;
+            if (layer < 0 || layer >= int(layers.size()) || local > kCells) continue;
+            for (const std::int32_t n : layers[std::size_t(layer)]) {
+                float* const to = &depths[std::size_t(n) * kLightNodesOfBrick] + local * kNodeStride[along];
+                const Place& place = places[std::size_t(n)];
+                for (int v = 0; v < kLightNodes; ++v)
+                    for (int u = 0; u < kLightNodes; ++u)
+                        to[u * kNodeStride[axes[0]] + v * kNodeStride[axes[1]]] =
+                            front.at(place.across[0] + u - front.shift_[0] * b,
+                                     place.across[1] + v - front.shift_[1] * b);
+            }
+        }
+    };
+    for (int step = 0; step < size[2]; ++step) {
+        const int s = front.downwards_ ? size[2] - 1 - step : step;  // slice
+        store_nodes(front.downwards_ ? s + 1 : s);
+        const auto& layer = layers[std::size_t(s / kCells)];
+        if (layer.empty()) continue;
+        std::ranges::fill(slice, 0.0f);
+        for (const std::int32_t n : layer) {
+            const float* const from = &extinction[std::size_t(n) * 64] + s % kCells * kCellStride[along];
+            for (int v = 0; v < kCells; ++v)
+                for (int u = 0; u < kCells; ++u)
+                    slice[std::size_t(places[std::size_t(n)].across[1] + v) * std::size_t(size[0]) +
+                          std::size_t(places[std::size_t(n)].across[0] + u)] =
+                        from[u * kCellStride[axes[0]] + v * kCellStride[axes[1]]];
+        }
+        // Line (i, j) passes the middle of the slice at i + shift (step + 1/2): between two cells, by the same
+        // weights on all lines.
+        const double move[2] = {front.first_[0] + front.shift_[0] * (step + 0.5) - 0.5,
+                                front.first_[1] + front.shift_[1] * (step + 0.5) - 0.5};
+        const int whole[2] = {int(std::floor(move[0])), int(std::floor(move[1]))};
+        const auto fu = float(move[0] - whole[0]), fv = float(move[1] - whole[1]);
+        for (int j = std::max(-whole[1] - 1, 0); j < std::min(size[1] - whole[1], front.lines_[1]); ++j) {
+            const int v = j + whole[1];
+            const float* const a = v >= 0 ? &slice[std::size_t(v) * std::size_t(size[0])] : nullptr;
+            const float* const b = v + 1 < size[1] ? &slice[std::size_t(v + 1) * std::size_t(size[0])] : nullptr;
+            float* const row = across.data();
+            for (int u = 0; u < size[0]; ++u)
+                row[u] = length * ((a != nullptr ? (1 - fv) * a[u] : 0.0f) + (b != nullptr ? fv * b[u] : 0.0f));
+            const int begin = std::max(-whole[0], 0), end = std::min(size[0] - 1 - whole[0], front.lines_[0]);
+            float* const to = &front.depth_[std::size_t(j) * width];
+            if (begin >= 1 && begin - 1 < front.lines_[0]) to[begin - 1] += fu * row[0];
+            for (int i = begin; i < end; ++i)
+                to[i] += (1 - fu) * row[i + whole[0]] + fu * row[i + whole[0] + 1];
+            if (end >= 0 && end < front.lines_[0]) to[end] += (1 - fu) * row[size[0] - 1];
+        }
+    }
+    store_nodes(front.downwards_ ? 0 : size[2]);
+    return front;
+}
+
+}  // namespace nephos

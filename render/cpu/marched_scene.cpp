@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/cpu/marched_scene.h"
+
+#include <cmath>
+
+namespace nephos {
+
+MarchedVolume::MarchedVolume(const CloudVolume& volume, const Vec3& eye_m)
+    : kernel(volume.field), sun_depths(volume.sun_depths.data()), surroundings(volume.surroundings.data()) {
+    const Vec3 from = volume.field.corner_m() - eye_m;
+    for (int axis = 0; axis < 3; ++axis) corner[axis] = float(from[axis]);
+    // The large noise changes by its whole width within half of a bump.
+    const ErosionConstants& e = volume.field.erosion();
+    float per_m = 0;
+    for (const auto& row : e.to_noise) per_m = std::max(per_m, std::hypot(row[0], row[1], row[2]));
+    reach = 1 / (16 * per_m);
+}
+
+MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit) {
+    for (const CloudVolume& volume : of)
+        if (!volume.field.places().empty()) volumes.emplace_back(volume, camera.position_m);
+    per_unit = float(1 / pixels_per_unit);
+    fade_begins = kMarchedFootprint_m / per_unit;
+    fade_ends = kSplattedFootprint_m / per_unit;
+}
+
+}  // namespace nephos

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the kernels of march-inl.h read, and where the rays of a tile are. Private to the module.
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "density/detail_kernels.h"
+#include "render/cloud/cloud_volume.h"
+#include "render/frame/view_sorting.h"
+#include "render/options/camera.h"
+#include "render/shared/shared.h"
+
+namespace nephos {
+
+struct MarchedVolume {
+    DetailKernel kernel;
+    float corner[3] = {};  // of its field, relative to the eye, metres
+    float reach = 80;      // metres to cloud per missing coverage, at most
+    const std::uint16_t *sun_depths = nullptr, *surroundings = nullptr;
+
+    MarchedVolume(const CloudVolume& volume, const Vec3& eye_m);
+};
+
+struct MarchedScene {
+    std::vector<MarchedVolume> volumes;
+    float per_unit = 1;                    // footprint of a pixel at distance 1
+    float fade_begins = 1, fade_ends = 1;  // metres from the eye
+
+    MarchedScene() = default;
+    MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit);
+};
+
+// The rays of a tile's pixels, row by row, between two parts of the march.
+struct MarchState {
+    static constexpr std::size_t kPixels = shader::kTileWidth * shader::kTileHeight;
+    alignas(64) float distance[kPixels];         // of the next sample
+    alignas(64) float extinction[kPixels] = {};  // of the last
+    alignas(64) float step[kPixels] = {};        // from the last to the next
+    alignas(64) float margin[kPixels];           // of the last; below 0: no sample, empty space was skipped
+    alignas(64) float weight[kPixels] = {}, weighted_distance[kPixels] = {};  // seen, but not shaded yet
+    bool begun = false, done = false;
+};
+
+}  // namespace nephos
