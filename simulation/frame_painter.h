@@ -10,6 +10,7 @@
 // or snow, what lies on the ground, lightning, and the debug view, as scene.render asks for them and as camera
 // and sun stand at the frame's time.
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -59,9 +60,10 @@ class FramePainter {
 
   private:
     std::vector<Metaball> metaballs_of(const FrameResult& frame, std::vector<DetailedVoxels>& detailed) const;
-    // Adds the voxels of metaballs from `first` on, whose air moves with `wind`.
-    void add_detail(const DensityGrid& density, const DetailOptions& detail, const Wind& wind, double time_s,
-                    std::size_t first, std::size_t count, std::vector<DetailedVoxels>& to) const;
+    // Adds the voxels of metaballs from `first` on.
+    void add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
+                    std::optional<std::size_t> layer, double time_s, std::size_t first, std::size_t count,
+                    std::vector<DetailedVoxels>& to) const;
 
     Scene scene_;
     Renderer renderer_;

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "simulation/frame_output.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {
@@ -89,7 +90,7 @@ MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& latt
     // With the state written, hum and act are remembered beside cld. A checkpoint holds the planes and that
     // history as bytes: gathered in a growing buffer, and copied once into the file's content.
     const double plane = double(BitPlane::bytes(lattice.extent));
-    const double history = window * (scene.density.write_state ? 3 : 1) * plane;
+    const double history = window * (remembers_whole_state(scene) ? 3 : 1) * plane;
     const double planes_under_way = scene.density.write_state ? under_way * 3 * plane : 0;
     const double checkpoint = kCheckpointCopies * (3 * plane + history);
     MemoryEstimate estimate;

@@ -20,7 +20,7 @@ namespace nephos {
 inline constexpr float kMostMarchedDepth = 64;
 
 struct CloudVolume {
-    explicit CloudVolume(const DetailedVoxels& voxels, double extinction_per_m);
+    explicit CloudVolume(const DetailedVoxels& voxels);
 
     CoverageField field;
     // Mean extinction of each cell of each brick that holds cloud, per metre.

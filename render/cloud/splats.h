@@ -11,8 +11,8 @@
 
 #include "core/weather.h"
 #include "density/density_grid.h"
+#include "density/detail.h"
 #include "density/metaballs.h"
-#include "density/options.h"
 #include "render/options/options.h"
 
 namespace nephos {
@@ -35,12 +35,9 @@ struct GroundCoverView {
 // away, where a pixel covers 15 to 25 m, the metaballs that stand for them take over.
 struct DetailedVoxels {
     DensityGrid density;
-    std::optional<DensityGrid> growth;   // as CoverageField takes it
-    DetailOptions detail;
-    double metaball_radius_cells = 2;
-    Vec3 drift_m{};                      // as in DetailSetting
-    Vec2 along{1, 0};
-    std::size_t first = 0, count = 0;    // of MetaballCloud::metaballs
+    std::optional<DensityGrid> moisture;  // as CoverageField takes it
+    DetailSetting setting;                // its extinction is that of the cloud
+    std::size_t first = 0, count = 0;     // of MetaballCloud::metaballs
 };
 
 // A cloud made of metaballs. Along a ray, extinction (per metre) is

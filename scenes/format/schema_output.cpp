@@ -272,22 +272,22 @@ const Section& detail_section() {
         "Detail below the voxel in pictures, their light, and files that are refined: noise erodes the edge of "
         "voxel clouds, from bumps of `size_m` down to half a metre, and keeps their mean density. Veils have none. "
         "See docs/detail.md.",
-        {density_key<&DensityOptions::detail, &DetailOptions::enabled>("enabled", "", kAny,
+        {key<&DetailOptions::enabled>("enabled", "", kAny,
                                              "Draw it. Off: the smooth field of metaballs, everywhere as far away."),
-         density_key<&DensityOptions::detail, &DetailOptions::strength>(
+         key<&DetailOptions::strength>(
              "strength", "", between(0, 1.4),
              "Depth of the erosion; cumulus has 1, stratus a third. 0: a smooth surface with a crisp edge."),
-         density_key<&DensityOptions::detail, &DetailOptions::size_m>("size_m", "m", between(20, 5000),
+         key<&DetailOptions::size_m>("size_m", "m", between(20, 5000),
                                             "Size of the largest bumps; each next kind has half of it."),
-         density_key<&DensityOptions::detail, &DetailOptions::stretch>("stretch", "", between(1, 50),
+         key<&DetailOptions::stretch>("stretch", "", between(1, 50),
                                              "How much longer the bumps are along the wind: fibres."),
-         density_key<&DensityOptions::detail, &DetailOptions::wisps>(
+         key<&DetailOptions::wisps>(
              "wisps", "", between(0, 1),
              "1: shreds hang below the base; 0: there are round bumps as above."),
-         density_key<&DensityOptions::detail, &DetailOptions::thermals>(
+         key<&DetailOptions::thermals>(
              "thermals", "", between(0, 1),
              "Strength of towers and hollows of two and four times `size_m`, between the bumps and the clouds."),
-         density_key<&DensityOptions::detail, &DetailOptions::mean_free_path_m>(
+         key<&DetailOptions::mean_free_path_m>(
              "mean_free_path_m", "m", between(1, 10'000),
              "Mean free path of light in cloud where half of the space is cloud. Smaller makes crisper, denser "
              "clouds of the same mass; in real cumulus it is 10 to 20 m.")},
