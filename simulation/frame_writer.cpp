@@ -7,7 +7,7 @@
 #include "core/random.h"
 #include "density/combine.h"
 #include "scenes/format/writer.h"
-#include "simulation/version.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 
