@@ -91,7 +91,7 @@ PendingFrame FramePainter::begin(FrameResult frame) {
     std::optional<GroundCoverView> ground;
     if (frame.ground) ground = view_of(*frame.ground);
     std::optional<FilmFrame> film;
-    if (frame.number > 0) film = FilmFrame{frame.number - 1, scene_.frames, scene_.render.sun};
+    if (frame.number > 0) film = FilmFrame{frame.number - 1, &scene_.frames, &scene_.render.sun};
     PendingSkyPicture picture =
         painter_.begin(renderer_, cloud, layers, scene_.render, frame.time_s, scene_.frames.exr, ground,
                        weather_of(scene_, frame.layers, frame.time_s), film);

@@ -10,7 +10,7 @@
 #include "scenes/format/layers.h"
 #include "scenes/format/writer.h"
 #include "simulation/frame_detail.h"
-#include "simulation/version.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 

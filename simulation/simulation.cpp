@@ -84,6 +84,8 @@ CloudStatistics no_automaton() {
 
 }  // namespace
 
+std::string version() { return NEPHOS_VERSION; }
+
 SimulationRange full_range(const Scene& scene) { return {scene.steps, 1, frame_count(scene)}; }
 
 SimulationRange range_of_frames(const Scene& scene, int first, int last) {
@@ -167,7 +169,8 @@ bool Simulation::density_is_due(std::uint64_t step) const { return steps_taken()
 // The lowest step whose density a result still needs, also one of a longer range: all frames that the scene's
 // steps hold are then followed by more.
 std::uint64_t Simulation::lowest_needed() const {
-    const bool frames_follow = scene_.frames.count == 0 && range_ == full_range(scene_);
+    const bool frames_follow =
+        scene_.frames.enabled && scene_.frames.count == 0 && range_ == full_range(scene_);
     std::uint64_t lowest = next_step_;
     if (next_frame_ <= range_.last_frame || (frames_follow && next_frame_ <= kMaxFrames))
         lowest = std::min(lowest, moment_of_number(next_frame_).step);

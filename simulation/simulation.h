@@ -34,6 +34,9 @@
 
 namespace nephos {
 
+// Returns the version of nephos: "0.1.0".
+std::string version();
+
 class ByteReader;
 
 // One layer after a step; a row of its own file of statistics.
@@ -134,14 +137,14 @@ SimulationRange range_of_frames(const Scene& scene, int first, int last);
 
 class Simulation {
   public:
-    // Everything of the scene, from its first state on. Throws as Automaton and read_state().
+    // Simulates everything of the scene, from its first state on. Throws as Automaton and read_state().
     explicit Simulation(const Scene& scene);
-    // At step 0: from the scene's own initial state, or from `initial`. Throws as Automaton; Error(usage) when
+    // Starts at step 0: from the scene's own initial state, or from `initial`. Throws as Automaton; Error(usage) when
     // a frame of the range lies after its last step, or frames are wanted of SimulationResults::statistics.
     Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
                std::optional<Lattice> initial = {},
                SimulationResults results = SimulationResults::everything);
-    // Where `checkpoint` was saved. The range may end later than that of the simulation that saved it, with
+    // Starts where `checkpoint` was saved. The range may end later than that of the simulation that saved it, with
     // frames that follow those it had. Throws Error(usage) when the checkpoint belongs to another simulation,
     // other results, another smoothing window or another range, or does not hold the states that a longer
     // range goes on from; Error(io) when its content is damaged.

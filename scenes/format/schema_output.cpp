@@ -120,8 +120,12 @@ const Section& frames_section() {
              "Simulated time of the first frame: skips the growing of the clouds."),
          key<&Scene::frames, &FrameOptions::count>(
              "count", "", between(0, kMaxFrames),
-             "Number of frames; 0: as many as the simulated time holds (for none at all: `nephos run "
-             "--statistics-only`)."),
+             "Number of frames; 0: as many as the simulated time holds (none at all: `enabled` = false)."),
+         written_if(
+             key<&Scene::frames, &FrameOptions::enabled>(
+                 "enabled", "", kAny,
+                 "Make frames; false: none, whatever the other keys say, only statistics of every step."),
+             [](const void* owner) { return !static_cast<const Scene*>(owner)->frames.enabled; }),
          key<&Scene::frames, &FrameOptions::png>("png", "", kAny,
                                                  "Write a tone-mapped picture of each frame."),
          key<&Scene::frames, &FrameOptions::exr>("exr", "", kAny,
@@ -255,14 +259,15 @@ const Section& air_section() {
 }
 
 const Section& ground_section() {
-    static const Section section{"Ground",
-                                 "The plane that wears the clouds' shadow.",
-                                 {render_key<&RenderOptions::ground, &Ground::height_m>(
-                                      "height_m", "m", between(-1e5, 1e5), "Its height."),
-                                  render_key<&RenderOptions::ground, &Ground::albedo>(
-                                      "albedo", "", between(0, 1),
-                                      "Share of the light that it reflects: red, green, blue.", "D, step 2")},
-                                 nullptr};
+    static const Section section{
+        "Ground",
+        "The plane that wears the clouds' shadow.",
+        {render_key<&RenderOptions::ground, &Ground::height_m>("height_m", "m", between(-1e5, 1e5),
+                                                               "Its height."),
+         render_key<&RenderOptions::ground, &Ground::albedo>(
+             "albedo", "", between(0, 1), "Fraction of the light that it reflects: red, green, blue.",
+             "D, step 2")},
+        nullptr};
     return section;
 }
 

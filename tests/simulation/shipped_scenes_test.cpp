@@ -12,8 +12,9 @@
 
 #include "render/renderer_test_access.h"
 #include "scenes/format/reader.h"
+#include "simulation/frame_painter.h"
 #include "simulation/simulation.h"
-#include "tests/simulation/drawn_frame.h"
+#include "tests/simulation/apart_by.h"
 
 namespace nephos {
 namespace {
@@ -50,11 +51,11 @@ struct Comparison : SimulationSink {
     explicit Comparison(const Scene& s) : scene(s) {}
     void step(const StepResult&) override {}
     void frame(const FrameResult& frame) override {
-        const Picture expected = test::drawn_frame(scene, frame, renderers[0], painters[0], false);
+        const Picture expected = painters[0].draw(frame);
         given = metaball_count(frame);
         clearest = *std::ranges::min_element(expected.transmittance);
-        for (std::size_t way = 1; way < std::size(renderers); ++way) {
-            const Picture other = test::drawn_frame(scene, frame, renderers[way], painters[way], false);
+        for (std::size_t way = 1; way < std::size(painters); ++way) {
+            const Picture other = painters[way].draw(frame);
             const float beauty = test::apart_by(expected.beauty, other.beauty),
                         transmittance = test::apart_by(expected.transmittance, other.transmittance);
             ASSERT_FALSE(std::isnan(beauty) || std::isnan(transmittance)) << "way " << way;
@@ -63,11 +64,11 @@ struct Comparison : SimulationSink {
     }
 
     const Scene& scene;
-    Renderer renderers[4] = {Renderer({.splatting = Splatting::blended}),
-                             Renderer({.splatting = Splatting::cpu}),
-                             Renderer({.splatting = Splatting::vulkan, .lists = TileLists::host}),
-                             Renderer({.splatting = Splatting::vulkan, .lists = TileLists::device})};
-    SkyPainter painters[4];
+    FramePainter painters[4] = {
+        FramePainter(scene, {.splatting = Splatting::blended}),
+        FramePainter(scene, {.splatting = Splatting::cpu}),
+        FramePainter(scene, {.splatting = Splatting::vulkan, .lists = TileLists::host}),
+        FramePainter(scene, {.splatting = Splatting::vulkan, .lists = TileLists::device})};
     float apart[4] = {}, clearest = 1;
     std::size_t given = 0;  // metaballs, before any are merged
 };
@@ -83,7 +84,7 @@ TEST_P(ShippedScenes, AreTheSameInEveryBackend) {
     EXPECT_LT(comparison.clearest, 0.99f) << "nothing to see";
     for (std::size_t way = 1; way < 4; ++way) EXPECT_LE(comparison.apart[way], 1.0f / 255) << "way " << way;
     const bool direct = std::ranges::any_of(scene.layers, [](const auto& layer) { return !layer.automaton; });
-    const std::size_t listed = RendererTestAccess::listed(comparison.renderers[3]);
+    const std::size_t listed = RendererTestAccess::listed(comparison.painters[3].renderer());
     // Billboards, and on a software device more metaballs than its loops go through, take the host's lists.
     if (!direct && comparison.given > 0 && comparison.given <= 50000) {
         EXPECT_GE(listed, 1u);
