@@ -185,8 +185,8 @@ void main() {
     if (kShells) {  // only those between two shells
         uvec2 drawn = drawn_splats();
         range = TileRange(entry_of(drawn.x, range), entry_of(drawn.y, range));
-        if (range.begin == range.end && step.first_batch == 0u) return;
     }
+    if (range.begin == range.end && step.first_batch == 0u) return;
     uvec2 first = first_pixel(tile);
     vec2 pixel = vec2(first) + 0.5;
     [[unroll]] for (uint row = 0u; row < kRows; ++row) {
@@ -214,7 +214,7 @@ void main() {
         uint y = first.y + row;
         if (first.x < step.width && y < step.height) {
             vec4 sum = vec4(red[row], green[row], blue[row], min(transmittance[row], 1.0));
-            if (step.last_batch != 0u && sum.a < kOpaque) sum.a = 0.0;
+            if (sum.a < kOpaque) sum.a = 0.0;
             radiance[y * step.width + first.x] = sum;
             if (kDistances) depth[y * step.width + first.x] = mean_distance[row];
         }
