@@ -19,6 +19,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/vec.h"
@@ -87,7 +88,6 @@ class CoverageField {
     std::size_t memory_bytes() const;
 
   private:
-    void find_bricks(const DensityGrid& grid, int reach);
     void measure_clearance();
     void set_distances();
     void set_erosion(const DetailSetting& setting, double base_m);
@@ -99,7 +99,7 @@ class CoverageField {
     std::vector<std::int32_t> table_, places_;
     std::vector<std::uint8_t> nodes_, clearance_;
     std::array<double, 256> histogram_{};  // of t over the nodes
-    double mass_ = 0;                      // sum of D over the nodes, before thermals
+    double mass_ = 0;                      // sum of D over the nodes, without thermals
     ErosionConstants erosion_;
 };
 
@@ -107,6 +107,10 @@ class CoverageField {
 // fastest; the first box begins at `corner_m` in the world.
 std::vector<float> detailed_density(const CoverageField& field, const Vec3& corner_m,
                                     const std::array<int, 3>& count, double footprint_m);
+
+// The same in the middles of the 8 x 8 x 8 boxes between the nodes of a brick that holds cloud, by its number; x
+// fastest.
+void detailed_density_of_brick(const CoverageField& field, std::size_t number, std::span<float> out);
 
 // The same for one place, in double-free scalar code: the reference of the kernels.
 float detailed_density_at(const CoverageField& field, const Vec3& place_m, float footprint_m);

@@ -19,14 +19,11 @@ constexpr std::size_t kCellsOfBrick = std::size_t(kCells) * kCells * kCells;
 // Means of the eight samples in each cell, whose footprint is half a cell.
 std::vector<float> mean_extinction(const CoverageField& field) {
     std::vector<float> result(field.places().size() * kCellsOfBrick);
-    const auto& bricks = field.bricks();
     const auto extinction = float(field.extinction_per_m());
     tbb::parallel_for(std::size_t{0}, field.places().size(), [&](std::size_t n) {
-        const std::int32_t at = field.places()[n];
-        const Vec3 place(at % bricks[0], at / bricks[0] % bricks[1], at / bricks[0] / bricks[1]);
         constexpr int kSamples = 2 * kCells;
-        const std::vector<float> samples = detailed_density(field, field.corner_m() + field.node_m() * kSamples * place,
-                                                            {kSamples, kSamples, kSamples}, field.node_m());
+        std::array<float, std::size_t(kSamples) * kSamples * kSamples> samples;
+        detailed_density_of_brick(field, n, samples);
         float* const to = &result[n * kCellsOfBrick];
         for (std::size_t i = 0; i < samples.size(); ++i) {
             const std::size_t x = i % kSamples, y = i / kSamples % kSamples, z = i / kSamples / kSamples;

@@ -29,6 +29,22 @@ float LightFront::at(double u, double v) const {
     return bilinear(depth_, lines_[0], lines_[1], u - first_[0], v - first_[1]);
 }
 
+void LightFront::resample(double u, double v, int width, int height, std::vector<float>& to) const {
+    const double u0 = std::floor(u - first_[0]), v0 = std::floor(v - first_[1]);
+    const auto fu = float(u - first_[0] - u0), fv = float(v - first_[1] - v0);
+    const auto lines = std::size_t(lines_[0]);
+    // The lines cover all nodes of the lattice: no look at their edges is needed.
+    for (int y = 0; y < height; ++y) {
+        const float* const low = &depth_[std::size_t(int(v0) + y) * lines + std::size_t(int(u0))];
+        const float* const high = low + lines;
+        float* const row = &to[std::size_t(y) * std::size_t(width)];
+        for (int x = 0; x < width; ++x) {
+            const float a = low[x] + fu * (low[x + 1] - low[x]), b = high[x] + fu * (high[x + 1] - high[x]);
+            row[x] = a + fv * (b - a);
+        }
+    }
+}
+
 float LightFront::depth_at(const Vec3& point_m) const {
     if (depth_.empty()) return 0;
     const Vec3 cells = (point_m - corner_m_) / cell_m_;
@@ -86,20 +102,27 @@ LightFront sweep(const CoverageField& field, std::span<const float> extinction, 
     }
     constexpr int kCellStride[3] = {1, kCells, kCells * kCells},
                   kNodeStride[3] = {1, kLightNodes, kLightNodes * kLightNodes};
-    std::vector<float> slice(std::size_t(size[0]) * std::size_t(size[1])), across(slice.size() + 1);
+    std::vector<float> slice(std::size_t(size[0]) * std::size_t(size[1])), across(slice.size() + 1),
+        nodes(std::size_t(size[0] + 1) * std::size_t(size[1] + 1));
     const auto store_nodes = [&](int plane) {  // its depths, into the bricks on both sides
         const double b = front.downwards_ ? size[2] - plane : plane;
+        bool resampled = false;
         for (const int layer : {plane / kCells, plane / kCells - 1}) {
             const int local = plane - layer * kCells;
             if (layer < 0 || layer >= int(layers.size()) || local > kCells) continue;
+            if (!resampled && !layers[std::size_t(layer)].empty()) {
+                front.resample(-front.shift_[0] * b, -front.shift_[1] * b, size[0] + 1, size[1] + 1, nodes);
+                resampled = true;
+            }
             for (const std::int32_t n : layers[std::size_t(layer)]) {
                 float* const to = &depths[std::size_t(n) * kLightNodesOfBrick] + local * kNodeStride[along];
                 const Place& place = places[std::size_t(n)];
-                for (int v = 0; v < kLightNodes; ++v)
+                for (int v = 0; v < kLightNodes; ++v) {
+                    const float* const from = &nodes[std::size_t(place.across[1] + v) * std::size_t(size[0] + 1) +
+                                                     std::size_t(place.across[0])];
                     for (int u = 0; u < kLightNodes; ++u)
-                        to[u * kNodeStride[axes[0]] + v * kNodeStride[axes[1]]] =
-                            front.at(place.across[0] + u - front.shift_[0] * b,
-                                     place.across[1] + v - front.shift_[1] * b);
+                        to[u * kNodeStride[axes[0]] + v * kNodeStride[axes[1]]] = from[u];
+                }
             }
         }
     };

@@ -29,6 +29,8 @@ class LightFront {
     friend LightFront sweep(const CoverageField&, std::span<const float>, const Vec3&, std::span<float>,
                             const std::function<float(const Vec3&)>&);
     float at(double u, double v) const;
+    // Fills width x height numbers, x fastest, for lines (u, v), (u + 1, v) ...
+    void resample(double u, double v, int width, int height, std::vector<float>& to) const;
 
     Vec3 corner_m_{}, to_light_{};
     double cell_m_ = 1, plane_ = 0;  // of the face that the light leaves by, cells
