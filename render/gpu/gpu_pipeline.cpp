@@ -22,6 +22,9 @@ namespace spirv {
 #include "shell_frag.h"
 #include "shell_vert.h"
 #include "view_finish_comp.h"
+#include "march_finish_comp.h"
+#include "march_shells_comp.h"
+#include "march_tiles_comp.h"
 #include "view_project_comp.h"
 #include "view_shells_comp.h"
 #include "view_splat_frag.h"
@@ -87,7 +90,8 @@ const ShaderSet& shaders() {
         spirv::light_map_comp,   spirv::light_centres_comp, spirv::view_project_comp, spirv::view_tiles_comp,
         spirv::view_finish_comp, spirv::background_vert,    spirv::background_frag,   spirv::view_splat_vert,
         spirv::view_splat_frag,  spirv::billboard_vert,     spirv::billboard_frag,    spirv::view_shells_comp,
-        spirv::shell_vert,       spirv::shell_frag};
+        spirv::shell_vert,       spirv::shell_frag,          spirv::march_tiles_comp,  spirv::march_shells_comp,
+        spirv::march_finish_comp};
     return kShaders;
 }
 
@@ -172,6 +176,15 @@ Pipeline create_tile_pipeline(const GpuDevice& gpu, ShaderCode code, std::array<
         if (each.id > 4) constants.push_back(each);
     return create_compute(gpu, code, constants,
                           gpu.tiles_are_subgroups && gpu.subgroup_size_varies ? lanes : 0);
+}
+
+Pipeline create_pixel_pipeline(const GpuDevice& gpu, ShaderCode code, bool distances,
+                               const ShaderVariant& variant) {
+    std::vector<ShaderConstant> constants{
+        {0, shader::kTileWidth * shader::kTileHeight}, {1, 1}, {2, false}, {4, distances}};
+    for (const ShaderConstant& each : constants_of(variant))
+        if (each.id > 4) constants.push_back(each);
+    return create_compute(gpu, code, constants, 0);
 }
 
 void reserve(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes, HostAccess access) {

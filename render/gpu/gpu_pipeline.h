@@ -19,6 +19,7 @@ struct ShaderSet {
     ShaderCode background_vert, background_frag, view_splat_vert, view_splat_frag;
     ShaderCode billboard_vert, billboard_frag;
     ShaderCode view_shells_comp, shell_vert, shell_frag;
+    ShaderCode march_tiles_comp, march_shells_comp, march_finish_comp;
 };
 const ShaderSet& shaders();
 
@@ -46,6 +47,7 @@ struct ShaderVariant {
     bool shells = false;        // 6, whatever includes shells.glsl
     bool fog = false;           // 7, likewise
     bool billboards = false;    // 8, compute shaders that draw splats: some are T's billboards
+    bool march = false;         // no constant: other shaders, which march through clouds with detail
     bool operator==(const ShaderVariant&) const = default;
 };
 
@@ -67,6 +69,9 @@ Pipeline create_compute_pipeline(const GpuDevice& gpu, ShaderCode code,
 // device has subgroups that fit. `switches` become specialization constants 3 and 4.
 Pipeline create_tile_pipeline(const GpuDevice& gpu, ShaderCode code, std::array<bool, 2> switches = {},
                               const ShaderVariant& variant = {});
+
+// The same, with an invocation for each pixel of a tile, whatever the device's subgroups.
+Pipeline create_pixel_pipeline(const GpuDevice& gpu, ShaderCode code, bool distances, const ShaderVariant& variant);
 
 // Makes a storage buffer at least so large; its content is lost when it grows.
 void reserve(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes, HostAccess access);

@@ -96,8 +96,9 @@ struct Eroded {
     float margin;  // coverage that is missing to be cloud; not above 0 inside
 };
 
-// The detailed density of a node at a place relative to the field's corner, metres.
-Eroded eroded(uint v, Node node, vec3 place, float footprint) {
+// The detailed density of a node at a place relative to the field's corner, metres; its margin only if that is asked
+// for.
+Eroded eroded(uint v, Node node, vec3 place, float footprint, bool margins) {
     float c = coverage_of(node.t), top = towards_top(place.z - march.volumes[v].base_m);
     float large = large_width(top, node.growth, march.volumes[v].base_width, march.volumes[v].top_width,
                               march.volumes[v].dissolving_width);
@@ -105,12 +106,13 @@ Eroded eroded(uint v, Node node, vec3 place, float footprint) {
     float fine = fine_width(footprint, march.volumes[v].fine_width), soft = edge_softness(footprint);
     float others = 0.5 * (medium + fine + soft);
     float low = max(0.5 - others - 0.5 * large, march.volumes[v].least_coverage);
-    if (!(c > low)) return Eroded(0.0, low - c);
+    bool needed = c > low;
+    if (!needed && !margins) return Eroded(0.0, 0.0);
     vec4 rows[3] = march.volumes[v].to_noise;
     vec3 tiles = vec3(dot(rows[0].xyz, place) + rows[0].w, dot(rows[1].xyz, place) + rows[1].w,
                       dot(rows[2].xyz, place) + rows[2].w);
     float noise = large * (noise_at(0u, 7u, tiles * 128.0) - 0.5) + 0.5;
-    if (abs(c - noise) < others && medium > 0.0) {
+    if (needed && abs(c - noise) < others && medium > 0.0) {
         vec3 at = tiles * (march.volumes[v].medium_scale * 64.0);
         float bumps = small_noise_at(noise_level(footprint, march.volumes[v].medium_per_m),
                                      vec3(0.6 * at.x - 0.8 * at.z, at.y, 0.8 * at.x + 0.6 * at.z)) - 0.5;
@@ -127,11 +129,12 @@ Eroded eroded(uint v, Node node, vec3 place, float footprint) {
     float coarse = saturate((footprint - 13.0) * (1.0 / 12.0));
     float gain = between(march.volumes[v].gain_fine, march.volumes[v].gain_coarse, coarse);
     float mean = density_of(node.t, march.volumes[v].half_density);
+    if (!needed) mask = 0.0;
     return Eroded(mask * min(gain * mean / fraction, max(mean, march.volumes[v].cap)), margin);
 }
 
 float density_at(uint v, vec3 offset_m, float footprint) {
     BrickPlace place = brick_place(v, offset_m);
     if (!place.within || place.number < 0) return 0.0;
-    return eroded(v, node_at(v, place), offset_m, footprint).density;
+    return eroded(v, node_at(v, place), offset_m, footprint, false).density;
 }

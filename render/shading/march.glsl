@@ -161,7 +161,7 @@ void sample_near(inout MarchSample result, vec3 ray, vec3 per_ray, float distanc
     for (uint v = 0u; v < march.count; ++v) {
         MarchPlace at = march_place(v, ray, per_ray, distance);
         if (at.near) {
-            Eroded found = eroded(v, node_at(v, at.place), at.offset, max(footprint, kLeastFootprint_m));
+            Eroded found = eroded(v, node_at(v, at.place), at.offset, max(footprint, kLeastFootprint_m), true);
             float extinction = found.density * march.volumes[v].extinction_per_m;
             result.extinction += extinction;
             if (extinction > 0.0) result.which = v;

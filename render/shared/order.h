@@ -31,7 +31,7 @@ struct CloudBall {
     float depth_scale;  // as in ViewBall, and the next two
     float sun_depth;
     float height;
-    uint pad0;
+    uint detailed;  // 1 = it stands for a cloud with detail
 };
 
 // One of T's billboards as the camera sees it; 36 bytes.
@@ -50,6 +50,7 @@ struct OrderFrame {
     vec4 up;         // xyz: unit; w: ... upwards
     vec4 forward;    // xyz: unit; w: pixels per unit at distance 1
     vec4 middle;     // xy: of the picture, pixels; z: 1 = the eye is above the ground; w: 1 = lightning
+    vec4 march;      // x: 1 = rays march through clouds with detail
 };
 
 // The shadow map, for sorting by distance from the sun.
@@ -115,7 +116,7 @@ NEPHOS_FUNCTION Groups dispatch_of(uint groups) {
 }
 
 #ifdef __cplusplus
-static_assert(sizeof(CloudBall) == 32 && sizeof(OrderFrame) == 11 * 16 && sizeof(OrderStep) == 60 && sizeof(SeenBillboard) == 36);
+static_assert(sizeof(CloudBall) == 32 && sizeof(OrderFrame) == 12 * 16 && sizeof(OrderStep) == 60 && sizeof(SeenBillboard) == 36);
 static_assert(sizeof(Groups) == 12 && offsetof(OrderCounts, visible_each) == 20 &&
               sizeof(OrderCounts) == 116);
 static_assert(sizeof(ViewPart) == 52 && offsetof(ViewPart, first) == 36);

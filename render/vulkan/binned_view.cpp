@@ -46,15 +46,28 @@ struct BinnedView::Pipelines {
 
     Pipelines(const GpuDevice& gpu, const ShaderVariant& which) : variant(which) {
         const std::vector<ShaderConstant> constants = constants_of(variant);
+        const bool march = variant.march;
         project = create_compute_pipeline(gpu, shaders().view_project_comp, constants);
-        finish = create_compute_pipeline(gpu, shaders().view_finish_comp, constants);
-        if (variant.shells) between = create_compute_pipeline(gpu, shaders().view_shells_comp, constants);
+        finish = create_compute_pipeline(gpu, march ? shaders().march_finish_comp : shaders().view_finish_comp, constants);
+        if (variant.shells)
+            between = create_compute_pipeline(
+                gpu, march ? shaders().march_shells_comp : shaders().view_shells_comp, constants);
     }
 
     // With billboards none are drawn as if all were fitted.
     bool draws(bool mixed) const { return mixed || !variant.billboards; }
+    // Where rays march, one pipeline draws both kinds.
+    const Pipeline& tiles_of(bool mixed, bool depth) const {
+        return tiles[mixed || variant.march ? 1 : 0][depth ? 1 : 0];
+    }
 
     void prepare(const GpuDevice& gpu, bool depth) {
+        if (variant.march) {
+            Pipeline& pipeline = tiles[1][depth ? 1 : 0];
+            if (!pipeline.exists())
+                pipeline = create_pixel_pipeline(gpu, shaders().march_tiles_comp, depth, variant);
+            return;
+        }
         for (const bool mixed : {false, true}) {
             Pipeline& pipeline = tiles[mixed ? 1 : 0][depth ? 1 : 0];
             if (draws(mixed) && !pipeline.exists())
@@ -70,6 +83,7 @@ struct BinnedView::Slot {
           frame(uniform_buffer<shader::Frame>(gpu)),
           order_frame(uniform_buffer<shader::OrderFrame>(gpu)),
           shells(uniform_buffer<shader::Shells>(gpu)),
+          march(uniform_buffer<shader::March>(gpu)),
           fence(gpu.device, vk::FenceCreateInfo()) {
         nephos::upload(gpu, billboards, {});
         nephos::upload(gpu, clouds, {});
@@ -79,7 +93,7 @@ struct BinnedView::Slot {
     }
 
     DescriptorSets sets;
-    GpuBuffer frame, order_frame, shells, billboards, clouds;  // read by the device
+    GpuBuffer frame, order_frame, shells, march, billboards, clouds;  // read by the device
     GpuBuffer radiance, depth, counts;                         // read back
     vk::raii::CommandBuffer commands{nullptr};
     vk::raii::Fence fence;
@@ -194,7 +208,7 @@ Resources BinnedView::view_resources(const Slot& slot) const {
     const ViewInputs& what = slot.what;
     const std::size_t tiles = TileGrid{slot.tile.width, slot.tile.height}.tiles();
     const GpuImage& textures = what.variant.billboards ? billboard_textures_ : unused_;
-    return {{0, slot.frame},
+    Resources all{{0, slot.frame},
             {1, lists_.balls()},
             {2, lists_.splats()},
             {3, textures, clamped_},
@@ -211,6 +225,13 @@ Resources BinnedView::view_resources(const Slot& slot) const {
             {15, lists_.parts()},
             {16, slot.billboards},
             {17, slot.clouds}};
+    if (what.variant.march)
+        all.set({{18, slot.march},
+                 {19, what.volumes->cells()},
+                 {20, what.volumes->light()},
+                 {21, what.volumes->noise()},
+                 {22, march_states_}});
+    return all;
 }
 
 // Splats up to the next shell, that shell and those that follow at once, splats again; the device knows how
@@ -230,11 +251,10 @@ void BinnedView::record_batch(const vk::raii::CommandBuffer& commands, Slot& slo
     shader::TileStep step = step_over(grid);
     step.first_batch = begin == 0;
     step.distances = slot.what.depth;
-    const std::size_t with_depth = slot.what.depth ? 1 : 0;
     vk::DescriptorSet tiles[2], between;
     for (const bool mixed : {false, true})
         if (pipelines.draws(mixed))
-            tiles[mixed ? 1 : 0] = slot.sets.fill(pipelines.tiles[mixed ? 1 : 0][with_depth], resources);
+            tiles[mixed ? 1 : 0] = slot.sets.fill(pipelines.tiles_of(mixed, slot.what.depth), resources);
     if (slot.what.shell_count > 0) between = slot.sets.fill(pipelines.between, resources);
     for (std::size_t part = 0; part <= slot.what.shell_count; ++part) {
         const std::size_t offset = part * sizeof(shader::ViewPart);
@@ -242,7 +262,7 @@ void BinnedView::record_batch(const vk::raii::CommandBuffer& commands, Slot& slo
         pass_barrier(commands);
         for (const bool mixed : {false, true}) {
             if (!pipelines.draws(mixed)) continue;
-            begin_compute(commands, pipelines.tiles[mixed ? 1 : 0][with_depth], tiles[mixed ? 1 : 0], step);
+            begin_compute(commands, pipelines.tiles_of(mixed, slot.what.depth), tiles[mixed ? 1 : 0], step);
             commands.dispatchIndirect(
                 *lists_.parts().buffer,
                 offset + (mixed ? offsetof(shader::ViewPart, mixed) : offsetof(shader::ViewPart, fitted)));
@@ -292,6 +312,7 @@ void BinnedView::submit(Slot& slot) {
     slot.sets.reset();
     slot.capacity = lists_.entry_capacity();
     slot.batch = std::min(batch_, slot.billboard_count > 0 ? limits.batch_with_billboards : batch_);
+    if (slot.what.variant.march) slot.batch = std::min(slot.batch, limits.batch_with_march);
     slot.commands.reset();
     slot.commands.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
     record(slot.commands, slot);
@@ -396,6 +417,12 @@ void BinnedView::reserve(const Tile& tile, Slot& slot) {
         radiance_ = create_buffer(gpu_, 4 * sizeof(float) * pixels, usage, HostAccess::none);
         depth_ = create_buffer(gpu_, sizeof(float) * pixels, usage, HostAccess::none);
     }
+    if (slot.what.variant.march && march_states_.bytes < 4 * sizeof(float) * pixels) {
+        wait();
+        march_states_ = {};
+        march_states_ = create_buffer(gpu_, 4 * sizeof(float) * pixels, vk::BufferUsageFlagBits::eStorageBuffer,
+                                      HostAccess::none);
+    }
     reserve_copy(gpu_, slot.radiance, 4 * sizeof(float) * pixels);
     reserve_copy(gpu_, slot.depth, sizeof(float) * pixels);
 }
@@ -407,19 +434,21 @@ void BinnedView::begin_tile(const ViewInputs& what, const shader::Frame& frame, 
     flush(slot);
     slot.wait(gpu_);  // of a picture that was thrown away
     failures_.reserve(failures_.size() + slots_.size());  // flush() may not throw
+    slot.what = what;
     slot.billboard_count = what.billboards.size();
     reserve(tile, slot);
     pipelines_for(what.variant).prepare(gpu_, what.depth);
     if (what.variant.billboards && billboard_textures_.width == 0)
         billboard_textures_ = upload_billboard_textures(gpu_);
-    slot.what = what;
     slot.tile = tile;
     write(gpu_, slot.frame, frame);
     write(gpu_, slot.order_frame, what.order);
     if (what.shells != nullptr) write(gpu_, slot.shells, *what.shells);
     nephos::upload(gpu_, slot.billboards, std::as_bytes(what.billboards));
     nephos::upload(gpu_, slot.clouds, std::as_bytes(what.clouds));
+    if (what.march != nullptr) write(gpu_, slot.march, *what.march);
     slot.what.shells = nullptr;  // these are there
+    slot.what.march = nullptr;
     slot.what.billboards = {};
     slot.what.clouds = {};
     slot.with_order = first || ordered_ != &picture;

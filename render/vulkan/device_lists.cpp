@@ -61,6 +61,7 @@ ListLimits limits_of(const GpuDevice& gpu) {
     if (gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu) {
         limits.batch = 50'000;
         limits.batch_with_billboards = 20'000;
+        limits.batch_with_march = 5'000;  // and as many steps of a ray
     }
     return limits;
 }
@@ -95,14 +96,14 @@ std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span
                         cloud.depth_scale[i],
                         sun_depths[i],
                         float((ball.z - cloud.base_m) * scale),
-                        0};
+                        cloud.is_detailed(i) ? 1u : 0u};
         }
     });
     return balls;
 }
 
 shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options, const Ground& ground,
-                               bool has_flash) {
+                               bool has_flash, bool marched) {
     const HighLow x = high_low(camera.position_m.x), y = high_low(camera.position_m.y),
                   z = high_low(camera.position_m.z), height = high_low(ground.height_m);
     const ViewPyramid pyramid(camera);
@@ -116,6 +117,7 @@ shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options,
     frame.forward = to_vec4(camera.forward, pixels_per_unit(options, camera));
     frame.middle = {float(half_width), float(half_height),
                     camera.position_m.z > ground.height_m ? 1.0f : 0.0f, has_flash ? 1.0f : 0.0f};
+    frame.march = {marched ? 1.0f : 0.0f, 0, 0, 0};
     return frame;
 }
 

@@ -38,6 +38,7 @@ struct ListLimits {
     std::size_t entries = std::size_t{1} << 24;        // of the lists of a batch: 256 MiB
     std::size_t batch = 0xffffffff;                 // splats of a batch
     std::size_t batch_with_billboards = 0xffffffff;  // where some of them are billboards
+    std::size_t batch_with_march = 0xffffffff;       // where rays march between them
 };
 
 // Returns the limits of a device: no storage buffer is larger than it allows, and on a device of type CPU no list
@@ -58,7 +59,7 @@ void check_distances(const PreparedCloud& cloud, const Vec3& eye);
 std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span<const float> sun_depths);
 
 shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options, const Ground& ground,
-                               bool has_flash);
+                               bool has_flash, bool marched = false);
 
 // What there must be room for; what only some pictures need has no less than one element.
 struct ListSizes {

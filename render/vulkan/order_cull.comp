@@ -2,9 +2,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "render/shared/order.h"
+#include "render/shared/march.h"
 // Order from the eye, first: which splats may be seen, and their distances as keys.
 #include "render/vulkan/order.glsl"
 #include "render/vulkan/exact_distance.glsl"
+#include "render/vulkan/ball_weight.glsl"
 
 layout(local_size_x = kSortGroup) in;
 
@@ -27,7 +29,7 @@ void main() {
     }
     CloudBall ball = cloud[i];
     FromEye place = from_eye(ball);
-    bool seen = is_seen(ball, place);
+    bool seen = is_seen(ball, place) && splatted_weight(ball, place.distance) > 0.0;
     keys_to[i] = seen ? floatBitsToUint(place.distance) : kCulled;
     table[i] = seen ? 1u : 0u;
 }

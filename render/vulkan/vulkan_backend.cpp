@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "render/backend/volume_light.h"
 #include "render/shared/half_floats.h"
 
 namespace nephos {
@@ -60,8 +61,22 @@ void VulkanBackend::use_cloud(const LitCloud& cloud) {
     held_metaballs_ = cloud.metaballs;
 }
 
-void VulkanBackend::light(LitCloud& cloud) {
+void VulkanBackend::use_volumes(const LitCloud& cloud) {
+    if (!volumes_) volumes_.emplace(scene_.gpu);
+    if (volumes_->has(cloud)) return;
+    view().flush();
+    volumes_->use(scene_.gpu, cloud);
+}
+
+void VulkanBackend::light(LitCloud& cloud, StageTimes& times) {
     if (cloud.all_known) return;
+    if (!cloud.volumes.empty()) {  // on the host, all at once
+        const std::vector<std::uint8_t> balls(cloud.sun_depths.size(), 1), tiles(cloud.known_tiles.size(), 1);
+        complete_light_of_volumes(cloud, balls, tiles, times);
+        cloud.all_known = true;
+        cloud.note_light_pass();
+        return;
+    }
     use_cloud(cloud);
     held_light_ = 0;
     view().light(cloud.frame, cloud.shadow_size, largest_radius(cloud.cloud), scene_.light_tiles());
@@ -72,8 +87,8 @@ void VulkanBackend::light(LitCloud& cloud) {
     scene_.note_map(cloud);
 }
 
-void VulkanBackend::light_all(LitCloud& cloud, StageTimes&) {
-    light(cloud);
+void VulkanBackend::light_all(LitCloud& cloud, StageTimes& times) {
+    light(cloud, times);
     fetch_light(cloud);
 }
 
@@ -89,7 +104,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
     ViewSortedSplats billboards;
     if (!frame.splats.billboards.empty()) billboards = frame.view_sorted_billboards();
     const std::vector<shader::SeenBillboard> seen = seen_billboards(billboards);
-    light(cloud);
+    light(cloud, frame.times);
     if (held_light_ != cloud.light) {  // it was computed on the host
         fetch_light(cloud);
         held_metaballs_ = 0;
@@ -104,13 +119,19 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
     if (has_shells(frame.options, cloud.cloud)) fetch_light(cloud);
     const AirShells shells = frame.shells();
     if (shells.any()) view().use_shade(shells.shade, shells.serial);
+    shader::March march;
+    if (!cloud.volumes.empty()) {
+        march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera));
+        use_volumes(cloud);
+    }
     const StageTimer timer(&frame.times, DrawStage::view);
     const ViewInputs what{.variant = {.physical_sky = frame.sky != nullptr,
                                       .shells = shells.any(),
                                       .fog = shells.has_fog(),
-                                      .billboards = !seen.empty()},
+                                      .billboards = !seen.empty(),
+                                      .march = march.count > 0},
                           .order = order_frame(frame.camera, frame.options.camera, frame.options.ground,
-                                               !frame.lightning.empty()),
+                                               !frame.lightning.empty(), !cloud.volumes.empty()),
                           .shadow_map = &scene_.shadow_map(cloud),
                           .sky = frame.sky != nullptr ? &scene_.sky_image(*frame.sky) : nullptr,
                           .scattering = &scene_.scattering(frame.table),
@@ -118,6 +139,8 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                           .shell_count = shells.count(),
                           .billboards = seen,
                           .clouds = billboards.clouds,
+                          .march = march.count > 0 ? &march : nullptr,
+                          .volumes = march.count > 0 ? &*volumes_ : nullptr,
                           .depth = frame.splats.depth};
     try {
         for (const FramePart& part : frame.parts)

@@ -27,6 +27,7 @@ class VulkanBackend : public Backend {
     bool begin(const FrameDescription& frame, Picture& picture) override;
     void finish(Picture& picture) override;
     void abandon(const Picture& picture) noexcept override;
+    bool marches() const override { return true; }
     std::vector<std::string> validation_messages() const override { return scene_.validation_messages(); }
 
     GpuScene& scene() { return scene_; }
@@ -37,9 +38,11 @@ class VulkanBackend : public Backend {
   private:
     void check_limits(const FrameDescription& frame);
     void use_cloud(const LitCloud& cloud);
-    void light(LitCloud& cloud);
+    void use_volumes(const LitCloud& cloud);
+    void light(LitCloud& cloud, StageTimes& times);
 
     GpuScene scene_;
+    std::optional<MarchVolumes> volumes_;  // with the first cloud with detail
     Version held_metaballs_ = 0;    // LitCloud::metaballs of what is in view_
     Version held_light_ = 0;        // LitCloud::light of the light of these
     Version depths_on_device_ = 0;  // LitCloud::light of the depths that view_ computed
