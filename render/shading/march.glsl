@@ -208,15 +208,21 @@ void advance(MarchSample now, inout MarchState state, inout MarchEvent event, in
     state.distance += now.step;
 }
 
-// Marches a ray up to a distance. `sum`: radiance and transmittance.
-void march_to(float limit_m, vec3 ray, inout MarchState state, inout vec4 sum, inout float sum_distance) {
+// Returns the distance at which a ray ends.
+float march_end(vec3 ray) {
     vec3 per_ray = inverse_of(ray);
     float end = 0.0;
     for (uint v = 0u; v < march.count; ++v) {
         vec2 part = part_in_box(v, per_ray);
         if (part.x < part.y) end = max(end, part.y);
     }
-    float stop = min(min(end, limit_m), min(ground_distance(ray), march.fade_ends));
+    return min(end, min(ground_distance(ray), march.fade_ends));
+}
+
+// Marches a ray up to a distance. `sum`: radiance and transmittance. Where there is nothing to march, do not call it:
+// lavapipe goes through the body of a loop once, even if no invocation does.
+void march_to(float stop, vec3 ray, inout MarchState state, inout vec4 sum, inout float sum_distance) {
+    vec3 per_ray = inverse_of(ray);
     MarchEvent event = MarchEvent(0.0, 0.0, 0u, false);
     while (state.distance < stop && sum.a > kMarchOpaque) {
         event.full = false;

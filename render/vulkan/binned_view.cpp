@@ -299,6 +299,7 @@ void BinnedView::record(const vk::raii::CommandBuffer& commands, Slot& slot) {
         begin = end;
     } while (begin < splats);
     pass_barrier(commands);
+    step.distances = slot.what.depth;
     begin_compute(commands, pipelines.finish, slot.sets.fill(pipelines.finish, resources), step);
     dispatch_groups(commands, (pixels + shader::kComputeGroup - 1) / shader::kComputeGroup);
     copy_barrier(commands);

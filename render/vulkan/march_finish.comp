@@ -34,7 +34,7 @@ void main() {
     vec3 ray = pixel_ray(pixel);
     MarchState state = load_march(index);
     float sum_distance = step.distances != 0u ? depth[index] : 0.0;
-    march_to(1.0e30, ray, state, clouds, sum_distance);
+    march_to(march_end(ray), ray, state, clouds, sum_distance);
     if (clouds.a < kOpaque) clouds.a = 0.0;
     clouds.rgb += clouds.a * background(ray);
     radiance[index] = clouds;

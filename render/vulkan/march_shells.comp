@@ -40,14 +40,20 @@ void main() {
     uvec2 drawn = drawn_shells();
     uint first = max(drawn.x, shells_before(part.x));
     uint last = part.x < part.y ? min(drawn.y, shells_before(part.y) + 1u) : drawn.x;
-    for (uint k = drawn.x; k < drawn.y; ++k) {
-        march_to(shell_end(k), ray, state, sum, sum_distance);
-        if (k >= first && k < last) {
-            AirLayer air = air_shell(k, sunlit, ray, pixel);
+    float end = march_end(ray);
+    uint k = drawn.x;
+    while (k < drawn.y) {
+        // Air alone, up to the shell with the next sample.
+        bool marches = state.distance < end && sum.a > kMarchOpaque;
+        uint next = marches ? max(k, min(shells_before(state.distance), drawn.y)) : drawn.y;
+        for (uint n = max(k, first); n < min(next, last); ++n) {
+            AirLayer air = air_shell(n, sunlit, ray, pixel);
             sum_distance += sum.a * (1.0 - air.transmittance) * air.distance;
             sum.rgb += sum.a * air.light;
             sum.a *= air.transmittance;
         }
+        k = next;
+        if (k < drawn.y) march_to(min(end, shell_end(k)), ray, state, sum, sum_distance);
     }
     store_march(index, state);
     radiance[index] = sum;

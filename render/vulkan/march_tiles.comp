@@ -22,14 +22,9 @@
 
 layout(constant_id = 8) const bool kBillboards = false;  // some splats are T's billboards
 
-void march_to_splat(uint index, vec3 ray, inout MarchState state) {
+float distance_of(uint index) {
     ViewBall splat = balls[index];
-    vec4 sum = vec4(red[0], green[0], blue[0], transmittance[0]);
-    march_to(length(vec3(splat.x, splat.y, splat.z)), ray, state, sum, mean_distance[0]);
-    red[0] = sum.r;
-    green[0] = sum.g;
-    blue[0] = sum.b;
-    transmittance[0] = sum.a;
+    return length(vec3(splat.x, splat.y, splat.z));
 }
 
 void main() {
@@ -49,13 +44,28 @@ void main() {
     uint at = first.y * step.width + first.x;
     MarchState state = begin_march(ray);
     if (step.first_batch == 0u) state = load_march(at);
-    for (uint i = range.begin; i < range.end && transmittance[0] >= kOpaque; ++i) {
-        uint index = list[i];
-        march_to_splat(index, ray, state);
-        if (kBillboards && unpackHalf2x16(tails[index]).y < 0.0) {
-            add_billboard(splats[index].x, pixel);
-        } else {
-            add_splat(index, pixel);
+    float end = march_end(ray);
+    uint i = range.begin;
+    while (i < range.end && transmittance[0] >= kOpaque) {
+        // Splats alone, up to that behind the next sample.
+        float limit_m = min(end, distance_of(list[i]));
+        while (i < range.end && transmittance[0] >= kOpaque &&
+               (state.distance >= limit_m || transmittance[0] <= kMarchOpaque)) {
+            uint index = list[i++];
+            if (kBillboards && unpackHalf2x16(tails[index]).y < 0.0) {
+                add_billboard(splats[index].x, pixel);
+            } else {
+                add_splat(index, pixel);
+            }
+            if (i < range.end) limit_m = min(end, distance_of(list[i]));
+        }
+        if (i < range.end && transmittance[0] > kMarchOpaque) {
+            vec4 sum = vec4(red[0], green[0], blue[0], transmittance[0]);
+            march_to(limit_m, ray, state, sum, mean_distance[0]);
+            red[0] = sum.r;
+            green[0] = sum.g;
+            blue[0] = sum.b;
+            transmittance[0] = sum.a;
         }
     }
     store_sums(first);

@@ -95,16 +95,18 @@ struct MarchView {
     double fov_deg;
 };
 
-constexpr MarchView kViews[] = {{"from afar", {0, -4000, 500}, {480, 400, 1300}, 40},
-                                {"from below", {300, -300, 20}, {480, 500, 1300}, 70},
-                                {"from within", {480, 300, 1250}, {500, 2000, 1250}, 60},
-                                {"where metaballs take over", {0, -9000, 800}, {480, 400, 1300}, 60}};
+// With 96 x 72 pixels the footprint of a pixel is about 12 m, 2 m, 6 m (rising to where rays end), 3 m and 20 m.
+constexpr MarchView kViews[] = {{"from afar", {0, -2000, 500}, {480, 400, 1250}, 20},
+                                {"near", {480, -350, 1250}, {480, 400, 1200}, 20},
+                                {"from below", {300, -300, 400}, {480, 500, 1300}, 60},
+                                {"from within", {480, 300, 1250}, {500, 2000, 1250}, 40},
+                                {"where metaballs take over", {0, -2800, 800}, {480, 400, 1250}, 30}};
 
 TEST_F(MarchBackends, Agree) {
     DetailedCloud cloud;
     cloud.add({0, 0, 1000}, 1);
     for (const MarchView& each : kViews)
-        expect_same(cloud.splats(), test::view(each.from, each.to, each.fov_deg, 80, 60), each.name);
+        expect_same(cloud.splats(), test::view(each.from, each.to, each.fov_deg, 96, 72), each.name);
 }
 
 TEST_F(MarchBackends, AgreeOnSeveralVolumes) {
@@ -116,14 +118,14 @@ TEST_F(MarchBackends, AgreeOnSeveralVolumes) {
     cloud.add({300, 200, 1250}, 2, fibres);
     cloud.add({-900, 900, 1100}, 3);
     for (const MarchView& each : kViews)
-        expect_same(cloud.splats(), test::view(each.from, each.to, each.fov_deg, 64, 48), each.name);
+        expect_same(cloud.splats(), test::view(each.from, each.to, each.fov_deg, 96, 72), each.name);
 }
 
 TEST_F(MarchBackends, AgreeThroughAir) {
     DetailedCloud cloud;
     cloud.add({0, 0, 1000}, 1);
     for (const MarchView& each : kViews) {
-        RenderOptions options = test::view(each.from, each.to, each.fov_deg, 64, 48);
+        RenderOptions options = test::view(each.from, each.to, each.fov_deg, 96, 72);
         options.shells.count = 24;
         options.light_shafts.strength = 1;
         options.fog.extinction_per_m = 2e-4;
@@ -143,7 +145,7 @@ TEST_F(MarchBackends, AgreeBetweenBillboards) {
         Splats splats = cloud.splats();
         splats.clouds = test::kBillboardClouds;
         splats.billboards = billboards;
-        expect_same(splats, test::view(each.from, each.to, each.fov_deg, 64, 48), each.name);
+        expect_same(splats, test::view(each.from, each.to, each.fov_deg, 96, 72), each.name);
     }
 }
 
