@@ -6,6 +6,8 @@
 // in cloud by about a pixel. What it sees is shaded whenever kEventOpacity has come together. The loops are nested so
 // that invocations that run together sample together, and shade together.
 
+#extension GL_EXT_control_flow_attributes : require
+
 // Interpolates numbers at the corners of cells between rows along x: of the light.
 struct LightCorner {
     uint first;  // word
@@ -54,7 +56,7 @@ vec3 marched_radiance(uint v, vec3 ray, float distance) {
     const float taps_m[3] = float[3](kTap0_m, kTap1_m, kTap2_m);
     const float lengths_m[3] = float[3](kTap0Length_m, kTap1Length_m, kTap2Length_m);
     float own = 0.0;
-    for (uint tap = 0u; tap < 3u; ++tap)
+    [[dont_unroll]] for (uint tap = 0u; tap < 3u; ++tap)
         own += lengths_m[tap] * extinction_per_m * density_at(v, offset + taps_m[tap] * to_sun, footprint);
     BrickPlace beyond = brick_place(v, offset + kTapsEnd_m * to_sun);
     float sun_depth = own + (beyond.within ? volume_sun_depth(v, beyond) : 0.0);
@@ -227,12 +229,14 @@ void march_to(float stop, vec3 ray, inout MarchState state, inout vec4 sum, inou
     while (state.distance < stop && sum.a > kMarchOpaque) {
         event.full = false;
         while (!event.full && state.distance < stop && sum.a > kMarchOpaque) {
-            MarchSample now = survey(ray, per_ray, state.distance);
-            while (!now.near && !event.full && state.distance < stop && sum.a > kMarchOpaque) {
-                advance(now, state, event, sum.a);
+            MarchSample now;
+            bool near = false;
+            while (!near && !event.full && state.distance < stop && sum.a > kMarchOpaque) {
                 now = survey(ray, per_ray, state.distance);
+                near = now.near;
+                if (!near) advance(now, state, event, sum.a);
             }
-            if (!event.full && state.distance < stop && sum.a > kMarchOpaque) {
+            if (near) {
                 sample_near(now, ray, per_ray, state.distance, sum.a);
                 advance(now, state, event, sum.a);
             }

@@ -119,7 +119,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
     if (has_shells(frame.options, cloud.cloud)) fetch_light(cloud);
     const AirShells shells = frame.shells();
     if (shells.any()) view().use_shade(shells.shade, shells.serial);
-    shader::March march;
+    shader::March march{};
     if (!cloud.volumes.empty()) {
         march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera));
         use_volumes(cloud);
