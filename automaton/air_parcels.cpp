@@ -42,17 +42,6 @@ AirParcel draw_parcel(const AutomatonOptions& options, int scatter, std::uint32_
     return parcel;
 }
 
-// Half the edges of the axis-parallel box around the ellipsoid, horizontally.
-struct HalfSize {
-    double x, y;
-};
-HalfSize half_size(const Ellipsoid& e) {
-    const SinCos turn = sin_cos_deg(e.yaw_deg);
-    const double a = e.semi_axes_m.x, b = e.semi_axes_m.y;
-    return {std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin),
-            std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos)};
-}
-
 // Adds displacements along one axis without overflow: modulo the box on a periodic axis, clamped to 2^29
 // cells on an open one, beyond which there is nothing.
 std::int64_t carry(std::int64_t sum, std::int64_t step, Boundary boundary, int extent) {
@@ -80,7 +69,7 @@ Box box_of(const AutomatonOptions& o) {
 // Returns true when the whole ellipsoid has left the box downwind, through an open side.
 bool has_left(const AutomatonOptions& options, const AirParcel& parcel, const Velocity& wind) {
     const Box box = box_of(options);
-    const HalfSize half = half_size(parcel.ellipsoid);
+    const Vec3 half = reach_m(parcel.ellipsoid);
     const Vec3 centre = present_centre(parcel, options.placement.cell_size_m);
     const bool left_x =
         options.boundaries.x == Boundary::open && ((wind.east_m_per_s > 0 && centre.x - half.x >= box.x1) ||
@@ -100,7 +89,7 @@ void place_upwind(const AutomatonOptions& options, AirParcel& parcel, const Velo
     const double inflow_y =
         options.boundaries.y == Boundary::open ? std::abs(wind.north_m_per_s) * (box.x1 - box.x0) : 0;
     Ellipsoid& e = parcel.ellipsoid;
-    const HalfSize half = half_size(e);
+    const Vec3 half = reach_m(e);
     if (draw(options, parcel, kSide, {0, inflow_x + inflow_y}) < inflow_x) {
         e.centre_m.x = wind.east_m_per_s > 0 ? box.x0 - half.x : box.x1 + half.x;
         e.centre_m.y = draw(options, parcel, kAlong, {box.y0, box.y1});
@@ -112,24 +101,10 @@ void place_upwind(const AutomatonOptions& options, AirParcel& parcel, const Velo
 
 }  // namespace
 
-SinCos sin_cos_deg(double degrees) {
-    const double turns = std::floor(degrees / 90 + 0.5);
-    const double r = (degrees - turns * 90) * (3.14159265358979323846 / 180);  // -pi/4..pi/4
-    const double r2 = r * r;
-    double s = 0, c = 0;  // Taylor series; the first term left out is below 2e-17
-    for (int n = 17; n >= 1; n -= 2) s = 1 - s * r2 / ((n + 1.0) * (n + 2.0));
-    for (int n = 16; n >= 0; n -= 2) c = 1 - c * r2 / ((n + 1.0) * (n + 2.0));
-    s *= r;
-    switch (int(std::fmod(turns, 4) + 4) % 4) {
-        case 0:
-            return {s, c};
-        case 1:
-            return {c, -s};
-        case 2:
-            return {-s, -c};
-        default:
-            return {-c, s};
-    }
+Vec3 reach_of(const Vec3& semi_axes, const Rotation& turn) {
+    const double a = semi_axes.x, b = semi_axes.y;
+    return {std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin),
+            std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos), semi_axes.z};
 }
 
 double fade_weight(const Ellipsoid& e, double time_s) {

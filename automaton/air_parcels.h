@@ -10,6 +10,7 @@
 #include "automaton/automaton.h"
 #include "automaton/options.h"
 #include "core/bytes.h"
+#include "core/math.h"
 
 namespace nephos {
 
@@ -46,11 +47,8 @@ class AirParcels {
 // Returns the fade weight of an ellipsoid at a time: 0 outside its life, 1 in its middle, linear in between.
 double fade_weight(const Ellipsoid& ellipsoid, double time_s);
 
-// Returns sine and cosine of an angle in degrees by polynomials: the same bits on every machine; error below
-// 1e-15.
-struct SinCos {
-    double sin = 0, cos = 1;
-};
-SinCos sin_cos_deg(double degrees);
+// Returns half the edges of the axis-aligned bounding box of an ellipsoid that is turned about the z axis, in
+// the unit of its semi-axes.
+Vec3 reach_of(const Vec3& semi_axes, const Rotation& turn);
 
 }  // namespace nephos

@@ -58,7 +58,7 @@ class Automaton {
     const AutomatonOptions& options() const;
     std::uint64_t steps() const;  // steps taken so far
     double time_s() const;        // steps() * time_step_s
-    // The planes of the current state; the views are valid until the next non-const call.
+    // Return the planes of the current state; the views are valid until the next non-const call.
     BitPlaneView hum() const;
     BitPlaneView act() const;
     BitPlaneView cld() const;

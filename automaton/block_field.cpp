@@ -95,25 +95,24 @@ void BlockField::add_with_images(const AutomatonOptions& options, const ActiveEl
     const double y = place((e.centre_m.y - origin.y) / cell, sides.y, extent.y);
     const double z = place((e.centre_m.z - origin.z) / cell, sides.z, extent.z);
     const double a = e.semi_axes_m.x / cell, b = e.semi_axes_m.y / cell, c = e.semi_axes_m.z / cell;
-    const SinCos turn = sin_cos_deg(e.yaw_deg);
-    const double half_x = std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin);
-    const double half_y = std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos);
-    const int nx = images(half_x, sides.x, extent.x), ny = images(half_y, sides.y, extent.y),
-              nz = images(c, sides.z, extent.z);
+    const Rotation turn = sin_cos_deg(e.yaw_deg);
+    const Vec3 half = reach_of({a, b, c}, turn);
+    const int nx = images(half.x, sides.x, extent.x), ny = images(half.y, sides.y, extent.y),
+              nz = images(half.z, sides.z, extent.z);
 
     FieldEllipsoid f =
         field_ellipsoid(options, active, {turn.cos / a, turn.sin / a, -turn.sin / b, turn.cos / b, 1 / c});
     for (int image_z = -nz; image_z <= nz; ++image_z) {
         f.centre_z = z + double(image_z) * extent.z;
-        std::tie(f.bz0, f.bz1) = block_range(f.centre_z - c, f.centre_z + c, extent.z);
+        std::tie(f.bz0, f.bz1) = block_range(f.centre_z - half.z, f.centre_z + half.z, extent.z);
         if (f.bz0 == f.bz1) continue;
         for (int image_y = -ny; image_y <= ny; ++image_y) {
             f.centre_y = y + double(image_y) * extent.y;
-            std::tie(f.by0, f.by1) = block_range(f.centre_y - half_y, f.centre_y + half_y, extent.y);
+            std::tie(f.by0, f.by1) = block_range(f.centre_y - half.y, f.centre_y + half.y, extent.y);
             if (f.by0 == f.by1) continue;
             for (int image_x = -nx; image_x <= nx; ++image_x) {
                 f.centre_x = x + double(image_x) * extent.x;
-                std::tie(f.bx0, f.bx1) = block_range(f.centre_x - half_x, f.centre_x + half_x, extent.x);
+                std::tie(f.bx0, f.bx1) = block_range(f.centre_x - half.x, f.centre_x + half.x, extent.x);
                 if (f.bx0 != f.bx1) ellipsoids_.push_back(f);
             }
         }

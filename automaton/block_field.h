@@ -66,7 +66,7 @@ class BlockField {
     BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> ellipsoids);
 
     const std::array<float, 3>& background() const { return background_; }
-    // False when no cell of the lattice can change by chance.
+    // Returns false when no cell of the lattice can change by chance.
     bool anything() const { return anything_; }
     bool any_extinction() const { return any_extinction_; }
     // Writes the ellipsoids that can touch blocks of row (by, bz) to `out`.

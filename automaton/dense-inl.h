@@ -68,8 +68,8 @@ inline void find_in_layer(const Segment& g, const BlockPlan& plan, int draw, int
     }
 }
 
-// Computes the thresholds of a layer; skips vectors without a bit in `wanted`.
-inline void make_thresholds(const Segment& g, int draw, std::uint64_t wanted,
+// Computes the thresholds of a layer; skips vectors without a bit in `requested`.
+inline void make_thresholds(const Segment& g, int draw, std::uint64_t requested,
                             const std::vector<LayerEllipsoid>& ellipsoids, LayerThresholds& out) {
     const hn::CappedTag<float, 16> d;
     const hn::RebindToSigned<decltype(d)> di;
@@ -78,7 +78,7 @@ inline void make_thresholds(const Segment& g, int draw, std::uint64_t wanted,
     constexpr std::size_t kLanes = hn::MaxLanes(d);
     const auto one = hn::Set(d, 1.0f);
     for (std::size_t c = 0; c < 64; c += kLanes) {
-        if ((wanted >> c & ((std::uint64_t{1} << kLanes) - 1)) == 0) continue;
+        if ((requested >> c & ((std::uint64_t{1} << kLanes) - 1)) == 0) continue;
         auto p = hn::Set(d, g.random.field->background()[std::size_t(draw)]);
         for (const LayerEllipsoid& e : ellipsoids) {
             const auto u2 = hn::Add(hn::LoadU(d, e.columns + c), hn::Set(d, e.c2));
@@ -181,19 +181,19 @@ inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& pl
     s.dirty[draw] = true;
     s.dense_words[draw] |= 1u << (block / 8);
     CellBits& events = s.dense_events[draw][block];
-    CellBits wanted;
+    CellBits requested;
     if (draw == kExt) {
-        std::memcpy(wanted, cloud_of_block(g, block, s), sizeof wanted);
+        std::memcpy(requested, cloud_of_block(g, block, s), sizeof requested);
     } else {
-        std::fill_n(wanted, 8, ~std::uint64_t{0});
+        std::fill_n(requested, 8, ~std::uint64_t{0});
     }
     const DrawPlan& draw_plan = plan.draws[std::size_t(draw)];
     if (draw_plan.kind == DrawPlan::Kind::certain) {
-        std::memcpy(events, wanted, sizeof wanted);
+        std::memcpy(events, requested, sizeof requested);
         return;
     }
     unsigned layers = 0;
-    for (int layer = 0; layer < 8; ++layer) layers |= unsigned{wanted[layer] != 0} << layer;
+    for (int layer = 0; layer < 8; ++layer) layers |= unsigned{requested[layer] != 0} << layer;
     HWY_ALIGN std::uint32_t random[4 * (32 + kMaxLanes64)];
     random_bytes(g, block, draw, layers, random);
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(random);
@@ -208,18 +208,18 @@ inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& pl
         if (uniform) {
             bits = compare_bytes(
                 bytes, [same](auto d, std::size_t) HWY_ATTR { return hn::Set(d, std::uint8_t(same >> 24)); });
-            queue_ties(block, draw, layer, bits.tie & wanted[layer], tie_threshold(same), s);
+            queue_ties(block, draw, layer, bits.tie & requested[layer], tie_threshold(same), s);
         } else {
             find_in_layer(g, plan, draw, layer, s);
-            make_thresholds(g, draw, wanted[layer], s.layer, t);
+            make_thresholds(g, draw, requested[layer], s.layer, t);
             bits = compare_bytes(
                 bytes, [&t](auto d, std::size_t c) HWY_ATTR { return hn::LoadU(d, t.top.data() + c); });
-            for (std::uint64_t cells = bits.tie & wanted[layer]; cells != 0; cells &= cells - 1) {
+            for (std::uint64_t cells = bits.tie & requested[layer]; cells != 0; cells &= cells - 1) {
                 const std::uint32_t full = t.full[std::size_t(std::countr_zero(cells))];
                 queue_ties(block, draw, layer, cells & (~cells + 1), tie_threshold(full), s);
             }
         }
-        events[layer] = bits.less & wanted[layer];
+        events[layer] = bits.less & requested[layer];
     }
 }
 

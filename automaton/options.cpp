@@ -69,21 +69,15 @@ void check_semi_axis(double semi_axis_m, const Name& name) {
         refuse(name, " = " + number(semi_axis_m) + ": expected a finite number > 0 m");
 }
 
-bool any_periodic(const Boundaries& b) {
-    return b.x == Boundary::periodic || b.y == Boundary::periodic || b.z == Boundary::periodic;
-}
-
 void check_periodic_reach(const Vec3& reach, const AutomatonOptions& o, const Name& name) {
-    const auto along = [&](double reach_m, int cells, Boundary boundary, const char* axis) {
-        const double most_m = kMaxPeriodicReach * cells * o.placement.cell_size_m;
-        if (boundary == Boundary::open || reach_m <= most_m) return;
-        refuse(name, " reaches " + number(reach_m) + " m from its centre along the periodic axis " + axis +
-                         ": expected at most " + number(most_m) + " m, " + number(kMaxPeriodicReach) +
-                         " times that axis");
-    };
-    along(reach.x, o.extent.x, o.boundaries.x, "x");
-    along(reach.y, o.extent.y, o.boundaries.y, "y");
-    along(reach.z, o.extent.z, o.boundaries.z, "z");
+    constexpr const char* kAxes[] = {"x", "y", "z"};
+    const Vec3 largest = largest_reach_m(o.extent, o.placement.cell_size_m, o.boundaries);
+    for (int axis = 0; axis < 3; ++axis) {
+        if (reach[axis] <= largest[axis]) continue;
+        refuse(name, " reaches " + number(reach[axis]) + " m from its centre along the periodic axis " +
+                         kAxes[axis] + ": expected at most " + number(largest[axis]) + " m, " +
+                         number(kMaxPeriodicReach) + " times that axis");
+    }
 }
 
 void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::string& name) {
@@ -113,7 +107,7 @@ void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::stri
                       .fade_out_s = s.fade_out_s},
             o, name);
     }
-    if (any_periodic(o.boundaries)) check_periodic_reach(reach_m(s), o, name);
+    check_periodic_reach(reach_m(s), o, name);
 }
 
 void check(const Wind& wind, const AutomatonOptions& o) {
@@ -150,12 +144,14 @@ double images_of(const Vec3& reach_m, const AutomatonOptions& o) {
 
 }  // namespace
 
-Vec3 reach_m(const Ellipsoid& e) {
-    const SinCos turn = sin_cos_deg(e.yaw_deg);
-    const double a = e.semi_axes_m.x, b = e.semi_axes_m.y;
-    return {std::sqrt(a * a * turn.cos * turn.cos + b * b * turn.sin * turn.sin),
-            std::sqrt(a * a * turn.sin * turn.sin + b * b * turn.cos * turn.cos), e.semi_axes_m.z};
+Vec3 largest_reach_m(const Extent& extent, double cell_size_m, const Boundaries& boundaries) {
+    const auto along = [&](Boundary boundary, int cells) {
+        return boundary == Boundary::periodic ? kMaxPeriodicReach * cells * cell_size_m : kForever;
+    };
+    return {along(boundaries.x, extent.x), along(boundaries.y, extent.y), along(boundaries.z, extent.z)};
 }
+
+Vec3 reach_m(const Ellipsoid& e) { return reach_of(e.semi_axes_m, sin_cos_deg(e.yaw_deg)); }
 
 Vec3 reach_m(const EllipsoidScatter& s) {
     const Vec3 largest{s.semi_axis_x_m.max, s.semi_axis_y_m.max, s.semi_axis_z_m.max};
@@ -180,7 +176,7 @@ void check(const Ellipsoid& e, const AutomatonOptions& o, const std::string& nam
     check_semi_axis(e.semi_axes_m.y, {name, ".semi_axes_m.y"});
     check_semi_axis(e.semi_axes_m.z, {name, ".semi_axes_m.z"});
     require_finite(e.yaw_deg, {name, ".yaw_deg"});
-    if (any_periodic(o.boundaries)) check_periodic_reach(reach_m(e), o, {name, ".semi_axes_m"});
+    check_periodic_reach(reach_m(e), o, {name, ".semi_axes_m"});
     check(e.centre, {name, ".centre"});
     check(e.rim, {name, ".rim"});
     check_life(e.birth_s, e.life_s, e.fade_in_s, e.fade_out_s, name);

@@ -45,6 +45,8 @@ Vec3 reach_m(const EllipsoidScatter& scatter);
 // Largest reach of an ellipsoid along a periodic axis, in lengths of that axis: every image of it that meets
 // the box is visited in every step, 33 of them along an axis at this limit.
 inline constexpr double kMaxPeriodicReach = 16;
+// Returns the largest reach along each axis of a lattice, in metres: infinite along open axes.
+Vec3 largest_reach_m(const Extent& extent, double cell_size_m, const Boundaries& boundaries);
 
 // Throws Error(usage) when an ellipsoid is not valid in a simulation with these options; `name` names it in
 // the message.

@@ -56,16 +56,6 @@ std::string temporary_name(const std::filesystem::path& path, const std::string&
     return "." + path.stem().string() + std::string(kPart) + numbers + path.extension().string();
 }
 
-// Throws Error(io) unless the file that was created is still there under its name.
-void require_same_file(const std::filesystem::path& temporary, dev_t device, ino_t inode,
-                       const std::filesystem::path& reported) {
-    struct stat status {};
-    if (::lstat(temporary.c_str(), &status) != 0) fail(reported, "its temporary file is gone", errno);
-    if (status.st_dev != device || status.st_ino != inode || !S_ISREG(status.st_mode))
-        throw Error(ErrorCode::io,
-                    reported.string() + ": another file was put in the place of its temporary one");
-}
-
 bool all_digits(std::string_view text) {
     return !text.empty() &&
            std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -133,12 +123,22 @@ void AtomicFile::create_temporary(const std::filesystem::path& folder) {
 }
 
 AtomicFile::~AtomicFile() {
-    std::error_code error;
-    if (!published_) std::filesystem::remove(temporary_, error);
+    struct stat status {};
+    if (!published_ && ::lstat(temporary_.c_str(), &status) == 0 && is_created_file(status))
+        ::unlink(temporary_.c_str());
+}
+
+// Returns true for the file that the constructor created.
+bool AtomicFile::is_created_file(const struct stat& status) const {
+    return status.st_dev == device_ && status.st_ino == inode_ && S_ISREG(status.st_mode);
 }
 
 void AtomicFile::publish() {
-    require_same_file(temporary_, device_, inode_, path_);
+    struct stat status {};
+    if (::lstat(temporary_.c_str(), &status) != 0) fail(path_, "its temporary file is gone", errno);
+    if (!is_created_file(status))
+        throw Error(ErrorCode::io,
+                    path_.string() + ": another file was put in the place of its temporary one");
     flush_to_device(temporary_, path_, O_RDONLY | O_NOFOLLOW);
     std::error_code error;
     std::filesystem::rename(temporary_, path_, error);

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include <sys/stat.h>
 #include <sys/types.h>
 
 namespace nephos {
@@ -23,7 +24,7 @@ class AtomicFile {
     // symbolic link keeps pointing to the new file; a device, a pipe or a folder in the place of the file is
     // refused. Throws Error(io) naming `path`.
     explicit AtomicFile(const std::filesystem::path& path);
-    // Without publish(): removes the temporary file.
+    // Removes the temporary file unless it was published, unless another was put in its place.
     ~AtomicFile();
     AtomicFile(const AtomicFile&) = delete;
     AtomicFile& operator=(const AtomicFile&) = delete;
@@ -36,6 +37,7 @@ class AtomicFile {
 
   private:
     void create_temporary(const std::filesystem::path& folder);
+    bool is_created_file(const struct stat& status) const;
 
     std::filesystem::path path_, temporary_;
     dev_t device_ = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// mix_bits() of core/noise_hash.h for vectors of 32-bit words, smooth_blend() of core/smoothstep.h for vectors of
+// mix_bits() of core/noise_hash.h for vectors of 32-bit words, smooth_blend() of core/math.h for vectors of
 // floats (not installed).
 
 #if defined(NEPHOS_CORE_VECTORS_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -114,7 +114,7 @@ class Sampler {
     }
 
   private:
-    // The two voxels around a place on an axis and their shares; of a periodic axis none beyond its sides.
+    // The two voxels around a place on an axis and their weights; of a periodic axis none beyond its sides.
     struct Neighbours {
         int index[2];
         double weight[2];

@@ -70,16 +70,17 @@ class Thermals {
 // The cells of a grid with thermals, and how much they grow, in blocks of 8 x 8 x 8.
 class Cells {
   public:
-    Cells(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* growth)
-        : blocks_(blocks_of(grid)) {
+    Cells(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture)
+        : blocks_(blocks_of(grid)), boundaries_(setting.boundaries), extent_(grid.extent()) {
         std::erase_if(blocks_, [](const Block& block) { return block.positive_count() == 0; });
         const Extent extent = grid.extent();
         const int size[3] = {extent.x, extent.y, extent.z};
         for (std::size_t axis = 0; axis < 3; ++axis) size_[axis] = (size[axis] + kBlock - 1) / kBlock;
         table_.assign(std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]), -1);
         density_.resize(blocks_.size() * kBlockVoxels);
-        if (growth != nullptr) growth_.resize(density_.size());
+        if (moisture != nullptr) growth_.resize(density_.size());
         masses_.resize(blocks_.size());
+        std::vector<double> moist(blocks_.size(), 0), cloudy(blocks_.size(), 0);
         const Thermals thermals(setting);
         const Vec3 origin = grid.placement().origin_m;
         const double cell = grid.placement().cell_size_m;
@@ -88,7 +89,7 @@ class Cells {
             table_[index_of(block.origin.x() / kBlock, block.origin.y() / kBlock, block.origin.z() / kBlock)] =
                 std::int32_t(n);
             std::optional<openvdb::FloatGrid::ConstAccessor> growing;
-            if (growth != nullptr) growing.emplace(OpenvdbAccess::grid(*growth).getConstAccessor());
+            if (moisture != nullptr) growing.emplace(OpenvdbAccess::grid(*moisture).getConstAccessor());
             masses_[n].fill(0);
             for (int v = 0; v < kBlockVoxels; ++v) {
                 const openvdb::Coord voxel = block.origin.offsetBy(v & 7, v >> 3 & 7, v >> 6);
@@ -98,9 +99,18 @@ class Cells {
                 const std::size_t at = n * kBlockVoxels + std::size_t(v);
                 density_[at] = q * thermals.factor(origin + cell * Vec3(voxel.x() + 0.5, voxel.y() + 0.5,
                                                                         voxel.z() + 0.5));
-                if (growing) growth_[at] = density_[at] * (2 * growing->getValue(voxel) - 1);
+                if (!growing) continue;
+                growth_[at] = growing->getValue(voxel);
+                moist[n] += double(growth_[at] * density_[at]);
+                cloudy[n] += double(density_[at]);
             }
         });
+        if (moisture == nullptr) return;
+        const double sum = std::accumulate(moist.begin(), moist.end(), 0.0),
+                     mass = std::accumulate(cloudy.begin(), cloudy.end(), 0.0);
+        const auto per_mean = float(sum > 0 ? mass / sum : 0);
+        for (std::size_t n = 0; n < growth_.size(); ++n)
+            growth_[n] = density_[n] * (per_mean > 0 ? std::min(growth_[n] * per_mean - 1, 1.0f) : 0.0f);
     }
 
     const std::vector<Block>& blocks() const { return blocks_; }
@@ -121,6 +131,23 @@ class Cells {
         std::fill_n(density, side * side * pitch, 0.0f);
         if (growth != nullptr) std::fill_n(growth, side * side * pitch, 0.0f);
         bool any = false;
+        if (crosses_periodic_side(corner, side)) {
+            for (int z = 0; z < side; ++z) {
+                for (int y = 0; y < side; ++y) {
+                    for (int x = 0; x < side; ++x) {
+                        const std::ptrdiff_t from = index_in_blocks(repeated(corner[0] + x, extent_.x, boundaries_.x),
+                                                                    repeated(corner[1] + y, extent_.y, boundaries_.y),
+                                                                    repeated(corner[2] + z, extent_.z, boundaries_.z));
+                        if (from < 0) continue;
+                        const int to = (z * side + y) * pitch + x;
+                        density[to] = density_[std::size_t(from)];
+                        any = any || density[to] > 0;
+                        if (growth != nullptr) growth[to] = growth_[std::size_t(from)];
+                    }
+                }
+            }
+            return any;
+        }
         const auto first = [&](std::size_t axis) { return std::max(corner[axis], 0) / kBlock; };
         const auto end = [&](std::size_t axis) {
             return std::min((corner[axis] + side - 1 + kBlock) / kBlock, size_[axis]);
@@ -152,11 +179,29 @@ class Cells {
     }
 
   private:
+    bool crosses_periodic_side(const int (&corner)[3], int side) const {
+        const auto crosses = [&](int at, int size, Boundary boundary) {
+            return boundary == Boundary::periodic && (at < 0 || at + side > size);
+        };
+        return crosses(corner[0], extent_.x, boundaries_.x) || crosses(corner[1], extent_.y, boundaries_.y) ||
+               crosses(corner[2], extent_.z, boundaries_.z);
+    }
+
+    // Index of a cell in density_; -1 where there is none.
+    std::ptrdiff_t index_in_blocks(int x, int y, int z) const {
+        if (x < 0 || y < 0 || z < 0 || x >= extent_.x || y >= extent_.y || z >= extent_.z) return -1;
+        const std::int32_t block = table_[index_of(x / kBlock, y / kBlock, z / kBlock)];
+        if (block < 0) return -1;
+        return std::ptrdiff_t(block) * kBlockVoxels + ((z % kBlock * kBlock) + y % kBlock) * kBlock + x % kBlock;
+    }
+
     std::size_t index_of(int x, int y, int z) const {
         return (std::size_t(z) * std::size_t(size_[1]) + std::size_t(y)) * std::size_t(size_[0]) + std::size_t(x);
     }
 
     std::vector<Block> blocks_;
+    Boundaries boundaries_;
+    Extent extent_;
     std::array<int, 3> size_{};
     std::vector<std::int32_t> table_;
     std::vector<float> density_, growth_;
@@ -227,7 +272,7 @@ void check(const DetailOptions& o) {
     require(within(o.mean_free_path_m, 1, 10000), "mean_free_path_m", o.mean_free_path_m, "1..10000");
 }
 
-CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* growth)
+CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture)
     : extinction_per_m_(setting.extinction_per_m) {
     check(setting.options);
     const double cell = grid.placement().cell_size_m;
@@ -242,7 +287,7 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
         bricks_[axis] = (cells_of[axis] + 2 * before + kCells - 1) / kCells;
     table_.assign(std::size_t(bricks_[0]) * std::size_t(bricks_[1]) * std::size_t(bricks_[2]), -1);
 
-    const Cells cells(grid, setting, growth);
+    const Cells cells(grid, setting, moisture);
     const std::vector<double> masses = cells.masses();
     mass_ = std::accumulate(masses.begin(), masses.end(), 0.0);
     // The base: a hundredth of the cloud lies below it, so that it moves no faster than the cloud.
@@ -258,11 +303,11 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
 
     // Bricks near blocks with cloud: some of them may hold none.
     std::vector<std::uint8_t> reached(table_.size(), 0);
-    for (const Block& block : cells.blocks()) {
+    const auto reach_around = [&](const openvdb::Coord& origin) {
         int low[3], high[3];
         for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = std::max((block.origin[axis] + before - sums.reach()) / kCells, 0);
-            high[axis] = std::min((block.origin[axis] + before + kBlock + sums.reach()) / kCells,
+            low[axis] = std::max((origin[axis] + before - sums.reach()) / kCells, 0);
+            high[axis] = std::min((origin[axis] + before + kBlock + sums.reach()) / kCells,
                                   bricks_[std::size_t(axis)] - 1);
         }
         for (int z = low[2]; z <= high[2]; ++z)
@@ -270,7 +315,14 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
                 for (int x = low[0]; x <= high[0]; ++x)
                     reached[(std::size_t(z) * std::size_t(bricks_[1]) + std::size_t(y)) * std::size_t(bricks_[0]) +
                             std::size_t(x)] = 1;
-    }
+    };
+    // Images of blocks beyond periodic sides reach into the lattice, too.
+    const auto images = [](Boundary boundary) { return boundary == Boundary::periodic ? 1 : 0; };
+    for (const Block& block : cells.blocks())
+        for (int k = -images(setting.boundaries.z); k <= images(setting.boundaries.z); ++k)
+            for (int j = -images(setting.boundaries.y); j <= images(setting.boundaries.y); ++j)
+                for (int i = -images(setting.boundaries.x); i <= images(setting.boundaries.x); ++i)
+                    reach_around(block.origin.offsetBy(i * extent.x, j * extent.y, k * extent.z));
     for (std::size_t n = 0; n < table_.size(); ++n)
         if (reached[n] != 0) places_.push_back(std::int32_t(n));
     if (places_.size() > std::size_t(std::numeric_limits<std::int32_t>::max()) / kBrickBytes)

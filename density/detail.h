@@ -35,6 +35,7 @@ struct DetailSetting {
     double metaball_radius_cells = 2.0;  // 1..8
     Vec3 drift_m{};                      // how far the wind has carried the air
     Vec2 along{1, 0};                    // unit direction of DetailOptions::stretch
+    Boundaries boundaries;               // of the grid; an open axis ends the cloud
 };
 
 // The constants of the erosion, as kernels and shaders read them.
@@ -62,10 +63,11 @@ class CoverageField {
     static constexpr int kBrickCells = 4;  // cells of the lattice on an edge
     static constexpr std::size_t kBrickBytes = 1460;  // two for each node, and two more
 
-    // Samples D at all nodes where it is above 0; with `growth`, of the same extent, -1..1 as 0..1, also how much
-    // the cloud grows there. Beyond the grid there is none. Throws Error(usage) when options are out of range, and
-    // when the field has more than 2^31 bytes.
-    CoverageField(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* growth = nullptr);
+    // Samples D at all nodes where it is above 0. `moisture`, of the same extent, says how much the cloud grows: not at
+    // all where it has its mean over the cloud, by 1 from twice that on, by -1 at 0. Without it nothing grows or
+    // dissolves. Beyond open boundaries there is no cloud. Throws Error(usage) when options are out of range, and when
+    // the field has more than 2^31 bytes.
+    CoverageField(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture = nullptr);
 
     // World place of the first node, and the distance between nodes (half a cell), metres.
     const Vec3& corner_m() const { return corner_m_; }

@@ -16,6 +16,7 @@
 #include <hwy/aligned_allocator.h>
 #include <hwy/highway.h>
 
+#include "density/smoothing_blocks-inl.h"
 #include "density/smoothing_vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -5,12 +5,52 @@
 #include <limits>
 #include <vector>
 
-#include "core/bit_count.h"
 #include "core/error.h"
 #include "density/openvdb_access.h"
 
+#ifndef HWY_DISABLED_TARGETS
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
+#endif
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "density/statistics.cpp"
+#include <hwy/foreach_target.h>
+// foreach_target.h must come first
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
 namespace nephos {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Returns the number of 1 bits in `count` words: std::popcount is a table look-up where the compiler may not assume
+// the instruction.
+std::uint64_t count_bits_of(const std::uint64_t* words, std::size_t count) {
+    const hn::ScalableTag<std::uint64_t> d;
+    const std::size_t lanes = hn::Lanes(d);
+    auto sums = hn::Zero(d);
+    std::size_t n = 0;
+    for (; n + lanes <= count; n += lanes) sums = hn::Add(sums, hn::PopulationCount(hn::LoadU(d, words + n)));
+    std::uint64_t total = hn::GetLane(hn::SumOfLanes(d, sums));
+    for (; n < count; ++n) total += hwy::PopCount(words[n]);
+    return total;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace nephos
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephos {
+
 namespace {
+
+HWY_EXPORT(count_bits_of);
+
+std::uint64_t count_bits(const std::uint64_t* words, std::size_t count) {
+    return HWY_DYNAMIC_DISPATCH(count_bits_of)(words, count);
+}
 
 std::uint64_t count_plane(const BitPlaneView& plane) { return count_bits(plane.words, plane.word_count()); }
 
@@ -73,3 +113,4 @@ CloudStatistics cloud_statistics(const DensityGrid& density) {
 }
 
 }  // namespace nephos
+#endif

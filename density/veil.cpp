@@ -9,9 +9,8 @@
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "core/noise_hash.h"
-#include "core/smoothstep.h"
-#include "core/trigonometry.h"
 #include "density/openvdb_access.h"
 #include "density/veil_kernel.h"
 
@@ -62,9 +61,9 @@ std::vector<float> samples_of(const VeilPlan& plan) {
 void set_thresholds(VeilPlan& plan, const VeilOptions& options) {
     std::vector<float> values = samples_of(plan);
     std::ranges::sort(values);
-    const auto quantile = [&](double share) {
+    const auto quantile = [&](double fraction) {
         const double last = double(values.size() - 1);
-        return values[std::size_t(std::clamp(share, 0.0, 1.0) * last)];
+        return values[std::size_t(std::clamp(fraction, 0.0, 1.0) * last)];
     };
     plan.low = quantile(1 - options.coverage);
     plan.high = quantile(1 - options.coverage * (1 - options.softness));

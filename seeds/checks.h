@@ -22,6 +22,13 @@ inline void require_in(const std::string& what, double value, double min, double
     usage_error(what + " is " + text_of(value) + ", expected " + text_of(min) + ".." + text_of(max));
 }
 
+// Throws Error(usage) unless each of the probabilities is in 0..1.
+inline void require_probabilities(const std::string& what, const Probabilities& p) {
+    require_in(what + ": p_hum", p.hum, 0, 1);
+    require_in(what + ": p_act", p.act, 0, 1);
+    require_in(what + ": p_ext", p.ext, 0, 1);
+}
+
 inline void require_positive(const std::string& what, double value) {
     if (value > 0 && std::isfinite(value)) return;
     usage_error(what + " is " + text_of(value) + ", expected a number above 0");

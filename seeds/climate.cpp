@@ -42,19 +42,19 @@ SkyShares shares_at(std::span<const Sky> skies, double state) {
     if (upper == none) upper = lower;
     if (lower == upper) return {lower, lower, 1, 0};
     const double difference = skies[upper].state - skies[lower].state;
-    const double upper_share = 1 - std::abs(state - skies[upper].state) / difference;
-    return {lower, upper, 1 - upper_share, upper_share};
+    const double upper_fraction = 1 - std::abs(state - skies[upper].state) / difference;
+    return {lower, upper, 1 - upper_fraction, upper_fraction};
 }
 
 int clouds_at(std::span<const Sky> skies, double state) {
-    const SkyShares shares = shares_at(skies, state);
-    return int(std::floor(shares.lower_share * skies[shares.lower].clouds +
-                          shares.upper_share * skies[shares.upper].clouds + 0.5));
+    const SkyShares fractions = shares_at(skies, state);
+    return int(std::floor(fractions.lower_fraction * skies[fractions.lower].clouds +
+                          fractions.upper_fraction * skies[fractions.upper].clouds + 0.5));
 }
 
 std::size_t nearest_sky(std::span<const Sky> skies, double state) {
-    const SkyShares shares = shares_at(skies, state);
-    return shares.upper_share > shares.lower_share ? shares.upper : shares.lower;
+    const SkyShares fractions = shares_at(skies, state);
+    return fractions.upper_fraction > fractions.lower_fraction ? fractions.upper : fractions.lower;
 }
 
 }  // namespace nephos

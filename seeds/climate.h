@@ -22,8 +22,8 @@ double state_at(std::span<const StatePoint> schedule, double time_s);
 // The two skies that bracket a state, with their probabilities P_Si = 1 - |St - Si| / Diff, Diff = the
 // distance of their states. At a sky's own state, and outside all states, one sky has probability 1.
 struct SkyShares {
-    std::size_t lower = 0, upper = 0;         // indices; equal when one sky has probability 1
-    double lower_share = 1, upper_share = 0;  // sum 1
+    std::size_t lower = 0, upper = 0;               // indices; equal when one sky has probability 1
+    double lower_fraction = 1, upper_fraction = 0;  // sum 1
 };
 
 // Returns the bracketing skies of a state. `skies` in any order, at least one, all states different. Pure.

@@ -7,14 +7,17 @@
 // Model space: metres, axes as in the world, origin of the base model; z = 0 is the height of the cloud's
 // base. World position = model position + position of the cloud.
 
-#include <array>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/vec.h"
 
 namespace nephos {
+
+struct Sphere {
+    Vec3 centre_m{};
+    double radius_m = 0;
+};
 
 // One box, parallel to the axes in the world as well: T never rotates boxes, so that its slab test holds.
 struct SeedBox {
@@ -47,38 +50,5 @@ inline double phase_weight(double distance, double phase, double softness) {
     const double weight = (phase * (1 + softness) - distance) / softness;
     return weight <= 0 ? 0 : weight >= 1 ? 1 : weight;
 }
-
-struct Sphere {
-    Vec3 centre_m{};
-    double radius_m = 0;
-};
-
-// Points p with dot(normal, p) + offset >= 0 are inside; |normal| = 1.
-struct Plane {
-    Vec3 normal{};
-    double offset_m = 0;
-};
-
-// A view frustum: six planes facing inwards, and the smallest enclosing sphere with its centre on the axis.
-struct Frustum {
-    std::array<Plane, 6> planes;  // near, far, left, right, bottom, top
-    Sphere sphere;
-};
-
-struct FrustumView {
-    Vec3 eye_m{};
-    Vec3 forward{0, 1, 0};              // any length > 0
-    Vec3 up{0, 0, 1};                   // not parallel to forward
-    double fov_y_deg = 60;              // full vertical angle, 0 < fov < 180
-    double aspect = 4.0 / 3.0;          // width / height, > 0
-    double near_m = 1, far_m = 100000;  // 0 < near < far
-};
-
-// Returns the frustum of a camera. Throws Error(usage) on values outside the ranges above.
-Frustum frustum_of(const FrustumView& view);
-
-// Tests a sphere against the frustum's sphere, then against its six planes (T). Conservative: false only if
-// the sphere is entirely outside the frustum; near edges true for some spheres just outside. Pure.
-bool may_see(const Frustum& frustum, const Sphere& sphere);
 
 }  // namespace nephos

@@ -12,11 +12,8 @@ void check(const CouplingOptions& options) {
     require_in("coupling: size scale", options.size_scale, 1e-3, 1e3);
     require_in("coupling: smallest semi-axis (m)", options.min_semi_axis_m, 0, 1e6);
     require_in("coupling: size at birth", options.size_at_birth, 0, 1);
-    for (const Probabilities& p : {options.centre, options.rim}) {
-        require_in("coupling: p_hum", p.hum, 0, 1);
-        require_in("coupling: p_act", p.act, 0, 1);
-        require_in("coupling: p_ext", p.ext, 0, 1);
-    }
+    require_probabilities("coupling", options.centre);
+    require_probabilities("coupling", options.rim);
 }
 
 void append_ellipsoids(std::vector<ActiveEllipsoid>& out, const BaseModel& model, const Cloud& cloud,

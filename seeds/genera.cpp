@@ -75,7 +75,7 @@ Range base_height_m(Genus genus, Region region) {
 }
 
 Genus genus_from_name(std::string_view text) {
-    const std::string wanted = lower(text).substr(0, 64);
+    const std::string requested = lower(text).substr(0, 64);
     const GenusFacts* nearest = nullptr;
     std::string_view nearest_name;
     std::size_t best = 4;  // farther than three letters is no typing error
@@ -83,8 +83,8 @@ Genus genus_from_name(std::string_view text) {
     for (const GenusFacts& facts : kGenera) {
         for (std::string_view name : {facts.abbreviation, facts.name}) {
             const std::string known = lower(name);
-            if (wanted == known && wanted.size() == text.size()) return facts.genus;
-            const std::size_t distance = edit_distance(wanted, known);
+            if (requested == known && requested.size() == text.size()) return facts.genus;
+            const std::size_t distance = edit_distance(requested, known);
             if (distance < std::min(best, known.size())) {
                 best = distance;
                 nearest = &facts;

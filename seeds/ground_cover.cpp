@@ -74,8 +74,8 @@ GroundFilm advanced(const GroundFilm& film, double rain_mm_per_h, double snow_mm
 GroundCoverMap mix(const GroundCoverMap& from, const GroundCoverMap& to, double fraction) {
     GroundCoverMap map = from;
     const auto between = [&](std::vector<float>& values, const std::vector<float>& later) {
-        const auto share = float(fraction);
-        for (std::size_t i = 0; i < values.size(); ++i) values[i] += share * (later[i] - values[i]);
+        const auto weight = float(fraction);
+        for (std::size_t i = 0; i < values.size(); ++i) values[i] += weight * (later[i] - values[i]);
     };
     between(map.water_mm, to.water_mm);
     between(map.snow_mm, to.snow_mm);

@@ -11,7 +11,7 @@
 // point upwind where its drops left the cloud's base (drift_m()). There are no obstacles.
 //
 // Water is a film of V mm. Hollows fill and then overflow (Linsley, Kohler and Paulhus 1949: depression
-// storage V = S (1 - exp(-P / S)) after a rain of P, so the share V / S of what falls runs off), and the film
+// storage V = S (1 - exp(-P / S)) after a rain of P, so the fraction V / S of what falls runs off), and the film
 // dries exponentially:
 //
 //     dV/dt = I (1 - V / S) - V / tau,   k = I / S + 1 / tau,
@@ -48,28 +48,14 @@ struct GroundCoverOptions {
 // Throws Error(usage) on values outside the ranges above.
 void check(const GroundCoverOptions& options);
 
-// Water and snow on the ground at one point.
-struct GroundFilm {
-    double water_mm = 0;
-    double snow_mm = 0;
-    bool operator==(const GroundFilm&) const = default;
-};
-
 // Returns the film after `duration_s` >= 0 of constant rain or snow (mm/h of water). Pure.
 GroundFilm advanced(const GroundFilm& film, double rain_mm_per_h, double snow_mm_per_h, double duration_s,
                     const GroundCoverOptions& options);
 
-// A map of water and snow at one time. Texel (column, row) is the rectangle of texel_x_m by texel_y_m whose
-// south-western corner is at (x_m + column texel_x_m, y_m + row texel_y_m); rows from south to north, x
-// fastest.
-struct GroundCoverMap {
-    double x_m = 0, y_m = 0;  // south-western corner, world
-    double texel_x_m = 1, texel_y_m = 1;
-    int columns = 0, rows = 0;
-    std::vector<float> water_mm, snow_mm;  // columns * rows
-    std::vector<float> rain_mm_per_h;      // precipitation that reaches the ground now, rain or snow
-    GroundFilm outside;                    // film on all ground beyond the map
-    double outside_rain_mm_per_h = 0;      // mean of rain_mm_per_h over the outermost texels
+// A map of water and snow at one time; each vector has columns * rows values >= 0.
+struct GroundCoverMap : GroundTexels {
+    std::vector<float> water_mm, snow_mm;
+    std::vector<float> rain_mm_per_h;  // precipitation that reaches the ground now, rain or snow
     bool operator==(const GroundCoverMap&) const = default;
 };
 

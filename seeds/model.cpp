@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/trigonometry.h"
+#include "core/math.h"
 #include "seeds/checks.h"
 #include "seeds/draw.h"
 

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "core/smoothstep.h"
-#include "core/trigonometry.h"
+#include "core/math.h"
 #include "seeds/checks.h"
 
 namespace nephos {
@@ -18,12 +17,6 @@ double edge_falloff(double radius, double edge) {
     if (radius >= 1) return 0;
     if (radius <= 1 - edge) return 1;
     return smooth_blend((1 - radius) / edge);
-}
-
-void check_probabilities(const std::string& what, const Probabilities& p) {
-    require_in(what + ": p_hum", p.hum, 0, 1);
-    require_in(what + ": p_act", p.act, 0, 1);
-    require_in(what + ": p_ext", p.ext, 0, 1);
 }
 
 }  // namespace
@@ -76,8 +69,8 @@ void check(const HumidColumn& column) {
     }
     require_in(where + ": strength", column.strength, 0, 1);
     require_positive(where + ": full intensity (mm/h)", column.full_intensity_mm_per_h);
-    check_probabilities(where, column.centre);
-    check_probabilities(where, column.rim);
+    require_probabilities(where, column.centre);
+    require_probabilities(where, column.rim);
 }
 
 std::vector<RainArea> placed_areas(std::span<const PlacedRain> rains, double time_s,

@@ -257,10 +257,10 @@ std::vector<int> RainFinder::match(const std::vector<RainPatch>& patches) const 
 
 void RainFinder::follow(const std::vector<RainPatch>& patches, const std::vector<int>& track_of,
                         double elapsed_s) {
-    const auto share = [&](double constant_s) {
+    const auto fraction = [&](double constant_s) {
         return constant_s > 0 ? elapsed_s / (constant_s + elapsed_s) : 1.0;
     };
-    const double follow = share(options_.respond_s), fade = share(options_.fade_s);
+    const double follow = fraction(options_.respond_s), fade = fraction(options_.fade_s);
     std::vector<bool> found(tracks_.size(), false);
     for (std::size_t p = 0; p < patches.size(); ++p) {
         const RainPatch& patch = patches[p];

@@ -210,10 +210,10 @@ void SkySimulation::dissolve(std::size_t number) {
 }
 
 std::size_t SkySimulation::draw_sky(std::uint32_t word) const {
-    const SkyShares shares = shares_at(options_.skies, state());
-    const bool lower = unit_interval(word) < shares.lower_share;
-    const std::size_t drawn = lower ? shares.lower : shares.upper,
-                      other = lower ? shares.upper : shares.lower;
+    const SkyShares proportions = shares_at(options_.skies, state());
+    const bool lower = unit_interval(word) < proportions.lower_fraction;
+    const std::size_t drawn = lower ? proportions.lower : proportions.upper,
+                      other = lower ? proportions.upper : proportions.lower;
     return options_.skies[drawn].models.empty() ? other : drawn;
 }
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/vec.h"
-#include "simulation/sky_picture.h"
+#include "render/options/camera.h"
 
 namespace nephos {
 namespace {
@@ -130,9 +130,11 @@ std::vector<WorldLine> debug_lines(const SkySimulation& sky, std::span<const Sky
     const DebugView& view = options.debug_view;
     std::vector<WorldLine> out;
     if (!view.any()) return out;
-    const Frustum frustum = frustum_of(options.camera);
+    const CameraFrame camera = camera_frame(options.camera);
+    const Frustum frustum(camera);
     for (const SkyCloud& cloud : clouds) {
-        if (!may_see(frustum, sky.sphere(cloud))) continue;
+        const Sphere sphere = sky.sphere(cloud);
+        if (!frustum.may_see(sphere.centre_m - camera.position_m, sphere.radius_m)) continue;
         CloudLines lines(sky.shape(cloud), sky.model(cloud), sky.position_m(cloud), out);
         if (view.boxes) lines.boxes();
         if (view.rays) lines.rays(light);

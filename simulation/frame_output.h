@@ -39,7 +39,7 @@ class FrameOutput {
     // Error(gpu) when pictures are wanted and the device that is asked for is not there.
     FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&)> done);
 
-    // As those of Renderer; empty without pictures.
+    // Return what Renderer's do; empty without pictures.
     std::string backend_name() const;
     std::string device_name() const;
 

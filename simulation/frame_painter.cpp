@@ -11,6 +11,7 @@
 #include "core/wind.h"
 #include "density/veil.h"
 #include "scenes/format/layers.h"
+#include "simulation/frame_detail.h"
 #include "simulation/memory.h"
 
 namespace nephos {
@@ -43,23 +44,12 @@ void lean(RainCurtain& curtain, const Wind& wind, const PrecipitationOptions& p,
 FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
     : scene_(scene), renderer_(device) {}
 
-void FramePainter::add_detail(const DensityGrid& density, const DetailOptions& detail, const Wind& wind,
-                              double time_s, std::size_t first, std::size_t count,
+void FramePainter::add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
+                              std::optional<std::size_t> layer, double time_s, std::size_t first, std::size_t count,
                               std::vector<DetailedVoxels>& to) const {
-    if (!detail.enabled || count == 0) return;
-    // The wind in the middle of the lattice carries all detail alike.
-    const Placement& placement = density.placement();
-    const double height = placement.origin_m.z + 0.5 * density.extent().z * placement.cell_size_m;
-    DetailedVoxels& part = to.emplace_back();
-    part.density = density;
-    part.detail = detail;
-    part.metaball_radius_cells = scene_.density.metaball_radius_cells;
-    part.drift_m = wind_displacement_m(wind, height, time_s);
-    const Velocity now = wind_at(wind, height, time_s);
-    const double speed = std::hypot(now.east_m_per_s, now.north_m_per_s);
-    if (speed > 0) part.along = Vec2(now.east_m_per_s, now.north_m_per_s) / speed;
-    part.first = first;
-    part.count = count;
+    const DetailSetting setting = detail_setting(scene_, layer, density, time_s);
+    if (!setting.options.enabled || count == 0) return;
+    to.push_back({.density = density, .moisture = moisture, .setting = setting, .first = first, .count = count});
 }
 
 // The metaballs of every lattice, each with the size of its own cells.
@@ -75,8 +65,7 @@ std::vector<Metaball> FramePainter::metaballs_of(const FrameResult& frame,
                                     : scene_.name + ": drawing its voxels");
     if (!of_layers) {
         std::vector<Metaball> balls = metaballs(frame.density, radius);
-        add_detail(frame.density, scene_.density.detail, common_wind(scene_), frame.time_s, 0, balls.size(),
-                   detailed);
+        add_detail(frame.density, frame.moisture, std::nullopt, frame.time_s, 0, balls.size(), detailed);
         return balls;
     }
     std::vector<Metaball> balls;
@@ -84,9 +73,7 @@ std::vector<Metaball> FramePainter::metaballs_of(const FrameResult& frame,
         const LayerFrame& layer = frame.layers[n];
         if (layer.direct) continue;
         const std::vector<Metaball> more = metaballs(layer.density, radius);
-        if (!scene_.layers[n].is_veil)
-            add_detail(layer.density, scene_.density.detail, layer_wind(scene_, n), frame.time_s, balls.size(),
-                       more.size(), detailed);
+        add_detail(layer.density, layer.moisture, n, frame.time_s, balls.size(), more.size(), detailed);
         balls.insert(balls.end(), more.begin(), more.end());
     }
     return balls;
@@ -104,7 +91,7 @@ PendingFrame FramePainter::begin(FrameResult frame) {
     std::optional<GroundCoverView> ground;
     if (frame.ground) ground = view_of(*frame.ground);
     std::optional<FilmFrame> film;
-    if (frame.number > 0) film = FilmFrame{frame.number - 1, scene_.frames, scene_.render.sun};
+    if (frame.number > 0) film = FilmFrame{frame.number - 1, &scene_.frames, &scene_.render.sun};
     PendingSkyPicture picture =
         painter_.begin(renderer_, cloud, layers, scene_.render, frame.time_s, scene_.frames.exr, ground,
                        weather_of(scene_, frame.layers, frame.time_s), film);

@@ -10,6 +10,7 @@
 // or snow, what lies on the ground, lightning, and the debug view, as scene.render asks for them and as camera
 // and sun stand at the frame's time.
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,7 +32,7 @@ struct PendingFrame {
     std::vector<DetailedVoxels> detailed;  // of these
     PendingSkyPicture picture;
 
-    // Whether a device is still drawing it, as far as is known.
+    // Returns true while a device is drawing it, as far as is known.
     bool is_pending() const { return picture.picture.is_pending(); }
 };
 
@@ -46,12 +47,13 @@ class FramePainter {
     // Renderer::draw_splats(), and Error(usage) when the frame does not fit into memory.
     Picture draw(const FrameResult& frame);
 
-    // The same in two steps, as Renderer::begin() and finish(). Pictures are finished in the order in which they
+    // Draw in two steps, as Renderer::begin() and finish(). Pictures are finished in the order in which they
     // were begun.
     PendingFrame begin(FrameResult frame);
     Picture finish(PendingFrame&& pending);
 
-    // As those of Renderer. They never change: any thread may call these three while another draws.
+    const Renderer& renderer() const { return renderer_; }
+    // Return what Renderer's do. They never change: any thread may call these three while another draws.
     std::string backend_name() const { return renderer_.backend_name(); }
     std::string device_name() const { return renderer_.device_name(); }
     // Adds back-end and device to the metadata of a picture that this painter drew.
@@ -59,9 +61,10 @@ class FramePainter {
 
   private:
     std::vector<Metaball> metaballs_of(const FrameResult& frame, std::vector<DetailedVoxels>& detailed) const;
-    // Adds the voxels of metaballs from `first` on, whose air moves with `wind`.
-    void add_detail(const DensityGrid& density, const DetailOptions& detail, const Wind& wind, double time_s,
-                    std::size_t first, std::size_t count, std::vector<DetailedVoxels>& to) const;
+    // Adds the voxels of metaballs from `first` on.
+    void add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
+                    std::optional<std::size_t> layer, double time_s, std::size_t first, std::size_t count,
+                    std::vector<DetailedVoxels>& to) const;
 
     Scene scene_;
     Renderer renderer_;

@@ -6,8 +6,11 @@
 
 #include "core/random.h"
 #include "density/combine.h"
+#include "density/metaballs.h"
+#include "scenes/format/layers.h"
 #include "scenes/format/writer.h"
-#include "simulation/version.h"
+#include "simulation/frame_detail.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 
@@ -30,9 +33,17 @@ VdbMetadata density_metadata(const Scene& scene, std::string scene_hash, double 
     return metadata;
 }
 
-DensityGrid FrameWriter::refined(const DensityGrid& density, const Boundaries& boundaries) const {
+DensityGrid FrameWriter::refined(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
+                                 std::optional<std::size_t> layer, const Boundaries& boundaries,
+                                 double time_s) const {
     const DensityOptions& options = scene_.density;
     if (options.refine == 1) return density;
+    DetailSetting setting = detail_setting(scene_, layer, density, time_s);
+    if (setting.options.enabled) {
+        setting.boundaries = boundaries;
+        const CoverageField field(density, setting, moisture ? &*moisture : nullptr);
+        return resample_with_detail(field, density.extent(), density.placement(), options.refine);
+    }
     return resample(density, options.refine, options.metaball_radius_cells, boundaries);
 }
 
@@ -45,7 +56,8 @@ void FrameWriter::write_density(const FrameResult& frame) const {
         write_layers(frame);
         return;
     }
-    const DensityGrid written = refined(frame.density, scene_.automaton.boundaries);
+    const DensityGrid written = 
+        refined(frame.density, frame.moisture, std::nullopt, scene_.automaton.boundaries, frame.time_s);
     VdbContent content;
     content.density = &written;
     content.half = scene_.density.half;
@@ -64,7 +76,7 @@ void FrameWriter::write_layers(const FrameResult& frame) const {
     for (std::size_t n = 0; n < frame.layers.size(); ++n) {
         const LayerFrame& layer = frame.layers[n];
         if (layer.direct) continue;
-        grids.push_back(refined(layer.density, layer.boundaries));
+        grids.push_back(refined(layer.density, layer.moisture, n, layer.boundaries, frame.time_s));
         boundaries.push_back(layer.boundaries);
         VdbContent content;
         content.density = &grids.back();

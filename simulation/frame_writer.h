@@ -30,7 +30,8 @@ class FrameWriter {
 
   private:
     void write_layers(const FrameResult& frame) const;
-    DensityGrid refined(const DensityGrid& density, const Boundaries& boundaries) const;
+    DensityGrid refined(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
+                        std::optional<std::size_t> layer, const Boundaries& boundaries, double time_s) const;
     VdbMetadata metadata_of(const FrameResult& frame, const StateHash& hash) const;
 
     Scene scene_;

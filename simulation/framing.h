@@ -16,7 +16,7 @@ struct WorldBox {
     Vec3 min_m{}, max_m{};
 };
 
-// Box around the voxels above 0; the whole grid when there is none.
+// Returns the box around the voxels above 0; the whole grid when there is none.
 WorldBox cloud_box(const DensityGrid& grid);
 
 enum class View {

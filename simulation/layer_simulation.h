@@ -37,7 +37,7 @@ enum class LayerParts { all, weather };
 
 class LayerSimulation {
   public:
-    // At step 0; `layer` < lattice_count(scene). With `initial` the automaton starts from it. Throws as
+    // Starts at step 0; `layer` < lattice_count(scene). With `initial` the automaton starts from it. Throws as
     // Automaton and SkySimulation.
     LayerSimulation(const Scene& scene, std::size_t layer, std::optional<Lattice> initial = {},
                     LayerParts parts = LayerParts::all);
@@ -49,21 +49,21 @@ class LayerSimulation {
     const Automaton* automaton() const { return automaton_ ? &*automaton_ : nullptr; }
     const SkySimulation* sky() const { return sky_ ? &*sky_ : nullptr; }
     double opacity() const { return options_.opacity; }
-    // Whether the layer is a veil; its density at any time, times the opacity, does not depend on steps.
+    // Returns true for a veil; its density at any time, times the opacity, does not depend on steps.
     bool is_veil() const { return options_.is_veil; }
     DensityGrid veil_at(double time_s) const;
-    // Whether there is a density, and the box that it fills.
+    // Return whether there is a density, and the box that it fills.
     bool has_density() const { return options_.automaton || options_.is_veil; }
     GridBox box() const;
-    // What lies beyond the box of its density; a veil ends at its sides.
+    // Returns what lies beyond the box of its density; a veil ends at its sides.
     Boundaries boundaries() const;
-    // Rain areas now: placed, attached, found.
+    // Returns the rain areas now: placed, attached, found.
     std::vector<RainArea> rain() const;
-    // Of the automaton's planes; without automaton of the sky's saved state; of a veil, XXH3-128 of what
+    // Returns the hash of the automaton's planes; without automaton of the sky's saved state; of a veil, XXH3-128 of what
     // decides its density: the layer as canonical scene text with its seed, and the step.
     StateHash hash() const;
 
-    // The complete state; `restore` throws Error(io) on bytes that no layer of this scene wrote.
+    // Serialise and restore the complete state; `restore` throws Error(io) on bytes that no layer of this scene wrote.
     std::vector<std::byte> save() const;
     void restore(std::span<const std::byte> bytes);
 
@@ -84,7 +84,7 @@ class LayerSimulation {
     std::optional<RainFinder> finder_;
 };
 
-// Every layer of a scene at step 0. `initial` only for a scene without layers.
+// Makes every layer of a scene at step 0. `initial` only for a scene without layers.
 std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial = {},
                                          LayerParts parts = LayerParts::all);
 
@@ -104,7 +104,7 @@ SimulationStart simulation_start(const Scene& scene);
 std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string& scene_file,
                                           const std::string& from);
 
-// The hash of a state of all layers: that of the only one, otherwise XXH3-128 of theirs in order.
+// Returns the hash of a state of all layers: that of the only one, otherwise XXH3-128 of theirs in order.
 StateHash combined_hash(std::span<const StateHash> hashes);
 StateHash combined_hash(std::span<const LayerSimulation> layers);
 

@@ -12,10 +12,10 @@
 #include "core/atomic_file.h"
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/math.h"
 #include "core/random.h"
-#include "core/trigonometry.h"
 #include "density/combine.h"
-#include "simulation/version.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {

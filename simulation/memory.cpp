@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "simulation/frame_output.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {
@@ -27,11 +28,14 @@ constexpr double kGrids = 3;              // two steps and the frame between the
 constexpr double kBytesPerVoxel = 4.5;    // a float, and the masks and nodes of the tree above it
 constexpr double kBytesPerVelocity = 13;  // three floats and the same
 constexpr double kBytesPerBits = 1;       // hum, act and cld with their masks and nodes
-constexpr double kPlannedCover = 0.5;     // share of voxels that are metaballs
+constexpr double kPlannedCover = 0.5;     // fraction of voxels that are metaballs
 // Itself twice, its colour, its keys while sorting, on the device too.
 constexpr double kBytesPerMetaball = 84;
 constexpr double kBytesPerPixel = 96;  // layers of the picture on both sides, and the files being written
 constexpr double kBytesPerShadowTexel = 16;
+// ffmpeg with the threads and options of render/image/video.cpp, measured from 640x360 to 1920x1080.
+constexpr double kBytesPerPixelEncoded = 240;
+constexpr std::size_t kEncoder = std::size_t(64) << 20;
 constexpr double kBytesPerPictureWritten = 20;  // a pixel of Picture: colour, transmittance, depth
 
 std::size_t saturated(double bytes) { return bytes < double(kUnlimited) ? std::size_t(bytes) : kUnlimited; }
@@ -89,7 +93,7 @@ MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& latt
     // With the state written, hum and act are remembered beside cld. A checkpoint holds the planes and that
     // history as bytes: gathered in a growing buffer, and copied once into the file's content.
     const double plane = double(BitPlane::bytes(lattice.extent));
-    const double history = window * (scene.density.write_state ? 3 : 1) * plane;
+    const double history = window * (remembers_whole_state(scene) ? 3 : 1) * plane;
     const double planes_under_way = scene.density.write_state ? under_way * 3 * plane : 0;
     const double checkpoint = kCheckpointCopies * (3 * plane + history);
     MemoryEstimate estimate;
@@ -149,7 +153,8 @@ double mirror_bytes(const Scene& scene, double pixels) {
 MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
     MemoryEstimate estimate;
     estimate.program = kProgram;
-    const bool frames = parts != RunParts::statistics, pictures = parts == RunParts::pictures;
+    const bool frames = parts != RunParts::statistics;
+    const bool pictures = parts == RunParts::pictures && wants_pictures(scene);
     const double under_way =
         (frames ? double(kFramesWritten) : 0) + (pictures ? double(kFramesDrawn + kFramesPrepared) : 0);
     double cells = 0;
@@ -174,6 +179,8 @@ MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
         saturated(metaballs * kBytesPerMetaball + pixels * kBytesPerPixel + texels * kBytesPerShadowTexel +
                   mirror_bytes(scene, pixels) +
                   double(kFramesWritten) * (pixels * kBytesPerPictureWritten + texels * sizeof(float)));
+    if (wants_video(scene))
+        estimate.pictures = sum(estimate.pictures, kEncoder + saturated(pixels * kBytesPerPixelEncoded));
     return estimate;
 }
 

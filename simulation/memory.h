@@ -28,13 +28,13 @@ struct MemoryEstimate {
     std::size_t automaton = 0;  // planes of bits and the work areas beside them
     // Planes of the time window, grids of two steps, of frames in flight to the files, and as written.
     std::size_t density = 0;
-    std::size_t pictures = 0;  // metaballs, picture and shadow map; 0 without pictures
+    std::size_t pictures = 0;  // metaballs, picture, shadow map and ffmpeg; 0 without pictures
     std::size_t total() const;
 };
 
 MemoryEstimate memory_estimate(const Scene& scene, RunParts parts = RunParts::pictures);
 
-// memory_estimate().total()
+// Returns memory_estimate().total().
 std::size_t memory_estimate_bytes(const Scene& scene, RunParts parts = RunParts::pictures);
 
 // Throws Error(usage) that names both figures, the largest part and the keys that it depends on, when the

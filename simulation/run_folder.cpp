@@ -14,7 +14,6 @@
 #include "render/image/video.h"
 #include "scenes/format/writer.h"
 #include "simulation/earlier_run.h"
-#include "simulation/folder_lock.h"
 #include "simulation/frame_output.h"
 #include "simulation/manifest.h"
 #include "simulation/statistics_file.h"
@@ -274,9 +273,13 @@ std::filesystem::path RunFolder::picture(int frame, std::string_view extension) 
 
 std::filesystem::path RunFolder::video() const { return folder / "frames" / (name + ".mp4"); }
 
-bool wants_png(const Scene& scene) { return scene.frames.png || scene.frames.video; }
-bool wants_pictures(const Scene& scene) { return wants_png(scene) || scene.frames.exr; }
-bool wants_video(const Scene& scene) { return scene.frames.video; }
+bool wants_png(const Scene& scene) {
+    return scene.frames.enabled && (scene.frames.png || scene.frames.video);
+}
+bool wants_pictures(const Scene& scene) {
+    return wants_png(scene) || (scene.frames.enabled && scene.frames.exr);
+}
+bool wants_video(const Scene& scene) { return scene.frames.enabled && scene.frames.video; }
 
 RunSettings run_settings(Scene scene, const std::string& scene_file) {
     RunSettings settings;

@@ -101,7 +101,7 @@ struct RunReport {
     std::vector<RunFiles> files;
 };
 
-// What a run of this scene with pictures writes of them: PNG files, for themselves or beside the video; any, which
+// Return what a run of this scene with pictures writes of them: PNG files, for themselves or beside the video; any, which
 // takes a back-end; a video, which takes the ffmpeg command.
 bool wants_png(const Scene& scene);
 bool wants_pictures(const Scene& scene);

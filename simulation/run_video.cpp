@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/run_video.h"
 
+#include <tbb/global_control.h>
+
 #include "core/error.h"
 
 namespace nephos {
@@ -18,6 +20,8 @@ void RunVideo::write(const Rgb8Image& image) {
         options.width = image.width;
         options.height = image.height;
         options.frames_per_second = frames_per_second_;
+        using Control = tbb::global_control;  // as many processors as threads of ours
+        options.processors = int(Control::active_value(Control::max_allowed_parallelism));
         writer_.emplace(folder_.video(), options);
     }
     writer_->add(image.rgb);

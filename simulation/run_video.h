@@ -14,7 +14,7 @@ namespace nephos {
 
 class RunVideo {
   public:
-    // Of the frames of the range. ffmpeg is started with the first of them.
+    // Begins with the frames of the range. ffmpeg is started with the first of them.
     explicit RunVideo(const RunSettings& settings);
 
     // Takes the picture of a frame that has been drawn; frames come in order. A failure ends the video and not the

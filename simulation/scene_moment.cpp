@@ -53,6 +53,7 @@ SceneMoment::SceneMoment(const Scene& scene, double time_s) {
     }
     require_memory(bytes, scene.name + ": the lattices that rain is looked for in");
     Scene moment = scene;
+    moment.frames.enabled = true;
     moment.frames.start_s = time_s;
     moment.frames.count = 1;
     moment.steps = steps_up_to(moment_of_frame(moment, 0));

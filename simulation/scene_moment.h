@@ -20,7 +20,7 @@ class SceneMoment {
     SceneMoment(const SceneMoment&) = delete;
     SceneMoment& operator=(const SceneMoment&) = delete;
 
-    // A frame without density; it stays valid while this object lives. Its number is that of the scene's frame
+    // Returns a frame without density; it stays valid while this object lives. Its number is that of the scene's frame
     // at that time, 0 where there is none.
     const FrameResult& frame() const { return frame_; }
 

@@ -84,6 +84,8 @@ CloudStatistics no_automaton() {
 
 }  // namespace
 
+std::string version() { return NEPHOS_VERSION; }
+
 SimulationRange full_range(const Scene& scene) { return {scene.steps, 1, frame_count(scene)}; }
 
 SimulationRange range_of_frames(const Scene& scene, int first, int last) {
@@ -167,7 +169,8 @@ bool Simulation::density_is_due(std::uint64_t step) const { return steps_taken()
 // The lowest step whose density a result still needs, also one of a longer range: all frames that the scene's
 // steps hold are then followed by more.
 std::uint64_t Simulation::lowest_needed() const {
-    const bool frames_follow = scene_.frames.count == 0 && range_ == full_range(scene_);
+    const bool frames_follow =
+        scene_.frames.enabled && scene_.frames.count == 0 && range_ == full_range(scene_);
     std::uint64_t lowest = next_step_;
     if (next_frame_ <= range_.last_frame || (frames_follow && next_frame_ <= kMaxFrames))
         lowest = std::min(lowest, moment_of_number(next_frame_).step);
@@ -235,11 +238,46 @@ DensityGrid Simulation::density_at(std::size_t layer, const Moment& moment) {
     return mix(before, densities_at_step(moment.step + 1)[layer], moment.fraction);
 }
 
+// The same window in time as the density, and a wider one in space: growth belongs to parts of a cloud, not to cells.
+DensityGrid Simulation::moisture_of(std::size_t layer, std::uint64_t step) {
+    densities_at_step(step);
+    const auto known = std::ranges::find(densities_, step, &Densities::step);
+    std::optional<DensityGrid>& moisture = known->moisture[layer];
+    if (moisture) return *moisture;
+    const std::uint64_t reach = window();
+    std::vector<BitPlane> moist;
+    std::vector<int> offsets;
+    for (std::uint64_t at = step > reach ? step - reach : 0; at <= step + reach; ++at) {
+        const Lattice& planes = *past(at).layers[layer].planes;
+        BitPlane& to = moist.emplace_back(planes.hum.extent());
+        for (std::size_t n = 0; n < to.words().size(); ++n)
+            to.words()[n] = planes.hum.words()[n] | planes.act.words()[n];
+        offsets.push_back(int(std::int64_t(at) - std::int64_t(step)));
+    }
+    std::vector<TimedPlane> planes;
+    for (std::size_t n = 0; n < moist.size(); ++n) planes.push_back({moist[n].view(), offsets[n]});
+    SmoothingOptions wider = scene_.density.smoothing;
+    wider.i0 = std::max(wider.i0, 3);
+    wider.j0 = std::max(wider.j0, 3);
+    wider.k0 = std::max(wider.k0, 2);
+    const AutomatonOptions& lattice = layers_[layer].automaton()->options();
+    moisture = smooth(planes, wider, lattice.placement, lattice.boundaries);
+    return *moisture;
+}
+
+std::optional<DensityGrid> Simulation::moisture_at(std::size_t layer, const Moment& moment) {
+    if (!scene_.density.detail.enabled || !remembers_planes(layer)) return std::nullopt;
+    DensityGrid before = moisture_of(layer, moment.step);
+    if (moment.fraction == 0) return before;
+    return mix(before, moisture_of(layer, moment.step + 1), moment.fraction);
+}
+
 // A layer at a moment between two steps.
 LayerFrame Simulation::layer_frame(std::size_t layer, const Moment& moment) {
     LayerFrame frame;
     frame.name = layers_[layer].name();
     if (makes_density(layer)) frame.density = density_at(layer, moment);
+    frame.moisture = moisture_at(layer, moment);
     frame.boundaries = layers_[layer].boundaries();
     const PastLayer& state = past(moment.step).layers[layer];
     frame.hash = state.hash;
@@ -291,6 +329,7 @@ void Simulation::report_frame(SimulationSink& sink) {
         result.act = result.layers.front().act;
         result.cld = result.layers.front().cld;
         result.planes = result.layers.front().planes;
+        result.moisture = result.layers.front().moisture;
         result.layers.clear();
     }
     sink.frame(result);
@@ -310,7 +349,7 @@ Simulation::PastLayer Simulation::past_of(std::size_t number) const {
     }
     if (remembers_planes(number)) {
         planes.cld = copy_of(layer.automaton()->cld());
-        if (scene_.density.write_state) {
+        if (remembers_whole_state(scene_)) {
             planes.hum = copy_of(layer.automaton()->hum());
             planes.act = copy_of(layer.automaton()->act());
         }
@@ -382,9 +421,10 @@ const std::vector<DensityGrid>& Simulation::densities_at_step(std::uint64_t step
     for (const Densities& known : densities_) {
         if (known.step == step) return known.layers;
     }
-    Densities made{step, {}};
+    Densities made{step, {}, {}};
     for (std::size_t n = 0; n < layers_.size(); ++n)
         made.layers.push_back(makes_density(n) ? density_of(n, step) : DensityGrid());
+    made.moisture.resize(layers_.size());
     densities_.push_back(std::move(made));
     return densities_.back().layers;
 }

@@ -34,6 +34,9 @@
 
 namespace nephos {
 
+// Returns the version of nephos: "0.1.0".
+std::string version();
+
 class ByteReader;
 
 // One layer after a step; a row of its own file of statistics.
@@ -64,6 +67,9 @@ struct LayerFrame {
     std::string name;
     DensityGrid density;    // one voxel a cell; without automaton there are no voxels
     Boundaries boundaries;  // of the density's box
+    // How much vapour and phase transition there is around each voxel, 0..1: clouds grow where there is more than in
+    // the mean, and dissolve where there is less. None without automaton, and where the scene has no detail.
+    std::optional<DensityGrid> moisture;
     StateHash hash;
     std::optional<BitPlaneView> hum, act, cld;  // as in FrameResult
     std::shared_ptr<const Lattice> planes;      // what they look at
@@ -81,6 +87,7 @@ struct FrameResult {
     int number = 1;  // as in file names, counted from 1; 0: a moment that is no frame of the scene
     double time_s = 0;
     DensityGrid density;  // one voxel a cell (not refined); of layers, all together (density/combine.h)
+    std::optional<DensityGrid> moisture;  // as in LayerFrame; a scene with layers has it in these
     std::uint64_t step =
         0;  // the last step at or before time_s, whose state the three planes and the hash are
     StateHash hash;
@@ -90,6 +97,12 @@ struct FrameResult {
     std::vector<LayerFrame> layers;                // none in a scene without layers
     std::shared_ptr<const GroundCoverMap> ground;  // at time_s; null when the scene does not ask for it
 };
+
+// Whether a simulation of the scene keeps hum and act of past states beside cld: for files, or for the growth that
+// detail shows.
+inline bool remembers_whole_state(const Scene& scene) {
+    return scene.density.write_state || scene.density.detail.enabled;
+}
 
 // Selects what a simulation computes from the states.
 enum class SimulationResults {
@@ -124,14 +137,14 @@ SimulationRange range_of_frames(const Scene& scene, int first, int last);
 
 class Simulation {
   public:
-    // Everything of the scene, from its first state on. Throws as Automaton and read_state().
+    // Simulates everything of the scene, from its first state on. Throws as Automaton and read_state().
     explicit Simulation(const Scene& scene);
-    // At step 0: from the scene's own initial state, or from `initial`. Throws as Automaton; Error(usage) when
+    // Starts at step 0: from the scene's own initial state, or from `initial`. Throws as Automaton; Error(usage) when
     // a frame of the range lies after its last step, or frames are wanted of SimulationResults::statistics.
     Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
                std::optional<Lattice> initial = {},
                SimulationResults results = SimulationResults::everything);
-    // Where `checkpoint` was saved. The range may end later than that of the simulation that saved it, with
+    // Starts where `checkpoint` was saved. The range may end later than that of the simulation that saved it, with
     // frames that follow those it had. Throws Error(usage) when the checkpoint belongs to another simulation,
     // other results, another smoothing window or another range, or does not hold the states that a longer
     // range goes on from; Error(io) when its content is damaged.
@@ -162,7 +175,7 @@ class Simulation {
         StateHash hash;
         double state = 0;
         // Never null; all are empty without an automaton or its density, hum and act unless the scene writes
-        // the state.
+        // the state or draws detail.
         std::shared_ptr<const Lattice> planes;
         std::vector<SkyCloud> clouds;
         std::vector<RainArea> rain;
@@ -177,6 +190,7 @@ class Simulation {
     struct Densities {
         std::uint64_t step = 0;
         std::vector<DensityGrid> layers;
+        std::vector<std::optional<DensityGrid>> moisture;  // of each layer, once a frame has asked for it
     };
 
     void step();
@@ -189,6 +203,8 @@ class Simulation {
     DensityGrid density_of(std::size_t layer, std::uint64_t step) const;
     double time_s(const Moment& moment) const;
     DensityGrid density_at(std::size_t layer, const Moment& moment);
+    DensityGrid moisture_of(std::size_t layer, std::uint64_t step);
+    std::optional<DensityGrid> moisture_at(std::size_t layer, const Moment& moment);
     const Past& past(std::uint64_t step) const;
     void report_step(SimulationSink& sink);
     void report_frame(SimulationSink& sink);

@@ -41,7 +41,7 @@ bool continues(const SimulationRange& before, const SimulationRange& after) {
 
 // What a history holds of each state: bit 0 for hum and act, from bit 1 on the results.
 std::uint8_t content_bits(const Scene& scene, SimulationResults results) {
-    return std::uint8_t(unsigned(scene.density.write_state) | unsigned(results) << 1);
+    return std::uint8_t(unsigned(remembers_whole_state(scene)) | unsigned(results) << 1);
 }
 
 void append_plane(std::vector<std::byte>& bytes, const BitPlane& plane) {
@@ -237,7 +237,7 @@ void Simulation::restore_history(const Checkpoint& checkpoint) {
             if (remembers_planes(layer)) {
                 const Extent& extent = layers_[layer].automaton()->options().extent;
                 planes.cld = get_plane(reader, extent);
-                if (scene_.density.write_state) {
+                if (remembers_whole_state(scene_)) {
                     planes.hum = get_plane(reader, extent);
                     planes.act = get_plane(reader, extent);
                 }

@@ -17,7 +17,6 @@
 namespace nephos {
 namespace {
 
-constexpr double kFarthest_m = 1e7;
 constexpr double kLeastFlash = 1.0 / 512;  // relative to the sun; less does not show
 
 }  // namespace
@@ -26,30 +25,7 @@ Light light_of(const Sun& sun) { return {direction_to_sun(sun), true}; }
 Light light_of(const Flash& flash) { return {flash.position_m, false}; }
 
 GroundCoverView view_of(const GroundCoverMap& map) {
-    return {map.x_m,
-            map.y_m,
-            map.texel_x_m,
-            map.texel_y_m,
-            map.columns,
-            map.rows,
-            map.water_mm,
-            map.snow_mm,
-            map.rain_mm_per_h,
-            map.outside.water_mm,
-            map.outside.snow_mm,
-            map.outside_rain_mm_per_h};
-}
-
-Frustum frustum_of(const Camera& camera) {
-    const CameraFrame frame = camera_frame(camera);
-    FrustumView view;
-    view.eye_m = camera.position_m;
-    view.forward = frame.forward;
-    view.up = frame.up;
-    view.fov_y_deg = camera.vertical_fov_deg;
-    view.aspect = double(camera.width) / camera.height;
-    view.far_m = kFarthest_m;
-    return frustum_of(view);
+    return {map, map.water_mm, map.snow_mm, map.rain_mm_per_h};
 }
 
 const SkyBillboards::ScatteredBillboards& SkyBillboards::scattered(const SkySimulation& sky,
@@ -80,7 +56,7 @@ std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<cons
         if (schedule.period() == 1) return present;
         const int frame = schedule.frame_of_light(cloud.slot, film->index);
         const auto [found, added] = earlier.try_emplace(frame);
-        if (added) found->second = light_of(sun_at(film->sun, frame_time_s(film->frames, frame)));
+        if (added) found->second = light_of(sun_at(*film->sun, frame_time_s(*film->frames, frame)));
         return found->second;
     };
     std::vector<CloudToLight> lit;
@@ -135,13 +111,16 @@ std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyC
                                   DrawnClouds& out, bool cull, const std::optional<Camera>& mirrored,
                                   const std::optional<FilmFrame>& film) {
     const std::size_t computed = light_by_sun(sky, clouds, options, film);
-    const Frustum frustum = frustum_of(options.camera);
-    const Frustum below = frustum_of(mirrored.value_or(options.camera));
+    const CameraFrame camera = camera_frame(options.camera),
+                      mirror = camera_frame(mirrored.value_or(options.camera));
+    const Frustum frustum(camera), below(mirror);
     std::vector<const SkyCloud*> seen;
     for (const SkyCloud& cloud : clouds) {
-        Sphere sphere = sky.sphere(cloud);
-        sphere.radius_m += scattered(sky, cloud).reach_m;
-        if (!cull || may_see(frustum, sphere) || may_see(below, sphere)) seen.push_back(&cloud);
+        const Sphere sphere = sky.sphere(cloud);
+        const double radius_m = sphere.radius_m + scattered(sky, cloud).reach_m;
+        if (!cull || frustum.may_see(sphere.centre_m - camera.position_m, radius_m) ||
+            below.may_see(sphere.centre_m - mirror.position_m, radius_m))
+            seen.push_back(&cloud);
     }
     if (flash) light_by_flash(sky, *flash, seen);
     std::size_t billboards = out.billboards.size();

@@ -33,11 +33,11 @@ struct DrawnClouds {
 };
 
 // A frame of a film. With options.light.cfa_clouds_per_frame, clouds keep the sun of earlier frames in turn
-// (seeds/light_schedule.h), and these are the frames.
+// (seeds/light_schedule.h), and these are the frames. Refers to the scene, which must outlive the call.
 struct FilmFrame {
-    int index = 0;  // from 0
-    FrameOptions frames;
-    Sun sun;  // before sun_at()
+    int index = 0;                         // from 0
+    const FrameOptions* frames = nullptr;  // not null
+    const Sun* sun = nullptr;              // not null; before sun_at()
 };
 
 class SkyBillboards {
@@ -53,7 +53,7 @@ class SkyBillboards {
                        bool cull = true, const std::optional<Camera>& mirrored = {},
                        const std::optional<FilmFrame>& film = {});
 
-    // Absorbed sunlight of a cloud's boxes as it was used last; empty before the first append().
+    // Returns the absorbed sunlight of a cloud's boxes as it was used last; empty before the first append().
     std::span<const double> sun_absorbed(const SkyCloud& cloud) const { return sun_.absorbed(cloud.serial); }
 
   private:
@@ -94,7 +94,7 @@ struct PendingSkyPicture {
 // Draws pictures of skies, one after the other: keeps what they have in common. Not thread-safe.
 class SkyPainter {
   public:
-    // Voxel clouds, the billboards of layers, the lightning of options.lightning that burns at `time_s`, what
+    // Draws voxel clouds, the billboards of layers, the lightning of options.lightning that burns at `time_s`, what
     // lies on the ground, and the debug view over it, as the camera is at that time; over all of it the rain
     // of `weather`, where options.precipitation is enabled. Every call has the same layers in the same order.
     // A picture depends on these arguments alone; one that is no frame of a `film` has all its clouds in the
@@ -105,7 +105,7 @@ class SkyPainter {
                  const std::optional<GroundCoverView>& ground_cover = {}, const Weather& weather = {},
                  const std::optional<FilmFrame>& film = {});
 
-    // The same in two steps, as Renderer::begin() and finish(): voxels and ground cover must stay as they are
+    // Draw in two steps, as Renderer::begin() and finish(): voxels and ground cover must stay as they are
     // until the second. Pictures are finished in the order in which they were begun.
     PendingSkyPicture begin(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                             const RenderOptions& options, double time_s, bool depth = true,
@@ -118,14 +118,11 @@ class SkyPainter {
     PrecipitationPainter precipitation_;
 };
 
-// The light of the sun, or of a flash, as the absorption factor takes it.
+// Return the light of the sun, or of a flash, as the absorption factor takes it.
 Light light_of(const Sun& sun);
 Light light_of(const Flash& flash);
 
-// A map as the renderer reads it; it must outlive the view.
+// Returns a map as the renderer reads it; it must outlive the view.
 GroundCoverView view_of(const GroundCoverMap& map);
-
-// What the camera of a picture sees.
-Frustum frustum_of(const Camera& camera);
 
 }  // namespace nephos

@@ -28,7 +28,7 @@ namespace nephos {
 template <typename Job>
 class Stage {
   public:
-    // At most `bound` jobs, at least 1, are in the stage: the one that is being done and those that wait.
+    // Makes a stage of at most `bound` jobs, at least 1: the one that is being done and those that wait.
     // Without `beside` there is no thread: add() does the job itself.
     Stage(std::size_t bound, bool beside, std::function<void(Job&)> work)
         : bound_(bound), work_(std::move(work)) {
@@ -61,7 +61,7 @@ class Stage {
         changed_.notify_all();
     }
 
-    // Whether a job waits to be done, or for a place in the stage: for the work, which may leave something
+    // Returns true when a job waits to be done, or for a place in the stage: for the work, which may leave something
     // undone that the next job does with less effort.
     bool is_awaited() {
         if (!thread_.joinable()) return false;  // add() does the job

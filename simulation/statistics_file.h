@@ -24,7 +24,7 @@ inline constexpr std::string_view kLayerStatisticsHeader =
     "step,time_s,state,clouds,rain_areas,rain_mm_per_h,hum,act,cld,cloud_cover,base_m,top_m,mean_density,"
     "hash\n";
 
-// A row with its newline.
+// Returns a row with its newline.
 std::string statistics_row(const StepResult& result);
 std::string statistics_row(const StepResult& result, const LayerStep& layer);
 
@@ -38,23 +38,23 @@ using StatisticsVisitor =
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
                               const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
 
-// Whether a file begins with the header; false also when it cannot be read.
+// Returns true when a file begins with the header; false also when it cannot be read.
 bool is_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
 
 // The file while a run appends to it. It holds whole rows at any moment, except while rows are being written:
 // then a power cut may leave a part of them, which resume() takes away.
 class StatisticsFile {
   public:
-    // A file with the header alone, in the place of any other. Throws Error(io).
+    // Creates a file with the header alone, in the place of any other. Throws Error(io).
     static StatisticsFile create(const std::filesystem::path& path,
                                  std::string_view header = kStatisticsHeader);
-    // The file as read_statistics() has checked it, later rows cut off. Throws Error(io).
+    // Opens the file as read_statistics() has checked it, later rows cut off. Throws Error(io).
     static StatisticsFile resume(const std::filesystem::path& path, std::uint64_t steps,
                                  const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
 
     // Keeps a row for the next save(), or writes out what has gathered. Throws Error(io).
     void add(std::string_view row);
-    // When it returns, all rows are in the file and on the device. Throws Error(io); the file then ends with
+    // Flushes: when it returns, all rows are in the file and on the device. Throws Error(io); the file then ends with
     // a whole row.
     void save();
 

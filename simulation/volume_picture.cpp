@@ -10,7 +10,7 @@
 #include "render/options/camera.h"
 #include "simulation/frame_painter.h"
 #include "simulation/scene_moment.h"
-#include "simulation/version.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 namespace {

@@ -48,7 +48,7 @@ struct FrameRange {
     bool operator==(const FrameRange&) const = default;
 };
 
-// Each adds its options to `command`; the struct must outlive the parse.
+// Adds options to `command`; the struct must outlive the parse.
 void add_scene_arguments(CLI::App& command, SceneArguments& arguments);  // SCENE --set --seed
 void add_scene_changes(CLI::App& command, SceneArguments& arguments);    // --set --seed
 void add_device(CLI::App& command, DeviceArguments& arguments);          // --splatting --device
@@ -56,7 +56,7 @@ void add_threads(CLI::App& command, WorkArguments& arguments);
 void add_json(CLI::App& command, WorkArguments& arguments);
 void add_quiet(CLI::App& command, WorkArguments& arguments);
 
-// An option `--name VALUE` whose value `use` takes; `use` throws Error(usage) with a message that starts with
+// Adds an option `--name VALUE` whose value `use` takes; `use` throws Error(usage) with a message that starts with
 // the value ("'abc' is not ..."), which add_value completes with the option's name.
 CLI::Option* add_value(CLI::App& command, const std::string& name, const std::string& type,
                        const std::string& description, std::function<void(const std::string&)> use);
@@ -70,13 +70,13 @@ std::vector<double> parse_reals(const std::string& text, std::size_t count, doub
 FrameRange parse_frames(const std::string& text);         // "A..B", "A..", "..B" or "A"
 std::pair<int, int> parse_size(const std::string& text);  // "WIDTHxHEIGHT"
 
-// The back-end and device of a scene, unless the command line names others.
+// Returns the back-end and device of a scene, unless the command line names others.
 DeviceOptions device_options(const DeviceArguments& arguments, const FrameOptions& frames);
 
-// The scene with its changes applied. Throws as read_scene().
+// Returns the scene with its changes applied. Throws as read_scene().
 Scene load_scene(const SceneArguments& arguments, SceneUse use = SceneUse::everything);
 
-// Every problem on standard error, "error:" in colour on a terminal.
+// Prints every problem on standard error, "error:" in colour on a terminal.
 void print_scene_errors(const SceneErrors& errors);
 
 // Says so on standard error when a scene has base models but no layer: nothing of them would be simulated.

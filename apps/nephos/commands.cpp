@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "core/random.h"
-#include "simulation/version.h"
+#include "simulation/simulation.h"
 
 namespace nephos {
 

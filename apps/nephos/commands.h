@@ -21,7 +21,7 @@ void add_hash_command(CLI::App& app, Action& action);
 void add_state_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
 
-// All of them, with --help and --version.
+// Adds all of them, with --help and --version.
 void add_commands(CLI::App& app, Action& action);
 
 // The text of --help: one page a command, wrapped to the terminal.
@@ -30,10 +30,10 @@ class HelpPage : public CLI::FormatterBase {
     std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;
 };
 
-// "-o, --out DIR" for an option, "SCENE" for a positional.
+// Returns "-o, --out DIR" for an option, "SCENE" for a positional.
 std::string option_label(const CLI::Option& option);
 
-// "nephos run SCENE [options]"
+// Returns "nephos run SCENE [options]".
 std::string usage_line(const CLI::App& app);
 
 // Completion scripts for shells, generated from the parser itself, so that they cannot drift from it.
@@ -48,7 +48,7 @@ std::string completion_script(const CLI::App& app, const std::string& shell);
 // pipe and a file-size limit appear as EPIPE and EFBIG at the write that met them.
 void install_signal_handlers();
 
-// From now on the first SIGINT or SIGTERM is only remembered; until this is called it ends the process at
+// Makes the first SIGINT or SIGTERM from now on only be remembered; until this is called it ends the process at
 // once, since there is nothing to save.
 void defer_signals();
 

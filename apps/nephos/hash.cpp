@@ -81,7 +81,7 @@ int hash(const HashArguments& a) {
                                              {"seed", std::to_string(scene.automaton.seed)},
                                              {"random_stream_version", kRandomStreamVersion},
                                              {"hashes", hashes}};
-        output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+        output.line(json_text(json));
     } else if (!a.check.empty()) {
         output.line(fmt::format("{}: steps 0 to {} agree", a.check, steps));
     }

@@ -209,7 +209,7 @@ int info(const InfoArguments& a) {
     }
     if (a.work.json) {
         const Json& all = a.files.size() == 1 ? results.front() : results;
-        output.line(all.dump(2, ' ', false, Json::error_handler_t::replace));
+        output.line(json_text(all));
     }
     return status;
 }

@@ -38,6 +38,19 @@ std::string extension_of(const std::string& path) {
     return extension;
 }
 
+// An option of one number in min..max.
+struct RealOption {
+    const char *name, *type, *text;
+    double min, max;
+};
+void add_real(CLI::App& command, const char* group, std::optional<double>& target, const RealOption& option) {
+    add_value(command, option.name, option.type, option.text,
+              [&target, min = option.min, max = option.max](const std::string& value) {
+                  target = parse_real(value, min, max);
+              })
+        ->group(group);
+}
+
 void add_picture_options(CLI::App& command, RenderArguments& a) {
     const char* group = "Picture";
     command
@@ -52,12 +65,6 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
         ->needs(command.get_option("--scene"))
         ->group(group);
-    const auto real = [&](const char* name, const char* type, const char* text, std::optional<double>& target,
-                          double min, double max) {
-        add_value(command, name, type, text, [&target, min, max](const std::string& value) {
-            target = parse_real(value, min, max);
-        })->group(group);
-    };
     add_value(command, "--size", "WxH", "Width and height in pixels (default: 1280x720)",
               [&](const std::string& text) { a.picture.size = parse_size(text); })
         ->group(group);
@@ -77,9 +84,10 @@ void add_picture_options(CLI::App& command, RenderArguments& a) {
     add_value(command, "--target", "X,Y,Z", "Point to look at in metres (default: middle of the cloud)",
               [&](const std::string& text) { a.picture.target_m = parse_point(text, -kFar_m, kFar_m); })
         ->group(group);
-    real("--fov", "DEG", "Vertical field of view, 1 to 170 degrees (default: 50)", a.picture.fov_deg, 1, 170);
-    real("--exposure", "EV", "Stops by which the PNG is brighter, -20 to 20 (default: 0)",
-         a.picture.exposure_ev, -20, 20);
+    add_real(command, group, a.picture.fov_deg,
+             {"--fov", "DEG", "Vertical field of view, 1 to 170 degrees (default: 50)", 1, 170});
+    add_real(command, group, a.picture.exposure_ev,
+             {"--exposure", "EV", "Stops by which the PNG is brighter, -20 to 20 (default: 0)", -20, 20});
     add_value(command, "--sun", "ELEV,AZIM",
               "Where the sun stands: degrees above the horizon (-18 to 90), and clockwise from north "
               "(default: 40,135)",
@@ -99,16 +107,12 @@ void add_cloud_options(CLI::App& command, RenderArguments& a) {
     command.add_option("--grid", a.read.grid, "Grid to draw (default: density, else the first float grid)")
         ->type_name("NAME")
         ->group(group);
-    const auto real = [&](const char* name, const char* type, const char* text, std::optional<double>& target,
-                          double min, double max) {
-        add_value(command, name, type, text, [&target, min, max](const std::string& value) {
-            target = parse_real(value, min, max);
-        })->group(group);
-    };
-    real("--extinction", "PER_M",
+    add_real(
+        command, group, a.picture.extinction_per_m,
+        {"--extinction", "PER_M",
          "Extinction per metre at density 1 (default: what the file says, else chosen so that the cloud is "
          "visible)",
-         a.picture.extinction_per_m, 0, 1e9);
+         0, 1e9});
     add_value(command, "--up", "AXIS",
               "Axis of the file that points up: z or y (default: what the file says, else z)",
               [&](const std::string& text) {
@@ -121,9 +125,11 @@ void add_cloud_options(CLI::App& command, RenderArguments& a) {
     add_value(command, "--scale", "M", "Metres of one unit of the file (default: 1)",
               [&](const std::string& text) { a.read.metres_per_unit = parse_real(text, 1e-9, 1e9); })
         ->group(group);
-    real("--albedo", "A", "Part of the light that is scattered and not absorbed, 0 to 1 (default: 1)",
-         a.picture.albedo, 0, 1);
-    real("--g", "G", "Forward scattering of light, -0.99 to 0.99 (default: 0.5)", a.picture.g, -0.99, 0.99);
+    add_real(
+        command, group, a.picture.albedo,
+        {"--albedo", "A", "Part of the light that is scattered and not absorbed, 0 to 1 (default: 1)", 0, 1});
+    add_real(command, group, a.picture.g,
+             {"--g", "G", "Forward scattering of light, -0.99 to 0.99 (default: 0.5)", -0.99, 0.99});
 }
 
 void check_outputs(const RenderArguments& a) {
@@ -168,7 +174,7 @@ void report(const RenderArguments& a, const LoadedDensity& loaded, const VolumeP
                                          {"extinction_per_m", drawn.extinction_per_m},
                                          {"backend", drawn.backend},
                                          {"device", drawn.device}};
-    output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    output.line(json_text(json));
 }
 
 int render(const RenderArguments& a) {

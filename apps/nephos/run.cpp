@@ -34,6 +34,10 @@ struct RunArguments {
 Scene scene_of(const RunArguments& a) {
     Scene scene = load_scene(a.scene, a.statistics_only ? SceneUse::without_frames : SceneUse::everything);
     if (!a.needs && !a.work.quiet) note_unused_models(scene);
+    if (a.video && !scene.frames.enabled)
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("--video: the scene '{}' has no frames (`frames.enabled` = false)", scene.name));
     if (a.video) scene.frames.video = true;
     return scene;
 }
@@ -148,7 +152,7 @@ void print_json(const RunReport& report) {
         {"backend", report.backend},
         {"device", report.device},
         {"files", files}};
-    Output().line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    Output().line(json_text(json));
 }
 
 int run(const RunArguments& a) {

@@ -77,7 +77,7 @@ int state(const StateArguments& a) {
         const nlohmann::ordered_json json = {
             {"file", a.out},         {"steps", steps},        {"hash", metadata.state_hash},
             {"hum", statistics.hum}, {"act", statistics.act}, {"cld", statistics.cld}};
-        output.line(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+        output.line(json_text(json));
     } else {
         output.line(fmt::format("{} {}", steps, metadata.state_hash));
     }

@@ -10,6 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "core/error.h"
 
 namespace nephos {
@@ -23,13 +25,13 @@ class Output {
   public:
     // Writes text as it is. Throws OutputClosed, or Error(io) with the reason.
     void write(std::string_view text);
-    // write() with a newline.
+    // Writes text and a newline; throws as write().
     void line(std::string_view text);
-    // Must be called before the end of the program, so that a late failure is seen; throws as write().
+    // Flushes before the end of the program, so that a late failure is seen; throws as write().
     void flush();
 };
 
-// Whether colours may be used on stdout or stderr.
+// Returns true when colours may be used on stdout or stderr.
 bool colours_on(std::FILE* stream);
 
 // Text between escape sequences (ECMA-48) when colours are on.
@@ -40,11 +42,14 @@ std::string styled(std::string_view text, Style style, bool colours);
 void print_error(std::string_view message);
 void print_error(const Error& error);  // with its place, when it has one
 void print_note(std::string_view message);
-// Text as it is on standard error; failures to write are ignored, there is nowhere left to say so.
+// Prints text as it is on standard error; failures to write are ignored, there is nowhere left to say so.
 void print_message(std::string_view text);
 
 // Columns of the terminal at `stream`, or `otherwise` when it is none.
 int terminal_width(std::FILE* stream, int otherwise);
+
+// Returns the text of a result for --json: indented; bytes that are no UTF-8 are replaced.
+std::string json_text(const nlohmann::ordered_json& json);
 
 // Seconds as "0:07", "12:34" or "1:02:03"; a count as "1,234,567".
 std::string human_duration(double seconds);
@@ -69,7 +74,7 @@ class ProgressBar {
     // Removes the line, before other messages; the next update() draws it again.
     void clear();
 
-    // The line as it would be drawn, without colours, at most `width` columns.
+    // Returns the line as it would be drawn, without colours, at most `width` columns.
     static std::string text(std::string_view unit, std::uint64_t start, std::uint64_t done,
                             std::uint64_t total, double elapsed_s, std::string_view detail, int width,
                             bool unicode);

@@ -111,7 +111,7 @@ int validate(const ValidateArguments& a) {
             results.push_back({{"file", file}, {"valid", false}, {"error", error.what()}});
         }
     }
-    if (a.work.json && !a.print) output.line(results.dump(2, ' ', false, Json::error_handler_t::replace));
+    if (a.work.json && !a.print) output.line(json_text(results));
     return unreadable ? int(ErrorCode::io) : status;
 }
 

@@ -43,15 +43,15 @@ std::string names_of(const VdbArchive& archive) {
     return names.empty() ? "none" : names;
 }
 
-std::size_t choose_grid(const VdbArchive& archive, const std::string& wanted) {
+std::size_t choose_grid(const VdbArchive& archive, const std::string& requested) {
     const auto& entries = archive.entries();
     const auto find = [&](const auto& matches) {
         return std::size_t(std::ranges::find_if(entries, matches) - entries.begin());
     };
-    const std::string name = wanted.empty() ? "density" : wanted;
+    const std::string name = requested.empty() ? "density" : requested;
     std::size_t n = find([&](const auto& e) { return e.descriptor.gridName() == name && is_fog(*e.header); });
     if (n < entries.size()) return n;
-    if (!wanted.empty()) {
+    if (!requested.empty()) {
         n = find([&](const auto& e) { return e.descriptor.gridName() == name; });
         throw std::runtime_error(n < entries.size()
                                      ? "grid `" + name + "` is not a float fog volume"
@@ -104,8 +104,8 @@ CoordBBox bounds_of(const openvdb::FloatGrid& grid, const openvdb::GridBase& hea
     return any ? active : CoordBBox(Coord(0), Coord(0));
 }
 
-bool has_y_up(const openvdb::GridBase& header, const openvdb::MetaMap& file, UpAxis wanted) {
-    if (wanted != UpAxis::automatic) return wanted == UpAxis::y;
+bool has_y_up(const openvdb::GridBase& header, const openvdb::MetaMap& file, UpAxis requested) {
+    if (requested != UpAxis::automatic) return requested == UpAxis::y;
     auto stated = meta_value<std::string>(header, kMetaUpAxis);
     if (!stated) stated = meta_value<std::string>(file, kMetaUpAxis);
     return stated == "y";

@@ -33,7 +33,7 @@ class CheckedArchive : public openvdb::io::Archive {
 };
 
 // Geometry that all grids of a file share.
-struct Frame {
+struct GridGeometry {
     Extent voxels;
     int refine = 1;       // voxels per cell and axis
     Placement placement;  // of the voxels
@@ -56,7 +56,7 @@ int refinement(Extent voxels, Extent cells) {
     return refine;
 }
 
-Frame frame_of(const VdbContent& content) {
+GridGeometry geometry_of(const VdbContent& content) {
     std::optional<Extent> cells;
     check_plane(content.hum, cells);
     check_plane(content.act, cells);
@@ -64,32 +64,33 @@ Frame frame_of(const VdbContent& content) {
     if (!content.density && !cells) throw Error(ErrorCode::usage, "nothing to write into a VDB file");
     if (content.wind && !content.density)
         throw Error(ErrorCode::usage, "`vel` in a VDB file needs a density grid");
-    Frame frame;
-    frame.voxels = content.density ? content.density->extent() : *cells;
-    if (frame.voxels.cells() == 0) throw Error(ErrorCode::usage, "a VDB file needs at least one voxel");
-    frame.placement = content.density ? content.density->placement() : content.cells;
+    GridGeometry geometry;
+    geometry.voxels = content.density ? content.density->extent() : *cells;
+    if (geometry.voxels.cells() == 0) throw Error(ErrorCode::usage, "a VDB file needs at least one voxel");
+    geometry.placement = content.density ? content.density->placement() : content.cells;
     if (content.density && cells) {
-        frame.refine = refinement(frame.voxels, *cells);
-        const double edge = frame.placement.cell_size_m * frame.refine;
-        if (!(content.cells.origin_m == frame.placement.origin_m) ||
+        geometry.refine = refinement(geometry.voxels, *cells);
+        const double edge = geometry.placement.cell_size_m * geometry.refine;
+        if (!(content.cells.origin_m == geometry.placement.origin_m) ||
             std::abs(edge - content.cells.cell_size_m) > 1e-9 * content.cells.cell_size_m) {
             throw Error(ErrorCode::usage, "a VDB file's density and planes lie at different places");
         }
     } else if (content.density && content.cells.cell_size_m > 0) {
-        const double ratio = content.cells.cell_size_m / frame.placement.cell_size_m;
-        if (ratio >= 1 && std::abs(ratio - std::round(ratio)) < 1e-9) frame.refine = int(std::round(ratio));
+        const double ratio = content.cells.cell_size_m / geometry.placement.cell_size_m;
+        if (ratio >= 1 && std::abs(ratio - std::round(ratio)) < 1e-9)
+            geometry.refine = int(std::round(ratio));
     }
-    const double size = frame.placement.cell_size_m;
-    const Vec3 o = frame.placement.origin_m;
-    frame.transform = openvdb::math::Transform::createLinearTransform(size);
-    frame.transform->postTranslate({o.x + size / 2, o.y + size / 2, o.z + size / 2});
-    return frame;
+    const double size = geometry.placement.cell_size_m;
+    const Vec3 o = geometry.placement.origin_m;
+    geometry.transform = openvdb::math::Transform::createLinearTransform(size);
+    geometry.transform->postTranslate({o.x + size / 2, o.y + size / 2, o.z + size / 2});
+    return geometry;
 }
 
-void describe(openvdb::GridBase& grid, const char* name, const Frame& frame,
+void describe(openvdb::GridBase& grid, const char* name, const GridGeometry& geometry,
               const openvdb::MetaMap& metadata) {
     grid.setName(name);
-    grid.setTransform(frame.transform->copy());
+    grid.setTransform(geometry.transform->copy());
     grid.setIsInWorldSpace(false);
     for (auto entry = metadata.beginMeta(); entry != metadata.endMeta(); ++entry) {
         grid.insertMeta(entry->first, *entry->second);
@@ -139,14 +140,14 @@ Mask refined_block_bits(const BitPlaneView& plane, int refine, int x, int y, int
     return mask;
 }
 
-openvdb::BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const Frame& frame) {
+openvdb::BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const GridGeometry& geometry) {
     auto grid = openvdb::BoolGrid::create(false);
     openvdb::tree::ValueAccessor<openvdb::BoolTree> accessor(grid->tree());
-    for (int z = 0; z < frame.voxels.z; z += kBlock) {
-        for (int y = 0; y < frame.voxels.y; y += kBlock) {
-            for (int x = 0; x < frame.voxels.x; x += kBlock) {
-                const Mask mask = frame.refine == 1 ? block_bits(plane, x, y, z)
-                                                    : refined_block_bits(plane, frame.refine, x, y, z);
+    for (int z = 0; z < geometry.voxels.z; z += kBlock) {
+        for (int y = 0; y < geometry.voxels.y; y += kBlock) {
+            for (int x = 0; x < geometry.voxels.x; x += kBlock) {
+                const Mask mask = geometry.refine == 1 ? block_bits(plane, x, y, z)
+                                                       : refined_block_bits(plane, geometry.refine, x, y, z);
                 if (mask.isOff()) continue;
                 if (mask.isOn()) {
                     accessor.addTile(1, {x, y, z}, true, true);
@@ -164,10 +165,11 @@ openvdb::BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const Frame& frame) 
 }
 
 // The wind at the height of each voxel, in every block of the density grid.
-openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const Frame& frame, double time_s) {
+openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geometry,
+                                      double time_s) {
     std::vector<openvdb::Vec3s> profile;
-    for (int k = 0; k < frame.voxels.z; ++k) {
-        const double height = frame.placement.origin_m.z + (k + 0.5) * frame.placement.cell_size_m;
+    for (int k = 0; k < geometry.voxels.z; ++k) {
+        const double height = geometry.placement.origin_m.z + (k + 0.5) * geometry.placement.cell_size_m;
         const Velocity v = wind_at(*content.wind, height, time_s);
         profile.emplace_back(float(v.east_m_per_s), float(v.north_m_per_s), 0.0f);
     }
@@ -178,7 +180,8 @@ openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const Frame& fr
         auto leaf = std::make_unique<VectorLeaf>(block.origin);
         for (int n = 0; n < kBlockVoxels; ++n) {
             const openvdb::Coord voxel = block.origin + openvdb::Coord(n >> 6, n >> 3 & 7, n & 7);
-            if (voxel.x() >= frame.voxels.x || voxel.y() >= frame.voxels.y || voxel.z() >= frame.voxels.z)
+            if (voxel.x() >= geometry.voxels.x || voxel.y() >= geometry.voxels.y ||
+                voxel.z() >= geometry.voxels.z)
                 continue;
             leaf->setValueOn(openvdb::Index(n), profile[std::size_t(voxel.z())]);
         }
@@ -187,7 +190,7 @@ openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const Frame& fr
     return grid;
 }
 
-openvdb::GridCPtrVec make_grids(const VdbContent& content, const Frame& frame,
+openvdb::GridCPtrVec make_grids(const VdbContent& content, const GridGeometry& geometry,
                                 const openvdb::MetaMap& metadata, double time_s) {
     openvdb::GridCPtrVec grids;
     if (content.density) {
@@ -196,20 +199,20 @@ openvdb::GridCPtrVec make_grids(const VdbContent& content, const Frame& frame,
         const auto grid = openvdb::FloatGrid::create(openvdb::ConstPtrCast<openvdb::FloatTree>(tree));
         grid->setGridClass(openvdb::GRID_FOG_VOLUME);
         grid->setSaveFloatAsHalf(content.half);
-        describe(*grid, "density", frame, metadata);
+        describe(*grid, "density", geometry, metadata);
         grids.push_back(grid);
     }
     const std::pair<const char*, const std::optional<BitPlaneView>*> planes[] = {
         {"hum", &content.hum}, {"act", &content.act}, {"cld", &content.cld}};
     for (const auto& [name, plane] : planes) {
         if (!*plane) continue;
-        const auto grid = bool_grid(**plane, frame);
-        describe(*grid, name, frame, metadata);
+        const auto grid = bool_grid(**plane, geometry);
+        describe(*grid, name, geometry, metadata);
         grids.push_back(grid);
     }
     if (content.wind) {
-        const auto grid = velocity_grid(content, frame, time_s);
-        describe(*grid, "vel", frame, metadata);
+        const auto grid = velocity_grid(content, geometry, time_s);
+        describe(*grid, "vel", geometry, metadata);
         grids.push_back(grid);
     }
     return grids;
@@ -266,16 +269,16 @@ void write_file(const std::filesystem::path& temporary, const std::filesystem::p
 
 void write_vdb(const std::filesystem::path& path, const VdbContent& content, const VdbMetadata& metadata) {
     openvdb::initialize();
-    const Frame frame = frame_of(content);
-    const openvdb::MetaMap meta = to_meta_map(metadata, frame.voxels, frame.refine);
-    const auto grids = make_grids(content, frame, meta, metadata.time_s);
+    const GridGeometry geometry = geometry_of(content);
+    const openvdb::MetaMap meta = to_meta_map(metadata, geometry.voxels, geometry.refine);
+    const auto grids = make_grids(content, geometry, meta, metadata.time_s);
     write_atomically(
         path, [&](const std::filesystem::path& temporary) { write_file(temporary, path, grids, meta); });
 }
 
-std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int frame) {
+std::filesystem::path frame_path(const std::filesystem::path& folder, const std::string& name, int geometry) {
     char number[16];
-    std::snprintf(number, sizeof number, "_%04d.vdb", frame);
+    std::snprintf(number, sizeof number, "_%04d.vdb", geometry);
     return folder / (name + number);
 }
 

@@ -12,7 +12,7 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
-#include "core/smoothstep.h"
+#include "core/math.h"
 #include "core/vectors-inl.h"
 #include "render/shared/shared.h"
 
@@ -57,7 +57,7 @@ HWY_INLINE AirFloats air_set(float value) { return hn::Set(AirTag(), value); }
 // A row of a table at a coordinate, linearly.
 struct RowPlace {
     hn::Vec<hn::RebindToSigned<AirTag>> index;
-    AirFloats share;
+    AirFloats fraction;
 };
 HWY_INLINE RowPlace place_in_row(AirFloats coordinate, std::size_t count) {
     const AirTag d;
@@ -69,7 +69,7 @@ HWY_INLINE RowPlace place_in_row(AirFloats coordinate, std::size_t count) {
 HWY_INLINE AirFloats look_up(const float* row, const RowPlace& place) {
     const AirTag d;
     const AirFloats a = hn::GatherIndex(d, row, place.index), b = hn::GatherIndex(d, row + 1, place.index);
-    return hn::MulAdd(place.share, hn::Sub(b, a), a);
+    return hn::MulAdd(place.fraction, hn::Sub(b, a), a);
 }
 
 // Adds what one part scatters.
@@ -83,9 +83,9 @@ void add_part(const PartRows& part, const SunBlock& suns) {
         const AirFloats sine = hn::Max(hn::Min(hn::Mul(far, air_set(part.per_radius)), one), hn::Neg(one));
         const AirFloats above = hn::MulAdd(hn::Sub(sine, air_set(part.horizon_sine)),
                                            air_set(part.per_twice_disc), air_set(0.5f));
-        const AirFloats share = hn::Max(hn::Min(above, one), zero);
-        if (!hn::AllFalse(d, hn::Gt(share, zero))) {
-            const AirFloats visible = smooth_blend(share);
+        const AirFloats fraction = hn::Max(hn::Min(above, one), zero);
+        if (!hn::AllFalse(d, hn::Gt(fraction, zero))) {
+            const AirFloats visible = smooth_blend(fraction);
             const AirFloats along = hn::Mul(sine, air_set(part.radius));
             const AirFloats to_top =
                 hn::Sub(hn::Sqrt(hn::Max(hn::MulAdd(along, along, air_set(part.inside)), zero)), along);
@@ -130,9 +130,9 @@ constexpr double kKilometre = 1000;
 // Interpolates a row between two rows of a plane.
 void mix_rows(const float* plane, std::size_t width, double coordinate, std::size_t rows, float* out) {
     const auto low = std::min(std::size_t(std::max(coordinate, 0.0)), rows - 2);
-    const auto share = float(std::clamp(coordinate - double(low), 0.0, 1.0));
+    const auto fraction = float(std::clamp(coordinate - double(low), 0.0, 1.0));
     const float *a = plane + low * width, *b = a + width;
-    for (std::size_t i = 0; i < width; ++i) out[i] = a[i] + share * (b[i] - a[i]);
+    for (std::size_t i = 0; i < width; ++i) out[i] = a[i] + fraction * (b[i] - a[i]);
 }
 
 void fill_columns(const SphericalAir& air, const AirTables& tables, double radius, PartRows& rows) {

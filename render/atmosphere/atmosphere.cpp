@@ -78,7 +78,7 @@ struct Suns {
     }
 };
 
-double mix(double a, double b, double share) { return a + share * (b - a); }
+double mix(double a, double b, double fraction) { return a + fraction * (b - a); }
 
 // Samples a plane of logarithms bilinearly and returns the exponential.
 double between_logs(const float* plane, double column, double row, std::size_t rows) {
@@ -285,8 +285,8 @@ void Atmosphere::Tables::make_irradiance_row(std::size_t row, std::size_t first_
         ScatteredPlanes light(suns.sine.size());
         scatter_along(air, tables, path, suns.sine, suns.cos_to_ray, light);
         const double solid_angle = 2 * kPi * ray.weight / double(kAzimuths);
-        const double share[3] = {std::max(ray.sine, 0.0), std::max(-ray.sine, 0.0),
-                                 std::sqrt(1 - ray.sine * ray.sine) / kPi};
+        const double fraction[3] = {std::max(ray.sine, 0.0), std::max(-ray.sine, 0.0),
+                                    std::sqrt(1 - ray.sine * ray.sine) / kPi};
         for (std::size_t i = 0; i < suns.sine.size(); ++i) {
             const Rgb ground = ground_radiance(path, double(suns.sine[i]), double(suns.cos_to_ray[i]),
                                                path.meets_ground && first_kind > 0);
@@ -297,7 +297,7 @@ void Atmosphere::Tables::make_irradiance_row(std::size_t row, std::size_t first_
                                                particles * light.mie[c][i] + light.many[c][i]) +
                                         ground[c];
                 for (std::size_t kind = first_kind; kind < end_kind; ++kind)
-                    sums[kind][c * kSunSines + i % kSunSines] += solid_angle * share[kind] * radiance;
+                    sums[kind][c * kSunSines + i % kSunSines] += solid_angle * fraction[kind] * radiance;
             }
         }
     };

@@ -85,9 +85,9 @@ const SkyTable& SkyLights::table(int node, double eye_altitude_m) {
 
 void SkyLights::mix_tables(const RenderOptions& options, double elevation_deg) {
     const double node = sun_node(elevation_deg), low = std::floor(node);
-    const auto share = float(node - low);
+    const auto fraction = float(node - low);
     const SkyTable& a = table(int(low), light_.eye_altitude_m);
-    const SkyTable& b = share > 0 ? table(int(low) + 1, light_.eye_altitude_m) : a;
+    const SkyTable& b = fraction > 0 ? table(int(low) + 1, light_.eye_altitude_m) : a;
     const Rgb sun_above_air = adapted_sun(options, elevation_deg);
     light_.texels.assign(4 * kTexels * shader::kSkyLayers, 0.0f);
     float *scattered = light_.texels.data(), *haze = scattered + 4 * kTexels, *sun = haze + 4 * kTexels;
@@ -95,8 +95,8 @@ void SkyLights::mix_tables(const RenderOptions& options, double elevation_deg) {
         const auto full = float(kPi * sun_above_air[c]);
         const auto night = float(options.atmosphere.night[c]);
         for (std::size_t i = c; i < 4 * kTexels; i += 4) {
-            scattered[i] = full * (a.scattered[i] + share * (b.scattered[i] - a.scattered[i])) + night;
-            haze[i] = full * (a.haze[i] + share * (b.haze[i] - a.haze[i]));
+            scattered[i] = full * (a.scattered[i] + fraction * (b.scattered[i] - a.scattered[i])) + night;
+            haze[i] = full * (a.haze[i] + fraction * (b.haze[i] - a.haze[i]));
         }
     }
     light_.horizon = {};

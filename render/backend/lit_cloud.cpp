@@ -71,12 +71,13 @@ CacheKey light_key(const CacheKey& metaballs, const RenderOptions& options) {
 CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, const RenderOptions& options) {
     std::vector<double> rest{mean_cosine(options.light.phase)};
     for (const DetailedVoxels& part : cloud.detailed) {
-        const DetailOptions& o = part.detail;
+        const DetailSetting& s = part.setting;
+        const DetailOptions& o = s.options;
         const Vec3 origin = part.density.placement().origin_m;
-        for (const double number : {double(part.first), double(part.count), part.metaball_radius_cells, part.drift_m.x,
-                                    part.drift_m.y, part.drift_m.z, part.along.x, part.along.y, o.strength, o.size_m,
+        for (const double number : {double(part.first), double(part.count), s.metaball_radius_cells, s.extinction_per_m, s.drift_m.x,
+                                    s.drift_m.y, s.drift_m.z, s.along.x, s.along.y, o.strength, o.size_m,
                                     o.stretch, o.wisps, o.thermals, o.mean_free_path_m, origin.x, origin.y, origin.z,
-                                    part.density.placement().cell_size_m, part.growth ? part.growth->sum() : -1.0})
+                                    part.density.placement().cell_size_m, part.moisture ? part.moisture->sum() : -1.0})
             rest.push_back(number);
     }
     return key_of({metaballs[0], metaballs[1]}, rest);
@@ -91,7 +92,7 @@ void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOpt
         cached.volumes.clear();
         cached.volumes_key = {};
         for (const DetailedVoxels& part : cloud.detailed) {
-            CloudVolume& volume = cached.volumes.emplace_back(part, cloud.extinction_per_m);
+            CloudVolume& volume = cached.volumes.emplace_back(part);
             see_surroundings(volume, mean_cosine(options.light.phase));
         }
         cached.volumes_key = key;

@@ -23,9 +23,9 @@ std::vector<Neighbours> neighbours_of(std::span<const std::uint64_t> blocks) {
         const std::int64_t offset = step(n % 3, 0) + step(n / 3 % 3, 1) + step(n / 9, 2);
         std::size_t at = 0;
         for (std::size_t b = 0; b < blocks.size(); ++b) {
-            const std::uint64_t wanted = blocks[b] + std::uint64_t(offset);
-            while (at < blocks.size() && blocks[at] < wanted) ++at;
-            all[b][n] = at < blocks.size() && blocks[at] == wanted ? at : kNone;
+            const std::uint64_t requested = blocks[b] + std::uint64_t(offset);
+            while (at < blocks.size() && blocks[at] < requested) ++at;
+            all[b][n] = at < blocks.size() && blocks[at] == requested ? at : kNone;
         }
     }
     return all;

@@ -46,10 +46,8 @@ float absorbed_depth(float depth, double extinction_per_m, double light_distance
 
 }  // namespace
 
-CloudVolume::CloudVolume(const DetailedVoxels& voxels, double extinction_per_m)
-    : field(voxels.density,
-            {voxels.detail, extinction_per_m, voxels.metaball_radius_cells, voxels.drift_m, voxels.along},
-            voxels.growth ? &*voxels.growth : nullptr),
+CloudVolume::CloudVolume(const DetailedVoxels& voxels)
+    : field(voxels.density, voxels.setting, voxels.moisture ? &*voxels.moisture : nullptr),
       extinction(mean_extinction(field)) {}
 
 std::size_t CloudVolume::memory_bytes() const {

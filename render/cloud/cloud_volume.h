@@ -21,7 +21,7 @@ namespace nephos {
 inline constexpr float kMostMarchedDepth = shader::kMostMarchedDepth;
 
 struct CloudVolume {
-    explicit CloudVolume(const DetailedVoxels& voxels, double extinction_per_m);
+    explicit CloudVolume(const DetailedVoxels& voxels);
 
     CoverageField field;
     // Mean extinction of each cell of each brick that holds cloud, per metre.

@@ -12,7 +12,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "core/smoothstep.h"
+#include "core/math.h"
 #include "core/vec.h"
 
 namespace nephos {
@@ -44,7 +44,7 @@ struct Sums {
     Values balls{};
     // The metaball that replaces it.
     Values radius{}, own_depth{};  // voxels; optical depth scale
-    Values share{};                // of what larger blocks leave
+    Values fraction{};             // of what larger blocks leave
 
     template <std::size_t kChildren>
     void add(std::size_t n, const Sums<kChildren>& part, std::size_t child) {
@@ -153,34 +153,34 @@ class BlockTree {
     bool merges() const {
         const auto merges_some = [](const auto& sums) {
             for (std::size_t n = 0; n < sums.kCount; ++n)
-                if (sums.balls[n] > 1 && sums.share[n] > 0) return true;
+                if (sums.balls[n] > 1 && sums.fraction[n] > 0) return true;
             return false;
         };
         return merges_some(small_) || merges_some(middle_);
     }
 
     void emit(MergedCloud& to) const {
-        emit_block(whole_, 0, whole_.share[0], to);
-        const float left = 1 - whole_.share[0];
+        emit_block(whole_, 0, whole_.fraction[0], to);
+        const float left = 1 - whole_.fraction[0];
         if (!(left > 0)) return;
-        for (std::size_t n = 0; n < 8; ++n) emit_block(middle_, n, left * middle_.share[n], to);
-        std::array<float, 64> own;  // share of each metaball in a small block
+        for (std::size_t n = 0; n < 8; ++n) emit_block(middle_, n, left * middle_.fraction[n], to);
+        std::array<float, 64> own;  // fraction of each metaball in a small block
         float most = 0;
         for (std::size_t n = 0; n < 64; ++n) {
-            const float of_small = left * (1 - middle_.share[octant_of(n)]);
+            const float of_small = left * (1 - middle_.fraction[octant_of(n)]);
             const bool alone = small_.balls[n] <= 1;  // it is its block
-            if (!alone) emit_block(small_, n, of_small * small_.share[n], to);
-            own[n] = alone ? of_small : of_small * (1 - small_.share[n]);
+            if (!alone) emit_block(small_, n, of_small * small_.fraction[n], to);
+            own[n] = alone ? of_small : of_small * (1 - small_.fraction[n]);
             most = std::max(most, small_.balls[n] > 0 ? own[n] : 0.0f);
         }
         if (!(most > 0)) return;
         const PreparedCloud& cloud = balls_.cloud;
         balls_.for_each([&](std::uint32_t i) {
-            const float share = own[balls_.place(i).pair];
-            if (!(share > 0)) return;
+            const float fraction = own[balls_.place(i).pair];
+            if (!(fraction > 0)) return;
             to.metaballs.push_back(cloud.metaballs[cloud.visible[i]]);
-            to.metaballs.back().density *= share;
-            to.depth_scale.push_back(share * cloud.depth_scale[i]);
+            to.metaballs.back().density *= fraction;
+            to.depth_scale.push_back(fraction * cloud.depth_scale[i]);
         });
     }
 
@@ -210,7 +210,7 @@ class BlockTree {
         for (std::size_t n = 0; n < 64; ++n) {
             const std::size_t m = octant_of(n);
             middle_.add(m, small_, n);
-            if (small_.balls[n] > 0) least[m] = std::min(least[m], small_.share[n]);
+            if (small_.balls[n] > 0) least[m] = std::min(least[m], small_.fraction[n]);
         }
         finish(middle_, merging_.levels[1], least, hidden);
     }
@@ -220,7 +220,7 @@ class BlockTree {
         for (std::size_t n = 0; n < 8; ++n) {
             whole_.add(0, middle_, n);
             if (!(middle_.balls[n] > 0)) continue;
-            least = std::min(least, middle_.share[n]);
+            least = std::min(least, middle_.fraction[n]);
             least_hidden = std::min(least_hidden, hidden[n]);
         }
         finish(whole_, merging_.levels[2], {least}, {least_hidden});
@@ -266,15 +266,15 @@ class BlockTree {
             const float limit = threshold * std::min(std::max(way[n] * per_far_square, 1e-12f), 1e12f);
             // Falls from 1 at kFull of the limit to 0 at the limit.
             const float t = std::min(std::max((limit - contrast) / ((1 - kFull) * limit), 0.0f), 1.0f);
-            sums.share[n] = least[n] * std::max(t * t * (3 - 2 * t), hidden[n]);
+            sums.fraction[n] = least[n] * std::max(t * t * (3 - 2 * t), hidden[n]);
         }
     }
 
     template <std::size_t kSide>
-    void emit_block(const Sums<kSide>& sums, std::size_t n, float share, MergedCloud& to) const {
-        if (!(share > 0) || !(sums.balls[n] > 0)) return;
+    void emit_block(const Sums<kSide>& sums, std::size_t n, float fraction, MergedCloud& to) const {
+        if (!(fraction > 0) || !(sums.balls[n] > 0)) return;
         const double radius_m = sums.radius[n] * balls_.lattice.edge_m;
-        const float depth = share * sums.own_depth[n];
+        const float depth = fraction * sums.own_depth[n];
         const auto world = [&](float sum, std::size_t axis) {
             return float((balls_.corner[axis] + double(sum) / sums.mass[n]) * balls_.lattice.edge_m);
         };

@@ -11,36 +11,27 @@
 
 #include "core/weather.h"
 #include "density/density_grid.h"
+#include "density/detail.h"
 #include "density/metaballs.h"
-#include "density/options.h"
 #include "render/options/options.h"
 
 namespace nephos {
 
 // The renderer's view of the map of water and snow on the ground (seeds/ground_cover.h) at the time of a
-// frame. Texel (column, row) is the rectangle of texel_x_m by texel_y_m whose south-western corner is at (x_m
-// + column texel_x_m, y_m + row texel_y_m); rows from south to north, x fastest. Towards its edge the map
-// fades to the outside values.
-struct GroundCoverView {
-    double x_m = 0, y_m = 0;               // south-western corner, world
-    double texel_x_m = 1, texel_y_m = 1;   // > 0
-    int columns = 0, rows = 0;             // both 0: the values outside everywhere
-    std::span<const float> water_mm;       // columns * rows, >= 0: film of water
+// frame; each span has columns * rows values >= 0. Towards its edge the map fades to the outside values.
+struct GroundCoverView : GroundTexels {
+    std::span<const float> water_mm;       // film of water
     std::span<const float> snow_mm;        // likewise, of water in the snow
-    std::span<const float> rain_mm_per_h;  // likewise: rain that falls into the water
-    double outside_water_mm = 0, outside_snow_mm = 0, outside_rain_mm_per_h = 0;
+    std::span<const float> rain_mm_per_h;  // rain that falls into the water
 };
 
 // Voxels of a cloud that are drawn with detail (density/detail.h): near the eye rays march through them, and farther
 // away, where a pixel covers 15 to 25 m, the metaballs that stand for them take over.
 struct DetailedVoxels {
     DensityGrid density;
-    std::optional<DensityGrid> growth;   // as CoverageField takes it
-    DetailOptions detail;
-    double metaball_radius_cells = 2;
-    Vec3 drift_m{};                      // as in DetailSetting
-    Vec2 along{1, 0};
-    std::size_t first = 0, count = 0;    // of MetaballCloud::metaballs
+    std::optional<DensityGrid> moisture;  // as CoverageField takes it
+    DetailSetting setting;                // its extinction is that of the cloud
+    std::size_t first = 0, count = 0;     // of MetaballCloud::metaballs
 };
 
 // A cloud made of metaballs. Along a ray, extinction (per metre) is

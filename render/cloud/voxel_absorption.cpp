@@ -64,15 +64,15 @@ DensityBlocks::DensityBlocks(const PreparedCloud& cloud, double extinction_per_m
             above[axis] = std::clamp(place - low[axis], 0.0, 1.0);
         }
         for (int corner = 0; corner < 8; ++corner) {
-            double share = content;
+            double fraction = content;
             std::size_t at[3];
             for (int axis = 0; axis < 3; ++axis) {
                 const int up = corner >> axis & 1;
-                share *= up != 0 ? above[axis] : 1 - above[axis];
+                fraction *= up != 0 ? above[axis] : 1 - above[axis];
                 at[axis] = std::size_t(low[axis] + up);
             }
             densities_[(at[2] * std::size_t(size_[1]) + at[1]) * std::size_t(size_[0]) + at[0]] +=
-                float(share);
+                float(fraction);
         }
     }
 }

@@ -11,7 +11,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "render/frame/shadow_map_bins.h"
+#include "render/frame/tile_bins.h"
 #include "render/shared/half_floats.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -205,13 +205,13 @@ LightBall light_ball(const shader::LightSplat& splat, const shader::LightPlace& 
             .end = to_row(box.y1)};
 }
 
-// The wanted centres, tile by tile, and in each tile in order from the sun.
+// The requested centres, tile by tile, and in each tile in order from the sun.
 struct Centres {
     TileBins bins;
     std::vector<float> x, y, z, depth;
 
-    Centres(const LightSortedSplats& order, const TileGrid& grid, std::span<const std::uint8_t> wanted)
-        : bins(bin_centres(order.splats, grid, wanted)) {
+    Centres(const LightSortedSplats& order, const TileGrid& grid, std::span<const std::uint8_t> requested)
+        : bins(bin_centres(order.splats, grid, requested)) {
         const std::size_t count = bins.list.size();
         x.resize(count);
         y.resize(count);
@@ -233,8 +233,8 @@ struct Centres {
     }
 };
 
-bool is_wanted(std::span<const std::uint8_t> wanted, std::size_t i) {
-    return wanted.empty() || wanted[i] != 0;
+bool is_requested(std::span<const std::uint8_t> requested, std::size_t i) {
+    return requested.empty() || requested[i] != 0;
 }
 
 // Calls work(first texel of a row, how many) for the rows of a tile of the map.
@@ -251,21 +251,21 @@ void for_each_row(std::size_t tile, const TileGrid& grid, const Work& work) {
 // The shadow map and the centres while batches of balls are added.
 struct LightSums {
     TileGrid grid;
-    std::span<const std::uint8_t> map_tiles;  // as LightWanted
-    std::vector<std::uint8_t> tiles;          // those of which anything is wanted
+    std::span<const std::uint8_t> map_tiles;  // as LightRequest
+    std::vector<std::uint8_t> tiles;          // those of which anything is requested
     Centres centres;
     std::vector<float>& map;
 
-    LightSums(const LightSortedSplats& order, const TileGrid& of, const LightWanted& wanted,
+    LightSums(const LightSortedSplats& order, const TileGrid& of, const LightRequest& requested,
               std::vector<float>& shadow)
         : grid(of),
-          map_tiles(wanted.map_tiles),
+          map_tiles(requested.map_tiles),
           tiles(of.tiles()),
-          centres(order, of, wanted.centres),
+          centres(order, of, requested.centres),
           map(shadow) {
         for (std::size_t t = 0; t < tiles.size(); ++t) {
             const shader::TileRange range = centres.bins.ranges[t];
-            tiles[t] = is_wanted(map_tiles, t) || range.begin < range.end ? 1 : 0;
+            tiles[t] = is_requested(map_tiles, t) || range.begin < range.end ? 1 : 0;
         }
     }
 };
@@ -298,7 +298,7 @@ std::size_t add_balls(std::span<const LightBall> balls, const TileBins& bins, fl
                                  .balls = of_tile,
                                  .largest_radius = largest_radius};
             pairs += HWY_DYNAMIC_DISPATCH(add_to_centres)(tile, light.centres.of_tile(t));
-            if (!is_wanted(light.map_tiles, t)) continue;
+            if (!is_requested(light.map_tiles, t)) continue;
             alignas(64) float sums[shader::kTileWidth * shader::kTileHeight] = {};
             pairs += HWY_DYNAMIC_DISPATCH(add_to_map)(tile, sums);
             const float* from = sums;
@@ -313,7 +313,7 @@ std::size_t add_balls(std::span<const LightBall> balls, const TileBins& bins, fl
 
 void clear_map(LightSums& light) {
     for (std::size_t t = 0; t < light.tiles.size(); ++t) {
-        if (!is_wanted(light.map_tiles, t)) continue;
+        if (!is_requested(light.map_tiles, t)) continue;
         for_each_row(t, light.grid, [&](std::size_t at, std::size_t count) {
             std::fill_n(light.map.begin() + std::ptrdiff_t(at), count, 0.0f);
         });
@@ -324,7 +324,7 @@ void clear_map(LightSums& light) {
 void finish(LightSums& light) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, light.tiles.size(), 64), [&](const auto& range) {
         for (std::size_t t = range.begin(); t != range.end(); ++t) {
-            if (!is_wanted(light.map_tiles, t)) continue;
+            if (!is_requested(light.map_tiles, t)) continue;
             for_each_row(t, light.grid, [&](std::size_t at, std::size_t count) {
                 HWY_DYNAMIC_DISPATCH(to_transmittance)(&light.map[at], count, kDarkTexel);
             });
@@ -334,7 +334,7 @@ void finish(LightSums& light) {
 
 }  // namespace
 
-void light_by_processor(const LightSortedSplats& order, int shadow_size, const LightWanted& wanted,
+void light_by_processor(const LightSortedSplats& order, int shadow_size, const LightRequest& requested,
                         std::vector<float>& depths, std::vector<float>& shadow, const BatchLimits& limits,
                         StageTimes* times) {
     const TileGrid grid{shadow_size, shadow_size};
@@ -342,7 +342,7 @@ void light_by_processor(const LightSortedSplats& order, int shadow_size, const L
     depths.resize(order.splats.size(), 0.0f);
     std::optional<StageTimer> timer(std::in_place, times, DrawStage::sun_bins);
     const std::vector<PixelBox> boxes = light_boxes(order.splats);
-    LightSums sums(order, grid, wanted, shadow);
+    LightSums sums(order, grid, requested, shadow);
     clear_map(sums);
     std::vector<LightBall> balls;
     for (std::size_t begin = 0; begin < boxes.size();) {

@@ -17,16 +17,16 @@
 namespace nephos {
 
 // The requested light; an empty span requests all.
-struct LightWanted {
-    std::span<const std::uint8_t> centres;    // one for each of LightSortedSplats::splats: not 0 if wanted
-    std::span<const std::uint8_t> map_tiles;  // one for each tile of the map: not 0 if wanted
+struct LightRequest {
+    std::span<const std::uint8_t> centres;    // one for each of LightSortedSplats::splats: not 0 if requested
+    std::span<const std::uint8_t> map_tiles;  // one for each tile of the map: not 0 if requested
 };
 
-// Fills what is wanted of `shadow`, shadow_size^2 texels, and of `depths`, the optical depths between
+// Fills what is requested of `shadow`, shadow_size^2 texels, and of `depths`, the optical depths between
 // centres and sun, which has one for each of
 // order.splats, and leaves the rest of both as it is. What one centre or texel gets has the same bits
-// whatever else is wanted.
-void light_by_processor(const LightSortedSplats& order, int shadow_size, const LightWanted& wanted,
+// whatever else is requested.
+void light_by_processor(const LightSortedSplats& order, int shadow_size, const LightRequest& requested,
                         std::vector<float>& depths, std::vector<float>& shadow,
                         const BatchLimits& limits = {}, StageTimes* times = nullptr);
 

@@ -71,9 +71,9 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
                   mix(set3(frame.ambient_base), set3(frame.ambient_top), {height, height, height}));
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), centre);
-        const Floats share = hn::Mul(set(frame.flash.w), hn::Load(d, ball.flash));
+        const Floats fraction = hn::Mul(set(frame.flash.w), hn::Load(d, ball.flash));
         arriving =
-            times_add(hn::Mul(share, flash_falloff(dot(way, way))), set3(frame.flash_colour), arriving);
+            times_add(hn::Mul(fraction, flash_falloff(dot(way, way))), set3(frame.flash_colour), arriving);
     }
     const Floats3 beta = air_transmittance(frame, ray, distance);
     const Floats light = hn::Exp(d, hn::Neg(sun_depth));

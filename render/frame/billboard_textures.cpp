@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/math.h"
 #include "core/noise_hash.h"
-#include "core/smoothstep.h"
 
 namespace nephos {
 namespace {

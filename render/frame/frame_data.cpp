@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/smoothstep.h"
+#include "core/math.h"
 #include "core/vec.h"
 #include "render/cloud/cloud_preparation.h"
 

@@ -63,7 +63,7 @@ void add_octaves(const CloudLight& light, std::vector<float>& table) {
 
 struct Between {
     std::size_t below;
-    float share;  // of the node above
+    float fraction;  // of the node above
 };
 
 Between between(float place, std::size_t nodes) {
@@ -71,11 +71,11 @@ Between between(float place, std::size_t nodes) {
     return {below, place - float(below)};
 }
 
-float mix(float a, float b, float share) { return a + share * (b - a); }
+float mix(float a, float b, float fraction) { return a + fraction * (b - a); }
 
 float at(const std::vector<float>& table, std::size_t row, const Between& angle) {
     const float* const nodes = &table[row * kAngles + angle.below];
-    return mix(nodes[0], nodes[1], angle.share);
+    return mix(nodes[0], nodes[1], angle.fraction);
 }
 
 }  // namespace
@@ -98,7 +98,7 @@ float scattered_once(const std::vector<float>& table, float cos_theta) {
 float scattered_often(const std::vector<float>& table, float cos_theta, float depth) {
     const Between angle = between(shader::scatter_column(cos_theta), kAngles),
                   row = between(shader::scatter_row(depth), kDepths);
-    return mix(at(table, 1 + row.below, angle), at(table, 2 + row.below, angle), row.share);
+    return mix(at(table, 1 + row.below, angle), at(table, 2 + row.below, angle), row.fraction);
 }
 
 void to_sun_depths(std::vector<float>& light) {

@@ -7,6 +7,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "render/shared/half_floats.h"
+
 namespace nephos {
 namespace {
 
@@ -19,19 +21,19 @@ struct TileBox {
     std::uint16_t x0, y0, x1, y1;
 };
 
-// Calls work(number) for the tiles of a box, except those whose `wanted` is 0.
+// Calls work(number) for the tiles of a box, except those whose `requested` is 0.
 template <bool kAll, class Work>
-void for_each_tile(const TileBox& box, std::size_t columns, std::span<const std::uint8_t> wanted,
+void for_each_tile(const TileBox& box, std::size_t columns, std::span<const std::uint8_t> requested,
                    const Work& work) {
     for (std::size_t y = box.y0; y < box.y1; ++y)
         for (std::size_t tile = y * columns + box.x0; tile < y * columns + box.x1; ++tile)
-            if (kAll || wanted[tile] != 0) work(tile);
+            if (kAll || requested[tile] != 0) work(tile);
 }
 
 // A counting sort by tile. Each part of the boxes counts for itself; its entries of a tile follow those of
 // the parts before it.
 template <bool kAll>
-TileBins bin(std::span<const PixelBox> boxes, const TileGrid& grid, std::span<const std::uint8_t> wanted) {
+TileBins bin(std::span<const PixelBox> boxes, const TileGrid& grid, std::span<const std::uint8_t> requested) {
     constexpr std::size_t kPart = 16384;
     const std::size_t parts = std::max<std::size_t>(1, std::min<std::size_t>(16, boxes.size() / kPart));
     const auto columns = std::size_t(grid.columns());
@@ -44,7 +46,7 @@ TileBins bin(std::span<const PixelBox> boxes, const TileGrid& grid, std::span<co
             const PixelBox box = tiles_of(boxes[i], grid);
             tiles[i] = {std::uint16_t(box.x0), std::uint16_t(box.y0), std::uint16_t(box.x1),
                         std::uint16_t(box.y1)};
-            for_each_tile<kAll>(tiles[i], columns, wanted, [&](std::size_t tile) { ++count[tile]; });
+            for_each_tile<kAll>(tiles[i], columns, requested, [&](std::size_t tile) { ++count[tile]; });
         }
     });
 
@@ -61,7 +63,7 @@ TileBins bin(std::span<const PixelBox> boxes, const TileGrid& grid, std::span<co
         std::uint32_t* const place = next[p].data();
         std::uint32_t* const list = bins.list.data();
         for (std::size_t i = boxes.size() * p / parts; i < boxes.size() * (p + 1) / parts; ++i)
-            for_each_tile<kAll>(tiles[i], columns, wanted,
+            for_each_tile<kAll>(tiles[i], columns, requested,
                                 [&](std::size_t tile) { list[place[tile]++] = std::uint32_t(i); });
     });
     return bins;
@@ -101,8 +103,8 @@ std::size_t end_of_batch(std::span<const PixelBox> boxes, std::size_t begin, con
 }
 
 TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid,
-                        std::span<const std::uint8_t> wanted) {
-    return wanted.empty() ? bin<true>(boxes, grid, wanted) : bin<false>(boxes, grid, wanted);
+                        std::span<const std::uint8_t> requested) {
+    return requested.empty() ? bin<true>(boxes, grid, requested) : bin<false>(boxes, grid, requested);
 }
 
 TileBins bin_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size_t& end, const TileGrid& grid,
@@ -112,6 +114,33 @@ TileBins bin_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size
         const auto fits = [&](const shader::TileRange& range) { return range.end - range.begin <= longest; };
         if (std::ranges::all_of(bins.ranges, fits)) return bins;
     }
+}
+
+std::vector<PixelBox> light_boxes(std::span<const shader::LightSplat> splats) {
+    std::vector<PixelBox> boxes(splats.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, splats.size(), 8192), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const shader::LightSplat& s = splats[i];
+            const auto [rx, ry] = unpack_halves(s.radii);
+            boxes[i] = {floor_to_pixel(s.x - rx), floor_to_pixel(s.y - ry), ceil_to_pixel(s.x + rx),
+                        ceil_to_pixel(s.y + ry)};
+        }
+    });
+    return boxes;
+}
+
+TileBins bin_centres(std::span<const shader::LightSplat> splats, const TileGrid& grid,
+                     std::span<const std::uint8_t> requested) {
+    std::vector<PixelBox> centres(splats.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, centres.size(), 8192), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            if (!requested.empty() && requested[i] == 0) continue;
+            const int x = std::clamp(int(splats[i].x), 0, grid.width - 1),
+                      y = std::clamp(int(splats[i].y), 0, grid.height - 1);
+            centres[i] = {x, y, x + 1, y + 1};
+        }
+    });
+    return bin_into_tiles(centres, grid);
 }
 
 }  // namespace nephos

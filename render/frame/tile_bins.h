@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Binning of splats into the tiles of an image. Private to the module.
+// Binning of splats into the tiles of an image, and of metaballs and their centres into those of the shadow map.
+// Private to the module.
 
 #include <algorithm>
 #include <cstdint>
@@ -36,10 +37,10 @@ struct TileBins {
     std::vector<std::uint32_t> list;        // indices into the boxes, rising in each tile
 };
 
-// Bins boxes in parallel; the result does not depend on the number of threads. `wanted`: 0 for tiles whose
+// Bins boxes in parallel; the result does not depend on the number of threads. `requested`: 0 for tiles whose
 // list remains empty; if it is empty, all lists are filled.
 TileBins bin_into_tiles(std::span<const PixelBox> boxes, const TileGrid& grid,
-                        std::span<const std::uint8_t> wanted = {});
+                        std::span<const std::uint8_t> requested = {});
 
 // Limits of one batch, for the memory of its lists.
 struct BatchLimits {
@@ -57,10 +58,18 @@ std::size_t end_of_batch(std::span<const PixelBox> boxes, std::size_t begin, con
 TileBins bin_batch(std::span<const PixelBox> boxes, std::size_t begin, std::size_t& end, const TileGrid& grid,
                    std::size_t longest);
 
+// Returns a bounding box in texels for each splat.
+std::vector<PixelBox> light_boxes(std::span<const shader::LightSplat> splats);
+
+// Bins the centres, in each tile in order from the sun. Every centre is in one tile, except those whose
+// `requested` is 0; if `requested` is empty, none is excepted.
+TileBins bin_centres(std::span<const shader::LightSplat> splats, const TileGrid& grid,
+                     std::span<const std::uint8_t> requested = {});
+
 // Far beyond any picture, and far from the limits of int.
 inline constexpr double kFarthestPixel = 1e6;
 
-// Round to whole pixels, four times per splat, for which calls of std::floor take too long where the
+// Rounds to whole pixels, four times per splat, for which calls of std::floor take too long where the
 // processor that is compiled for has no instruction for it.
 inline int floor_to_pixel(double value) {
     const double near = std::clamp(value, -kFarthestPixel, kFarthestPixel);

@@ -33,7 +33,7 @@ bool within(float value, float min, float max) { return value >= min && value <=
 
 // Returns the first field of a billboard that is out of the range in splats.h, with that range; null if none
 // is.
-const char* wanted(const CloudBillboard& billboard, std::size_t clouds) {
+const char* expected(const CloudBillboard& billboard, std::size_t clouds) {
     if (!finite(billboard.centre_m)) return "a finite centre";
     if (!(billboard.width_m > 0 && billboard.height_m > 0 && billboard.width_m <= kLargestBillboard_m &&
           billboard.height_m <= kLargestBillboard_m))
@@ -93,7 +93,7 @@ class Collector {
         by_distance_.add_all(
             first, splats_.billboards.size(), [this, first, &first_bad](std::uint32_t i, float& distance) {
                 const CloudBillboard& billboard = splats_.billboards[i - first];
-                if (wanted(billboard, splats_.clouds.size()) != nullptr) {
+                if (expected(billboard, splats_.clouds.size()) != nullptr) {
                     std::size_t known = first_bad;
                     while (i - first < known && !first_bad.compare_exchange_weak(known, i - first)) {
                     }
@@ -105,7 +105,7 @@ class Collector {
                             double(shader::kMinBillboardPixels), distance);
             });
         if (first_bad < splats_.billboards.size())
-            fail("billboard", first_bad, wanted(splats_.billboards[first_bad], splats_.clouds.size()));
+            fail("billboard", first_bad, expected(splats_.billboards[first_bad], splats_.clouds.size()));
     }
 
     ViewSortedSplats order() {
@@ -289,7 +289,7 @@ class Collector {
     const Splats& splats_;
     const CameraFrame& camera_;
     Vec3 eye_{};
-    ViewPyramid pyramid_;
+    Frustum pyramid_;
     double pixels_per_unit_, ground_m_;
     bool above_ground_;
     KeyedOrder by_distance_;               // indices: metaballs first, then billboards
@@ -298,18 +298,6 @@ class Collector {
 };
 
 }  // namespace
-
-ViewPyramid::ViewPyramid(const CameraFrame& camera)
-    : inward_{camera.forward, glm::normalize(camera.half_width * camera.forward + camera.right),
-              glm::normalize(camera.half_width * camera.forward - camera.right),
-              glm::normalize(camera.half_height * camera.forward + camera.up),
-              glm::normalize(camera.half_height * camera.forward - camera.up)} {}
-
-bool ViewPyramid::may_see(const Vec3& offset, double radius) const {
-    for (const Vec3& inward : inward_)
-        if (dot(offset, inward) < -radius) return false;
-    return true;
-}
 
 ViewSortedSplats sort_for_view(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
                                double pixels_per_unit, const Ground& ground, bool marched) {

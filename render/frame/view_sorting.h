@@ -58,18 +58,4 @@ ViewSortedSplats sort_for_view(const PreparedCloud& cloud, const Splats& splats,
 // Sets the light of the metaballs of an order.
 void set_light(ViewSortedSplats& order, const MetaballLight& light);
 
-// The view volume: the inside of the four planes through the eye and the sides of the image, in front of the
-// eye, without a far plane.
-class ViewPyramid {
-  public:
-    explicit ViewPyramid(const CameraFrame& camera);
-    // Tests a sphere; false only if it is entirely outside. `offset`: of its centre from the eye.
-    bool may_see(const Vec3& offset, double radius) const;
-    // Returns the normal of one of the planes, pointing inwards.
-    const Vec3& inward(std::size_t plane) const { return inward_[plane]; }
-
-  private:
-    Vec3 inward_[5]{};
-};
-
 }  // namespace nephos

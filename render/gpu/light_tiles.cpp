@@ -6,7 +6,7 @@
 #include <cstring>
 #include <span>
 
-#include "render/frame/shadow_map_bins.h"
+#include "render/frame/tile_bins.h"
 
 namespace nephos {
 namespace {

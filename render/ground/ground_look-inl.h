@@ -31,13 +31,13 @@ HWY_INLINE Floats water_reflectance(Floats cosine, Floats slope_variance) {
                       set(kWaterNormalReflectance));
 }
 
-// soaked_albedo() of wet_ground.h without the share of light that gets in and out.
+// soaked_albedo() of wet_ground.h without the fraction of light that gets in and out.
 HWY_INLINE Floats3 soaked_albedo(const shader::vec4& dry) {
     const auto of = [](float albedo) { return set(float(nephos::soaked_albedo(double(albedo)))); };
     return {of(dry.x), of(dry.y), of(dry.z)};
 }
 
-// Share of the ground that lies below a film (see wet_ground.h), where noise is the height of
+// Fraction of the ground that lies below a film (see wet_ground.h), where noise is the height of
 // the hollows and tufts in standard deviations.
 HWY_INLINE Floats covered(Floats film_mm, float half_mm, const ResolvedNoise& noise) {
     constexpr float kSharpness = 0.1f;  // of edges: a tenth of a standard deviation
@@ -48,8 +48,9 @@ HWY_INLINE Floats covered(Floats film_mm, float half_mm, const ResolvedNoise& no
     // Clamped to the range of exp(): a film of nanometres is thousands of deviations away.
     const Floats x = hn::Max(hn::Div(hn::Sub(level, noise.value), deviation), set(-50.0f));
     // The normal distribution's integral, within 0.01.
-    const Floats share = hn::Div(set(1.0f), hn::Add(set(1.0f), hn::Exp(Lanes(), hn::Mul(set(-1.702f), x))));
-    return hn::IfThenElseZero(hn::Gt(film_mm, hn::Zero(Lanes())), share);
+    const Floats fraction =
+        hn::Div(set(1.0f), hn::Add(set(1.0f), hn::Exp(Lanes(), hn::Mul(set(-1.702f), x))));
+    return hn::IfThenElseZero(hn::Gt(film_mm, hn::Zero(Lanes())), fraction);
 }
 
 struct Mirrored {
@@ -66,7 +67,7 @@ HWY_INLINE Mirrored mirrored_level(const MirrorView& view, hn::Vec<Ints> first, 
     const Floats x = hn::MulSub(u, hn::ConvertTo(d, width), set(0.5f)),
                  y = hn::MulSub(v, hn::ConvertTo(d, height), set(0.5f));
     const Floats x0 = hn::Floor(x), y0 = hn::Floor(y);
-    const Floats share_x = hn::Sub(x, x0), share_y = hn::Sub(y, y0);
+    const Floats fraction_x = hn::Sub(x, x0), fraction_y = hn::Sub(y, y0);
     const auto inside = [&](hn::Vec<Ints> at, hn::Vec<Ints> size) {
         return hn::Min(hn::Max(at, zero), hn::Sub(size, one));
     };
@@ -79,8 +80,8 @@ HWY_INLINE Mirrored mirrored_level(const MirrorView& view, hn::Vec<Ints> first, 
                nw = texel(hn::Add(high, west)), ne = texel(hn::Add(high, east));
     const auto channel = [&](int c) {
         const float* from = view.texels.data() + c;
-        return lerp(lerp(hn::GatherIndex(d, from, sw), hn::GatherIndex(d, from, se), share_x),
-                    lerp(hn::GatherIndex(d, from, nw), hn::GatherIndex(d, from, ne), share_x), share_y);
+        return lerp(lerp(hn::GatherIndex(d, from, sw), hn::GatherIndex(d, from, se), fraction_x),
+                    lerp(hn::GatherIndex(d, from, nw), hn::GatherIndex(d, from, ne), fraction_x), fraction_y);
     };
     return {{channel(0), channel(1), channel(2)}, channel(3)};
 }
@@ -108,11 +109,11 @@ HWY_INLINE Mirrored mirrored(const MirrorView& view, const Floats3& direction, F
                               hn::GatherIndex(di, sizes + 2, index), u, v);
     };
     const Mirrored near = at(fine);
-    const Floats share = hn::Sub(level, fine);
-    if (hn::AllTrue(d, hn::Eq(share, hn::Zero(d)))) return near;
+    const Floats fraction = hn::Sub(level, fine);
+    if (hn::AllTrue(d, hn::Eq(fraction, hn::Zero(d)))) return near;
     const Mirrored far = at(coarse);
-    return {mix(near.light, far.light, {share, share, share}),
-            lerp(near.transmittance, far.transmittance, share)};
+    return {mix(near.light, far.light, {fraction, fraction, fraction}),
+            lerp(near.transmittance, far.transmittance, fraction)};
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -22,20 +22,20 @@ HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
 using Ints = hn::RebindToSigned<Lanes>;
-using Words = hn::RebindToUnsigned<Lanes>;
-using Hash = hn::Vec<Words>;
+using HashLanes = hn::RebindToUnsigned<Lanes>;
+using Hash = hn::Vec<HashLanes>;
 
 HWY_INLINE Floats clamp01(Floats x) { return hn::Max(hn::Min(x, set(1.0f)), hn::Zero(Lanes())); }
 HWY_INLINE Floats smooth_step(Floats low, Floats high, Floats x) {
     return smooth_blend(clamp01(hn::Div(hn::Sub(x, low), hn::Sub(high, low))));
 }
-HWY_INLINE Floats lerp(Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); }
+HWY_INLINE Floats lerp(Floats a, Floats b, Floats fraction) { return hn::MulAdd(fraction, hn::Sub(b, a), a); }
 
 // Returns a cell's number modulo 2^32 from its floor; undefined for far points, which no octave resolves.
 HWY_INLINE Hash cell_of(Floats floor, std::uint32_t first) {
     const Floats far = set(1.0e9f);
     const auto near = hn::ConvertTo(Ints(), hn::Min(hn::Max(floor, hn::Neg(far)), far));
-    return hn::Add(hn::BitCast(Words(), near), hn::Set(Words(), first));
+    return hn::Add(hn::BitCast(HashLanes(), near), hn::Set(HashLanes(), first));
 }
 
 // Returns the dot product of a gradient, uniform in a square by the two halves of a hash, with the offset
@@ -43,7 +43,7 @@ HWY_INLINE Hash cell_of(Floats floor, std::uint32_t first) {
 HWY_INLINE Floats slope_along(Hash hash, Floats x, Floats y) {
     const Ints di;
     const auto component = [&](Hash bits) {
-        const auto number = hn::BitCast(di, hn::And(bits, hn::Set(Words(), 0xffffu)));
+        const auto number = hn::BitCast(di, hn::And(bits, hn::Set(HashLanes(), 0xffffu)));
         return hn::MulAdd(hn::ConvertTo(Lanes(), number), set(1.0f / 32768.0f), set(-1.0f));
     };
     return hn::MulAdd(component(hash), x, hn::Mul(component(hn::ShiftRight<16>(hash)), y));
@@ -55,7 +55,7 @@ HWY_INLINE Floats noise(const NoiseOctave& o, const Floats3& p) {
                  y = hn::MulAdd(set(o.y_x), p.x, hn::MulAdd(set(o.y_y), p.y, set(o.from_y)));
     const Floats x0 = hn::Floor(x), y0 = hn::Floor(y), one = set(1.0f);
     const Floats fx = hn::Sub(x, x0), fy = hn::Sub(y, y0), gx = hn::Sub(fx, one), gy = hn::Sub(fy, one);
-    const Hash column = cell_of(x0, o.cell_x), row = cell_of(y0, o.cell_y), next = hn::Set(Words(), 1u);
+    const Hash column = cell_of(x0, o.cell_x), row = cell_of(y0, o.cell_y), next = hn::Set(HashLanes(), 1u);
     const Hash west = mixed(column), east = mixed(hn::Add(column, next)), north = hn::Add(row, next);
     const auto blend = [](Floats f) {
         const Floats inner = hn::MulAdd(hn::MulSub(set(6.0f), f, set(15.0f)), f, set(10.0f));
@@ -82,9 +82,9 @@ HWY_INLINE ResolvedNoise resolved_noise(std::span<const NoiseOctave> octaves, co
     ResolvedNoise sum{hn::Zero(d), set(1.0f)};
     for (const NoiseOctave& octave : octaves) {
         const Floats per_pixel = hn::Div(set(octave.wavelength_m), pixel_m);
-        const Floats share = smooth_step(set(2.0f), set(5.0f), per_pixel);
-        if (hn::AllTrue(d, hn::Eq(share, hn::Zero(d)))) break;  // the next ones are finer still
-        const Floats weight = hn::Mul(set(octave.weight), share);
+        const Floats fraction = smooth_step(set(2.0f), set(5.0f), per_pixel);
+        if (hn::AllTrue(d, hn::Eq(fraction, hn::Zero(d)))) break;  // the next ones are finer still
+        const Floats weight = hn::Mul(set(octave.weight), fraction);
         sum.value = hn::MulAdd(weight, noise(octave, p), sum.value);
         sum.variance = hn::NegMulAdd(weight, weight, sum.variance);
     }

@@ -26,9 +26,9 @@ struct Slopes {
 HWY_INLINE Slopes slopes_in_square(const RippleSlopes& slopes, Floats x, Floats y, Hash hash) {
     const Lanes d;
     const Ints di;
-    const Words dw;
+    const HashLanes dw;
     const Floats x0 = hn::Floor(x), y0 = hn::Floor(y);
-    const Floats share_x = hn::Sub(x, x0), share_y = hn::Sub(y, y0);
+    const Floats fraction_x = hn::Sub(x, x0), fraction_y = hn::Sub(y, y0);
     const auto mask = hn::Set(di, kRippleTexels - 1), one = hn::Set(di, 1);
     const auto moved = [&](Floats at, Hash by) {
         return hn::Add(hn::ConvertTo(di, at), hn::BitCast(di, hn::And(by, hn::Set(dw, 0xffu))));
@@ -43,8 +43,8 @@ HWY_INLINE Slopes slopes_in_square(const RippleSlopes& slopes, Floats x, Floats 
         const auto at = [&](hn::Vec<Ints> a, hn::Vec<Ints> b) {
             return hn::GatherIndex(d, of.data(), hn::Add(a, b));
         };
-        return lerp(lerp(at(south, west), at(south, east), share_x),
-                    lerp(at(north, west), at(north, east), share_x), share_y);
+        return lerp(lerp(at(south, west), at(south, east), fraction_x),
+                    lerp(at(north, west), at(north, east), fraction_x), fraction_y);
     };
     return {value(slopes.x), value(slopes.y), hn::Zero(d)};
 }
@@ -75,7 +75,7 @@ HWY_INLINE Slopes ripples_at(const RippleGrid& grid, const Floats3& point, Float
     const Floats tx = hn::MulAdd(px, set(kTexels), set(grid.texel_x)),
                  ty = hn::MulAdd(py, set(kTexels), set(grid.texel_y));
     const Hash column = cell_of(x0, grid.corner_x), row = cell_of(y0, grid.corner_y);
-    const Words dw;
+    const HashLanes dw;
     const Hash next = hn::Set(dw, 1u);
     const Hash both = hn::IfThenElseZero(hn::RebindMask(dw, upper), next);
     Slopes sum{zero, zero, zero};

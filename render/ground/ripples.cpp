@@ -117,9 +117,9 @@ Ripples ripples_at(double time_s, double rain_mm_per_h, double history_s) {
 RippleSlopes ripple_slopes(double time_s, double rain_mm_per_h) {
     const Ripples ripples = ripples_at(time_s, rain_mm_per_h);
     const double steps = time_s / kRippleStep_s;
-    const auto share = float(steps - std::floor(steps));
+    const auto fraction = float(steps - std::floor(steps));
     std::vector<float> height = ripples.before;
-    for (std::size_t i = 0; i < height.size(); ++i) height[i] += share * (ripples.now[i] - height[i]);
+    for (std::size_t i = 0; i < height.size(); ++i) height[i] += fraction * (ripples.now[i] - height[i]);
     RippleSlopes slopes{height, height, 0};
     constexpr auto kPerTwoTexels = float(0.5 / kTexel_m);
     double squares = 0;

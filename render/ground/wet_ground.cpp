@@ -61,7 +61,7 @@ HWY_INLINE Lying lying_at(const CoverTexels& texels, const Floats3& point) {
     const Lanes d;
     const Ints di;
     const GroundCoverView& map = *texels.map;
-    const Lying outside{set(float(map.outside_water_mm)), set(float(map.outside_snow_mm)),
+    const Lying outside{set(float(map.outside.water_mm)), set(float(map.outside.snow_mm)),
                         set(float(map.outside_rain_mm_per_h))};
     if (map.columns == 0) return outside;
     const Floats across = hn::MulAdd(set(texels.per_x), point.x, set(texels.from_x)),
@@ -71,8 +71,8 @@ HWY_INLINE Lying lying_at(const CoverTexels& texels, const Floats3& point) {
         return hn::Mul(hn::Min(at, hn::Sub(set(float(count)), at)), set(1.0f / float(count)));
     };
     const Floats inner = hn::Min(from_edge(across, map.columns), from_edge(up, map.rows));
-    const Floats share = smooth_step(hn::Zero(d), set(kEdge), inner);
-    if (hn::AllFalse(d, hn::Gt(share, hn::Zero(d)))) return outside;
+    const Floats fraction = smooth_step(hn::Zero(d), set(kEdge), inner);
+    if (hn::AllFalse(d, hn::Gt(fraction, hn::Zero(d)))) return outside;
     const auto place = [&](Floats at, int count) {
         return hn::Max(hn::Min(hn::Sub(at, set(0.5f)), set(float(count - 1))), hn::Zero(d));
     };
@@ -86,7 +86,7 @@ HWY_INLINE Lying lying_at(const CoverTexels& texels, const Floats3& point) {
             return lerp(hn::GatherIndex(d, first, index), hn::GatherIndex(d, first + 1, index),
                         hn::Sub(x, x0));
         };
-        return lerp(beyond, lerp(row(of.data()), row(of.data() + map.columns), hn::Sub(y, y0)), share);
+        return lerp(beyond, lerp(row(of.data()), row(of.data() + map.columns), hn::Sub(y, y0)), fraction);
     };
     return {value(map.water_mm, outside.water_mm), value(map.snow_mm, outside.snow_mm),
             value(map.rain_mm_per_h, outside.rain_mm_per_h)};
@@ -158,10 +158,10 @@ HWY_INLINE Surface wet_surface(const GroundPass& pass, const Seen& seen, const L
     surface.reflected = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     if (pass.mirror == nullptr) return surface;
     const Floats strength = set(pass.reflection);
-    const auto reflects = [&](Floats share, Floats slope_x, Floats slope_y, Floats blur) {
-        if (hn::AllFalse(d, hn::Gt(share, set(1.0e-4f)))) return;
+    const auto reflects = [&](Floats fraction, Floats slope_x, Floats slope_y, Floats blur) {
+        if (hn::AllFalse(d, hn::Gt(fraction, set(1.0e-4f)))) return;
         const Floats3 light = reflected(pass, seen, mirrored_ray(seen.ray, slope_x, slope_y), blur);
-        surface.reflected = times_add(hn::Mul(strength, share), light, surface.reflected);
+        surface.reflected = times_add(hn::Mul(strength, fraction), light, surface.reflected);
     };
     reflects(hn::Mul(puddle, of_water), slopes.x, slopes.y, hn::Mul(set(2.0f), hn::Sqrt(slopes.variance)));
     reflects(hn::Mul(hn::Sub(one, puddle), of_soil), hn::Zero(d), hn::Zero(d), set(0.6f));
@@ -250,7 +250,7 @@ bool any(std::span<const float> values) {
     return std::ranges::any_of(values, [](float value) { return value > 0; });
 }
 
-bool any_water(const GroundCoverView& cover) { return cover.outside_water_mm > 0 || any(cover.water_mm); }
+bool any_water(const GroundCoverView& cover) { return cover.outside.water_mm > 0 || any(cover.water_mm); }
 
 // Returns true when a corner of the image, and hence any ray, points below the horizon of the plane.
 bool ground_in_view(const RenderOptions& options) {
@@ -280,7 +280,7 @@ double soaked_albedo(double dry_albedo) {
 }
 
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover) {
-    return (any_water(cover) || cover.outside_snow_mm > 0 || any(cover.snow_mm)) && ground_in_view(options);
+    return (any_water(cover) || cover.outside.snow_mm > 0 || any(cover.snow_mm)) && ground_in_view(options);
 }
 
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover) {
@@ -301,7 +301,7 @@ void check(const GroundCoverView& cover) {
     const auto bad = [](double value) { return !(value >= 0 && std::isfinite(value)); };
     for (const std::span<const float> values : {cover.water_mm, cover.snow_mm, cover.rain_mm_per_h})
         require(std::ranges::none_of(values, bad), "expected water, snow and rain of 0 mm or more");
-    require(!bad(cover.outside_water_mm) && !bad(cover.outside_snow_mm) && !bad(cover.outside_rain_mm_per_h),
+    require(!bad(cover.outside.water_mm) && !bad(cover.outside.snow_mm) && !bad(cover.outside_rain_mm_per_h),
             "expected water, snow and rain of 0 mm or more outside");
 }
 

@@ -45,7 +45,7 @@ struct Rgb8Image {
     std::vector<std::uint8_t> rgb;  // 3 * width * height
 };
 
-// The same of a picture that has been encoded already: the 3 * width * height bytes of to_srgb8(). The image's own
+// Writes a picture that has been encoded already: the 3 * width * height bytes of to_srgb8(). The image's own
 // text chunks are not written.
 void write_png(const std::filesystem::path& path, const Rgb8Image& image, const RenderOptions& options,
                const PictureMetadata& metadata);

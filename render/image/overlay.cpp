@@ -127,11 +127,11 @@ float reach_of(const Streak& s) { return s.width + 1.0f; }
 void blend(Picture& picture, const Streak& s, int x, int y, float cover) {
     const std::size_t i = std::size_t(y) * std::size_t(picture.width) + std::size_t(x);
     const float seen = s.distance_m <= picture.depth_m[i] ? 1.0f : picture.transmittance[i];
-    const float share = s.opacity * cover * seen;
+    const float fraction = s.opacity * cover * seen;
     float* pixel = &picture.beauty[3 * i];
-    pixel[0] += share * (s.red - pixel[0]);
-    pixel[1] += share * (s.green - pixel[1]);
-    pixel[2] += share * (s.blue - pixel[2]);
+    pixel[0] += fraction * (s.red - pixel[0]);
+    pixel[1] += fraction * (s.green - pixel[1]);
+    pixel[2] += fraction * (s.blue - pixel[2]);
 }
 
 // Along the longer axis, in each row (steep) or column the pixels near the middle line.

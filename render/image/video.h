@@ -15,6 +15,7 @@ struct VideoOptions {
     int width = 0, height = 0;      // pixels, 1..16384
     double frames_per_second = 25;  // > 0, at most 1000
     int quality = 18;               // constant rate factor of x264, 0 (lossless) .. 51
+    int processors = 0;             // on which ffmpeg may run, >= 0; 0: all. Without effect on the file
 };
 
 // Throws Error(io), with the package to install, when there is no ffmpeg command on the PATH. To be called
@@ -27,7 +28,7 @@ class VideoWriter {
     // Starts ffmpeg. Throws Error(usage) on bad options, Error(io) when ffmpeg is missing or the file cannot be
     // written.
     VideoWriter(const std::filesystem::path& path, const VideoOptions& options);
-    // Without finish(): ends ffmpeg and removes what it has written.
+    // Ends ffmpeg and removes what it has written, unless it was finished.
     ~VideoWriter();
     VideoWriter(const VideoWriter&) = delete;
     VideoWriter& operator=(const VideoWriter&) = delete;

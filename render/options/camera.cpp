@@ -60,6 +60,18 @@ CameraFrame camera_frame(const Camera& camera) {
     return frame;
 }
 
+Frustum::Frustum(const CameraFrame& camera)
+    : inward_{camera.forward, glm::normalize(camera.half_width * camera.forward + camera.right),
+              glm::normalize(camera.half_width * camera.forward - camera.right),
+              glm::normalize(camera.half_height * camera.forward + camera.up),
+              glm::normalize(camera.half_height * camera.forward - camera.up)} {}
+
+bool Frustum::may_see(const Vec3& offset, double radius) const {
+    for (const Vec3& inward : inward_)
+        if (dot(offset, inward) < -radius) return false;
+    return true;
+}
+
 Vec3 pixel_ray(const CameraFrame& frame, const Camera& camera, double px, double py) {
     const double x = (2.0 * px / camera.width - 1.0) * frame.half_width;
     const double y = (1.0 - 2.0 * py / camera.height) * frame.half_height;

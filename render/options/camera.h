@@ -6,6 +6,8 @@
 //
 //     forward + (2 px / width - 1) * right * half_width + (1 - 2 py / height) * up * half_height
 
+#include <cstddef>
+
 #include <glm/mat4x4.hpp>
 
 #include "render/options/options.h"
@@ -21,6 +23,21 @@ struct CameraFrame {
 // Returns the axes of a camera; north is up in the image when it looks straight up or down. Throws
 // Error(usage) when target and position coincide. Pure, as all functions here.
 CameraFrame camera_frame(const Camera& camera);
+
+// The view frustum: the inside of the four planes through the eye and the sides of the image, in front of the
+// eye, without a far plane.
+class Frustum {
+  public:
+    explicit Frustum(const CameraFrame& camera);
+    // Tests a sphere, given by the offset of its centre from the eye. Conservative: false only if it is entirely
+    // outside; near edges true for some spheres just outside.
+    bool may_see(const Vec3& offset, double radius) const;
+    // Returns the normal of one of the planes, pointing inwards.
+    const Vec3& inward(std::size_t plane) const { return inward_[plane]; }
+
+  private:
+    Vec3 inward_[5]{};
+};
 
 // Returns the direction of the ray through a point of the image, in pixels; unit length.
 Vec3 pixel_ray(const CameraFrame& frame, const Camera& camera, double px, double py);

@@ -42,7 +42,7 @@ HgDraine hg_draine_fit(double droplet_diameter_um) {
     return {.g = std::exp(-0.0990567 / (d - 1.67154)),
             .draine_g = std::exp(-2.20679 / (d + 3.91029) - 0.428934),
             .alpha = std::exp(3.62489 - 8.29288 / (d + 5.52825)),
-            .draine_share = std::exp(-0.599085 / (d - 0.641583) - 0.665888)};
+            .draine_fraction = std::exp(-0.599085 / (d - 0.641583) - 0.665888)};
 }
 
 double phase(const PhaseFunction& function, double cos_theta, double directed) {
@@ -60,8 +60,8 @@ double phase(const PhaseFunction& function, double cos_theta, double directed) {
             break;
     }
     const HgDraine fit = hg_draine_fit(function.droplet_diameter_um);
-    return (1 - fit.draine_share) * henyey_greenstein(cos_theta, directed * fit.g) +
-           fit.draine_share * draine(cos_theta, directed * fit.draine_g, directed * fit.alpha);
+    return (1 - fit.draine_fraction) * henyey_greenstein(cos_theta, directed * fit.g) +
+           fit.draine_fraction * draine(cos_theta, directed * fit.draine_g, directed * fit.alpha);
 }
 
 double mean_cosine(const PhaseFunction& function) {
@@ -77,7 +77,8 @@ double mean_cosine(const PhaseFunction& function) {
             break;
     }
     const HgDraine fit = hg_draine_fit(function.droplet_diameter_um);
-    return (1 - fit.draine_share) * fit.g + fit.draine_share * draine_mean_cosine(fit.draine_g, fit.alpha);
+    return (1 - fit.draine_fraction) * fit.g +
+           fit.draine_fraction * draine_mean_cosine(fit.draine_g, fit.alpha);
 }
 
 }  // namespace nephos

@@ -39,10 +39,10 @@ double rayleigh(double cos_theta);
 double draine(double cos_theta, double g, double alpha);
 
 // Jendersie and d'Eon 2023, "An Approximate Mie Scattering Function for Fog and Cloud Rendering", equations
-// 4 to 7: (1 - draine_share) * Henyey-Greenstein(g) + draine_share * Draine(draine_g, alpha) is close to
+// 4 to 7: (1 - draine_fraction) * Henyey-Greenstein(g) + draine_fraction * Draine(draine_g, alpha) is close to
 // Mie's solution for water droplets of a diameter of 5..50 micrometres.
 struct HgDraine {
-    double g = 0, draine_g = 0, alpha = 0, draine_share = 0;
+    double g = 0, draine_g = 0, alpha = 0, draine_fraction = 0;
 };
 HgDraine hg_draine_fit(double droplet_diameter_um);
 

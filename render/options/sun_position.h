@@ -24,7 +24,7 @@ inline std::optional<int> digits(std::string_view text, std::size_t count) {
     return value;
 }
 
-inline std::optional<double> day_share(std::string_view time) {
+inline std::optional<double> day_fraction(std::string_view time) {
     if (time.size() != 5 && time.size() != 8) return {};
     const auto hour = digits(time.substr(0, 2), 2), minute = digits(time.substr(3, 2), 2),
                second = time.size() == 8 ? digits(time.substr(6), 2) : std::optional(0);
@@ -43,12 +43,12 @@ inline std::optional<double> days_since_2000(std::string_view date, std::string_
     if (date.size() != 10 || date[4] != '-' || date[7] != '-') return {};
     const auto y = digits(date.substr(0, 4), 4), m = digits(date.substr(5, 2), 2),
                d = digits(date.substr(8), 2);
-    const std::optional<double> share = day_share(time);
-    if (!y || !m || !d || !share || *y < 1900 || *y > 2100) return {};
+    const std::optional<double> fraction = day_fraction(time);
+    if (!y || !m || !d || !fraction || *y < 1900 || *y > 2100) return {};
     const year_month_day day{year(*y), month(unsigned(*m)), std::chrono::day(unsigned(*d))};
     if (!day.ok()) return {};
     const auto days = sys_days(day) - sys_days(year(2000) / 1 / 1);
-    return double(days.count()) + *share - 0.5;
+    return double(days.count()) + *fraction - 0.5;
 }
 
 struct SunPosition {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;
 constexpr double kNearest_m = 0.3, kNearFade_m = 0.7;  // drops before the eye vanish
-constexpr double kFadeShare = 0.2;                     // of the reach
+constexpr double kFadeFraction = 0.2;                  // of the reach
 constexpr double kVerticalFade = 0.3;                  // of half the height
 constexpr double kMostOpaque = 0.85, kLeastOpaque = 1.0 / 2048;
 constexpr double kGrowth[2] = {8, 2};        // of the size over the depth, rain and snow
@@ -64,10 +64,10 @@ double real_particles(const ParticlePass& pass, const PrecipitationOptions& p, c
             const RainCurtain& c = *term.curtain;
             const double height = (place.z - c.ground_m) / (c.base_m - c.ground_m);
             if (height < 0 || height > 1) continue;
-            const double share = rain_share(ellipse_at(c, place.z), place.x, place.y, p.edge);
-            if (share <= 0) continue;
-            most =
-                std::max(most, share * left_of_rain(height, p.evaporation) * real_per_drawn(term.law, d_mm));
+            const double fraction = rain_fraction(ellipse_at(c, place.z), place.x, place.y, p.edge);
+            if (fraction <= 0) continue;
+            most = std::max(most,
+                            fraction * left_of_rain(height, p.evaporation) * real_per_drawn(term.law, d_mm));
         }
         return most;
     };
@@ -80,14 +80,14 @@ double linear(double low, double high, double x) { return std::clamp((x - low) /
 // Returns the fade weight of a particle: by its reach, the container's top and bottom, the eye, the number.
 double presence(const Pass& p, std::size_t i, double d, double z, double distance_m) {
     const double reach = double(p.particles.reach[i]);
-    double share = p.pass.share * std::min(1.0, (reach - d) / (kFadeShare * reach));
-    share *= linear(kNearest_m, kNearFade_m, distance_m);
-    if (!p.pass.far) share *= linear(1, 1 - kVerticalFade, std::abs(z) / (0.5 * p.pass.boxes.height_m));
+    double fraction = p.pass.fraction * std::min(1.0, (reach - d) / (kFadeFraction * reach));
+    fraction *= linear(kNearest_m, kNearFade_m, distance_m);
+    if (!p.pass.far) fraction *= linear(1, 1 - kVerticalFade, std::abs(z) / (0.5 * p.pass.boxes.height_m));
     if (p.pass.number < 1) {
         const double order = double(i) / double(p.particles.size());
-        share *= linear(0, kNumberFade, p.pass.number * (1 + kNumberFade) - order);
+        fraction *= linear(0, kNumberFade, p.pass.number * (1 + kNumberFade) - order);
     }
-    return share;
+    return fraction;
 }
 
 struct Ends {
@@ -201,8 +201,9 @@ double size_at_eye(const Particles& particles, const ParticlePass& pass, const S
 
 double drawn_per_m3(std::size_t count, const ParticleBoxes& boxes, double d) {
     // The integral of 3 e^2 / (4 e^2) from d to 1, with the fade weights of particles near their reach.
-    const double left = d <= 1 - kFadeShare ? 1 - d - 0.5 * kFadeShare / (1 - kFadeShare) * d
-                                            : (1 - d) * (1 - d) * (1 - kFadeShare) / (2 * kFadeShare * d);
+    const double left = d <= 1 - kFadeFraction
+                            ? 1 - d - 0.5 * kFadeFraction / (1 - kFadeFraction) * d
+                            : (1 - d) * (1 - d) * (1 - kFadeFraction) / (2 * kFadeFraction * d);
     return 0.75 * double(count) * std::max(left, 0.01) / (boxes.depth_m * boxes.depth_m * boxes.height_m);
 }
 

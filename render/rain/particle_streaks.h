@@ -36,18 +36,18 @@ struct CurtainTerm {
 
 // Weights of the near and the far rain of an area for an eye at a distance from its perimeter. At distance 0
 // all is near: both transitions are continuous.
-struct RainShares {
+struct RainFractions {
     double near = 1, far = 0;  // sum 1
     double far_number = 1;     // fraction of the far particles, falling to 0 at PrecipitationOptions::reach_m
 };
-RainShares rain_shares(const PrecipitationOptions& precipitation, double outside_m);
+RainFractions rain_fractions(const PrecipitationOptions& precipitation, double outside_m);
 
 // One container of particles in one frame.
 struct ParticlePass {
     RainContainer container;
     ParticleBoxes boxes;
     bool far = false;
-    double share = 1;                     // factor of their opacity
+    double fraction = 1;                  // factor of their opacity
     double number = 1;                    // fraction of the particles that exist
     std::vector<CurtainTerm> rain, less;  // the rain in it; the part of it that another pass draws
 };

@@ -72,7 +72,7 @@ HWY_EXPORT(place_some);
 constexpr std::size_t kMostLanes = 8;  // doubles in the widest vector of any target
 
 // Even numbers of a sequence of low discrepancy (Roberts 2018): any run of particles has all sizes and
-// reaches in their shares.
+// reaches in their fractions.
 double weyl(std::size_t i, double step, double start) {
     const double value = start + double(i) * step;
     return value - std::floor(value);

@@ -7,7 +7,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "core/smoothstep.h"
+#include "core/math.h"
 #include "core/vec.h"
 #include "render/frame/frame_data.h"
 #include "render/image/overlay.h"
@@ -28,12 +28,12 @@ constexpr double kNearHeight = 1.25;  // height of the near container in depths
 
 }  // namespace
 
-RainShares rain_shares(const PrecipitationOptions& p, double outside_m) {
-    RainShares shares;
-    shares.near = 1 - smoothstep(0, kFadeDepths * p.depth_m, outside_m);
-    shares.far = (1 - shares.near);
-    shares.far_number = std::clamp(1 - outside_m / p.reach_m, 0.0, 1.0);
-    return shares;
+RainFractions rain_fractions(const PrecipitationOptions& p, double outside_m) {
+    RainFractions fractions;
+    fractions.near = 1 - smoothstep(0, kFadeDepths * p.depth_m, outside_m);
+    fractions.far = (1 - fractions.near);
+    fractions.far_number = std::clamp(1 - outside_m / p.reach_m, 0.0, 1.0);
+    return fractions;
 }
 
 std::vector<ParticlePass> particle_passes(const RenderOptions& options, const CameraFrame& camera,
@@ -53,10 +53,10 @@ std::vector<ParticlePass> particle_passes(const RenderOptions& options, const Ca
             outside.push_back(at);
         }
     }
-    const auto pass_of = [&](const RainContainer& at, double depth, double share) {
+    const auto pass_of = [&](const RainContainer& at, double depth, double fraction) {
         ParticlePass pass;
         pass.container = at;
-        pass.share = share;
+        pass.fraction = fraction;
         pass.boxes = {at.centre.x, at.centre.y, camera.position_m.z, weather.carried_x_m, weather.carried_y_m,
                       time_s,      depth,       p.margin_m,          kNearHeight * depth};
         return pass;
@@ -70,14 +70,14 @@ std::vector<ParticlePass> particle_passes(const RenderOptions& options, const Ca
     // Where areas overlap the strongest rain counts, so an area adds only what exceeds those before it.
     std::vector<CurtainTerm> before = near;
     for (std::size_t i = 0; i < far.size(); ++i) {
-        const RainShares shares = rain_shares(p, outside[i].outside_m);
+        const RainFractions fractions = rain_fractions(p, outside[i].outside_m);
         const RainCurtain& curtain = *far[i].curtain;
         for (const bool is_far : {false, true}) {
-            const double share = is_far ? shares.far : shares.near;
-            if (share <= 0) continue;
-            ParticlePass pass = pass_of(outside[i], is_far ? far_depth : p.depth_m, share);
+            const double fraction = is_far ? fractions.far : fractions.near;
+            if (fraction <= 0) continue;
+            ParticlePass pass = pass_of(outside[i], is_far ? far_depth : p.depth_m, fraction);
             pass.far = is_far;
-            pass.number = is_far ? shares.far_number : 1;
+            pass.number = is_far ? fractions.far_number : 1;
             if (is_far) {
                 pass.boxes.height_m = curtain.base_m - curtain.ground_m;
                 pass.boxes.centre_z_m = 0.5 * (curtain.base_m + curtain.ground_m);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/smoothstep.h"
+#include "core/math.h"
 #include "core/vec.h"
 #include "render/frame/frame_data.h"
 #include "render/options/phase_function.h"
@@ -15,11 +15,11 @@ namespace {
 
 // Times pi: radiance per radiance of a white surface that faces the light.
 double particle_phase(PrecipitationKind kind, double cosine) {
-    return kForwardShare * std::numbers::pi * henyey_greenstein(cosine, forward_g(kind)) +
-           (1 - kForwardShare) * 0.25;
+    return kForwardFraction * std::numbers::pi * henyey_greenstein(cosine, forward_g(kind)) +
+           (1 - kForwardFraction) * 0.25;
 }
 
-constexpr double kSkyShare[2] = {0.68, 0.8};  // of a drop's and a flake's light, the rest is the ground's
+constexpr double kSkyFraction[2] = {0.68, 0.8};  // of a drop's and a flake's light, the rest is the ground's
 
 // A weighted mean of the picture's pixels and of a value by the options, which replaces missing pixels.
 struct Mean {
@@ -59,8 +59,8 @@ Rgb surroundings(const Picture& picture, const RenderOptions& options, const Cam
     Rgb both{};
     for (std::size_t c = 0; c < 3; ++c) both[c] = options.ground.albedo[c] * sky[c];
     const Rgb ground = below.with(both, more);
-    const double share = kSkyShare[int(options.precipitation.kind)];
-    for (std::size_t c = 0; c < 3; ++c) both[c] = share * sky[c] + (1 - share) * ground[c];
+    const double fraction = kSkyFraction[int(options.precipitation.kind)];
+    for (std::size_t c = 0; c < 3; ++c) both[c] = fraction * sky[c] + (1 - fraction) * ground[c];
     return both;
 }
 
@@ -106,14 +106,14 @@ float sunlight_at(const Picture& picture, const Vec3& place_m) {
     const double v = dot(from, f.v_axis_m) / dot(f.v_axis_m, f.v_axis_m) * size - 0.5;
     if (!(u > -1 && u < size && v > -1 && v < size)) return 1.0f;
     const int x = int(std::floor(u)), y = int(std::floor(v));
-    const float share_x = float(u - x), share_y = float(v - y);
+    const float fraction_x = float(u - x), fraction_y = float(v - y);
     const auto texel = [&](int column, int row) {
         if (column < 0 || row < 0 || column >= picture.shadow_size || row >= picture.shadow_size) return 1.0f;
         return picture.shadow[std::size_t(row) * std::size_t(picture.shadow_size) + std::size_t(column)];
     };
-    const float above = texel(x, y) + share_x * (texel(x + 1, y) - texel(x, y));
-    const float below = texel(x, y + 1) + share_x * (texel(x + 1, y + 1) - texel(x, y + 1));
-    return above + share_y * (below - above);
+    const float above = texel(x, y) + fraction_x * (texel(x + 1, y) - texel(x, y));
+    const float below = texel(x, y + 1) + fraction_x * (texel(x + 1, y + 1) - texel(x, y + 1));
+    return above + fraction_y * (below - above);
 }
 
 Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Vec3& place_m,

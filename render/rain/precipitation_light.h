@@ -34,9 +34,9 @@ PictureAir air_of(const Picture& picture, const RenderOptions& options);
 // below all clouds; points between or above them count as shaded, too.
 float sunlight_at(const Picture& picture, const Vec3& place_m);
 
-// Phase function of particles: the fraction kForwardShare is Henyey-Greenstein with g = 0.85 for drops and
+// Phase function of particles: the fraction kForwardFraction is Henyey-Greenstein with g = 0.85 for drops and
 // 0.6 for flakes, the rest isotropic.
-inline constexpr double kForwardShare = 0.8;
+inline constexpr double kForwardFraction = 0.8;
 double forward_g(PrecipitationKind kind);
 
 // Returns the radiance of a particle, or of an opaque curtain of particles, along a unit ray; `sunlight`

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/smoothstep.h"
+#include "core/math.h"
 #include "core/vec.h"
 
 namespace nephos {
@@ -28,8 +28,8 @@ Vec2 nearest_in_quadrant(double a, double b, double x, double y) {
     if (y <= 1e-12 * b) {
         const double gap = a2 - b2;
         if (gap > 0 && a * x < gap) {
-            const double share = a * x / gap;
-            return {a * share, b * std::sqrt(std::max(0.0, 1 - share * share))};
+            const double fraction = a * x / gap;
+            return {a * fraction, b * std::sqrt(std::max(0.0, 1 - fraction * fraction))};
         }
         if (!(gap > 0) && x <= 1e-12 * a) return {0, b};  // the centre of a circle: any point will do
         return {a, 0};
@@ -97,7 +97,7 @@ Vec2 nearest_on_perimeter(const Ellipse& e, double x_m, double y_m) {
     return world(e, {std::copysign(nearest.x, p.x), std::copysign(nearest.y, p.y)});
 }
 
-double rain_share(const Ellipse& e, double x_m, double y_m, double edge) {
+double rain_fraction(const Ellipse& e, double x_m, double y_m, double edge) {
     const double value = ellipse_value(e, x_m, y_m);
     if (value >= 1) return 0;
     if (edge <= 0) return 1;

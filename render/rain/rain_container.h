@@ -44,7 +44,7 @@ double ellipse_value(const Ellipse& ellipse, double x_m, double y_m);
 Vec2 nearest_on_perimeter(const Ellipse& ellipse, double x_m, double y_m);
 // Returns the rain at a point relative to that in the middle: 1, falling as 3 s^2 - 2 s^3 to 0 at the
 // perimeter over the outer fraction `edge` (0..1) of the radius.
-double rain_share(const Ellipse& ellipse, double x_m, double y_m, double edge);
+double rain_fraction(const Ellipse& ellipse, double x_m, double y_m, double edge);
 
 // The traces of the frustum's side planes on the ground: unit vectors left and right of the view. Where the
 // camera looks so steeply that all directions are in view, `all` is true.

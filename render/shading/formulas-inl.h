@@ -25,6 +25,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // At most two rows of a tile, and every number of lanes divides a tile.
 using Lanes = hn::CappedTag<float, 2 * shader::kTileWidth>;
 using Floats = hn::Vec<Lanes>;
+using Words = hn::Vec<hn::RebindToSigned<Lanes>>;
 
 HWY_INLINE Floats set(float value) { return hn::Set(Lanes(), value); }
 

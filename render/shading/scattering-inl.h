@@ -20,12 +20,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
-using Words = hn::Vec<hn::RebindToSigned<Lanes>>;
-
 // A place between two nodes of the scattering table.
 struct Between {
     hn::Vec<hn::RebindToSigned<Lanes>> below;
-    Floats share;  // of the node above
+    Floats fraction;  // of the node above
 };
 
 HWY_INLINE Between between(Floats place, shader::uint nodes) {
@@ -46,7 +44,7 @@ HWY_INLINE Floats scattering_at(const float* HWY_RESTRICT table, hn::Vec<hn::Reb
                                 const Between& angle) {
     const auto at = hn::Add(first, angle.below);
     const Floats a = hn::GatherIndex(Lanes(), table, at), b = hn::GatherIndex(Lanes(), table + 1, at);
-    return hn::MulAdd(angle.share, hn::Sub(b, a), a);
+    return hn::MulAdd(angle.fraction, hn::Sub(b, a), a);
 }
 
 // Returns pi times the phase function of the cosine.
@@ -62,7 +60,7 @@ HWY_INLINE Floats scattered_often(const PictureFrame& frame, const Floats3& ray,
     const auto first = hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles);
     const Floats a = scattering_at(frame.scattering, first, column),
                  b = scattering_at(frame.scattering, hn::Add(first, angles), column);
-    return hn::MulAdd(row.share, hn::Sub(b, a), a);
+    return hn::MulAdd(row.fraction, hn::Sub(b, a), a);
 }
 
 // The same at the node `angle` of the table alone: what was scattered often changes little from one to the
@@ -74,7 +72,7 @@ HWY_INLINE Floats scattered_often(const PictureFrame& frame, Words angle, Floats
     const auto at = hn::Add(hn::Mul(hn::Add(row.below, hn::Set(di, 1)), angles), angle);
     const Floats a = hn::GatherIndex(Lanes(), frame.scattering, at),
                  b = hn::GatherIndex(Lanes(), frame.scattering, hn::Add(at, angles));
-    return hn::MulAdd(row.share, hn::Sub(b, a), a);
+    return hn::MulAdd(row.fraction, hn::Sub(b, a), a);
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -16,7 +16,9 @@
 #include <hwy/highway.h>
 
 #include "render/frame/air_shells.h"
+#include "render/shading/air-inl.h"
 #include "render/shading/background-inl.h"
+#include "render/shading/fog-inl.h"
 #include "render/shading/formulas-inl.h"
 #include "render/shading/scattering-inl.h"
 
@@ -34,20 +36,7 @@ HWY_INLINE Floats along_row(const shader::vec4& row, const Floats3& point) {
     return hn::Add(dot(set3(row), point), set(row.w));
 }
 
-HWY_INLINE Floats byte_of(Words word, int shift) {
-    const hn::RebindToSigned<Lanes> di;
-    return hn::ConvertTo(Lanes(), hn::And(hn::ShiftRightSame(word, shift), hn::Set(di, 0xFF)));
-}
-
-// Interpolates the four bytes of words, 0..1, bilinearly; the upper half is the next row.
-HWY_INLINE Floats between_bytes(Words word, Floats share_u, Floats share_v) {
-    const auto mix = [](Floats a, Floats b, Floats share) { return hn::MulAdd(share, hn::Sub(b, a), a); };
-    const Floats left = mix(byte_of(word, 0), byte_of(word, 16), share_v),
-                 right = mix(byte_of(word, 8), byte_of(word, 24), share_v);
-    return hn::Mul(mix(left, right, share_u), set(1.0f / 255.0f));
-}
-
-// Share of the sunlight that the clouds leave at points relative to the eye: D's gamma. The shade of a cloud
+// Fraction of the sunlight that the clouds leave at points relative to the eye: D's gamma. The shade of a cloud
 // begins at its top and is complete at its base.
 HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
     const Lanes d;
@@ -58,90 +47,19 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
     };
     const Floats u = place(data.shade_u, data.shade.x), v = place(data.shade_v, data.shade.y);
     const auto column = hn::ConvertTo(di, u), row = hn::ConvertTo(di, v);
-    const Floats share_u = hn::Sub(u, hn::ConvertTo(d, column)), share_v = hn::Sub(v, hn::ConvertTo(d, row));
+    const Floats weight_u = hn::Sub(u, hn::ConvertTo(d, column)),
+                 weight_v = hn::Sub(v, hn::ConvertTo(d, row));
     const auto columns = std::int32_t(data.settings.z), plane = std::int32_t(data.settings.w);
     const auto index = hn::Add(hn::Mul(row, hn::Set(di, columns)), column);
     const auto* words = reinterpret_cast<const std::int32_t*>(air.shade.data());
     const auto of_plane = [&](int number) {
-        return between_bytes(hn::GatherIndex(di, words + number * plane, index), share_u, share_v);
+        return between_bytes(hn::GatherIndex(di, words + number * plane, index), weight_u, weight_v);
     };
     const Floats gamma = of_plane(0), along = along_row(data.shade_along, point), one = set(1.0f);
     if (hn::AllTrue(d, hn::Ge(along, one))) return gamma;  // below all clouds
     const Floats begin = of_plane(1), length = hn::Max(hn::Sub(of_plane(2), begin), set(1.0f / 255.0f));
     const Floats part = hn::Min(hn::Max(hn::Div(hn::Sub(along, begin), length), hn::Zero(d)), one);
     return hn::NegMulAdd(part, hn::Sub(one, gamma), one);
-}
-
-HWY_INLINE Floats fraction(Floats value) { return hn::Sub(value, hn::Floor(value)); }
-
-// Noise of fog at points relative to the eye, 0..1.
-HWY_INLINE Floats fog_noise(const AirShells& air, const Floats3& point, const shader::vec4& eye) {
-    const hn::RebindToSigned<Lanes> di;
-    constexpr int kEdge = int(shader::kFogVoxels);
-    const auto voxel = [&](float from, Floats along) {
-        return hn::Mul(fraction(hn::MulAdd(set(eye.w), along, set(from))), set(float(kEdge)));
-    };
-    const Floats x = voxel(eye.x, point.x), y = voxel(eye.y, point.y), z = voxel(eye.z, point.z);
-    const auto wrapped = [&](auto number) { return hn::And(number, hn::Set(di, kEdge - 1)); };
-    const auto column = wrapped(hn::ConvertTo(di, x)), row = wrapped(hn::ConvertTo(di, y)),
-               level = wrapped(hn::ConvertTo(di, z));
-    const auto above = wrapped(hn::Add(level, hn::Set(di, 1)));
-    const auto plane = hn::Add(hn::Mul(row, hn::Set(di, kEdge)), column);
-    const auto* words =
-        reinterpret_cast<const std::int32_t*>(air.shade.data()) + 3 * std::ptrdiff_t(air.data.settings.w);
-    const auto at = [&](auto of) {
-        return hn::GatherIndex(di, words, hn::Add(hn::Mul(of, hn::Set(di, kEdge * kEdge)), plane));
-    };
-    const Floats low = between_bytes(at(level), fraction(x), fraction(y)),
-                 high = between_bytes(at(above), fraction(x), fraction(y));
-    return hn::MulAdd(fraction(z), hn::Sub(high, low), low);
-}
-
-struct FogPart {
-    Floats depth, low;
-};
-
-HWY_INLINE FogPart fog_part(const AirShells& air, const Floats3& ray, Floats begin, Floats end) {
-    const shader::Shells& data = air.data;
-    const Floats height = hn::MulAdd(ray.z, begin, set(data.fog.z));
-    const Floats low_end = hn::IfThenElse(hn::Lt(ray.z, hn::Zero(Lanes())), end, begin);
-    const Floats low = hn::MulAdd(ray.z, low_end, set(data.fog.z));
-    const Floats dense = fast_exp(hn::Min(hn::Mul(low, set(-data.fog.y)), set(60.0f)));
-    return {hn::Mul(set(data.fog.x), fog_column(height, ray.z, hn::Sub(end, begin), data.fog.y)),
-            hn::Mul(set(data.fog.x), dense)};
-}
-
-// Returns the distance at which half of the opacity of fog is reached; `transmittance`: exp(-fog.depth).
-HWY_INLINE Floats fog_middle(const AirShells& air, const FogPart& fog, Floats transmittance,
-                             const Floats3& ray, Floats begin, Floats end) {
-    const Lanes d;
-    const Floats one = set(1.0f), zero = hn::Zero(d);
-    const Floats taken = hn::Neg(hn::Log(d, hn::MulAdd(set(0.5f), transmittance, set(0.5f))));
-    const auto down = hn::Lt(ray.z, zero);
-    const Floats rest = hn::IfThenElse(down, hn::Sub(fog.depth, taken), taken);
-    const Floats per_low = hn::Div(rest, hn::Max(fog.low, set(1.0e-30f)));
-    const Floats falls = hn::Mul(hn::Abs(ray.z), set(air.data.fog.y)), x = hn::Mul(falls, per_low);
-    const Floats near = hn::MulAdd(x, hn::MulAdd(x, set(1.0f / 3.0f), set(0.5f)), one);
-    const Floats log = hn::Log(d, hn::Max(hn::Sub(one, x), set(1.0e-7f)));
-    const Floats far = hn::Div(hn::Neg(log), hn::Max(falls, set(1.0e-30f)));
-    const Floats way =
-        hn::Min(hn::Max(hn::IfThenElse(hn::Lt(x, set(1.0e-2f)), hn::Mul(per_low, near), far), zero),
-                hn::Sub(end, begin));
-    return hn::IfThenElse(down, hn::Sub(end, way), hn::Add(begin, way));
-}
-
-HWY_INLINE Floats fog_patches(const AirShells& air, const Floats3& point, Floats begin, Floats end) {
-    const Lanes d;
-    const shader::Shells& data = air.data;
-    const Floats one = set(1.0f), zero = hn::Zero(d);
-    const Floats patches = hn::Max(hn::Mul(set(data.fog_coarse.w), hn::Sub(end, begin)), set(1.0e-6f));
-    const Floats fades = hn::NegMulAdd(set(4.0f / data.shade.w), begin, set(4.0f));
-    const Floats varies = hn::Mul(hn::Mul(set(data.fog.w), hn::Min(one, hn::Div(set(0.125f), patches))),
-                                  hn::Min(hn::Max(fades, zero), one));
-    if (hn::AllTrue(d, hn::Le(varies, zero))) return one;
-    const Floats noise = hn::Add(fog_noise(air, point, data.fog_coarse),
-                                 fog_noise(air, {point.y, point.z, point.x}, data.fog_fine));
-    return hn::Max(hn::MulAdd(varies, hn::Sub(noise, one), one), zero);
 }
 
 // exp(-extinction distance) of clear air (render/shading/air.glsl), to what fast_exp() is good for.
@@ -179,7 +97,7 @@ struct RayAir {
         const Floats cosine = dot(set3(frame.to_sun), direction);
         const Between column = scatter_column(cosine);
         once = scattered_once(frame, cosine);
-        angle = hn::Add(column.below, hn::ConvertTo(hn::RebindToSigned<Lanes>(), hn::Round(column.share)));
+        angle = hn::Add(column.below, hn::ConvertTo(hn::RebindToSigned<Lanes>(), hn::Round(column.fraction)));
     }
 };
 
@@ -197,27 +115,10 @@ HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Flo
     Floats3 arriving = times_add(sun, sunlight, ambient);
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), times(at, of.ray));
-        const Floats share = hn::Mul(fast_exp(hn::Neg(above)), flash_falloff(dot(way, way)));
-        arriving = times_add(hn::Mul(set(frame.flash.w), share), set3(frame.flash_colour), arriving);
+        const Floats weight = hn::Mul(fast_exp(hn::Neg(above)), flash_falloff(dot(way, way)));
+        arriving = times_add(hn::Mul(set(frame.flash.w), weight), set3(frame.flash_colour), arriving);
     }
     return times(set(frame.ambient_top.w), arriving);
-}
-
-// Sunlight at heights above the eye that differ little, as those of the pixels of a vector in one shell:
-// between the two nodes of the table that are nearest to the first of them.
-HWY_INLINE Floats3 sunlight_nearby(const PictureFrame& frame, Floats heights) {
-    if (frame.sky == nullptr) return set3(frame.sunlight);
-    constexpr auto kColumns = std::size_t(shader::kSkyColumns), kTexels = kColumns * shader::kSkyRows;
-    const Floats altitude = hn::Add(set(frame.air.x), heights);
-    const Floats place = hn::Mul(altitude, set(float(kColumns - 1) / shader::kSunlightTop));
-    const Floats x = hn::Min(hn::Max(place, hn::Zero(Lanes())), set(float(kColumns - 1)));
-    const auto below = std::min(std::size_t(hn::GetLane(x)), kColumns - 2);
-    const Floats share = hn::Sub(x, set(float(below)));
-    const float* const texel = frame.sky + 4 * (2 * kTexels + below);
-    const auto channel = [&](std::size_t c) {
-        return hn::MulAdd(share, set(texel[c + 4] - texel[c]), set(texel[c]));
-    };
-    return {channel(0), channel(1), channel(2)};
 }
 
 enum class Heights {
@@ -231,10 +132,10 @@ struct AirPlaces {
 };
 
 HWY_INLINE AirPlaces air_places(const AirShells& air, const FogPart& fog, const Floats3& ray, Floats begin,
-                                Floats end, Floats share) {
+                                Floats end, Floats weight) {
     const Lanes d;
     const Floats distance = hn::Sub(end, begin), one = set(1.0f), half = set(0.5f), zero = hn::Zero(d);
-    const AirPlaces even{hn::MulAdd(share, distance, begin), hn::MulAdd(half, distance, begin)};
+    const AirPlaces even{hn::MulAdd(weight, distance, begin), hn::MulAdd(half, distance, begin)};
     const auto last = hn::Ge(begin, set(air.data.shade.w));
     const Floats transmittance = fast_exp(hn::Neg(fog.depth));
     const Floats some = hn::Mul(hn::Sub(set(0.99f), transmittance), set(1.0f / 0.09f));
@@ -250,14 +151,14 @@ HWY_INLINE AirPlaces air_places(const AirShells& air, const FogPart& fog, const 
 // `before`, `behind`: transmittance of clear air up to the two distances.
 template <Heights kHeights>
 HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const Floats3& before,
-                              const Floats3& behind, Floats begin, Floats end, Floats share) {
+                              const Floats3& behind, Floats begin, Floats end, Floats weight) {
     const Lanes d;
     const AirShells& air = *frame.shells;
     const Floats one = set(1.0f), zero = hn::Zero(d);
     const FogPart fog = air.has_fog() ? fog_part(air, of.ray, begin, end) : FogPart{zero, zero};
     const bool foggy = !hn::AllTrue(d, hn::Lt(fog.depth, set(1.0e-5f))), shaded = air.data.settings.y > 0;
     if (!foggy && !shaded) return {{zero, zero, zero}, one, begin};
-    const AirPlaces places = air_places(air, fog, of.ray, begin, end, share);
+    const AirPlaces places = air_places(air, fog, of.ray, begin, end, weight);
     const Floats height = hn::Mul(of.ray.z, places.middle);
     const Floats3 sunlight =
         kHeights == Heights::alike ? sunlight_nearby(frame, height) : sunlight_at(frame, height);
@@ -298,7 +199,7 @@ HWY_INLINE AirLayer layer_in_front(const PictureFrame& frame, const Floats3& ray
 }
 
 // Distances along rays between which something is drawn.
-struct AirPart {
+struct AirInterval {
     float begin = kNowhere, end = 0;
     void add(Floats from, Floats until) {
         const Lanes d;
@@ -310,10 +211,10 @@ struct AirPart {
 };
 
 // Shade of clouds, and fog.
-HWY_INLINE AirPart part_with_air(const AirShells& air, const Floats3& ray) {
+HWY_INLINE AirInterval interval_with_air(const AirShells& air, const Floats3& ray) {
     const Lanes d;
     const shader::Shells& data = air.data;
-    AirPart part;
+    AirInterval part;
     const auto steep = [](Floats slope) {
         return hn::IfThenElse(hn::Lt(hn::Abs(slope), set(1.0e-12f)), set(1.0e-12f), slope);
     };

@@ -45,7 +45,7 @@ struct SeenBillboard {
 struct OrderFrame {
     vec4 eye_high;   // xyz: the eye, world; w: height of the ground
     vec4 eye_low;    // the rounding error of eye_high
-    vec4 inward[5];  // xyz: normals of the planes of ViewPyramid
+    vec4 inward[5];  // xyz: normals of the planes of Frustum
     vec4 right;      // xyz: unit; w: pixels per unit of a tangent across
     vec4 up;         // xyz: unit; w: ... upwards
     vec4 forward;    // xyz: unit; w: pixels per unit at distance 1

@@ -38,7 +38,6 @@ NEPHOS_CONST uint kTileWidth = 8u;      // pixels
 NEPHOS_CONST uint kTileHeight = 16u;
 NEPHOS_CONST uint kQueriesPerLane = 4u;
 NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
-NEPHOS_CONST float kMaxFittedDepth = 6.0f;    // depth scale; denser metaballs are integrated in the tiles
 NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance below which splats behind are skipped
 NEPHOS_CONST uint kIntegrate = 1u;      // flag: evaluate the integral along the ray, do not use the textures
 NEPHOS_CONST uint kNotFitted = 4u;      // flag: the tiles evaluate the integral, whatever the billboards do
@@ -197,32 +196,6 @@ NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
     return float((x * 3242174889u + y * 2447445414u) >> 8) * (1.0f / 16777216.0f);
 }
 
-// 1 - exp(-d line_integral(w, sqrt(w))) as w^2 (c0 + c1 w + ... + c5 w^5), for depth scales d up to
-// kMaxFittedDepth; the coefficients are polynomials of s = d / (d + 4). Largest error 0.0006 min(1, d); from
-// tests/reference/fit_opacity.py.
-NEPHOS_FUNCTION float fit_parameter(float depth_scale) { return depth_scale / (depth_scale + 4.0f); }
-NEPHOS_FUNCTION float fit_row(float s, float a, float b, float c, float d, float e) {
-    return s * (a + s * (b + s * (c + s * (d + s * e))));
-}
-NEPHOS_FUNCTION float opacity_c0(float s) {
-    return fit_row(s, 0.4231499f, 1.2760525f, -11.549244f, 42.971609f, -38.80289f);
-}
-NEPHOS_FUNCTION float opacity_c1(float s) {
-    return fit_row(s, 5.0145599f, -34.206589f, 320.55556f, -886.62836f, 752.04615f);
-}
-NEPHOS_FUNCTION float opacity_c2(float s) {
-    return fit_row(s, -6.3734665f, 194.69115f, -1524.4345f, 4065.3462f, -3188.8959f);
-}
-NEPHOS_FUNCTION float opacity_c3(float s) {
-    return fit_row(s, 10.831419f, -377.91478f, 2859.7263f, -7389.1236f, 5301.7407f);
-}
-NEPHOS_FUNCTION float opacity_c4(float s) {
-    return fit_row(s, -8.3280895f, 306.77561f, -2368.4252f, 5817.7935f, -3754.5104f);
-}
-NEPHOS_FUNCTION float opacity_c5(float s) {
-    return fit_row(s, 2.426292f, -94.490722f, 721.69415f, -1645.7595f, 927.43252f);
-}
-
 // The scattering angle varies over the disc of a metaball: weighted by opacity, the mean of 1 - cos exceeds
 // its value at the centre by this factor times the square of the angular radius. A lobe of the phase function
 // narrower than the disc is thus averaged over it instead of making one bright dot.
@@ -242,6 +215,7 @@ inline float fast_exp(float x) { return exp(x); }
 #define fast_exp(x) exp(x)
 #endif
 #include "render/shared/formulas.h"
+#include "render/shared/opacity_fit.h"
 
 #ifdef __cplusplus
 static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&

@@ -106,7 +106,7 @@ shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options,
                                bool has_flash, bool marched) {
     const HighLow x = high_low(camera.position_m.x), y = high_low(camera.position_m.y),
                   z = high_low(camera.position_m.z), height = high_low(ground.height_m);
-    const ViewPyramid pyramid(camera);
+    const Frustum pyramid(camera);
     const double half_width = 0.5 * options.width, half_height = 0.5 * options.height;
     shader::OrderFrame frame;
     frame.eye_high = {x.high, y.high, z.high, height.high};

@@ -2,7 +2,7 @@
 #pragma once
 
 // The light pass from an order and lists that the device makes, for a cloud that lies there (device_lists.h):
-// the twin of sort_for_light() and shadow_map_bins.h.
+// the twin of sort_for_light() and bin_centres().
 //
 //     keys      distances along the light; sort
 //     view      metaballs on the shadow map, the tiles that each touches, and the tile of its centre

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "render/shared/order.h"
 // Order from the sun, last: metaballs on the shadow map (sort_for_light() of cloud_preparation.h), the tiles that they
-// touch, and as keys the tiles that their centres are in (shadow_map_bins.h).
+// touch, and as keys the tiles that their centres are in (bin_centres()).
 #include "render/vulkan/order.glsl"
 #include "render/vulkan/exact_distance.glsl"
 #include "render/vulkan/sun.glsl"

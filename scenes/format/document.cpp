@@ -148,16 +148,16 @@ struct Excerpt {
 Excerpt excerpt_around(std::string_view line, int column) {
     constexpr std::size_t kBefore = 70, kAfter = 40;  // characters
     std::vector<std::size_t> offsets;                 // of the characters up to the last one shown
-    const auto wanted = std::size_t(std::max(column, 1));
-    for (std::size_t at = 0; at < line.size() && offsets.size() < wanted + kAfter;) {
+    const auto requested = std::size_t(std::max(column, 1));
+    for (std::size_t at = 0; at < line.size() && offsets.size() < requested + kAfter;) {
         offsets.push_back(at);
         at += character_at(line, at).bytes.size();
     }
-    const std::size_t caret = std::min(wanted, offsets.size() + 1);  // one past the end is a place, too
+    const std::size_t caret = std::min(requested, offsets.size() + 1);  // one past the end is a place, too
     const std::size_t first = caret > kBefore ? caret - kBefore : 0;
     const std::size_t begin = first < offsets.size() ? offsets[first] : line.size();
     std::size_t end = line.size();
-    if (offsets.size() == wanted + kAfter) end = offsets.back();
+    if (offsets.size() == requested + kAfter) end = offsets.back();
     Excerpt excerpt{printable(line.substr(begin, end - begin)), int(caret - first)};
     if (first > 0) {
         excerpt.text.insert(0, "...");

@@ -71,7 +71,7 @@ class Document {
   public:
     Node root;
     std::vector<Problem> problems;
-    bool frames_wanted = true;    // false: frames need not fit into the simulated time (reader.h)
+    bool frames_checked = true;   // false: frames need not fit into the simulated time (reader.h)
     bool models_missing = false;  // a file named by `models` could not be read
 
     // Adds a source text and returns its index for Place::origin.

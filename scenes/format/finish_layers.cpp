@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
-#include "core/trigonometry.h"
+#include <glm/common.hpp>
+
+#include "core/math.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
 #include "seeds/sky_simulation.h"
@@ -25,6 +28,14 @@ SectionReader below(const SectionReader& reader, std::string_view name) {
     const std::string path = reader.path + "." + std::string(name);
     if (entry == nullptr || entry->value.kind != Node::Kind::table) return {reader.document, empty, path, {}};
     return {reader.document, entry->value, path, {}};
+}
+
+// Returns the reader of an item of an array of tables within a table.
+SectionReader rule_of(const SectionReader& reader, const char* array, std::size_t index) {
+    return {reader.document,
+            reader.find(array)->value.items[index],
+            indexed(reader.path + "." + array, index),
+            {}};
 }
 
 // The item of an array of texts, or the text alone.
@@ -107,10 +118,7 @@ void check_references(const SectionReader& reader, const Scene& scene) {
         for (std::size_t r = 0; models_known && r < layer.rain.attached.size(); ++r) {
             const std::string& model = layer.rain.attached[r].model;
             if (model.empty()) continue;
-            const SectionReader rule{reader.document,
-                                     rain.find("attached")->value.items[r],
-                                     indexed(rain.path + ".attached", r),
-                                     {}};
+            const SectionReader rule = rule_of(rain, "attached", r);
             check_known(rule, rule.find("model")->value, model, "model", scene.models, "base model");
         }
     }
@@ -255,6 +263,62 @@ void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOpt
     layer.veil.direction_deg = degrees_of_vector(velocity.east_m_per_s, velocity.north_m_per_s);
 }
 
+// Returns half the edges of the largest rain area that a rule attaches to clouds.
+Vec3 largest_rain(const AttachedRainRule& rule, const SkySimulation& sky) {
+    Vec3 largest{};
+    for (const CloudShape& shape : sky.shapes()) {
+        const BaseModel& model = sky.options().models[shape.model];
+        if ((!rule.model.empty() && model.name != rule.model) || (rule.genus && model.genus != rule.genus))
+            continue;
+        const Vec3 size = shape.cloud.high_m - shape.cloud.low_m;
+        largest = glm::max(largest, Vec3(size.x, size.y, 0) * (rule.size_scale / 2));
+    }
+    return largest;
+}
+
+// Checks the reach of the ellipsoids that clouds and rain make in the layer's automaton; `sky` has all shapes of
+// clouds that will ever appear.
+void check_reach_of_clouds(const SectionReader& reader, const LayerOptions& layer, const SkySimulation& sky) {
+    const Vec3 largest = largest_reach_m(layer.extent, layer.placement.cell_size_m, layer.boundaries);
+    const auto check_table = [&](const SectionReader& table, const std::string& what, const Vec3& reach,
+                                 std::string_view horizontal, std::string_view vertical) {
+        const SectionReader& there = table.table.entries.empty() ? reader : table;
+        check_periodic_reach(there, what, largest, reach, horizontal, vertical);
+    };
+    const SectionReader coupling = below(reader, "coupling"), rain = below(reader, "rain");
+    Vec3 of_boxes{};
+    for (const CloudShape& shape : sky.shapes())
+        for (const SeedBox& box : shape.cloud.boxes)
+            if (sky.options().models[shape.model].seeds[box.seed].strength > 0)
+                of_boxes = glm::max(of_boxes, box.size_m * (layer.coupling.size_scale / 2));
+    if (layer.coupling.strength > 0) {
+        check_table(coupling, "the largest box of a cloud, scaled by " + coupling.quoted("size_scale") + ",",
+                    of_boxes, "size_scale", "size_scale");
+        check_table(coupling, coupling.quoted("min_semi_axis_m"), Vec3(layer.coupling.min_semi_axis_m),
+                    "min_semi_axis_m", "min_semi_axis_m");
+    }
+    const HumidColumn& column = layer.rain.column;
+    if (column.strength <= 0) return;
+    for (std::size_t n = 0; n < layer.rain.placed.size(); ++n) {
+        const PlacedRain& placed = layer.rain.placed[n];
+        if (placed.intensity_mm_per_h <= 0) continue;
+        const Ellipsoid area{.semi_axes_m = {placed.semi_a_m, placed.semi_b_m, 0}, .yaw_deg = placed.yaw_deg};
+        check_periodic_reach(rule_of(rain, "placed", n), {}, largest, reach_m(area),
+                             placed.semi_a_m >= placed.semi_b_m ? "semi_a_m" : "semi_b_m", "semi_a_m");
+    }
+    for (std::size_t n = 0; n < layer.rain.attached.size(); ++n) {
+        if (layer.rain.attached[n].intensity_mm_per_h <= 0) continue;
+        const SectionReader reader_of_rule = rule_of(rain, "attached", n);
+        check_periodic_reach(
+            reader_of_rule,
+            "the rain of the largest cloud, scaled by " + reader_of_rule.quoted("size_scale") + ",", largest,
+            largest_rain(layer.rain.attached[n], sky), "size_scale", "size_scale");
+    }
+    if (!layer.rain.placed.empty() || !layer.rain.attached.empty() || layer.rain.find)
+        check_table(below(rain, "column"), "the humid column `" + rain.path + ".column`",
+                    {0, 0, (column.top_m - column.bottom_m) / 2}, "top_m", "top_m");
+}
+
 // The libraries' own checks, and whether every cloud fits into the world: makes the clouds.
 void check_simulation(const SectionReader& reader, const Scene& scene, std::size_t layer) {
     const LayerOptions& options = scene.layers[layer];
@@ -268,7 +332,8 @@ void check_simulation(const SectionReader& reader, const Scene& scene, std::size
     }
     try {
         if (options.automaton) check(automaton_options(scene, layer));
-        SkySimulation(sky_options(scene, layer));
+        const SkySimulation sky(sky_options(scene, layer));
+        if (options.automaton) check_reach_of_clouds(reader, options, sky);
     } catch (const Error& error) {
         reader.report("name", error.what());
     }

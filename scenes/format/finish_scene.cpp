@@ -52,41 +52,10 @@ void check_wind_speed(const SectionReader& reader, const Scene& scene) {
                       " cells: a shorter `time.step_s`, a larger `lattice.cell_size_m` or less wind");
 }
 
-// The axis of a lattice along which an ellipsoid reaches too far, and how far.
-struct TooFar {
-    const char* axis;
-    double reach_m, most_m;
-};
-
-std::optional<TooFar> too_far(const char* axis, double reach_m, int cells, double cell_m, Boundary boundary) {
-    const double most_m = kMaxPeriodicReach * cells * cell_m;
-    if (boundary == Boundary::open || reach_m <= most_m) return {};
-    return TooFar{axis, reach_m, most_m};
-}
-
-// Checks kMaxPeriodicReach: every periodic image of an ellipsoid that reaches the box costs time.
-// `horizontal` and `vertical` are the keys of its size; each is reported once.
-void check_periodic_reach(const SectionReader& item, const AutomatonOptions& o, const Vec3& reach,
-                          std::string_view horizontal, std::string_view vertical) {
-    const double cell_m = o.placement.cell_size_m;
-    const auto x = too_far("x (east)", reach.x, o.extent.x, cell_m, o.boundaries.x),
-               y = too_far("y (north)", reach.y, o.extent.y, cell_m, o.boundaries.y),
-               z = too_far("z (up)", reach.z, o.extent.z, cell_m, o.boundaries.z);
-    const auto report = [&](std::string_view key, const TooFar& found) {
-        item.report(key,
-                    item.quoted(key) + " reaches " + number_text(found.reach_m) +
-                        " m from the centre along the periodic axis " + found.axis,
-                    "expected at most " + number_text(found.most_m) + " m, " +
-                        number_text(kMaxPeriodicReach) +
-                        " times the lattice along that axis, or an open boundary there");
-    };
-    if (x || y) report(horizontal, x ? *x : *y);
-    if (z && (vertical != horizontal || !(x || y))) report(vertical, *z);
-}
-
 void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
     if (!reader.sound({"lattice", "field"})) return;
     const AutomatonOptions& o = scene.automaton;
+    const Vec3 largest = largest_reach_m(o.extent, o.placement.cell_size_m, o.boundaries);
     const auto check_items = [&](const char* name, const auto& check_item) {
         const Entry* items = below(reader, "field").find(name);
         for (std::size_t n = 0; items != nullptr && n < items->value.items.size(); ++n) {
@@ -96,18 +65,18 @@ void check_periodic_sizes(const SectionReader& reader, const Scene& scene) {
         }
     };
     check_items("ellipsoids", [&](std::size_t n, const SectionReader& item) {
-        check_periodic_reach(item, o, reach_m(o.field.ellipsoids[n]), "semi_axes_m", "semi_axes_m");
+        check_periodic_reach(item, {}, largest, reach_m(o.field.ellipsoids[n]), "semi_axes_m", "semi_axes_m");
     });
     check_items("scatters", [&](std::size_t n, const SectionReader& item) {
         const EllipsoidScatter& s = o.field.scatters[n];
         const bool longer = s.semi_axis_x_m.max >= s.semi_axis_y_m.max;
-        check_periodic_reach(item, o, reach_m(s), longer ? "semi_axis_x_m" : "semi_axis_y_m",
-                             "semi_axis_z_m");
+        const char* const horizontal = longer ? "semi_axis_x_m" : "semi_axis_y_m";
+        check_periodic_reach(item, {}, largest, reach_m(s), horizontal, "semi_axis_z_m");
     });
 }
 
 void check_frames(const SectionReader& reader, const Scene& scene) {
-    if (!reader.document.frames_wanted || !reader.sound({"time", "frames"})) return;
+    if (!reader.document.frames_checked || !reader.sound({"time", "frames"}) || !scene.frames.enabled) return;
     const SectionReader frames = below(reader, "frames");
     const double end_s = simulated_time_s(scene);
     const std::string simulated =
@@ -144,6 +113,23 @@ void replace_infinite(Range& range, double low, double size) {
 }
 
 }  // namespace
+
+void check_periodic_reach(const SectionReader& reader, const std::string& what, const Vec3& largest_m,
+                          const Vec3& reach_m, std::string_view horizontal, std::string_view vertical) {
+    constexpr const char* kAxes[] = {"x (east)", "y (north)", "z (up)"};
+    const auto exceeds = [&](int axis) { return reach_m[axis] > largest_m[axis]; };
+    const auto report = [&](std::string_view key, int axis) {
+        reader.report(key,
+                      (what.empty() ? reader.quoted(key) : what) + " reaches " + number_text(reach_m[axis]) +
+                          " m from the centre along the periodic axis " + kAxes[axis],
+                      "expected at most " + number_text(largest_m[axis]) + " m, " +
+                          number_text(kMaxPeriodicReach) +
+                          " times the lattice along that axis, or an open boundary there");
+    };
+    const bool across = exceeds(0) || exceeds(1);
+    if (across) report(horizontal, exceeds(0) ? 0 : 1);
+    if (exceeds(2) && (vertical != horizontal || !across)) report(vertical, 2);
+}
 
 void check_wind_times(const SectionReader& owner, const Wind& wind) {
     const std::string path = owner.path.empty() ? "wind" : owner.path + ".wind";

@@ -45,6 +45,13 @@ bool has_density(const Scene& scene) {
            std::ranges::any_of(scene.layers, [](const LayerOptions& layer) { return has_density(layer); });
 }
 
+DetailOptions layer_detail(const Scene& scene, std::size_t layer) {
+    const LayerOptions& options = scene.layers[layer];
+    DetailOptions detail = options.own_detail ? options.detail : scene.density.detail;
+    if (options.is_veil) detail.enabled = false;
+    return detail;
+}
+
 const Wind& layer_wind(const Scene& scene, std::size_t layer) {
     const Wind& own = scene.layers[layer].wind;
     return own.keyframes.empty() ? scene.automaton.wind : own;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "automaton/options.h"
+#include "density/options.h"
 #include "density/veil.h"
 #include "seeds/coupling.h"
 #include "seeds/genera.h"
@@ -91,6 +92,8 @@ struct LayerOptions {
     bool cross_edges_whole = true;  // the reader's default: only with an automaton
     CouplingOptions coupling;
     LayerRain rain;
+    bool own_detail = false;  // true: `detail` holds for this layer instead of the scene's
+    DetailOptions detail;
     bool operator==(const LayerOptions&) const = default;
 };
 
@@ -118,6 +121,9 @@ VeilOptions veil_options(const Scene& scene, std::size_t layer);
 
 // Returns the bounding rectangle of the worlds of all layers, which the map of the ground covers. Pure.
 WorldRectangle whole_world(const Scene& scene);
+
+// Returns the detail of a layer: its own, or the scene's; none of a veil.
+DetailOptions layer_detail(const Scene& scene, std::size_t layer);
 
 // Returns the wind of a layer: its own, or the scene's if it has none.
 const Wind& layer_wind(const Scene& scene, std::size_t layer);

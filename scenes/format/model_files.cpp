@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Returns "did you mean `genera/Cu.toml`?" when the folder of the missing file has one of a similar name.
-std::string advice_on_missing_file(const fs::path& path, const fs::path& wanted) {
+std::string advice_on_missing_file(const fs::path& path, const fs::path& requested) {
     std::error_code error;
     std::vector<std::string> names;
     for (fs::directory_iterator at(path.parent_path().empty() ? "." : path.parent_path(), error), end;
@@ -26,7 +26,7 @@ std::string advice_on_missing_file(const fs::path& path, const fs::path& wanted)
     const std::string_view meant = closest_word(path.filename().string(), known);
     if (meant.empty())
         return "expected a scene file with [[model]] tables, named relative to the scene's folder";
-    return "did you mean " + enclosed((wanted.parent_path() / std::string(meant)).generic_string(), '"') +
+    return "did you mean " + enclosed((requested.parent_path() / std::string(meant)).generic_string(), '"') +
            "?";
 }
 

@@ -230,7 +230,7 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
                       "expected a scene in TOML");
     }
     Document document;
-    document.frames_wanted = use == SceneUse::everything;
+    document.frames_checked = use == SceneUse::everything;
     const int file = document.add_origin(label, std::string(text), true);
     if (std::optional<Node> root = document.parse(file)) {
         if (root->entries.empty() && overrides.empty()) {

@@ -29,6 +29,7 @@ Moment moment_of_frame(const Scene& scene, int index) {
 std::uint64_t steps_up_to(const Moment& moment) { return moment.step + (moment.fraction > 0 ? 1 : 0); }
 
 int frame_count(const Scene& scene) {
+    if (!scene.frames.enabled) return 0;
     if (scene.frames.count > 0) return scene.frames.count;
     // Every operation up to the moment is monotonic, so those that fit come before those that do not.
     int fit = 0, most = kMaxFrames;

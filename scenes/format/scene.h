@@ -24,6 +24,7 @@ namespace nephos {
 // shows the simulated time start_s + n * time_scale / per_second, independent of the time step: between two
 // steps the density is interpolated.
 struct FrameOptions {
+    bool enabled = true;       // false: no frames, whatever `count` is
     double per_second = 24.0;  // frames of one second of film, > 0, at most 1000
     double time_scale = 60.0;  // simulated seconds that pass in one second of film, > 0
     double start_s = 0.0;      // simulated time of the first frame, >= 0
@@ -88,7 +89,7 @@ Moment moment_of_frame(const Scene& scene, int index);
 // Returns the number of steps needed for a moment: the first step that is not before it.
 std::uint64_t steps_up_to(const Moment& moment);
 
-// Returns the number of frames: frames.count, or if that is 0 all frames up to and including the last step,
+// Returns the number of frames: 0 without frames.enabled, frames.count, or if that is 0 all frames up to and including the last step,
 // at most kMaxFrames.
 int frame_count(const Scene& scene);
 

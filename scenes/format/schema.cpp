@@ -171,7 +171,7 @@ const Section& scene_section() {
         precipitation.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->render.precipitation == PrecipitationOptions{});
         };
-        Key detail = group("detail", detail_section());
+        Key detail = table<&Scene::density, &DensityOptions::detail>("detail", detail_section(), detail_section().effect);
         detail.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->density.detail == DetailOptions{});
         };

@@ -146,7 +146,7 @@ const Section& scatter_section() {
 // The wind that comes from a direction, clockwise from north. sin_cos_deg() has the same bits on every
 // machine, which matters because the velocity decides the bits of the simulation.
 Velocity velocity_from(double from_deg, double speed_m_per_s) {
-    const SinCos from = sin_cos_deg(from_deg);
+    const Rotation from = sin_cos_deg(from_deg);
     return {0.0 - speed_m_per_s * from.sin, 0.0 - speed_m_per_s * from.cos};
 }
 

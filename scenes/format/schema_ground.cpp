@@ -81,7 +81,7 @@ std::vector<Key> look_keys() {
         look_key<&Look::snow_cover_mm>("snow_cover_mm", "mm", between(1e-3, 1000),
                                        "Snow, as water, that covers half of the ground."),
         look_key<&Look::snow_albedo>("snow_albedo", "", between(0, 1),
-                                     "Share of the light that snow reflects: red, green, blue.",
+                                     "Fraction of the light that snow reflects: red, green, blue.",
                                      "Wiscombe and Warren 1980")};
 }
 

@@ -282,6 +282,7 @@ void finish_layer(const SectionReader& reader, void* owner) {
     auto& layer = *static_cast<LayerOptions*>(owner);
     layer.is_veil = reader.find("veil") != nullptr;
     if (layer.is_veil) layer.automaton = false;
+    layer.own_detail = reader.find("detail") != nullptr;
 }
 
 }  // namespace
@@ -355,6 +356,8 @@ const Section& layer_section() {
                         "that of `automaton`: clouds that are drawn directly can be seen beyond the edge"),
              table<&LayerOptions::coupling>("coupling", coupling_section(), coupling_section().effect),
              table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect),
+             default_is(table<&LayerOptions::detail>("detail", detail_section(), detail_section().effect),
+                        "that of `[detail]`"),
              written_if(&of_veils,
                         table<&LayerOptions::veil>("veil", veil_section(), veil_section().effect))},
             &finish_layer};
@@ -362,6 +365,8 @@ const Section& layer_section() {
             if (std::ranges::find(keys_of_clouds(), key.name) != keys_of_clouds().end()) {
                 key.written = &of_clouds;
             }
+            if (key.name == "detail")
+                key.written = [](const void* owner) { return static_cast<const LayerOptions*>(owner)->own_detail; };
         }
         return layers;
     }();
@@ -371,7 +376,8 @@ const Section& layer_section() {
 std::span<const std::string_view> keys_of_clouds() {
     static constexpr std::string_view kKeys[] = {
         "skies",       "automaton",     "background",         "base_height_m",     "genus",    "climate",
-        "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole", "coupling", "rain"};
+        "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole", "coupling", "rain",
+        "detail"};
     return kKeys;
 }
 

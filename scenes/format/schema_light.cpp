@@ -38,7 +38,7 @@ const Section& light_section() {
         "How clouds scatter light.",
         {render_key<&RenderOptions::light, &CloudLight::albedo>(
              "albedo", "", between(0, 1),
-             "Share of the light that is scattered and not absorbed; below 1 the whole cloud is darker.",
+             "Fraction of the light that is scattered and not absorbed; below 1 the whole cloud is darker.",
              "D, step 1"),
          word<&Scene::render, &RenderOptions::light, &CloudLight::phase, &PhaseFunction::kind>(
              "phase", {"isotropic", "rayleigh", "henyey_greenstein", "cornette_shanks", "hg_draine"},

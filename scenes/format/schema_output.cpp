@@ -120,8 +120,12 @@ const Section& frames_section() {
              "Simulated time of the first frame: skips the growing of the clouds."),
          key<&Scene::frames, &FrameOptions::count>(
              "count", "", between(0, kMaxFrames),
-             "Number of frames; 0: as many as the simulated time holds (for none at all: `nephos run "
-             "--statistics-only`)."),
+             "Number of frames; 0: as many as the simulated time holds (none at all: `enabled` = false)."),
+         written_if(
+             key<&Scene::frames, &FrameOptions::enabled>(
+                 "enabled", "", kAny,
+                 "Make frames; false: none, whatever the other keys say, only statistics of every step."),
+             [](const void* owner) { return !static_cast<const Scene*>(owner)->frames.enabled; }),
          key<&Scene::frames, &FrameOptions::png>("png", "", kAny,
                                                  "Write a tone-mapped picture of each frame."),
          key<&Scene::frames, &FrameOptions::exr>("exr", "", kAny,
@@ -255,14 +259,15 @@ const Section& air_section() {
 }
 
 const Section& ground_section() {
-    static const Section section{"Ground",
-                                 "The plane that wears the clouds' shadow.",
-                                 {render_key<&RenderOptions::ground, &Ground::height_m>(
-                                      "height_m", "m", between(-1e5, 1e5), "Its height."),
-                                  render_key<&RenderOptions::ground, &Ground::albedo>(
-                                      "albedo", "", between(0, 1),
-                                      "Share of the light that it reflects: red, green, blue.", "D, step 2")},
-                                 nullptr};
+    static const Section section{
+        "Ground",
+        "The plane that wears the clouds' shadow.",
+        {render_key<&RenderOptions::ground, &Ground::height_m>("height_m", "m", between(-1e5, 1e5),
+                                                               "Its height."),
+         render_key<&RenderOptions::ground, &Ground::albedo>(
+             "albedo", "", between(0, 1), "Fraction of the light that it reflects: red, green, blue.",
+             "D, step 2")},
+        nullptr};
     return section;
 }
 
@@ -272,22 +277,22 @@ const Section& detail_section() {
         "Detail below the voxel in pictures, their light, and files that are refined: noise erodes the edge of "
         "voxel clouds, from bumps of `size_m` down to half a metre, and keeps their mean density. Veils have none. "
         "See docs/detail.md.",
-        {density_key<&DensityOptions::detail, &DetailOptions::enabled>("enabled", "", kAny,
+        {key<&DetailOptions::enabled>("enabled", "", kAny,
                                              "Draw it. Off: the smooth field of metaballs, everywhere as far away."),
-         density_key<&DensityOptions::detail, &DetailOptions::strength>(
+         key<&DetailOptions::strength>(
              "strength", "", between(0, 1.4),
              "Depth of the erosion; cumulus has 1, stratus a third. 0: a smooth surface with a crisp edge."),
-         density_key<&DensityOptions::detail, &DetailOptions::size_m>("size_m", "m", between(20, 5000),
+         key<&DetailOptions::size_m>("size_m", "m", between(20, 5000),
                                             "Size of the largest bumps; each next kind has half of it."),
-         density_key<&DensityOptions::detail, &DetailOptions::stretch>("stretch", "", between(1, 50),
+         key<&DetailOptions::stretch>("stretch", "", between(1, 50),
                                              "How much longer the bumps are along the wind: fibres."),
-         density_key<&DensityOptions::detail, &DetailOptions::wisps>(
+         key<&DetailOptions::wisps>(
              "wisps", "", between(0, 1),
              "1: shreds hang below the base; 0: there are round bumps as above."),
-         density_key<&DensityOptions::detail, &DetailOptions::thermals>(
+         key<&DetailOptions::thermals>(
              "thermals", "", between(0, 1),
              "Strength of towers and hollows of two and four times `size_m`, between the bumps and the clouds."),
-         density_key<&DensityOptions::detail, &DetailOptions::mean_free_path_m>(
+         key<&DetailOptions::mean_free_path_m>(
              "mean_free_path_m", "m", between(1, 10'000),
              "Mean free path of light in cloud where half of the space is cloud. Smaller makes crisper, denser "
              "clouds of the same mass; in real cumulus it is 10 to 20 m.")},

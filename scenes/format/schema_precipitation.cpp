@@ -48,7 +48,7 @@ const Section& precipitation_section() {
              "intensity_scale", "", between(0, 100), "Multiplies the rain of all areas."),
          render_key<&RenderOptions::precipitation, &PrecipitationOptions::wind_drift>(
              "wind_drift", "", between(0, 10),
-             "Share of the wind that carries drops, flakes and the lower end of shafts."),
+             "Fraction of the wind that carries drops, flakes and the lower end of shafts."),
          render_key<&RenderOptions::precipitation, &PrecipitationOptions::depth_m>(
              "depth_m", "m", between(1, 1000),
              "Depth of the container of particles around the eye; deeper has fewer in the same space.",

@@ -4,6 +4,7 @@
 // The sections of a scene file; see schema.h (not installed).
 
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "scenes/format/schema.h"
@@ -61,6 +62,12 @@ void check_wind_times(const SectionReader& owner, const Wind& wind);
 
 // Reports key frames of the camera unless their times rise strictly; the reader is that of [camera].
 void check_camera_path(const SectionReader& reader, const Camera& camera);
+
+// Reports an ellipsoid that reaches too far along a periodic axis, as every periodic image of it that meets the
+// box costs time: `reach_m` is compared with `largest_m`, largest_reach_m() of the lattice. `what` names the
+// ellipsoid in messages; `horizontal` and `vertical` are the keys of its size, each of which is reported once.
+void check_periodic_reach(const SectionReader& reader, const std::string& what, const Vec3& largest_m,
+                          const Vec3& reach_m, std::string_view horizontal, std::string_view vertical);
 
 // Performs the part of finish_scene() on models, skies, climate and layers.
 void finish_layers(const SectionReader& reader, Scene& scene);

@@ -57,11 +57,11 @@ const Section& light_shafts_section() {
         "last shell. Only clouds of voxels cast shadows on the air; T's billboards cast none.",
         {render_key<&RenderOptions::light_shafts, &LightShafts::strength>(
              "strength", "", between(0, 1),
-             "Share of the light that shaded air loses; 0: no shafts, 1: all of its direct sunlight.",
+             "Fraction of the light that shaded air loses; 0: no shafts, 1: all of its direct sunlight.",
              "D, light shafts (I_s)"),
          render_key<&RenderOptions::light_shafts, &LightShafts::sun_share>(
              "sun_share", "", between(0, 1),
-             "Share of the air's light that is direct sunlight, scattered once, in a direction of mean "
+             "Fraction of the air's light that is direct sunlight, scattered once, in a direction of mean "
              "brightness; the rest comes from sky and ground and is not shaded. The physical sky knows it.",
              "D, light shafts (I_s)"),
          render_key<&RenderOptions::light_shafts, &LightShafts::g>(

@@ -112,10 +112,10 @@ const Section& veil_section() {
                                              "Where the fibres point, counter-clockwise from east."),
             "downwind at `top_m` at the start"));
         add(key<&VeilOptions::coverage>("coverage", "", above(0, 1),
-                                        "Share of a level of the sky where there is a veil."));
+                                        "Fraction of a level of the sky where there is a veil."));
         add(key<&VeilOptions::softness>(
             "softness", "", between(0, 1),
-            "Share of what is covered over which the density rises from 0 to 1: small, hard edges."));
+            "Fraction of what is covered over which the density rises from 0 to 1: small, hard edges."));
         add(key<&VeilOptions::sheet>("sheet", "", between(0, 1),
                                      "Density everywhere in the layer, below that of the pattern."));
         add(default_is(

@@ -201,6 +201,27 @@ TEST(AtomicFile, RefusesALinkInThePlaceOfItsTemporaryFile) {
     EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "precious");
 }
 
+// What another put in the place of the temporary file is not ours to remove; our own file is.
+TEST(AtomicFile, LeavesAFileThatAnotherPutInThePlaceOfItsTemporaryOne) {
+    const TemporaryFolder folder;
+    fs::path temporary;
+    const auto exchange = [&](const fs::path& name) {
+        temporary = name;
+        std::ofstream(folder / "another") << "another's";
+        fs::rename(folder / "another", name);
+    };
+    EXPECT_THROW(write_atomically(folder / "file", exchange), Error);
+    EXPECT_FALSE(fs::exists(folder / "file"));
+    std::ifstream in(temporary);
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "another's");
+    const auto fail = [&](const fs::path& name) {
+        temporary = name;
+        throw Error(ErrorCode::check, "on purpose");
+    };
+    EXPECT_THROW(write_atomically(folder / "file", fail), Error);
+    EXPECT_FALSE(fs::exists(temporary));
+}
+
 TEST(Checkpoint, AFailedRestoreChangesNothing) {
     Automaton automaton(stormy_options());
     automaton.step();

@@ -117,7 +117,7 @@ TEST(Advection, EqualsTheNaiveTwin) {
 
 TEST(SinCos, AgreesWithTheLibrary) {
     for (double degrees = -725; degrees < 1000; degrees += 0.37) {
-        const SinCos value = sin_cos_deg(degrees);
+        const Rotation value = sin_cos_deg(degrees);
         EXPECT_NEAR(value.sin, std::sin(degrees * std::acos(-1.0) / 180),
                     4e-15 * (1 + std::abs(degrees) / 90));
         EXPECT_NEAR(value.cos, std::cos(degrees * std::acos(-1.0) / 180),
@@ -172,7 +172,7 @@ TEST(AirParcels, AreCarriedUnlessFixed) {
 // Whatever the wind's direction, parcels that left come back on the upwind sides and their number stays.
 TEST(AirParcels, AreReplacedUpwind) {
     for (int degrees = 0; degrees < 360; degrees += 30) {
-        const SinCos direction = sin_cos_deg(degrees);
+        const Rotation direction = sin_cos_deg(degrees);
         const Velocity wind{40 * direction.cos, 40 * direction.sin};
         const AutomatonOptions o = carried_options(wind);
         AirParcels parcels(o);

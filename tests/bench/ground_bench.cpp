@@ -75,7 +75,7 @@ BenchRow overlay_row() {
     Picture picture = blank_picture(options);
     for (float& share : picture.transmittance) share = 1;
     GroundCoverView cover;
-    cover.outside_water_mm = 2;
+    cover.outside.water_mm = 2;
     cover.outside_rain_mm_per_h = 10;
     const Camera below = mirrored_camera(options.camera, 0, 0.5);
     RenderOptions mirrored_options = options;

@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <gtest/gtest.h>
 
 #include "core/error.h"
@@ -55,10 +56,11 @@ double metaball_line_integral(double b) {
 double density_at(const DensityGrid& grid, const Vec3& point_m, double radius) {
     const Vec3 at = (point_m - grid.placement().origin_m) / grid.placement().cell_size_m;
     const int reach = int(radius) + 2;
+    const glm::ivec3 cell(glm::floor(at));
     double sum = 0, weight = 0;
-    for (int k = int(at.z) - reach; k <= int(at.z) + reach; ++k) {
-        for (int j = int(at.y) - reach; j <= int(at.y) + reach; ++j) {
-            for (int i = int(at.x) - reach; i <= int(at.x) + reach; ++i) {
+    for (int k = cell.z - reach; k <= cell.z + reach; ++k) {
+        for (int j = cell.y - reach; j <= cell.y + reach; ++j) {
+            for (int i = cell.x - reach; i <= cell.x + reach; ++i) {
                 const Vec3 d = Vec3(i + 0.5, j + 0.5, k + 0.5) - at;
                 const double f = metaball_field(std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z) / radius);
                 weight += f;
@@ -67,6 +69,29 @@ double density_at(const DensityGrid& grid, const Vec3& point_m, double radius) {
         }
     }
     return sum / weight;
+}
+
+// The oracle itself, by symmetry, for a box that is all cloud: on a face half of the weight lies inside, on an edge
+// a quarter and on a corner an eighth; values as far inside of a face as outside add up to 1; nothing beyond reach.
+// The box's corner is at a negative place, and so are the cells outside of it.
+TEST(Metaballs, TheOracleIsSymmetricAtTheFacesOfABox) {
+    const Vec3 corner{-3, -50, -700};
+    const double cell = 12.5;
+    const DensityGrid grid = uniform_grid({24, 24, 24}, 1.0f, {corner, cell});
+    for (const double radius : {1.0, 1.3, 2.0, 3.5}) {
+        const auto at = [&](double x, double y, double z) {
+            return density_at(grid, corner + cell * Vec3{x, y, z}, radius);
+        };
+        EXPECT_NEAR(at(12.3, 11.9, 12.6), 1, 1e-12) << radius;
+        EXPECT_NEAR(at(0, 12.3, 11.9), 0.5, 1e-12) << radius;
+        EXPECT_NEAR(at(12.3, 24, 11.9), 0.5, 1e-12) << radius;
+        EXPECT_NEAR(at(0, 12.3, 24), 0.25, 1e-12) << radius;
+        EXPECT_NEAR(at(0, 0, 0), 0.125, 1e-12) << radius;
+        for (double inside = 0.05; inside < radius; inside += 0.1)
+            EXPECT_NEAR(at(inside, 12.3, 11.9) + at(-inside, 12.3, 11.9), 1, 1e-12)
+                << radius << " " << inside;
+        EXPECT_EQ(at(-radius - 0.5, 12.3, 11.9), 0) << radius;
+    }
 }
 
 // Midpoint rule with 20000 points along the chord.

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Prints kOpacityFit of render/shared/shared.h: the opacity of a metaball, 1 - exp(-d column(w)), as a polynomial
-w^2 sum_ij c_ij w^i s^(j+1) with s = d / (d + 4), for depth scales d in 0..6. Least squares on a grid with Lawson's
-weights, so that the largest error, relative to min(1, d), becomes about as small as it can be."""
+"""Prints the coefficients of render/shared/opacity_fit.h: the opacity of a metaball, 1 - exp(-d column(w)), as a
+polynomial w^2 sum_ij c_ij w^i s^(j+1) with s = d / (d + 4), for depth scales d in 0..6. Least squares on a grid with
+Lawson's weights, so that the largest error, relative to min(1, d), becomes about as small as it can be."""
 
 import numpy
 

@@ -3,7 +3,11 @@
 
 #include "render/options/camera.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -42,6 +46,41 @@ TEST(Camera, LookingStraightUpAndDownNorthIsUp) {
     const CameraFrame up = camera_frame(looking({5, 6, 0}, {5, 6, 100}));
     expect_near(up.up, {0, 1, 0}, 1e-12);
     expect_near(up.right, {-1, 0, 0}, 1e-12);  // as when one lies on the back, head to the north
+}
+
+// Brute force: a sphere that holds one of many points of the view is visible; one that a plane has wholly
+// outside is not; and most of those that are visible are needed.
+TEST(Frustum, HoldsWhatIsInView) {
+    Camera camera = looking({10, -20, 5}, {110, 180, 35});
+    camera.vertical_fov_deg = 50;
+    const CameraFrame view = camera_frame(camera);
+    const Frustum frustum(view);
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> u(-1, 1), unit(0, 1);
+    std::vector<Vec3> samples;  // offsets from the eye
+    for (int i = 0; i < 20000; ++i) {
+        const Vec3 ray =
+            view.forward + u(random) * view.half_width * view.right + u(random) * view.half_height * view.up;
+        samples.push_back(700 * std::cbrt(unit(random)) * ray);
+        EXPECT_TRUE(frustum.may_see(samples.back(), 1e-9));
+    }
+    std::size_t visible = 0, kept = 0;
+    for (int i = 0; i < 1500; ++i) {
+        const Vec3 offset = 500.0 * Vec3{u(random), u(random), u(random)};
+        const double radius = 5 + 60 * unit(random);
+        const bool may_see = frustum.may_see(offset, radius);
+        const bool touches =
+            std::ranges::any_of(samples, [&](const Vec3& p) { return glm::length(p - offset) < radius; });
+        EXPECT_TRUE(may_see || !touches) << i;
+        visible += touches;
+        kept += may_see;
+    }
+    EXPECT_GT(visible, 50u);
+    EXPECT_LT(kept, 1.5 * double(visible));
+    const Vec3 ahead = 100.0 * view.forward, aside = 120 * view.half_width * view.right;
+    EXPECT_FALSE(frustum.may_see(-ahead, 50));
+    EXPECT_FALSE(frustum.may_see(ahead + aside, 5));
+    EXPECT_FALSE(frustum.may_see(ahead - aside, 5));
 }
 
 // A point that is half the picture's height above the axis falls on the upper edge; one to the east on the

@@ -40,9 +40,8 @@ struct DetailedCloud {
         }
         DetailedVoxels& part = detailed.emplace_back();
         part.density = DensityGrid::from_dense(values, extent, {origin_m, 40.0});
-        part.detail = options;
-        part.drift_m = {1234, -567, 0};
-        const std::vector<Metaball> own = metaballs(part.density, part.metaball_radius_cells);
+        part.setting = {.options = options, .extinction_per_m = extinction_per_m, .drift_m = {1234, -567, 0}};
+        const std::vector<Metaball> own = metaballs(part.density, part.setting.metaball_radius_cells);
         part.first = balls.size();
         part.count = own.size();
         balls.insert(balls.end(), own.begin(), own.end());

@@ -101,7 +101,7 @@ TEST(Phase, FitOfDroplets) {
     EXPECT_NEAR(fit.g, 0.988177, 1e-5);
     EXPECT_NEAR(fit.draine_g, 0.555667, 1e-5);
     EXPECT_NEAR(fit.alpha, 21.9955, 1e-3);
-    EXPECT_NEAR(fit.draine_share, 0.481955, 1e-5);
+    EXPECT_NEAR(fit.draine_fraction, 0.481955, 1e-5);
     // Mie's asymmetry of cloud droplets is about 0.85 to 0.88.
     for (double d = 5; d <= 50; d += 5) {
         const double g = mean_cosine({Phase::hg_draine, 0, d});

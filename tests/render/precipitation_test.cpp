@@ -289,12 +289,12 @@ TEST(Precipitation, IsContinuousAcrossThePerimeter) {
     }
     EXPECT_GT(least, 0);
     EXPECT_GT(most, least);
-    const RainShares at = rain_shares(PrecipitationOptions{}, 0);
+    const RainFractions at = rain_fractions(PrecipitationOptions{}, 0);
     EXPECT_EQ(at.near, 1);
     EXPECT_EQ(at.far, 0);
     double near = 1, number = 1;
     for (double outside = 0; outside < 700; outside += 1) {
-        const RainShares shares = rain_shares(PrecipitationOptions{}, outside);
+        const RainFractions shares = rain_fractions(PrecipitationOptions{}, outside);
         EXPECT_NEAR(shares.near + shares.far, 1, 1e-12);
         EXPECT_LE(shares.near, near);
         EXPECT_LE(shares.far_number, number);

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -67,6 +68,38 @@ std::string message_of(const std::filesystem::path& path, int frames, int width 
         return error.what();
     }
     return {};
+}
+
+// However many processors it runs on, ffmpeg makes the same file; one is all that a command in its place sees.
+TEST(Video, RunsOnTheProcessorsThatItIsGiven) {
+    if (!has_ffmpeg()) GTEST_SKIP() << "ffmpeg is not here";
+    const TemporaryFolder folder;
+    const auto encoded = [&](const std::string& name, int processors) {
+        VideoWriter video(folder.path() / name, {.width = 64, .height = 48, .processors = processors});
+        for (int frame = 0; frame < 30; ++frame) {
+            std::vector<std::uint8_t> rgb(3 * 64 * 48);
+            for (std::size_t i = 0; i < rgb.size(); ++i)
+                rgb[i] = std::uint8_t(i * 7 + std::size_t(frame) * i / 5);
+            video.add(rgb);
+        }
+        video.finish();
+        std::ifstream file(folder.path() / name, std::ios::binary);
+        return std::string(std::istreambuf_iterator<char>(file), {});
+    };
+    const std::string all = encoded("all.mp4", 0);
+    EXPECT_GT(all.size(), 1000u);
+    EXPECT_EQ(encoded("one.mp4", 1), all);
+    put_command(folder.path(), "#!/bin/sh\nsleep 0.2\nnproc > \"${0%/*}/seen\"\ncat > /dev/null\n");
+    const PathOverride path(folder.path().string() + ":/usr/bin:/bin");
+    {
+        VideoWriter video(folder.path() / "b.mp4", {.width = 64, .height = 48, .processors = 1});
+        video.add(std::vector<std::uint8_t>(3 * 64 * 48));
+        video.finish();
+    }
+    std::ifstream seen(folder.path() / "seen");
+    int processors = 0;
+    seen >> processors;
+    EXPECT_EQ(processors, 1);
 }
 
 TEST(Video, EncodesFramesInOrder) {

@@ -32,8 +32,8 @@ Renderer& renderer(Splatting splatting = Splatting::cpu) {
 // The same everywhere.
 GroundCoverView everywhere(double water_mm, double snow_mm, double rain_mm_per_h = 0) {
     GroundCoverView cover;
-    cover.outside_water_mm = water_mm;
-    cover.outside_snow_mm = snow_mm;
+    cover.outside.water_mm = water_mm;
+    cover.outside.snow_mm = snow_mm;
     cover.outside_rain_mm_per_h = rain_mm_per_h;
     return cover;
 }
@@ -216,7 +216,11 @@ TEST(WetGroundTest, TheMapFadesOutAtItsEdge) {
     options.camera.target_m = {0, 1, 0};
     options.wet_ground.snow_cover_mm = 2;
     const std::vector<float> none(64, 0.0f), snow(64, 4.0f);
-    const GroundCoverView cover{-2000, -2000, 500, 500, 8, 8, none, snow, none, 0, 0, 0};
+    const GroundCoverView cover{
+        {.x_m = -2000, .y_m = -2000, .texel_x_m = 500, .texel_y_m = 500, .columns = 8, .rows = 8},
+        none,
+        snow,
+        none};
     const Picture picture = draw(options, cover);
     const Rgb middle = pixel(picture, 48, 36), corner = pixel(picture, 1, 1);
     EXPECT_GT(middle[1], 4 * corner[1]);

@@ -317,6 +317,17 @@ TEST(Frames, TheLastIsNotLostToRounding) {
     EXPECT_TRUE(contains(errors, "expected `frames.count` up to 148")) << errors;
 }
 
+// Without frames the other keys have no effect: a start beyond the end is no error.
+TEST(Frames, CanBeNone) {
+    const std::string text = "[time]\nsteps = 3\n[frames]\nenabled = false\nstart_s = 1e9\ncount = 7\n";
+    const Scene scene = scene_of(text);
+    EXPECT_EQ(frame_count(scene), 0);
+    EXPECT_TRUE(contains(to_toml(scene), "enabled = false"));
+    EXPECT_EQ(scene_of(to_toml(scene)), scene);
+    EXPECT_FALSE(contains(to_toml(scene_of("[frames]\ncount = 0\n")), "enabled = false"));
+    EXPECT_GT(frame_count(scene_of("[frames]\ncount = 0\n")), 0);
+}
+
 // A start so late that its quotient by the step is no 64-bit integer is refused like any other.
 TEST(Frames, AStartBeyondAnyStepIsRefused) {
     const std::string errors =
@@ -392,6 +403,8 @@ TEST(Hashes, CoverWhatTheySay) {
     EXPECT_EQ(simulation_hash(scene),
               simulation_hash(with([](Scene& s) { s.render.sun.elevation_deg = 3; })));
     EXPECT_EQ(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.frames.count = 3; })));
+    EXPECT_EQ(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.frames.enabled = false; })));
+    EXPECT_NE(scene_hash(scene), scene_hash(with([](Scene& s) { s.frames.enabled = false; })));
     EXPECT_NE(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.automaton.seed = 9; })));
     EXPECT_NE(simulation_hash(scene), simulation_hash(with([](Scene& s) { s.density.smoothing.t0 = 0; })));
     EXPECT_NE(simulation_hash(scene),

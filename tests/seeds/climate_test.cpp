@@ -24,25 +24,25 @@ TEST(Climate, WorkedExample) {
     const SkyShares shares = shares_at(skies_of({{0, 0}, {0.25, 0}, {0.75, 0}, {1, 0}}), state);
     EXPECT_EQ(shares.lower, 1u);
     EXPECT_EQ(shares.upper, 2u);
-    EXPECT_EQ(shares.lower_share, 0.5);
-    EXPECT_EQ(shares.upper_share, 0.5);
+    EXPECT_EQ(shares.lower_fraction, 0.5);
+    EXPECT_EQ(shares.upper_fraction, 0.5);
 }
 
 TEST(Climate, SharesFollowTheFormulaInAnyOrder) {
     const auto skies = skies_of({{0.75, 30}, {0, 10}, {1, 400}, {0.25, 20}});
     for (double state : {0.0, 0.1, 0.25, 0.3, 0.7, 0.75, 0.9, 1.0}) {
         const SkyShares s = shares_at(skies, state);
-        EXPECT_NEAR(s.lower_share + s.upper_share, 1, 1e-15);
+        EXPECT_NEAR(s.lower_fraction + s.upper_fraction, 1, 1e-15);
         if (s.lower == s.upper) {
             EXPECT_EQ(skies[s.lower].state, state);
-            EXPECT_EQ(s.lower_share, 1);
+            EXPECT_EQ(s.lower_fraction, 1);
             continue;
         }
         const double difference = skies[s.upper].state - skies[s.lower].state;
         EXPECT_LT(skies[s.lower].state, state);
         EXPECT_GT(skies[s.upper].state, state);
-        EXPECT_NEAR(s.lower_share, 1 - std::abs(state - skies[s.lower].state) / difference, 1e-15);
-        EXPECT_NEAR(s.upper_share, 1 - std::abs(state - skies[s.upper].state) / difference, 1e-15);
+        EXPECT_NEAR(s.lower_fraction, 1 - std::abs(state - skies[s.lower].state) / difference, 1e-15);
+        EXPECT_NEAR(s.upper_fraction, 1 - std::abs(state - skies[s.upper].state) / difference, 1e-15);
     }
     EXPECT_EQ(clouds_at(skies, 0.5), 25);
     EXPECT_EQ(clouds_at(skies, 0.125), 15);
@@ -54,7 +54,7 @@ TEST(Climate, SharesFollowTheFormulaInAnyOrder) {
     const auto upper = skies_of({{0, 50}, {0.5, 100}});
     EXPECT_EQ(clouds_at(upper, 0.9), 100);
     EXPECT_EQ(shares_at(upper, 0.9).lower, 1u);
-    EXPECT_EQ(shares_at(skies_of({{0.5, 7}}), 0.1).lower_share, 1);
+    EXPECT_EQ(shares_at(skies_of({{0.5, 7}}), 0.1).lower_fraction, 1);
 }
 
 TEST(Climate, AnySchedule) {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "core/trigonometry.h"
+#include "core/math.h"
 #include "seeds/draw.h"
 #include "tests/seeds/fixtures.h"
 

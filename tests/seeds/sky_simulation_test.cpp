@@ -158,7 +158,7 @@ TEST(SkySimulation, EnteringCloudsFollowTheShares) {
                 upper += c.sky == shares.upper;
             }
         }
-        const double p = shares.upper_share;
+        const double p = shares.upper_fraction;
         EXPECT_NEAR(upper, entered * p, 4 * std::sqrt(entered * p * (1 - p))) << state;
     }
 }

@@ -269,7 +269,7 @@ automaton = false
     const SkyShares half = shares_at(options.skies, 0.5);
     EXPECT_EQ(half.lower, 1u);
     EXPECT_EQ(half.upper, 2u);
-    EXPECT_EQ(half.lower_share, 0.5);
+    EXPECT_EQ(half.lower_fraction, 0.5);
 
     for (const double state : {0.5, 0.35, 0.9}) {
         const Scene scene =
@@ -291,8 +291,8 @@ automaton = false
             for (const SkyCloud& cloud : layer.sky()->clouds()) seen = std::max(seen, cloud.serial + 1);
         }
         ASSERT_GT(entered, 10000);
-        const double sigma = std::sqrt(entered * shares.lower_share * shares.upper_share);
-        EXPECT_NEAR(lower, entered * shares.lower_share, 4 * sigma) << "state " << state;
+        const double sigma = std::sqrt(entered * shares.lower_fraction * shares.upper_fraction);
+        EXPECT_NEAR(lower, entered * shares.lower_fraction, 4 * sigma) << "state " << state;
     }
 }
 

@@ -17,7 +17,7 @@
 #include "core/error.h"
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/writer.h"
-#include "simulation/folder_lock.h"
+#include "simulation/earlier_run.h"
 #include "simulation/statistics_file.h"
 #include "tests/simulation/file_content.h"
 #include "tests/simulation/small_run.h"

@@ -11,8 +11,9 @@
 #include <gtest/gtest.h>
 
 #include "scenes/format/reader.h"
+#include "simulation/frame_painter.h"
 #include "simulation/simulation.h"
-#include "tests/simulation/drawn_frame.h"
+#include "tests/simulation/apart_by.h"
 
 namespace nephos {
 namespace {
@@ -49,11 +50,12 @@ struct Comparison : SimulationSink {
     explicit Comparison(const Scene& s) : scene(s) {}
     void step(const StepResult&) override {}
     void frame(const FrameResult& frame) override {
-        const Picture expected = test::drawn_frame(scene, frame, renderers[0], painters[0], false);
+        compare_detail(frame);
+        const Picture expected = painters[0].draw(frame);
         given = metaball_count(frame);
         clearest = *std::ranges::min_element(expected.transmittance);
-        for (std::size_t way = 1; way < std::size(renderers); ++way) {
-            const Picture other = test::drawn_frame(scene, frame, renderers[way], painters[way], false);
+        for (std::size_t way = 1; way < std::size(painters); ++way) {
+            const Picture other = painters[way].draw(frame);
             const float beauty = test::apart_by(expected.beauty, other.beauty),
                         transmittance = test::apart_by(expected.transmittance, other.transmittance);
             ASSERT_FALSE(std::isnan(beauty) || std::isnan(transmittance)) << "way " << way;
@@ -61,11 +63,29 @@ struct Comparison : SimulationSink {
         }
     }
 
+    // Clouds with detail, which one back-end does not draw. Where a sample meets the edge of cloud rounding may decide
+    // what it finds.
+    void compare_detail(const FrameResult& frame) {
+        const Picture expected = FramePainter(scene, {.splatting = Splatting::cpu}).draw(frame),
+                      other = FramePainter(scene, {.splatting = Splatting::vulkan}).draw(frame);
+        for (std::size_t i = 0; i < expected.beauty.size(); ++i) {
+            const float scale = std::max(1.0f, expected.beauty[i]);
+            if (std::abs(expected.beauty[i] - other.beauty[i]) > scale / 255) ++apart_in_detail;
+        }
+        pixels = expected.pixels();
+    }
+
+    static Scene without_detail(Scene scene) {
+        scene.density.detail.enabled = false;
+        return scene;
+    }
+
     const Scene& scene;
-    Renderer renderers[3] = {Renderer({.splatting = Splatting::blended}),
-                             Renderer({.splatting = Splatting::cpu}),
-                             Renderer({.splatting = Splatting::vulkan})};
-    SkyPainter painters[3];
+    const Scene plain = without_detail(scene);
+    FramePainter painters[3] = {FramePainter(plain, {.splatting = Splatting::blended}),
+                                FramePainter(plain, {.splatting = Splatting::cpu}),
+                                FramePainter(plain, {.splatting = Splatting::vulkan})};
+    std::size_t apart_in_detail = 0, pixels = 0;
     float apart[3] = {}, clearest = 1;
     std::size_t given = 0;  // metaballs, before any are merged
 };
@@ -80,7 +100,10 @@ TEST_P(ShippedScenes, AreTheSameInEveryBackend) {
     while (!simulation.finished()) simulation.advance(comparison);
     EXPECT_LT(comparison.clearest, 0.99f) << "nothing to see";
     for (std::size_t way = 1; way < 3; ++way) EXPECT_LE(comparison.apart[way], 1.0f / 255) << "way " << way;
-    std::printf("frame %d, %zu metaballs, least transmittance %.3f; apart by %.5f, %.5f\n", middle,
+    EXPECT_LE(comparison.apart_in_detail, comparison.pixels / 2000) << "with detail";
+    std::printf("with detail %zu numbers apart; ", comparison.apart_in_detail);
+    std::printf("frame %d, %zu metaballs, least transmittance %.3f; apart by %.5f, %.5f
+", middle,
                 comparison.given, double(comparison.clearest), double(comparison.apart[1]),
                 double(comparison.apart[2]));
 }

@@ -126,17 +126,17 @@ TEST(SkyBillboards, ABoundedNumberOfCloudsIsLitAnewInAFrame) {
     const SkySimulation sky(sky_of(10));
     RenderOptions options = from_the_edge();
     options.light.cfa_clouds_per_frame = 4;
-    std::optional<FilmFrame> film(std::in_place);
-    film->frames.per_second = 1;
-    film->frames.time_scale = 120;
-    film->sun = options.sun;
-    film->sun.date = "2026-06-21";
-    film->sun.time = "16:00";
-    film->sun.latitude_deg = 50;
-    film->sun.moves = true;
+    FrameOptions frames;
+    frames.per_second = 1;
+    frames.time_scale = 120;
+    Sun sun = options.sun;
+    sun.date = "2026-06-21";
+    sun.time = "16:00";
+    sun.latitude_deg = 50;
+    sun.moves = true;
     const auto absorption = [&](SkyBillboards& billboards, int frame, std::size_t* computed = nullptr) {
-        film->index = frame;
-        options.sun = sun_at(film->sun, frame_time_s(film->frames, frame));
+        const FilmFrame film{frame, &frames, &sun};
+        options.sun = sun_at(sun, frame_time_s(frames, frame));
         DrawnClouds drawn;
         const std::size_t anew = billboards.append(sky, sky.clouds(), options, {}, drawn, false, {}, film);
         if (computed != nullptr) *computed = anew;

@@ -10,9 +10,10 @@
 #include <gtest/gtest.h>
 
 #include "scenes/format/reader.h"
+#include "simulation/frame_painter.h"
 #include "simulation/simulation.h"
 #include "tests/reference/with_threads.h"
-#include "tests/simulation/drawn_frame.h"
+#include "tests/simulation/apart_by.h"
 
 namespace nephos {
 namespace {
@@ -28,13 +29,9 @@ Scene coarse_storm() {
                                              "wet_ground.texels=64",
                                              "precipitation.particles=5000",
                                              "fog.extinction_per_m=0.0002",
-                                             "fog.height_m=300"};
+                                             "fog.height_m=300",
+                                             "frames.exr=true"};
     return read_scene(std::filesystem::path(NEPHOS_SOURCE_DIR) / "scenes/storm.toml", overrides);
-}
-
-std::vector<float> drawn(const Scene& scene, const FrameResult& frame, Renderer& renderer,
-                         SkyPainter& painter) {
-    return test::drawn_frame(scene, frame, renderer, painter, true).beauty;
 }
 
 struct Comparison : SimulationSink {
@@ -42,11 +39,11 @@ struct Comparison : SimulationSink {
     void step(const StepResult&) override {}
     void frame(const FrameResult& frame) override {
         if (frame.number != 30 && frame.number != 47 && frame.number != 81) return;
-        const std::vector<float> expected = drawn(scene, frame, renderers[0], painters[0]);
+        const std::vector<float> expected = painters[0].draw(frame).beauty;
         const auto [least, most] = std::ranges::minmax(expected);
         EXPECT_GT(most, 2 * least) << "nothing to see";
         for (std::size_t way = 1; way < 3; ++way) {
-            const std::vector<float> other = drawn(scene, frame, renderers[way], painters[way]);
+            const std::vector<float> other = painters[way].draw(frame).beauty;
             const float apart = test::apart_by(expected, other);
             // Tiles end at a transmittance of 1/4096, some a few balls sooner: what stands by a flash behind
             // them may have a radiance of 30.
@@ -54,20 +51,17 @@ struct Comparison : SimulationSink {
             EXPECT_LT(apart, flashes ? 1.0f / 255 + 30.0f / 4096 : 1.0f / 255)
                 << "frame " << frame.number << ", way " << way;
         }
-        SkyPainter new_painter;
+        FramePainter new_painter(scene, {.splatting = Splatting::cpu});
         for (const std::size_t threads : {1, 3})
-            EXPECT_EQ(
-                test::with_threads(threads, [&] { return drawn(scene, frame, renderers[0], new_painter); }),
-                expected)
+            EXPECT_EQ(test::with_threads(threads, [&] { return new_painter.draw(frame).beauty; }), expected)
                 << "frame " << frame.number << ", " << threads << " threads";
         ++compared;
     }
 
     const Scene& scene;
-    Renderer renderers[3] = {Renderer({.validation = true, .splatting = Splatting::cpu}),
-                             Renderer({.validation = true, .splatting = Splatting::vulkan}),
-                             Renderer({.validation = true, .splatting = Splatting::blended})};
-    SkyPainter painters[3];
+    FramePainter painters[3] = {FramePainter(scene, {.validation = true, .splatting = Splatting::cpu}),
+                                FramePainter(scene, {.validation = true, .splatting = Splatting::vulkan}),
+                                FramePainter(scene, {.validation = true, .splatting = Splatting::blended})};
     int compared = 0;
 };
 
@@ -77,8 +71,8 @@ TEST(Storm, IsTheSameInEveryBackend) {
     Simulation simulation(scene, full_range(scene), std::string(32, '0'));
     while (!simulation.finished()) simulation.advance(comparison);
     EXPECT_EQ(comparison.compared, 3);
-    for (const Renderer& renderer : comparison.renderers)
-        for (const std::string& message : renderer.validation_messages()) ADD_FAILURE() << message;
+    for (const FramePainter& painter : comparison.painters)
+        for (const std::string& message : painter.renderer().validation_messages()) ADD_FAILURE() << message;
 }
 
 }  // namespace

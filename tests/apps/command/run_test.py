@@ -76,6 +76,20 @@ class Run(Case):
         self.assertEqual((self.folder / "more/statistics.csv").read_text().splitlines(), some)
         self.assertEqual(list(self.folder.glob("some/**/*.vdb")) + list(self.folder.glob("some/**/*.png")), [])
 
+    def test_a_scene_without_frames_has_the_same_statistics(self):
+        none = ["--set", "frames.enabled=false"]
+        self.call("run", self.scene, "--no-render", "--out", "all")
+        report = json.loads(self.call("run", self.scene, "--out", "some", *none, "--json").stdout)
+        self.assertEqual((report["frames"], report["complete"], report["backend"]), (0, True, ""))
+        some, whole = ((self.folder / name / "statistics.csv").read_text() for name in ("some", "all"))
+        self.assertEqual(some, whole)
+        self.assertEqual(sorted(p.name for p in (self.folder / "some").iterdir()),
+                         ["checkpoint.nephos", "manifest.json", "statistics.csv"])
+        self.assertEqual(json.loads(self.call("validate", self.scene, *none, "--json").stdout)[0]["frames"], 0)
+        for option in (["--video"], ["--frames", "1"]):
+            result = self.call("run", self.scene, "--out", "no", *none, *option, status=2)
+            self.assertIn("has no frames", result.stderr)
+
     def test_names_of_files_do_not_matter_to_info(self):
         self.call("run", self.scene, "--no-render", "--out", "out")
         shutil.copy(self.folder / "out/density/tiny_0001.vdb", self.folder / "a.exr")

@@ -35,7 +35,7 @@ class SetUp(Case):
         return result, calls
 
     def test_missing_packages_are_listed_and_installed_once(self):
-        result, calls = self.install("build run", missing=["cmake", "mesa-vulkan-drivers", "openexr"])
+        result, calls = self.install("build vulkan", missing=["cmake", "mesa-vulkan-drivers", "openexr"])
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("  cmake\n  mesa-vulkan-drivers\n", result.stderr)
         self.assertEqual(len(calls), 2)
@@ -52,11 +52,12 @@ class SetUp(Case):
                                  ([self.scene, "--video", "--splatting", "blended"], "vulkan\nffmpeg\n"),
                                  ([self.scene, "--set", 'frames.splatting="vulkan"'], "vulkan\n"),
                                  ([self.scene, "--set", "frames.video=true"], "ffmpeg\n"),
+                                 ([video, "--set", "frames.enabled=false"], ""),
                                  ([self.scene, "--set", "frames.png=false"], "")):
             self.assertEqual(self.call("run", *arguments, "--needs").stdout, needs)
         self.assertFalse((self.folder / "out").exists(), "nothing was done")
 
-    def test_run_installs_ffmpeg_for_whoever_asks_for_a_video(self):
+    def test_run_installs_what_a_run_asks_for(self):
         # A tree that is built already, whose command tells what it was called with.
         for name in ("run", "apps/setup.sh", "packages.txt"):
             (self.folder / name).parent.mkdir(exist_ok=True)
@@ -71,22 +72,25 @@ class SetUp(Case):
         """))
         nephos.chmod(0o755)
         self.stand_in("ninja", "echo 'ninja: no work to do.'")
-        self.stand_in("dpkg-query", "sed -n 's/^[a-z]\\+ \\+\\([^ ]*\\).*/installed \\1/p' packages.txt | grep -v ffmpeg; exit 1")
+        self.stand_in("dpkg-query", "sed -n 's/^[a-z]\\+ \\+\\([^ ]*\\).*/installed \\1/p' packages.txt | grep -v -e ffmpeg -e mesa; exit 1")
         self.stand_in("apt-get", f'echo "$*" >> "{self.folder}/apt.log"')
         self.stand_in("id", "echo 0")
-        for arguments, installs in (([self.scene], False), ([self.scene, "--video"], True), ([video], True),
-                                    ([video, "--no-render"], False), ([self.scene, "--set", "frames.video=true"], True),
-                                    (["no.toml"], False)):
+        card = bool(list(pathlib.Path("/dev").glob("dri/renderD*")))
+        for arguments, ffmpeg, driver in (
+                ([self.scene], False, card), ([self.scene, "--video"], True, card), ([video], True, card),
+                ([video, "--no-render"], False, card), ([self.scene, "--set", "frames.video=true"], True, card),
+                ([self.scene, "--splatting", "vulkan"], False, True), (["no.toml"], False, card)):
             log = self.folder / "apt.log"
             log.unlink(missing_ok=True)
             result = subprocess.run(["./run", *arguments], cwd=self.folder, capture_output=True, text=True, timeout=60,
                                     env={**self.environment, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
             self.assertEqual(result.stdout, "".join(f"<{a}>" for a in ["run", *arguments]), result.stderr)
-            self.assertEqual("install --no-install-recommends ffmpeg" in (log.read_text() if log.exists() else ""),
-                             installs, arguments)
+            installed = log.read_text() if log.exists() else ""
+            self.assertEqual("install --no-install-recommends ffmpeg" in installed, ffmpeg, arguments)
+            self.assertEqual("install --no-install-recommends mesa-vulkan-drivers" in installed, driver, arguments)
 
     def test_nothing_to_do_says_nothing(self):
-        result, calls = self.install("build run test bench", missing=[])
+        result, calls = self.install("build vulkan test bench", missing=[])
         self.assertEqual((result.returncode, result.stderr, result.stdout, calls), (0, "", "", []))
 
     def test_sudo_without_a_password_or_a_command_to_copy(self):

@@ -1,18 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Sine, cosine and arc tangent from IEEE additions, multiplications, divisions and square roots alone, so
+// Functions of numbers for all modules (not installed).
+//
+// Sine, cosine and arc tangent are made from IEEE additions, multiplications, divisions and square roots alone, so
 // that clouds have the same bits with every C library and processor (libm's functions may differ in the last
 // bit). Angles are in degrees, whose reduction to a quarter turn is exact.
 
+#include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace nephos {
+
+// Returns 3 t^2 - 2 t^3 for t in 0..1: rises from 0 to 1 with slope 0 at both ends.
+template <class T>
+constexpr T smooth_blend(T t) {
+    return t * t * (3 - 2 * t);
+}
+
+// Returns 0 at `low` and before it, 1 at `high` and beyond, smooth_blend() between. `low` may be above
+// `high`; they must differ. NaN gives NaN.
+template <class T>
+constexpr T smoothstep(std::type_identity_t<T> low, std::type_identity_t<T> high, T x) {
+    return smooth_blend(std::clamp<T>((x - low) / (high - low), 0, 1));
+}
 
 // A rotation in the plane, by the angle whose cosine and sine these are.
 struct Rotation {
     double cos = 1, sin = 0;
 };
+
+// Returns a rotation followed by `quarters` quarter turns.
+inline Rotation quarter_turned(const Rotation& by, long long quarters) {
+    switch (quarters & 3) {
+        case 0:
+            return by;
+        case 1:
+            return {-by.sin, by.cos};
+        case 2:
+            return {-by.cos, -by.sin};
+        default:
+            return {by.sin, -by.cos};
+    }
+}
 
 // Returns cosine and sine of an angle of |degrees| <= 1e6; absolute error below 4e-16. Pure.
 inline Rotation rotation_of_degrees(double degrees) {
@@ -33,16 +64,19 @@ inline Rotation rotation_of_degrees(double degrees) {
                                                                 q * (1.0 / 479001600 +
                                                                      q * (-1.0 / 87178291200.0 +
                                                                           q * (1.0 / 20922789888000.0))))))));
-    switch (static_cast<long long>(quarters) & 3) {
-        case 0:
-            return {c, s};
-        case 1:
-            return {-s, c};
-        case 2:
-            return {-c, -s};
-        default:
-            return {s, -c};
-    }
+    return quarter_turned({c, s}, static_cast<long long>(quarters));
+}
+
+// Returns the same for angles of any size; absolute error below 1e-15. Its last bits differ, and golden hashes
+// of automata depend on these, those of clouds on the others. Pure.
+inline Rotation sin_cos_deg(double degrees) {
+    const double turns = std::floor(degrees / 90 + 0.5);
+    const double r = (degrees - turns * 90) * (3.14159265358979323846 / 180);  // -pi/4..pi/4
+    const double r2 = r * r;
+    double s = 0, c = 0;  // Taylor series; the first term left out is below 2e-17
+    for (int n = 17; n >= 1; n -= 2) s = 1 - s * r2 / ((n + 1.0) * (n + 2.0));
+    for (int n = 16; n >= 0; n -= 2) c = 1 - c * r2 / ((n + 1.0) * (n + 2.0));
+    return quarter_turned({c, s * r}, int(std::fmod(turns, 4) + 4));
 }
 
 // Returns the angle of the vector (x, y) from the x axis in degrees, counter-clockwise, -180..180; 0 for the
