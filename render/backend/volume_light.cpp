@@ -6,7 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "render/cpu/processor_light.h"
+#include "render/backend/processor_light.h"
 
 namespace nephos {
 

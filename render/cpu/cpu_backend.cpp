@@ -12,7 +12,7 @@
 #include <tbb/task_arena.h>
 
 #include "render/backend/volume_light.h"
-#include "render/cpu/processor_light.h"
+#include "render/backend/processor_light.h"
 #include "render/cpu/processor_view.h"
 #include "render/frame/view_sorting.h"
 

@@ -20,7 +20,7 @@
 #include <hwy/highway.h>
 
 #include "density/detail-inl.h"
-#include "render/cpu/marched_scene.h"
+#include "render/frame/marched_scene.h"
 #include "render/cpu/screen_ball-inl.h"
 #include "render/cpu/tile_air-inl.h"
 #include "render/cpu/view_scene.h"
@@ -413,7 +413,9 @@ HWY_INLINE bool march_vector(const ViewScene& scene, const TileRays& rays, std::
         extinction = hn::IfThenElse(active, found, extinction);
         margin = hn::IfThenElse(active, hn::IfThenElse(now.near, now.margin, set(-1.0f)), margin);
         way = hn::IfThenElse(active, now.step, way);
-        distance = hn::IfThenElse(active, hn::Add(distance, now.step), distance);
+        const Floats next =
+            hn::Max(hn::Add(distance, now.step), hn::Mul(distance, set(shader::kLeastAdvance)));
+        distance = hn::IfThenElse(active, next, distance);
         active = hn::And(active, hn::And(hn::Lt(distance, stop), hn::Gt(left, opaque)));
     }
     const Mask rest = hn::Gt(weight, zero);

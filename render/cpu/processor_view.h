@@ -12,7 +12,7 @@
 
 #include "render/cloud/stage_times.h"
 #include "render/cpu/billboard_texels.h"
-#include "render/cpu/marched_scene.h"
+#include "render/frame/marched_scene.h"
 #include "render/cpu/screen_ball.h"
 #include "render/frame/air_shells.h"
 #include "render/frame/frame_data.h"

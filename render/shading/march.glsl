@@ -110,60 +110,56 @@ MarchState begin_march(vec3 ray) {
 struct MarchSample {
     float extinction, margin, step;
     uint which;
-    bool near;  // to cloud: it is to be sampled
+    uint near;  // bits of volumes that are to be sampled: cloud is near
 };
 
 // A place of a ray in a volume, and the way out of the cube of empty bricks or cells around it.
 struct MarchPlace {
-    BrickPlace place;
-    vec3 offset;
+    bool within;  // the bricks' box
     float out_m;
     bool near;
 };
 
 MarchPlace march_place(uint v, vec3 ray, vec3 per_ray, float distance) {
-    MarchPlace at;
     vec4 corner = march.volumes[v].corner;
-    at.offset = distance * ray - corner.xyz;
-    at.place = brick_place(v, at.offset);
-    bool holds = at.place.within && at.place.number >= 0;
-    vec3 cell = min(floor(0.5 * at.place.local), vec3(3.0));
-    uint byte = 64u * uint(max(at.place.number, 0)) + uint((cell.z * 4.0 + cell.y) * 4.0 + cell.x);
+    vec3 offset = distance * ray - corner.xyz;
+    BrickPlace place = brick_place(v, offset);
+    bool holds = place.within && place.number >= 0;
+    vec3 cell = min(floor(0.5 * place.local), vec3(3.0));
+    uint byte = 64u * uint(max(place.number, 0)) + uint((cell.z * 4.0 + cell.y) * 4.0 + cell.x);
     uint clear = (march_cells[march.volumes[v].first_clearance + byte / 4u] >> (8u * (byte & 3u))) & 255u;
-    at.near = holds && clear == 0u;
-    float count = holds ? float(clear) : float(-at.place.number), size = (holds ? 2.0 : 8.0) * corner.w;
-    vec3 own = holds ? at.place.brick * 4.0 + cell : at.place.brick;
+    float count = holds ? float(clear) : float(-place.number), size = (holds ? 2.0 : 8.0) * corner.w;
+    vec3 own = holds ? place.brick * 4.0 + cell : place.brick;
     vec3 edge = mix(own + 1.0 - count, own + count, greaterThan(per_ray, vec3(0.0)));
-    vec3 out_m = (edge * size - at.offset) * per_ray;
-    at.out_m = min(out_m.x, min(out_m.y, out_m.z));
-    return at;
+    vec3 out_m = (edge * size - offset) * per_ray;
+    return MarchPlace(place.within, min(out_m.x, min(out_m.y, out_m.z)), holds && clear == 0u);
 }
 
 // Sets the step to where cloud may be, as far as nothing is to be sampled.
 MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
-    MarchSample result = MarchSample(0.0, 1.0, kFarAway_m, 0u, false);
+    MarchSample result = MarchSample(0.0, 1.0, kFarAway_m, 0u, 0u);
     for (uint v = 0u; v < march.count; ++v) {
         MarchPlace at = march_place(v, ray, per_ray, distance);
         vec2 part = part_in_box(v, per_ray);
         // At the faces of the box rounding decides what is inside: there rays go on by a metre.
         float step = distance < part.y ? 1.0 : kFarAway_m;
         if (distance < part.x) step = part.x - distance + kBeyondFace_m;
-        if (at.place.within) step = max(at.out_m, 0.0) + kBeyondFace_m;
+        if (at.within) step = max(at.out_m, 0.0) + kBeyondFace_m;
         if (at.near)
-            result.near = true;
+            result.near |= 1u << v;
         else
             result.step = min(result.step, step);
     }
     return result;
 }
 
-void sample_near(inout MarchSample result, vec3 ray, vec3 per_ray, float distance, float transmittance) {
+void sample_near(inout MarchSample result, vec3 ray, float distance, float transmittance) {
     float footprint = distance * march.per_unit, finest = max(kLeastStep_m, kStepPixels * footprint);
     float least_step = finest * ((1.0 - transmittance) * kStepGrowth + 1.0);
     for (uint v = 0u; v < march.count; ++v) {
-        MarchPlace at = march_place(v, ray, per_ray, distance);
-        if (at.near) {
-            Eroded found = eroded(v, node_at(v, at.place), at.offset, max(footprint, kLeastFootprint_m), true);
+        if ((result.near >> v & 1u) != 0u) {
+            vec3 offset = distance * ray - march.volumes[v].corner.xyz;
+            Eroded found = eroded(v, node_at(v, brick_place(v, offset)), offset, max(footprint, kLeastFootprint_m), true);
             float extinction = found.density * march.volumes[v].extinction_per_m;
             result.extinction += extinction;
             if (extinction > 0.0) result.which = v;
@@ -205,9 +201,9 @@ void advance(MarchSample now, inout MarchState state, inout MarchEvent event, in
     bool leaves = event.weight > kLeavingOpacity && found <= 0.0;
     event.full = event.weight > kEventOpacity || leaves || ends;
     state.extinction = found;
-    state.margin = now.near ? now.margin : -1.0;
+    state.margin = now.near != 0u ? now.margin : -1.0;
     state.way = now.step;
-    state.distance += now.step;
+    state.distance = max(state.distance + now.step, state.distance * kLeastAdvance);
 }
 
 // Returns the distance at which a ray ends.
@@ -233,11 +229,11 @@ void march_to(float stop, vec3 ray, inout MarchState state, inout vec4 sum, inou
             bool near = false;
             while (!near && !event.full && state.distance < stop && sum.a > kMarchOpaque) {
                 now = survey(ray, per_ray, state.distance);
-                near = now.near;
+                near = now.near != 0u;
                 if (!near) advance(now, state, event, sum.a);
             }
             if (near) {
-                sample_near(now, ray, per_ray, state.distance, sum.a);
+                sample_near(now, ray, state.distance, sum.a);
                 advance(now, state, event, sum.a);
             }
         }

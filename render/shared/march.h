@@ -19,6 +19,7 @@ NEPHOS_CONST float kStepPixels = 1.2f;                // ... or this many footpr
 NEPHOS_CONST float kStepGrowth = 4.0f;                // of steps behind opaque cloud
 NEPHOS_CONST float kLongestStep_m = 30.0f;            // near cloud
 NEPHOS_CONST float kBeyondFace_m = 0.01f;             // where a ray goes on behind the face of a cell or a box
+NEPHOS_CONST float kLeastAdvance = 1.0000005f;         // of a distance in any step: far away floats are coarse
 NEPHOS_CONST float kFarAway_m = 1.0e9f;
 NEPHOS_CONST float kLeastFootprint_m = 0.05f;
 NEPHOS_CONST float kSkippedSteps = 1.5f;              // of cloud before a sample behind empty space, in finest steps
@@ -47,7 +48,7 @@ NEPHOS_FUNCTION float splatted_weight(float footprint_m) {
     return part * part * (3.0f - 2.0f * part);
 }
 
-// A CoverageField with its light, in the words of all volumes (march_words.h).
+// A CoverageField with its light, in the words of all volumes (render/vulkan/march_volumes.h).
 struct MarchVolume {
     vec4 corner;         // xyz: of its field, relative to the eye, metres; w: between two nodes
     vec4 to_noise[3];    // rows, as in ErosionConstants

@@ -46,12 +46,11 @@ struct BinnedView::Pipelines {
 
     Pipelines(const GpuDevice& gpu, const ShaderVariant& which) : variant(which) {
         const std::vector<ShaderConstant> constants = constants_of(variant);
-        const bool march = variant.march;
         project = create_compute_pipeline(gpu, shaders().view_project_comp, constants);
-        finish = create_compute_pipeline(gpu, march ? shaders().march_finish_comp : shaders().view_finish_comp, constants);
-        if (variant.shells)
-            between = create_compute_pipeline(
-                gpu, march ? shaders().march_shells_comp : shaders().view_shells_comp, constants);
+        const ShaderSet& all = shaders();
+        finish = create_compute_pipeline(gpu, variant.march ? all.march_finish_comp : all.view_finish_comp, constants);
+        const ShaderCode air = variant.march ? all.march_shells_comp : all.view_shells_comp;
+        if (variant.shells) between = create_compute_pipeline(gpu, air, constants);
     }
 
     // With billboards none are drawn as if all were fitted.
@@ -62,16 +61,11 @@ struct BinnedView::Pipelines {
     }
 
     void prepare(const GpuDevice& gpu, bool depth) {
-        if (variant.march) {
-            Pipeline& pipeline = tiles[1][depth ? 1 : 0];
-            if (!pipeline.exists())
-                pipeline = create_pixel_pipeline(gpu, shaders().march_tiles_comp, depth, variant);
-            return;
-        }
         for (const bool mixed : {false, true}) {
             Pipeline& pipeline = tiles[mixed ? 1 : 0][depth ? 1 : 0];
-            if (draws(mixed) && !pipeline.exists())
-                pipeline = create_tile_pipeline(gpu, shaders().view_tiles_comp, {mixed, depth}, variant);
+            if (!draws(mixed) || pipeline.exists() || (variant.march && !mixed)) continue;
+            pipeline = variant.march ? create_pixel_pipeline(gpu, shaders().march_tiles_comp, depth, variant)
+                                     : create_tile_pipeline(gpu, shaders().view_tiles_comp, {mixed, depth}, variant);
         }
     }
 };
@@ -225,12 +219,7 @@ Resources BinnedView::view_resources(const Slot& slot) const {
             {15, lists_.parts()},
             {16, slot.billboards},
             {17, slot.clouds}};
-    if (what.variant.march)
-        all.set({{18, slot.march},
-                 {19, what.volumes->cells()},
-                 {20, what.volumes->light()},
-                 {21, what.volumes->noise()},
-                 {22, march_states_}});
+    if (what.variant.march) all.set(what.volumes->resources(slot.march));
     return all;
 }
 
@@ -418,11 +407,9 @@ void BinnedView::reserve(const Tile& tile, Slot& slot) {
         radiance_ = create_buffer(gpu_, 4 * sizeof(float) * pixels, usage, HostAccess::none);
         depth_ = create_buffer(gpu_, sizeof(float) * pixels, usage, HostAccess::none);
     }
-    if (slot.what.variant.march && march_states_.bytes < 4 * sizeof(float) * pixels) {
+    if (slot.what.variant.march && !slot.what.volumes->has_room(pixels)) {
         wait();
-        march_states_ = {};
-        march_states_ = create_buffer(gpu_, 4 * sizeof(float) * pixels, vk::BufferUsageFlagBits::eStorageBuffer,
-                                      HostAccess::none);
+        slot.what.volumes->reserve(gpu_, pixels);
     }
     reserve_copy(gpu_, slot.radiance, 4 * sizeof(float) * pixels);
     reserve_copy(gpu_, slot.depth, sizeof(float) * pixels);

@@ -38,7 +38,7 @@ struct ViewInputs {
     std::span<const shader::SeenBillboard> billboards;
     std::span<const shader::ViewCloud> clouds;
     const shader::March* march = nullptr;  // clouds with detail, see variant.march; until begin_tile() returns
-    const MarchVolumes* volumes = nullptr;  // of these
+    MarchVolumes* volumes = nullptr;        // of these
     bool depth = true;
 };
 
@@ -117,7 +117,6 @@ class BinnedView {
     std::size_t balls_ = 0;
     std::size_t batch_ = 0;  // splats of a batch for which the lists of this cloud had room
     GpuBuffer shade_, radiance_, depth_;
-    GpuBuffer march_states_;  // of the pixels; empty until something is marched
     GpuImage billboard_textures_;  // created with the first billboard
     std::uint64_t shade_serial_ = 0;
     std::vector<std::unique_ptr<Pipelines>> pipelines_;

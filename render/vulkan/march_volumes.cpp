@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "density/detail_noise.h"
-#include "render/cpu/marched_scene.h"
+#include "render/frame/marched_scene.h"
 
 namespace nephos {
 namespace {
@@ -155,6 +155,12 @@ MarchVolumes::MarchVolumes(const GpuDevice& gpu) {
     std::vector<std::uint32_t> words = detail_noise().large;
     words.insert(words.end(), detail_noise().small.begin(), detail_noise().small.end());
     replace(gpu, noise_, words);
+}
+
+void MarchVolumes::reserve(const GpuDevice& gpu, std::size_t pixels) {
+    states_ = {};  // the old one goes before the new one comes
+    states_ = create_buffer(gpu, 4 * sizeof(float) * pixels, vk::BufferUsageFlagBits::eStorageBuffer,
+                            HostAccess::none);
 }
 
 void MarchVolumes::use(const GpuDevice& gpu, const LitCloud& cloud) {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "render/backend/lit_cloud.h"
-#include "render/gpu/gpu_resources.h"
+#include "render/gpu/descriptor_sets.h"
 #include "render/options/camera.h"
 #include "render/shared/march.h"
 
@@ -37,12 +37,18 @@ class MarchVolumes {
     // device has no buffers so large.
     void use(const GpuDevice& gpu, const LitCloud& cloud);
 
-    const GpuBuffer& cells() const { return cells_; }
-    const GpuBuffer& light() const { return light_; }
-    const GpuBuffer& noise() const { return noise_; }
+    // Make room for the rays of so many pixels; then nothing that reads them may be in flight.
+    bool has_room(std::size_t pixels) const { return states_.bytes >= 4 * sizeof(float) * pixels; }
+    void reserve(const GpuDevice& gpu, std::size_t pixels);
+
+    // Returns what shaders that march read and write; `constants`: a shader::March.
+    Resources resources(const GpuBuffer& constants) const {
+        return {{18, constants}, {19, cells_}, {20, light_}, {21, noise_}, {22, states_}};
+    }
 
   private:
     GpuBuffer cells_, light_, noise_;
+    GpuBuffer states_;  // of the rays, between two dispatches
     Version cells_version_ = 0, light_version_ = 0;
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Clouds with detail, marched by the shaders, against those of the processor.
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "density/density_grid.h"
 #include "density/metaballs.h"
 #include "render/renderer.h"
+#include "render/renderer_test_access.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/random_billboards.h"
 #include "tests/render/voxel_cloud.h"
@@ -146,6 +149,25 @@ TEST_F(MarchBackends, AgreeBetweenBillboards) {
         splats.billboards = billboards;
         expect_same(splats, test::view(each.from, each.to, each.fov_deg, 96, 72), each.name);
     }
+}
+
+// Neither batches of splats nor parts of the picture show; nor do the clouds of another frame.
+TEST_F(MarchBackends, PartsAreWholePictures) {
+    Renderer parts(test::validated(Splatting::vulkan, 40));
+    RendererTestAccess::limit_lists(parts, std::size_t{1} << 24, 37);
+    for (const int seed : {1, 4}) {
+        DetailedCloud cloud;
+        cloud.add({0, 0, 1000}, seed);
+        for (const double distance : {2400.0, 2800.0}) {
+            RenderOptions options = test::view({0, -distance, 800}, {480, 400, 1250}, 30, 96, 72);
+            if (seed == 4) options.light_shafts.strength = 1;
+            const Picture whole = vulkan_.draw_splats(cloud.splats(), options),
+                          other = parts.draw_splats(cloud.splats(), options);
+            EXPECT_LE(test::largest_difference(whole.beauty, other.beauty), 0.5f / 255.0f);
+            EXPECT_LE(test::largest_difference(whole.transmittance, other.transmittance), 0.5f / 255.0f);
+        }
+    }
+    test::expect_no_messages(parts);
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ struct Comparison : SimulationSink {
 
     static Scene without_detail(Scene scene) {
         scene.density.detail.enabled = false;
+        for (auto& layer : scene.layers) layer.detail.enabled = false;
         return scene;
     }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/cpu/marched_scene.h"
+#include "render/frame/marched_scene.h"
 
 #include <cmath>
 #include <string>
