@@ -140,7 +140,9 @@ struct Eroded {
     Floats margin;  // coverage that is missing to be cloud; not above 0 inside
 };
 
-// The detailed density of nodes at places relative to the field's corner, metres. Lanes that are not `asked` are 0.
+// The detailed density of nodes at places relative to the field's corner, metres. Lanes that are not `asked` are 0. No
+// lane depends on the others; without kMargins the margins are of no use.
+template <bool kMargins = false>
 HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, Floats y, Floats z, Floats footprint,
                          Mask asked) {
     const Lanes d;
@@ -154,7 +156,7 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
     const Floats others = hn::Mul(half, hn::Add(medium, hn::Add(fine, soft)));
     const Floats low = hn::Max(hn::NegMulAdd(half, large, hn::Sub(half, others)), number(kLeastCoverage));
     const Mask needed = hn::And(asked, hn::Gt(c, low));
-    if (hn::AllFalse(d, needed)) return {zero, hn::Sub(low, c)};
+    if (!kMargins && hn::AllFalse(d, needed)) return {zero, zero};
     const auto turned = [&](int row) {
         const auto& to = e.to_noise[std::size_t(row)];
         return hn::MulAdd(number(to[0]), x,
@@ -183,13 +185,13 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
                            hn::MulAdd(number(0.8f), a, hn::Mul(number(0.6f), g))),
             half);
         const Floats sign = text::billows(top, node.growth, e.wisps);
-        noise = hn::MulAdd(hn::Mul(medium, sign), bumps, noise);
+        noise = hn::IfThenElse(near, hn::MulAdd(hn::Mul(medium, sign), bumps, noise), noise);
         if (!hn::AllFalse(d, hn::And(near, hn::Gt(fine, zero)))) {
             const Floats finer = number(e.fine_scale * float(kSmallNoiseVoxels));
             const Floats grain = hn::Sub(small_noise_at(field, level_of(e.fine_per_m), hn::Mul(u, finer),
                                                         hn::Mul(v, finer), hn::Mul(w, finer)),
                                          half);
-            noise = hn::MulAdd(fine, grain, noise);
+            noise = hn::IfThenElse(near, hn::MulAdd(fine, grain, noise), noise);
         }
     }
     const Floats margin = hn::Sub(hn::NegMulAdd(half, soft, noise), c);

@@ -81,14 +81,14 @@ std::unique_ptr<Backend> open_backend(const DeviceOptions& options) {
                                 "\" is asked for: leave it out, or choose vulkan or blended");
             return std::make_unique<CpuBackend>();
         case Splatting::vulkan:
-            return std::make_unique<VulkanBackend>(open_device(options), options.lists);
+            return std::make_unique<VulkanBackend>(open_device(options));
         case Splatting::blended:
             return std::make_unique<BlendedBackend>(open_device(options));
         case Splatting::automatic:
             break;
     }
     if (std::optional<GpuDevice> card = open_graphics_card(options))
-        return std::make_unique<VulkanBackend>(std::move(*card), options.lists);
+        return std::make_unique<VulkanBackend>(std::move(*card));
     return std::make_unique<CpuBackend>();
 }
 
@@ -147,8 +147,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
                            .sky = sky_of(splats, options),
                            .table = scattering,
                            .air = air,
-                           .times = times,
-                           .overflowed = drawing.overflowed};
+                           .times = times};
     if (frame.sky != nullptr) picture.air = air_of(*frame.sky);
     for (int y = 0; y < picture.height; y += tile_size) {
         for (int x = 0; x < picture.width; x += tile_size) {
@@ -165,12 +164,8 @@ void Renderer::Impl::begin(Drawing& drawing) {
 
 void Renderer::Impl::finish(Drawing& drawing) {
     if (drawing.backend == nullptr) return;
-    {
-        const StageTimer timer(&times, DrawStage::view);
-        if (std::exchange(drawing.backend, nullptr)->finish(drawing.picture)) return;
-    }
-    drawing.overflowed = true;
-    begin(drawing);
+    const StageTimer timer(&times, DrawStage::view);
+    std::exchange(drawing.backend, nullptr)->finish(drawing.picture);
 }
 
 Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail) {

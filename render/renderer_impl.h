@@ -29,7 +29,6 @@ struct PendingPicture::State {
     DetailView detail;  // from which the cloud's metaballs are merged
     Picture picture;
     Backend* backend = nullptr;  // that draws it; null: it is finished
-    bool overflowed = false;     // see FrameDescription
 };
 
 struct Renderer::Impl {

@@ -25,13 +25,9 @@ GpuDevice& RendererTestAccess::device(const Renderer& renderer) {
 
 namespace {
 
-ListedView& listed_view(VulkanBackend* backend) {
-    if (backend == nullptr) throw Error(ErrorCode::usage, "only the back-end vulkan has lists on a device");
-    return backend->listed_view();
-}
-
-const ListedView* made_view(const VulkanBackend* backend) {
-    return backend == nullptr ? nullptr : backend->listed_view_if_made();
+BinnedView& binned_view(VulkanBackend* backend) {
+    if (backend == nullptr) throw Error(ErrorCode::usage, "only the back-end vulkan bins on a device");
+    return backend->view();
 }
 
 GpuBuffer storage(const GpuDevice& gpu, std::size_t bytes, std::span<const std::byte> content = {},
@@ -51,9 +47,9 @@ std::vector<std::uint32_t> words_of(const GpuBuffer& buffer, std::size_t count) 
 // The passes with nothing but what sums and sorts need.
 struct SortBench {
     const GpuDevice& gpu;
-    OrderPipelines pipelines = create_order_pipelines(gpu);
-    OrderSets sets = create_order_sets(gpu, pipelines, 2);
-    GpuBuffer counts, table, sums, unused;
+    std::vector<Pipeline> pipelines = create_order_pipelines(gpu);
+    DescriptorSets sets{gpu};
+    GpuBuffer counts, table, sums;
     SortBuffers buffers;
 
     SortBench(const GpuDevice& device, std::span<const std::uint32_t> words, std::size_t table_size)
@@ -63,27 +59,20 @@ struct SortBench {
                          vk::BufferUsageFlagBits::eIndirectBuffer);
         table = storage(gpu, 4 * table_size);
         sums = storage(gpu, 4 * blocks_of(table_size));
-        unused = storage(gpu, sizeof(shader::Shells), {}, vk::BufferUsageFlagBits::eUniformBuffer);
         std::vector<std::uint32_t> indices(words.size());
         std::iota(indices.begin(), indices.end(), 0u);
         for (const std::size_t n : {0u, 1u}) {
             buffers.keys[n] = storage(gpu, words.size_bytes(), std::as_bytes(words));
             buffers.values[n] = storage(gpu, words.size_bytes(), std::as_bytes(std::span(indices)));
         }
-        for (const std::size_t n : {0u, 1u}) {
-            for (std::uint32_t binding = 0; binding < kOrderBindings; ++binding)
-                bind_order_buffer(gpu, sets.sets[n], binding, unused);
-            bind_order_buffer(gpu, sets.sets[n], 1, counts);
-            bind_sort_buffers(gpu, sets.sets[n], buffers, n);
-            bind_order_buffer(gpu, sets.sets[n], 9, table);
-            bind_order_buffer(gpu, sets.sets[n], 10, sums);
-        }
     }
 
+    Resources resources() const { return {{1, counts}, {9, table}, {10, sums}}; }
+
     template <class Record>
-    void run(const Record& record) const {
+    void run(const Record& record) {
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-            record(OrderRecorder(commands, pipelines, counts));
+            record(OrderRecorder(commands, pipelines, sets, counts));
             full_barrier(commands);
             for (const GpuBuffer* each : {&counts, &table, &buffers.values[0], &buffers.values[1]})
                 buffer_barrier(commands, *each, access::compute, access::host);
@@ -119,21 +108,21 @@ void RendererTestAccess::provoke_hazard(Renderer& renderer) {
 
 std::vector<std::uint32_t> RendererTestAccess::sorted(Renderer& renderer, std::span<const std::uint32_t> keys,
                                                       std::uint32_t bits) {
-    const SortBench bench(device(renderer), keys, digits_in_table(keys.size()));
+    SortBench bench(device(renderer), keys, digits_in_table(keys.size()));
     bench.run([&](const OrderRecorder& recorder) {
-        recorder.sort({bench.sets.sets[0], bench.sets.sets[1]}, shader::kSeenDigits, bits);
+        recorder.sort(bench.resources(), bench.buffers, 0, shader::kSeenDigits, bits);
     });
-    return words_of(bench.buffers.values[OrderRecorder::passes(bits) % 2], keys.size());
+    return words_of(bench.buffers.values[OrderRecorder::end_of_sort(0, bits)], keys.size());
 }
 
 std::vector<std::uint32_t> RendererTestAccess::prefix_sums(Renderer& renderer,
                                                            std::span<const std::uint32_t> numbers) {
-    const SortBench bench(device(renderer), numbers, numbers.size());
+    SortBench bench(device(renderer), numbers, numbers.size());
     std::ranges::copy(std::as_bytes(numbers), bench.table.mapped);
     bench.run([&](const OrderRecorder& recorder) {
         shader::OrderStep step{};
-        step.table = shader::kSeenBalls;
-        recorder.scan(bench.sets.sets[0], step);
+        step.table = shader::kSeenSplats;
+        recorder.scan(bench.resources(), step);
     });
     std::vector<std::uint32_t> sums = words_of(bench.table, numbers.size());
     sums.push_back(reinterpret_cast<const shader::OrderCounts*>(bench.counts.mapped)->total);
@@ -141,27 +130,24 @@ std::vector<std::uint32_t> RendererTestAccess::prefix_sums(Renderer& renderer,
 }
 
 RendererTestAccess::Lists RendererTestAccess::lists(Renderer& renderer, int tile_width, int tile_height) {
-    ListedView::Lists lists = listed_view(vulkan(renderer)).read_lists({0, 0, tile_width, tile_height});
+    BinnedView::Lists lists = binned_view(vulkan(renderer)).read_lists({0, 0, tile_width, tile_height});
     return {std::move(lists.balls), std::move(lists.ranges), std::move(lists.list)};
 }
 
-void RendererTestAccess::limit_lists(Renderer& renderer, std::size_t balls, std::size_t entries) {
-    listed_view(vulkan(renderer)).limits = {balls, entries};
+void RendererTestAccess::limit_lists(Renderer& renderer, std::size_t entries, std::size_t batch) {
+    ListLimits& limits = binned_view(vulkan(renderer)).limits;
+    limits.entries = std::min(limits.entries, entries);
+    limits.batch = std::min(limits.batch, batch);
+    limits.batch_with_billboards = std::min(limits.batch_with_billboards, batch);
 }
 
-std::size_t RendererTestAccess::listed(const Renderer& renderer) {
-    const ListedView* const view = made_view(vulkan(renderer));
-    return view != nullptr ? view->drawn : 0;
+void RendererTestAccess::limit_splats(Renderer& renderer, std::size_t splats) {
+    binned_view(vulkan(renderer)).limits.splats = splats;
 }
 
-std::size_t RendererTestAccess::too_long(const Renderer& renderer) {
-    const ListedView* const view = made_view(vulkan(renderer));
-    return view != nullptr ? view->too_long : 0;
-}
-
-std::size_t RendererTestAccess::listed_light(const Renderer& renderer) {
-    const ListedView* const view = made_view(vulkan(renderer));
-    return view != nullptr ? view->lit : 0;
+std::size_t RendererTestAccess::overflows(const Renderer& renderer) {
+    const BinnedView* const view = vulkan(renderer) == nullptr ? nullptr : vulkan(renderer)->view_if_created();
+    return view != nullptr ? view->overflows : 0;
 }
 
 void RendererTestAccess::limit_storage(Renderer& renderer, std::uint32_t bytes) {

@@ -32,20 +32,19 @@ struct RendererTestAccess {
     // Sums of the numbers before each, and of all at the end.
     static std::vector<std::uint32_t> prefix_sums(Renderer& renderer, std::span<const std::uint32_t> numbers);
 
-    // The device's lists for the last tile of the previous picture (listed_view.h).
+    // The device's lists for the last tile of the previous picture, of its last batch (binned_view.h).
     struct Lists {
         std::vector<shader::ViewBall> balls;  // nearest first
         std::vector<shader::TileRange> ranges;
         std::vector<std::uint32_t> list;
     };
     static Lists lists(Renderer& renderer, int tile_width, int tile_height);
-    // Less than the device could take.
-    static void limit_lists(Renderer& renderer, std::size_t balls, std::size_t entries);
-    // Pictures, or tiles of them, that were begun from the device's lists.
-    static std::size_t listed(const Renderer& renderer);
-    // Those of them that had too many entries, and how often light was made from such lists.
-    static std::size_t too_long(const Renderer& renderer);
-    static std::size_t listed_light(const Renderer& renderer);
+    // Lower limits than those of the device: entries of the lists, splats of a batch.
+    static void limit_lists(Renderer& renderer, std::size_t entries, std::size_t batch = SIZE_MAX);
+    // Fewer metaballs and billboards than the device takes.
+    static void limit_splats(Renderer& renderer, std::size_t splats);
+    // Tiles of pictures that were drawn again because their lists were too long.
+    static std::size_t overflows(const Renderer& renderer);
     // As with a device whose shaders see less of a buffer.
     static void limit_storage(Renderer& renderer, std::uint32_t bytes);
 

@@ -49,25 +49,29 @@ struct FrameDescription {
     const Versioned<std::vector<float>>& table;  // scattering_table.h
     AirCache& air;
     StageTimes& times;
-    bool overflowed = false;  // Backend::finish() returned false for this picture
 
     // Returns what the camera sees of the splats, the metaballs still without their light. Throws Error(usage)
     // naming a billboard that is not as splats.h wants it.
-    ViewSortedSplats view_sorted() const {
-        const StageTimer timer(&times, DrawStage::view_sorting);
-        ViewSortedSplats order = sort_for_view(cloud.cloud, splats, camera,
-                                               pixels_per_unit(options.camera, camera), options.ground,
-                                               !cloud.volumes.empty());
-        // Balls are read twice; keys move through memory three times, and back and forth.
-        times[DrawStage::view_sorting].bytes =
-            cloud.cloud.metaballs.size_bytes() +
-            order.balls.size() * (sizeof(Metaball) + 7 * 8 + sizeof(shader::ViewBall));
-        return order;
-    }
+    ViewSortedSplats view_sorted() const { return view_sorted(cloud.cloud); }
+    // The same of the billboards alone.
+    ViewSortedSplats view_sorted_billboards() const { return view_sorted(PreparedCloud{}); }
     // Returns the shells of air between the clouds, for which the light of `cloud` must be on the host.
     AirShells shells() const {
         return air_shells(options, cloud.cloud, cloud.frame, cloud.shadow, cloud.shadow_size, cloud.light,
                           splats.time_s, air.noise, air.shade);
+    }
+
+  private:
+    ViewSortedSplats view_sorted(const PreparedCloud& metaballs) const {
+        const StageTimer timer(&times, DrawStage::view_sorting);
+        ViewSortedSplats order = sort_for_view(metaballs, splats, camera,
+                                               pixels_per_unit(options.camera, camera), options.ground,
+                                               !cloud.volumes.empty());
+        // Balls are read twice; keys move through memory three times, and back and forth.
+        times[DrawStage::view_sorting].bytes =
+            metaballs.metaballs.size_bytes() +
+            order.balls.size() * (sizeof(Metaball) + 7 * 8 + sizeof(shader::ViewBall));
+        return order;
     }
 };
 
@@ -91,9 +95,8 @@ class Backend {
     // Draws a picture, or begins to: then returns true, and the picture must stay where it is until finish()
     // or abandon(). At most two are in flight; begin() waits for earlier ones.
     virtual bool begin(const FrameDescription& frame, Picture& picture) = 0;
-    // Waits until a picture in flight is complete. Returns false when it did not fit into the memory of the
-    // device: it is to be begun again, with FrameDescription::overflowed. Throws what failed in flight.
-    virtual bool finish(Picture&) { return true; }
+    // Waits until a picture in flight is complete. Throws what failed in flight.
+    virtual void finish(Picture&) {}
     // Waits for a picture in flight and throws it away.
     virtual void abandon(const Picture&) noexcept {}
 

@@ -38,7 +38,7 @@ void main() {
     vec3 position = centre + reach.x * axes.right + reach.y * axes.up;
     BillboardAir air = billboard_air(billboard, centre, distance);
     coordinate = billboard_coordinate(corner, billboard.texture_bits >> 8 & 15u);
-    lit = air.share * billboard_light_at(position, billboard, clouds[billboard.cloud]);
+    lit = air.transmitted * billboard_light_at(position, billboard, clouds[billboard.cloud]);
     veil = vec4(air.veil, billboard.opacity);
     layer_level_distance = vec3(uvec2(billboard.texture_bits & 255u, billboard.texture_bits >> 12), distance);
 }

@@ -36,6 +36,22 @@ void BlendedBackend::light_all(LitCloud& cloud, StageTimes&) {
     scene_.fetch_map(cloud);
 }
 
+ViewPass& BlendedBackend::pass_for(const FrameDescription& frame, const AirShells& shells,
+                                   const ViewSortedSplats& order) {
+    const ShaderVariant variant{
+        .physical_sky = frame.sky != nullptr, .shells = shells.any(), .fog = shells.has_fog()};
+    auto& pass = passes_[variant.physical_sky ? 1 : 0][variant.fog ? 2 : variant.shells ? 1 : 0];
+    if (!pass) pass.emplace(scene_.gpu, variant);
+    if (!attenuation_) attenuation_.emplace(upload_attenuation(scene_.gpu));
+    const GpuImage& sky = frame.sky != nullptr ? scene_.sky_image(*frame.sky) : scene_.unused();
+    pass->use({{3, *attenuation_, scene_.clamped},
+               {4, scene_.shadow_map(frame.cloud), scene_.white_beyond},
+               {11, sky, scene_.clamped},
+               {12, scene_.scattering(frame.table)}});
+    if (shells.any()) pass->use_shells(scene_.gpu, shells, order);
+    return *pass;
+}
+
 bool BlendedBackend::begin(const FrameDescription& frame, Picture& picture) {
     LitCloud& cloud = frame.cloud;
     ViewSortedSplats order = frame.view_sorted();
@@ -43,9 +59,8 @@ bool BlendedBackend::begin(const FrameDescription& frame, Picture& picture) {
     set_light(order, {cloud.sun_depths, frame.lightning});
     if (has_shells(frame.options, cloud.cloud)) scene_.fetch_map(cloud);
     const AirShells shells = frame.shells();
-    if (!attenuation_) attenuation_.emplace(upload_attenuation(scene_.gpu));
     const StageTimer timer(&frame.times, DrawStage::view);
-    ViewPass& pass = prepared_pass(passes_, scene_, *attenuation_, frame, order, shells, false);
+    ViewPass& pass = pass_for(frame, shells, order);
     for (const FramePart& part : frame.parts)
         pass.draw_tile(scene_.gpu, part.frame, part.tile, order, picture);
     return false;

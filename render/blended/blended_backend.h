@@ -31,9 +31,14 @@ class BlendedBackend : public Backend {
     GpuScene& scene() { return scene_; }
 
   private:
+    // Returns the pass for a picture, with all that it reads.
+    ViewPass& pass_for(const FrameDescription& frame, const AirShells& shells, const ViewSortedSplats& order);
+
     GpuScene scene_;
-    std::optional<GpuImage> attenuation_;  // made when it is needed
-    PassVariants<ViewPass> passes_;
+    std::optional<GpuImage> attenuation_;  // created when it is needed
+    // Created when they are needed: without and with the physical sky; without shells of air, with them, and with
+    // fog in them.
+    std::optional<ViewPass> passes_[2][3];
 };
 
 }  // namespace nephos

@@ -14,49 +14,33 @@ constexpr std::array kFormats{vk::Format::eR32G32B32A32Sfloat, vk::Format::eR32S
 
 }  // namespace
 
-ViewPass::ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-                   const vk::raii::Sampler& sampler, const ShaderVariant& variant)
-    : layout_(&layout),
-      background_(create_graphics_pipeline(gpu, layout, shaders().background_vert, shaders().background_frag,
-                                           kFormats, Blend::none, variant)),
-      splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert, shaders().view_splat_frag,
-                                      kFormats, Blend::over, variant)),
-      integrated_splat_(create_graphics_pipeline(gpu, layout, shaders().view_splat_vert,
-                                                 shaders().view_splat_frag, kFormats, Blend::over,
+ViewPass::ViewPass(const GpuDevice& gpu, const ShaderVariant& variant)
+    : background_(create_graphics_pipeline(gpu, shaders().background_vert, shaders().background_frag, kFormats,
+                                           Blend::none, variant)),
+      splat_(create_graphics_pipeline(gpu, shaders().view_splat_vert, shaders().view_splat_frag, kFormats,
+                                      Blend::over, variant)),
+      integrated_splat_(create_graphics_pipeline(gpu, shaders().view_splat_vert, shaders().view_splat_frag,
+                                                 kFormats, Blend::over,
                                                  {true, variant.physical_sky, variant.shells, variant.fog})),
-      shell_(variant.shells ? create_graphics_pipeline(gpu, layout, shaders().shell_vert,
-                                                       shaders().shell_frag, kFormats, Blend::over, variant)
-                            : nullptr),
-      bindings_(create_bindings(gpu, layout)),
+      sets_(gpu),
       frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
       balls_(create_buffer(gpu, kBatch * sizeof(shader::ViewBall), vk::BufferUsageFlagBits::eStorageBuffer,
                            HostAccess::write)),
-      billboards_(gpu, layout, kFormats, frame_, variant),
-      shells_(gpu, bindings_) {
-    bind_buffer(gpu, bindings_, 0, frame_);
-    bind_buffer(gpu, bindings_, 1, balls_);
-    for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, bindings_, binding, attenuation, sampler);
+      billboards_(gpu, kFormats, variant),
+      shells_(gpu) {
+    if (variant.shells)
+        shell_ = create_graphics_pipeline(gpu, shaders().shell_vert, shaders().shell_frag, kFormats,
+                                          Blend::over, variant);
+    resources_.set({{0, frame_}, {1, balls_}, {13, shells_.shells()}, {14, shells_.shade()}});
 }
 
-void ViewPass::use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler) {
-    bind_image(gpu, bindings_, 11, tables, sampler);
-    billboards_.use_sky(gpu, tables, sampler);
-}
-
-void ViewPass::use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler) {
-    bind_image(gpu, bindings_, 4, map, sampler);
-}
+void ViewPass::use(const Resources& resources) { resources_.set(resources); }
 
 void ViewPass::use_shells(const GpuDevice& gpu, const AirShells& shells, const ViewSortedSplats& order) {
-    shells_.use(gpu, bindings_, shells);
-    billboards_.use_shells(gpu, shells);
+    shells_.use(gpu, shells);
+    resources_.set({{14, shells_.shade()}});
     runs_ = runs_between_shells(shells, order);
-}
-
-void ViewPass::use_scattering(const GpuDevice& gpu, const GpuBuffer& table) {
-    bind_buffer(gpu, bindings_, 12, table);
-    billboards_.use_scattering(gpu, table);
 }
 
 void ViewPass::resize_targets(const GpuDevice& gpu, const Tile& tile) {
@@ -78,16 +62,11 @@ void ViewPass::resize_targets(const GpuDevice& gpu, const Tile& tile) {
     depth_pixels_ = pixel_buffer(pixels * sizeof(float));
 }
 
-void ViewPass::bind(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& pipeline) const {
-    commands.bindPipeline(vk::PipelineBindPoint::eGraphics, *pipeline);
-    commands.bindDescriptorSets(vk::PipelineBindPoint::eGraphics, *layout_->layout, 0, bindings_.set, {});
-}
-
-void ViewPass::draw_background(const GpuDevice& gpu, vk::Extent2D area) const {
+void ViewPass::draw_background(const GpuDevice& gpu, vk::Extent2D area) {
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         begin_image(commands, radiance_, access::draw);
         begin_image(commands, depth_, access::draw);
-        bind(commands, background_);
+        bind(commands, vk::PipelineBindPoint::eGraphics, background_, sets_.fill(background_, resources_));
         const std::array<const GpuImage*, 2> targets{&radiance_, &depth_};
         draw_into(commands, targets, area, vk::AttachmentLoadOp::eDontCare,
                   [&] { commands.draw(3, 1, 0, 0); });
@@ -140,16 +119,27 @@ void ViewPass::draw_batch(const GpuDevice& gpu, vk::Extent2D area, const ViewSor
         image_barrier(commands, radiance_, access::draw, access::draw);
         image_barrier(commands, depth_, access::draw, access::draw);
         const std::array<const GpuImage*, 2> targets{&radiance_, &depth_};
+        const vk::DescriptorSet splats = sets_.fill(splat_, resources_),
+                                integrated_splats = sets_.fill(integrated_splat_, resources_),
+                                air = shell_.exists() ? sets_.fill(shell_, resources_) : vk::DescriptorSet();
+        const vk::DescriptorSet textured = billboards.begin < billboards.end
+                                               ? billboards_.fill(sets_, resources_)
+                                               : vk::DescriptorSet();
+        const auto use = [&](const Pipeline& pipeline, vk::DescriptorSet set) {
+            bind(commands, vk::PipelineBindPoint::eGraphics, pipeline, set);
+        };
         draw_into(commands, targets, area, vk::AttachmentLoadOp::eLoad, [&] {
             for (const Run& run : runs) {
                 const std::uint32_t count = run.end - run.begin;
                 if (run.kind == SplatKind::billboard) {
-                    billboards_.draw(commands, run.begin - billboards.begin, count, order.depth);
+                    use(billboards_.pipeline(order.depth), textured);
+                    commands.draw(6 * count, 1, 6 * (run.begin - billboards.begin), 0);
                 } else if (run.kind == SplatKind::shell) {
-                    bind(commands, shell_);
+                    use(shell_, air);
                     commands.draw(3, 1, 0, run.begin);
                 } else {
-                    bind(commands, run.kind == SplatKind::metaball ? splat_ : integrated_splat_);
+                    const bool textures = run.kind == SplatKind::metaball;
+                    use(textures ? splat_ : integrated_splat_, textures ? splats : integrated_splats);
                     commands.draw(6 * count, 1, 6 * (run.begin - balls.begin), 0);
                 }
             }
@@ -175,6 +165,7 @@ void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const
                          const ViewSortedSplats& order, Picture& picture) {
     resize_targets(gpu, tile);
     write(gpu, frame_, frame);
+    sets_.reset();
     const vk::Extent2D area{std::uint32_t(tile.width), std::uint32_t(tile.height)};
     draw_background(gpu, area);
     draw_splats(gpu, area, order);

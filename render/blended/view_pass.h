@@ -16,18 +16,13 @@ namespace nephos {
 
 class ViewPass {
   public:
-    ViewPass(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& attenuation,
-             const vk::raii::Sampler& sampler, const ShaderVariant& variant);
+    ViewPass(const GpuDevice& gpu, const ShaderVariant& variant);
 
-    // Tables of the physical sky; readable by shaders.
-    void use_sky(const GpuDevice& gpu, const GpuImage& tables, const vk::raii::Sampler& sampler);
-    // The map that the ground wears; in the layout GENERAL and readable by fragment shaders.
-    void use_shadow_map(const GpuDevice& gpu, const GpuImage& map, const vk::raii::Sampler& sampler);
-
-    // The air between the clouds, in front of what `order` has; for a pass made for shells.
+    // Sets what later draws read, by the numbers in the shaders: attenuation textures (3), the shadow map of the
+    // ground (4), tables of the sky (11; any image with the gradient) and the scattering table (12).
+    void use(const Resources& resources);
+    // Sets the air between the clouds, in front of what `order` has; for a pass made for shells.
     void use_shells(const GpuDevice& gpu, const AirShells& shells, const ViewSortedSplats& order);
-    // scattering_table.h
-    void use_scattering(const GpuDevice& gpu, const GpuBuffer& table);
 
     // Draws one tile and stores its pixels in the picture.
     void draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
@@ -35,16 +30,15 @@ class ViewPass {
 
   private:
     void resize_targets(const GpuDevice& gpu, const Tile& tile);
-    void bind(const vk::raii::CommandBuffer& commands, const vk::raii::Pipeline& pipeline) const;
-    void draw_background(const GpuDevice& gpu, vk::Extent2D area) const;
+    void draw_background(const GpuDevice& gpu, vk::Extent2D area);
     void draw_splats(const GpuDevice& gpu, vk::Extent2D area, const ViewSortedSplats& order);
     void draw_batch(const GpuDevice& gpu, vk::Extent2D area, const ViewSortedSplats& order,
                     std::span<const Run> runs);
     void read_back(const GpuDevice& gpu, vk::Extent2D area) const;
 
-    const PipelineLayout* layout_;
-    vk::raii::Pipeline background_, splat_, integrated_splat_, shell_;
-    Bindings bindings_;
+    Pipeline background_, splat_, integrated_splat_, shell_;
+    DescriptorSets sets_;
+    Resources resources_;
     GpuBuffer frame_, balls_, radiance_pixels_, depth_pixels_;
     GpuImage radiance_, depth_;
     BillboardPass billboards_;

@@ -13,11 +13,12 @@
 #include "render/cloud/splats.h"
 #include "render/image/picture.h"
 #include "render/options/options.h"
+#include "render/shared/march.h"
 
 namespace nephos {
 
 // Depths of more are all alike: nothing arrives.
-inline constexpr float kMostMarchedDepth = 64;
+inline constexpr float kMostMarchedDepth = shader::kMostMarchedDepth;
 
 struct CloudVolume {
     explicit CloudVolume(const DetailedVoxels& voxels);

@@ -20,23 +20,19 @@
 #include <hwy/highway.h>
 
 #include "density/detail-inl.h"
-#include "render/cpu/marched_scene.h"
+#include "render/frame/marched_scene.h"
 #include "render/cpu/screen_ball-inl.h"
 #include "render/cpu/tile_air-inl.h"
 #include "render/cpu/view_scene.h"
 #include "render/shading/background-inl.h"
 #include "render/shading/scattering-inl.h"
 #include "render/shading/shells-inl.h"
+#include "render/shared/march.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
 using Mask = hn::Mask<Lanes>;
-
-inline constexpr float kEventOpacity = 0.12f;         // of a point that is shaded
-inline constexpr float kMarchOpaque = 1.0f / 256.0f;  // transmittance at which a ray ends
-inline constexpr float kLeastStep_m = 2, kStepPixels = 1.2f, kLongestStep_m = 30;
-inline constexpr float kStepGrowth = 4;  // of steps behind opaque cloud
 
 // A place in the bricks of a volume.
 struct BrickPlace {
@@ -170,18 +166,20 @@ HWY_INLINE Floats3 marched_radiance(const ViewScene& scene, const MarchedVolume&
     const Floats3 point = times(distance, ray), corner{set(volume.corner[0]), set(volume.corner[1]),
                                                        set(volume.corner[2])};
     const Floats3 offset = subtract(point, corner), to_sun = set3(frame.to_sun);
-    constexpr float kTap_m[] = {3, 10, 22}, kTapLength_m[] = {6.5f, 9.5f, 17}, kTapsEnd_m = 30.5f;
+    constexpr float kTap_m[] = {shader::kTap0_m, shader::kTap1_m, shader::kTap2_m},
+                    kTapLength_m[] = {shader::kTap0Length_m, shader::kTap1Length_m, shader::kTap2Length_m};
     Floats own = zero;
     for (std::size_t tap = 0; tap < 3; ++tap) {
         const Floats extinction =
             density_at(volume, times_add(set(kTap_m[tap]), to_sun, offset), footprint, asked).density;
         own = hn::MulAdd(set(kTapLength_m[tap] * volume.kernel.extinction_per_m), extinction, own);
     }
-    BrickPlace beyond = brick_place(volume, times_add(set(kTapsEnd_m), to_sun, offset));
+    BrickPlace beyond = brick_place(volume, times_add(set(shader::kTapsEnd_m), to_sun, offset));
     const Floats far = hn::IfThenElseZero(beyond.within, sun_depth_at(volume, beyond));
     const Floats sun_depth = hn::Add(own, far);
     const Surroundings seen = surroundings_at(volume, brick_place(volume, offset));
-    const Floats fold = hn::MulAdd(set(0.55f), fast_exp(hn::Mul(own, set(-0.5f))), set(0.45f));
+    const Floats fold = hn::MulAdd(
+        set(shader::kFoldShare), fast_exp(hn::Mul(own, set(-shader::kFoldDecay))), set(1 - shader::kFoldShare));
 
     const Floats albedo = set(frame.ambient_top.w);
     const Floats3 sunlight = sunlight_at(frame, point.z);
@@ -271,9 +269,9 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
     const hn::RebindToSigned<Lanes> di;
     const Floats zero = hn::Zero(d), one = set(1.0f);
     const Floats footprint = hn::Mul(distance, set(march.per_unit));
-    const Floats finest = hn::Max(set(kLeastStep_m), hn::Mul(set(kStepPixels), footprint));
-    const Floats least_step = hn::Mul(finest, hn::MulAdd(hn::Sub(one, transmittance), set(kStepGrowth), one));
-    MarchSample sample{zero, one, set(1.0e9f), zero, hn::Lt(one, zero)};
+    const Floats finest = hn::Max(set(shader::kLeastStep_m), hn::Mul(set(shader::kStepPixels), footprint));
+    const Floats least_step = hn::Mul(finest, hn::MulAdd(hn::Sub(one, transmittance), set(shader::kStepGrowth), one));
+    MarchSample sample{zero, one, set(shader::kFarAway_m), zero, hn::Lt(one, zero)};
     for (std::size_t v = 0; v < march.volumes.size(); ++v) {
         const MarchedVolume& volume = march.volumes[v];
         const Floats3 corner{set(volume.corner[0]), set(volume.corner[1]), set(volume.corner[2])};
@@ -281,8 +279,8 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
         const BrickPlace place = brick_place(volume, offset);
         const Mask before = hn::Lt(distance, parts[v].begin);
         // At the faces of the box rounding decides what is inside: there rays go on by a metre.
-        const Floats beside = hn::IfThenElse(hn::Lt(distance, parts[v].end), one, set(1.0e9f));
-        Floats step = hn::IfThenElse(before, hn::Add(hn::Sub(parts[v].begin, distance), set(0.01f)), beside);
+        const Floats beside = hn::IfThenElse(hn::Lt(distance, parts[v].end), one, set(shader::kFarAway_m));
+        Floats step = hn::IfThenElse(before, hn::Add(hn::Sub(parts[v].begin, distance), set(shader::kBeyondFace_m)), beside);
         const Mask within = hn::And(place.within, active);
         const Mask holds = hn::And(within, hn::RebindMask(d, hn::Gt(place.number, hn::Set(di, -1))));
         // Cells of the brick, and how far away the next with cloud is.
@@ -307,19 +305,19 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
         const Floats out = hn::Min(way_out(place.brick.x, cell.x, offset.x, per_ray.x),
                                    hn::Min(way_out(place.brick.y, cell.y, offset.y, per_ray.y),
                                            way_out(place.brick.z, cell.z, offset.z, per_ray.z)));
-        step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), set(0.01f)), step);
+        step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), set(shader::kBeyondFace_m)), step);
         if (!hn::AllFalse(d, sampled)) {
             const auto number = hn::Max(place.number, hn::Zero(di));
             const erosion::Node node =
                 erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z);
-            const erosion::Eroded found = erosion::eroded(volume.kernel, node, offset.x, offset.y, offset.z,
-                                                          hn::Max(footprint, set(0.05f)), sampled);
+            const erosion::Eroded found = erosion::eroded<true>(volume.kernel, node, offset.x, offset.y, offset.z,
+                                                          hn::Max(footprint, set(shader::kLeastFootprint_m)), sampled);
             const Floats extinction = hn::Mul(found.density, set(volume.kernel.extinction_per_m));
             sample.extinction = hn::Add(sample.extinction, extinction);
             sample.which = hn::IfThenElse(hn::Gt(extinction, zero), set(float(v)), sample.which);
             sample.margin = hn::IfThenElse(sampled, hn::Min(sample.margin, found.margin), sample.margin);
             const Floats towards = hn::Min(hn::Max(hn::Mul(found.margin, set(volume.reach)), least_step),
-                                           hn::Max(set(kLongestStep_m), least_step));
+                                           hn::Max(set(shader::kLongestStep_m), least_step));
             step = hn::IfThenElse(sampled, towards, step);
             sample.near = hn::Or(sample.near, sampled);
         }
@@ -344,19 +342,17 @@ inline void begin_march(const MarchedScene& march, const TileRays& rays, MarchSt
     state.begun = true;
 }
 
-inline constexpr std::size_t kMostVolumes = 16;
-
 // Marches one vector of rays up to a distance. Returns true while there is more to march.
 HWY_INLINE bool march_vector(const ViewScene& scene, const TileRays& rays, std::size_t at, float limit_m,
                              MarchQueue* queues, MarchState& state, TileSums& sums) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
     const MarchedScene& march = *scene.march;
-    const Floats zero = hn::Zero(d), one = set(1.0f), opaque = set(kMarchOpaque);
+    const Floats zero = hn::Zero(d), one = set(1.0f), opaque = set(shader::kMarchOpaque);
     Floats distance = hn::Load(d, state.distance + at), left = hn::Load(d, sums.transmittance + at);
     const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
     const Floats3 per_ray{inverse(ray.x), inverse(ray.y), inverse(ray.z)};
-    BoxPart parts[kMostVolumes];
+    BoxPart parts[shader::kMostVolumes];
     Floats end = zero;
     for (std::size_t v = 0; v < march.volumes.size(); ++v) {
         parts[v] = part_in_box(march.volumes[v], per_ray);
@@ -395,11 +391,11 @@ HWY_INLINE bool march_vector(const ViewScene& scene, const TileRays& rays, std::
         // The step before counts as cloud; where it came from outside, only from the surface on: where the margin
         // of the two samples passes zero, or about one fine step where empty space was skipped.
         const Floats finest =
-            hn::Max(set(kLeastStep_m), hn::Mul(set(kStepPixels * march.per_unit), distance));
-        const Floats inside = hn::Div(hn::Neg(now.margin), hn::Max(hn::Sub(margin, now.margin), set(1.0e-4f)));
+            hn::Max(set(shader::kLeastStep_m), hn::Mul(set(shader::kStepPixels * march.per_unit), distance));
+        const Floats inside = hn::Div(hn::Neg(now.margin), hn::Max(hn::Sub(margin, now.margin), set(shader::kLeastMargin)));
         const Floats behind = hn::IfThenElse(
-            hn::Lt(margin, zero), hn::Mul(set(1.5f), finest),
-            hn::MulAdd(way, hn::Max(hn::Min(inside, one), zero), hn::Mul(set(0.3f), finest)));
+            hn::Lt(margin, zero), hn::Mul(set(shader::kSkippedSteps), finest),
+            hn::MulAdd(way, hn::Max(hn::Min(inside, one), zero), hn::Mul(set(shader::kSurfaceSteps), finest)));
         const Floats length = hn::IfThenElse(hn::Gt(extinction, zero), way, hn::Min(way, behind));
         const Floats depth = hn::Mul(hn::Mul(set(0.5f), hn::Add(found, extinction)), length);
         const Floats opacity = hn::IfThenElseZero(active, hn::Sub(one, fast_exp(hn::Neg(depth))));
@@ -411,13 +407,15 @@ HWY_INLINE bool march_vector(const ViewScene& scene, const TileRays& rays, std::
         weight = hn::Add(weight, seen);
         weighted = hn::MulAdd(seen, hn::NegMulAdd(set(0.5f), length, distance), weighted);
         which = hn::IfThenElse(hn::Gt(found, zero), now.which, which);
-        const Mask leaves = hn::And(hn::Gt(weight, set(0.004f)), hn::Le(found, zero));
-        const Mask full = hn::And(active, hn::Or(hn::Gt(weight, set(kEventOpacity)), hn::Or(leaves, ends)));
+        const Mask leaves = hn::And(hn::Gt(weight, set(shader::kLeavingOpacity)), hn::Le(found, zero));
+        const Mask full = hn::And(active, hn::Or(hn::Gt(weight, set(shader::kEventOpacity)), hn::Or(leaves, ends)));
         if (!hn::AllFalse(d, full)) enqueue(full);
         extinction = hn::IfThenElse(active, found, extinction);
         margin = hn::IfThenElse(active, hn::IfThenElse(now.near, now.margin, set(-1.0f)), margin);
         way = hn::IfThenElse(active, now.step, way);
-        distance = hn::IfThenElse(active, hn::Add(distance, now.step), distance);
+        const Floats next =
+            hn::Max(hn::Add(distance, now.step), hn::Mul(distance, set(shader::kLeastAdvance)));
+        distance = hn::IfThenElse(active, next, distance);
         active = hn::And(active, hn::And(hn::Lt(distance, stop), hn::Gt(left, opaque)));
     }
     const Mask rest = hn::Gt(weight, zero);
@@ -437,7 +435,7 @@ inline void march_to(const ViewScene& scene, const TileRays& rays, float limit_m
                      TileSums& sums) {
     if (state.done) return;
     if (!state.begun) begin_march(*scene.march, rays, state);
-    MarchQueue queues[kMostVolumes];
+    MarchQueue queues[shader::kMostVolumes];
     bool more = false;
     for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(Lanes()))
         more = march_vector(scene, rays, at, limit_m, queues, state, sums) || more;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Step 2 of D on the processor: what view_tiles.h has in compute shaders, in vectors of 4 to 16 lanes
+// Step 2 of D on the processor: what binned_view.h has in compute shaders, in vectors of 4 to 16 lanes
 // (Highway, chosen at run time), tiles in parallel. The test reference of the compute shaders, and what draws
 // where there is no graphics card. The result does not depend on the number of threads. Private to the
 // module.
@@ -12,7 +12,7 @@
 
 #include "render/cloud/stage_times.h"
 #include "render/cpu/billboard_texels.h"
-#include "render/cpu/marched_scene.h"
+#include "render/frame/marched_scene.h"
 #include "render/cpu/screen_ball.h"
 #include "render/frame/air_shells.h"
 #include "render/frame/frame_data.h"

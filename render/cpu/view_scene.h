@@ -10,7 +10,7 @@
 #include <span>
 
 #include "render/cpu/billboard_texels.h"
-#include "render/cpu/marched_scene.h"
+#include "render/frame/marched_scene.h"
 #include "render/cpu/screen_ball.h"
 #include "render/frame/frame_data.h"
 #include "render/shared/shared.h"

@@ -8,12 +8,13 @@
 #include <vector>
 
 #include "render/cloud/splats.h"
+#include "render/shared/shared.h"
 
 namespace nephos {
 
 inline constexpr int kBillboardKinds = 3;
 inline constexpr int kBillboardVariants = 4;  // layers of a kind; layer = kind * kBillboardVariants + variant
-inline constexpr int kBillboardTexels = 128;  // on each side of the finest level; a power of two
+inline constexpr int kBillboardTexels = int(shader::kBillboardTexels);
 inline constexpr int kBillboardLevels = 5;    // 128 .. 8 texels: a coarser one would consist of its rim
 
 // One mip level of all layers: texel (i, j) of layer l is the pair at 2 * ((l * side + j) * side + i), row 0

@@ -79,10 +79,8 @@ shader::TileStep step_over(const TileGrid& grid) {
             .first_batch = 1,
             .last_batch = 1,
             .largest_radius = 0,
-            .first = 0,
-            .end = 0,
-            .distances = 0,
-            .listed = 0};
+            .part = 0,
+            .distances = 0};
 }
 
 PixelBox tiles_of(const PixelBox& box, const TileGrid& grid) {

@@ -17,6 +17,7 @@
 #include "core/vec.h"
 #include "render/frame/billboard_textures.h"
 #include "render/shared/half_floats.h"
+#include "render/shared/march.h"
 
 namespace nephos {
 namespace {
@@ -143,7 +144,7 @@ class Collector {
 
     // Weight of the ball with an index in `visible`, beside what is marched in its place.
     float weight_of(std::uint32_t index, double distance) const {
-        return marched_ && cloud_.is_detailed(index) ? splatted_weight(float(distance / pixels_per_unit_)) : 1.0f;
+        return marched_ && cloud_.is_detailed(index) ? shader::splatted_weight(float(distance / pixels_per_unit_)) : 1.0f;
     }
 
     bool is_ball(std::uint32_t index) const { return index < cloud_.visible.size(); }

@@ -7,7 +7,6 @@
 // The order is total: equal distances are ordered by index, billboards before metaballs, so images do not
 // depend on the sort algorithm.
 
-#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -51,19 +50,10 @@ struct MetaballLight {
 
 // Culls splats to the view and sorts them; metaballs are without light. `pixels_per_unit` is the size in
 // pixels of a unit at distance 1. If clouds with detail are `marched`, metaballs that stand for them are only where
-// they take over (splatted_weight()). Throws Error(usage) naming the first billboard or cloud with a field out of
+// they take over (shader::splatted_weight()). Throws Error(usage) naming the first billboard or cloud with a field out of
 // the range in splats.h.
 ViewSortedSplats sort_for_view(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
                                double pixels_per_unit, const Ground& ground, bool marched = false);
-
-// Between these footprints of a pixel, metres, metaballs take over from rays that march through detail.
-inline constexpr float kMarchedFootprint_m = 15, kSplattedFootprint_m = 25;
-// Returns the weight of metaballs whose pixels have a footprint: 0 to 1, without a step.
-inline float splatted_weight(float footprint_m) {
-    const float part = std::clamp(
-        (footprint_m - kMarchedFootprint_m) / (kSplattedFootprint_m - kMarchedFootprint_m), 0.0f, 1.0f);
-    return part * part * (3 - 2 * part);
-}
 
 // Sets the light of the metaballs of an order.
 void set_light(ViewSortedSplats& order, const MetaballLight& light);

@@ -73,18 +73,17 @@ GpuImage upload_billboard_textures(const GpuDevice& gpu) {
     return image;
 }
 
-ShellBuffers::ShellBuffers(const GpuDevice& gpu, const Bindings& bindings)
+ShellBuffers::ShellBuffers(const GpuDevice& gpu)
     : shells_(create_buffer(gpu, sizeof(shader::Shells), vk::BufferUsageFlagBits::eUniformBuffer,
                             HostAccess::write)) {
-    bind_buffer(gpu, bindings, 13, shells_);
-    use(gpu, bindings, {});
+    use(gpu, {});
 }
 
-void ShellBuffers::use(const GpuDevice& gpu, const Bindings& bindings, const AirShells& shells) {
+void ShellBuffers::use(const GpuDevice& gpu, const AirShells& shells) {
     write(gpu, shells_, shells.data);
     if (shade_.bytes != 0 && shells.serial == serial_) return;
     serial_ = shells.serial;
-    upload(gpu, bindings, 14, shade_, std::as_bytes(shells.shade));
+    upload(gpu, shade_, std::as_bytes(shells.shade));
 }
 
 }  // namespace nephos

@@ -31,14 +31,16 @@ class SkyImage {
 // Uploads the textures of billboard_textures.h with all levels, readable by shaders.
 GpuImage upload_billboard_textures(const GpuDevice& gpu);
 
-// The shells of air: bindings 13 and 14.
+// The shells of air: bindings 13 and 14 of shells.glsl.
 class ShellBuffers {
   public:
-    // Binds both, still without shells: descriptors must be bound, used or not.
-    ShellBuffers(const GpuDevice& gpu, const Bindings& bindings);
+    // Buffers without shells: descriptors must be there, used or not.
+    explicit ShellBuffers(const GpuDevice& gpu);
 
-    // Sets the data that shaders read in later draws.
-    void use(const GpuDevice& gpu, const Bindings& bindings, const AirShells& shells);
+    // Sets the data that shaders read in later draws; shade() may then be another buffer.
+    void use(const GpuDevice& gpu, const AirShells& shells);
+    const GpuBuffer& shells() const { return shells_; }
+    const GpuBuffer& shade() const { return shade_; }
 
   private:
     GpuBuffer shells_, shade_;

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "core/error.h"
+#include "render/shared/order.h"
 
 namespace nephos {
 namespace {
@@ -114,6 +115,13 @@ std::string missing_abilities(const vk::raii::PhysicalDevice& physical) {
     if ((v11.subgroupSupportedOperations & needed) != needed ||
         !(v11.subgroupSupportedStages & vk::ShaderStageFlagBits::eCompute))
         return "votes and ballots of subgroups in compute shaders";
+    const vk::PhysicalDeviceLimits limits = physical.getProperties().limits;
+    if (limits.maxComputeWorkGroupInvocations < shader::kSortGroup ||
+        limits.maxComputeWorkGroupSize[0] < shader::kSortGroup)
+        return "work groups of " + std::to_string(shader::kSortGroup);
+    if (limits.maxPerStageDescriptorStorageBuffers < kMostStorageBuffers ||
+        limits.maxDescriptorSetStorageBuffers < kMostStorageBuffers)
+        return std::to_string(kMostStorageBuffers) + " storage buffers in a shader";
     return {};
 }
 
@@ -144,22 +152,22 @@ std::string name_of(const vk::raii::PhysicalDevice& physical) {
     return std::string(physical.getProperties().deviceName.data());
 }
 
-// True when `wanted` is the device's number or, unless it is a number, a part of its name.
-bool is_named(const std::string& wanted, std::size_t number, const std::string& name) {
-    if (wanted.find_first_not_of("0123456789") == std::string::npos) return wanted == std::to_string(number);
-    return name.find(wanted) != std::string::npos;
+// True when `requested` is the device's number or, unless it is a number, a part of its name.
+bool is_named(const std::string& requested, std::size_t number, const std::string& name) {
+    if (requested.find_first_not_of("0123456789") == std::string::npos) return requested == std::to_string(number);
+    return name.find(requested) != std::string::npos;
 }
 
 vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevice>& devices,
-                                       const std::string& wanted) {
+                                       const std::string& requested) {
     if (devices.empty()) fail_without_driver();
 
     const vk::raii::PhysicalDevice* best = nullptr;
-    bool named = wanted.empty();
+    bool named = requested.empty();
     std::string reasons;
     for (std::size_t i = 0; i < devices.size(); ++i) {
         const std::string name = name_of(devices[i]);
-        if (!wanted.empty() && !is_named(wanted, i, name)) continue;
+        if (!requested.empty() && !is_named(requested, i, name)) continue;
         named = true;
         const std::string missing = find_queue_family(devices[i]) ? missing_abilities(devices[i])
                                                                   : "a queue for graphics and compute";
@@ -174,7 +182,7 @@ vk::raii::PhysicalDevice choose_device(const std::vector<vk::raii::PhysicalDevic
         std::string known;
         for (std::size_t i = 0; i < devices.size(); ++i)
             known += (i == 0 ? "" : ", ") + std::to_string(i) + " = " + name_of(devices[i]);
-        throw Error(ErrorCode::usage, "no Vulkan device \"" + wanted + "\"; there is " + known);
+        throw Error(ErrorCode::usage, "no Vulkan device \"" + requested + "\"; there is " + known);
     }
     if (best == nullptr) throw Error(ErrorCode::gpu, "no usable Vulkan device" + reasons + "; " + kInstall);
     return *best;

@@ -18,6 +18,9 @@
 
 namespace nephos {
 
+// Storage buffers that a shader reads and writes at most.
+inline constexpr std::uint32_t kMostStorageBuffers = 14;
+
 // Messages of the validation layer, from any thread.
 struct ValidationLog {
     mutable std::mutex mutex;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <initializer_list>
 #include <vector>
 
 #include "render/shared/shared.h"
@@ -20,6 +22,9 @@ namespace spirv {
 #include "shell_frag.h"
 #include "shell_vert.h"
 #include "view_finish_comp.h"
+#include "march_finish_comp.h"
+#include "march_shells_comp.h"
+#include "march_tiles_comp.h"
 #include "view_project_comp.h"
 #include "view_shells_comp.h"
 #include "view_splat_frag.h"
@@ -31,21 +36,39 @@ vk::raii::ShaderModule create_module(const GpuDevice& gpu, ShaderCode code) {
     return {gpu.device, vk::ShaderModuleCreateInfo({}, code.size_bytes(), code.data())};
 }
 
-// A variant as specialization constants; constants that a shader does not have are ignored.
-struct VariantConstants {
-    std::array<vk::Bool32, 5> values;
-    std::array<vk::SpecializationMapEntry, 5> entries{vk::SpecializationMapEntry(0, 0, sizeof(vk::Bool32)),
-                                                      vk::SpecializationMapEntry(5, 4, sizeof(vk::Bool32)),
-                                                      vk::SpecializationMapEntry(6, 8, sizeof(vk::Bool32)),
-                                                      vk::SpecializationMapEntry(7, 12, sizeof(vk::Bool32)),
-                                                      vk::SpecializationMapEntry(8, 16, sizeof(vk::Bool32))};
-    explicit VariantConstants(const ShaderVariant& variant)
-        : values{vk::Bool32(variant.exact), vk::Bool32(variant.physical_sky), vk::Bool32(variant.shells),
-                 vk::Bool32(variant.fog), vk::Bool32(variant.billboards)} {}
-    vk::SpecializationInfo info() const {
-        return {std::uint32_t(entries.size()), entries.data(), sizeof values, values.data()};
+// Constants in the form of Vulkan; made from a list that outlives it.
+struct Specialization {
+    std::vector<vk::SpecializationMapEntry> entries;
+    vk::SpecializationInfo info;
+
+    explicit Specialization(std::span<const ShaderConstant> constants) {
+        static_assert(sizeof(ShaderConstant) == 8);
+        for (const ShaderConstant& each : constants) {
+            const auto at = std::uint32_t(entries.size() * sizeof(ShaderConstant));
+            entries.emplace_back(each.id, at + std::uint32_t(offsetof(ShaderConstant, value)), 4);
+        }
+        info = {std::uint32_t(entries.size()), entries.data(), constants.size_bytes(), constants.data()};
     }
 };
+
+// The bindings and layouts of a pipeline for these shaders; its stages are still to be made.
+Pipeline create_layouts(const GpuDevice& gpu, std::initializer_list<ShaderCode> codes,
+                        vk::ShaderStageFlags stages) {
+    Pipeline result;
+    for (const ShaderCode code : codes)
+        for (const ShaderBinding& binding : bindings_of(code))
+            if (std::ranges::find(result.bindings, binding) == result.bindings.end())
+                result.bindings.push_back(binding);
+    std::vector<vk::DescriptorSetLayoutBinding> bindings;
+    for (const auto& [number, type] : result.bindings) bindings.emplace_back(number, type, 1, stages);
+    result.set_layout =
+        vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
+    vk::PipelineLayoutCreateInfo info({}, *result.set_layout);
+    const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0, kPushBytes);
+    if (stages & vk::ShaderStageFlagBits::eCompute) info.setPushConstantRanges(constants);
+    result.layout = vk::raii::PipelineLayout(gpu.device, info);
+    return result;
+}
 
 vk::PipelineColorBlendAttachmentState blend_state(Blend blend) {
     using Factor = vk::BlendFactor;
@@ -60,31 +83,6 @@ vk::PipelineColorBlendAttachmentState blend_state(Blend blend) {
     return state;
 }
 
-// The layout of gpu_pipeline.h, each binding at its number.
-auto layout_bindings() {
-    using Type = vk::DescriptorType;
-    using Stage = vk::ShaderStageFlagBits;
-    const vk::ShaderStageFlags all = Stage::eVertex | Stage::eFragment | Stage::eCompute;
-    return std::array{
-        vk::DescriptorSetLayoutBinding(0, Type::eUniformBuffer, 1, all),
-        vk::DescriptorSetLayoutBinding(1, Type::eStorageBuffer, 1, all),
-        vk::DescriptorSetLayoutBinding(2, Type::eStorageBuffer, 1, all),
-        vk::DescriptorSetLayoutBinding(3, Type::eCombinedImageSampler, 1, all),
-        vk::DescriptorSetLayoutBinding(4, Type::eCombinedImageSampler, 1, all),
-        vk::DescriptorSetLayoutBinding(5, Type::eStorageBuffer, 1, Stage::eCompute),
-        vk::DescriptorSetLayoutBinding(6, Type::eStorageBuffer, 1, Stage::eCompute),
-        vk::DescriptorSetLayoutBinding(7, Type::eStorageBuffer, 1, Stage::eCompute),
-        vk::DescriptorSetLayoutBinding(8, Type::eStorageBuffer, 1, Stage::eCompute),
-        vk::DescriptorSetLayoutBinding(9, Type::eStorageBuffer, 1, Stage::eCompute),
-        vk::DescriptorSetLayoutBinding(10, Type::eStorageImage, 1, Stage::eCompute),
-        vk::DescriptorSetLayoutBinding(11, Type::eCombinedImageSampler, 1, all),
-        vk::DescriptorSetLayoutBinding(12, Type::eStorageBuffer, 1, all),
-        vk::DescriptorSetLayoutBinding(13, Type::eUniformBuffer, 1, all),
-        vk::DescriptorSetLayoutBinding(14, Type::eStorageBuffer, 1, all),
-        vk::DescriptorSetLayoutBinding(15, Type::eStorageBuffer, 1, Stage::eCompute),
-    };
-}
-
 }  // namespace
 
 const ShaderSet& shaders() {
@@ -92,32 +90,31 @@ const ShaderSet& shaders() {
         spirv::light_map_comp,   spirv::light_centres_comp, spirv::view_project_comp, spirv::view_tiles_comp,
         spirv::view_finish_comp, spirv::background_vert,    spirv::background_frag,   spirv::view_splat_vert,
         spirv::view_splat_frag,  spirv::billboard_vert,     spirv::billboard_frag,    spirv::view_shells_comp,
-        spirv::shell_vert,       spirv::shell_frag};
+        spirv::shell_vert,       spirv::shell_frag,          spirv::march_tiles_comp,  spirv::march_shells_comp,
+        spirv::march_finish_comp};
     return kShaders;
 }
 
-PipelineLayout create_pipeline_layout(const GpuDevice& gpu) {
-    const std::array bindings = layout_bindings();
-    PipelineLayout result;
-    result.set = vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
-    const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0, sizeof(shader::TileStep));
-    result.layout =
-        vk::raii::PipelineLayout(gpu.device, vk::PipelineLayoutCreateInfo({}, *result.set, constants));
-    return result;
+std::vector<ShaderConstant> constants_of(const ShaderVariant& variant) {
+    return {{0, variant.exact},
+            {5, variant.physical_sky},
+            {6, variant.shells},
+            {7, variant.fog},
+            {8, variant.billboards}};
 }
 
-vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
-                                            ShaderCode vertex, ShaderCode fragment,
-                                            std::span<const vk::Format> attachments, Blend blend,
-                                            ShaderVariant variant, std::size_t written) {
+Pipeline create_graphics_pipeline(const GpuDevice& gpu, ShaderCode vertex, ShaderCode fragment,
+                                  std::span<const vk::Format> attachments, Blend blend,
+                                  const ShaderVariant& variant, std::size_t written) {
+    using Stage = vk::ShaderStageFlagBits;
+    Pipeline result = create_layouts(gpu, {vertex, fragment}, Stage::eVertex | Stage::eFragment);
     const vk::raii::ShaderModule vertex_module = create_module(gpu, vertex);
     const vk::raii::ShaderModule fragment_module = create_module(gpu, fragment);
-    const VariantConstants values(variant);
-    const vk::SpecializationInfo constants = values.info();
-    const std::array stages{vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eVertex,
-                                                              *vertex_module, "main", &constants),
-                            vk::PipelineShaderStageCreateInfo({}, vk::ShaderStageFlagBits::eFragment,
-                                                              *fragment_module, "main", &constants)};
+    const std::vector<ShaderConstant> values = constants_of(variant);
+    const Specialization constants(values);
+    const std::array stages{
+        vk::PipelineShaderStageCreateInfo({}, Stage::eVertex, *vertex_module, "main", &constants.info),
+        vk::PipelineShaderStageCreateInfo({}, Stage::eFragment, *fragment_module, "main", &constants.info)};
     const vk::PipelineVertexInputStateCreateInfo no_vertices;
     const vk::PipelineInputAssemblyStateCreateInfo triangles({}, vk::PrimitiveTopology::eTriangleList);
     const vk::PipelineViewportStateCreateInfo viewport({}, 1, nullptr, 1, nullptr);
@@ -137,52 +134,76 @@ vk::raii::Pipeline create_graphics_pipeline(const GpuDevice& gpu, const Pipeline
     vk::GraphicsPipelineCreateInfo info;
     info.setStages(stages).setPVertexInputState(&no_vertices).setPInputAssemblyState(&triangles);
     info.setPViewportState(&viewport).setPRasterizationState(&raster).setPMultisampleState(&single_sample);
-    info.setPColorBlendState(&blending).setPDynamicState(&dynamic).setLayout(*layout.layout);
+    info.setPColorBlendState(&blending).setPDynamicState(&dynamic).setLayout(*result.layout);
     info.pNext = &rendering;
-    return {gpu.device, nullptr, info};
+    result.pipeline = vk::raii::Pipeline(gpu.device, nullptr, info);
+    return result;
 }
 
-vk::raii::Pipeline create_compute_pipeline(const GpuDevice& gpu, const PipelineLayout& layout,
-                                           ShaderCode code, ShaderVariant variant) {
-    const vk::raii::ShaderModule module = create_module(gpu, code);
-    const VariantConstants values(variant);
-    const vk::SpecializationInfo constants = values.info();
-    const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main",
-                                                  &constants);
-    return {gpu.device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *layout.layout)};
-}
+namespace {
 
-vk::raii::Pipeline create_tile_pipeline(const GpuDevice& gpu, const PipelineLayout& layout, ShaderCode code,
-                                        std::array<bool, 2> switches, ShaderVariant variant) {
+// `subgroup_size`: 0: as the device chooses.
+Pipeline create_compute(const GpuDevice& gpu, ShaderCode code, std::span<const ShaderConstant> values,
+                        std::uint32_t subgroup_size) {
+    Pipeline result = create_layouts(gpu, {code}, vk::ShaderStageFlagBits::eCompute);
     const vk::raii::ShaderModule module = create_module(gpu, code);
-    // Lanes, rows of a lane, whether lanes hand splats round, the switches, sky, shells and billboards.
-    const std::uint32_t lanes = gpu.tile_lanes;
-    const std::array<std::uint32_t, 9> values{lanes,
-                                              shader::kTileWidth * shader::kTileHeight / lanes,
-                                              std::uint32_t(gpu.tiles_are_subgroups),
-                                              std::uint32_t(switches[0]),
-                                              std::uint32_t(switches[1]),
-                                              std::uint32_t(variant.physical_sky),
-                                              std::uint32_t(variant.shells),
-                                              std::uint32_t(variant.fog),
-                                              std::uint32_t(variant.billboards)};
-    std::array<vk::SpecializationMapEntry, values.size()> entries;
-    for (std::uint32_t i = 0; i < entries.size(); ++i) entries[i] = vk::SpecializationMapEntry(i, 4 * i, 4);
-    const vk::SpecializationInfo constants(entries.size(), entries.data(), sizeof values, values.data());
-    vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo subgroup(lanes);
+    const Specialization constants(values);
+    const vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo subgroup(subgroup_size);
     vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main",
-                                            &constants);
-    if (gpu.tiles_are_subgroups && gpu.subgroup_size_varies) stage.pNext = &subgroup;
-    return {gpu.device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *layout.layout)};
+                                            &constants.info);
+    if (subgroup_size != 0) stage.pNext = &subgroup;
+    result.pipeline = vk::raii::Pipeline(gpu.device, nullptr,
+                                         vk::ComputePipelineCreateInfo({}, stage, *result.layout));
+    return result;
 }
 
-void begin_compute(const vk::raii::CommandBuffer& commands, const PipelineLayout& layout,
-                   const Bindings& bindings, const vk::raii::Pipeline& pipeline,
-                   const shader::TileStep& step) {
-    constexpr auto kPoint = vk::PipelineBindPoint::eCompute;
-    commands.bindPipeline(kPoint, *pipeline);
-    commands.bindDescriptorSets(kPoint, *layout.layout, 0, bindings.set, {});
-    commands.pushConstants<shader::TileStep>(*layout.layout, vk::ShaderStageFlagBits::eCompute, 0, step);
+}  // namespace
+
+Pipeline create_compute_pipeline(const GpuDevice& gpu, ShaderCode code,
+                                 std::span<const ShaderConstant> constants) {
+    return create_compute(gpu, code, constants, 0);
+}
+
+Pipeline create_tile_pipeline(const GpuDevice& gpu, ShaderCode code, std::array<bool, 2> switches,
+                              const ShaderVariant& variant) {
+    const std::uint32_t lanes = gpu.tile_lanes;
+    std::vector<ShaderConstant> constants{{0, lanes},
+                                          {1, shader::kTileWidth * shader::kTileHeight / lanes},
+                                          {2, gpu.tiles_are_subgroups},
+                                          {3, switches[0]},
+                                          {4, switches[1]}};
+    for (const ShaderConstant& each : constants_of(variant))
+        if (each.id > 4) constants.push_back(each);
+    return create_compute(gpu, code, constants,
+                          gpu.tiles_are_subgroups && gpu.subgroup_size_varies ? lanes : 0);
+}
+
+Pipeline create_pixel_pipeline(const GpuDevice& gpu, ShaderCode code, bool distances,
+                               const ShaderVariant& variant) {
+    std::vector<ShaderConstant> constants{
+        {0, shader::kTileWidth * shader::kTileHeight}, {1, 1}, {2, false}, {4, distances}};
+    for (const ShaderConstant& each : constants_of(variant))
+        if (each.id > 4) constants.push_back(each);
+    return create_compute(gpu, code, constants, 0);
+}
+
+void reserve(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes, HostAccess access) {
+    if (buffer.bytes >= std::max<std::size_t>(bytes, 1)) return;
+    buffer = {};  // the old one goes before the new one comes
+    buffer = create_buffer(gpu, bytes + bytes / 4 + 256,
+                           vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc,
+                           access);
+}
+
+void upload(const GpuDevice& gpu, GpuBuffer& buffer, std::span<const std::byte> bytes) {
+    reserve(gpu, buffer, bytes.size(), HostAccess::write);
+    write(gpu, buffer, bytes);
+}
+
+void bind(const vk::raii::CommandBuffer& commands, vk::PipelineBindPoint point, const Pipeline& pipeline,
+          vk::DescriptorSet set) {
+    commands.bindPipeline(point, *pipeline.pipeline);
+    commands.bindDescriptorSets(point, *pipeline.layout, 0, set, {});
 }
 
 void dispatch_groups(const vk::raii::CommandBuffer& commands, std::size_t groups) {
@@ -195,64 +216,6 @@ void compute_barrier(const vk::raii::CommandBuffer& commands) {
     const vk::MemoryBarrier2 change(access::compute.stages, access::compute.kinds, access::compute.stages,
                                     access::compute.kinds);
     commands.pipelineBarrier2(vk::DependencyInfo().setMemoryBarriers(change));
-}
-
-Bindings create_bindings(const GpuDevice& gpu, const PipelineLayout& layout) {
-    std::vector<vk::DescriptorPoolSize> sizes;
-    for (const vk::DescriptorSetLayoutBinding& binding : layout_bindings())
-        sizes.emplace_back(binding.descriptorType, binding.descriptorCount);
-    Bindings bindings;
-    bindings.pool = vk::raii::DescriptorPool(gpu.device, vk::DescriptorPoolCreateInfo({}, 1, sizes));
-    // Allocated without RAII: the set goes with its pool.
-    const vk::Device device = *gpu.device;
-    const vk::DescriptorSetAllocateInfo info(*bindings.pool, *layout.set);
-    const vk::Result result =
-        device.allocateDescriptorSets(&info, &bindings.set, *gpu.device.getDispatcher());
-    if (result != vk::Result::eSuccess) fail_gpu("allocating descriptors", result);
-    return bindings;
-}
-
-void bind_buffer(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
-                 const GpuBuffer& buffer) {
-    const vk::DescriptorType type = layout_bindings()[binding].descriptorType;
-    // Buffers are made larger than what is asked for, perhaps larger than a shader may see.
-    const vk::DeviceSize seen =
-        type == vk::DescriptorType::eStorageBuffer
-            ? std::min<vk::DeviceSize>(buffer.bytes, gpu.properties.limits.maxStorageBufferRange)
-            : VK_WHOLE_SIZE;
-    const vk::DescriptorBufferInfo info(*buffer.buffer, 0, seen);
-    gpu.device.updateDescriptorSets(vk::WriteDescriptorSet(bindings.set, binding, 0, type, {}, info), {});
-}
-
-void bind_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, const GpuImage& image,
-                const vk::raii::Sampler& sampler) {
-    const vk::DescriptorImageInfo info(*sampler, *image.view, vk::ImageLayout::eGeneral);
-    gpu.device.updateDescriptorSets(
-        vk::WriteDescriptorSet(bindings.set, binding, 0, vk::DescriptorType::eCombinedImageSampler, info),
-        {});
-}
-
-void reserve(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
-             std::size_t bytes, HostAccess access) {
-    if (buffer.bytes >= std::max<std::size_t>(bytes, 1)) return;
-    buffer = {};  // the old one goes before the new one comes
-    buffer = create_buffer(gpu, bytes + bytes / 4 + 256,
-                           vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc,
-                           access);
-    bind_buffer(gpu, bindings, binding, buffer);
-}
-
-void upload(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding, GpuBuffer& buffer,
-            std::span<const std::byte> bytes) {
-    reserve(gpu, bindings, binding, buffer, bytes.size(), HostAccess::write);
-    write(gpu, buffer, bytes);
-}
-
-void bind_storage_image(const GpuDevice& gpu, const Bindings& bindings, std::uint32_t binding,
-                        const GpuImage& image) {
-    const vk::DescriptorImageInfo info({}, *image.view, vk::ImageLayout::eGeneral);
-    gpu.device.updateDescriptorSets(
-        vk::WriteDescriptorSet(bindings.set, binding, 0, vk::DescriptorType::eStorageImage, info), {});
 }
 
 vk::raii::Sampler create_sampler(const GpuDevice& gpu, vk::SamplerAddressMode beyond) {

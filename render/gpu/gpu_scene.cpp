@@ -29,7 +29,6 @@ GpuImage create_unused_image(const GpuDevice& gpu) {
 
 GpuScene::GpuScene(GpuDevice device)
     : gpu(std::move(device)),
-      layout(create_pipeline_layout(gpu)),
       clamped(create_sampler(gpu, vk::SamplerAddressMode::eClampToEdge)),
       white_beyond(create_sampler(gpu, vk::SamplerAddressMode::eClampToBorder)) {}
 
@@ -55,7 +54,7 @@ const GpuImage& GpuScene::unused() {
 }
 
 LightTiles& GpuScene::light_tiles() {
-    if (!light_tiles_) light_tiles_.emplace(gpu, layout, unused(), clamped);
+    if (!light_tiles_) light_tiles_.emplace(gpu);
     return *light_tiles_;
 }
 

@@ -22,7 +22,6 @@ class GpuScene {
     GpuScene& operator=(const GpuScene&) = delete;
 
     GpuDevice gpu;
-    PipelineLayout layout;
     vk::raii::Sampler clamped, white_beyond;  // beyond the edge: the edge's texel; white
     // Waits for frames in flight, before anything that they read is replaced. Empty: there are none.
     std::function<void()> wait_idle;
@@ -31,8 +30,7 @@ class GpuScene {
     int largest_shadow_map() const;
     std::vector<std::string> validation_messages() const;
 
-    // For bindings that no shader reads and that lavapipe (Mesa 22.3) wants to be bound. It stays where it
-    // is.
+    // For images that a variant of a shader declares and does not read. It stays where it is.
     const GpuImage& unused();
     LightTiles& light_tiles();
     const GpuImage& sky_image(const SkyLight& sky);
@@ -59,28 +57,5 @@ class GpuScene {
     Version scattering_version_ = 0;
     Version map_ = 0;  // LitCloud::light of the map in light_tiles_
 };
-
-// Passes of one kind, made when they are needed: without and with the physical sky; without shells of air,
-// with them, and with fog in them.
-template <class Pass>
-using PassVariants = std::optional<Pass>[2][3];
-
-// Returns the pass for a picture, with all that it reads bound; `image` is what its constructor takes.
-template <class Pass>
-Pass& prepared_pass(PassVariants<Pass>& passes, GpuScene& scene, const GpuImage& image,
-                    const FrameDescription& frame, const ViewSortedSplats& order, const AirShells& shells,
-                    bool billboards) {
-    const ShaderVariant variant{.physical_sky = frame.sky != nullptr,
-                                .shells = shells.any(),
-                                .fog = shells.has_fog(),
-                                .billboards = billboards};
-    auto& pass = passes[variant.physical_sky ? 1 : 0][variant.fog ? 2 : variant.shells ? 1 : 0];
-    if (!pass) pass.emplace(scene.gpu, scene.layout, image, scene.clamped, variant);
-    if (frame.sky != nullptr) pass->use_sky(scene.gpu, scene.sky_image(*frame.sky), scene.clamped);
-    pass->use_shadow_map(scene.gpu, scene.shadow_map(frame.cloud), scene.white_beyond);
-    pass->use_scattering(scene.gpu, scene.scattering(frame.table));
-    if (shells.any()) pass->use_shells(scene.gpu, shells, order);
-    return *pass;
-}
 
 }  // namespace nephos

@@ -44,17 +44,10 @@ struct LightTiles::Queries {
     }
 };
 
-LightTiles::LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
-                       const vk::raii::Sampler& sampler)
-    : layout_(&layout),
-      sampler_(&sampler),
-      map_pipeline_(create_tile_pipeline(gpu, layout, shaders().light_map_comp)),
-      centres_pipeline_(create_tile_pipeline(gpu, layout, shaders().light_centres_comp)),
-      bindings_(create_bindings(gpu, layout)),
-      listed_(create_bindings(gpu, layout)) {
-    for (const Bindings* each : {&bindings_, &listed_})
-        for (const std::uint32_t binding : {3u, 11u}) bind_image(gpu, *each, binding, unused, sampler);
-}
+LightTiles::LightTiles(const GpuDevice& gpu)
+    : map_pipeline_(create_tile_pipeline(gpu, shaders().light_map_comp)),
+      centres_pipeline_(create_tile_pipeline(gpu, shaders().light_centres_comp)),
+      sets_(gpu) {}
 
 void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
     const auto size = std::uint32_t(shadow_size);
@@ -66,11 +59,6 @@ void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
     depths_ = create_buffer(gpu, std::size_t{size} * size * sizeof(float),
                             vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc,
                             gpu.unified_memory ? HostAccess::read : HostAccess::none);
-    for (const Bindings* each : {&bindings_, &listed_}) {
-        bind_image(gpu, *each, 4, map_, *sampler_);
-        bind_storage_image(gpu, *each, 10, map_);
-        bind_buffer(gpu, *each, 8, depths_);
-    }
     submit_and_wait(
         gpu, [&](const vk::raii::CommandBuffer& commands) { begin_image(commands, map_, access::compute); });
 }
@@ -89,23 +77,28 @@ void LightTiles::use(const GpuDevice& gpu, std::span<const float> shadow, int sh
     });
 }
 
-void LightTiles::upload_bins(const GpuDevice& gpu, const TileBins& bins) {
-    upload(gpu, bindings_, 5, ranges_, std::as_bytes(std::span(bins.ranges)));
-    upload(gpu, bindings_, 6, list_, std::as_bytes(std::span(bins.list)));
+void LightTiles::record_map(const vk::raii::CommandBuffer& commands, DescriptorSets& sets,
+                            const Resources& resources, const TileGrid& grid, const Batch& batch) const {
+    shader::TileStep step = step_over(grid);
+    step.first_batch = batch.first;
+    step.last_batch = batch.last;
+    const Resources all = resources.with({{8, depths_}, {10, map_}});
+    begin_compute(commands, map_pipeline_, sets.fill(map_pipeline_, all), step);
+    image_barrier(commands, map_, access::sample, access::compute);
+    dispatch_groups(commands, grid.tiles());
+    buffer_barrier(commands, depths_, access::compute, access::host);
+    image_barrier(commands, map_, access::compute, access::sample);
 }
 
-void LightTiles::draw_map(const GpuDevice& gpu, const TileGrid& grid, bool first, bool last) {
+void LightTiles::record(const vk::raii::CommandBuffer& commands, DescriptorSets& sets,
+                        const Resources& resources, const TileGrid& grid, const Batch& batch,
+                        std::size_t items, const GpuBuffer& arguments, std::size_t offset) const {
+    record_map(commands, sets, resources, grid, batch);
     shader::TileStep step = step_over(grid);
-    step.first_batch = first;
-    step.last_batch = last;
-    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-        compute_barrier(commands);  // the batch before left its sums
-        begin_compute(commands, *layout_, bindings_, map_pipeline_, step);
-        image_barrier(commands, map_, access::sample, access::compute);
-        dispatch_groups(commands, grid.tiles());
-        buffer_barrier(commands, depths_, access::compute, access::host);
-        image_barrier(commands, map_, access::compute, access::sample);
-    });
+    step.largest_radius = batch.largest_radius;
+    step.tile_count = shader::uint(items);
+    begin_compute(commands, centres_pipeline_, sets.fill(centres_pipeline_, resources), step);
+    commands.dispatchIndirect(*arguments.buffer, offset);
 }
 
 // Adds what the splats on the device take from the light of all centres.
@@ -122,43 +115,21 @@ void LightTiles::ask(const GpuDevice& gpu, const LightSortedSplats& order, const
             items.push_back(item);
         }
         const std::span asked = std::span(queries.queries).subspan(first, end - first);
-        upload(gpu, bindings_, 1, queries_, std::as_bytes(asked));
-        upload(gpu, bindings_, 7, items_, std::as_bytes(std::span(items)));
+        upload(gpu, queries_, std::as_bytes(asked));
+        upload(gpu, items_, std::as_bytes(std::span(items)));
         shader::TileStep step = step_over(grid);
         step.tile_count = shader::uint(items.size());
-        step.first_batch = step.last_batch = 0;
         step.largest_radius = order.largest_radius;
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-            begin_compute(commands, *layout_, bindings_, centres_pipeline_, step);
+            const Resources all{{1, queries_}, {2, splats_}, {5, ranges_},
+                                {6, list_},    {7, items_},  {9, places_}};
+            begin_compute(commands, centres_pipeline_, sets_.fill(centres_pipeline_, all), step);
             dispatch_groups(commands, items.size());
             buffer_barrier(commands, queries_, access::compute, access::host);
         });
         const std::byte* const answers = read_back(gpu, queries_, asked.size_bytes(), queries_copy_);
         std::memcpy(asked.data(), answers, asked.size_bytes());
     }
-}
-
-void LightTiles::use_lists(const GpuDevice& gpu, int shadow_size, const Lists& lists) {
-    resize_map(gpu, shadow_size);
-    const std::pair<std::uint32_t, const GpuBuffer*> buffers[] = {{1, lists.queries}, {2, lists.splats},
-                                                                  {5, lists.ranges},  {6, lists.list},
-                                                                  {7, lists.items},   {9, lists.places}};
-    for (const auto& [binding, buffer] : buffers) bind_buffer(gpu, listed_, binding, *buffer);
-}
-
-void LightTiles::record_lists(const vk::raii::CommandBuffer& commands, const TileGrid& grid,
-                              float largest_radius, std::size_t items, const GpuBuffer& arguments,
-                              std::size_t offset) const {
-    shader::TileStep step = step_over(grid);
-    step.largest_radius = largest_radius;
-    begin_compute(commands, *layout_, listed_, map_pipeline_, step);
-    image_barrier(commands, map_, access::sample, access::compute);
-    dispatch_groups(commands, grid.tiles());
-    buffer_barrier(commands, depths_, access::compute, access::host);
-    image_barrier(commands, map_, access::compute, access::sample);
-    step.tile_count = shader::uint(items);
-    begin_compute(commands, *layout_, listed_, centres_pipeline_, step);
-    commands.dispatchIndirect(*arguments.buffer, offset);
 }
 
 void LightTiles::read_map(const GpuDevice& gpu, std::vector<float>& shadow) {
@@ -177,11 +148,16 @@ std::vector<float> LightTiles::run(const GpuDevice& gpu, const LightSortedSplats
         std::size_t end = end_of_batch(boxes, begin, grid, kMaxSplats, kMaxEntries);
         const TileBins bins = bin_batch(boxes, begin, end, grid, longest_list(gpu));
         const std::span splats = std::span(order.splats).subspan(begin, end - begin);
-        upload(gpu, bindings_, 2, splats_, std::as_bytes(splats));
-        upload(gpu, bindings_, 9, places_,
-               std::as_bytes(std::span(order.places).subspan(begin, end - begin)));
-        upload_bins(gpu, bins);
-        draw_map(gpu, grid, begin == 0, end == boxes.size());
+        upload(gpu, splats_, std::as_bytes(splats));
+        upload(gpu, places_, std::as_bytes(std::span(order.places).subspan(begin, end - begin)));
+        upload(gpu, ranges_, std::as_bytes(std::span(bins.ranges)));
+        upload(gpu, list_, std::as_bytes(std::span(bins.list)));
+        sets_.reset();
+        submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+            compute_barrier(commands);  // the batch before left its sums
+            record_map(commands, sets_, {{2, splats_}, {5, ranges_}, {6, list_}}, grid,
+                       {.first = begin == 0, .last = end == boxes.size()});
+        });
         ask(gpu, order, grid, queries);
         begin = end;
     } while (begin < boxes.size());

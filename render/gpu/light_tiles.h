@@ -23,23 +23,25 @@ namespace nephos {
 
 class LightTiles {
   public:
-    // `unused` is not read, but lavapipe (Mesa 22.3) wants every sampler of a set to be bound.
-    LightTiles(const GpuDevice& gpu, const PipelineLayout& layout, const GpuImage& unused,
-               const vk::raii::Sampler& sampler);
+    explicit LightTiles(const GpuDevice& gpu);
 
     // Leaves the shadow map in shadow_map() and returns the optical depth between each centre and the sun, in
     // the order of `order`.
     std::vector<float> run(const GpuDevice& gpu, const LightSortedSplats& order, int shadow_size);
 
-    // The same from lists on the device (device_sun.h): buffers as bindings 1, 2, 5, 6, 7 and 9 want them.
-    struct Lists {
-        const GpuBuffer *queries, *splats, *ranges, *list, *items, *places;
+    // Makes shadow_map() one of shadow_size^2 texels, whose content is lost if it had another size.
+    void resize_map(const GpuDevice& gpu, int shadow_size);
+    // One batch of the splats: the first clears the sums of the map, the last completes them.
+    struct Batch {
+        bool first = true, last = true;
+        float largest_radius = 0;  // of any splat, metres
     };
-    void use_lists(const GpuDevice& gpu, int shadow_size, const Lists& lists);
-    // Map and light at the centres; at most `items`, as many as the arguments of the dispatch at `offset`
-    // say.
-    void record_lists(const vk::raii::CommandBuffer& commands, const TileGrid& grid, float largest_radius,
-                      std::size_t items, const GpuBuffer& arguments, std::size_t offset) const;
+    // Records what a batch adds to the map and to the depths of the centres. `resources`: LightSplat, LightPlace,
+    // their lists, LightQuery and LightItem, by their numbers in light_map.comp and light_centres.comp. At most
+    // `items` items, as many as the arguments of the dispatch at `offset` say.
+    void record(const vk::raii::CommandBuffer& commands, DescriptorSets& sets, const Resources& resources,
+                const TileGrid& grid, const Batch& batch, std::size_t items, const GpuBuffer& arguments,
+                std::size_t offset) const;
     // Copies the texels of the map to the host, once these commands or run() are done.
     void read_map(const GpuDevice& gpu, std::vector<float>& shadow);
 
@@ -51,16 +53,12 @@ class LightTiles {
 
   private:
     struct Queries;
-    void resize_map(const GpuDevice& gpu, int shadow_size);
-    void upload_bins(const GpuDevice& gpu, const TileBins& bins);
-    void draw_map(const GpuDevice& gpu, const TileGrid& grid, bool first, bool last);
+    void record_map(const vk::raii::CommandBuffer& commands, DescriptorSets& sets, const Resources& resources,
+                    const TileGrid& grid, const Batch& batch) const;
     void ask(const GpuDevice& gpu, const LightSortedSplats& order, const TileGrid& grid, Queries& queries);
 
-    const PipelineLayout* layout_;
-    const vk::raii::Sampler* sampler_;
-    vk::raii::Pipeline map_pipeline_, centres_pipeline_;
-    Bindings bindings_;
-    Bindings listed_;  // of lists on the device
+    Pipeline map_pipeline_, centres_pipeline_;
+    DescriptorSets sets_;  // of run()
     GpuBuffer queries_, splats_, places_, ranges_, list_, items_, depths_;
     GpuBuffer queries_copy_, depths_copy_;  // where the processor reads the device's memory slowly
     GpuImage map_;

@@ -15,15 +15,6 @@ enum class Splatting {
     blended,    // billboards with attenuation textures, blended back to front, as D has it: the reference
 };
 
-// The place where Splatting::vulkan sorts metaballs and bins them into tiles. The picture is the same within
-// 1/255, because screen-space bounds are rounded differently. Frames with billboards, or beyond the device's
-// limits, use the host.
-enum class TileLists {
-    automatic,  // host on a device of type CPU, else device
-    host,       // sorted by the processor and uploaded for each picture
-    device,     // sorted by compute shaders from metaballs that stay on the device
-};
-
 struct DeviceOptions {
     // Part of a device's name ("llvmpipe") or its number in device_names(). Empty: the environment variable
     // NEPHOS_DEVICE in the same form; without it a discrete card, then an integrated, a virtual and a
@@ -33,11 +24,10 @@ struct DeviceOptions {
     // tests. No effect where the back-end cpu draws.
     bool validation = false;
     // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
-    // the picture; memory on the device is about 24 bytes * tile_size^2, and 40 bytes more to read back two
-    // pictures from lists of the device. Less where the device allows no such buffers or images.
+    // the picture; memory on the device is about 24 bytes * tile_size^2, and with Splatting::vulkan 40 bytes more to
+    // read back two pictures. Less where the device allows no such buffers or images.
     int tile_size = 2048;
     Splatting splatting = Splatting::automatic;
-    TileLists lists = TileLists::automatic;
 };
 
 // Returns the device that is requested by name or number, by the options or by NEPHOS_DEVICE; empty: any. Reads the

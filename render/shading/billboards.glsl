@@ -24,7 +24,7 @@ vec3 billboard_light_at(vec3 position, ViewBillboard billboard, ViewCloud cloud)
 
 // Transmittance and in-scattered light of the air between the eye and a billboard, times the billboard's opacity.
 struct BillboardAir {
-    vec3 share;  // of the cloud's light that arrives
+    vec3 transmitted;  // fraction of the cloud's light that arrives
     vec3 veil;   // radiance of the air
 };
 

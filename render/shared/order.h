@@ -14,12 +14,12 @@ namespace nephos::shader {
 NEPHOS_CONST uint kSortGroup = 256u;      // invocations of a work group, and values of a digit
 NEPHOS_CONST uint kSortBlock = 2048u;     // elements that a work group sorts or sums
 NEPHOS_CONST uint kCulled = 0xffffffffu;  // key of culled splats; no distance has these bits
-NEPHOS_CONST float kFarthest_m = 1.0e9f;  // positions beyond are sorted by the host
+NEPHOS_CONST float kFarthest_m = 1.0e15f;  // coordinates of what is drawn: squares and their sums are floats
 NEPHOS_CONST float kCullReach = 1.5f;     // largest extent of a metaball in radii, as in view_sorting.cpp
 
 // The content of a table of numbers, which determines its size.
-NEPHOS_CONST uint kAllBalls = 0u;    // OrderStep::count
-NEPHOS_CONST uint kSeenBalls = 1u;   // OrderCounts::visible
+NEPHOS_CONST uint kAllSplats = 0u;   // OrderStep::count + billboards
+NEPHOS_CONST uint kSeenSplats = 1u;  // OrderCounts::visible
 NEPHOS_CONST uint kSeenDigits = 2u;  // digits of their keys, for each block
 NEPHOS_CONST uint kListDigits = 3u;  // digits of the entries' keys, for each block
 NEPHOS_CONST uint kMapTiles = 4u;    // items of work in the tiles of the shadow map: OrderStep::tiles
@@ -31,7 +31,13 @@ struct CloudBall {
     float depth_scale;  // as in ViewBall, and the next two
     float sun_depth;
     float height;
-    uint pad0;
+    uint detailed;  // 1 = it stands for a cloud with detail
+};
+
+// One of T's billboards as the camera sees it; 36 bytes.
+struct SeenBillboard {
+    ViewBillboard billboard;
+    float distance;  // of its centre from the eye, metres
 };
 
 // The camera of a frame. Positions are sums of two floats, high and low, so that differences of positions
@@ -44,6 +50,7 @@ struct OrderFrame {
     vec4 up;         // xyz: unit; w: ... upwards
     vec4 forward;    // xyz: unit; w: pixels per unit at distance 1
     vec4 middle;     // xy: of the picture, pixels; z: 1 = the eye is above the ground; w: 1 = lightning
+    vec4 march;      // x: 1 = rays march through clouds with detail
 };
 
 // The shadow map, for sorting by distance from the sun.
@@ -57,6 +64,8 @@ struct SunFrame {
 // Push constants.
 struct OrderStep {
     uint count;           // metaballs of the cloud
+    uint billboards;      // splats behind the metaballs: their indices go on from `count`
+    uint begin, end;      // batch: the splats of the order that are binned
     uint table;           // kAllBalls ...
     uint shift;           // of the digit in the key
     uint x, y;            // corner of the tile of the picture, pixels
@@ -74,10 +83,10 @@ struct Groups {
 
 // Counters in device memory, for indirect dispatch.
 struct OrderCounts {
-    uint visible;     // metaballs
+    uint visible;     // splats
     uint entries;     // of the lists; 0 on overflow
-    uint wanted;      // number of entries even on overflow; at most 2^32 - 1
-    uint not_fitted;  // 1 = some metaballs are not fitted
+    uint required;    // entries of the longest batch so far, even on overflow; at most 2^32 - 1
+    uint not_fitted;  // 1 = there are billboards, or metaballs that are not fitted
     uint total;       // of the last table that was summed
     Groups visible_each, visible_blocks,
         visible_digits;  // work groups: of an element each, of blocks, of the
@@ -86,7 +95,7 @@ struct OrderCounts {
     Groups items;                                         // of LightItem
 };
 
-// The splats between two shells of air, and the shells behind them that no splat separates.
+// The splats of a batch between two shells of air, and the shells behind them that no splat separates.
 struct ViewPart {
     Groups fitted, mixed;  // tiles, for the shader without and the one with balls that are not fitted: one of
                            // them has none
@@ -107,7 +116,7 @@ NEPHOS_FUNCTION Groups dispatch_of(uint groups) {
 }
 
 #ifdef __cplusplus
-static_assert(sizeof(CloudBall) == 32 && sizeof(OrderFrame) == 11 * 16 && sizeof(OrderStep) == 48);
+static_assert(sizeof(CloudBall) == 32 && sizeof(OrderFrame) == 12 * 16 && sizeof(OrderStep) == 60 && sizeof(SeenBillboard) == 36);
 static_assert(sizeof(Groups) == 12 && offsetof(OrderCounts, visible_each) == 20 &&
               sizeof(OrderCounts) == 116);
 static_assert(sizeof(ViewPart) == 52 && offsetof(ViewPart, first) == 36);

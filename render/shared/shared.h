@@ -41,7 +41,7 @@ NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
 NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance below which splats behind are skipped
 NEPHOS_CONST uint kIntegrate = 1u;      // flag: evaluate the integral along the ray, do not use the textures
 NEPHOS_CONST uint kNotFitted = 4u;      // flag: the tiles evaluate the integral, whatever the billboards do
-NEPHOS_CONST uint kBillboardFlag = 8u;  // flag, of no metaball: a ViewBillboard, see project_billboard.glsl
+NEPHOS_CONST uint kBillboardFlag = 8u;  // flag, of no metaball: a billboard, whose index is in the bits from 4 on
 NEPHOS_CONST uint kAround = 2u;         // flag: around or close to the eye, covers the whole picture
 NEPHOS_CONST uint kSkyColumns = 64u;    // of the tables of the sky (atmosphere.h)
 NEPHOS_CONST uint kSkyRows = 96u;
@@ -62,6 +62,7 @@ NEPHOS_CONST uint kScatterDepths = 97u;             // ... and scatter_row()
 NEPHOS_CONST float kScatterRowsPerDoubling = 8.0f;  // of 1 + optical depth
 NEPHOS_CONST float kMaxSunDepth = 4095.0f;          // of the last row; beyond it nothing changes
 NEPHOS_CONST float kMinBillboardPixels = 1.0f;      // smaller billboards of T are widened to this half size
+NEPHOS_CONST uint kBillboardTexels = 128u;          // on a side of their finest textures; a power of two
 
 // A metaball in camera space; 32 bytes.
 struct ViewBall {
@@ -70,7 +71,8 @@ struct ViewBall {
     float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * line_integral()
     float sun_depth;    // optical depth towards the sun: exp(-sun_depth) arrives
     float height;       // in the cloud: 0 base, 1 top
-    uint flags;         // lower half; upper half: transmitted fraction of the lightning, 0..65535
+    uint flags;         // lower half; upper half: transmitted fraction of the lightning, 0..65535. On the device a
+                        // ViewBall with kBillboardFlag stands for a billboard and has nothing but its centre
 };
 
 // One of T's billboards in camera space; 32 bytes.
@@ -134,12 +136,11 @@ struct TileRange {
 struct TileStep {
     uint width, height;            // of the picture or the map, pixels
     uint tiles_x;                  // tiles in a row
-    uint tile_count;               // or number of splats, or of items
-    uint first_batch, last_batch;  // booleans: clear the sums before; finish them after
+    uint tile_count;               // or number of splats that there is room for, or of items
+    uint first_batch, last_batch;  // booleans: clear the sums before; light: finish them after
     float largest_radius;          // light: metres, of any splat
-    uint first, end;               // view: the splats, or shells, that are drawn
+    uint part;                     // view: index of the ViewPart (order.h) that is drawn
     uint distances;                // view: boolean, depth is requested
-    uint listed;  // view: boolean, first is the number of a ViewPart (order.h) that has the splats and shells
 };
 
 // Uniforms of one image, or of a tile of it.
@@ -221,7 +222,7 @@ static_assert(sizeof(ViewBall) == 32 && offsetof(ViewBall, depth_scale) == 16 &&
               offsetof(ViewBall, flags) == 28);
 static_assert(sizeof(ViewSplat) == 16 && sizeof(LightSplat) == 16 && sizeof(LightPlace) == 8);
 static_assert(sizeof(LightQuery) == 16 && sizeof(LightItem) == 16);
-static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 44);
+static_assert(sizeof(TileRange) == 8 && sizeof(TileStep) == 36);
 static_assert(sizeof(ViewBillboard) == 32 && offsetof(ViewBillboard, half_size) == 12 &&
               offsetof(ViewBillboard, cloud) == 28);
 static_assert(sizeof(ViewCloud) == 32 && offsetof(ViewCloud, inverse_height) == 16);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// view_tiles.comp for T's billboards, as project_billboard.glsl leaves them.
+// T's billboards, as project_billboard.glsl leaves them; needs tile_splats.glsl.
 #include "render/shading/billboards.glsl"
 
 layout(set = 0, binding = 3) uniform sampler2DArray billboard_textures;
@@ -29,17 +29,5 @@ void add_billboard(uint at, vec2 pixel) {
         blue[row] += sum.b;
         if (kDistances) mean_distance[row] += part * distance;
         transmittance[row] -= part;
-    }
-}
-
-bool is_billboard(uint entry) { return unpackHalf2x16(tails[list[entry]]).y < 0.0; }
-
-// Metaballs up to the next billboard, billboards up to the next metaball, and so on. In loops, because lavapipe works
-// through both sides of a branch.
-void add_all_and_billboards(TileRange range, vec2 pixel) {
-    uint i = range.begin;
-    while (i < range.end && !is_opaque()) {
-        while (i < range.end && !is_billboard(i) && !is_opaque()) add_splat(list[i++], pixel);
-        while (i < range.end && is_billboard(i) && !is_opaque()) add_billboard(splats[list[i++]].x, pixel);
     }
 }

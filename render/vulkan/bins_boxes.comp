@@ -2,7 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "render/shared/order.h"
-// Lists of the tiles, first: the tiles that each splat touches (screen_box.cpp, tile_bins.cpp), and how many.
+// Boxes of the splats, in tiles of the picture (screen_box.cpp, tile_bins.cpp).
 #include "render/vulkan/order.glsl"
 #include "render/vulkan/exact_distance.glsl"
 
@@ -29,11 +29,29 @@ ivec4 screen_box(CloudBall ball, FromEye place) {
     return ivec4(clamp(box, vec4(-1.0e6), vec4(1.0e6)));
 }
 
+// Middles of pixels within the rectangle between the middles of the outermost texels, which are clear.
+ivec4 screen_box(ViewBillboard billboard) {
+    vec3 centre = vec3(billboard.x, billboard.y, billboard.z);
+    vec2 per_m = vec2(frame.right.w, frame.up.w) / dot(centre, frame.forward.xyz);
+    float visible = 1.0001 * (1.0 - 1.0 / float(kBillboardTexels >> (billboard.texture_bits >> 12)));
+    vec2 middle = frame.middle.xy + vec2(dot(centre, frame.right.xyz), -dot(centre, frame.up.xyz)) * per_m;
+    vec2 extent = visible * unpackHalf2x16(billboard.half_size) * per_m + 0.001;
+    vec4 box = vec4(ceil(middle - extent - 0.5), floor(middle + extent + 0.5));
+    return ivec4(clamp(box, vec4(-1.0e6), vec4(1.0e6)));
+}
+
 void main() {
     uint k = work_group() * kSortGroup + gl_LocalInvocationID.x;
     if (k >= counts.visible) return;
-    CloudBall ball = cloud[values_from[k]];
-    ivec4 box = screen_box(ball, from_eye(ball)) - ivec4(step.x, step.y, step.x, step.y);
+    uint i = values_from[k];
+    ivec4 box;
+    if (i < step.count) {
+        CloudBall ball = cloud[i];
+        box = screen_box(ball, from_eye(ball));
+    } else {
+        box = screen_box(billboards[i - step.count].billboard);
+    }
+    box -= ivec4(step.x, step.y, step.x, step.y);
     ivec2 first = max(box.xy, ivec2(0)), end = min(box.zw, ivec2(step.width, step.height));
     uvec2 low = uvec2(0u), high = uvec2(0u), tile = uvec2(kTileWidth, kTileHeight);
     if (first.x < end.x && first.y < end.y) {
@@ -41,5 +59,4 @@ void main() {
         high = (uvec2(end) + tile - 1u) / tile;
     }
     boxes[k] = uvec2(low.x | low.y << 16, high.x | high.y << 16);
-    table[k] = (high.x - low.x) * (high.y - low.y);
 }

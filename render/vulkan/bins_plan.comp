@@ -2,8 +2,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "render/shared/order.h"
-// Lists of the tiles, second: whether they fit, how many work groups the passes to come need, and which splats and which
-// shells of air are drawn one after the other (air_shells.h).
+// Lists of the tiles, second: whether they fit, how many work groups the passes to come need, and which splats of the
+// batch and which shells of air are drawn one after the other (air_shells.h). Shells are drawn by the batch that has the
+// last splat in front of them.
 #include "render/vulkan/order.glsl"
 
 layout(local_size_x = kSortGroup) in;
@@ -26,7 +27,7 @@ uint nearer_than(float distance) {
 
 void plan_lists() {
     uint entries = counts.total <= step.capacity ? counts.total : 0u, blocks = groups_of(entries, kSortBlock);
-    counts.wanted = counts.total;
+    counts.required = max(step.begin == 0u ? 0u : counts.required, counts.total);
     counts.entries = entries;
     counts.entries_each = dispatch_of(groups_of(entries, kSortGroup));
     counts.entries_blocks = dispatch_of(blocks);
@@ -39,12 +40,15 @@ void main() {
     if (k < step.shells) in_front[k] = nearer_than(shell_end(k));
     barrier();
     if (k > step.shells) return;
-    uint first = k == 0u ? 0u : in_front[k - 1u], end = k == step.shells ? counts.visible : in_front[k];
-    uint tiles = k == 0u || first < end ? step.tiles : 0u;  // the first clears the sums
+    bool first_batch = step.begin == 0u;
+    uint before = k == 0u ? 0u : in_front[k - 1u], behind = k == step.shells ? counts.visible : in_front[k];
+    uint first = max(before, step.begin), end = max(first, min(behind, step.end));
+    uint tiles = first < end || (k == 0u && first_batch) ? step.tiles : 0u;  // the first clears the sums
     bool mixed = counts.not_fitted != 0u;
     uint end_shell = k;
-    if (k < step.shells && (k == 0u || first < end)) {
-        while (end_shell < step.shells && in_front[end_shell] == end) ++end_shell;
+    bool shell_follows = behind == 0u ? first_batch : behind > step.begin && behind <= step.end;
+    if (k < step.shells && (k == 0u || before < behind) && shell_follows) {
+        while (end_shell < step.shells && in_front[end_shell] == behind) ++end_shell;
     }
     uint pixels = end_shell > k ? step.width * step.height : 0u;
     parts[k].fitted = dispatch_of(mixed ? 0u : tiles);

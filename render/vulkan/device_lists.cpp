@@ -8,6 +8,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "core/error.h"
 #include "core/vec.h"
 #include "render/frame/frame_data.h"
 #include "render/frame/view_sorting.h"
@@ -25,8 +26,13 @@ HighLow high_low(double value) {
 }
 
 bool within_reach(double value) { return std::abs(value) < double(shader::kFarthest_m); }
+bool within_reach(const Vec3& at) { return within_reach(at.x) && within_reach(at.y) && within_reach(at.z); }
 bool within_reach(const Metaball& ball) {
-    return within_reach(ball.x) && within_reach(ball.y) && within_reach(ball.z) && within_reach(ball.radius);
+    return within_reach(Vec3{ball.x, ball.y, ball.z}) && within_reach(double(ball.radius));
+}
+
+std::size_t whole_blocks(std::size_t count) {
+    return std::max<std::size_t>(1, blocks_of(count)) * shader::kSortBlock;
 }
 
 void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes, vk::BufferUsageFlags more = {}) {
@@ -43,22 +49,38 @@ std::uint32_t bits_of(std::size_t tiles) { return std::uint32_t(std::bit_width(t
 
 ListLimits limits_of(const GpuDevice& gpu) {
     const std::size_t range = gpu.properties.limits.maxStorageBufferRange;
-    ListLimits most;
-    // lavapipe (Mesa 22.3) leaves all loops of a shader after 65,535 turns in all; a metaball that is not
-    // fitted takes more than one in the loop over a tile's list (view_tiles.cpp).
-    if (gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu) most.balls = 50'000;
-    // The table of digits is smaller than either.
-    return {std::min(most.balls, range / sizeof(shader::CloudBall) / shader::kSortBlock * shader::kSortBlock),
-            std::min(most.entries, range / sizeof(shader::uint) / shader::kSortBlock * shader::kSortBlock)};
+    const auto longest = [&](std::size_t bytes) {
+        return range / bytes / shader::kSortBlock * shader::kSortBlock;
+    };
+    ListLimits limits;
+    // Of all buffers of splats, that of the billboards has the largest elements; indices have 28 bits.
+    limits.splats = std::min(longest(sizeof(shader::SeenBillboard)), std::size_t{1} << 28);
+    limits.entries = std::min(limits.entries, longest(sizeof(shader::uint)));
+    // lavapipe (Mesa 22.3) leaves all loops of a shader after 65,535 turns in all: eight metaballs take nine at most,
+    // or one where lanes hand them round, and a splat among billboards up to three.
+    if (gpu.properties.deviceType == vk::PhysicalDeviceType::eCpu) {
+        limits.batch = 50'000;
+        limits.batch_with_billboards = 20'000;
+        limits.batch_with_march = 15'000;  // two turns each; a sample of a ray takes about five
+    }
+    return limits;
 }
 
-bool is_near_enough(const PreparedCloud& cloud) {
-    return std::ranges::all_of(cloud.visible,
-                               [&](std::uint32_t i) { return within_reach(cloud.metaballs[i]); });
+std::size_t smaller_batch(std::size_t batch, std::size_t required, const ListLimits& limits) {
+    if (batch <= 1)
+        throw Error(ErrorCode::gpu, "the lists of a picture's tiles need " + std::to_string(required) +
+                                        " entries for one metaball; this device has room for " +
+                                        std::to_string(limits.entries));
+    return std::max<std::size_t>(1, std::min(batch / 2, batch * limits.entries / (2 * required)));
 }
 
-bool is_near_enough(const Vec3& eye) {
-    return within_reach(eye.x) && within_reach(eye.y) && within_reach(eye.z);
+void check_distances(const PreparedCloud& cloud, const Vec3& eye) {
+    if (within_reach(eye) && std::ranges::all_of(cloud.visible, [&](std::uint32_t i) {
+            return within_reach(cloud.metaballs[i]);
+        }))
+        return;
+    throw Error(ErrorCode::usage,
+                "the back-end vulkan draws clouds, and has a camera, up to 1e15 m from the origin");
 }
 
 std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span<const float> sun_depths) {
@@ -74,14 +96,14 @@ std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span
                         cloud.depth_scale[i],
                         sun_depths[i],
                         float((ball.z - cloud.base_m) * scale),
-                        0};
+                        cloud.is_detailed(i) ? 1u : 0u};
         }
     });
     return balls;
 }
 
 shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options, const Ground& ground,
-                               bool has_flash) {
+                               bool has_flash, bool marched) {
     const HighLow x = high_low(camera.position_m.x), y = high_low(camera.position_m.y),
                   z = high_low(camera.position_m.z), height = high_low(ground.height_m);
     const Frustum pyramid(camera);
@@ -95,26 +117,35 @@ shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options,
     frame.forward = to_vec4(camera.forward, pixels_per_unit(options, camera));
     frame.middle = {float(half_width), float(half_height),
                     camera.position_m.z > ground.height_m ? 1.0f : 0.0f, has_flash ? 1.0f : 0.0f};
+    frame.march = {marched ? 1.0f : 0.0f, 0, 0, 0};
     return frame;
 }
 
-bool DeviceLists::has_room(std::size_t balls, std::size_t tiles, std::size_t entries) const {
-    return sums_.bytes != 0 && balls <= ball_capacity_ && tiles <= tile_capacity_ &&
-           entries <= entry_capacity_;
+bool DeviceLists::has_room(const ListSizes& sizes) const {
+    return sums_.bytes != 0 && sizes.splats <= splat_capacity_ && sizes.billboards <= billboard_capacity_ &&
+           sizes.tiles <= tile_capacity_ && sizes.entries <= entry_capacity_;
 }
 
-void DeviceLists::reserve_balls(const GpuDevice& gpu, std::size_t count) {
-    constexpr std::size_t kWord = sizeof(shader::uint);
-    ball_capacity_ = 0;  // until all of them are there
+void DeviceLists::reserve_cloud(const GpuDevice& gpu, std::size_t balls) {
+    if (cloud_.bytes != 0 && balls <= ball_capacity_) return;
+    ball_capacity_ = 0;  // until both are there
+    const std::size_t count = whole_blocks(balls);
     make(gpu, cloud_, count * sizeof(shader::CloudBall));
-    make(gpu, flash_, count * kWord);
+    make(gpu, flash_, count * sizeof(shader::uint));
+    ball_capacity_ = count;
+}
+
+void DeviceLists::reserve_splats(const GpuDevice& gpu, std::size_t count, std::size_t billboards) {
+    constexpr std::size_t kWord = sizeof(shader::uint);
+    splat_capacity_ = 0;  // until all of them are there
     make(gpu, balls_, count * sizeof(shader::ViewBall));
-    make(gpu, splats_, count * sizeof(shader::ViewSplat));
+    make(gpu, splats_, (count + 4 * billboards) * sizeof(shader::ViewSplat));
     make(gpu, tails_, count * kWord);
     make(gpu, boxes_, count * 2 * kWord);
     for (GpuBuffer* each : {&order_.keys[0], &order_.keys[1], &order_.values[0], &order_.values[1]})
         make(gpu, *each, count * kWord);
-    ball_capacity_ = count;
+    splat_capacity_ = count;
+    billboard_capacity_ = billboards;
 }
 
 void DeviceLists::reserve_entries(const GpuDevice& gpu, std::size_t count) {
@@ -125,8 +156,8 @@ void DeviceLists::reserve_entries(const GpuDevice& gpu, std::size_t count) {
     entry_capacity_ = count;
 }
 
-void DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t tiles, std::size_t entries) {
-    if (has_room(balls, tiles, entries)) return;
+void DeviceLists::reserve(const GpuDevice& gpu, const ListSizes& sizes) {
+    if (has_room(sizes)) return;
     constexpr std::size_t kWord = sizeof(shader::uint);
     if (parts_.bytes == 0) {
         make(gpu, counts_, sizeof(shader::OrderCounts), vk::BufferUsageFlagBits::eIndirectBuffer);
@@ -134,18 +165,17 @@ void DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t t
         make(gpu, parts_, sizeof(shader::ViewPart) * (shader::kMaxShells + 2),
              vk::BufferUsageFlagBits::eIndirectBuffer);
     }
-    const auto whole_blocks = [](std::size_t count) {
-        return std::max<std::size_t>(1, blocks_of(count)) * shader::kSortBlock;
-    };
-    if (balls > ball_capacity_) reserve_balls(gpu, whole_blocks(balls));
-    if (entries > entry_capacity_) reserve_entries(gpu, whole_blocks(entries));
-    if (tiles > tile_capacity_) {
+    if (balls_.bytes == 0 || sizes.splats > splat_capacity_ || sizes.billboards > billboard_capacity_)
+        reserve_splats(gpu, std::max(splat_capacity_, whole_blocks(sizes.splats)),
+                       std::max(billboard_capacity_, sizes.billboards));
+    if (sizes.entries > entry_capacity_) reserve_entries(gpu, whole_blocks(sizes.entries));
+    if (sizes.tiles > tile_capacity_) {
         tile_capacity_ = 0;
-        make(gpu, ranges_, tiles * sizeof(shader::TileRange));
-        tile_capacity_ = tiles;
+        make(gpu, ranges_, sizes.tiles * sizeof(shader::TileRange));
+        tile_capacity_ = sizes.tiles;
     }
-    // Marks or tiles of balls, digits of entries, items of the tiles of a shadow map.
-    const std::size_t numbers = std::max({ball_capacity_, digits_in_table(entry_capacity_), tile_capacity_});
+    // Marks or entries of splats, digits of entries, items of the tiles of a shadow map.
+    const std::size_t numbers = std::max({splat_capacity_, digits_in_table(entry_capacity_), tile_capacity_});
     if (numbers * kWord > table_.bytes || sums_.bytes == 0) {
         sums_ = {};
         make(gpu, table_, numbers * kWord);
@@ -154,46 +184,27 @@ void DeviceLists::reserve(const GpuDevice& gpu, std::size_t balls, std::size_t t
 }
 
 const GpuBuffer& DeviceLists::list(std::size_t tiles) const {
-    return entries_.values[OrderRecorder::passes(bits_of(tiles)) % 2];
+    return entries_.values[OrderRecorder::end_of_sort(0, bits_of(tiles))];
 }
 
-void DeviceLists::bind(const GpuDevice& gpu, const Sets& sets, const GpuBuffer& frame,
-                       const GpuBuffer& shells) const {
-    for (std::size_t n = 0; n < sets.size(); ++n) {
-        bind_order_buffer(gpu, sets[n], 0, frame);
-        bind_order_buffer(gpu, sets[n], 1, counts_);
-        bind_order_buffer(gpu, sets[n], 2, cloud_);
-        bind_order_buffer(gpu, sets[n], 3, flash_);
-        bind_order_buffer(gpu, sets[n], 4, balls_);
-        bind_sort_buffers(gpu, sets[n], n < 2 ? order_ : entries_, n % 2);
-        bind_order_buffer(gpu, sets[n], 9, table_);
-        bind_order_buffer(gpu, sets[n], 10, sums_);
-        bind_order_buffer(gpu, sets[n], 11, boxes_);
-        bind_order_buffer(gpu, sets[n], 12, ranges_);
-        bind_order_buffer(gpu, sets[n], 13, parts_);
-        bind_order_buffer(gpu, sets[n], 14, shells);
-    }
+Resources DeviceLists::resources() const {
+    return {{1, counts_}, {2, cloud_}, {3, flash_},   {4, balls_},  {9, table_},
+            {10, sums_},  {11, boxes_}, {12, ranges_}, {13, parts_}};
 }
 
-void DeviceLists::record_order(const vk::raii::CommandBuffer& commands, const Sets& sets,
-                               std::size_t count) const {
-    const OrderRecorder recorder(commands, pipelines_, counts_);
-    shader::OrderStep step{};
-    step.count = shader::uint(count);
-    step.table = shader::kAllBalls;
-    const std::size_t each = (count + shader::kSortGroup - 1) / shader::kSortGroup;
-    recorder.run(OrderPass::cull, sets[0], step, each);  // keys to buffer 1
-    recorder.scan(sets[0], step);
-    recorder.run(OrderPass::compact, sets[1], step, each);  // from there to buffer 0
-    recorder.run(OrderPass::plan, sets[0], step, 1);
-    recorder.sort({sets[0], sets[1]}, shader::kSeenDigits, 32);
-    recorder.run_indirect(OrderPass::view, sets[0], step, offsetof(shader::OrderCounts, visible_each));
+Resources DeviceLists::with_order(const Resources& resources, std::size_t from) const {
+    Resources both = resources;
+    both.set(order_.from(from));
+    return both;
 }
 
 shader::OrderStep DeviceLists::step_of(const Tile& tile, std::size_t shells) const {
     const TileGrid grid{tile.width, tile.height};
     return {.count = 0,
-            .table = shader::kSeenBalls,
+            .billboards = 0,
+            .begin = 0,
+            .end = 0,
+            .table = shader::kSeenSplats,
             .shift = 0,
             .x = shader::uint(tile.x),
             .y = shader::uint(tile.y),
@@ -206,24 +217,34 @@ shader::OrderStep DeviceLists::step_of(const Tile& tile, std::size_t shells) con
             .per_item = 0};
 }
 
-void DeviceLists::record_lists(const OrderRecorder& recorder, const Sets& sets,
-                               const shader::OrderStep& step) const {
-    const std::uint32_t bits = bits_of(step.tiles);
-    recorder.scan(sets[0], step);
-    recorder.run(OrderPass::bins_plan, sets[0], step, 1);
-    recorder.run_indirect(OrderPass::emit, sets[3], step, offsetof(shader::OrderCounts, entries_each));
-    recorder.sort({sets[2], sets[3]}, shader::kListDigits, bits);
-    recorder.run(OrderPass::ranges, sets[2 + OrderRecorder::passes(bits) % 2], step,
-                 (step.tiles + shader::kSortGroup - 1) / shader::kSortGroup);
+void DeviceLists::record_order(const OrderRecorder& recorder, const Resources& resources, std::size_t balls,
+                               std::size_t billboards) const {
+    shader::OrderStep step{};
+    step.count = shader::uint(balls);
+    step.billboards = shader::uint(billboards);
+    step.table = shader::kAllSplats;
+    const std::size_t each = (balls + billboards + shader::kSortGroup - 1) / shader::kSortGroup;
+    recorder.run(OrderPass::cull, with_order(resources, 0), step, each);  // keys to buffer 1
+    recorder.scan(resources, step);
+    recorder.run(OrderPass::compact, with_order(resources, 1), step, each);  // from there to buffer 0
+    recorder.run(OrderPass::plan, resources, step, 1);
+    recorder.sort(resources, order_, 0, shader::kSeenDigits, 32);
+    recorder.run_indirect(OrderPass::view, with_order(resources), step,
+                          offsetof(shader::OrderCounts, visible_each));
 }
 
-void DeviceLists::record_bins(const vk::raii::CommandBuffer& commands, const Sets& sets, const Tile& tile,
-                              std::size_t shells) const {
-    const OrderRecorder own = recorder(commands);
-    const shader::OrderStep step = step_of(tile, shells);
-    own.run_indirect(OrderPass::boxes, sets[0], step, offsetof(shader::OrderCounts, visible_each));
-    record_lists(own, sets, step);
-    pass_barrier(commands);
+void DeviceLists::record_batch(const OrderRecorder& recorder, const Resources& resources,
+                               const shader::OrderStep& step) const {
+    const std::uint32_t bits = bits_of(step.tiles);
+    Resources all = with_order(resources);
+    recorder.run_indirect(OrderPass::bins_count, all, step, offsetof(shader::OrderCounts, visible_each));
+    recorder.scan(all, step);
+    recorder.run(OrderPass::bins_plan, all, step, 1);
+    all.set(entries_.from(1));  // to buffer 0
+    recorder.run_indirect(OrderPass::emit, all, step, offsetof(shader::OrderCounts, entries_each));
+    recorder.sort(all, entries_, 0, shader::kListDigits, bits);
+    all.set(entries_.from(OrderRecorder::end_of_sort(0, bits)));
+    recorder.run(OrderPass::ranges, all, step, (step.tiles + shader::kSortGroup - 1) / shader::kSortGroup);
 }
 
 }  // namespace nephos

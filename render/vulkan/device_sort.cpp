@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/vulkan/device_sort.h"
 
-#include <algorithm>
-#include <vector>
-
-#include "render/gpu/gpu_pipeline.h"
+#include <array>
 
 namespace nephos {
 namespace {
 
 namespace spirv {
 #include "bins_boxes_comp.h"
+#include "bins_count_comp.h"
 #include "bins_emit_comp.h"
 #include "bins_plan_comp.h"
 #include "bins_ranges_comp.h"
@@ -35,84 +33,21 @@ std::array<ShaderCode, kOrderPasses> codes() {
     return {
         spirv::scan_reduce_comp,  spirv::scan_sums_comp,   spirv::scan_blocks_comp,   spirv::sort_count_comp,
         spirv::sort_scatter_comp, spirv::order_cull_comp,  spirv::order_compact_comp, spirv::order_plan_comp,
-        spirv::order_view_comp,   spirv::bins_boxes_comp,  spirv::bins_plan_comp,     spirv::bins_emit_comp,
-        spirv::bins_ranges_comp,  spirv::sun_keys_comp,    spirv::sun_view_comp,      spirv::sun_items_comp,
-        spirv::sun_items_comp,    spirv::sun_queries_comp, spirv::sun_store_comp};
-}
-
-vk::DescriptorType type_of(std::uint32_t binding) {
-    return binding == 0 || binding == 14 ? vk::DescriptorType::eUniformBuffer
-                                         : vk::DescriptorType::eStorageBuffer;
+        spirv::order_view_comp,   spirv::bins_boxes_comp,  spirv::bins_count_comp,    spirv::bins_plan_comp,
+        spirv::bins_emit_comp,    spirv::bins_ranges_comp, spirv::sun_keys_comp,      spirv::sun_view_comp,
+        spirv::sun_items_comp,    spirv::sun_items_comp,   spirv::sun_queries_comp,   spirv::sun_store_comp};
 }
 
 }  // namespace
 
-std::string missing_for_lists(const GpuDevice& gpu) {
-    const vk::PhysicalDeviceLimits& limits = gpu.properties.limits;
-    constexpr std::uint32_t kStorage = kOrderBindings - 2;
-    if (limits.maxComputeWorkGroupInvocations < shader::kSortGroup ||
-        limits.maxComputeWorkGroupSize[0] < shader::kSortGroup)
-        return "work groups of 256";
-    if (limits.maxPerStageDescriptorStorageBuffers < kStorage ||
-        limits.maxDescriptorSetStorageBuffers < kStorage)
-        return "13 storage buffers in a shader";
-    return {};
-}
-
-OrderPipelines create_order_pipelines(const GpuDevice& gpu) {
-    OrderPipelines result;
-    std::vector<vk::DescriptorSetLayoutBinding> bindings;
-    for (std::uint32_t i = 0; i < kOrderBindings; ++i)
-        bindings.emplace_back(i, type_of(i), 1, vk::ShaderStageFlagBits::eCompute);
-    result.set_layout =
-        vk::raii::DescriptorSetLayout(gpu.device, vk::DescriptorSetLayoutCreateInfo({}, bindings));
-    const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0, sizeof(shader::OrderStep));
-    result.layout =
-        vk::raii::PipelineLayout(gpu.device, vk::PipelineLayoutCreateInfo({}, *result.set_layout, constants));
+std::vector<Pipeline> create_order_pipelines(const GpuDevice& gpu) {
+    std::vector<Pipeline> pipelines;
     const std::array code = codes();
     for (std::size_t i = 0; i < kOrderPasses; ++i) {
-        const vk::Bool32 writes = i == std::size_t(OrderPass::sun_items);  // constant 0 of that shader
-        const vk::SpecializationMapEntry entry(0, 0, sizeof writes);
-        const vk::SpecializationInfo constants_of(1, &entry, sizeof writes, &writes);
-        const vk::raii::ShaderModule module(
-            gpu.device, vk::ShaderModuleCreateInfo({}, code[i].size_bytes(), code[i].data()));
-        const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main",
-                                                      &constants_of);
-        result.passes.emplace_back(gpu.device, nullptr,
-                                   vk::ComputePipelineCreateInfo({}, stage, *result.layout));
+        const ShaderConstant writes{0, i == std::size_t(OrderPass::sun_items)};  // of sun_items.comp
+        pipelines.push_back(create_compute_pipeline(gpu, code[i], {&writes, 1}));
     }
-    return result;
-}
-
-OrderSets create_order_sets(const GpuDevice& gpu, const OrderPipelines& pipelines, std::uint32_t count) {
-    const std::array sizes{
-        vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, 2 * count),
-        vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, (kOrderBindings - 2) * count)};
-    OrderSets result;
-    result.pool = vk::raii::DescriptorPool(gpu.device, vk::DescriptorPoolCreateInfo({}, count, sizes));
-    const std::vector<vk::DescriptorSetLayout> layouts(count, *pipelines.set_layout);
-    const vk::DescriptorSetAllocateInfo info(*result.pool, layouts);
-    // Allocated without RAII: the sets go with their pool.
-    result.sets.resize(count);
-    const vk::Device device = *gpu.device;
-    const vk::Result allocated =
-        device.allocateDescriptorSets(&info, result.sets.data(), *gpu.device.getDispatcher());
-    if (allocated != vk::Result::eSuccess) fail_gpu("allocating descriptors", allocated);
-    return result;
-}
-
-void bind_order_buffer(const GpuDevice& gpu, vk::DescriptorSet set, std::uint32_t binding,
-                       const GpuBuffer& buffer) {
-    const vk::DescriptorBufferInfo info(*buffer.buffer, 0, VK_WHOLE_SIZE);
-    gpu.device.updateDescriptorSets(vk::WriteDescriptorSet(set, binding, 0, type_of(binding), {}, info), {});
-}
-
-void bind_sort_buffers(const GpuDevice& gpu, vk::DescriptorSet set, const SortBuffers& buffers,
-                       std::size_t from) {
-    bind_order_buffer(gpu, set, 5, buffers.keys[from]);
-    bind_order_buffer(gpu, set, 6, buffers.values[from]);
-    bind_order_buffer(gpu, set, 7, buffers.keys[1 - from]);
-    bind_order_buffer(gpu, set, 8, buffers.values[1 - from]);
+    return pipelines;
 }
 
 std::size_t blocks_of(std::size_t numbers) { return (numbers + shader::kSortBlock - 1) / shader::kSortBlock; }
@@ -127,7 +62,7 @@ shader::OrderCounts counts_for(std::size_t visible, std::size_t entries) {
     constexpr std::size_t kEach = shader::kSortGroup, kBlock = shader::kSortBlock;
     return {.visible = shader::uint(visible),
             .entries = shader::uint(entries),
-            .wanted = shader::uint(entries),
+            .required = shader::uint(entries),
             .not_fitted = 0,
             .total = 0,
             .visible_each = groups_for(visible, kEach),
@@ -140,59 +75,57 @@ shader::OrderCounts counts_for(std::size_t visible, std::size_t entries) {
             .items = {}};
 }
 
-void OrderRecorder::bind(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step) const {
-    constexpr auto kPoint = vk::PipelineBindPoint::eCompute;
+void OrderRecorder::begin(OrderPass pass, const Resources& resources, const shader::OrderStep& step) const {
+    const Pipeline& pipeline = pipelines_[std::size_t(pass)];
     pass_barrier(commands_);
-    commands_.bindPipeline(kPoint, *pipelines_.passes[std::size_t(pass)]);
-    commands_.bindDescriptorSets(kPoint, *pipelines_.layout, 0, set, {});
-    commands_.pushConstants<shader::OrderStep>(*pipelines_.layout, vk::ShaderStageFlagBits::eCompute, 0,
-                                               step);
+    begin_compute(commands_, pipeline, sets_.fill(pipeline, resources), step);
 }
 
-void OrderRecorder::run(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step,
+void OrderRecorder::run(OrderPass pass, const Resources& resources, const shader::OrderStep& step,
                         std::size_t groups) const {
-    bind(pass, set, step);
+    begin(pass, resources, step);
     dispatch_groups(commands_, groups);
 }
 
-void OrderRecorder::run_indirect(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step,
+void OrderRecorder::run_indirect(OrderPass pass, const Resources& resources, const shader::OrderStep& step,
                                  std::size_t offset) const {
-    bind(pass, set, step);
+    begin(pass, resources, step);
     commands_.dispatchIndirect(*counts_.buffer, offset);
 }
 
-void OrderRecorder::scan(vk::DescriptorSet set, const shader::OrderStep& step) const {
+void OrderRecorder::scan(const Resources& resources, const shader::OrderStep& step) const {
     const auto over_blocks = [&](OrderPass pass) {
         switch (step.table) {
-            case shader::kAllBalls:
-                return run(pass, set, step, blocks_of(step.count));
+            case shader::kAllSplats:
+                return run(pass, resources, step, blocks_of(step.count + step.billboards));
             case shader::kMapTiles:
-                return run(pass, set, step, blocks_of(step.tiles));
-            case shader::kSeenBalls:
-                return run_indirect(pass, set, step, offsetof(shader::OrderCounts, visible_blocks));
+                return run(pass, resources, step, blocks_of(step.tiles));
+            case shader::kSeenSplats:
+                return run_indirect(pass, resources, step, offsetof(shader::OrderCounts, visible_blocks));
             case shader::kSeenDigits:
-                return run_indirect(pass, set, step, offsetof(shader::OrderCounts, visible_digits));
+                return run_indirect(pass, resources, step, offsetof(shader::OrderCounts, visible_digits));
             default:
-                return run_indirect(pass, set, step, offsetof(shader::OrderCounts, entries_digits));
+                return run_indirect(pass, resources, step, offsetof(shader::OrderCounts, entries_digits));
         }
     };
     over_blocks(OrderPass::scan_reduce);
-    run(OrderPass::scan_sums, set, step, 1);
+    run(OrderPass::scan_sums, resources, step, 1);
     over_blocks(OrderPass::scan_blocks);
 }
 
-void OrderRecorder::sort(const std::array<vk::DescriptorSet, 2>& sets, std::uint32_t table,
-                         std::uint32_t bits) const {
+void OrderRecorder::sort(const Resources& resources, const SortBuffers& buffers, std::size_t from,
+                         std::uint32_t table, std::uint32_t bits) const {
     const std::size_t blocks = table == shader::kListDigits ? offsetof(shader::OrderCounts, entries_blocks)
                                                             : offsetof(shader::OrderCounts, visible_blocks);
     shader::OrderStep step{};
     step.table = table;
     for (std::uint32_t pass = 0; pass < passes(bits); ++pass) {
-        const vk::DescriptorSet set = sets[pass % 2];
+        Resources moved = resources;
+        moved.set(buffers.from((from + pass) % 2));
         step.shift = 8 * pass;
-        run_indirect(OrderPass::sort_count, set, step, blocks);
-        scan(set, step);
-        run_indirect(OrderPass::sort_scatter, set, step, blocks);
+        run_indirect(OrderPass::sort_count, moved, step, blocks);
+        scan(moved, step);
+        run_indirect(OrderPass::sort_scatter, moved, step, blocks);
     }
 }
 

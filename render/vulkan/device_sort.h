@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Prefix sums and a stable radix sort in compute shaders, and what else makes orders and lists on the device
-// (device_lists.h): pipelines and the one descriptor layout that they share, render/vulkan/order.glsl.
+// Prefix sums and a stable radix sort in compute shaders, and the recording of the passes that make orders and lists
+// on the device (device_lists.h), whose bindings are in render/vulkan/order.glsl.
 //
 // The sort takes 8 bits a pass, least significant first: digits are counted for each block of 2048 elements,
 // a prefix sum over digits and blocks gives each block its places, and elements go there in their order. Sums
@@ -10,12 +10,10 @@
 // subgroups. How many elements there are only the device knows (shader::OrderCounts), so passes are
 // dispatched indirectly. Private to the module.
 
-#include <array>
 #include <cstdint>
-#include <string>
 #include <vector>
 
-#include "render/gpu/gpu_resources.h"
+#include "render/gpu/gpu_pipeline.h"
 #include "render/shared/order.h"
 
 namespace nephos {
@@ -31,6 +29,7 @@ enum class OrderPass {
     plan,
     view,
     boxes,
+    bins_count,
     bins_plan,
     emit,
     ranges,
@@ -41,37 +40,20 @@ enum class OrderPass {
     sun_queries,
     sun_store,
 };
-inline constexpr std::size_t kOrderPasses = 19;
-inline constexpr std::uint32_t kOrderBindings = 15;  // 0 and 14 are uniform buffers, the others storage
+inline constexpr std::size_t kOrderPasses = 20;
 
 // Storage buffers that sort passes read and write.
 struct SortBuffers {
     GpuBuffer keys[2], values[2];
+
+    // Returns them as resources of a pass that moves elements from keys[from], values[from] to those of 1 - from.
+    Resources from(std::size_t from) const {
+        return {{5, keys[from]}, {6, values[from]}, {7, keys[1 - from]}, {8, values[1 - from]}};
+    }
 };
 
-struct OrderPipelines {
-    vk::raii::DescriptorSetLayout set_layout{nullptr};
-    vk::raii::PipelineLayout layout{nullptr};
-    std::vector<vk::raii::Pipeline> passes;  // as OrderPass numbers them
-};
-
-// Returns the reason why this device cannot sort and make lists; empty if it can.
-std::string missing_for_lists(const GpuDevice& gpu);
-
-OrderPipelines create_order_pipelines(const GpuDevice& gpu);
-
-// `count` sets of the layout, and their pool.
-struct OrderSets {
-    vk::raii::DescriptorPool pool{nullptr};
-    std::vector<vk::DescriptorSet> sets;
-};
-OrderSets create_order_sets(const GpuDevice& gpu, const OrderPipelines& pipelines, std::uint32_t count);
-
-void bind_order_buffer(const GpuDevice& gpu, vk::DescriptorSet set, std::uint32_t binding,
-                       const GpuBuffer& buffer);
-// Elements go from keys[from], values[from] to those of 1 - from.
-void bind_sort_buffers(const GpuDevice& gpu, vk::DescriptorSet set, const SortBuffers& buffers,
-                       std::size_t from);
+// Returns the pipelines of all passes, as OrderPass numbers them.
+std::vector<Pipeline> create_order_pipelines(const GpuDevice& gpu);
 
 // Numbers in the table of a sort of so many elements.
 std::size_t digits_in_table(std::size_t elements);
@@ -86,28 +68,31 @@ shader::OrderCounts counts_for(std::size_t visible, std::size_t entries);
 // Writes commands of passes. All commands before a pass are done and visible when it begins.
 class OrderRecorder {
   public:
-    // `counts` has shader::OrderCounts.
-    OrderRecorder(const vk::raii::CommandBuffer& commands, const OrderPipelines& pipelines,
-                  const GpuBuffer& counts)
-        : commands_(commands), pipelines_(pipelines), counts_(counts) {}
+    // `counts` has shader::OrderCounts. All of them outlive this.
+    OrderRecorder(const vk::raii::CommandBuffer& commands, const std::vector<Pipeline>& pipelines,
+                  DescriptorSets& sets, const GpuBuffer& counts)
+        : commands_(commands), pipelines_(pipelines), sets_(sets), counts_(counts) {}
 
-    void run(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step, std::size_t groups) const;
+    void run(OrderPass pass, const Resources& resources, const shader::OrderStep& step,
+             std::size_t groups) const;
     // Dispatches the number of groups in a member of OrderCounts.
-    void run_indirect(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step,
+    void run_indirect(OrderPass pass, const Resources& resources, const shader::OrderStep& step,
                       std::size_t offset) const;
     // Computes prefix sums of the table step.table; the sum of all goes to OrderCounts::total.
-    void scan(vk::DescriptorSet set, const shader::OrderStep& step) const;
-    // Sorts by the lower `bits` of the keys what is in buffers 0; it ends in buffers passes(bits) % 2.
-    // `sets`: from buffers 0 to 1, and from 1 to 0. `table`: kSeenDigits or kListDigits.
-    void sort(const std::array<vk::DescriptorSet, 2>& sets, std::uint32_t table, std::uint32_t bits) const;
-
-    static std::uint32_t passes(std::uint32_t bits) { return (bits + 7) / 8; }
+    void scan(const Resources& resources, const shader::OrderStep& step) const;
+    // Sorts by the lower `bits` of the keys what is in buffers `from`; it ends in buffers end_of_sort(from, bits).
+    // `table`: kSeenDigits or kListDigits.
+    void sort(const Resources& resources, const SortBuffers& buffers, std::size_t from, std::uint32_t table,
+              std::uint32_t bits) const;
+    static std::size_t end_of_sort(std::size_t from, std::uint32_t bits) { return (from + passes(bits)) % 2; }
 
   private:
-    void bind(OrderPass pass, vk::DescriptorSet set, const shader::OrderStep& step) const;
+    static std::uint32_t passes(std::uint32_t bits) { return (bits + 7) / 8; }
+    void begin(OrderPass pass, const Resources& resources, const shader::OrderStep& step) const;
 
     const vk::raii::CommandBuffer& commands_;
-    const OrderPipelines& pipelines_;
+    const std::vector<Pipeline>& pipelines_;
+    DescriptorSets& sets_;
     const GpuBuffer& counts_;
 };
 

@@ -10,16 +10,18 @@
 namespace nephos {
 namespace {
 
-// Sets: four as of DeviceLists, and two for the centres.
-constexpr std::uint32_t kSets = 6;
-constexpr std::size_t kCentres = 4;
-
 void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
     if (buffer.bytes >= bytes) return;
     buffer = {};
     buffer = create_buffer(gpu, bytes,
                            vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferDst,
                            HostAccess::none);
+}
+
+// The most items of work that there may be.
+std::size_t items_in(const SunRequest& request, std::size_t per_item) {
+    const TileGrid grid{request.shadow_size, request.shadow_size};
+    return grid.tiles() + request.metaballs / per_item;
 }
 
 }  // namespace
@@ -35,8 +37,9 @@ shader::SunFrame sun_frame(const ShadowFrame& frame, int shadow_size) {
             .v = to_vec4((shadow_size / (height * height)) * frame.v_axis_m, height / shadow_size)};
 }
 
-DeviceSun::DeviceSun(const GpuDevice& gpu, const DeviceLists& lists)
-    : sets_(lists.create_sets(gpu, kSets)),
+DeviceSun::DeviceSun(const GpuDevice& gpu)
+    : per_item_(shader::kQueriesPerLane * gpu.tile_lanes),
+      sets_(gpu),
       frame_(create_buffer(gpu, sizeof(shader::SunFrame), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
       no_shells_(create_buffer(gpu, sizeof(shader::Shells), vk::BufferUsageFlagBits::eUniformBuffer,
@@ -45,82 +48,81 @@ DeviceSun::DeviceSun(const GpuDevice& gpu, const DeviceLists& lists)
     reserve_copy(gpu, counts_, sizeof(shader::OrderCounts));
 }
 
-void DeviceSun::bind(const GpuDevice& gpu, const DeviceLists& lists) {
-    const auto& sets = sets_.sets;
-    lists.bind(gpu, {sets[kCentres], sets[kCentres + 1], sets[2], sets[3]}, frame_, no_shells_);
-    lists.bind(gpu, {sets[0], sets[1], sets[2], sets[3]}, frame_, no_shells_);
-    for (const std::size_t n : {std::size_t{0}, std::size_t{1}, kCentres, kCentres + 1}) {
-        bind_order_buffer(gpu, sets[n], 3, lists.tails());  // sources
-        bind_order_buffer(gpu, sets[n], 4, lists.splats());
-        bind_order_buffer(gpu, sets[n], 12, places_);
-        if (n < kCentres) continue;
-        bind_order_buffer(gpu, sets[n], 11, queries_);
-        bind_order_buffer(gpu, sets[n], 13, items_);
-    }
-}
-
-vk::DescriptorSet DeviceSun::centres_of(const TileGrid& grid) const {
-    return sets_.sets[kCentres + (1 + OrderRecorder::passes(bits_of(grid.tiles()))) % 2];
-}
-
-void DeviceSun::record(const vk::raii::CommandBuffer& commands, const DeviceLists& lists, std::size_t count,
-                       const TileGrid& grid, std::uint32_t per_item) const {
-    const auto& sets = sets_.sets;
-    const OrderRecorder recorder = lists.recorder(commands);
+void DeviceSun::record(const vk::raii::CommandBuffer& commands, const SunRequest& request,
+                       const DeviceLists& lists, std::size_t batch, const LightTiles& tiles) {
+    const std::size_t count = request.metaballs;
+    const TileGrid grid{request.shadow_size, request.shadow_size};
+    const OrderRecorder recorder = lists.recorder(commands, sets_);
+    Resources resources = lists.resources();
+    resources.set({{14, no_shells_},
+                   {16, frame_},
+                   {17, lists.tails()},
+                   {18, lists.splats()},
+                   {19, queries_},
+                   {20, places_},
+                   {21, items_}});
     shader::OrderStep step = lists.step_of({0, 0, grid.width, grid.height}, 0);
     step.count = shader::uint(count);
-    step.per_item = per_item;
-    const auto each = [&](OrderPass pass, vk::DescriptorSet set) {
-        recorder.run_indirect(pass, set, step, offsetof(shader::OrderCounts, visible_each));
+    step.per_item = per_item_;
+    const auto each = [&](OrderPass pass, const Resources& with) {
+        recorder.run_indirect(pass, with, step, offsetof(shader::OrderCounts, visible_each));
     };
-    const std::size_t tile_groups = (grid.tiles() + shader::kSortGroup - 1) / shader::kSortGroup;
-    recorder.run(OrderPass::sun_keys, sets[1], step, (count + shader::kSortGroup - 1) / shader::kSortGroup);
-    recorder.run(OrderPass::plan, sets[0], step, 1);
-    recorder.sort({sets[0], sets[1]}, shader::kSeenDigits, 32);
-    each(OrderPass::sun_view, sets[0]);
-    lists.record_lists(recorder, {sets[0], sets[1], sets[2], sets[3]}, step);
+    recorder.run(OrderPass::sun_keys, lists.with_order(resources, 1), step,
+                 (count + shader::kSortGroup - 1) / shader::kSortGroup);
+    recorder.run(OrderPass::plan, resources, step, 1);
+    recorder.sort(resources, lists.order(), 0, shader::kSeenDigits, 32);
+    each(OrderPass::sun_view, lists.with_order(resources, 0));
 
     // Tiles of the centres are in buffers 1.
-    recorder.sort({sets[1], sets[0]}, shader::kSeenDigits, bits_of(grid.tiles()));
-    const vk::DescriptorSet centres = centres_of(grid);
+    const std::uint32_t bits = bits_of(grid.tiles());
+    recorder.sort(resources, lists.order(), 1, shader::kSeenDigits, bits);
+    const Resources centres = lists.with_order(resources, OrderRecorder::end_of_sort(1, bits));
+    const std::size_t tile_groups = (grid.tiles() + shader::kSortGroup - 1) / shader::kSortGroup;
     step.table = shader::kMapTiles;
     recorder.run(OrderPass::sun_count_items, centres, step, tile_groups);
     recorder.scan(centres, step);
     recorder.run(OrderPass::sun_items, centres, step, tile_groups);
     each(OrderPass::sun_queries, centres);
+
+    step.table = shader::kSeenSplats;
+    const Resources of_tiles{{1, queries_}, {2, lists.splats()},           {5, lists.ranges()},
+                             {7, items_},   {6, lists.list(grid.tiles())}, {9, places_}};
+    for (std::size_t begin = 0; begin < count; begin += batch) {
+        step.begin = shader::uint(begin);
+        step.end = shader::uint(std::min(count, begin + batch));
+        lists.record_batch(recorder, resources, step);
+        pass_barrier(commands);
+        tiles.record(commands, sets_, of_tiles, grid,
+                     {begin == 0, begin + batch >= count, request.largest_radius}, items_in(request, per_item_),
+                     lists.counts(), offsetof(shader::OrderCounts, items));
+    }
+    each(OrderPass::sun_store, centres);
 }
 
-bool DeviceSun::run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists,
+void DeviceSun::run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists,
                     const ListLimits& limits, LightTiles& tiles) {
     const std::size_t count = request.metaballs;
     const TileGrid grid{request.shadow_size, request.shadow_size};
-    const std::uint32_t per_item = shader::kQueriesPerLane * gpu.tile_lanes;
-    const std::size_t items = grid.tiles() + count / per_item;
     write(gpu, frame_, sun_frame(request.frame, request.shadow_size));
     make(gpu, places_, count * sizeof(shader::LightPlace));
     make(gpu, queries_, count * sizeof(shader::LightQuery));
-    make(gpu, items_, items * sizeof(shader::LightItem));
+    make(gpu, items_, items_in(request, per_item_) * sizeof(shader::LightItem));
     reserve_copy(gpu, depths_, count * sizeof(float));
-    std::size_t entries = std::min(4 * count, limits.entries), wanted = entries;
+    tiles.resize_map(gpu, request.shadow_size);
+    std::size_t required = std::min(4 * count, limits.entries), batch = std::min(count, limits.batch);
     do {
-        entries = wanted;
-        lists.reserve(gpu, count, grid.tiles(), entries);
-        bind(gpu, lists);
-        tiles.use_lists(
-            gpu, request.shadow_size,
-            {&queries_, &lists.splats(), &lists.ranges(), &lists.list(grid.tiles()), &items_, &places_});
-        entries = lists.entry_capacity();
+        if (required > limits.entries) batch = smaller_batch(batch, required, limits);
+        lists.reserve(gpu, {.splats = count,
+                            .billboards = 0,
+                            .tiles = grid.tiles(),
+                            .entries = std::min(required, limits.entries)});
+        sets_.reset();
         submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
             full_barrier(commands);
             // Beyond one row, more work groups run than there are items: the others find empty ones.
             commands.fillBuffer(*items_.buffer, 0, VK_WHOLE_SIZE, 0);
             full_barrier(commands);
-            record(commands, lists, count, grid, per_item);
-            pass_barrier(commands);
-            tiles.record_lists(commands, grid, request.largest_radius, items, lists.counts(),
-                               offsetof(shader::OrderCounts, items));
-            lists.recorder(commands).run_indirect(OrderPass::sun_store, centres_of(grid), {},
-                                                  offsetof(shader::OrderCounts, visible_each));
+            record(commands, request, lists, batch, tiles);
             full_barrier(commands);
             commands.copyBuffer(*lists.table().buffer, *depths_.buffer,
                                 vk::BufferCopy(0, 0, count * sizeof(float)));
@@ -129,10 +131,8 @@ bool DeviceSun::run(const GpuDevice& gpu, const SunRequest& request, DeviceLists
             buffer_barrier(commands, depths_, access::copy_to, access::host);
             buffer_barrier(commands, counts_, access::copy_to, access::host);
         });
-        wanted = reinterpret_cast<const shader::OrderCounts*>(counts_.mapped)->wanted;
-        if (wanted > limits.entries) return false;
-    } while (wanted > entries);
-    return true;
+        required = reinterpret_cast<const shader::OrderCounts*>(counts_.mapped)->required;
+    } while (required > lists.entry_capacity());
 }
 
 void DeviceSun::read_depths(std::span<float> depths) const {

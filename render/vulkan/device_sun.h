@@ -6,8 +6,8 @@
 //
 //     keys      distances along the light; sort
 //     view      metaballs on the shadow map, the tiles that each touches, and the tile of its centre
-//     lists     as of a picture (device_lists.h)
 //     centres   sorted by tile, in each tile nearest to the sun first; cut into items of work
+//     lists     as of a picture (device_lists.h), batch by batch:
 //     map, light at the centres (light_tiles.h)
 //     store     the light goes to the cloud
 //
@@ -33,23 +33,21 @@ struct SunRequest {
 
 class DeviceSun {
   public:
-    DeviceSun(const GpuDevice& gpu, const DeviceLists& lists);
+    explicit DeviceSun(const GpuDevice& gpu);
 
-    // Lights metaballs on the device, and makes the shadow map in `tiles`. Returns false if the lists would
-    // be larger than `limits`: then the light is not there. Nothing else may be in flight.
-    bool run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists, const ListLimits& limits,
+    // Lights metaballs on the device, and makes the shadow map in `tiles`; in smaller batches when their lists are
+    // longer than the limits. Nothing else may be in flight. Throws Error(gpu) if not even one metaball fits.
+    void run(const GpuDevice& gpu, const SunRequest& request, DeviceLists& lists, const ListLimits& limits,
              LightTiles& tiles);
     // Copies the optical depths between centres and sun that the last run() computed.
     void read_depths(std::span<float> depths) const;
 
   private:
-    void bind(const GpuDevice& gpu, const DeviceLists& lists);
-    // Returns the descriptor set that reads the centres in the order of their tiles.
-    vk::DescriptorSet centres_of(const TileGrid& grid) const;
-    void record(const vk::raii::CommandBuffer& commands, const DeviceLists& lists, std::size_t count,
-                const TileGrid& grid, std::uint32_t per_item) const;
+    void record(const vk::raii::CommandBuffer& commands, const SunRequest& request, const DeviceLists& lists,
+                std::size_t batch, const LightTiles& tiles);
 
-    OrderSets sets_;
+    std::uint32_t per_item_;  // centres in an item of work
+    DescriptorSets sets_;
     GpuBuffer frame_, no_shells_;
     GpuBuffer places_, queries_, items_, depths_, counts_;
 };

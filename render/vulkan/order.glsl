@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of the passes that make orders and lists (device_sort.h). No pass depends on the size of subgroups, and no
+// Bindings of the passes that make orders and lists (device_lists.h). No pass depends on the size of subgroups, and no
 // work group waits for another.
 
 layout(set = 0, binding = 0) uniform OrderFrameBlock {
@@ -12,7 +12,7 @@ layout(set = 0, binding = 2, std430) buffer Cloud {
     CloudBall cloud[];
 };
 layout(set = 0, binding = 3, std430) readonly buffer Flash {
-    uint flash_share[];  // of the lightning, 0..65535
+    uint flash_fraction[];  // of the lightning, 0..65535
 };
 layout(set = 0, binding = 4, std430) writeonly buffer Balls {
     ViewBall balls[];
@@ -47,6 +47,9 @@ layout(set = 0, binding = 13, std430) writeonly buffer Parts {
 layout(set = 0, binding = 14) uniform ShellsBlock {
     Shells shells;
 };
+layout(set = 0, binding = 15, std430) readonly buffer Billboards {
+    SeenBillboard billboards[];  // nearest first
+};
 layout(push_constant) uniform Step {
     OrderStep step;
 };
@@ -56,8 +59,8 @@ uint work_group() { return gl_WorkGroupID.y * kGroupRow + gl_WorkGroupID.x; }
 // Elements that are sorted, and numbers in the table.
 uint sorted_elements() { return step.table == kListDigits ? counts.entries : counts.visible; }
 uint table_size() {
-    if (step.table == kAllBalls) return step.count;
-    if (step.table == kSeenBalls) return counts.visible;
+    if (step.table == kAllSplats) return step.count + step.billboards;
+    if (step.table == kSeenSplats) return counts.visible;
     if (step.table == kMapTiles) return step.tiles;
     return kSortGroup * groups_of(sorted_elements(), kSortBlock);
 }

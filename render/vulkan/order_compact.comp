@@ -9,7 +9,7 @@ layout(local_size_x = kSortGroup) in;
 
 void main() {
     uint i = work_group() * kSortGroup + gl_LocalInvocationID.x;
-    if (i >= step.count) return;
+    if (i >= step.count + step.billboards) return;
     uint key = keys_from[i];
     if (key == kCulled) return;
     keys_to[table[i]] = key;

@@ -2,9 +2,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "render/shared/order.h"
-// Order from the eye, first: which metaballs may be seen, and their distances as keys.
+#include "render/shared/march.h"
+// Order from the eye, first: which splats may be seen, and their distances as keys.
 #include "render/vulkan/order.glsl"
 #include "render/vulkan/exact_distance.glsl"
+#include "render/vulkan/ball_weight.glsl"
 
 layout(local_size_x = kSortGroup) in;
 
@@ -19,10 +21,15 @@ bool is_seen(CloudBall ball, FromEye place) {
 
 void main() {
     uint i = work_group() * kSortGroup + gl_LocalInvocationID.x;
-    if (i >= step.count) return;
+    if (i >= step.count + step.billboards) return;
+    if (i >= step.count) {  // the host has culled them
+        keys_to[i] = floatBitsToUint(billboards[i - step.count].distance);
+        table[i] = 1u;
+        return;
+    }
     CloudBall ball = cloud[i];
     FromEye place = from_eye(ball);
-    bool seen = is_seen(ball, place);
+    bool seen = is_seen(ball, place) && splatted_weight(ball, place.distance) > 0.0;
     keys_to[i] = seen ? floatBitsToUint(place.distance) : kCulled;
     table[i] = seen ? 1u : 0u;
 }

@@ -10,7 +10,7 @@ layout(local_size_x = 1) in;
 void main() {
     uint visible = counts.total, blocks = groups_of(visible, kSortBlock);
     counts.visible = visible;
-    counts.not_fitted = 0u;
+    counts.not_fitted = step.billboards > 0u ? 1u : 0u;
     counts.visible_each = dispatch_of(groups_of(visible, kSortGroup));
     counts.visible_blocks = dispatch_of(blocks);
     counts.visible_digits = dispatch_of(groups_of(blocks * kSortGroup, kSortBlock));

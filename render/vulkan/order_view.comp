@@ -2,9 +2,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "render/shared/order.h"
-// Order from the eye, last: metaballs as the eye sees them, nearest first (view_sorting.cpp).
+#include "render/shared/march.h"
+// Order from the eye, last: splats as the eye sees them, nearest first (view_sorting.cpp).
 #include "render/vulkan/order.glsl"
 #include "render/vulkan/exact_distance.glsl"
+#include "render/vulkan/ball_weight.glsl"
 
 layout(local_size_x = kSortGroup) in;
 
@@ -30,11 +32,18 @@ void main() {
         return;
     }
     uint i = values_from[k];
+    if (i >= step.count) {
+        uint index = i - step.count;
+        ViewBillboard billboard = billboards[index].billboard;
+        balls[k] = ViewBall(billboard.x, billboard.y, billboard.z, 0.0, 0.0, 0.0, 0.0, kBillboardFlag | index << 4);
+        return;
+    }
     CloudBall ball = cloud[i];
     FromEye place = from_eye(ball);
+    ball.depth_scale *= splatted_weight(ball, place.distance);
     uint flags = flags_of(ball, place);
     if ((flags & kNotFitted) != 0u) atomicMax(counts.not_fitted, 1u);
-    if (frame.middle.w > 0.0) flags |= flash_share[i] << 16;
+    if (frame.middle.w > 0.0) flags |= flash_fraction[i] << 16;
     balls[k] = ViewBall(place.offset.x, place.offset.y, place.offset.z, ball.radius, ball.depth_scale, ball.sun_depth,
                         ball.height, flags);
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// view_project.comp for T's billboards, where a picture has some. They stand between the metaballs in the same buffers:
-// in the place of a ViewBall a ViewBillboard with kBillboardFlag in `cloud`, whose upper bits are the cloud's number; behind the last
-// splat the clouds.
-// As a splat a billboard has the number of four further words of vec4 behind the last splat:
+// view_project.comp for T's billboards, where a picture has some. As a splat a billboard has the index of four further
+// vectors behind the last splat that there is room for:
 //
 //     centre, pixels; 1 / half size, pixels
 //     halves: l0 l0 l0 l1 l1 l1 l2 l2
@@ -13,10 +11,10 @@
 // corners over two triangles.
 #include "render/shading/billboards.glsl"
 
-layout(set = 0, binding = 1, std430) readonly buffer ViewBillboards {
-    ViewBillboard billboards[];
+layout(set = 0, binding = 16, std430) readonly buffer Billboards {
+    SeenBillboard billboards[];
 };
-layout(set = 0, binding = 1, std430) readonly buffer Clouds {
+layout(set = 0, binding = 17, std430) readonly buffer Clouds {
     ViewCloud clouds[];
 };
 layout(set = 0, binding = 2, std430) writeonly buffer BillboardSplats {
@@ -27,9 +25,10 @@ uint bounded_halves(float low, float high) {
     return packHalf2x16(clamp(vec2(low, high), vec2(-60000.0), vec2(60000.0)));
 }
 
-void project_billboard(uint index) {
-    ViewBillboard billboard = billboards[index];
-    ViewCloud cloud = clouds[step.tile_count + (billboard.cloud >> 4)];
+// `index`: of the splat; `number`: of the billboard.
+void project_billboard(uint index, uint number) {
+    ViewBillboard billboard = billboards[number].billboard;
+    ViewCloud cloud = clouds[billboard.cloud];
     BillboardAxes axes = billboard_axes();
     vec3 centre = vec3(billboard.x, billboard.y, billboard.z);
     float distance = length(centre);
@@ -40,14 +39,14 @@ void project_billboard(uint index) {
     vec3 right = reach.x * axes.right, up = reach.y * axes.up;
 
     BillboardAir air = billboard_air(billboard, centre, distance);
-    vec3 low = air.share * billboard_light_at(centre - right - up, billboard, cloud);
-    vec3 beside = air.share * billboard_light_at(centre + right - up, billboard, cloud);
-    vec3 high = air.share * billboard_light_at(centre + right + up, billboard, cloud);
-    vec3 above = air.share * billboard_light_at(centre - right + up, billboard, cloud);
+    vec3 low = air.transmitted * billboard_light_at(centre - right - up, billboard, cloud);
+    vec3 beside = air.transmitted * billboard_light_at(centre + right - up, billboard, cloud);
+    vec3 high = air.transmitted * billboard_light_at(centre + right + up, billboard, cloud);
+    vec3 above = air.transmitted * billboard_light_at(centre - right + up, billboard, cloud);
     vec3 l0 = 0.5 * (low + high), l1 = 0.5 * (beside - low), l2 = 0.5 * (high - beside);
     vec3 l3 = 0.5 * (above - low + beside - high);
 
-    uint at = step.tile_count + 4u * index;
+    uint at = step.tile_count + 4u * number;
     billboard_splats[index] = uvec4(at, 0u, 0u, 0u);
     tails[index] = packHalf2x16(vec2(0.0, -1.0));
     billboard_splats[at] = uvec4(floatBitsToUint(pixel), floatBitsToUint(1.0 / (reach * to_pixels)));

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of the passes that make the order from the sun and the lists of the shadow map's tiles (device_sun.h), where
-// they have others than order.glsl, which must be included before.
+// Further bindings of the passes that make the order from the sun and the items of work (device_sun.h); order.glsl must
+// be included before.
 
-layout(set = 0, binding = 0) uniform SunFrameBlock {
+layout(set = 0, binding = 16) uniform SunFrameBlock {
     SunFrame sun;
 };
-layout(set = 0, binding = 3, std430) buffer Sources {
+layout(set = 0, binding = 17, std430) buffer Sources {
     uint sources[];  // of the splats: metaballs
 };
-layout(set = 0, binding = 4, std430) buffer Splats {
+layout(set = 0, binding = 18, std430) buffer Splats {
     LightSplat splats[];  // nearest to the sun first
 };
-layout(set = 0, binding = 11, std430) buffer Queries {
+layout(set = 0, binding = 19, std430) buffer Queries {
     LightQuery queries[];  // centres, tile by tile, in each nearest to the sun first
 };
-layout(set = 0, binding = 12, std430) buffer Places {
+layout(set = 0, binding = 20, std430) buffer Places {
     LightPlace places[];
 };
-layout(set = 0, binding = 13, std430) writeonly buffer Items {
+layout(set = 0, binding = 21, std430) writeonly buffer Items {
     LightItem items[];
 };
 

@@ -10,8 +10,8 @@
 
 layout(local_size_x = kSortGroup) in;
 
-// Texels, first and end, of what a splat touches, as tiles of the map.
-void list_tiles(uint k, vec2 centre, vec2 radii) {
+// Stores the tiles of the map that a splat touches.
+void store_box(uint k, vec2 centre, vec2 radii) {
     ivec2 size = ivec2(step.width, step.height);
     ivec2 first = max(ivec2(clamp(floor(centre - radii), vec2(-1.0e6), vec2(1.0e6))), ivec2(0));
     ivec2 end = min(ivec2(clamp(ceil(centre + radii), vec2(-1.0e6), vec2(1.0e6))), size);
@@ -21,7 +21,6 @@ void list_tiles(uint k, vec2 centre, vec2 radii) {
         high = (uvec2(end) + tile - 1u) / tile;
     }
     boxes[k] = uvec2(low.x | low.y << 16, high.x | high.y << 16);
-    table[k] = (high.x - low.x) * (high.y - low.y);
 }
 
 void main() {
@@ -37,7 +36,7 @@ void main() {
     splats[k] = LightSplat(centre.x, centre.y, packed, ball.depth_scale * thinning.x * thinning.y);
     places[k] = LightPlace(uintBitsToFloat(keys_from[k]), 1.0 / ball.radius);
     sources[k] = i;
-    list_tiles(k, centre, unpackHalf2x16(packed));
+    store_box(k, centre, unpackHalf2x16(packed));
     uvec2 own = uvec2(clamp(centre, vec2(0.0), vec2(step.width, step.height) - 1.0)) / uvec2(kTileWidth, kTileHeight);
     keys_to[k] = own.y * step.columns + own.x;
     values_to[k] = k;

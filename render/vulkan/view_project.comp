@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "render/shared/shared.h"
+#include "render/shared/order.h"
 // Tiles, first: each metaball as a splat on the screen, with its light.
 #include "render/shading/frame.glsl"
 #include "render/shading/ray.glsl"
@@ -31,7 +31,7 @@ void main() {
     if (index >= step.tile_count) return;
     ViewBall ball = balls[index];
     if (kBillboards && (ball.flags & kBillboardFlag) != 0u) {
-        project_billboard(index);
+        project_billboard(index, ball.flags >> 4);
         return;
     }
     vec3 centre = vec3(ball.x, ball.y, ball.z);

@@ -2,22 +2,15 @@
 #include "render/vulkan/vulkan_backend.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/error.h"
+#include "render/backend/volume_light.h"
 #include "render/shared/half_floats.h"
 
 namespace nephos {
 namespace {
-
-bool lists_of(const GpuDevice& gpu, TileLists lists) {
-    const std::string missing = missing_for_lists(gpu);
-    if (lists == TileLists::device && !missing.empty())
-        throw Error(ErrorCode::usage,
-                    "the Vulkan device cannot make the lists of tiles: it lacks " + missing);
-    if (lists != TileLists::automatic) return lists == TileLists::device;
-    return gpu.properties.deviceType != vk::PhysicalDeviceType::eCpu && missing.empty();
-}
 
 float largest_radius(const PreparedCloud& cloud) {
     float largest = 0;
@@ -25,137 +18,144 @@ float largest_radius(const PreparedCloud& cloud) {
     return largest;
 }
 
+// Returns the billboards of an order, nearest first; their distances rise, whatever rounding does.
+std::vector<shader::SeenBillboard> seen_billboards(const ViewSortedSplats& order) {
+    std::vector<shader::SeenBillboard> seen(order.billboards.size());
+    float last = 0;
+    std::transform(order.billboards.rbegin(), order.billboards.rend(), seen.begin(),
+                   [&last](const shader::ViewBillboard& each) {
+                       last = std::max(last, std::hypot(each.x, each.y, each.z));
+                       return shader::SeenBillboard{each, last};
+                   });
+    return seen;
+}
+
 }  // namespace
 
-VulkanBackend::VulkanBackend(GpuDevice device, TileLists lists)
-    : scene_(std::move(device)), lists_on_device_(lists_of(scene_.gpu, lists)) {
+VulkanBackend::VulkanBackend(GpuDevice device) : scene_(std::move(device)) {
     scene_.wait_idle = [this] {
-        if (listed_view_) listed_view_->flush();
+        if (view_) view_->flush();
     };
 }
 
-ListedView& VulkanBackend::listed_view() {
-    if (!listed_view_)
-        listed_view_.emplace(scene_.gpu, scene_.layout, scene_.unused(), scene_.clamped, scene_.white_beyond);
-    return *listed_view_;
+BinnedView& VulkanBackend::view() {
+    if (!view_) view_.emplace(scene_.gpu, scene_.unused(), scene_.clamped, scene_.white_beyond);
+    return *view_;
 }
 
-// Returns true when the device can sort and bin the metaballs of a cloud.
-bool VulkanBackend::can_list(const LitCloud& cloud) {
-    if (!lists_on_device_ || cloud.cloud.visible.empty() ||
-        cloud.cloud.visible.size() > listed_view().limits.balls)
-        return false;
-    if (nearness_.metaballs != cloud.metaballs) nearness_ = {cloud.metaballs, is_near_enough(cloud.cloud)};
-    return nearness_.is_near;
+void VulkanBackend::check_limits(const FrameDescription& frame) {
+    const std::size_t splats = frame.cloud.cloud.visible.size() + frame.splats.billboards.size();
+    if (splats > view().limits.splats)
+        throw Error(ErrorCode::usage, "this Vulkan device draws at most " +
+                                          std::to_string(view().limits.splats) +
+                                          " metaballs and billboards, but there are " +
+                                          std::to_string(splats) + ": choose the back-end cpu");
+    check_distances(frame.cloud.cloud, frame.camera.position_m);
 }
 
-bool VulkanBackend::uses_lists(const FrameDescription& frame) {
-    return !frame.overflowed && frame.splats.billboards.empty() && can_list(frame.cloud) &&
-           is_near_enough(frame.camera.position_m);
+// Uploads a cloud with the light that is on the host, unless it is there.
+void VulkanBackend::use_cloud(const LitCloud& cloud) {
+    if (held_metaballs_ == cloud.metaballs) return;
+    held_metaballs_ = held_light_ = 0;  // until all of it is there
+    view().use_cloud(cloud_balls(cloud.cloud, cloud.sun_depths));
+    held_metaballs_ = cloud.metaballs;
 }
 
-// Computes light with lists made on the device. Returns false on overflow.
-bool VulkanBackend::light_listed(LitCloud& cloud) {
-    if (!can_list(cloud)) return false;
-    if (held_metaballs_ != cloud.metaballs) {
-        held_metaballs_ = 0;  // until all of it is there
-        listed_view().use_cloud(cloud_balls(cloud.cloud, cloud.sun_depths));
-        held_metaballs_ = cloud.metaballs;
+void VulkanBackend::use_volumes(const LitCloud& cloud) {
+    if (!volumes_) volumes_.emplace(scene_.gpu);
+    if (volumes_->has(cloud)) return;
+    view().flush();
+    volumes_->use(scene_.gpu, cloud);
+}
+
+void VulkanBackend::light(LitCloud& cloud, StageTimes& times) {
+    if (cloud.all_known) return;
+    if (!cloud.volumes.empty()) {  // on the host, all at once
+        const std::vector<std::uint8_t> balls(cloud.sun_depths.size(), 1), tiles(cloud.known_tiles.size(), 1);
+        complete_light_of_volumes(cloud, balls, tiles, times);
+        cloud.all_known = true;
+        cloud.note_light_pass();
+        return;
     }
+    use_cloud(cloud);
     held_light_ = 0;
-    if (!listed_view().light(cloud.frame, cloud.shadow_size, largest_radius(cloud.cloud),
-                             scene_.light_tiles()))
-        return false;
+    view().light(cloud.frame, cloud.shadow_size, largest_radius(cloud.cloud), scene_.light_tiles());
     cloud.all_known = true;
     cloud.note_light_pass();
     cloud.host_light = 0;  // neither depths nor map are there
     held_light_ = depths_on_device_ = cloud.light;
     scene_.note_map(cloud);
-    return true;
 }
 
-void VulkanBackend::light(LitCloud& cloud) {
-    if (!cloud.all_known && !light_listed(cloud)) scene_.light(cloud);
-}
-
-void VulkanBackend::light_all(LitCloud& cloud, StageTimes&) {
-    scene_.light(cloud);
+void VulkanBackend::light_all(LitCloud& cloud, StageTimes& times) {
+    light(cloud, times);
     fetch_light(cloud);
 }
 
 void VulkanBackend::fetch_light(LitCloud& cloud) {
     if (cloud.host_light == cloud.light) return;
-    if (depths_on_device_ == cloud.light) listed_view().read_depths(cloud.sun_depths);
+    if (depths_on_device_ == cloud.light) view().read_depths(cloud.sun_depths);
     scene_.fetch_map(cloud);
 }
 
 bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
-    if (!uses_lists(frame)) {
-        draw_ordered(frame, picture);
-        return false;
-    }
-    begin_listed(frame, picture);
-    return true;
-}
-
-void VulkanBackend::begin_listed(const FrameDescription& frame, Picture& picture) {
+    check_limits(frame);
     LitCloud& cloud = frame.cloud;
-    ListedView& view = listed_view();
-    light(cloud);
-    if (held_metaballs_ != cloud.metaballs || held_light_ != cloud.light) {
+    ViewSortedSplats billboards;
+    if (!frame.splats.billboards.empty()) billboards = frame.view_sorted_billboards();
+    const std::vector<shader::SeenBillboard> seen = seen_billboards(billboards);
+    light(cloud, frame.times);
+    if (held_light_ != cloud.light) {  // it was computed on the host
         fetch_light(cloud);
-        held_metaballs_ = held_light_ = 0;
-        view.use_cloud(cloud_balls(cloud.cloud, cloud.sun_depths));
-        held_metaballs_ = cloud.metaballs;
-        held_light_ = cloud.light;
+        held_metaballs_ = 0;
     }
+    use_cloud(cloud);
+    held_light_ = cloud.light;
     if (!frame.lightning.empty()) {
         std::vector<shader::uint> fractions(frame.lightning.size());
         std::ranges::transform(frame.lightning, fractions.begin(), unorm16);
-        view.use_flash(fractions);
+        view().use_flash(fractions);
     }
     if (has_shells(frame.options, cloud.cloud)) fetch_light(cloud);
     const AirShells shells = frame.shells();
-    if (shells.any()) view.use_shade(shells.shade, shells.serial);
+    if (shells.any()) view().use_shade(shells.shade, shells.serial);
+    shader::March march{};
+    if (!cloud.volumes.empty()) {
+        march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera));
+        use_volumes(cloud);
+    }
     const StageTimer timer(&frame.times, DrawStage::view);
-    const ListedPicture what{
-        .variant = {.physical_sky = frame.sky != nullptr, .shells = shells.any(), .fog = shells.has_fog()},
-        .order =
-            order_frame(frame.camera, frame.options.camera, frame.options.ground, !frame.lightning.empty()),
-        .shadow_map = &scene_.shadow_map(cloud),
-        .sky = frame.sky != nullptr ? &scene_.sky_image(*frame.sky) : nullptr,
-        .scattering = &scene_.scattering(frame.table),
-        .shells = shells.any() ? &shells.data : nullptr,
-        .shell_count = shells.count(),
-        .depth = frame.splats.depth};
+    const ViewInputs what{.variant = {.physical_sky = frame.sky != nullptr,
+                                      .shells = shells.any(),
+                                      .fog = shells.has_fog(),
+                                      .billboards = !seen.empty(),
+                                      .march = march.count > 0},
+                          .order = order_frame(frame.camera, frame.options.camera, frame.options.ground,
+                                               !frame.lightning.empty(), !cloud.volumes.empty()),
+                          .shadow_map = &scene_.shadow_map(cloud),
+                          .sky = frame.sky != nullptr ? &scene_.sky_image(*frame.sky) : nullptr,
+                          .scattering = &scene_.scattering(frame.table),
+                          .shells = shells.any() ? &shells.data : nullptr,
+                          .shell_count = shells.count(),
+                          .billboards = seen,
+                          .clouds = billboards.clouds,
+                          .march = march.count > 0 ? &march : nullptr,
+                          .volumes = march.count > 0 ? &*volumes_ : nullptr,
+                          .depth = frame.splats.depth};
     try {
         for (const FramePart& part : frame.parts)
-            view.begin_tile(what, part.frame, part.tile, picture, &part == &frame.parts.front());
+            view().begin_tile(what, part.frame, part.tile, picture, &part == &frame.parts.front());
     } catch (...) {
-        view.abandon(picture);  // the device may write into it
+        view().abandon(picture);  // the device may write into it
         throw;
     }
+    return true;
 }
 
-void VulkanBackend::draw_ordered(const FrameDescription& frame, Picture& picture) {
-    LitCloud& cloud = frame.cloud;
-    ViewSortedSplats order = frame.view_sorted();
-    light(cloud);
-    fetch_light(cloud);
-    set_light(order, {cloud.sun_depths, frame.lightning});
-    const AirShells shells = frame.shells();
-    const bool billboards = !order.billboards.empty();
-    const StageTimer timer(&frame.times, DrawStage::view);
-    ViewTiles& pass =
-        prepared_pass(passes_[billboards ? 1 : 0], scene_, scene_.unused(), frame, order, shells, billboards);
-    for (const FramePart& part : frame.parts)
-        pass.draw_tile(scene_.gpu, frame.options, frame.camera, part.frame, part.tile, order, picture);
-}
-
-bool VulkanBackend::finish(Picture& picture) { return listed_view().finish(picture); }
+void VulkanBackend::finish(Picture& picture) { view().finish(picture); }
 
 void VulkanBackend::abandon(const Picture& picture) noexcept {
-    if (listed_view_) listed_view_->abandon(picture);
+    if (view_) view_->abandon(picture);
 }
 
 }  // namespace nephos

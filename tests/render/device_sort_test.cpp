@@ -29,8 +29,7 @@ class DeviceSort : public ::testing::Test {
         EXPECT_EQ(RendererTestAccess::sorted(renderer_, keys, bits), expected) << keys.size() << " keys";
     }
 
-    Renderer renderer_{DeviceOptions{
-        .device = {}, .validation = true, .splatting = Splatting::vulkan, .lists = TileLists::device}};
+    Renderer renderer_{DeviceOptions{.device = {}, .validation = true, .splatting = Splatting::vulkan}};
 };
 
 // None, one, around a work group and a block of it, and so many that the sums have several blocks; random

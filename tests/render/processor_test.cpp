@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
-#include "render/cpu/processor_light.h"
+#include "render/backend/processor_light.h"
 #include "render/cpu/processor_view.h"
 #include "render/frame/scattering_table.h"
 #include "tests/render/random_billboards.h"

@@ -31,7 +31,6 @@ class FramesInFlight : public test::SmallRun {
         scene.render.shadow_map_size = 64;
         RunSettings s = settings_of(scene, folder);
         s.device.splatting = Splatting::vulkan;
-        s.device.lists = TileLists::device;
         return s;
     }
 

@@ -56,7 +56,7 @@ class LostPictures : public testing::Test {
     static constexpr const char* kWaits = "NEPHOS_LOSE_WAIT_AFTER";
     const std::vector<Metaball> balls_ = lattice();
     Splats splats_;
-    Renderer renderer() const { return Renderer({{}, false, 2048, Splatting::vulkan, TileLists::device}); }
+    Renderer renderer() const { return Renderer({.splatting = Splatting::vulkan}); }
 };
 
 // The wait for the second fails while the lists of the first grow, which waits for both.

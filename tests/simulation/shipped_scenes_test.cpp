@@ -10,7 +10,6 @@
 
 #include <gtest/gtest.h>
 
-#include "render/renderer_test_access.h"
 #include "scenes/format/reader.h"
 #include "simulation/frame_painter.h"
 #include "simulation/simulation.h"
@@ -51,6 +50,7 @@ struct Comparison : SimulationSink {
     explicit Comparison(const Scene& s) : scene(s) {}
     void step(const StepResult&) override {}
     void frame(const FrameResult& frame) override {
+        compare_detail(frame);
         const Picture expected = painters[0].draw(frame);
         given = metaball_count(frame);
         clearest = *std::ranges::min_element(expected.transmittance);
@@ -63,13 +63,31 @@ struct Comparison : SimulationSink {
         }
     }
 
+    // Clouds with detail, which one back-end does not draw. Where a sample meets the edge of cloud rounding may decide
+    // what it finds.
+    void compare_detail(const FrameResult& frame) {
+        const Picture expected = FramePainter(scene, {.splatting = Splatting::cpu}).draw(frame),
+                      other = FramePainter(scene, {.splatting = Splatting::vulkan}).draw(frame);
+        for (std::size_t i = 0; i < expected.beauty.size(); ++i) {
+            const float scale = std::max(1.0f, expected.beauty[i]);
+            if (std::abs(expected.beauty[i] - other.beauty[i]) > scale / 255) ++apart_in_detail;
+        }
+        pixels = expected.pixels();
+    }
+
+    static Scene without_detail(Scene scene) {
+        scene.density.detail.enabled = false;
+        for (auto& layer : scene.layers) layer.detail.enabled = false;
+        return scene;
+    }
+
     const Scene& scene;
-    FramePainter painters[4] = {
-        FramePainter(scene, {.splatting = Splatting::blended}),
-        FramePainter(scene, {.splatting = Splatting::cpu}),
-        FramePainter(scene, {.splatting = Splatting::vulkan, .lists = TileLists::host}),
-        FramePainter(scene, {.splatting = Splatting::vulkan, .lists = TileLists::device})};
-    float apart[4] = {}, clearest = 1;
+    const Scene plain = without_detail(scene);
+    FramePainter painters[3] = {FramePainter(plain, {.splatting = Splatting::blended}),
+                                FramePainter(plain, {.splatting = Splatting::cpu}),
+                                FramePainter(plain, {.splatting = Splatting::vulkan})};
+    std::size_t apart_in_detail = 0, pixels = 0;
+    float apart[3] = {}, clearest = 1;
     std::size_t given = 0;  // metaballs, before any are merged
 };
 
@@ -82,17 +100,13 @@ TEST_P(ShippedScenes, AreTheSameInEveryBackend) {
     Simulation simulation(scene, range_of_frames(scene, middle, middle), std::string(32, '0'));
     while (!simulation.finished()) simulation.advance(comparison);
     EXPECT_LT(comparison.clearest, 0.99f) << "nothing to see";
-    for (std::size_t way = 1; way < 4; ++way) EXPECT_LE(comparison.apart[way], 1.0f / 255) << "way " << way;
-    const bool direct = std::ranges::any_of(scene.layers, [](const auto& layer) { return !layer.automaton; });
-    const std::size_t listed = RendererTestAccess::listed(comparison.painters[3].renderer());
-    // Billboards, and on a software device more metaballs than its loops go through, take the host's lists.
-    if (!direct && comparison.given > 0 && comparison.given <= 50000) {
-        EXPECT_GE(listed, 1u);
-    }
-    std::printf(
-        "frame %d, %zu metaballs, listed %zu times, least transmittance %.3f; apart by %.5f, %.5f, %.5f\n",
-        middle, comparison.given, listed, double(comparison.clearest), double(comparison.apart[1]),
-        double(comparison.apart[2]), double(comparison.apart[3]));
+    for (std::size_t way = 1; way < 3; ++way) EXPECT_LE(comparison.apart[way], 1.0f / 255) << "way " << way;
+    EXPECT_LE(comparison.apart_in_detail, comparison.pixels / 2000) << "with detail";
+    std::printf("with detail %zu numbers apart; ", comparison.apart_in_detail);
+    std::printf("frame %d, %zu metaballs, least transmittance %.3f; apart by %.5f, %.5f
+", middle,
+                comparison.given, double(comparison.clearest), double(comparison.apart[1]),
+                double(comparison.apart[2]));
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, ShippedScenes, testing::ValuesIn(shipped_scenes()), [](const auto& scene) {

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/cpu/marched_scene.h"
+#include "render/frame/marched_scene.h"
 
 #include <cmath>
+#include <string>
+
+#include "core/error.h"
+#include "render/shared/march.h"
 
 namespace nephos {
 
@@ -19,9 +23,12 @@ MarchedVolume::MarchedVolume(const CloudVolume& volume, const Vec3& eye_m)
 MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit) {
     for (const CloudVolume& volume : of)
         if (!volume.field.places().empty()) volumes.emplace_back(volume, camera.position_m);
+    if (volumes.size() > shader::kMostVolumes)
+        throw Error(ErrorCode::usage, std::to_string(volumes.size()) + " clouds with detail: expected at most " +
+                                          std::to_string(shader::kMostVolumes));
     per_unit = float(1 / pixels_per_unit);
-    fade_begins = kMarchedFootprint_m / per_unit;
-    fade_ends = kSplattedFootprint_m / per_unit;
+    fade_begins = shader::kMarchedFootprint_m / per_unit;
+    fade_ends = shader::kSplattedFootprint_m / per_unit;
 }
 
 }  // namespace nephos

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/cpu/processor_light.h"
+#include "render/backend/processor_light.h"
 
 #include <algorithm>
 #include <atomic>
@@ -15,7 +15,7 @@
 #include "render/shared/half_floats.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "render/cpu/processor_light.cpp"
+#define HWY_TARGET_INCLUDE "render/backend/processor_light.cpp"
 #include <hwy/foreach_target.h>
 // foreach_target.h must come first
 #include <hwy/cache_control.h>

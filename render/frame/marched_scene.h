@@ -31,6 +31,7 @@ struct MarchedScene {
     float fade_begins = 1, fade_ends = 1;  // metres from the eye
 
     MarchedScene() = default;
+    // Throws Error(usage) when there are more than shader::kMostVolumes that hold cloud.
     MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit);
 };
 

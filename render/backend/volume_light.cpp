@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/backend/volume_light.h"
+
+#include <algorithm>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+#include "render/backend/processor_light.h"
+
+namespace nephos {
+
+void complete_light_of_volumes(LitCloud& cloud, std::span<const std::uint8_t> balls,
+                               std::span<const std::uint8_t> tiles, StageTimes& times) {
+    const StageTimer timer(&times, DrawStage::light);
+    if (std::ranges::count(cloud.cloud.detailed, 1) < std::ptrdiff_t(cloud.cloud.visible.size())) {
+        PreparedCloud others = cloud.cloud;
+        for (std::size_t i = 0; i < others.visible.size(); ++i)
+            if (others.is_detailed(i)) others.depth_scale[i] = 0;
+        const LightSortedSplats order = sort_for_light(others, cloud.frame, cloud.shadow_size);
+        std::vector<std::uint8_t> centres(order.source.size());
+        for (std::size_t i = 0; i < centres.size(); ++i) centres[i] = balls[order.source[i]];
+        std::vector<float> depths;
+        light_by_processor(order, cloud.shadow_size, {centres, tiles}, depths, cloud.shadow, {}, &times);
+        for (std::size_t i = 0; i < centres.size(); ++i)
+            if (centres[i] != 0) cloud.sun_depths[order.source[i]] = depths[i];
+    }
+    tbb::parallel_for(std::size_t{0}, cloud.sun_depths.size(), [&](std::size_t i) {
+        if (balls[i] == 0) return;
+        const Metaball& ball = cloud.cloud.metaballs[cloud.cloud.visible[i]];
+        for (const CloudVolume& volume : cloud.volumes)
+            cloud.sun_depths[i] += sun_depth_at(volume, Vec3(ball.x, ball.y, ball.z));
+    });
+    if (std::ranges::count(tiles, 1) > 0) cast_shadows(cloud.volumes, cloud.frame, cloud.shadow_size, cloud.shadow);
+}
+
+}  // namespace nephos

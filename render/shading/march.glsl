@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rays through clouds with detail (density/detail.h); needs ray.glsl, air.glsl, scattering.glsl, shells.glsl and
+// detail.glsl. The twin of render/cpu/march-inl.h.
+//
+// A ray crosses empty space in one step, bricks or cells at once; near cloud it steps by the coverage that is missing,
+// in cloud by about a pixel. What it sees is shaded whenever kEventOpacity has come together. The loops are nested so
+// that invocations that run together sample together, and shade together.
+
+#extension GL_EXT_control_flow_attributes : require
+
+// Interpolates numbers at the corners of cells between rows along x: of the light.
+struct LightCorner {
+    uint first;  // word
+    vec3 share;
+};
+
+LightCorner light_place(BrickPlace place) {
+    vec3 cells = 0.5 * place.local, below = min(floor(cells), vec3(3.0));
+    uvec3 at = uvec3(below);
+    return LightCorner(uint(max(place.number, 0)) * kMarchLightWords + (at.z * kMarchLightNodes + at.y) * kMarchLightNodes + at.x,
+                       cells - below);
+}
+
+float between_rows(vec4 rows, vec3 share) {
+    return between(between(rows.x, rows.y, share.y), between(rows.z, rows.w, share.y), share.z);
+}
+
+uvec4 light_rows(uint first) {
+    return uvec4(march_light[first], march_light[first + kMarchLightNodes], march_light[first + kMarchLightNodes * kMarchLightNodes],
+                 march_light[first + kMarchLightNodes * kMarchLightNodes + kMarchLightNodes]);
+}
+
+float volume_sun_depth(uint v, BrickPlace place) {
+    LightCorner at = light_place(place);
+    uvec4 words = light_rows(march.volumes[v].first_light + at.first);
+    vec4 low = vec4(words & 0xffffu), high = vec4(words >> 16);
+    float root = between_rows(low + at.share.x * (high - low), at.share) * (1.0 / 65535.0);
+    return root * root * kMostMarchedDepth;
+}
+
+// Returns the fractions of the sky and of the ground that are seen.
+vec2 volume_surroundings(uint v, BrickPlace place) {
+    LightCorner at = light_place(place);
+    uvec4 words = light_rows(march.volumes[v].first_light + march.volumes[v].light_words + at.first);
+    vec4 sky0 = vec4(words & 255u), sky1 = vec4((words >> 16) & 255u);
+    vec4 ground0 = vec4((words >> 8) & 255u), ground1 = vec4(words >> 24);
+    return (1.0 / 255.0) * vec2(between_rows(sky0 + at.share.x * (sky1 - sky0), at.share),
+                                between_rows(ground0 + at.share.x * (ground1 - ground0), at.share));
+}
+
+// The light of a point in a volume towards the eye. The sunlight that arrives is attenuated by three samples towards
+// the sun, which see the detail, and beyond them by the volume's depths.
+vec3 marched_radiance(uint v, vec3 ray, float distance) {
+    float footprint = distance * march.per_unit, extinction_per_m = march.volumes[v].extinction_per_m;
+    vec3 point = distance * ray, offset = point - march.volumes[v].corner.xyz, to_sun = frame.to_sun.xyz;
+    const float taps_m[3] = float[3](kTap0_m, kTap1_m, kTap2_m);
+    const float lengths_m[3] = float[3](kTap0Length_m, kTap1Length_m, kTap2Length_m);
+    float own = 0.0;
+    [[dont_unroll]] for (uint tap = 0u; tap < 3u; ++tap)
+        own += lengths_m[tap] * extinction_per_m * density_at(v, offset + taps_m[tap] * to_sun, footprint);
+    BrickPlace beyond = brick_place(v, offset + kTapsEnd_m * to_sun);
+    float sun_depth = own + (beyond.within ? volume_sun_depth(v, beyond) : 0.0);
+    vec2 seen = volume_surroundings(v, brick_place(v, offset));
+    float fold = kFoldShare * exp(-kFoldDecay * own) + (1.0 - kFoldShare);
+    vec3 sunlight = sunlight_at(point.z);
+    vec3 arriving = seen.x * fold * frame.ambient_top.rgb + seen.y * fold * frame.ambient_base.rgb;
+    arriving += scattered_often(ray, sun_depth) * sunlight;
+    arriving += scattered_once(dot(to_sun, ray)) * exp(-sun_depth) * sunlight;
+    vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark
+    arriving += frame.flash.w * flash_falloff(dot(way, way)) * fold * frame.flash_colour.rgb;
+    vec3 beta = air_transmittance(ray, distance);
+    vec3 radiance = beta * (frame.ambient_top.w * arriving) + air_light(ray, beta);
+    AirLayer air = layer_in_front(point, distance);
+    return air.transmittance * radiance + air.light;
+}
+
+// Where a ray is between two parts of the march.
+struct MarchState {
+    float distance;    // of the next sample
+    float extinction;  // of the last
+    float way;         // from the last to the next
+    float margin;      // of the last; below 0: no sample, empty space was skipped
+};
+
+// One over a direction, never infinite.
+vec3 inverse_of(vec3 direction) {
+    return 1.0 / mix(direction, vec3(1.0e-6), lessThan(abs(direction), vec3(1.0e-6)));
+}
+
+// Returns the part of a ray in the box of a volume's bricks.
+vec2 part_in_box(uint v, vec3 per_ray) {
+    vec4 corner = march.volumes[v].corner;
+    vec3 bricks = vec3(march.volumes[v].bricks_x, march.volumes[v].bricks_y, march.volumes[v].bricks_z);
+    vec3 a = corner.xyz * per_ray, b = (corner.xyz + 8.0 * corner.w * bricks) * per_ray;
+    vec3 low = min(a, b), high = max(a, b);
+    return vec2(max(max(low.x, low.y), max(low.z, 0.0)), min(min(high.x, high.y), high.z));
+}
+
+MarchState begin_march(vec3 ray) {
+    vec3 per_ray = inverse_of(ray);
+    float first = 3.0e38;
+    for (uint v = 0u; v < march.count; ++v) {
+        vec2 part = part_in_box(v, per_ray);
+        if (part.x < part.y) first = min(first, part.x);
+    }
+    return MarchState(first, 0.0, 0.0, -1.0);
+}
+
+// What a sample of a ray found in all volumes.
+struct MarchSample {
+    float extinction, margin, step;
+    uint which;
+    uint near;  // bits of volumes that are to be sampled: cloud is near
+};
+
+// A place of a ray in a volume, and the way out of the cube of empty bricks or cells around it.
+struct MarchPlace {
+    bool within;  // the bricks' box
+    float out_m;
+    bool near;
+};
+
+MarchPlace march_place(uint v, vec3 ray, vec3 per_ray, float distance) {
+    vec4 corner = march.volumes[v].corner;
+    vec3 offset = distance * ray - corner.xyz;
+    BrickPlace place = brick_place(v, offset);
+    bool holds = place.within && place.number >= 0;
+    vec3 cell = min(floor(0.5 * place.local), vec3(3.0));
+    uint byte = 64u * uint(max(place.number, 0)) + uint((cell.z * 4.0 + cell.y) * 4.0 + cell.x);
+    uint clear = (march_cells[march.volumes[v].first_clearance + byte / 4u] >> (8u * (byte & 3u))) & 255u;
+    float count = holds ? float(clear) : float(-place.number), size = (holds ? 2.0 : 8.0) * corner.w;
+    vec3 own = holds ? place.brick * 4.0 + cell : place.brick;
+    vec3 edge = mix(own + 1.0 - count, own + count, greaterThan(per_ray, vec3(0.0)));
+    vec3 out_m = (edge * size - offset) * per_ray;
+    return MarchPlace(place.within, min(out_m.x, min(out_m.y, out_m.z)), holds && clear == 0u);
+}
+
+// Sets the step to where cloud may be, as far as nothing is to be sampled.
+MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
+    MarchSample result = MarchSample(0.0, 1.0, kFarAway_m, 0u, 0u);
+    for (uint v = 0u; v < march.count; ++v) {
+        MarchPlace at = march_place(v, ray, per_ray, distance);
+        vec2 part = part_in_box(v, per_ray);
+        // At the faces of the box rounding decides what is inside: there rays go on by a metre.
+        float step = distance < part.y ? 1.0 : kFarAway_m;
+        if (distance < part.x) step = part.x - distance + kBeyondFace_m;
+        if (at.within) step = max(at.out_m, 0.0) + kBeyondFace_m;
+        if (at.near)
+            result.near |= 1u << v;
+        else
+            result.step = min(result.step, step);
+    }
+    return result;
+}
+
+void sample_near(inout MarchSample result, vec3 ray, float distance, float transmittance) {
+    float footprint = distance * march.per_unit, finest = max(kLeastStep_m, kStepPixels * footprint);
+    float least_step = finest * ((1.0 - transmittance) * kStepGrowth + 1.0);
+    for (uint v = 0u; v < march.count; ++v) {
+        if ((result.near >> v & 1u) != 0u) {
+            vec3 offset = distance * ray - march.volumes[v].corner.xyz;
+            Eroded found = eroded(v, node_at(v, brick_place(v, offset)), offset, max(footprint, kLeastFootprint_m), true);
+            float extinction = found.density * march.volumes[v].extinction_per_m;
+            result.extinction += extinction;
+            if (extinction > 0.0) result.which = v;
+            result.margin = min(result.margin, found.margin);
+            result.step = min(result.step, min(max(found.margin * march.volumes[v].reach, least_step),
+                                               max(kLongestStep_m, least_step)));
+        }
+    }
+}
+
+// What has been seen since the last point that was shaded.
+struct MarchEvent {
+    float weight, weighted;  // opacity; times distance
+    uint which;
+    bool full;  // to be shaded
+};
+
+// Takes a sample into account and goes on to the next place.
+void advance(MarchSample now, inout MarchState state, inout MarchEvent event, inout float left) {
+    float share = clamp((state.distance - march.fade_begins) / (march.fade_ends - march.fade_begins), 0.0, 1.0);
+    float found = now.extinction * (1.0 - share * share * (3.0 - 2.0 * share));
+    // The step before counts as cloud; where it came from outside, only from the surface on: where the margin of the
+    // two samples passes zero, or about one fine step where empty space was skipped.
+    float finest = max(kLeastStep_m, kStepPixels * march.per_unit * state.distance);
+    float inside = -now.margin / max(state.margin - now.margin, kLeastMargin);
+    float behind = state.margin < 0.0 ? kSkippedSteps * finest
+                                      : state.way * clamp(inside, 0.0, 1.0) + kSurfaceSteps * finest;
+    float way = state.extinction > 0.0 ? state.way : min(state.way, behind);
+    float seen = left * (1.0 - exp(-0.5 * (found + state.extinction) * way));
+    left -= seen;
+    bool ends = left <= kMarchOpaque;  // what little is left is seen here, too
+    if (ends) {
+        seen += left;
+        left = 0.0;
+    }
+    event.weight += seen;
+    event.weighted += seen * (state.distance - 0.5 * way);
+    if (found > 0.0) event.which = now.which;
+    bool leaves = event.weight > kLeavingOpacity && found <= 0.0;
+    event.full = event.weight > kEventOpacity || leaves || ends;
+    state.extinction = found;
+    state.margin = now.near != 0u ? now.margin : -1.0;
+    state.way = now.step;
+    state.distance = max(state.distance + now.step, state.distance * kLeastAdvance);
+}
+
+// Returns the distance at which a ray ends.
+float march_end(vec3 ray) {
+    vec3 per_ray = inverse_of(ray);
+    float end = 0.0;
+    for (uint v = 0u; v < march.count; ++v) {
+        vec2 part = part_in_box(v, per_ray);
+        if (part.x < part.y) end = max(end, part.y);
+    }
+    return min(end, min(ground_distance(ray), march.fade_ends));
+}
+
+// Marches a ray up to a distance. `sum`: radiance and transmittance. Where there is nothing to march, do not call it:
+// lavapipe goes through the body of a loop once, even if no invocation does.
+void march_to(float stop, vec3 ray, inout MarchState state, inout vec4 sum, inout float sum_distance) {
+    vec3 per_ray = inverse_of(ray);
+    MarchEvent event = MarchEvent(0.0, 0.0, 0u, false);
+    while (state.distance < stop && sum.a > kMarchOpaque) {
+        event.full = false;
+        while (!event.full && state.distance < stop && sum.a > kMarchOpaque) {
+            MarchSample now;
+            bool near = false;
+            while (!near && !event.full && state.distance < stop && sum.a > kMarchOpaque) {
+                now = survey(ray, per_ray, state.distance);
+                near = now.near != 0u;
+                if (!near) advance(now, state, event, sum.a);
+            }
+            if (near) {
+                sample_near(now, ray, state.distance, sum.a);
+                advance(now, state, event, sum.a);
+            }
+        }
+        if (event.weight > 0.0) {
+            float distance = event.weighted / max(event.weight, 1.0e-9);
+            sum.rgb += event.weight * marched_radiance(event.which, ray, distance);
+            sum_distance += event.weighted;
+            event.weight = 0.0;
+            event.weighted = 0.0;
+        }
+    }
+}

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Constants and structs of rays through clouds with detail (density/detail.h), shared by C++ and the shaders that march
+// (render/shading/march.glsl).
+#ifndef NEPHOS_RENDER_SHADERS_MARCH_H
+#define NEPHOS_RENDER_SHADERS_MARCH_H
+
+#include "render/shared/shared.h"
+
+#ifdef __cplusplus
+namespace nephos::shader {
+#endif
+
+NEPHOS_CONST uint kMostVolumes = 16u;                 // in a picture
+NEPHOS_CONST float kEventOpacity = 0.12f;             // of a point that is shaded
+NEPHOS_CONST float kLeavingOpacity = 0.004f;          // of one where the ray leaves cloud
+NEPHOS_CONST float kMarchOpaque = 1.0f / 256.0f;      // transmittance at which a ray ends
+NEPHOS_CONST float kLeastStep_m = 2.0f;               // in cloud,
+NEPHOS_CONST float kStepPixels = 1.2f;                // ... or this many footprints of a pixel
+NEPHOS_CONST float kStepGrowth = 4.0f;                // of steps behind opaque cloud
+NEPHOS_CONST float kLongestStep_m = 30.0f;            // near cloud
+NEPHOS_CONST float kBeyondFace_m = 0.01f;             // where a ray goes on behind the face of a cell or a box
+NEPHOS_CONST float kLeastAdvance = 1.0000005f;         // of a distance in any step: far away floats are coarse
+NEPHOS_CONST float kFarAway_m = 1.0e9f;
+NEPHOS_CONST float kLeastFootprint_m = 0.05f;
+NEPHOS_CONST float kSkippedSteps = 1.5f;              // of cloud before a sample behind empty space, in finest steps
+NEPHOS_CONST float kSurfaceSteps = 0.3f;              // ... beyond the surface between two samples
+NEPHOS_CONST float kLeastMargin = 1.0e-4f;            // difference of two samples' margins
+// A shaded point samples the cloud towards the sun at these distances, which stand for these lengths; beyond the last
+// the volume's depths go on.
+NEPHOS_CONST float kTap0_m = 3.0f, kTap1_m = 10.0f, kTap2_m = 22.0f;
+NEPHOS_CONST float kTap0Length_m = 6.5f, kTap1Length_m = 9.5f, kTap2Length_m = 17.0f;
+NEPHOS_CONST float kTapsEnd_m = 30.5f;
+// The light of sky and ground in folds: this share of it falls off with the samples' optical depth times kFoldDecay.
+NEPHOS_CONST float kFoldShare = 0.55f, kFoldDecay = 0.5f;
+NEPHOS_CONST float kMostMarchedDepth = 64.0f;         // towards the sun: of more nothing arrives
+// Words of a brick: of its nodes, of the corners of its cells, and of its cells' clearance.
+NEPHOS_CONST uint kNodeEdge = 9u, kNodeWords = 729u;
+NEPHOS_CONST uint kMarchLightNodes = 5u, kMarchLightWords = 125u;
+NEPHOS_CONST uint kClearanceWords = 16u;
+NEPHOS_CONST uint kLargeNoiseWords = 2097152u;        // those of the small noise follow
+// Between these footprints of a pixel metaballs take over from rays.
+NEPHOS_CONST float kMarchedFootprint_m = 15.0f, kSplattedFootprint_m = 25.0f;
+
+// Returns the weight of metaballs whose pixels have a footprint: 0 to 1, without a step.
+NEPHOS_FUNCTION float splatted_weight(float footprint_m) {
+    float part = (footprint_m - kMarchedFootprint_m) / (kSplattedFootprint_m - kMarchedFootprint_m);
+    part = min(max(part, 0.0f), 1.0f);
+    return part * part * (3.0f - 2.0f * part);
+}
+
+// A CoverageField with its light, in the words of all volumes (render/vulkan/march_volumes.h).
+struct MarchVolume {
+    vec4 corner;         // xyz: of its field, relative to the eye, metres; w: between two nodes
+    vec4 to_noise[3];    // rows, as in ErosionConstants
+    uint bricks_x, bricks_y, bricks_z;
+    float per_node;      // 1 / metres between two nodes
+    uint first_table, first_clearance, first_nodes;  // of its words
+    uint first_light;
+    uint light_words;    // of its sun depths; those of the surroundings follow
+    float reach;         // metres to cloud per missing coverage, at most
+    float extinction_per_m;
+    float half_density;  // as in ErosionConstants from here on
+    float cap, base_width, top_width, dissolving_width;
+    float medium_width, fine_width, wisps, base_m;
+    float gain_fine, gain_coarse, medium_scale, fine_scale;
+    float medium_per_m, fine_per_m;
+    float least_coverage;
+    uint pad0;
+};
+
+struct March {
+    uint count;                    // of volumes
+    float per_unit;                // footprint of a pixel at distance 1
+    float fade_begins, fade_ends;  // metres from the eye
+    MarchVolume volumes[kMostVolumes];
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(MarchVolume) == 176 && offsetof(MarchVolume, first_table) == 80 &&
+              offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 16);
+
+}  // namespace nephos::shader
+#endif
+#endif

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/vulkan/march_volumes.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "density/detail_noise.h"
+#include "render/frame/marched_scene.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kEdge = CoverageField::kBrickNodes, kNodes = kEdge * kEdge * kEdge;
+static_assert(shader::kNodeEdge == kEdge && shader::kNodeWords == kNodes);
+static_assert(shader::kMarchLightNodes == kLightNodes && shader::kMarchLightWords == kLightNodesOfBrick);
+static_assert(4 * shader::kClearanceWords ==
+              CoverageField::kBrickCells * CoverageField::kBrickCells * CoverageField::kBrickCells);
+static_assert(shader::kLargeNoiseWords == kLargeNoiseVoxels * kLargeNoiseVoxels * kLargeNoiseVoxels);
+
+// Where the words of a volume begin.
+struct Places {
+    std::size_t table = 0, clearance = 0, nodes = 0, light = 0;
+    std::size_t cells_end = 0, light_end = 0;
+};
+
+Places places_after(const Places& before, const CloudVolume& volume) {
+    const std::size_t bricks = volume.field.places().size();
+    Places at;
+    at.table = before.cells_end;
+    at.clearance = at.table + volume.field.table().size();
+    at.nodes = at.clearance + bricks * shader::kClearanceWords;
+    at.cells_end = at.nodes + bricks * kNodes;
+    at.light = before.light_end;
+    at.light_end = at.light + 2 * bricks * kLightNodesOfBrick;
+    return at;
+}
+
+// Calls what(volume, places) for each that holds cloud; returns the last places.
+template <class What>
+Places for_each_volume(std::span<const CloudVolume> volumes, const What& what) {
+    Places at;
+    for (const CloudVolume& volume : volumes) {
+        if (volume.field.places().empty()) continue;
+        at = places_after(at, volume);
+        what(volume, at);
+    }
+    return at;
+}
+
+// Replaces a buffer by one with these words, which the device reads fast.
+void replace(const GpuDevice& gpu, GpuBuffer& buffer, std::span<const std::uint32_t> words) {
+    const std::span<const std::byte> bytes = std::as_bytes(words);
+    if (bytes.size() > gpu.properties.limits.maxStorageBufferRange)
+        throw Error(ErrorCode::usage, "this Vulkan device has no room for clouds with detail of " +
+                                          std::to_string(bytes.size()) + " bytes, but for at most " +
+                                          std::to_string(gpu.properties.limits.maxStorageBufferRange) +
+                                          ": choose the back-end cpu");
+    buffer = {};  // the old one goes before the new one comes
+    buffer = create_buffer(gpu, std::max<std::size_t>(bytes.size(), 4),
+                           vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferDst,
+                           HostAccess::none);
+    if (bytes.empty()) return;
+    const GpuBuffer staging =
+        create_buffer(gpu, bytes.size(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    write(gpu, staging, bytes);
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        commands.copyBuffer(*staging.buffer, *buffer.buffer, vk::BufferCopy(0, 0, bytes.size()));
+        buffer_barrier(commands, buffer, access::copy_to, access::compute);
+    });
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes) {
+    std::vector<std::uint32_t> words(for_each_volume(volumes, [](const auto&, const auto&) {}).cells_end);
+    for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
+        const CoverageField& field = volume.field;
+        std::memcpy(&words[at.table], field.table().data(), 4 * field.table().size());
+        for (std::size_t i = 0; i < field.clearance().size(); ++i)
+            words[at.clearance + i / 4] |= std::uint32_t(field.clearance()[i]) << (i % 4 * 8);
+        tbb::parallel_for(std::size_t{0}, field.places().size(), [&](std::size_t brick) {
+            const std::uint8_t* const from = &field.nodes()[brick * CoverageField::kBrickBytes];
+            std::uint32_t* const to = &words[at.nodes + brick * kNodes];
+            for (std::size_t i = 0; i < kNodes; ++i)
+                to[i] = from[2 * i] | std::uint32_t(from[2 * i + 1]) << 8 |
+                        std::uint32_t(from[2 * i + 2]) << 16 | std::uint32_t(from[2 * i + 3]) << 24;
+        });
+    });
+    return words;
+}
+
+std::vector<std::uint32_t> march_light(std::span<const CloudVolume> volumes) {
+    std::vector<std::uint32_t> words(for_each_volume(volumes, [](const auto&, const auto&) {}).light_end);
+    for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
+        const std::size_t count = volume.field.places().size() * kLightNodesOfBrick;
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto pair = [i](const std::vector<std::uint16_t>& of) {
+                return std::uint32_t(of[i]) | std::uint32_t(of[i + 1]) << 16;
+            };
+            words[at.light + i] = pair(volume.sun_depths);
+            words[at.light + count + i] = pair(volume.surroundings);
+        }
+    });
+    return words;
+}
+
+shader::March march_constants(std::span<const CloudVolume> volumes, const CameraFrame& camera,
+                              double pixels_per_unit) {
+    const MarchedScene scene(volumes, camera, pixels_per_unit);
+    shader::March march{shader::uint(scene.volumes.size()), scene.per_unit, scene.fade_begins, scene.fade_ends, {}};
+    std::size_t n = 0;
+    for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
+        const MarchedVolume& from = scene.volumes[n];
+        const ErosionConstants& e = volume.field.erosion();
+        shader::MarchVolume& to = march.volumes[n++];
+        to.corner = {from.corner[0], from.corner[1], from.corner[2], from.kernel.node_m};
+        for (std::size_t row = 0; row < 3; ++row)
+            to.to_noise[row] = {e.to_noise[row][0], e.to_noise[row][1], e.to_noise[row][2], e.to_noise[row][3]};
+        to.bricks_x = shader::uint(from.kernel.bricks[0]);
+        to.bricks_y = shader::uint(from.kernel.bricks[1]);
+        to.bricks_z = shader::uint(from.kernel.bricks[2]);
+        to.per_node = 1.0f / from.kernel.node_m;
+        to.first_table = shader::uint(at.table);
+        to.first_clearance = shader::uint(at.clearance);
+        to.first_nodes = shader::uint(at.nodes);
+        to.first_light = shader::uint(at.light);
+        to.light_words = shader::uint((at.light_end - at.light) / 2);
+        to.reach = from.reach;
+        to.extinction_per_m = from.kernel.extinction_per_m;
+        to.half_density = e.half_density;
+        to.cap = e.cap;
+        to.base_width = e.base_width;
+        to.top_width = e.top_width;
+        to.dissolving_width = e.dissolving_width;
+        to.medium_width = e.medium_width;
+        to.fine_width = e.fine_width;
+        to.wisps = e.wisps;
+        to.base_m = e.base_m;
+        to.gain_fine = e.gain[0];
+        to.gain_coarse = e.gain[1];
+        to.medium_scale = e.medium_scale;
+        to.fine_scale = e.fine_scale;
+        to.medium_per_m = e.medium_per_m;
+        to.fine_per_m = e.fine_per_m;
+        to.least_coverage = kLeastCoverage;
+    });
+    return march;
+}
+
+MarchVolumes::MarchVolumes(const GpuDevice& gpu) {
+    std::vector<std::uint32_t> words = detail_noise().large;
+    words.insert(words.end(), detail_noise().small.begin(), detail_noise().small.end());
+    replace(gpu, noise_, words);
+}
+
+void MarchVolumes::reserve(const GpuDevice& gpu, std::size_t pixels) {
+    states_ = {};  // the old one goes before the new one comes
+    states_ = create_buffer(gpu, 4 * sizeof(float) * pixels, vk::BufferUsageFlagBits::eStorageBuffer,
+                            HostAccess::none);
+}
+
+void MarchVolumes::use(const GpuDevice& gpu, const LitCloud& cloud) {
+    if (cells_version_ != cloud.volumes_version) {
+        cells_version_ = 0;  // until it is there
+        replace(gpu, cells_, march_cells(cloud.volumes));
+        cells_version_ = cloud.volumes_version;
+    }
+    if (light_version_ != cloud.volumes_light) {
+        light_version_ = 0;
+        replace(gpu, light_, march_light(cloud.volumes));
+        light_version_ = cloud.volumes_light;
+    }
+}
+
+}  // namespace nephos

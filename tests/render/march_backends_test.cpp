@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// Clouds with detail, marched by the shaders, against those of the processor.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "density/density_grid.h"
+#include "density/metaballs.h"
+#include "render/renderer.h"
+#include "render/renderer_test_access.h"
+#include "tests/render/picture_checks.h"
+#include "tests/render/random_billboards.h"
+#include "tests/render/voxel_cloud.h"
+
+namespace nephos {
+namespace {
+
+// Heaps of voxels with detail, with the metaballs that stand for them.
+struct DetailedCloud {
+    std::vector<Metaball> balls;
+    std::vector<DetailedVoxels> detailed;
+    double extinction_per_m = 0.15;
+
+    void add(const Vec3& origin_m, int seed, const DetailOptions& options = {}) {
+        const Extent extent{24, 20, 14};
+        std::vector<float> values(extent.cells(), 0.0f);
+        for (int z = 0; z < extent.z; ++z) {
+            for (int y = 0; y < extent.y; ++y) {
+                for (int x = 0; x < extent.x; ++x) {
+                    const double dx = (x + 0.5) / extent.x - 0.5, dy = (y + 0.5) / extent.y - 0.5,
+                                 dz = (z + 0.5) / extent.z - 0.3;
+                    const double inside = 1 - 5 * (dx * dx + dy * dy + dz * dz);
+                    if (inside > 0)
+                        values[linear_index(extent, x, y, z)] =
+                            float(0.6 * inside * test::voxel_noise(x, y, z, seed));
+                }
+            }
+        }
+        DetailedVoxels& part = detailed.emplace_back();
+        part.density = DensityGrid::from_dense(values, extent, {origin_m, 40.0});
+        part.setting = {.options = options, .extinction_per_m = extinction_per_m, .drift_m = {1234, -567, 0}};
+        const std::vector<Metaball> own = metaballs(part.density, part.setting.metaball_radius_cells);
+        part.first = balls.size();
+        part.count = own.size();
+        balls.insert(balls.end(), own.begin(), own.end());
+    }
+
+    Splats splats() const {
+        Splats result;
+        result.metaballs = {balls, extinction_per_m, metaball_normalisation(2), detailed};
+        return result;
+    }
+};
+
+// Pixels that differ by more than 1/255 in any channel, of pictures in which white is 1.
+std::size_t different(const Picture& a, const Picture& b) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < a.pixels(); ++i) {
+        float most = 0;
+        for (std::size_t c = 0; c < 3; ++c)
+            most = std::max(most, std::abs(a.beauty[3 * i + c] - b.beauty[3 * i + c]) /
+                                      std::max(1.0f, b.beauty[3 * i + c]));
+        if (most > 1.0f / 255.0f) ++count;
+    }
+    return count;
+}
+
+class MarchBackends : public ::testing::Test {
+  protected:
+    void TearDown() override { test::expect_no_messages(vulkan_); }
+
+    void expect_same(const Splats& splats, const RenderOptions& options, const std::string& what) {
+        const Picture slow = cpu_.draw_splats(splats, options), fast = vulkan_.draw_splats(splats, options);
+        const std::size_t count = different(fast, slow);
+        std::printf("%s: %zu of %zu pixels differ, beauty by up to %.5f, transmittance %.5f\n", what.c_str(), count,
+                    slow.pixels(), double(test::largest_difference(fast.beauty, slow.beauty)),
+                    double(test::largest_difference(fast.transmittance, slow.transmittance)));
+        EXPECT_LE(count, slow.pixels() / 1000) << what;
+        EXPECT_LE(test::largest_difference(fast.shadow, slow.shadow), 1e-6f) << what;
+        std::size_t covered = 0;
+        for (const float each : slow.transmittance) covered += each < 0.5f ? 1 : 0;
+        EXPECT_GT(covered, slow.pixels() / 100) << what;
+        test::expect_same_depths(fast, slow, 0.1f, 0.01f);
+    }
+
+    Renderer cpu_{test::validated(Splatting::cpu)}, vulkan_{test::validated(Splatting::vulkan)};
+};
+
+struct MarchView {
+    const char* name;
+    Vec3 from, to;
+    double fov_deg;
+};
+
+// With 96 x 72 pixels the footprint of a pixel is about 12 m, 2 m, 6 m (rising to where rays end), 3 m and 20 m.
+constexpr MarchView kViews[] = {{"from afar", {0, -2000, 500}, {480, 400, 1250}, 20},
+                                {"near", {480, -350, 1250}, {480, 400, 1200}, 20},
+                                {"from below", {300, -300, 400}, {480, 500, 1300}, 60},
+                                {"from within", {480, 300, 1250}, {500, 2000, 1250}, 40},
+                                {"where metaballs take over", {0, -2800, 800}, {480, 400, 1250}, 30}};
+
+TEST_F(MarchBackends, Agree) {
+    DetailedCloud cloud;
+    cloud.add({0, 0, 1000}, 1);
+    for (const MarchView& each : kViews)
+        expect_same(cloud.splats(), test::view(each.from, each.to, each.fov_deg, 96, 72), each.name);
+}
+
+TEST_F(MarchBackends, AgreeOnSeveralVolumes) {
+    DetailedCloud cloud;
+    DetailOptions fibres;
+    fibres.stretch = 8;
+    fibres.size_m = 300;
+    cloud.add({0, 0, 1000}, 1);
+    cloud.add({300, 200, 1250}, 2, fibres);
+    cloud.add({-900, 900, 1100}, 3);
+    for (const MarchView& each : kViews)
+        expect_same(cloud.splats(), test::view(each.from, each.to, each.fov_deg, 96, 72), each.name);
+}
+
+TEST_F(MarchBackends, AgreeThroughAir) {
+    DetailedCloud cloud;
+    cloud.add({0, 0, 1000}, 1);
+    for (const MarchView& each : kViews) {
+        RenderOptions options = test::view(each.from, each.to, each.fov_deg, 96, 72);
+        options.shells.count = 24;
+        options.light_shafts.strength = 1;
+        options.fog.extinction_per_m = 2e-4;
+        options.fog.height_m = 900;
+        expect_same(cloud.splats(), options, each.name);
+    }
+}
+
+TEST_F(MarchBackends, AgreeBetweenBillboards) {
+    DetailedCloud cloud;
+    cloud.add({-480, -400, 800}, 1);
+    const std::vector<CloudBillboard> billboards = test::random_billboards(5, 60, 2);
+    for (MarchView each : kViews) {
+        each.from.y -= 600;
+        each.from.x -= 480;
+        each.to = {0, 0, 1050};
+        Splats splats = cloud.splats();
+        splats.clouds = test::kBillboardClouds;
+        splats.billboards = billboards;
+        expect_same(splats, test::view(each.from, each.to, each.fov_deg, 96, 72), each.name);
+    }
+}
+
+// Neither batches of splats nor parts of the picture show; nor do the clouds of another frame.
+TEST_F(MarchBackends, PartsAreWholePictures) {
+    Renderer parts(test::validated(Splatting::vulkan, 40));
+    RendererTestAccess::limit_lists(parts, std::size_t{1} << 24, 37);
+    for (const int seed : {1, 4}) {
+        DetailedCloud cloud;
+        cloud.add({0, 0, 1000}, seed);
+        for (const double distance : {2400.0, 2800.0}) {
+            RenderOptions options = test::view({0, -distance, 800}, {480, 400, 1250}, 30, 96, 72);
+            if (seed == 4) options.light_shafts.strength = 1;
+            const Picture whole = vulkan_.draw_splats(cloud.splats(), options),
+                          other = parts.draw_splats(cloud.splats(), options);
+            EXPECT_LE(test::largest_difference(whole.beauty, other.beauty), 0.5f / 255.0f);
+            EXPECT_LE(test::largest_difference(whole.transmittance, other.transmittance), 0.5f / 255.0f);
+        }
+    }
+    test::expect_no_messages(parts);
+}
+
+}  // namespace
+}  // namespace nephos
