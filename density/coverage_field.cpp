@@ -269,7 +269,8 @@ void check(const DetailOptions& o) {
     require(within(o.stretch, 1, 50), "stretch", o.stretch, "1..50");
     require(within(o.wisps, 0, 1), "wisps", o.wisps, "0..1");
     require(within(o.thermals, 0, 1), "thermals", o.thermals, "0..1");
-    require(within(o.mean_free_path_m, 1, 10000), "mean_free_path_m", o.mean_free_path_m, "1..10000");
+    require(o.mean_free_path_m == 0 || within(o.mean_free_path_m, 1, 10000), "mean_free_path_m", o.mean_free_path_m,
+            "0 or 1..10000");
 }
 
 CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture)
@@ -533,7 +534,8 @@ void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
     ErosionConstants& e = erosion_;
     // Extinction of zero: nothing shows; any number will do.
     const double extinction = std::max(setting.extinction_per_m, 1e-9);
-    e.half_density = float(std::clamp(1 / (2 * extinction * o.mean_free_path_m), 1e-6, 10.0));
+    const double free_path_m = o.mean_free_path_m > 0 ? o.mean_free_path_m : 1.5 * node_m_;
+    e.half_density = float(std::clamp(1 / (2 * extinction * free_path_m), 1e-6, 10.0));
     e.cap = 10 * e.half_density;
     const auto strength = float(o.strength);
     e.base_width = std::max(0.5f * strength, 0.02f);

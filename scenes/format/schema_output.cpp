@@ -293,9 +293,10 @@ const Section& detail_section() {
              "thermals", "", between(0, 1),
              "Strength of towers and hollows of two and four times `size_m`, between the bumps and the clouds."),
          key<&DetailOptions::mean_free_path_m>(
-             "mean_free_path_m", "m", between(1, 10'000),
-             "Mean free path of light in cloud where half of the space is cloud. Smaller makes crisper, denser "
-             "clouds of the same mass; in real cumulus it is 10 to 20 m.")},
+             "mean_free_path_m", "m", between(0, 10'000),
+             "Mean free path of light in cloud where half of the space is cloud; 0: three quarters of a cell. Smaller "
+             "makes crisper, denser clouds of the same mass; in real cumulus it is 10 to 20 m. Sheets and thin clouds "
+             "want more: less than one in two places of theirs would be cloud otherwise.")},
         nullptr};
     return section;
 }

@@ -304,7 +304,7 @@ TEST(Detail, RefusesOptionsOutOfRange) {
     for (const auto change : {+[](DetailOptions& o) { o.size_m = 1; }, +[](DetailOptions& o) { o.strength = 2; },
                               +[](DetailOptions& o) { o.stretch = 0.5; }, +[](DetailOptions& o) { o.wisps = -1; },
                               +[](DetailOptions& o) { o.thermals = 1.5; },
-                              +[](DetailOptions& o) { o.mean_free_path_m = 0; }}) {
+                              +[](DetailOptions& o) { o.mean_free_path_m = 0.5; }}) {
         DetailSetting setting = cumulus_setting();
         change(setting.options);
         EXPECT_THROW(CoverageField(grid, setting), Error);
