@@ -377,6 +377,40 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     set_erosion(setting, base * cell);
     measure_clearance();
     set_distances();
+    const Boundary boundaries[3] = {setting.boundaries.x, setting.boundaries.y, setting.boundaries.z};
+    std::array<std::vector<std::uint8_t>, 3> counted;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        counted[axis].assign(std::size_t(bricks_[axis]) * kCells, 1);
+        for (int cell = 0; boundaries[axis] == Boundary::periodic && cell < bricks_[axis] * kCells; ++cell)
+            if (cell < before || cell >= before + cells_of[axis]) counted[axis][std::size_t(cell)] = 0;
+    }
+    measure_cells(counted);
+}
+
+// The cells are those of the closed form; what they lack of the grid's mass then makes all denser.
+void CoverageField::measure_cells(const std::array<std::vector<std::uint8_t>, 3>& counted) {
+    constexpr std::size_t kSamples = 2 * kCells, kOfBrick = kCells * kCells * kCells;
+    cell_density_.assign(places_.size() * kOfBrick, 0.0f);
+    std::vector<double> sums(places_.size(), 0);
+    tbb::parallel_for(std::size_t{0}, places_.size(), [&](std::size_t n) {
+        std::array<float, kSamples * kSamples * kSamples> samples;
+        detailed_density_of_brick(*this, n, samples);
+        float* const to = &cell_density_[n * kOfBrick];
+        const auto at = unpacked(std::size_t(places_[n]), bricks_);
+        const auto is_counted = [&](std::size_t axis, std::size_t sample) {
+            return counted[axis][std::size_t(at[axis]) * kCells + sample / 2] != 0;
+        };
+        for (std::size_t i = 0; i < samples.size(); ++i) {
+            const std::size_t x = i % kSamples, y = i / kSamples % kSamples, z = i / kSamples / kSamples;
+            to[(z / 2 * kCells + y / 2) * kCells + x / 2] += 0.125f * samples[i];
+            if (is_counted(0, x) && is_counted(1, y) && is_counted(2, z)) sums[n] += double(samples[i]);
+        }
+    });
+    const double sum = std::accumulate(sums.begin(), sums.end(), 0.0);
+    if (!(sum > 0)) return;
+    const auto more = float(std::clamp(mass_ / sum, 0.5, 2.0));
+    for (float& gain : erosion_.gain) gain *= more;
+    for (float& density : cell_density_) density *= more;
 }
 
 // Cells as bits: a row of three bricks' cells along x in a word.

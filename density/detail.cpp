@@ -120,7 +120,7 @@ DetailKernel::DetailKernel(const CoverageField& field)
       corner_m{field.corner_m().x, field.corner_m().y, field.corner_m().z} {}
 
 std::size_t CoverageField::memory_bytes() const {
-    return nodes_.size() + clearance_.size() + 4 * (table_.size() + places_.size());
+    return nodes_.size() + clearance_.size() + 4 * cell_density_.size() + 4 * (table_.size() + places_.size());
 }
 
 std::vector<float> detailed_density(const CoverageField& field, const Vec3& corner_m,

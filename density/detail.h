@@ -10,7 +10,8 @@
 // and 40 m (DetailOptions::size_m), with a medium one of 21 to 5 m and a fine one of 2.5 to 0.6 m near the eye, and
 // mask(u) = clamp(u / softness + 1/2, 0, 1). G(C) is the fraction of the noise below C, so that the mean over the
 // noise is D again: mass is conserved in closed form (cloudy_fraction() in detail_formulas.h), but for the thinnest
-// fringe, which holds no cloud; the rest is denser by CoverageField::gain() for it.
+// fringe, which holds no cloud, and for the few bumps that a small cloud has. For these the rest is denser by a gain,
+// so that the whole field has the mass of the grid.
 //
 // The noise lies fixed in air that drifts with the wind. It varies with the height above the base (billows above,
 // wisps below) and with the growth of the cloud, -1 where it dissolves (shreds) to 1 where it grows (crisp bumps).
@@ -85,12 +86,18 @@ class CoverageField {
     // kBrickCells^3 of each of these, x fastest: the number of cells to the next that may hold cloud, at most 4.
     const std::vector<std::uint8_t>& clearance() const { return clearance_; }
 
+    // kBrickCells^3 of each of these, x fastest: the mean detailed density of each cell, of eight samples whose
+    // footprint is half a cell.
+    const std::vector<float>& cell_density() const { return cell_density_; }
+
     const ErosionConstants& erosion() const { return erosion_; }
     double extinction_per_m() const { return extinction_per_m_; }
     std::size_t memory_bytes() const;
 
   private:
     void measure_clearance();
+    // `counted`: 1 for each layer of cells on each axis whose mass is that of the grid, not of an image.
+    void measure_cells(const std::array<std::vector<std::uint8_t>, 3>& counted);
     void set_distances();
     void set_erosion(const DetailSetting& setting, double base_m);
     float gain_at(double footprint_m) const;
@@ -100,6 +107,7 @@ class CoverageField {
     std::array<int, 3> bricks_{};
     std::vector<std::int32_t> table_, places_;
     std::vector<std::uint8_t> nodes_, clearance_;
+    std::vector<float> cell_density_;
     std::array<double, 256> histogram_{};  // of t over the nodes
     double mass_ = 0;                      // sum of D over the nodes, without thermals
     ErosionConstants erosion_;

@@ -14,22 +14,10 @@ namespace nephos {
 namespace {
 
 constexpr int kCells = CoverageField::kBrickCells;
-constexpr std::size_t kCellsOfBrick = std::size_t(kCells) * kCells * kCells;
 
-// Means of the eight samples in each cell, whose footprint is half a cell.
 std::vector<float> mean_extinction(const CoverageField& field) {
-    std::vector<float> result(field.places().size() * kCellsOfBrick);
-    const auto extinction = float(field.extinction_per_m());
-    tbb::parallel_for(std::size_t{0}, field.places().size(), [&](std::size_t n) {
-        constexpr int kSamples = 2 * kCells;
-        std::array<float, std::size_t(kSamples) * kSamples * kSamples> samples;
-        detailed_density_of_brick(field, n, samples);
-        float* const to = &result[n * kCellsOfBrick];
-        for (std::size_t i = 0; i < samples.size(); ++i) {
-            const std::size_t x = i % kSamples, y = i / kSamples % kSamples, z = i / kSamples / kSamples;
-            to[(z / 2 * kCells + y / 2) * kCells + x / 2] += 0.125f * extinction * samples[i];
-        }
-    });
+    std::vector<float> result = field.cell_density();
+    for (float& number : result) number *= float(field.extinction_per_m());
     return result;
 }
 
