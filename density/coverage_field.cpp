@@ -381,8 +381,8 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     std::array<std::vector<std::uint8_t>, 3> counted;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         counted[axis].assign(std::size_t(bricks_[axis]) * kCells, 1);
-        for (int cell = 0; boundaries[axis] == Boundary::periodic && cell < bricks_[axis] * kCells; ++cell)
-            if (cell < before || cell >= before + cells_of[axis]) counted[axis][std::size_t(cell)] = 0;
+        for (int c = 0; boundaries[axis] == Boundary::periodic && c < bricks_[axis] * kCells; ++c)
+            if (c < before || c >= before + cells_of[axis]) counted[axis][std::size_t(c)] = 0;
     }
     measure_cells(counted);
 }

@@ -15,6 +15,9 @@
 namespace nephos {
 namespace {
 
+constexpr double kLeastVoxelWithDetail_m = 20;
+
+
 RenderOptions render_options(const VolumePictureOptions& given, const std::optional<Scene>& scene,
                              const DensityGrid& grid, double time_s) {
     RenderOptions options;
@@ -95,6 +98,9 @@ VolumePicture draw_volume(const std::string& file, const LoadedDensity& loaded,
     drawn.density.extinction_per_m = result.extinction_per_m;
     drawn.density.metaball_radius_cells = result.metaball_radius_voxels;
     drawn.frames.exr = given.depth;
+    // Voxels that are as fine as the bumps, or were refined with detail, have what it would add.
+    if (loaded.refine > 1 || loaded.density.placement().cell_size_m < kLeastVoxelWithDetail_m)
+        drawn.density.detail.enabled = false;
     FramePainter painter(drawn, device);
     result.backend = painter.backend_name();
     result.device = painter.device_name();

@@ -43,7 +43,8 @@ struct VolumePicture {
     std::string backend, device;          // that drew
 };
 
-// Draws the density of a file named `file` through FramePainter: with a scene as a frame of that scene at the
+// Voxels of at least 20 m of a file that was not refined are drawn with detail (density/detail.h), the scene's or its
+// defaults. Draws the density of a file named `file` through FramePainter: with a scene as a frame of that scene at the
 // file's time (at 0 s when it names none), with its rain, ground cover, lightning and clouds that have no
 // density. Those are simulated to that time (scene_moment.h). Throws as FramePainter and SceneMoment, and
 // Error(usage) when camera and target are one point.
