@@ -91,6 +91,11 @@ Node node_at(uint v, BrickPlace place) {
     return Node(both.x * (1.0 / 255.0), both.y * (1.0 / 127.0) - 128.0 / 127.0);
 }
 
+// Rounded as the processor does it: of the fine noise there are thousands of voxels in a tile.
+float turned(vec4 row, vec3 place) {
+    return fma(row.x, place.x, fma(row.y, place.y, fma(row.z, place.z, row.w)));
+}
+
 struct Eroded {
     float density;
     float margin;  // coverage that is missing to be cloud; not above 0 inside
@@ -108,9 +113,8 @@ Eroded eroded(uint v, Node node, vec3 place, float footprint, bool margins) {
     float low = max(0.5 - others - 0.5 * large, march.volumes[v].least_coverage);
     bool needed = c > low;
     if (!needed && !margins) return Eroded(0.0, 0.0);
-    vec4 rows[3] = march.volumes[v].to_noise;
-    vec3 tiles = vec3(dot(rows[0].xyz, place) + rows[0].w, dot(rows[1].xyz, place) + rows[1].w,
-                      dot(rows[2].xyz, place) + rows[2].w);
+    vec3 tiles = vec3(turned(march.volumes[v].to_noise[0], place), turned(march.volumes[v].to_noise[1], place),
+                      turned(march.volumes[v].to_noise[2], place));
     float noise = large * (noise_at(0u, 7u, tiles * 128.0) - 0.5) + 0.5;
     if (needed && abs(c - noise) < others && medium > 0.0) {
         vec3 at = tiles * (march.volumes[v].medium_scale * 64.0);

@@ -102,11 +102,9 @@ TEST_P(ShippedScenes, AreTheSameInEveryBackend) {
     EXPECT_LT(comparison.clearest, 0.99f) << "nothing to see";
     for (std::size_t way = 1; way < 3; ++way) EXPECT_LE(comparison.apart[way], 1.0f / 255) << "way " << way;
     EXPECT_LE(comparison.apart_in_detail, comparison.pixels / 2000) << "with detail";
-    std::printf("with detail %zu numbers apart; ", comparison.apart_in_detail);
-    std::printf("frame %d, %zu metaballs, least transmittance %.3f; apart by %.5f, %.5f
-", middle,
-                comparison.given, double(comparison.clearest), double(comparison.apart[1]),
-                double(comparison.apart[2]));
+    std::printf("frame %d, %zu metaballs, least transmittance %.3f; apart by %.5f, %.5f; with detail %zu numbers\n",
+                middle, comparison.given, double(comparison.clearest), double(comparison.apart[1]),
+                double(comparison.apart[2]), comparison.apart_in_detail);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, ShippedScenes, testing::ValuesIn(shipped_scenes()), [](const auto& scene) {
