@@ -10,6 +10,7 @@
 // Private to the module.
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -56,12 +57,15 @@ struct FrameDescription {
     // The same of the billboards alone.
     ViewSortedSplats view_sorted_billboards() const { return view_sorted(PreparedCloud{}); }
     // Returns the shells of air between the clouds, for which the light of `cloud` must be on the host.
-    AirShells shells() const {
-        return air_shells(options, cloud.cloud, cloud.frame, cloud.shadow, cloud.shadow_size, cloud.light,
-                          splats.time_s, air.noise, air.shade);
-    }
+    AirShells shells() const { return shells(cloud.shadow); }
+    // The same without the plane of the shade map that is made of the shadow map, which may be on a device.
+    AirShells shells_without_light() const { return shells({}); }
 
   private:
+    AirShells shells(std::span<const float> shadow) const {
+        return air_shells(options, cloud.cloud, cloud.frame, shadow, cloud.shadow_size, cloud.light,
+                          splats.time_s, air.noise, air.shade);
+    }
     ViewSortedSplats view_sorted(const PreparedCloud& metaballs) const {
         const StageTimer timer(&times, DrawStage::view_sorting);
         ViewSortedSplats order = sort_for_view(metaballs, splats, camera,

@@ -146,6 +146,7 @@ class ShadeMap {
 
     // Means of the shadow map, 0..255, with a border of full light.
     std::vector<std::uint32_t> means() const {
+        if (shadow_.empty()) return std::vector<std::uint32_t>(texels(), 0);
         std::vector<std::uint32_t> light(texels(), 255);
         tbb::parallel_for(0, inner_, [&](int row) {
             for (int column = 0; column < inner_; ++column) {

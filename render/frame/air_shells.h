@@ -77,8 +77,8 @@ std::size_t shells_before(const shader::Shells& data, float distance);
 bool has_shells(const RenderOptions& options, const PreparedCloud& cloud);
 
 // Returns the shells of a frame; none when the options have none or they would have no effect. `shadow`: the
-// texels of the shadow map; `light`: number of the state of cloud, frame and shadow; `time_s`: simulated time
-// of the picture. What is returned lives as long as `cache` is not given to another call.
+// shadow map, or empty: its plane of `shade` is left 0; `light`: version of cloud, frame and shadow; `time_s`:
+// simulated time of the picture. What is returned lives as long as `cache` is not given to another call.
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
                      std::span<const float> shadow, int shadow_size, Version light, double time_s,
                      FogNoise& noise, ShadeCache& cache);

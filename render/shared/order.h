@@ -76,6 +76,13 @@ struct OrderStep {
     uint per_item;  // centres in an item of work
 };
 
+// Push constants of the light of the shade map.
+struct ShadeStep {
+    uint columns;      // of the shade map, and rows
+    uint shadow_size;  // of the shadow map, texels
+    uint texels;       // of the shadow map along an edge of a texel of the shade map
+};
+
 // VkDispatchIndirectCommand
 struct Groups {
     uint x, y, z;

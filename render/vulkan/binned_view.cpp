@@ -123,7 +123,9 @@ BinnedView::BinnedView(const GpuDevice& gpu, const GpuImage& unused, const vk::r
       unused_(unused),
       clamped_(clamped),
       white_beyond_(white_beyond),
-      lists_(gpu) {
+      lists_(gpu),
+      shade_light_(create_compute_pipeline(gpu, shaders().shade_light_comp)),
+      shade_sets_(gpu) {
     for (std::size_t n = 0; n < kFramesInFlight; ++n) slots_.push_back(std::make_unique<Slot>(gpu));
     use_shade({}, 0);  // must be there, used or not
     use_cloud({});
@@ -184,7 +186,8 @@ void BinnedView::use_flash(std::span<const shader::uint> fractions) {
     upload(lists_.flash(), std::as_bytes(fractions));
 }
 
-void BinnedView::use_shade(std::span<const std::uint32_t> words, std::uint64_t serial) {
+void BinnedView::use_shade(std::span<const std::uint32_t> words, std::uint64_t serial,
+                           const GpuImage* shadow_map, const shader::ShadeStep& step) {
     if (shade_.bytes != 0 && serial == shade_serial_) return;
     flush();
     const std::size_t bytes = std::max<std::size_t>(words.size_bytes(), 4);
@@ -195,6 +198,18 @@ void BinnedView::use_shade(std::span<const std::uint32_t> words, std::uint64_t s
             HostAccess::none);
     }
     upload(shade_, std::as_bytes(words));
+    if (shadow_map != nullptr) {
+        const std::size_t texels = std::size_t(step.columns) * step.columns;
+        shade_sets_.reset();
+        const vk::DescriptorSet set =
+            shade_sets_.fill(shade_light_, {{4, *shadow_map, white_beyond_}, {14, shade_}});
+        submit_and_wait(gpu_, [&](const vk::raii::CommandBuffer& commands) {
+            full_barrier(commands);
+            begin_compute(commands, shade_light_, set, step);
+            dispatch_groups(commands, (texels + shader::kComputeGroup - 1) / shader::kComputeGroup);
+            full_barrier(commands);
+        });
+    }
     shade_serial_ = serial;
 }
 

@@ -63,8 +63,10 @@ class BinnedView {
     // Sets the transmitted fraction of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> fractions);
     // Uploads the shade map of the shells and the noise of the fog (air_shells.h), unless these are there
-    // already.
-    void use_shade(std::span<const std::uint32_t> words, std::uint64_t serial);
+    // already, and computes its plane of light from the shadow map. `shadow_map`: null: it is there, or there is no
+    // cloud.
+    void use_shade(std::span<const std::uint32_t> words, std::uint64_t serial,
+                   const GpuImage* shadow_map = nullptr, const shader::ShadeStep& step = {});
 
     // Begins to draw a tile into `picture`, which must stay where it is until it is finished. `first`: of it.
     void begin_tile(const ViewInputs& what, const shader::Frame& frame, const Tile& tile, Picture& picture,
@@ -116,6 +118,8 @@ class BinnedView {
     std::optional<DeviceSun> sun_;  // created when it is needed
     std::size_t balls_ = 0;
     std::size_t batch_ = 0;  // splats of a batch for which the lists of this cloud had room
+    Pipeline shade_light_;
+    DescriptorSets shade_sets_;
     GpuBuffer shade_, radiance_, depth_;
     GpuImage billboard_textures_;  // created with the first billboard
     std::uint64_t shade_serial_ = 0;

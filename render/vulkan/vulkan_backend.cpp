@@ -30,6 +30,12 @@ std::vector<shader::SeenBillboard> seen_billboards(const ViewSortedSplats& order
     return seen;
 }
 
+shader::ShadeStep shade_step(const ShadeCache& shade, int shadow_size) {
+    return {.columns = shader::uint(shade.columns),
+            .shadow_size = shader::uint(shadow_size),
+            .texels = shader::uint(std::lround(shadow_size / std::max(shade.texels_per_map, 1.0)))};
+}
+
 }  // namespace
 
 VulkanBackend::VulkanBackend(GpuDevice device) : scene_(std::move(device)) {
@@ -116,9 +122,11 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
         std::ranges::transform(frame.lightning, fractions.begin(), unorm16);
         view().use_flash(fractions);
     }
-    if (has_shells(frame.options, cloud.cloud)) fetch_light(cloud);
-    const AirShells shells = frame.shells();
-    if (shells.any()) view().use_shade(shells.shade, shells.serial);
+    const GpuImage& shadow_map = scene_.shadow_map(cloud);
+    const AirShells shells = frame.shells_without_light();
+    if (shells.any())
+        view().use_shade(shells.shade, shells.serial, cloud.cloud.visible.empty() ? nullptr : &shadow_map,
+                         shade_step(frame.air.shade, cloud.shadow_size));
     shader::March march{};
     if (!cloud.volumes.empty()) {
         march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera));
@@ -132,7 +140,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                                       .march = march.count > 0},
                           .order = order_frame(frame.camera, frame.options.camera, frame.options.ground,
                                                !frame.lightning.empty(), !cloud.volumes.empty()),
-                          .shadow_map = &scene_.shadow_map(cloud),
+                          .shadow_map = &shadow_map,
                           .sky = frame.sky != nullptr ? &scene_.sky_image(*frame.sky) : nullptr,
                           .scattering = &scene_.scattering(frame.table),
                           .shells = shells.any() ? &shells.data : nullptr,
