@@ -146,7 +146,8 @@ void RendererTestAccess::limit_splats(Renderer& renderer, std::size_t splats) {
 }
 
 std::size_t RendererTestAccess::overflows(const Renderer& renderer) {
-    const BinnedView* const view = vulkan(renderer) == nullptr ? nullptr : vulkan(renderer)->view_if_created();
+    const BinnedView* const view =
+        vulkan(renderer) == nullptr ? nullptr : vulkan(renderer)->view_if_created();
     return view != nullptr ? view->overflows : 0;
 }
 

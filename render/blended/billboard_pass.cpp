@@ -23,8 +23,7 @@ void BillboardPass::use_billboards(const GpuDevice& gpu, std::span<const shader:
 }
 
 vk::DescriptorSet BillboardPass::fill(DescriptorSets& sets, const Resources& resources) const {
-    return sets.fill(pipeline_,
-                     resources.with({{1, billboards_}, {2, clouds_}, {3, textures_, sampler_}}));
+    return sets.fill(pipeline_, resources.with({{1, billboards_}, {2, clouds_}, {3, textures_, sampler_}}));
 }
 
 }  // namespace nephos

@@ -15,7 +15,8 @@ namespace nephos {
 class BillboardPass {
   public:
     // `attachments` are those of the view pass.
-    BillboardPass(const GpuDevice& gpu, std::span<const vk::Format> attachments, const ShaderVariant& variant);
+    BillboardPass(const GpuDevice& gpu, std::span<const vk::Format> attachments,
+                  const ShaderVariant& variant);
 
     // Sets the clouds of later draws.
     void use_clouds(const GpuDevice& gpu, std::span<const shader::ViewCloud> clouds);

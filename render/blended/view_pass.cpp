@@ -15,8 +15,8 @@ constexpr std::array kFormats{vk::Format::eR32G32B32A32Sfloat, vk::Format::eR32S
 }  // namespace
 
 ViewPass::ViewPass(const GpuDevice& gpu, const ShaderVariant& variant)
-    : background_(create_graphics_pipeline(gpu, shaders().background_vert, shaders().background_frag, kFormats,
-                                           Blend::none, variant)),
+    : background_(create_graphics_pipeline(gpu, shaders().background_vert, shaders().background_frag,
+                                           kFormats, Blend::none, variant)),
       splat_(create_graphics_pipeline(gpu, shaders().view_splat_vert, shaders().view_splat_frag, kFormats,
                                       Blend::over, variant)),
       integrated_splat_(create_graphics_pipeline(gpu, shaders().view_splat_vert, shaders().view_splat_frag,
@@ -122,9 +122,8 @@ void ViewPass::draw_batch(const GpuDevice& gpu, vk::Extent2D area, const ViewSor
         const vk::DescriptorSet splats = sets_.fill(splat_, resources_),
                                 integrated_splats = sets_.fill(integrated_splat_, resources_),
                                 air = shell_.exists() ? sets_.fill(shell_, resources_) : vk::DescriptorSet();
-        const vk::DescriptorSet textured = billboards.begin < billboards.end
-                                               ? billboards_.fill(sets_, resources_)
-                                               : vk::DescriptorSet();
+        const vk::DescriptorSet textured =
+            billboards.begin < billboards.end ? billboards_.fill(sets_, resources_) : vk::DescriptorSet();
         const auto use = [&](const Pipeline& pipeline, vk::DescriptorSet set) {
             bind(commands, vk::PipelineBindPoint::eGraphics, pipeline, set);
         };

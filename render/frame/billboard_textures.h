@@ -15,7 +15,7 @@ namespace nephos {
 inline constexpr int kBillboardKinds = 3;
 inline constexpr int kBillboardVariants = 4;  // layers of a kind; layer = kind * kBillboardVariants + variant
 inline constexpr int kBillboardTexels = int(shader::kBillboardTexels);
-inline constexpr int kBillboardLevels = 5;    // 128 .. 8 texels: a coarser one would consist of its rim
+inline constexpr int kBillboardLevels = 5;  // 128 .. 8 texels: a coarser one would consist of its rim
 
 // One mip level of all layers: texel (i, j) of layer l is the pair at 2 * ((l * side + j) * side + i), row 0
 // at the top. First value: opacity; second: opacity times a brightness of 0.7..1. Both 0..255 for 0..1.

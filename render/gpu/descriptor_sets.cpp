@@ -162,8 +162,7 @@ vk::DescriptorSet DescriptorSets::fill(const Pipeline& pipeline, const Resources
             // Shaders see no more of a buffer than the device allows.
             const vk::DeviceSize seen =
                 type == vk::DescriptorType::eStorageBuffer
-                    ? std::min<vk::DeviceSize>(resource->bytes,
-                                               gpu_->properties.limits.maxStorageBufferRange)
+                    ? std::min<vk::DeviceSize>(resource->bytes, gpu_->properties.limits.maxStorageBufferRange)
                     : VK_WHOLE_SIZE;
             buffers[i] = vk::DescriptorBufferInfo(resource->buffer, 0, seen);
             write.pBufferInfo = &buffers[i];

@@ -154,7 +154,8 @@ std::string name_of(const vk::raii::PhysicalDevice& physical) {
 
 // True when `requested` is the device's number or, unless it is a number, a part of its name.
 bool is_named(const std::string& requested, std::size_t number, const std::string& name) {
-    if (requested.find_first_not_of("0123456789") == std::string::npos) return requested == std::to_string(number);
+    if (requested.find_first_not_of("0123456789") == std::string::npos)
+        return requested == std::to_string(number);
     return name.find(requested) != std::string::npos;
 }
 

@@ -153,8 +153,8 @@ Pipeline create_compute(const GpuDevice& gpu, ShaderCode code, std::span<const S
     vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main",
                                             &constants.info);
     if (subgroup_size != 0) stage.pNext = &subgroup;
-    result.pipeline = vk::raii::Pipeline(gpu.device, nullptr,
-                                         vk::ComputePipelineCreateInfo({}, stage, *result.layout));
+    result.pipeline =
+        vk::raii::Pipeline(gpu.device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *result.layout));
     return result;
 }
 

@@ -39,11 +39,12 @@ NEPHOS_CONST uint kTileHeight = 16u;
 NEPHOS_CONST uint kQueriesPerLane = 4u;
 NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
 NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance below which splats behind are skipped
-NEPHOS_CONST uint kIntegrate = 1u;      // flag: evaluate the integral along the ray, do not use the textures
-NEPHOS_CONST uint kNotFitted = 4u;      // flag: the tiles evaluate the integral, whatever the billboards do
-NEPHOS_CONST uint kBillboardFlag = 8u;  // flag, of no metaball: a billboard, whose index is in the bits from 4 on
-NEPHOS_CONST uint kAround = 2u;         // flag: around or close to the eye, covers the whole picture
-NEPHOS_CONST uint kSkyColumns = 64u;    // of the tables of the sky (atmosphere.h)
+NEPHOS_CONST uint kIntegrate = 1u;  // flag: evaluate the integral along the ray, do not use the textures
+NEPHOS_CONST uint kNotFitted = 4u;  // flag: the tiles evaluate the integral, whatever the billboards do
+NEPHOS_CONST uint kBillboardFlag =
+    8u;                          // flag, of no metaball: a billboard, whose index is in the bits from 4 on
+NEPHOS_CONST uint kAround = 2u;  // flag: around or close to the eye, covers the whole picture
+NEPHOS_CONST uint kSkyColumns = 64u;  // of the tables of the sky (atmosphere.h)
 NEPHOS_CONST uint kSkyRows = 96u;
 NEPHOS_CONST uint kSkyLayers = 3u;            // scattered, haze, and sunlight by altitude
 NEPHOS_CONST float kSunlightTop = 16000.0f;   // metres above the ground: sunlight changes no more
@@ -71,8 +72,8 @@ struct ViewBall {
     float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * line_integral()
     float sun_depth;    // optical depth towards the sun: exp(-sun_depth) arrives
     float height;       // in the cloud: 0 base, 1 top
-    uint flags;         // lower half; upper half: transmitted fraction of the lightning, 0..65535. On the device a
-                        // ViewBall with kBillboardFlag stands for a billboard and has nothing but its centre
+    uint flags;  // lower half; upper half: transmitted fraction of the lightning, 0..65535. On the device a
+                 // ViewBall with kBillboardFlag stands for a billboard and has nothing but its centre
 };
 
 // One of T's billboards in camera space; 32 bytes.

@@ -435,7 +435,7 @@ void BinnedView::begin_tile(const ViewInputs& what, const shader::Frame& frame, 
     Slot& slot = *slots_[next_];
     next_ = (next_ + 1) % slots_.size();
     flush(slot);
-    slot.wait(gpu_);  // of a picture that was thrown away
+    slot.wait(gpu_);                                      // of a picture that was thrown away
     failures_.reserve(failures_.size() + slots_.size());  // flush() may not throw
     slot.what = what;
     slot.billboard_count = what.billboards.size();

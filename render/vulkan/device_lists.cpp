@@ -75,9 +75,8 @@ std::size_t smaller_batch(std::size_t batch, std::size_t required, const ListLim
 }
 
 void check_distances(const PreparedCloud& cloud, const Vec3& eye) {
-    if (within_reach(eye) && std::ranges::all_of(cloud.visible, [&](std::uint32_t i) {
-            return within_reach(cloud.metaballs[i]);
-        }))
+    if (within_reach(eye) &&
+        std::ranges::all_of(cloud.visible, [&](std::uint32_t i) { return within_reach(cloud.metaballs[i]); }))
         return;
     throw Error(ErrorCode::usage,
                 "the back-end vulkan draws clouds, and has a camera, up to 1e15 m from the origin");
@@ -188,7 +187,7 @@ const GpuBuffer& DeviceLists::list(std::size_t tiles) const {
 }
 
 Resources DeviceLists::resources() const {
-    return {{1, counts_}, {2, cloud_}, {3, flash_},   {4, balls_},  {9, table_},
+    return {{1, counts_}, {2, cloud_},  {3, flash_},   {4, balls_}, {9, table_},
             {10, sums_},  {11, boxes_}, {12, ranges_}, {13, parts_}};
 }
 

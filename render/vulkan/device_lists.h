@@ -34,9 +34,9 @@ namespace nephos {
 
 // Limits of what a device draws.
 struct ListLimits {
-    std::size_t splats = 0;                            // metaballs and billboards of a cloud
-    std::size_t entries = std::size_t{1} << 24;        // of the lists of a batch: 256 MiB
-    std::size_t batch = 0xffffffff;                 // splats of a batch
+    std::size_t splats = 0;                          // metaballs and billboards of a cloud
+    std::size_t entries = std::size_t{1} << 24;      // of the lists of a batch: 256 MiB
+    std::size_t batch = 0xffffffff;                  // splats of a batch
     std::size_t batch_with_billboards = 0xffffffff;  // where some of them are billboards
     std::size_t batch_with_march = 0xffffffff;       // where rays march between them
 };

@@ -93,8 +93,8 @@ void DeviceSun::record(const vk::raii::CommandBuffer& commands, const SunRequest
         lists.record_batch(recorder, resources, step);
         pass_barrier(commands);
         tiles.record(commands, sets_, of_tiles, grid,
-                     {begin == 0, begin + batch >= count, request.largest_radius}, items_in(request, per_item_),
-                     lists.counts(), offsetof(shader::OrderCounts, items));
+                     {begin == 0, begin + batch >= count, request.largest_radius},
+                     items_in(request, per_item_), lists.counts(), offsetof(shader::OrderCounts, items));
     }
     each(OrderPass::sun_store, centres);
 }

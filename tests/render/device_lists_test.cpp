@@ -401,8 +401,7 @@ TEST_F(BinnedPictures, BatchesDoNotShow) {
             RenderOptions options = test::view({100, 200, 1000}, {700, 300, 1100}, 60, 80, 60);
             options.light_shafts.strength = strength;
             options.fog.extinction_per_m = strength * 0.0004;
-            Splats splats =
-                with_billboards ? test::scene_of(test::kBillboardClouds, billboards) : Splats();
+            Splats splats = with_billboards ? test::scene_of(test::kBillboardClouds, billboards) : Splats();
             splats.metaballs = {balls, 0.002, 0.7};
             EXPECT_LE(difference(batches.draw_splats(splats, options), binned_.draw_splats(splats, options)),
                       5e-4f);

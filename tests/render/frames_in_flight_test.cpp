@@ -47,8 +47,7 @@ TEST(FramesInFlight, HaveTheBitsOfThoseDrawnOneByOne) {
         Renderer one_by_one(test::validated(Splatting::vulkan, tile_size)),
             renderer(test::validated(Splatting::vulkan, tile_size));
         std::vector<Picture> expected;
-        for (const Case& each : cases)
-            expected.push_back(one_by_one.draw_splats(each.splats, each.options));
+        for (const Case& each : cases) expected.push_back(one_by_one.draw_splats(each.splats, each.options));
         std::vector<PendingPicture> pending;
         for (std::size_t n = 0; n < cases.size(); ++n) {
             pending.push_back(renderer.begin(cases[n].splats, cases[n].options));
