@@ -18,8 +18,8 @@ struct ShaderSet {
     ShaderCode light_map_comp, light_centres_comp, view_project_comp, view_tiles_comp, view_finish_comp;
     ShaderCode background_vert, background_frag, view_splat_vert, view_splat_frag;
     ShaderCode billboard_vert, billboard_frag;
-    ShaderCode view_shells_comp, shell_vert, shell_frag, shade_light_comp;
-    ShaderCode march_tiles_comp, march_shells_comp, march_finish_comp;
+    ShaderCode view_shells_comp, shell_vert, shell_frag;
+    ShaderCode march_tiles_comp, march_shells_comp, march_finish_comp, shade_light_comp;
 };
 const ShaderSet& shaders();
 
