@@ -16,12 +16,10 @@ layout(set = 0, binding = 8, std430) buffer Radiance {
 layout(set = 0, binding = 9, std430) buffer Depth {
     float depth[];
 };
-layout(set = 0, binding = 15, std430) readonly buffer Parts {
-    ViewPart parts[];
-};
 layout(push_constant) uniform Step {
     TileStep step;
 };
+#include "render/vulkan/parts.glsl"
 
 void main() {
     uint index = gl_GlobalInvocationID.y * (kGroupRow * kComputeGroup) + gl_GlobalInvocationID.x;
@@ -35,9 +33,9 @@ void main() {
     float sum_distance = kFog && step.distances != 0u ? depth[index] : 0.0;
     // Without these bounds masked lanes would take as long as others.
     vec2 part = part_with_air(ray);
-    ViewPart drawn = parts[step.part];
-    uint last = part.x < part.y ? min(drawn.end_shell, shells_before(part.y) + 1u) : drawn.first_shell;
-    for (uint k = max(drawn.first_shell, shells_before(part.x)); k < last; ++k) {
+    uvec2 drawn = drawn_shells();
+    uint last = part.x < part.y ? min(drawn.y, shells_before(part.y) + 1u) : drawn.x;
+    for (uint k = max(drawn.x, shells_before(part.x)); k < last; ++k) {
         AirLayer air = air_shell(k, sunlit, ray, pixel);
         sum_distance += sum.a * (1.0 - air.transmittance) * air.distance;
         sum.rgb += sum.a * air.light;
