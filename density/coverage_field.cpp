@@ -535,8 +535,9 @@ void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
     // Extinction of zero: nothing shows; any number will do.
     const double extinction = std::max(setting.extinction_per_m, 1e-9);
     const double free_path_m = o.mean_free_path_m > 0 ? o.mean_free_path_m : 1.5 * node_m_;
-    e.half_density = float(std::clamp(1 / (2 * extinction * free_path_m), 1e-6, 10.0));
-    e.cap = 10 * e.half_density;
+    // At most a quarter: saturated cells are cloud throughout, however thin.
+    e.half_density = float(std::clamp(1 / (2 * extinction * free_path_m), 1e-6, 0.25));
+    e.cap = std::min(10 * e.half_density, 1.0f);
     const auto strength = float(o.strength);
     e.base_width = std::max(0.5f * strength, 0.02f);
     e.top_width = std::max(0.62f * strength, 0.02f);

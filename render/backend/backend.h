@@ -70,7 +70,7 @@ struct FrameDescription {
         const StageTimer timer(&times, DrawStage::view_sorting);
         ViewSortedSplats order = sort_for_view(metaballs, splats, camera,
                                                pixels_per_unit(options.camera, camera), options.ground,
-                                               !cloud.volumes.empty());
+                                               footprint_scale(cloud.volumes));
         // Balls are read twice; keys move through memory three times, and back and forth.
         times[DrawStage::view_sorting].bytes =
             metaballs.metaballs.size_bytes() +

@@ -8,6 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "render/shared/march.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
@@ -40,6 +41,13 @@ CloudVolume::CloudVolume(const DetailedVoxels& voxels)
 
 std::size_t CloudVolume::memory_bytes() const {
     return field.memory_bytes() + 4 * extinction.size() + 2 * (sun_depths.size() + surroundings.size());
+}
+
+double footprint_scale(std::span<const CloudVolume> volumes) {
+    double scale = 0;
+    for (const CloudVolume& volume : volumes)
+        scale = std::max({scale, 1.0, 2 * volume.field.node_m() / double(shader::kFootprintCell_m)});
+    return scale;
 }
 
 // Ten of the fourteen directions of Lebedev's rule of order 5 (V. I. Lebedev 1976): the axes in the horizontal plane,

@@ -34,6 +34,10 @@ struct CloudVolume {
     std::size_t memory_bytes() const;
 };
 
+// Returns how many times the footprints are larger at which metaballs take over from rays, than with cells of 40 m: by
+// the largest cells; at least 1, and 0 without volumes.
+double footprint_scale(std::span<const CloudVolume> volumes);
+
 // Computes the surroundings, which do not depend on the sun. `mean_cosine`: of the phase function.
 void see_surroundings(CloudVolume& volume, double mean_cosine);
 

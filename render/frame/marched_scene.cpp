@@ -27,8 +27,9 @@ MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& c
         throw Error(ErrorCode::usage, std::to_string(volumes.size()) + " clouds with detail: expected at most " +
                                           std::to_string(shader::kMostVolumes));
     per_unit = float(1 / pixels_per_unit);
-    fade_begins = shader::kMarchedFootprint_m / per_unit;
-    fade_ends = shader::kSplattedFootprint_m / per_unit;
+    const auto scale = float(footprint_scale(of));
+    fade_begins = scale * shader::kMarchedFootprint_m / per_unit;
+    fade_ends = scale * shader::kSplattedFootprint_m / per_unit;
 }
 
 }  // namespace nephos

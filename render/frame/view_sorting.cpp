@@ -64,9 +64,9 @@ shader::ViewCloud billboard_cloud(const BillboardCloud& cloud, std::size_t index
 class Collector {
   public:
     Collector(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
-              double pixels_per_unit, const Ground& ground, bool marched)
+              double pixels_per_unit, const Ground& ground, double footprint_scale)
         : cloud_(cloud),
-          marched_(marched),
+          footprint_scale_(footprint_scale),
           splats_(splats),
           camera_(camera),
           eye_(camera.position_m),
@@ -144,7 +144,8 @@ class Collector {
 
     // Weight of the ball with an index in `visible`, beside what is marched in its place.
     float weight_of(std::uint32_t index, double distance) const {
-        return marched_ && cloud_.is_detailed(index) ? shader::splatted_weight(float(distance / pixels_per_unit_)) : 1.0f;
+        if (!(footprint_scale_ > 0) || !cloud_.is_detailed(index)) return 1;
+        return shader::splatted_weight(float(distance / (pixels_per_unit_ * footprint_scale_)));
     }
 
     bool is_ball(std::uint32_t index) const { return index < cloud_.visible.size(); }
@@ -285,7 +286,7 @@ class Collector {
     }
 
     const PreparedCloud& cloud_;
-    const bool marched_;
+    const double footprint_scale_;
     const Splats& splats_;
     const CameraFrame& camera_;
     Vec3 eye_{};
@@ -300,12 +301,12 @@ class Collector {
 }  // namespace
 
 ViewSortedSplats sort_for_view(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
-                               double pixels_per_unit, const Ground& ground, bool marched) {
+                               double pixels_per_unit, const Ground& ground, double footprint_scale) {
     if (splats.billboards.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
         throw Error(ErrorCode::usage, "more than 2^31 billboards");
     if (splats.clouds.size() >> 28 != 0)  // a shader::ViewBillboard has 28 bits for its cloud
         throw Error(ErrorCode::usage, "more than 2^28 clouds of billboards");
-    Collector collector(cloud, splats, camera, pixels_per_unit, ground, marched);
+    Collector collector(cloud, splats, camera, pixels_per_unit, ground, footprint_scale);
     collector.add_metaballs();
     collector.add_billboards();
     return collector.order();

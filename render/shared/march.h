@@ -39,6 +39,8 @@ NEPHOS_CONST uint kMarchLightNodes = 5u, kMarchLightWords = 125u;
 NEPHOS_CONST uint kClearanceWords = 16u;
 NEPHOS_CONST uint kLargeNoiseWords = 2097152u;        // those of the small noise follow
 // Between these footprints of a pixel metaballs take over from rays.
+// of cells of 40 m; larger cells have larger bumps, and metaballs that need as much longer.
+NEPHOS_CONST float kFootprintCell_m = 40.0f;
 NEPHOS_CONST float kMarchedFootprint_m = 15.0f, kSplattedFootprint_m = 25.0f;
 
 // Returns the weight of metaballs whose pixels have a footprint: 0 to 1, without a step.

@@ -3,5 +3,5 @@
 
 // Weight of a metaball beside what is marched in its place.
 float splatted_weight(CloudBall ball, float distance) {
-    return frame.march.x > 0.0 && ball.detailed != 0u ? splatted_weight(distance / frame.forward.w) : 1.0;
+    return frame.march.x > 0.0 && ball.detailed != 0u ? splatted_weight(distance * frame.march.x / frame.forward.w) : 1.0;
 }

@@ -102,7 +102,7 @@ std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span
 }
 
 shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options, const Ground& ground,
-                               bool has_flash, bool marched) {
+                               bool has_flash, double footprint_scale) {
     const HighLow x = high_low(camera.position_m.x), y = high_low(camera.position_m.y),
                   z = high_low(camera.position_m.z), height = high_low(ground.height_m);
     const Frustum pyramid(camera);
@@ -116,7 +116,7 @@ shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options,
     frame.forward = to_vec4(camera.forward, pixels_per_unit(options, camera));
     frame.middle = {float(half_width), float(half_height),
                     camera.position_m.z > ground.height_m ? 1.0f : 0.0f, has_flash ? 1.0f : 0.0f};
-    frame.march = {marched ? 1.0f : 0.0f, 0, 0, 0};
+    frame.march = {footprint_scale > 0 ? float(1 / footprint_scale) : 0.0f, 0, 0, 0};
     return frame;
 }
 

@@ -59,7 +59,7 @@ void check_distances(const PreparedCloud& cloud, const Vec3& eye);
 std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span<const float> sun_depths);
 
 shader::OrderFrame order_frame(const CameraFrame& camera, const Camera& options, const Ground& ground,
-                               bool has_flash, bool marched = false);
+                               bool has_flash, double footprint_scale = 0);
 
 // What there must be room for; what only some pictures need has no less than one element.
 struct ListSizes {

@@ -139,7 +139,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                                       .billboards = !seen.empty(),
                                       .march = march.count > 0},
                           .order = order_frame(frame.camera, frame.options.camera, frame.options.ground,
-                                               !frame.lightning.empty(), !cloud.volumes.empty()),
+                                               !frame.lightning.empty(), footprint_scale(cloud.volumes)),
                           .shadow_map = &shadow_map,
                           .sky = frame.sky != nullptr ? &scene_.sky_image(*frame.sky) : nullptr,
                           .scattering = &scene_.scattering(frame.table),

@@ -59,7 +59,8 @@ std::size_t keys_at(const std::vector<std::string>& path) {
 // A field that somebody adds to an option struct must become a key, too. Whoever comes here: add it to
 // scenes/format/schema_automaton.cpp or scenes/format/schema_output.cpp and build the target scene_descriptions.
 TEST(Description, EveryOptionHasAKey) {
-    EXPECT_EQ(keys_at({"density"}), member_count<DensityOptions>());
+    EXPECT_EQ(keys_at({"density"}), member_count<DensityOptions>() - 1);  // the other is [detail]
+    EXPECT_EQ(keys_at({"detail"}), member_count<DetailOptions>());
     EXPECT_EQ(keys_at({"density", "smoothing"}), member_count<SmoothingOptions>());
     EXPECT_EQ(keys_at({"frames"}), member_count<FrameOptions>());
     EXPECT_EQ(keys_at({"camera"}), member_count<Camera>());
@@ -104,8 +105,8 @@ TEST(Description, EveryOptionOfCloudsHasAKey) {
     EXPECT_EQ(keys_at({"climate"}), member_count<ClimateOptions>());
     EXPECT_EQ(keys_at({"climate", "schedule"}), member_count<StatePoint>());
     // [layer.lattice] holds extent, placement (two keys) and boundaries, [layer.climate] the schedule.
-    // Whether it is a veil is said by the table of that name.
-    EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 3);
+    // Whether it is a veil is said by the table of that name, as is whether it has detail of its own.
+    EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 4);
     EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 1);  // the seed is the layer's
     EXPECT_EQ(keys_at({"layer", "veil", "octave"}), member_count<VeilOctave>());
     EXPECT_EQ(keys_at({"layer", "lattice"}), 4u);

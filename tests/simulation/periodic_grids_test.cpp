@@ -57,6 +57,7 @@ class PeriodicGrids : public test::SmallRun {
     DensityGrid written(const std::string& text, int refine) const {
         Scene scene = read_scene_text(text, "overcast.toml", ".", {});
         scene.density.refine = refine;
+        scene.density.detail.enabled = false;
         RunSettings settings = settings_of(scene, "out" + std::to_string(refine));
         settings.render = false;
         EXPECT_TRUE(run_scene(settings, {}).complete);
