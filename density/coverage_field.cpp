@@ -24,6 +24,7 @@ namespace text = detail_text;
 
 constexpr int kEdge = CoverageField::kBrickNodes, kCells = CoverageField::kBrickCells;
 constexpr double kBumps = 8;      // of size_m on an edge of the large noise
+constexpr double kUsualBumps_m = 160;  // of which detail_formulas.h says when they fade
 constexpr double kFraction = 0.01;  // of the mass that lies below the base
 
 // Rows that turn places so that the period of the noise shows along no axis.
@@ -42,13 +43,18 @@ std::array<int, 3> unpacked(std::size_t place, const std::array<int, 3>& size) {
     return {at % size[0], at / size[0] % size[1], at / size[0] / size[1]};
 }
 
+// The size of the largest bumps in cells of an edge.
+double bump_size_m(const DetailOptions& options, double cell_m) {
+    return options.size_m > 0 ? options.size_m : 4 * cell_m;
+}
+
 // Large noise of mean 1 that multiplies densities: hollows and towers between the bumps and the voxels' field.
 class Thermals {
   public:
-    explicit Thermals(const DetailSetting& setting)
+    Thermals(const DetailSetting& setting, double cell_m)
         : strength_(float(setting.options.thermals)),
           drift_m_(setting.drift_m),
-          per_m_(1 / (4 * kBumps * setting.options.size_m)) {}
+          per_m_(1 / (4 * kBumps * bump_size_m(setting.options, cell_m))) {}
 
     float factor(const Vec3& place) const {
         if (!(strength_ > 0)) return 1;
@@ -81,7 +87,7 @@ class Cells {
         if (moisture != nullptr) growth_.resize(density_.size());
         masses_.resize(blocks_.size());
         std::vector<double> moist(blocks_.size(), 0), cloudy(blocks_.size(), 0);
-        const Thermals thermals(setting);
+        const Thermals thermals(setting, grid.placement().cell_size_m);
         const Vec3 origin = grid.placement().origin_m;
         const double cell = grid.placement().cell_size_m;
         tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t n) {
@@ -265,7 +271,7 @@ class NodeSums {
 
 void check(const DetailOptions& o) {
     require(within(o.strength, 0, 1.4), "strength", o.strength, "0..1.4");
-    require(within(o.size_m, 20, 5000), "size_m", o.size_m, "20..5000");
+    require(o.size_m == 0 || within(o.size_m, 20, 5000), "size_m", o.size_m, "0 or 20..5000");
     require(within(o.stretch, 1, 50), "stretch", o.stretch, "1..50");
     require(within(o.wisps, 0, 1), "wisps", o.wisps, "0..1");
     require(within(o.thermals, 0, 1), "thermals", o.thermals, "0..1");
@@ -515,6 +521,7 @@ void CoverageField::set_distances() {
 
 // Mass of the field to that of the detailed field with gain 1, in the mean over the noise.
 float CoverageField::gain_at(double footprint_m) const {
+    // Of detail with usual bumps; the kernels scale theirs.
     const auto footprint = float(footprint_m);
     const float medium = text::medium_width(footprint, erosion_.medium_width), soft = text::edge_softness(footprint);
     const float large = erosion_.top_width, small = std::min(std::sqrt(medium * medium + soft * soft), large);
@@ -546,7 +553,7 @@ void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
     e.fine_width = 0.03f * strength;
     e.wisps = float(o.wisps);
     e.base_m = float(base_m);
-    const double tile = kBumps * o.size_m;
+    const double size_m = bump_size_m(o, 2 * node_m_), tile = kBumps * size_m;
     const Vec2 along = setting.along;
     for (std::size_t row = 0; row < 3; ++row) {
         const Vec3 turn(kTurn[row][0], kTurn[row][1], kTurn[row][2]);
@@ -557,11 +564,11 @@ void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
         e.to_noise[row] = {float(to.x), float(to.y), float(to.z), float(offset - std::floor(offset))};
     }
     // The offset of the small noises is that of the large one: a whole number of their tiles in one of its.
-    const double medium_tile = tile / 16, fine_tile = tile / 128;
     e.medium_scale = 16;
     e.fine_scale = 128;
-    e.medium_per_m = float(kSmallNoiseVoxels / medium_tile);
-    e.fine_per_m = float(kSmallNoiseVoxels / fine_tile);
+    e.medium_per_m = float(kSmallNoiseVoxels / (kBumps * kUsualBumps_m / 16));
+    e.fine_per_m = float(kSmallNoiseVoxels / (kBumps * kUsualBumps_m / 128));
+    e.footprint_scale = float(kUsualBumps_m / size_m);
     e.gain = {1, 1};
     if (mass_ > 0) e.gain = {gain_at(13), gain_at(25)};
 }

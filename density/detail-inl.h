@@ -147,6 +147,7 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
                          Mask asked) {
     const Lanes d;
     const ErosionConstants& e = *field.erosion;
+    footprint = hn::Mul(footprint, number(e.footprint_scale));
     const Floats zero = hn::Zero(d), half = number(0.5f);
     const Floats c = text::coverage_of(node.t);
     const Floats top = text::towards_top(hn::Sub(z, number(e.base_m)));

@@ -207,6 +207,7 @@ float detailed_density_at(const CoverageField& field, const Vec3& place_m, float
         growth += weight * (float(at[1]) - 128.0f) / 127.0f;
     }
     const ErosionConstants& e = field.erosion();
+    footprint *= e.footprint_scale;
     const float c = text::coverage_of(t), top = text::towards_top(float(from.z) - e.base_m);
     const float large = text::large_width(top, growth, e.base_width, e.top_width, e.dissolving_width);
     const float medium = text::medium_width(footprint, e.medium_width),

@@ -28,7 +28,7 @@ struct SmoothingOptions {
 struct DetailOptions {
     bool enabled = true;
     double strength = 1;           // of the erosion, 0..1.4; 0: smooth as the metaballs, only with a crisp edge
-    double size_m = 160;           // of the largest bumps, 20..5000
+    double size_m = 0;             // of the largest bumps, 20..5000; 0: four cells
     double stretch = 1;            // of the bumps along the wind, 1..50: fibres
     double wisps = 1;              // 0..1: hanging shreds at the base instead of round bumps
     double thermals = 0.5;         // 0..1: strength of towers and hollows of two and four times size_m

@@ -107,6 +107,7 @@ Eroded eroded(uint v, Node node, vec3 place, float footprint, bool margins) {
     float c = coverage_of(node.t), top = towards_top(place.z - march.volumes[v].base_m);
     float large = large_width(top, node.growth, march.volumes[v].base_width, march.volumes[v].top_width,
                               march.volumes[v].dissolving_width);
+    footprint *= march.volumes[v].footprint_scale;
     float medium = medium_width(footprint, march.volumes[v].medium_width);
     float fine = fine_width(footprint, march.volumes[v].fine_width), soft = edge_softness(footprint);
     float others = 0.5 * (medium + fine + soft);

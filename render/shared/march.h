@@ -67,7 +67,7 @@ struct MarchVolume {
     float gain_fine, gain_coarse, medium_scale, fine_scale;
     float medium_per_m, fine_per_m;
     float least_coverage;
-    uint pad0;
+    float footprint_scale;
 };
 
 struct March {

@@ -146,6 +146,7 @@ shader::March march_constants(std::span<const CloudVolume> volumes, const Camera
         to.fine_scale = e.fine_scale;
         to.medium_per_m = e.medium_per_m;
         to.fine_per_m = e.fine_per_m;
+        to.footprint_scale = e.footprint_scale;
         to.least_coverage = kLeastCoverage;
     });
     return march;

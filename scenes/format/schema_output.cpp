@@ -282,8 +282,9 @@ const Section& detail_section() {
          key<&DetailOptions::strength>(
              "strength", "", between(0, 1.4),
              "Depth of the erosion; cumulus has 1, stratus a third. 0: a smooth surface with a crisp edge."),
-         key<&DetailOptions::size_m>("size_m", "m", between(20, 5000),
-                                            "Size of the largest bumps; each next kind has half of it."),
+         key<&DetailOptions::size_m>("size_m", "m", between(0, 5000),
+                                            "Size of the largest bumps, at least 20 m; each next kind has half of it. "
+                                            "0: four cells."),
          key<&DetailOptions::stretch>("stretch", "", between(1, 50),
                                              "How much longer the bumps are along the wind: fibres."),
          key<&DetailOptions::wisps>(
