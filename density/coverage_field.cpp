@@ -25,6 +25,9 @@ namespace text = detail_text;
 constexpr int kEdge = CoverageField::kBrickNodes, kCells = CoverageField::kBrickCells;
 constexpr double kBumps = 8;      // of size_m on an edge of the large noise
 constexpr double kUsualBumps_m = 160;  // of which detail_formulas.h says when they fade
+// Tiles of the medium noise in one of the large: 0.6 and 0.8 of it, by which it is turned, are whole, too, so that
+// nothing changes when the drift passes a tile.
+constexpr float kMediumTiles = 15;
 constexpr double kFraction = 0.01;  // of the mass that lies below the base
 
 // Rows that turn places so that the period of the noise shows along no axis.
@@ -533,7 +536,7 @@ float CoverageField::gain_at(double footprint_m) const {
         drawn += histogram_[n] *
                  double(std::min(mean / std::max(fraction, 0.02f), std::max(mean, erosion_.cap)) * fraction);
     }
-    return drawn > 0 ? float(mass_ / drawn) : 1.0f;
+    return drawn > 0 ? float(std::clamp(mass_ / drawn, 0.5, 4.0)) : 1.0f;
 }
 
 void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
@@ -564,9 +567,9 @@ void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
         e.to_noise[row] = {float(to.x), float(to.y), float(to.z), float(offset - std::floor(offset))};
     }
     // The offset of the small noises is that of the large one: a whole number of their tiles in one of its.
-    e.medium_scale = 16;
+    e.medium_scale = kMediumTiles;
     e.fine_scale = 128;
-    e.medium_per_m = float(kSmallNoiseVoxels / (kBumps * kUsualBumps_m / 16));
+    e.medium_per_m = float(kSmallNoiseVoxels / (kBumps * kUsualBumps_m / kMediumTiles));
     e.fine_per_m = float(kSmallNoiseVoxels / (kBumps * kUsualBumps_m / 128));
     e.footprint_scale = float(kUsualBumps_m / size_m);
     e.gain = {1, 1};

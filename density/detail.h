@@ -51,7 +51,7 @@ struct ErosionConstants {
     // Rows that turn a place relative to the field's corner into one in the large noise, in tiles; the fourth
     // numbers are its offset.
     std::array<std::array<float, 4>, 3> to_noise{};
-    float medium_scale = 15.42f, fine_scale = 128;  // tiles of the small noise in one of the large
+    float medium_scale = 15, fine_scale = 128;  // tiles of the small noise in one of the large
     // Voxels of the small noise per metre at its level 0, for bumps of 160 m; footprints times footprint_scale are those
     // that detail with such bumps would have.
     float medium_per_m = 1, fine_per_m = 1, footprint_scale = 1;

@@ -26,6 +26,8 @@ constexpr double kCheckpointCopiesOfLattice = 2;
 constexpr std::size_t kProgram = std::size_t(64) << 20;
 constexpr double kGrids = 3;              // two steps and the frame between them
 constexpr double kBytesPerVoxel = 4.5;    // a float, and the masks and nodes of the tree above it
+constexpr double kBytesPerCoverage = 48;   // a CoverageField and the cells that it is made of, by cell
+constexpr double kBytesPerMarchedLight = 100;  // the light of a cell, and ten sweeps through it at once
 constexpr double kBytesPerVelocity = 13;  // three floats and the same
 constexpr double kBytesPerBits = 1;       // hum, act and cld with their masks and nodes
 constexpr double kPlannedCover = 0.5;     // fraction of voxels that are metaballs
@@ -55,15 +57,24 @@ double voxels_in_blocks(const Extent& cells, int refine) {
     return along(cells.x) * along(cells.y) * along(cells.z);
 }
 
+// Cells around which a CoverageField has samples, when there is cloud in every brick.
+double cells_with_detail(const Extent& cells) {
+    constexpr double kMargin = 16;  // on both sides together, of metaballs of two cells
+    return (cells.x + kMargin) * (cells.y + kMargin) * (cells.z + kMargin);
+}
+
 // The grids of the frame that is made, of those that are under way to their files, and the copies that are
 // written, of one frame at a time.
 double grid_bytes(const Extent& cells, const DensityOptions& density, double under_way) {
     const double written = voxels_in_blocks(cells, density.refine);
     double bytes = (kGrids + under_way) * kBytesPerVoxel * voxels_in_blocks(cells, 1);
     if (density.refine > 1) bytes += kBytesPerVoxel * written;
-    if (density.write_velocity) bytes += kBytesPerVelocity * written;
-    if (density.write_state) bytes += kBytesPerBits * written;
-    return bytes;
+    double copies = 0;
+    if (density.write_velocity) copies += kBytesPerVelocity * written;
+    if (density.write_state) copies += kBytesPerBits * written;
+    // The field that a grid is refined from is gone before its copies are made.
+    const bool detailed = density.refine > 1 && density.detail.enabled;
+    return bytes + std::max(copies, detailed ? kBytesPerCoverage * cells_with_detail(cells) : 0.0);
 }
 
 }  // namespace
@@ -96,9 +107,13 @@ MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& latt
     const double history = window * (remembers_whole_state(scene) ? 3 : 1) * plane;
     const double planes_under_way = scene.density.write_state ? under_way * 3 * plane : 0;
     const double checkpoint = kCheckpointCopies * (3 * plane + history);
+    // Moisture of both neighbours of a frame and between them, and of frames under way.
+    const double moisture = scene.density.detail.enabled
+                                ? (3 + under_way) * kBytesPerVoxel * voxels_in_blocks(lattice.extent, 1)
+                                : 0;
     MemoryEstimate estimate;
     estimate.automaton = Automaton::memory_bytes(lattice);
-    estimate.density = saturated(history + planes_under_way + checkpoint +
+    estimate.density = saturated(history + planes_under_way + checkpoint + moisture +
                                  grid_bytes(lattice.extent, scene.density, under_way));
     return estimate;
 }
@@ -157,7 +172,7 @@ MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
     const bool pictures = parts == RunParts::pictures && wants_pictures(scene);
     const double under_way =
         (frames ? double(kFramesWritten) : 0) + (pictures ? double(kFramesDrawn + kFramesPrepared) : 0);
-    double cells = 0;
+    double cells = 0, detailed = 0;
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
         if (!scene.layers.empty() && !has_density(scene.layers[n])) continue;
         const AutomatonOptions options = automaton_options(scene, n);
@@ -168,6 +183,7 @@ MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
         estimate.automaton = sum(estimate.automaton, lattice.automaton);
         estimate.density = sum(estimate.density, lattice.density);
         cells += double(options.extent.x) * options.extent.y * options.extent.z;
+        if (scene.density.detail.enabled && !veil) detailed += cells_with_detail(options.extent);
     }
     const double combined = frames ? combined_bytes(scene, under_way) : 0;
     estimate.density = sum(estimate.density, saturated(combined + ground_bytes(scene, under_way)));
@@ -177,7 +193,7 @@ MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
     const double metaballs = cells * kPlannedCover;
     estimate.pictures =
         saturated(metaballs * kBytesPerMetaball + pixels * kBytesPerPixel + texels * kBytesPerShadowTexel +
-                  mirror_bytes(scene, pixels) +
+                  mirror_bytes(scene, pixels) + detailed * (kBytesPerCoverage + kBytesPerMarchedLight) +
                   double(kFramesWritten) * (pixels * kBytesPerPictureWritten + texels * sizeof(float)));
     if (wants_video(scene))
         estimate.pictures = sum(estimate.pictures, kEncoder + saturated(pixels * kBytesPerPixelEncoded));
