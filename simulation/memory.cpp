@@ -107,9 +107,9 @@ MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& latt
     const double history = window * (remembers_whole_state(scene) ? 3 : 1) * plane;
     const double planes_under_way = scene.density.write_state ? under_way * 3 * plane : 0;
     const double checkpoint = kCheckpointCopies * (3 * plane + history);
-    // Moisture of both neighbours of a frame and between them, and of frames under way.
+    // Moisture of both neighbours of a frame and between them, and of frames under way; and what smoothing leaves.
     const double moisture = scene.density.detail.enabled
-                                ? (3 + under_way) * kBytesPerVoxel * voxels_in_blocks(lattice.extent, 1)
+                                ? (5 + under_way) * kBytesPerVoxel * voxels_in_blocks(lattice.extent, 1)
                                 : 0;
     MemoryEstimate estimate;
     estimate.automaton = Automaton::memory_bytes(lattice);
@@ -193,7 +193,8 @@ MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
     const double metaballs = cells * kPlannedCover;
     estimate.pictures =
         saturated(metaballs * kBytesPerMetaball + pixels * kBytesPerPixel + texels * kBytesPerShadowTexel +
-                  mirror_bytes(scene, pixels) + detailed * (kBytesPerCoverage + kBytesPerMarchedLight) +
+                  mirror_bytes(scene, pixels) +
+                  kPlannedCover * detailed * (kBytesPerCoverage + kBytesPerMarchedLight) +
                   double(kFramesWritten) * (pixels * kBytesPerPictureWritten + texels * sizeof(float)));
     if (wants_video(scene))
         estimate.pictures = sum(estimate.pictures, kEncoder + saturated(pixels * kBytesPerPixelEncoded));
