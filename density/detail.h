@@ -34,10 +34,17 @@ struct DetailSetting {
     DetailOptions options;
     double extinction_per_m = 0.02;      // at density 1
     double metaball_radius_cells = 2.0;  // 1..8
+    double opacity = 1;                  // density of saturated cells, 0..1
     Vec3 drift_m{};                      // how far the wind has carried the air
     Vec2 along{1, 0};                    // unit direction of DetailOptions::stretch
     Boundaries boundaries;               // of the grid; an open axis ends the cloud
 };
+
+// Largest number of clouds with detail in a picture.
+inline constexpr std::size_t kMaxDetailedClouds = 16;
+
+class CoverageCells;
+class NodeSums;
 
 // The constants of the erosion, as kernels and shaders read them.
 struct ErosionConstants {
@@ -68,7 +75,7 @@ class CoverageField {
 
     // Samples D at all nodes where it is above 0. `moisture`, of the same extent, says how much the cloud grows: not at
     // all where it has its mean over the cloud, by 1 from twice that on, by -1 at 0. Without it nothing grows or
-    // dissolves. Beyond open boundaries there is no cloud. Throws Error(usage) when options are out of range, and when
+    // dissolves. Beyond open boundaries there is no cloud. Throws Error(usage) when a setting is out of range, and when
     // the field has more than 2^31 bytes.
     CoverageField(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture = nullptr);
 
@@ -97,10 +104,11 @@ class CoverageField {
     std::size_t memory_bytes() const;
 
   private:
-    void measure_clearance();
+    void find_places(const CoverageCells& cells, const Boundaries& boundaries, const std::array<int, 3>& extent,
+                     int before, int reach);
+    void sample_nodes(const CoverageCells& cells, const NodeSums& sums, int before);
     // `counted`: 1 for each layer of cells on each axis whose mass is that of the grid, not of an image.
     void measure_cells(const std::array<std::vector<std::uint8_t>, 3>& counted);
-    void set_distances();
     void set_erosion(const DetailSetting& setting, double base_m);
     float gain_at(double footprint_m) const;
 

@@ -19,6 +19,7 @@ DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> laye
     setting.options = layer ? layer_detail(scene, *layer) : scene.density.detail;
     setting.extinction_per_m = scene.density.extinction_per_m;
     setting.metaball_radius_cells = scene.density.metaball_radius_cells;
+    if (layer) setting.opacity = scene.layers[*layer].opacity;
     setting.drift_m = wind_displacement_m(wind, height, time_s);
     const Velocity now = wind_at(wind, height, time_s);
     const double speed = std::hypot(now.east_m_per_s, now.north_m_per_s);

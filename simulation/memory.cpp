@@ -65,7 +65,7 @@ double cells_with_detail(const Extent& cells) {
 
 // The grids of the frame that is made, of those that are under way to their files, and the copies that are
 // written, of one frame at a time.
-double grid_bytes(const Extent& cells, const DensityOptions& density, double under_way) {
+double grid_bytes(const Extent& cells, const DensityOptions& density, bool detail, double under_way) {
     const double written = voxels_in_blocks(cells, density.refine);
     double bytes = (kGrids + under_way) * kBytesPerVoxel * voxels_in_blocks(cells, 1);
     if (density.refine > 1) bytes += kBytesPerVoxel * written;
@@ -73,7 +73,7 @@ double grid_bytes(const Extent& cells, const DensityOptions& density, double und
     if (density.write_velocity) copies += kBytesPerVelocity * written;
     if (density.write_state) copies += kBytesPerBits * written;
     // The field that a grid is refined from is gone before its copies are made.
-    const bool detailed = density.refine > 1 && density.detail.enabled;
+    const bool detailed = density.refine > 1 && detail;
     return bytes + std::max(copies, detailed ? kBytesPerCoverage * cells_with_detail(cells) : 0.0);
 }
 
@@ -108,13 +108,14 @@ MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& latt
     const double planes_under_way = scene.density.write_state ? under_way * 3 * plane : 0;
     const double checkpoint = kCheckpointCopies * (3 * plane + history);
     // Moisture of both neighbours of a frame and between them, and of frames under way; and what smoothing leaves.
-    const double moisture = scene.density.detail.enabled
+    const bool detail = count_detailed(scene) > 0;
+    const double moisture = detail
                                 ? (5 + under_way) * kBytesPerVoxel * voxels_in_blocks(lattice.extent, 1)
                                 : 0;
     MemoryEstimate estimate;
     estimate.automaton = Automaton::memory_bytes(lattice);
     estimate.density = saturated(history + planes_under_way + checkpoint + moisture +
-                                 grid_bytes(lattice.extent, scene.density, under_way));
+                                 grid_bytes(lattice.extent, scene.density, detail, under_way));
     return estimate;
 }
 
@@ -123,7 +124,7 @@ MemoryEstimate veil_estimate(const Scene& scene, const AutomatonOptions& lattice
     DensityOptions density = scene.density;
     density.write_state = false;
     MemoryEstimate estimate;
-    estimate.density = saturated(grid_bytes(lattice.extent, density, under_way));
+    estimate.density = saturated(grid_bytes(lattice.extent, density, false, under_way));
     return estimate;
 }
 
@@ -183,7 +184,7 @@ MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
         estimate.automaton = sum(estimate.automaton, lattice.automaton);
         estimate.density = sum(estimate.density, lattice.density);
         cells += double(options.extent.x) * options.extent.y * options.extent.z;
-        if (scene.density.detail.enabled && !veil) detailed += cells_with_detail(options.extent);
+        if (count_detailed(scene) > 0 && !veil) detailed += cells_with_detail(options.extent);
     }
     const double combined = frames ? combined_bytes(scene, under_way) : 0;
     estimate.density = sum(estimate.density, saturated(combined + ground_bytes(scene, under_way)));

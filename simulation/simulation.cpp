@@ -266,7 +266,8 @@ DensityGrid Simulation::moisture_of(std::size_t layer, std::uint64_t step) {
 }
 
 std::optional<DensityGrid> Simulation::moisture_at(std::size_t layer, const Moment& moment) {
-    if (!scene_.density.detail.enabled || !remembers_planes(layer)) return std::nullopt;
+    const bool detailed = scene_.layers.empty() ? scene_.density.detail.enabled : layer_detail(scene_, layer).enabled;
+    if (!detailed || !remembers_planes(layer)) return std::nullopt;
     DensityGrid before = moisture_of(layer, moment.step);
     if (moment.fraction == 0) return before;
     return mix(before, moisture_of(layer, moment.step + 1), moment.fraction);

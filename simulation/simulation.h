@@ -101,7 +101,7 @@ struct FrameResult {
 // Whether a simulation of the scene keeps hum and act of past states beside cld: for files, or for the growth that
 // detail shows.
 inline bool remembers_whole_state(const Scene& scene) {
-    return scene.density.write_state || scene.density.detail.enabled;
+    return scene.density.write_state || count_detailed(scene) > 0;
 }
 
 // Selects what a simulation computes from the states.

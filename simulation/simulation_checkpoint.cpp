@@ -208,8 +208,15 @@ void Simulation::restore_history(const Checkpoint& checkpoint) {
     reader.skip(sizeof kHistoryVersion);  // read by restore_layers()
     const SimulationRange before = get_range(reader);
     const bool same_window = std::uint64_t(reader.get<std::int32_t>()) == window();
-    const bool same_content = reader.get<std::uint8_t>() == content_bits(scene_, results_);
-    if (!continues(before, range_) || !same_window || !same_content) {
+    const std::uint8_t content = reader.get<std::uint8_t>(), expected = content_bits(scene_, results_);
+    if ((content & 1) != (expected & 1)) {
+        throw Error(ErrorCode::usage,
+                    (content & 1) != 0 ? "the checkpoint belongs to a run that drew detail or wrote the state: expected "
+                                         "`detail.enabled` or `density.write_state` as then"
+                                       : "the checkpoint belongs to a run without detail and without the state: expected "
+                                         "`detail.enabled = false` and no `density.write_state`, as then");
+    }
+    if (!continues(before, range_) || !same_window || content != expected) {
         throw Error(ErrorCode::usage,
                     "the checkpoint belongs to a run with other frames or another smoothing window");
     }

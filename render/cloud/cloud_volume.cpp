@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
+#include <limits>
 
 #include <tbb/parallel_for.h>
 
@@ -40,7 +40,8 @@ CloudVolume::CloudVolume(const DetailedVoxels& voxels)
       extinction(mean_extinction(field)) {}
 
 std::size_t CloudVolume::memory_bytes() const {
-    return field.memory_bytes() + 4 * extinction.size() + 2 * (sun_depths.size() + surroundings.size());
+    return field.memory_bytes() + 4 * (extinction.size() + corner_depths.size()) +
+           2 * (sun_depths.size() + own_depths.size() + surroundings.size());
 }
 
 double footprint_scale(std::span<const CloudVolume> volumes) {
@@ -81,70 +82,106 @@ void see_surroundings(CloudVolume& volume, double mean_cosine) {
     });
 }
 
+namespace {
+
+// Whether the line from a point towards the light passes the box of a field's bricks.
+bool looks_through(const CoverageField& field, const Vec3& place_m, const Vec3& to_light) {
+    double begin = 0, end = std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+        const double low = field.corner_m()[axis] - place_m[axis],
+                     high = low + 2 * kCells * field.node_m() * field.bricks()[std::size_t(axis)];
+        if (to_light[axis] == 0) {
+            if (low > 0 || high < 0) return false;
+            continue;
+        }
+        const double a = low / to_light[axis], b = high / to_light[axis];
+        begin = std::max(begin, std::min(a, b));
+        end = std::min(end, std::max(a, b));
+    }
+    return begin < end;
+}
+
+// Interpolates between the corners of a cube of a table with rows of `width` and planes of `plane` numbers.
+template <class Number>
+float trilinear(const Number* corner, std::size_t width, std::size_t plane, const float (&rest)[3]) {
+    float sum = 0;
+    for (std::size_t n = 0; n < 8; ++n) {
+        const std::size_t o[3] = {n & 1, n >> 1 & 1, n >> 2};
+        float weight = 1;
+        for (std::size_t axis = 0; axis < 3; ++axis) weight *= o[axis] != 0 ? rest[axis] : 1 - rest[axis];
+        sum += weight * float(corner[o[2] * plane + o[1] * width + o[0]]);
+    }
+    return sum;
+}
+
+}  // namespace
+
 void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light) {
-    // Those nearer to the sun first, by the middles of their boxes.
-    std::vector<std::size_t> order(volumes.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    const auto towards = [&](std::size_t n) {
-        const auto& bricks = volumes[n].field.bricks();
-        const Vec3 size(bricks[0], bricks[1], bricks[2]);
-        return -glm::dot(to_sun, volumes[n].field.corner_m() + 4 * volumes[n].field.node_m() * size);
-    };
-    std::ranges::stable_sort(order, {}, towards);
-    for (std::size_t k = 0; k < order.size(); ++k) {
-        CloudVolume& volume = volumes[order[k]];
-        std::vector<float> depths(volume.field.places().size() * kLightNodesOfBrick);
-        std::function<float(const Vec3&)> arriving;
-        if (k > 0) {
-            arriving = [&](const Vec3& point) {
-                float depth = 0;
-                for (std::size_t m = 0; m < k; ++m) depth += volumes[order[m]].front.depth_at(point);
-                return depth;
-            };
-        }
-        volume.front = sweep(volume.field, volume.extinction, to_sun, depths, arriving);
-        if (k > 0) {  // what it adds itself
-            std::vector<float> own(depths.size());
-            volume.front = sweep(volume.field, volume.extinction, to_sun, own);
-        }
-        volume.sun_depths.assign(depths.size() + 1, 0);
-        for (std::size_t i = 0; i < depths.size(); ++i) {
-            float depth = depths[i];
-            if (light.lighting == Lighting::cfa)
-                depth = absorbed_depth(depth, volume.field.extinction_per_m(), light.light_distance_m);
-            volume.sun_depths[i] = packed_depth(depth);
-        }
+    // First each by itself, then what the others add.
+    std::vector<std::vector<float>> depths(volumes.size());
+    tbb::parallel_for(std::size_t{0}, volumes.size(), [&](std::size_t n) {
+        CloudVolume& volume = volumes[n];
+        const auto& bricks = volume.field.bricks();
+        depths[n].resize(volume.field.places().size() * kLightNodesOfBrick);
+        volume.own_depths.resize(volumes.size() == 1 ? 0 : depths[n].size());
+        volume.corner_depths.resize(std::size_t(bricks[0] + 1) * std::size_t(bricks[1] + 1) * std::size_t(bricks[2] + 1));
+        volume.to_sun = to_sun;
+        volume.front = sweep(volume.field, volume.extinction, to_sun, depths[n], volume.corner_depths);
+        for (std::size_t i = 0; i < volume.own_depths.size(); ++i) volume.own_depths[i] = packed_depth(depths[n][i]);
+    });
+    for (std::size_t n = 0; n < volumes.size(); ++n) {
+        CloudVolume& volume = volumes[n];
+        volume.sun_depths.assign(depths[n].size() + 1, 0);
+        const auto& bricks = volume.field.bricks();
+        tbb::parallel_for(std::size_t{0}, volume.field.places().size(), [&](std::size_t brick) {
+            const std::int32_t at = volume.field.places()[brick];
+            const Vec3 corner(at % bricks[0], at / bricks[0] % bricks[1], at / bricks[0] / bricks[1]);
+            for (std::size_t i = 0; i < kLightNodesOfBrick; ++i) {
+                const Vec3 node(i % kLightNodes, i / kLightNodes % kLightNodes, i / kLightNodes / kLightNodes);
+                const Vec3 place = volume.field.corner_m() + 2 * volume.field.node_m() * (double(kCells) * corner + node);
+                float depth = depths[n][brick * kLightNodesOfBrick + i];
+                for (std::size_t m = 0; m < volumes.size(); ++m)
+                    if (m != n) depth += sun_depth_at(volumes[m], place);
+                if (light.lighting == Lighting::cfa)
+                    depth = absorbed_depth(depth, volume.field.extinction_per_m(), light.light_distance_m);
+                volume.sun_depths[brick * kLightNodesOfBrick + i] = packed_depth(depth);
+            }
+        });
     }
 }
 
 float sun_depth_at(const CloudVolume& volume, const Vec3& place_m) {
     const CoverageField& field = volume.field;
+    if (!looks_through(field, place_m, volume.to_sun)) return 0;
+    const auto& bricks = field.bricks();
     const Vec3 cells = (place_m - field.corner_m()) / (2 * field.node_m());
-    int brick[3], whole[3];
-    float rest[3];
+    std::size_t brick[3];
+    double local[3];
     for (int axis = 0; axis < 3; ++axis) {
-        brick[axis] = int(std::floor(cells[axis] / kCells));
-        if (brick[axis] < 0 || brick[axis] >= field.bricks()[std::size_t(axis)])
-            return glm::dot(volume.front.to_light(), cells) < 0 ? volume.front.depth_at(place_m) : 0.0f;
-        const double local = cells[axis] - brick[axis] * kCells;
-        whole[axis] = std::min(int(local), kCells - 1);
-        rest[axis] = float(local - whole[axis]);
+        const double at = std::floor(cells[axis] / kCells);
+        if (at < 0 || at >= bricks[std::size_t(axis)]) return volume.front.depth_at(place_m);
+        brick[axis] = std::size_t(at);
+        local[axis] = cells[axis] - at * kCells;
     }
-    const std::int32_t number =
-        field.table()[(std::size_t(brick[2]) * std::size_t(field.bricks()[1]) + std::size_t(brick[1])) *
-                          std::size_t(field.bricks()[0]) +
-                      std::size_t(brick[0])];
-    if (number < 0) return 0;
-    const std::uint16_t* const nodes = &volume.sun_depths[std::size_t(number) * kLightNodesOfBrick];
-    float root = 0;
-    for (int n = 0; n < 8; ++n) {
-        const int o[3] = {n & 1, n >> 1 & 1, n >> 2};
-        float weight = 1;
-        for (int axis = 0; axis < 3; ++axis) weight *= o[axis] != 0 ? rest[axis] : 1 - rest[axis];
-        root += weight * float(nodes[((whole[2] + o[2]) * kLightNodes + whole[1] + o[1]) * kLightNodes + whole[0] +
-                                     o[0]]);
+    const auto x = std::size_t(bricks[0]), y = std::size_t(bricks[1]);
+    const std::int32_t number = field.table()[(brick[2] * y + brick[1]) * x + brick[0]];
+    float rest[3];
+    if (number < 0) {
+        for (int axis = 0; axis < 3; ++axis) rest[axis] = float(local[axis] / kCells);
+        return trilinear(&volume.corner_depths[(brick[2] * (y + 1) + brick[1]) * (x + 1) + brick[0]], x + 1,
+                         (x + 1) * (y + 1), rest);
     }
-    root /= 65535;
+    std::size_t whole[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        whole[axis] = std::size_t(std::min(int(local[axis]), kCells - 1));
+        rest[axis] = float(local[axis] - double(whole[axis]));
+    }
+    const std::vector<std::uint16_t>& depths = volume.own_depths.empty() ? volume.sun_depths : volume.own_depths;
+    const float root =
+        trilinear(&depths[std::size_t(number) * kLightNodesOfBrick + (whole[2] * kLightNodes + whole[1]) * kLightNodes +
+                          whole[0]],
+                  kLightNodes, std::size_t(kLightNodes) * kLightNodes, rest) /
+        65535;
     return root * root * kMostMarchedDepth;
 }
 

@@ -29,7 +29,12 @@ struct CloudVolume {
     // kLightNodesOfBrick numbers for each such brick and one more: 65535 sqrt(depth / kMostMarchedDepth), and the
     // fractions of the sky (lower byte) and of the ground (upper byte) that are seen, 0..255.
     std::vector<std::uint16_t> sun_depths, surroundings;
-    LightFront front;  // of the sunlight that leaves it
+    // Sunlight that this volume alone attenuates: on the way out, at the corners of all bricks (x fastest, bricks + 1 on
+    // each axis), and like sun_depths, where there are other volumes.
+    Vec3 to_sun{0, 0, 1};
+    LightFront front;
+    std::vector<float> corner_depths;
+    std::vector<std::uint16_t> own_depths;
 
     std::size_t memory_bytes() const;
 };
@@ -44,8 +49,7 @@ void see_surroundings(CloudVolume& volume, double mean_cosine);
 // Computes the sunlight in all volumes; they shade each other. With Lighting::cfa its absorption is that of T.
 void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light);
 
-// Returns the optical depth of a volume towards the sun at a place: that of its nodes in bricks that hold cloud, all
-// of it beyond the volume, and 0 elsewhere.
+// Returns the optical depth of a volume alone towards the sun, at any place of the world. After light_volumes().
 float sun_depth_at(const CloudVolume& volume, const Vec3& place_m);
 
 // Multiplies the texels of a shadow map by the light that the volumes leave.

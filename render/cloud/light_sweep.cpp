@@ -54,7 +54,7 @@ float LightFront::depth_at(const Vec3& point_m) const {
 }
 
 LightFront sweep(const CoverageField& field, std::span<const float> extinction, const Vec3& to_light,
-                 std::span<float> depths, const std::function<float(const Vec3&)>& arriving) {
+                 std::span<float> depths, std::span<float> corners) {
     LightFront front;
     int along = 2;
     for (int axis = 0; axis < 2; ++axis)
@@ -65,7 +65,6 @@ LightFront sweep(const CoverageField& field, std::span<const float> extinction, 
     const int size[3] = {bricks[std::size_t(axes[0])] * kCells, bricks[std::size_t(axes[1])] * kCells,
                          bricks[std::size_t(along)] * kCells};
     front.corner_m_ = field.corner_m();
-    front.to_light_ = to_light;
     front.cell_m_ = 2 * field.node_m();
     front.downwards_ = to_light[along] > 0;
     front.plane_ = size[2];
@@ -77,15 +76,6 @@ LightFront sweep(const CoverageField& field, std::span<const float> extinction, 
     }
     const auto width = std::size_t(front.lines_[0]);
     front.depth_.assign(width * std::size_t(front.lines_[1]), 0.0f);
-    if (arriving) {
-        for (std::size_t n = 0; n < front.depth_.size(); ++n) {
-            Vec3 at{};
-            at[axes[0]] = double(n % width) + front.first_[0];
-            at[axes[1]] = double(n / width) + front.first_[1];
-            at[along] = front.downwards_ ? size[2] : 0;
-            front.depth_[n] = arriving(front.corner_m_ + front.cell_m_ * at);
-        }
-    }
     const auto length = float(front.cell_m_ / slope);
 
     // The bricks of each layer along the light.
@@ -125,6 +115,15 @@ LightFront sweep(const CoverageField& field, std::span<const float> extinction, 
                 }
             }
         }
+        if (corners.empty() || plane % kCells != 0) return;
+        if (!resampled)
+            front.resample(-front.shift_[0] * b, -front.shift_[1] * b, size[0] + 1, size[1] + 1, nodes);
+        const int stride[3] = {1, bricks[0] + 1, (bricks[0] + 1) * (bricks[1] + 1)};
+        for (int v = 0; v <= size[1] / kCells; ++v)
+            for (int u = 0; u <= size[0] / kCells; ++u)
+                corners[std::size_t(u) * std::size_t(stride[axes[0]]) + std::size_t(v) * std::size_t(stride[axes[1]]) +
+                        std::size_t(plane / kCells) * std::size_t(stride[along])] =
+                    nodes[std::size_t(v * kCells) * std::size_t(size[0] + 1) + std::size_t(u * kCells)];
     };
     for (int step = 0; step < size[2]; ++step) {
         const int s = front.downwards_ ? size[2] - 1 - step : step;  // slice

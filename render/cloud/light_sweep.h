@@ -6,7 +6,6 @@
 // that depth does not spread sideways. Private to the module.
 
 #include <array>
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -21,18 +20,17 @@ inline constexpr std::size_t kLightNodesOfBrick = std::size_t(kLightNodes) * kLi
 // The lines of a sweep as they leave the lattice.
 class LightFront {
   public:
-    // Returns the optical depth of the line through a point of the world beyond the lattice.
+    // Returns the optical depth of the whole line through a point.
     float depth_at(const Vec3& point_m) const;
-    const Vec3& to_light() const { return to_light_; }
 
   private:
     friend LightFront sweep(const CoverageField&, std::span<const float>, const Vec3&, std::span<float>,
-                            const std::function<float(const Vec3&)>&);
+                            std::span<float>);
     float at(double u, double v) const;
     // Fills width x height numbers, x fastest, for lines (u, v), (u + 1, v) ...
     void resample(double u, double v, int width, int height, std::vector<float>& to) const;
 
-    Vec3 corner_m_{}, to_light_{};
+    Vec3 corner_m_{};
     double cell_m_ = 1, plane_ = 0;  // of the face that the light leaves by, cells
     int axes_[3] = {0, 1, 2};        // across, across, along
     double shift_[2] = {};           // across by each cell along, cells
@@ -44,8 +42,8 @@ class LightFront {
 
 // Sums extinction (per metre; one number a cell of each brick that holds cloud, x fastest) from the light on.
 // `depths` gets the optical depth at the corners of cells: kLightNodesOfBrick for each such brick, x fastest.
-// `arriving`, which may be empty, is the depth of the line through a point before it meets the lattice.
+// `corners`, unless it is empty, gets those at the corners of all bricks: (bricks + 1) on each axis, x fastest.
 LightFront sweep(const CoverageField& field, std::span<const float> extinction, const Vec3& to_light,
-                 std::span<float> depths, const std::function<float(const Vec3&)>& arriving = {});
+                 std::span<float> depths, std::span<float> corners = {});
 
 }  // namespace nephos

@@ -9,6 +9,8 @@
 
 namespace nephos {
 
+static_assert(shader::kMostVolumes == kMaxDetailedClouds);
+
 MarchedVolume::MarchedVolume(const CloudVolume& volume, const Vec3& eye_m)
     : kernel(volume.field), sun_depths(volume.sun_depths.data()), surroundings(volume.surroundings.data()) {
     const Vec3 from = volume.field.corner_m() - eye_m;
@@ -27,6 +29,9 @@ MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& c
         throw Error(ErrorCode::usage, std::to_string(volumes.size()) + " clouds with detail: expected at most " +
                                           std::to_string(shader::kMostVolumes));
     per_unit = float(1 / pixels_per_unit);
+    double cell_m = double(shader::kFootprintCell_m);
+    for (const CloudVolume& volume : of) cell_m = std::min(cell_m, 2 * volume.field.node_m());
+    least_step = float(cell_m / double(shader::kFootprintCell_m)) * shader::kLeastStep_m;
     const auto scale = float(footprint_scale(of));
     fade_begins = scale * shader::kMarchedFootprint_m / per_unit;
     fade_ends = scale * shader::kSplattedFootprint_m / per_unit;

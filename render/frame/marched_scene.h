@@ -29,6 +29,7 @@ struct MarchedScene {
     std::vector<MarchedVolume> volumes;
     float per_unit = 1;                    // footprint of a pixel at distance 1
     float fade_begins = 1, fade_ends = 1;  // metres from the eye
+    float least_step = 1;                  // in cloud, metres
 
     MarchedScene() = default;
     // Throws Error(usage) when there are more than shader::kMostVolumes that hold cloud.

@@ -39,6 +39,8 @@ BrickPlace brick_place(uint v, vec3 offset_m) {
     return place;
 }
 
+bool holds_cloud(BrickPlace place) { return place.within && place.number >= 0; }
+
 // The four bytes of a word of DetailNoise, 0..255, bilinearly.
 float of_word(uint word, vec2 share) {
     vec4 bytes = bytes_of(word);
@@ -140,6 +142,6 @@ Eroded eroded(uint v, Node node, vec3 place, float footprint, bool margins) {
 
 float density_at(uint v, vec3 offset_m, float footprint) {
     BrickPlace place = brick_place(v, offset_m);
-    if (!place.within || place.number < 0) return 0.0;
+    if (!holds_cloud(place)) return 0.0;
     return eroded(v, node_at(v, place), offset_m, footprint, false).density;
 }

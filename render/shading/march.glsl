@@ -58,9 +58,11 @@ vec3 marched_radiance(uint v, vec3 ray, float distance) {
     float own = 0.0;
     [[dont_unroll]] for (uint tap = 0u; tap < 3u; ++tap)
         own += lengths_m[tap] * extinction_per_m * density_at(v, offset + taps_m[tap] * to_sun, footprint);
-    BrickPlace beyond = brick_place(v, offset + kTapsEnd_m * to_sun);
-    float sun_depth = own + (beyond.within ? volume_sun_depth(v, beyond) : 0.0);
-    vec2 seen = volume_surroundings(v, brick_place(v, offset));
+    BrickPlace here = brick_place(v, offset), beyond = brick_place(v, offset + kTapsEnd_m * to_sun);
+    // Bricks without cloud have no depths: what is beyond them shows in those of the point itself.
+    float sun_depth = holds_cloud(beyond) ? own + volume_sun_depth(v, beyond)
+                                          : max(own, holds_cloud(here) ? volume_sun_depth(v, here) : 0.0);
+    vec2 seen = holds_cloud(here) ? volume_surroundings(v, here) : vec2(1.0);
     float fold = kFoldShare * exp(-kFoldDecay * own) + (1.0 - kFoldShare);
     vec3 sunlight = sunlight_at(point.z);
     vec3 arriving = seen.x * fold * frame.ambient_top.rgb + seen.y * fold * frame.ambient_base.rgb;
@@ -124,7 +126,7 @@ MarchPlace march_place(uint v, vec3 ray, vec3 per_ray, float distance) {
     vec4 corner = march.volumes[v].corner;
     vec3 offset = distance * ray - corner.xyz;
     BrickPlace place = brick_place(v, offset);
-    bool holds = place.within && place.number >= 0;
+    bool holds = holds_cloud(place);
     vec3 cell = min(floor(0.5 * place.local), vec3(3.0));
     uint byte = 64u * uint(max(place.number, 0)) + uint((cell.z * 4.0 + cell.y) * 4.0 + cell.x);
     uint clear = (march_cells[march.volumes[v].first_clearance + byte / 4u] >> (8u * (byte & 3u))) & 255u;
@@ -154,7 +156,7 @@ MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
 }
 
 void sample_near(inout MarchSample result, vec3 ray, float distance, float transmittance) {
-    float footprint = distance * march.per_unit, finest = max(kLeastStep_m, kStepPixels * footprint);
+    float footprint = distance * march.per_unit, finest = max(march.least_step, kStepPixels * footprint);
     float least_step = finest * ((1.0 - transmittance) * kStepGrowth + 1.0);
     for (uint v = 0u; v < march.count; ++v) {
         if ((result.near >> v & 1u) != 0u) {
@@ -183,7 +185,7 @@ void advance(MarchSample now, inout MarchState state, inout MarchEvent event, in
     float found = now.extinction * (1.0 - share * share * (3.0 - 2.0 * share));
     // The step before counts as cloud; where it came from outside, only from the surface on: where the margin of the
     // two samples passes zero, or about one fine step where empty space was skipped.
-    float finest = max(kLeastStep_m, kStepPixels * march.per_unit * state.distance);
+    float finest = max(march.least_step, kStepPixels * march.per_unit * state.distance);
     float inside = -now.margin / max(state.margin - now.margin, kLeastMargin);
     float behind = state.margin < 0.0 ? kSkippedSteps * finest
                                       : state.way * clamp(inside, 0.0, 1.0) + kSurfaceSteps * finest;

@@ -14,7 +14,7 @@ NEPHOS_CONST uint kMostVolumes = 16u;                 // in a picture
 NEPHOS_CONST float kEventOpacity = 0.12f;             // of a point that is shaded
 NEPHOS_CONST float kLeavingOpacity = 0.004f;          // of one where the ray leaves cloud
 NEPHOS_CONST float kMarchOpaque = 1.0f / 256.0f;      // transmittance at which a ray ends
-NEPHOS_CONST float kLeastStep_m = 2.0f;               // in cloud,
+NEPHOS_CONST float kLeastStep_m = 2.0f;               // in cloud, of cells of kFootprintCell_m and more,
 NEPHOS_CONST float kStepPixels = 1.2f;                // ... or this many footprints of a pixel
 NEPHOS_CONST float kStepGrowth = 4.0f;                // of steps behind opaque cloud
 NEPHOS_CONST float kLongestStep_m = 30.0f;            // near cloud
@@ -74,12 +74,14 @@ struct March {
     uint count;                    // of volumes
     float per_unit;                // footprint of a pixel at distance 1
     float fade_begins, fade_ends;  // metres from the eye
+    float least_step;              // in cloud, metres
+    float unused0, unused1, unused2;
     MarchVolume volumes[kMostVolumes];
 };
 
 #ifdef __cplusplus
 static_assert(sizeof(MarchVolume) == 176 && offsetof(MarchVolume, first_table) == 80 &&
-              offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 16);
+              offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 32);
 
 }  // namespace nephos::shader
 #endif

@@ -111,7 +111,8 @@ std::vector<std::uint32_t> march_light(std::span<const CloudVolume> volumes) {
 shader::March march_constants(std::span<const CloudVolume> volumes, const CameraFrame& camera,
                               double pixels_per_unit) {
     const MarchedScene scene(volumes, camera, pixels_per_unit);
-    shader::March march{shader::uint(scene.volumes.size()), scene.per_unit, scene.fade_begins, scene.fade_ends, {}};
+    shader::March march{shader::uint(scene.volumes.size()), scene.per_unit, scene.fade_begins, scene.fade_ends,
+                         scene.least_step, 0, 0, 0, {}};
     std::size_t n = 0;
     for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
         const MarchedVolume& from = scene.volumes[n];

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 
 #include "core/math.h"
+#include "density/detail.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
 #include "seeds/sky_simulation.h"
@@ -339,6 +340,21 @@ void check_simulation(const SectionReader& reader, const Scene& scene, std::size
     }
 }
 
+// Reports the first layer with detail that is one too many for a picture.
+void check_count_of_detailed(const SectionReader& reader, const Scene& scene) {
+    if (count_detailed(scene) <= kMaxDetailedClouds) return;
+    std::size_t count = 0;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        if (!scene.layers[n].automaton || !layer_detail(scene, n).enabled) continue;
+        if (++count <= kMaxDetailedClouds) continue;
+        item_of(reader, "layer", n)
+            .report("detail", std::to_string(count_detailed(scene)) + " layers with detail are too many",
+                    "expected at most " + std::to_string(kMaxDetailedClouds) +
+                        ", and `detail.enabled = false` in the others");
+        return;
+    }
+}
+
 // Reports keys that a scene with layers may not have, and keys that need layers.
 void check_layers_or_field(const SectionReader& reader, const Scene& scene) {
     if (scene.layers.empty()) {
@@ -386,6 +402,7 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
     if (!reader.document.problems.empty()) return;
     for (std::size_t n = 0; n < scene.layers.size(); ++n)
         check_simulation(item_of(reader, "layer", n), scene, n);
+    check_count_of_detailed(reader, scene);
 }
 
 }  // namespace nephos

@@ -52,6 +52,14 @@ DetailOptions layer_detail(const Scene& scene, std::size_t layer) {
     return detail;
 }
 
+std::size_t count_detailed(const Scene& scene) {
+    if (scene.layers.empty()) return scene.density.detail.enabled ? 1 : 0;
+    std::size_t count = 0;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n)
+        count += scene.layers[n].automaton && layer_detail(scene, n).enabled ? 1 : 0;
+    return count;
+}
+
 const Wind& layer_wind(const Scene& scene, std::size_t layer) {
     const Wind& own = scene.layers[layer].wind;
     return own.keyframes.empty() ? scene.automaton.wind : own;

@@ -125,6 +125,9 @@ WorldRectangle whole_world(const Scene& scene);
 // Returns the detail of a layer: its own, or the scene's; none of a veil.
 DetailOptions layer_detail(const Scene& scene, std::size_t layer);
 
+// Returns the number of automata of the scene whose clouds have detail.
+std::size_t count_detailed(const Scene& scene);
+
 // Returns the wind of a layer: its own, or the scene's if it has none.
 const Wind& layer_wind(const Scene& scene, std::size_t layer);
 

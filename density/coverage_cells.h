@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The cells of a grid that a CoverageField is made of: densities with thermals, and growth, in blocks of 8 x 8 x 8
+// (not installed).
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "density/detail.h"
+#include "density/openvdb_access.h"
+
+namespace nephos {
+
+// Bumps of DetailOptions::size_m on an edge of a tile of the large noise.
+inline constexpr double kBumpsOfTile = 8;
+
+// Rows that turn places so that the period of the noise shows along no axis.
+inline constexpr double kNoiseTurn[3][3] = {{.8, .6, 0}, {-.48, .64, .6}, {.36, -.48, .8}};
+
+// Returns the size of the largest bumps, metres, in cells with edges of `cell_m`.
+double bump_size_m(const DetailOptions& options, double cell_m);
+
+// An immutable value; const functions are thread-safe.
+class CoverageCells {
+  public:
+    // `moisture` may be null: then nothing grows. Cells beyond periodic sides repeat; beyond open ones there are none.
+    CoverageCells(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture);
+
+    // Those that hold cloud.
+    const std::vector<Block>& blocks() const { return blocks_; }
+    bool grows() const { return !growth_.empty(); }
+
+    // Returns the sums of the grid's own values in each layer of cells.
+    std::vector<double> masses() const;
+
+    // Copies a cube of cells with its lowest corner at (i, j, k) into rows of `pitch` numbers: densities, and, unless it
+    // is null, growth times density. Returns false if all are 0; then what was copied is not complete.
+    bool copy(const int (&corner)[3], int side, int pitch, float* density, float* growth) const;
+
+  private:
+    bool crosses_periodic_side(const int (&corner)[3], int side) const;
+    // Index of a cell in density_; -1 where there is none.
+    std::ptrdiff_t index_in_blocks(int x, int y, int z) const;
+    std::size_t index_of(int x, int y, int z) const;  // of a block in table_
+    bool copy_images(const int (&corner)[3], int side, int pitch, float* density, float* growth) const;
+
+    std::vector<Block> blocks_;
+    Boundaries boundaries_;
+    Extent extent_;
+    std::array<int, 3> size_{};  // in blocks
+    std::vector<std::int32_t> table_;
+    std::vector<float> density_, growth_;
+    std::vector<std::array<double, kBlock>> masses_;
+};
+
+}  // namespace nephos

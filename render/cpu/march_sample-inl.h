@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Samples of rays in clouds with detail, and the steps to the next ones, for vectors of rays.
+
+#if defined(NEPHOS_RENDER_MARCH_SAMPLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_RENDER_MARCH_SAMPLE_INL_H_
+#undef NEPHOS_RENDER_MARCH_SAMPLE_INL_H_
+#else
+#define NEPHOS_RENDER_MARCH_SAMPLE_INL_H_
+#endif
+
+#include <cstddef>
+#include <limits>
+
+#include <hwy/highway.h>
+
+#include "render/cpu/marched_light-inl.h"
+#include "render/frame/marched_scene.h"
+#include "render/shared/march.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+
+// What a sample of a ray found in all volumes.
+struct MarchSample {
+    Floats extinction, margin, step, which;
+    Mask near;  // to cloud: it was sampled
+};
+
+// One over a direction, never infinite.
+HWY_INLINE Floats inverse(Floats direction) {
+    const Floats least = set(1.0e-6f);
+    const Floats safe = hn::IfThenElse(hn::Lt(hn::Abs(direction), least), least, direction);
+    return hn::Div(set(1.0f), safe);
+}
+
+// The part of rays in the box of a volume's bricks.
+struct BoxPart {
+    Floats begin, end;
+};
+
+HWY_INLINE BoxPart part_in_box(const MarchedVolume& volume, const Floats3& per_ray) {
+    const float edge = 8 * volume.kernel.node_m;
+    BoxPart part{hn::Zero(Lanes()), set(std::numeric_limits<float>::max())};
+    const Floats per[3] = {per_ray.x, per_ray.y, per_ray.z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Floats a = hn::Mul(set(volume.corner[axis]), per[axis]),
+                     b = hn::Mul(set(volume.corner[axis] + edge * float(volume.kernel.bricks[axis])), per[axis]);
+        part.begin = hn::Max(part.begin, hn::Min(a, b));
+        part.end = hn::Min(part.end, hn::Max(a, b));
+    }
+    return part;
+}
+
+HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& ray, const Floats3& per_ray,
+                                      const BoxPart* parts, Floats distance, Floats transmittance, Mask active) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    const Floats zero = hn::Zero(d), one = set(1.0f);
+    const Floats footprint = hn::Mul(distance, set(march.per_unit));
+    const Floats finest = hn::Max(set(march.least_step), hn::Mul(set(shader::kStepPixels), footprint));
+    const Floats least_step = hn::Mul(finest, hn::MulAdd(hn::Sub(one, transmittance), set(shader::kStepGrowth), one));
+    MarchSample sample{zero, one, set(shader::kFarAway_m), zero, hn::Lt(one, zero)};
+    for (std::size_t v = 0; v < march.volumes.size(); ++v) {
+        const MarchedVolume& volume = march.volumes[v];
+        const Floats3 corner{set(volume.corner[0]), set(volume.corner[1]), set(volume.corner[2])};
+        const Floats3 offset = subtract(times(distance, ray), corner);
+        const BrickPlace place = brick_place(volume, offset);
+        const Mask before = hn::Lt(distance, parts[v].begin);
+        // At the faces of the box rounding decides what is inside: there rays go on by a metre.
+        const Floats beside = hn::IfThenElse(hn::Lt(distance, parts[v].end), one, set(shader::kFarAway_m));
+        Floats step = hn::IfThenElse(before, hn::Add(hn::Sub(parts[v].begin, distance), set(shader::kBeyondFace_m)), beside);
+        const Mask within = hn::And(place.within, active);
+        const Mask holds = hn::And(within, hn::RebindMask(d, hn::Gt(place.number, hn::Set(di, -1))));
+        // Cells of the brick, and how far away the next with cloud is.
+        const Floats half = set(0.5f), three = set(3.0f);
+        const auto cell_of = [&](Floats local) { return hn::Min(hn::Floor(hn::Mul(local, half)), three); };
+        const Floats3 cell{cell_of(place.local.x), cell_of(place.local.y), cell_of(place.local.z)};
+        const Floats in_brick = hn::MulAdd(hn::MulAdd(cell.z, set(4.0f), cell.y), set(4.0f), cell.x);
+        const auto at = hn::Add(hn::ShiftLeft<6>(hn::Max(place.number, hn::Zero(di))), hn::ConvertTo(di, in_brick));
+        const auto clear_word = hn::GatherOffset(
+            di, reinterpret_cast<const std::int32_t*>(volume.kernel.clearance), at);
+        const Floats clear = hn::ConvertTo(d, hn::And(clear_word, hn::Set(di, 255)));
+        const Mask sampled = hn::And(holds, hn::Eq(clear, zero));
+        // Out of the cube of empty bricks or cells around the place.
+        const Floats count = hn::IfThenElse(holds, clear, hn::ConvertTo(d, hn::Neg(place.number)));
+        const Floats size = hn::IfThenElse(holds, set(2 * volume.kernel.node_m), set(8 * volume.kernel.node_m));
+        const auto way_out = [&](Floats brick, Floats of_cell, Floats offset_m, Floats per) {
+            const Floats own = hn::IfThenElse(holds, hn::MulAdd(brick, set(4.0f), of_cell), brick);
+            const Floats edge = hn::IfThenElse(hn::Gt(per, zero), hn::Add(own, count),
+                                               hn::Sub(hn::Add(own, one), count));
+            return hn::Mul(hn::MulSub(edge, size, offset_m), per);
+        };
+        const Floats out = hn::Min(way_out(place.brick.x, cell.x, offset.x, per_ray.x),
+                                   hn::Min(way_out(place.brick.y, cell.y, offset.y, per_ray.y),
+                                           way_out(place.brick.z, cell.z, offset.z, per_ray.z)));
+        step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), set(shader::kBeyondFace_m)), step);
+        if (!hn::AllFalse(d, sampled)) {
+            const auto number = hn::Max(place.number, hn::Zero(di));
+            const erosion::Node node =
+                erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z);
+            const erosion::Eroded found = erosion::eroded<true>(volume.kernel, node, offset.x, offset.y, offset.z,
+                                                          hn::Max(footprint, set(shader::kLeastFootprint_m)), sampled);
+            const Floats extinction = hn::Mul(found.density, set(volume.kernel.extinction_per_m));
+            sample.extinction = hn::Add(sample.extinction, extinction);
+            sample.which = hn::IfThenElse(hn::Gt(extinction, zero), set(float(v)), sample.which);
+            sample.margin = hn::IfThenElse(sampled, hn::Min(sample.margin, found.margin), sample.margin);
+            const Floats towards = hn::Min(hn::Max(hn::Mul(found.margin, set(volume.reach)), least_step),
+                                           hn::Max(set(shader::kLongestStep_m), least_step));
+            step = hn::IfThenElse(sampled, towards, step);
+            sample.near = hn::Or(sample.near, sampled);
+        }
+        sample.step = hn::Min(sample.step, step);
+    }
+    return sample;
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
