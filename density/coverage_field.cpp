@@ -173,15 +173,16 @@ void CoverageField::sample_nodes(const CoverageCells& cells, const NodeSums& sum
             }
             sums.sum(density.data(), means.data());
             if (cells.grows()) sums.sum(growing.data(), growths.data());
+            std::uint8_t* const out = &nodes_[n * kBrickBytes];
+            for (std::size_t node = 0; node < means.size(); ++node) {
+                const float d = means[node], growth = growths[node] / std::max(d, 1e-30f);
+                out[2 * node] = std::uint8_t(int(255 * (d / (d + half_density)) + 0.5f));
+                out[2 * node + 1] = std::uint8_t(int(128.5f + 127 * std::min(std::max(growth, -1.0f), 1.0f)));
+            }
             histograms[n].fill(0);
-            std::uint8_t* out = &nodes_[n * kBrickBytes];
-            for (std::size_t node = 0; node < means.size(); ++node, out += 2) {
-                const float d = means[node];
-                out[0] = std::uint8_t(255 * (d / (d + half_density)) + 0.5f);
-                const float growth_here = d > 0 ? std::clamp(growths[node] / d, -1.0f, 1.0f) : 0.0f;
-                out[1] = std::uint8_t(128.5f + 127 * growth_here);
-                const std::size_t x = node % kEdge, y = node / kEdge % kEdge, z = node / kEdge / kEdge;
-                if (std::max({x, y, z}) < kEdge - 1) ++histograms[n][out[0]];  // the others are the next brick's
+            for (std::size_t row = 0; row < kEdge * (kEdge - 1); ++row) {  // the last ones are those of other bricks
+                if (row % kEdge == kEdge - 1) continue;
+                for (std::size_t x = 0; x < kEdge - 1; ++x) ++histograms[n][out[2 * (row * kEdge + x)]];
             }
         }
     });
@@ -210,13 +211,17 @@ void CoverageField::measure_cells(const std::array<std::vector<std::uint8_t>, 3>
         detailed_density_of_brick(*this, n, samples);
         float* const to = &cell_density_[n * kOfBrick];
         const auto at = unpacked(std::size_t(places_[n]), bricks_);
-        const auto is_counted = [&](std::size_t axis, std::size_t sample) {
-            return counted[axis][std::size_t(at[axis]) * kCells + sample / 2] != 0;
-        };
-        for (std::size_t i = 0; i < samples.size(); ++i) {
-            const std::size_t x = i % kSamples, y = i / kSamples % kSamples, z = i / kSamples / kSamples;
-            to[(z / 2 * kCells + y / 2) * kCells + x / 2] += 0.125f * samples[i];
-            if (is_counted(0, x) && is_counted(1, y) && is_counted(2, z)) sums[n] += double(samples[i]);
+        for (std::size_t cell = 0; cell < kOfBrick; ++cell) {
+            const std::size_t x = cell % kCells, y = cell / kCells % kCells, z = cell / kCells / kCells;
+            const float* const from = &samples[((2 * z) * kSamples + 2 * y) * kSamples + 2 * x];
+            float sum = 0;
+            for (const std::size_t row : {std::size_t{0}, kSamples, kSamples * kSamples, kSamples * (kSamples + 1)})
+                sum += from[row] + from[row + 1];
+            to[cell] = 0.125f * sum;
+            const bool is_counted = counted[0][std::size_t(at[0]) * kCells + x] != 0 &&
+                                    counted[1][std::size_t(at[1]) * kCells + y] != 0 &&
+                                    counted[2][std::size_t(at[2]) * kCells + z] != 0;
+            if (is_counted) sums[n] += double(sum);
         }
     });
     const double sum = std::accumulate(sums.begin(), sums.end(), 0.0);

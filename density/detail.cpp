@@ -54,10 +54,18 @@ void sample_places(const DetailKernel& field, std::int32_t brick, const float* c
 void sample_brick(const DetailKernel& field, std::int32_t brick, const float* corner, float* out) {
     using namespace erosion;
     const Lanes d;
-    constexpr std::size_t kSide = CoverageField::kBrickNodes - 1, kCount = kSide * kSide * kSide;
+    constexpr std::size_t kSide = CoverageField::kBrickNodes - 1, kCount = kSide * kSide * kSide,
+                          kCells = CoverageField::kBrickCells;
+    static_assert(kMaxLanes <= 2 * kSide, "all lanes lie in one row of cells");
+    const std::uint8_t* const clearance = field.clearance + std::size_t(brick) * kCells * kCells * kCells;
     const std::size_t lanes = hn::Lanes(d);
     HWY_ALIGN float middle[3][kMaxLanes];
     for (std::size_t n = 0; n < kCount; n += lanes) {
+        const std::size_t row = (n / kSide / kSide / 2 * kCells + n / kSide % kSide / 2) * kCells;
+        if (clearance[row] > 0 && clearance[row + 1] > 0 && clearance[row + 2] > 0 && clearance[row + 3] > 0) {
+            std::fill_n(out + n, lanes, 0.0f);  // no cloud near
+            continue;
+        }
         for (std::size_t i = 0; i < lanes; ++i) {
             middle[0][i] = float((n + i) % kSide) + 0.5f;
             middle[1][i] = float((n + i) / kSide % kSide) + 0.5f;

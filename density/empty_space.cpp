@@ -50,6 +50,8 @@ std::vector<std::uint8_t> clearance_of_cells(std::span<const std::uint8_t> nodes
     using Rows = std::array<std::uint16_t, kSide * kSide>;
     tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
         const auto at = unpacked(std::size_t(places[n]), bricks);
+        std::uint8_t* const out = &clearance[n * kCells * kCells * kCells];
+        if (std::ranges::all_of(occupied[n], [](std::uint8_t row) { return row == (1u << kCells) - 1; })) return;
         Rows near{};
         for (int m = 0; m < 27; ++m) {
             const int o[3] = {m % 3, m / 3 % 3, m / 9};
@@ -70,7 +72,6 @@ std::vector<std::uint8_t> clearance_of_cells(std::span<const std::uint8_t> nodes
                 to = std::uint16_t(to | occupied[std::size_t(number)][std::size_t(cell)] << kCells * o[0]);
             }
         }
-        std::uint8_t* const out = &clearance[n * kCells * kCells * kCells];
         std::fill_n(out, kCells * kCells * kCells, std::uint8_t(kCells));
         for (int distance = 0; distance < kCells; ++distance) {
             for (int cell = 0; cell < kCells * kCells * kCells; ++cell) {
