@@ -69,7 +69,8 @@ CacheKey light_key(const CacheKey& metaballs, const RenderOptions& options) {
 
 // Of the parts with detail, whose densities are those of their metaballs.
 CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, const RenderOptions& options) {
-    std::vector<double> rest{mean_cosine(options.light.phase)};
+    const CloudLight& light = options.light;
+    std::vector<double> rest{mean_cosine(light.phase), double(diffuses(light)), light.albedo};
     for (const DetailedVoxels& part : cloud.detailed) {
         const DetailSetting& s = part.setting;
         const DetailOptions& o = s.options;
@@ -141,6 +142,7 @@ void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptio
     if (!was_given || !cached.merged.empty()) cached.metaballs = next_version();
     const TileGrid grid{options.shadow_map_size, options.shadow_map_size};
     cached.sun_depths.assign(cached.cloud.visible.size(), 0.0f);
+    cached.drawn_depths.clear();
     cached.shadow.assign(std::size_t(grid.width) * std::size_t(grid.height), 1.0f);
     cached.known_light.assign(cached.sun_depths.size(), 0);
     cached.known_tiles.assign(grid.tiles(), 0);

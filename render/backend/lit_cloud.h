@@ -35,6 +35,7 @@ struct LitCloud {
     ShadowFrame frame;
     int shadow_size = 0;
     std::vector<float> sun_depths;          // optical depth to the sun, one for each of cloud.visible
+    std::vector<float> drawn_depths;        // with volumes: those that metaballs are drawn with, by diffuse light
     std::vector<float> shadow;              // shadow_size^2 texels of the shadow map
     std::vector<std::uint8_t> known_light;  // 1 for each of `sun_depths` that is computed
     std::vector<std::uint8_t> known_tiles;  // 1 for each tile of `shadow` that is computed
@@ -52,6 +53,9 @@ struct LitCloud {
     std::vector<CloudVolume> volumes;
     CacheKey volumes_key{}, volumes_light_key{};
     Version volumes_version = 0, volumes_light = 0;
+
+    // What metaballs are drawn with.
+    const std::vector<float>& depths_to_draw() const { return drawn_depths.empty() ? sun_depths : drawn_depths; }
 
     // Notes that a pass has changed sun_depths or shadow.
     void note_light_pass() {

@@ -13,6 +13,7 @@ namespace nephos {
 void complete_light_of_volumes(LitCloud& cloud, std::span<const std::uint8_t> balls,
                                std::span<const std::uint8_t> tiles, StageTimes& times) {
     const StageTimer timer(&times, DrawStage::light);
+    cloud.drawn_depths.resize(cloud.sun_depths.size());
     if (std::ranges::count(cloud.cloud.detailed, 1) < std::ptrdiff_t(cloud.cloud.visible.size())) {
         PreparedCloud others = cloud.cloud;
         for (std::size_t i = 0; i < others.visible.size(); ++i)
@@ -28,8 +29,15 @@ void complete_light_of_volumes(LitCloud& cloud, std::span<const std::uint8_t> ba
     tbb::parallel_for(std::size_t{0}, cloud.sun_depths.size(), [&](std::size_t i) {
         if (balls[i] == 0) return;
         const Metaball& ball = cloud.cloud.metaballs[cloud.cloud.visible[i]];
-        for (const CloudVolume& volume : cloud.volumes)
-            cloud.sun_depths[i] += sun_depth_at(volume, Vec3(ball.x, ball.y, ball.z));
+        const Vec3 centre(ball.x, ball.y, ball.z);
+        for (const CloudVolume& volume : cloud.volumes) cloud.sun_depths[i] += sun_depth_at(volume, centre);
+        cloud.drawn_depths[i] = cloud.sun_depths[i];
+        if (!cloud.cloud.is_detailed(i)) return;
+        for (const CloudVolume& volume : cloud.volumes) {
+            if (volume.diffuse.upwards.empty()) continue;
+            const float depth = equivalent_depth_at(volume, centre, cloud.sun_depths[i]);
+            if (depth != cloud.sun_depths[i]) cloud.drawn_depths[i] = depth;
+        }
     });
     if (std::ranges::count(tiles, 1) > 0) cast_shadows(cloud.volumes, cloud.frame, cloud.shadow_size, cloud.shadow);
 }

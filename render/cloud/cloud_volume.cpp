@@ -41,7 +41,8 @@ CloudVolume::CloudVolume(const DetailedVoxels& voxels)
 
 std::size_t CloudVolume::memory_bytes() const {
     return field.memory_bytes() + 4 * (extinction.size() + corner_depths.size()) +
-           2 * (sun_depths.size() + own_depths.size() + surroundings.size());
+           2 * (sun_depths.size() + own_depths.size() + surroundings.size() + diffuse.upwards.size() +
+                diffuse.sideways.size());
 }
 
 double footprint_scale(std::span<const CloudVolume> volumes) {
@@ -49,6 +50,11 @@ double footprint_scale(std::span<const CloudVolume> volumes) {
     for (const CloudVolume& volume : volumes)
         scale = std::max({scale, 1.0, 2 * volume.field.node_m() / double(shader::kFootprintCell_m)});
     return scale;
+}
+
+bool diffuses(const CloudLight& light) {
+    return light.multiple == MultipleScattering::diffusion && light.lighting == Lighting::light_pass &&
+           light.multiple_scattering > 0;
 }
 
 // Ten of the fourteen directions of Lebedev's rule of order 5 (V. I. Lebedev 1976): the axes in the horizontal plane,
@@ -131,6 +137,8 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
     });
     for (std::size_t n = 0; n < volumes.size(); ++n) {
         CloudVolume& volume = volumes[n];
+        volume.diffuse = {};
+        volume.mean_cosine = mean_cosine(light.phase);
         volume.sun_depths.assign(depths[n].size() + 1, 0);
         const auto& bricks = volume.field.bricks();
         tbb::parallel_for(std::size_t{0}, volume.field.places().size(), [&](std::size_t brick) {
@@ -139,50 +147,82 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
             for (std::size_t i = 0; i < kLightNodesOfBrick; ++i) {
                 const Vec3 node(i % kLightNodes, i / kLightNodes % kLightNodes, i / kLightNodes / kLightNodes);
                 const Vec3 place = volume.field.corner_m() + 2 * volume.field.node_m() * (double(kCells) * corner + node);
-                float depth = depths[n][brick * kLightNodesOfBrick + i];
+                float& total = depths[n][brick * kLightNodesOfBrick + i];
                 for (std::size_t m = 0; m < volumes.size(); ++m)
-                    if (m != n) depth += sun_depth_at(volumes[m], place);
+                    if (m != n) total += sun_depth_at(volumes[m], place);
+                float depth = total;
                 if (light.lighting == Lighting::cfa)
                     depth = absorbed_depth(depth, volume.field.extinction_per_m(), light.light_distance_m);
                 volume.sun_depths[brick * kLightNodesOfBrick + i] = packed_depth(depth);
             }
         });
+        if (diffuses(light))
+            volume.diffuse =
+                diffuse_sunlight(volume.field, volume.extinction, depths[n], light.albedo, volume.mean_cosine);
     }
 }
 
-float sun_depth_at(const CloudVolume& volume, const Vec3& place_m) {
-    const CoverageField& field = volume.field;
-    if (!looks_through(field, place_m, volume.to_sun)) return 0;
-    const auto& bricks = field.bricks();
-    const Vec3 cells = (place_m - field.corner_m()) / (2 * field.node_m());
+namespace {
+
+// A place in a field: the brick, and cells from its corner.
+struct PlaceInField {
     std::size_t brick[3];
     double local[3];
-    for (int axis = 0; axis < 3; ++axis) {
-        const double at = std::floor(cells[axis] / kCells);
-        if (at < 0 || at >= bricks[std::size_t(axis)]) return volume.front.depth_at(place_m);
-        brick[axis] = std::size_t(at);
-        local[axis] = cells[axis] - at * kCells;
+    bool inside = true;
+    std::int32_t number = -1;  // of a brick that holds cloud
+
+    PlaceInField(const CoverageField& field, const Vec3& place_m) {
+        const auto& bricks = field.bricks();
+        const Vec3 cells = (place_m - field.corner_m()) / (2 * field.node_m());
+        for (int axis = 0; axis < 3; ++axis) {
+            const double at = std::floor(cells[axis] / kCells);
+            inside = inside && at >= 0 && at < bricks[std::size_t(axis)];
+            brick[axis] = std::size_t(std::max(at, 0.0));
+            local[axis] = cells[axis] - at * kCells;
+        }
+        if (inside)
+            number = field.table()[(brick[2] * std::size_t(bricks[1]) + brick[1]) * std::size_t(bricks[0]) + brick[0]];
     }
-    const auto x = std::size_t(bricks[0]), y = std::size_t(bricks[1]);
-    const std::int32_t number = field.table()[(brick[2] * y + brick[1]) * x + brick[0]];
+};
+
+}  // namespace
+
+float sun_depth_at(const CloudVolume& volume, const Vec3& place_m) {
+    if (!looks_through(volume.field, place_m, volume.to_sun)) return 0;
+    const PlaceInField at(volume.field, place_m);
+    if (!at.inside) return volume.front.depth_at(place_m);
+    const auto x = std::size_t(volume.field.bricks()[0]) + 1, y = std::size_t(volume.field.bricks()[1]) + 1;
     float rest[3];
-    if (number < 0) {
-        for (int axis = 0; axis < 3; ++axis) rest[axis] = float(local[axis] / kCells);
-        return trilinear(&volume.corner_depths[(brick[2] * (y + 1) + brick[1]) * (x + 1) + brick[0]], x + 1,
-                         (x + 1) * (y + 1), rest);
+    if (at.number < 0) {
+        for (int axis = 0; axis < 3; ++axis) rest[axis] = float(at.local[axis] / kCells);
+        return trilinear(&volume.corner_depths[(at.brick[2] * y + at.brick[1]) * x + at.brick[0]], x, x * y, rest);
     }
     std::size_t whole[3];
     for (int axis = 0; axis < 3; ++axis) {
-        whole[axis] = std::size_t(std::min(int(local[axis]), kCells - 1));
-        rest[axis] = float(local[axis] - double(whole[axis]));
+        whole[axis] = std::size_t(std::min(int(at.local[axis]), kCells - 1));
+        rest[axis] = float(at.local[axis] - double(whole[axis]));
     }
     const std::vector<std::uint16_t>& depths = volume.own_depths.empty() ? volume.sun_depths : volume.own_depths;
+    const std::size_t first = std::size_t(at.number) * kLightNodesOfBrick +
+                              (whole[2] * kLightNodes + whole[1]) * kLightNodes + whole[0];
     const float root =
-        trilinear(&depths[std::size_t(number) * kLightNodesOfBrick + (whole[2] * kLightNodes + whole[1]) * kLightNodes +
-                          whole[0]],
-                  kLightNodes, std::size_t(kLightNodes) * kLightNodes, rest) /
-        65535;
+        trilinear(&depths[first], kLightNodes, std::size_t(kLightNodes) * kLightNodes, rest) / 65535;
     return root * root * kMostMarchedDepth;
+}
+
+// What leaves a cloud towards the eye goes outwards: the flux along it is about a third of the fluence.
+float equivalent_depth_at(const CloudVolume& volume, const Vec3& place_m, float sun_depth) {
+    constexpr double kOutwards = 1.0 / 3;
+    const PlaceInField at(volume.field, place_m);
+    if (at.number < 0) return sun_depth;
+    std::size_t node = std::size_t(at.number) * kLightNodesOfBrick, stride = 1;
+    for (int axis = 0; axis < 3; ++axis, stride *= kLightNodes)
+        node += stride * std::size_t(std::lround(at.local[axis]));
+    const double root = double(volume.diffuse.upwards[node] & 255u) / 255, g = volume.mean_cosine;
+    const double diffuse = 0.25 * double(shader::kMostFluence) * root * root *
+                           (double(shader::kDiffuseBase) + double(shader::kDiffuseFlux) * g * kOutwards);
+    const double near = 0.25 * (std::exp((g - 1) * double(sun_depth)) - std::exp(-double(sun_depth)));
+    return float(std::max(1 / std::max(diffuse + near, 1e-3) - 1, 0.0) / (1.5 * std::max(1 - g, 0.01)));
 }
 
 void cast_shadows(std::span<const CloudVolume> volumes, const ShadowFrame& frame, int size,

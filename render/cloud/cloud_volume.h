@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "density/detail.h"
+#include "render/cloud/diffusion.h"
 #include "render/cloud/light_sweep.h"
 #include "render/cloud/splats.h"
 #include "render/image/picture.h"
@@ -33,6 +34,8 @@ struct CloudVolume {
     // each axis), and like sun_depths, where there are other volumes.
     Vec3 to_sun{0, 0, 1};
     LightFront front;
+    DiffuseLight diffuse;  // where diffuses(light)
+    double mean_cosine = 0;
     std::vector<float> corner_depths;
     std::vector<std::uint16_t> own_depths;
 
@@ -43,6 +46,10 @@ struct CloudVolume {
 // the largest cells; at least 1, and 0 without volumes.
 double footprint_scale(std::span<const CloudVolume> volumes);
 
+// Whether sunlight that is scattered often diffuses from cell to cell: with MultipleScattering::diffusion, but for the
+// absorption of T.
+bool diffuses(const CloudLight& light);
+
 // Computes the surroundings, which do not depend on the sun. `mean_cosine`: of the phase function.
 void see_surroundings(CloudVolume& volume, double mean_cosine);
 
@@ -51,6 +58,10 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
 
 // Returns the optical depth of a volume alone towards the sun, at any place of the world. After light_volumes().
 float sun_depth_at(const CloudVolume& volume, const Vec3& place_m);
+
+// Returns the depth at which a metaball at the place scatters as much light as the volume there, if it is not lit by
+// diffuse light itself: 1 / (1 + 1.5 (1 - g) depth) of it (scattering_table.h). Where diffuses(light).
+float equivalent_depth_at(const CloudVolume& volume, const Vec3& place_m, float sun_depth);
 
 // Multiplies the texels of a shadow map by the light that the volumes leave.
 void cast_shadows(std::span<const CloudVolume> volumes, const ShadowFrame& frame, int size, std::span<float> shadow);

@@ -110,9 +110,10 @@ bool CpuBackend::begin(const FrameDescription& frame, Picture& picture) {
     }
     const VisibleSet* const known = seen ? &*seen : nullptr;
     complete_light(cloud, order.source, known, frame.times);
-    set_light(order, {cloud.sun_depths, frame.lightning});
+    set_light(order, {cloud.depths_to_draw(), frame.lightning});
     const AirShells shells = frame.shells();
-    const MarchedScene march(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera));
+    const MarchedScene march(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera),
+                             frame.options.light);
     for (ProcessorView& view : views)
         view.draw(picture, cloud.shadow.data(), cloud.shadow_size, shells, known,
                   march.volumes.empty() ? nullptr : &march);

@@ -126,22 +126,50 @@ HWY_INLINE Floats sun_depth_at(const MarchedVolume& volume, const BrickPlace& pl
     return hn::Mul(hn::Mul(root, root), set(kMostMarchedDepth));
 }
 
-struct Surroundings {
-    Floats sky, ground;
+// The lower and the upper bytes of such numbers, 0..255.
+struct TwoBytes {
+    Floats low, high;
 };
 
-HWY_INLINE Surroundings surroundings_at(const MarchedVolume& volume, const BrickPlace& place) {
-    const auto corners = light_at(volume.surroundings, place, [](Words word, Floats fx) {
+HWY_INLINE TwoBytes bytes_at(const std::uint16_t* nodes, const BrickPlace& place) {
+    const auto corners = light_at(nodes, place, [](Words word, Floats fx) {
         const auto along = [&](int low, int high) {
             const Floats a = byte_of(word, low), b = byte_of(word, high);
             return hn::MulAdd(fx, hn::Sub(b, a), a);
         };
-        return Surroundings{along(0, 16), along(8, 24)};
+        return TwoBytes{along(0, 16), along(8, 24)};
     });
-    const Floats unit = set(1.0f / 255.0f);
-    return {hn::Mul(unit, between_rows(corners[0].sky, corners[1].sky, corners[2].sky, corners[3].sky, place)),
-            hn::Mul(unit,
-                    between_rows(corners[0].ground, corners[1].ground, corners[2].ground, corners[3].ground, place))};
+    return {between_rows(corners[0].low, corners[1].low, corners[2].low, corners[3].low, place),
+            between_rows(corners[0].high, corners[1].high, corners[2].high, corners[3].high, place)};
+}
+
+// The sunlight that is scattered more than once towards the eye, of colour 1: by light that still travels nearly along
+// the sun's, and by light that diffuses (render/cloud/diffusion.h). That is known at the lattice's scale; bumps and
+// folds have more and less of it as their own depth differs from the lattice's.
+HWY_INLINE Floats scattered_in_volume(const ViewScene& scene, const MarchedVolume& volume, const Floats3& ray,
+                                      Floats sun_depth, const BrickPlace& here, Mask in_brick) {
+    const hn::RebindToSigned<Lanes> di;
+    const MarchedScene& march = *scene.march;
+    const PictureFrame& frame = *scene.frame;
+    if (!(march.diffuse > 0)) return scattered_often(frame, ray, sun_depth);
+    const TwoBytes up = bytes_at(volume.upwards, here), side = bytes_at(volume.sideways, here);
+    const Floats root = hn::Mul(up.low, set(1.0f / 255.0f)), unit = set(1.0f / 127.0f), none = set(128.0f / 127.0f);
+    const Floats along = dot({hn::MulSub(side.low, unit, none), hn::MulSub(side.high, unit, none),
+                              hn::MulSub(up.high, unit, none)},
+                             ray);
+    const Floats directed = hn::Max(hn::NegMulAdd(set(shader::kDiffuseFlux * march.mean_cosine), along,
+                                                  set(shader::kDiffuseBase)),
+                                    hn::Zero(Lanes()));
+    const Floats one = set(1.0f), decay = set(shader::kDiffuseDecay * (1 - march.mean_cosine));
+    const Floats relief = hn::Div(hn::MulAdd(decay, sun_depth_at(volume, here), one), hn::MulAdd(decay, sun_depth, one));
+    const Floats diffuse = hn::Mul(hn::Mul(hn::Mul(root, root), hn::Min(relief, set(shader::kMostRelief))),
+                                   hn::Mul(directed, set(0.25f * shader::kMostFluence)));
+    const Between column = scatter_column(dot(set3(frame.to_sun), ray));
+    const Floats forwards = scattering_at(
+        frame.scattering, hn::Set(di, int((1 + shader::kScatterDepths) * shader::kScatterAngles)), column);
+    const Floats near = hn::Sub(fast_exp(hn::Mul(sun_depth, set(march.mean_cosine - 1))), fast_exp(hn::Neg(sun_depth)));
+    return hn::Mul(set(march.diffuse),
+                   hn::MulAdd(forwards, hn::Max(near, hn::Zero(Lanes())), hn::IfThenElseZero(in_brick, diffuse)));
 }
 
 // The light of points in a volume towards the eye. The sunlight that arrives is attenuated by three samples towards
@@ -171,17 +199,17 @@ HWY_INLINE Floats3 marched_radiance(const ViewScene& scene, const MarchedVolume&
         const Floats depth_here = hn::IfThenElseZero(in_brick, sun_depth_at(volume, here));
         sun_depth = hn::IfThenElse(known, sun_depth, hn::Max(own, depth_here));
     }
-    Surroundings seen = surroundings_at(volume, here);
-    seen.sky = hn::IfThenElse(in_brick, seen.sky, set(1.0f));
-    seen.ground = hn::IfThenElse(in_brick, seen.ground, set(1.0f));
+    const TwoBytes seen = bytes_at(volume.surroundings, here);
+    const Floats unit = set(1.0f / 255.0f), sky = hn::IfThenElse(in_brick, hn::Mul(unit, seen.low), set(1.0f)),
+                 ground_seen = hn::IfThenElse(in_brick, hn::Mul(unit, seen.high), set(1.0f));
     const Floats fold = hn::MulAdd(
         set(shader::kFoldShare), fast_exp(hn::Mul(own, set(-shader::kFoldDecay))), set(1 - shader::kFoldShare));
 
     const Floats albedo = set(frame.ambient_top.w);
     const Floats3 sunlight = sunlight_at(frame, point.z);
-    Floats3 arriving = times(hn::Mul(seen.sky, fold), set3(frame.ambient_top));
-    arriving = times_add(hn::Mul(seen.ground, fold), set3(frame.ambient_base), arriving);
-    arriving = times_add(scattered_often(frame, ray, sun_depth), sunlight, arriving);
+    Floats3 arriving = times(hn::Mul(sky, fold), set3(frame.ambient_top));
+    arriving = times_add(hn::Mul(ground_seen, fold), set3(frame.ambient_base), arriving);
+    arriving = times_add(scattered_in_volume(scene, volume, ray, sun_depth, here, in_brick), sunlight, arriving);
     const Floats once = hn::Mul(scattered_once(frame, dot(to_sun, ray)), hn::Exp(d, hn::Neg(sun_depth)));
     arriving = times_add(once, sunlight, arriving);
     if (frame.flash.w > 0) {

@@ -12,7 +12,8 @@ namespace nephos {
 static_assert(shader::kMostVolumes == kMaxDetailedClouds);
 
 MarchedVolume::MarchedVolume(const CloudVolume& volume, const Vec3& eye_m)
-    : kernel(volume.field), sun_depths(volume.sun_depths.data()), surroundings(volume.surroundings.data()) {
+    : kernel(volume.field), sun_depths(volume.sun_depths.data()), surroundings(volume.surroundings.data()),
+      upwards(volume.diffuse.upwards.data()), sideways(volume.diffuse.sideways.data()) {
     const Vec3 from = volume.field.corner_m() - eye_m;
     for (int axis = 0; axis < 3; ++axis) corner[axis] = float(from[axis]);
     // The large noise changes by its whole width within half of a bump.
@@ -22,7 +23,10 @@ MarchedVolume::MarchedVolume(const CloudVolume& volume, const Vec3& eye_m)
     reach = 1 / (16 * per_m);
 }
 
-MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit) {
+MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit,
+                           const CloudLight& light) {
+    if (diffuses(light)) diffuse = float(light.multiple_scattering);
+    mean_cosine = float(nephos::mean_cosine(light.phase));
     for (const CloudVolume& volume : of)
         if (!volume.field.places().empty()) volumes.emplace_back(volume, camera.position_m);
     if (volumes.size() > shader::kMostVolumes)

@@ -20,7 +20,7 @@ struct MarchedVolume {
     DetailKernel kernel;
     float corner[3] = {};  // of its field, relative to the eye, metres
     float reach = 80;      // metres to cloud per missing coverage, at most
-    const std::uint16_t *sun_depths = nullptr, *surroundings = nullptr;
+    const std::uint16_t *sun_depths = nullptr, *surroundings = nullptr, *upwards = nullptr, *sideways = nullptr;
 
     MarchedVolume(const CloudVolume& volume, const Vec3& eye_m);
 };
@@ -30,10 +30,12 @@ struct MarchedScene {
     float per_unit = 1;                    // footprint of a pixel at distance 1
     float fade_begins = 1, fade_ends = 1;  // metres from the eye
     float least_step = 1;                  // in cloud, metres
+    float diffuse = 0, mean_cosine = 0;    // as in shader::March
 
     MarchedScene() = default;
     // Throws Error(usage) when there are more than shader::kMostVolumes that hold cloud.
-    MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit);
+    MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit,
+                 const CloudLight& light);
 };
 
 // The rays of a tile's pixels, row by row, between two parts of the march.

@@ -81,9 +81,12 @@ float at(const std::vector<float>& table, std::size_t row, const Between& angle)
 }  // namespace
 
 std::vector<float> scattering_table(const CloudLight& light) {
-    std::vector<float> table((1 + kDepths) * kAngles);
+    std::vector<float> table((2 + kDepths) * kAngles);
     for (std::size_t column = 0; column < kAngles; ++column)
         table[column] = float(kPi * phase(light.phase, cosine_of_column(column)));
+    const double directed = std::max(mean_cosine(light.phase), 0.0);
+    for (std::size_t column = 0; column < kAngles; ++column)
+        table[(1 + kDepths) * kAngles + column] = float(kPi * phase(light.phase, cosine_of_column(column), directed));
     if (light.multiple == MultipleScattering::diffusion)
         add_diffusion(light, table);
     else

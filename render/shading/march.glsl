@@ -38,14 +38,33 @@ float volume_sun_depth(uint v, BrickPlace place) {
     return root * root * kMostMarchedDepth;
 }
 
-// Returns the fractions of the sky and of the ground that are seen.
-vec2 volume_surroundings(uint v, BrickPlace place) {
+// Returns the lower and the upper bytes, 0..255, of the numbers of a plane of the light's words: 1 of the sky and the
+// ground that are seen, 2 and 3 of diffuse light.
+vec2 volume_bytes(uint v, uint plane, BrickPlace place) {
     LightCorner at = light_place(place);
-    uvec4 words = light_rows(march.volumes[v].first_light + march.volumes[v].light_words + at.first);
-    vec4 sky0 = vec4(words & 255u), sky1 = vec4((words >> 16) & 255u);
-    vec4 ground0 = vec4((words >> 8) & 255u), ground1 = vec4(words >> 24);
-    return (1.0 / 255.0) * vec2(between_rows(sky0 + at.share.x * (sky1 - sky0), at.share),
-                                between_rows(ground0 + at.share.x * (ground1 - ground0), at.share));
+    uvec4 words = light_rows(march.volumes[v].first_light + plane * march.volumes[v].light_words + at.first);
+    vec4 low0 = vec4(words & 255u), low1 = vec4((words >> 16) & 255u);
+    vec4 high0 = vec4((words >> 8) & 255u), high1 = vec4(words >> 24);
+    return vec2(between_rows(low0 + at.share.x * (low1 - low0), at.share),
+                between_rows(high0 + at.share.x * (high1 - high0), at.share));
+}
+
+// Returns the sunlight that is scattered more than once towards the eye, of colour 1: by light that still travels nearly
+// along the sun's, and by light that diffuses (render/cloud/diffusion.h). That is known at the lattice's scale; bumps and
+// folds have more and less of it as their own depth differs from the lattice's.
+float scattered_in_volume(uint v, vec3 ray, float sun_depth, BrickPlace here) {
+    vec2 up = volume_bytes(v, 2u, here), side = volume_bytes(v, 3u, here);
+    float root = up.x * (1.0 / 255.0);
+    vec3 flux = vec3(side, up.y) * (1.0 / 127.0) - 128.0 / 127.0;
+    float directed = max(kDiffuseBase - kDiffuseFlux * march.mean_cosine * dot(flux, ray), 0.0);
+    float decay = kDiffuseDecay * (1.0 - march.mean_cosine);
+    float relief = (1.0 + decay * volume_sun_depth(v, here)) / (1.0 + decay * sun_depth);
+    float diffuse = root * root * min(relief, kMostRelief) * directed * (0.25 * kMostFluence);
+    if (!holds_cloud(here)) diffuse = 0.0;
+    float forwards = scattering_at(1u + kScatterDepths, scatter_column(dot(frame.to_sun.xyz, ray)));
+    float near = max(exp((march.mean_cosine - 1.0) * sun_depth) - exp(-sun_depth), 0.0);
+    float often = scattered_often(ray, sun_depth);
+    return march.diffuse > 0.0 ? march.diffuse * (forwards * near + diffuse) : often;
 }
 
 // The light of a point in a volume towards the eye. The sunlight that arrives is attenuated by three samples towards
@@ -62,11 +81,11 @@ vec3 marched_radiance(uint v, vec3 ray, float distance) {
     // Bricks without cloud have no depths: what is beyond them shows in those of the point itself.
     float sun_depth = holds_cloud(beyond) ? own + volume_sun_depth(v, beyond)
                                           : max(own, holds_cloud(here) ? volume_sun_depth(v, here) : 0.0);
-    vec2 seen = holds_cloud(here) ? volume_surroundings(v, here) : vec2(1.0);
+    vec2 seen = holds_cloud(here) ? volume_bytes(v, 1u, here) * (1.0 / 255.0) : vec2(1.0);
     float fold = kFoldShare * exp(-kFoldDecay * own) + (1.0 - kFoldShare);
     vec3 sunlight = sunlight_at(point.z);
     vec3 arriving = seen.x * fold * frame.ambient_top.rgb + seen.y * fold * frame.ambient_base.rgb;
-    arriving += scattered_often(ray, sun_depth) * sunlight;
+    arriving += scattered_in_volume(v, ray, sun_depth, here) * sunlight;
     arriving += scattered_once(dot(to_sun, ray)) * exp(-sun_depth) * sunlight;
     vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark
     arriving += frame.flash.w * flash_falloff(dot(way, way)) * fold * frame.flash_colour.rgb;

@@ -32,6 +32,14 @@ NEPHOS_CONST float kTap0Length_m = 6.5f, kTap1Length_m = 9.5f, kTap2Length_m = 1
 NEPHOS_CONST float kTapsEnd_m = 30.5f;
 // The light of sky and ground in folds: this share of it falls off with the samples' optical depth times kFoldDecay.
 NEPHOS_CONST float kFoldShare = 0.55f, kFoldDecay = 0.5f;
+// Light that diffuses (render/cloud/diffusion.h): of fluence f and flux F, 1/4 (kDiffuseBase f + kDiffuseFlux g omega F)
+// is scattered towards omega. By Eddington's approximation the numbers are 1 and 3; with these the albedo of slabs of
+// optical depth 5, 20 and 80 and g of 0.5 to 0.85 is within 5 % of the exact one.
+NEPHOS_CONST float kDiffuseBase = 1.15f, kDiffuseFlux = 2.4f;
+// By how much diffuse light falls off with a depth that the lattice does not know: as 1 / (1 + kDiffuseDecay (1 - g)
+// depth), diffusion through a slab; and the most that a bump has more than the lattice.
+NEPHOS_CONST float kDiffuseDecay = 1.5f, kMostRelief = 2.0f;
+NEPHOS_CONST float kMostFluence = 4.0f;               // that a node can store
 NEPHOS_CONST float kMostMarchedDepth = 64.0f;         // towards the sun: of more nothing arrives
 // Words of a brick: of its nodes, of the corners of its cells, and of its cells' clearance.
 NEPHOS_CONST uint kNodeEdge = 9u, kNodeWords = 729u;
@@ -58,7 +66,7 @@ struct MarchVolume {
     float per_node;      // 1 / metres between two nodes
     uint first_table, first_clearance, first_nodes;  // of its words
     uint first_light;
-    uint light_words;    // of its sun depths; those of the surroundings follow
+    uint light_words;    // of its sun depths; those of the surroundings follow, and two of the diffuse light
     float reach;         // metres to cloud per missing coverage, at most
     float extinction_per_m;
     float half_density;  // as in ErosionConstants from here on
@@ -75,7 +83,9 @@ struct March {
     float per_unit;                // footprint of a pixel at distance 1
     float fade_begins, fade_ends;  // metres from the eye
     float least_step;              // in cloud, metres
-    float unused0, unused1, unused2;
+    float diffuse;                 // strength of the light that diffuses; 0: the scattering table has it
+    float mean_cosine;             // of the phase function
+    float unused0;
     MarchVolume volumes[kMostVolumes];
 };
 

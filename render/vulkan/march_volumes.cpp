@@ -35,7 +35,7 @@ Places places_after(const Places& before, const CloudVolume& volume) {
     at.nodes = at.clearance + bricks * shader::kClearanceWords;
     at.cells_end = at.nodes + bricks * kNodes;
     at.light = before.light_end;
-    at.light_end = at.light + 2 * bricks * kLightNodesOfBrick;
+    at.light_end = at.light + 4 * bricks * kLightNodesOfBrick;
     return at;
 }
 
@@ -103,16 +103,19 @@ std::vector<std::uint32_t> march_light(std::span<const CloudVolume> volumes) {
             };
             words[at.light + i] = pair(volume.sun_depths);
             words[at.light + count + i] = pair(volume.surroundings);
+            if (volume.diffuse.upwards.empty()) continue;
+            words[at.light + 2 * count + i] = pair(volume.diffuse.upwards);
+            words[at.light + 3 * count + i] = pair(volume.diffuse.sideways);
         }
     });
     return words;
 }
 
 shader::March march_constants(std::span<const CloudVolume> volumes, const CameraFrame& camera,
-                              double pixels_per_unit) {
-    const MarchedScene scene(volumes, camera, pixels_per_unit);
+                              double pixels_per_unit, const CloudLight& light) {
+    const MarchedScene scene(volumes, camera, pixels_per_unit, light);
     shader::March march{shader::uint(scene.volumes.size()), scene.per_unit, scene.fade_begins, scene.fade_ends,
-                         scene.least_step, 0, 0, 0, {}};
+                         scene.least_step, scene.diffuse, scene.mean_cosine, 0, {}};
     std::size_t n = 0;
     for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
         const MarchedVolume& from = scene.volumes[n];
@@ -129,7 +132,7 @@ shader::March march_constants(std::span<const CloudVolume> volumes, const Camera
         to.first_clearance = shader::uint(at.clearance);
         to.first_nodes = shader::uint(at.nodes);
         to.first_light = shader::uint(at.light);
-        to.light_words = shader::uint((at.light_end - at.light) / 2);
+        to.light_words = shader::uint((at.light_end - at.light) / 4);
         to.reach = from.reach;
         to.extinction_per_m = from.kernel.extinction_per_m;
         to.half_density = e.half_density;

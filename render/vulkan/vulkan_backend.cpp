@@ -63,7 +63,7 @@ void VulkanBackend::check_limits(const FrameDescription& frame) {
 void VulkanBackend::use_cloud(const LitCloud& cloud) {
     if (held_metaballs_ == cloud.metaballs) return;
     held_metaballs_ = held_light_ = 0;  // until all of it is there
-    view().use_cloud(cloud_balls(cloud.cloud, cloud.sun_depths));
+    view().use_cloud(cloud_balls(cloud.cloud, cloud.depths_to_draw()));
     held_metaballs_ = cloud.metaballs;
 }
 
@@ -129,7 +129,8 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                          shade_step(frame.air.shade, cloud.shadow_size));
     shader::March march{};
     if (!cloud.volumes.empty()) {
-        march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera));
+        march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera),
+                                frame.options.light);
         use_volumes(cloud);
     }
     const StageTimer timer(&frame.times, DrawStage::view);

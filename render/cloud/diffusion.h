@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Sunlight that is scattered many times in a cloud with detail, by the diffusion equation on cells twice as large as
+// the lattice's. It conserves energy: a thick cloud is white from above and grey from below, and what leaves through the
+// sides is missing inside. Private to the module.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/vec.h"
+#include "density/detail.h"
+
+namespace nephos {
+
+// What diffuses at the corners of cells, kLightNodesOfBrick pairs of bytes for each brick and one pair more. Fluence is
+// that per irradiance of the sun on a plane that faces it.
+struct DiffuseLight {
+    // Lower byte: 255 sqrt(fluence / kMostFluence); upper byte: upward flux / fluence, 1..255 for -1..1.
+    std::vector<std::uint16_t> upwards;
+    // Flux to the east and to the north, likewise.
+    std::vector<std::uint16_t> sideways;
+};
+
+// Solves div(D grad fluence) = absorption fluence - source, D = 1 / (3 (1 - g) extinction): the first-order spherical
+// harmonics of the equation of radiative transfer (A. Ishimaru 1978, "Wave Propagation and Scattering in Random Media",
+// chapter 9; J. Stam 1995, "Multiple Scattering as a Diffusion Process"), with Marshak's condition of no incoming light
+// at faces of cells without cloud. The source is what the sunlight loses, attenuated by (1 - g) times its depth.
+// `extinction`: per metre, one number for each lattice cell of each brick, x fastest. `sun_depths`: at the corners of
+// cells. `albedo`: of single scattering. `mean_cosine`: g < 1. Results do not depend on the number of threads.
+DiffuseLight diffuse_sunlight(const CoverageField& field, std::span<const float> extinction,
+                              std::span<const float> sun_depths, double albedo, double mean_cosine);
+
+// Unpacks a node: what is scattered towards a unit direction of travel, as radiance under a sun of irradiance pi.
+float diffuse_radiance(const DiffuseLight& light, std::size_t node, double mean_cosine, const Vec3& direction);
+
+}  // namespace nephos
