@@ -111,7 +111,7 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     sample_nodes(cells, sums, before);
     mass_ *= 8;  // nodes for each cell
     set_erosion(setting, base_m);
-    clearance_ = clearance_of_cells(nodes_, places_, table_, bricks_);
+    clearance_ = clearance_of_cells(nodes_, places_, table_, bricks_, erosion_.least_coverage);
     set_distances(table_, bricks_);
 
     const Boundary boundaries[3] = {setting.boundaries.x, setting.boundaries.y, setting.boundaries.z};
@@ -240,8 +240,9 @@ float CoverageField::gain_at(double footprint_m) const {
     double drawn = 0;
     for (std::size_t n = 1; n < histogram_.size(); ++n) {
         const float t = float(n) / 255, c = text::coverage_of(t);
-        if (!(c > std::max(0.5f - 0.5f * (large + medium + soft), kLeastCoverage))) continue;
-        const float mean = text::density_of(t, erosion_.half_density), fraction = text::cloudy_fraction(c, large, small);
+        if (!(c > erosion_.least_coverage && c + erosion_.whole > 0.5f - 0.5f * (large + medium + soft))) continue;
+        const float mean = text::density_of(t, erosion_.half_density),
+                    fraction = text::cloudy_fraction(c + erosion_.whole, large, small);
         drawn += histogram_[n] *
                  double(std::min(mean / std::max(fraction, 0.02f), std::max(mean, erosion_.cap)) * fraction);
     }
@@ -266,6 +267,10 @@ void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
     e.medium_width = 0.17f * strength;
     e.fine_width = 0.03f * strength;
     e.wisps = float(o.wisps);
+    if (o.strength == 0) {
+        e.least_coverage = 0;
+        e.whole = kWhole;
+    }
     e.base_m = float(base_m);
     const double size_m = bump_size_m(o, 2 * node_m_), tile = kBumpsOfTile * size_m;
     const Vec2 along = setting.along;

@@ -149,14 +149,14 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
     const ErosionConstants& e = *field.erosion;
     footprint = hn::Mul(footprint, number(e.footprint_scale));
     const Floats zero = hn::Zero(d), half = number(0.5f);
-    const Floats c = text::coverage_of(node.t);
+    const Floats coverage = text::coverage_of(node.t), c = hn::Add(coverage, number(e.whole));
     const Floats top = text::towards_top(hn::Sub(z, number(e.base_m)));
     const Floats large = text::large_width(top, node.growth, e.base_width, e.top_width, e.dissolving_width);
     const Floats medium = text::medium_width(footprint, e.medium_width), fine = text::fine_width(footprint, e.fine_width),
                  soft = text::edge_softness(footprint);
     const Floats others = hn::Mul(half, hn::Add(medium, hn::Add(fine, soft)));
-    const Floats low = hn::Max(hn::NegMulAdd(half, large, hn::Sub(half, others)), number(kLeastCoverage));
-    const Mask needed = hn::And(asked, hn::Gt(c, low));
+    const Floats low = hn::NegMulAdd(half, large, hn::Sub(half, others));
+    const Mask needed = hn::And(asked, hn::And(hn::Gt(c, low), hn::Gt(coverage, number(e.least_coverage))));
     if (!kMargins && hn::AllFalse(d, needed)) return {zero, zero};
     const auto turned = [&](int row) {
         const auto& to = e.to_noise[std::size_t(row)];

@@ -216,12 +216,12 @@ float detailed_density_at(const CoverageField& field, const Vec3& place_m, float
     }
     const ErosionConstants& e = field.erosion();
     footprint *= e.footprint_scale;
-    const float c = text::coverage_of(t), top = text::towards_top(float(from.z) - e.base_m);
+    const float coverage = text::coverage_of(t), c = coverage + e.whole, top = text::towards_top(float(from.z) - e.base_m);
     const float large = text::large_width(top, growth, e.base_width, e.top_width, e.dissolving_width);
     const float medium = text::medium_width(footprint, e.medium_width),
                 fine = text::fine_width(footprint, e.fine_width), soft = text::edge_softness(footprint);
     const float others = 0.5f * (medium + fine + soft);
-    if (!(c > std::max(0.5f - 0.5f * large - others, kLeastCoverage))) return 0;
+    if (!(c > 0.5f - 0.5f * large - others && coverage > e.least_coverage)) return 0;
     float turned[3];
     for (std::size_t row = 0; row < 3; ++row) {
         const auto& to = e.to_noise[row];

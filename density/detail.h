@@ -46,6 +46,9 @@ inline constexpr std::size_t kMaxDetailedClouds = 16;
 class CoverageCells;
 class NodeSums;
 
+// ErosionConstants::whole of a field with DetailOptions::strength 0, whose density is that of the metaballs.
+inline constexpr float kWhole = 8;
+
 // The constants of the erosion, as kernels and shaders read them.
 struct ErosionConstants {
     float half_density = 0.1f;
@@ -53,6 +56,8 @@ struct ErosionConstants {
     float base_width = 0.5f, top_width = 0.62f, dissolving_width = 0.9f, medium_width = 0.17f,
           fine_width = 0.03f;
     float wisps = 1;
+    float least_coverage = 0.03f;  // of less there is no cloud, whatever the noise
+    float whole = 0;               // added to coverage: 0, or kWhole where nothing is eroded
     float base_m = 0;              // of the cloud, above the field's corner
     std::array<float, 2> gain{};   // for footprints up to 13 m, and from 25 m on
     // Rows that turn a place relative to the field's corner into one in the large noise, in tiles; the fourth

@@ -11,9 +11,6 @@
 
 namespace nephos {
 
-// Coverage below this holds no cloud, whatever the noise.
-inline constexpr float kLeastCoverage = 0.03f;
-
 struct DetailKernel {
     const std::uint8_t* nodes = nullptr;
     const std::int32_t* table = nullptr;

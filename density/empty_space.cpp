@@ -25,9 +25,10 @@ std::array<int, 3> unpacked(std::size_t place, const std::array<int, 3>& size) {
 
 // Cells as bits: a row of three bricks' cells along x in a word.
 std::vector<std::uint8_t> clearance_of_cells(std::span<const std::uint8_t> nodes, std::span<const std::int32_t> places,
-                                             std::span<const std::int32_t> table, const std::array<int, 3>& bricks) {
+                                             std::span<const std::int32_t> table, const std::array<int, 3>& bricks,
+                                             float least_coverage) {
     std::array<bool, 256> cloud{};
-    for (std::size_t t = 0; t < cloud.size(); ++t) cloud[t] = text::coverage_of(float(t) / 255) > kLeastCoverage;
+    for (std::size_t t = 0; t < cloud.size(); ++t) cloud[t] = text::coverage_of(float(t) / 255) > least_coverage;
     // Four bits for each row of cells of each brick: a cell may hold cloud when one of its nodes does.
     std::vector<std::array<std::uint8_t, kCells * kCells>> occupied(places.size());
     tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {

@@ -16,6 +16,7 @@ namespace nephos {
 namespace {
 
 constexpr double kLeastVoxelWithDetail_m = 20;
+constexpr std::uint64_t kMostMarchedVoxels = 16'000'000;
 
 
 RenderOptions render_options(const VolumePictureOptions& given, const std::optional<Scene>& scene,
@@ -98,9 +99,11 @@ VolumePicture draw_volume(const std::string& file, const LoadedDensity& loaded,
     drawn.density.extinction_per_m = result.extinction_per_m;
     drawn.density.metaball_radius_cells = result.metaball_radius_voxels;
     drawn.frames.exr = given.depth;
-    // Voxels that are as fine as the bumps, or were refined with detail, have what it would add.
+    // Voxels that are as fine as the bumps, or were refined with detail, have what it would add. Very many are drawn as
+    // metaballs alone: fields of them would take 45 bytes a voxel.
+    if (loaded.density.active_voxels() > kMostMarchedVoxels) drawn.density.detail.enabled = false;
     if (loaded.refine > 1 || loaded.density.placement().cell_size_m < kLeastVoxelWithDetail_m)
-        drawn.density.detail.enabled = false;
+        drawn.density.detail.strength = drawn.density.detail.thermals = 0;
     FramePainter painter(drawn, device);
     result.backend = painter.backend_name();
     result.device = painter.device_name();

@@ -158,7 +158,7 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
         });
         if (diffuses(light))
             volume.diffuse =
-                diffuse_sunlight(volume.field, volume.extinction, depths[n], light.albedo, volume.mean_cosine);
+                diffuse_sunlight(volume.field, volume.extinction, depths[n], to_sun, light.albedo, volume.mean_cosine);
     }
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include <tbb/parallel_for.h>
 
@@ -15,21 +16,27 @@ namespace {
 
 constexpr int kCells = CoverageField::kBrickCells, kSide = kCells / 2;  // cells of the equation on a brick's edge
 constexpr std::size_t kOfBrick = std::size_t(kSide) * kSide * kSide;
-constexpr float kRelaxation = 1.6f;    // of successive over-relaxation, about the best for clouds of 12 cells
-constexpr float kSmallChange = 1e-3f;  // of the largest fluence, which ends the iterations
+constexpr double kSmallResidual = 2e-3;  // relative, which ends the iterations
 constexpr int kMostRounds = 200;
 // Conductance between cells that hold next to nothing: of more the iterations would only take longer.
-constexpr float kMostConductance = 2;
+constexpr float kMostConductance = 10;
+
+constexpr float kLeastThickness = 0.1f;  // reduced optical, of cells in the weights of their light
 
 // The cells around one: below and above it on each axis.
 struct Neighbours {
     std::int32_t cell[6];  // -1: no cloud
 };
 
+struct CellLight {
+    std::array<float, 4> values{};  // fluence, and flux to the east, north and up
+    float weight = 0;
+};
+
 class DiffusionCells {
   public:
     DiffusionCells(const CoverageField& field, std::span<const float> extinction, std::span<const float> sun_depths,
-                   double albedo, double mean_cosine)
+                   const Vec3& to_sun, double albedo, double mean_cosine)
         : bricks_(field.places().size()), mean_cosine_(float(mean_cosine)) {
         const auto cell_m = float(4 * field.node_m());
         const std::size_t count = bricks_ * kOfBrick;
@@ -46,47 +53,69 @@ class DiffusionCells {
             }
         });
         find_neighbours(field);
-        set_coefficients(sun_depths, float(albedo));
+        set_coefficients(sun_depths, {float(to_sun.x), float(to_sun.y), float(to_sun.z)}, float(albedo));
     }
 
+    // Conjugate gradients, with the diagonal as preconditioner (M. R. Hestenes and E. Stiefel 1952). Sums are those of
+    // bricks in their order, whatever the number of threads.
     void solve() {
         fluence_.assign(thickness_.size(), 0.0f);
-        std::vector<float> changes(bricks_), largest(bricks_);
+        std::vector<float> residual = source_, direction(source_.size()), image(source_.size());
+        double before = 0, first = 0;
         for (int round = 0; round < kMostRounds; ++round) {
-            for (int colour = 0; colour < 2; ++colour) {
-                // Neighbours have the other colour: cells of one do not wait for each other.
-                tbb::parallel_for(std::size_t{0}, bricks_, [&](std::size_t brick) {
-                    float change = colour == 0 ? 0.0f : changes[brick], most = colour == 0 ? 0.0f : largest[brick];
-                    for (std::size_t cell = 0; cell < kOfBrick; ++cell) {
-                        if (int((cell & 1) ^ (cell >> 1 & 1) ^ (cell >> 2)) != colour) continue;
-                        const std::size_t at = brick * kOfBrick + cell;
-                        if (!(thickness_[at] > 0)) continue;
-                        const float more = kRelaxation * (balance(at) - fluence_[at]);
-                        fluence_[at] += more;
-                        change = std::max(change, std::abs(more));
-                        most = std::max(most, fluence_[at]);
-                    }
-                    changes[brick] = change;
-                    largest[brick] = most;
-                });
-            }
-            const float change = *std::ranges::max_element(changes), most = *std::ranges::max_element(largest);
-            if (!(change > kSmallChange * most)) break;
+            const double product = sum_over_bricks([&](std::size_t at) {
+                return double(residual[at]) * double(residual[at]) * double(inverse_[at]);
+            });
+            if (round == 0) first = product;
+            if (!(product > kSmallResidual * kSmallResidual * first)) break;
+            const auto keep = float(round > 0 ? product / before : 0);
+            before = product;
+            for_cells([&](std::size_t at) { direction[at] = inverse_[at] * residual[at] + keep * direction[at]; });
+            const double curvature = sum_over_bricks([&](std::size_t at) {
+                image[at] = balance(direction, at);
+                return double(direction[at]) * double(image[at]);
+            });
+            const auto step = float(product / curvature);
+            for_cells([&](std::size_t at) {
+                fluence_[at] += step * direction[at];
+                residual[at] -= step * image[at];
+            });
         }
     }
 
-    std::array<float, 4> fluence_and_flux(std::size_t at) const {
-        std::array<float, 4> result{fluence_[at], 0, 0, 0};
+    // Fluence in the middle of a cell, flux through it to the east, north and up, and the weight of these in places
+    // between cells: there the fluence is nearest to that of the thinner one. A cell without cloud has the fluence of
+    // the faces of those beside it.
+    CellLight light_of(std::size_t at) const {
+        CellLight result;
+        if (!(thickness_[at] > 0)) {
+            result.weight = 1 / kLeastThickness;
+            float count = 0;
+            for (const std::int32_t other : neighbours_[at].cell) {
+                if (other < 0) continue;
+                const CellLight beside = light_of(std::size_t(other));
+                for (std::size_t n = 0; n < 4; ++n)
+                    result.values[n] += beside.values[n] * (n == 0 ? 2 * loss(thickness_[std::size_t(other)]) : 1.0f);
+                ++count;
+            }
+            for (float& number : result.values) number /= std::max(count, 1.0f);
+            return result;
+        }
+        result.weight = 1 / (thickness_[at] + kLeastThickness);
+        result.values[0] = fluence_[at];
         for (std::size_t n = 0; n < 6; ++n) {
             const std::int32_t other = neighbours_[at].cell[n];
             const float towards = other < 0 ? fluence_[at] * loss(thickness_[at])
                                             : (fluence_[at] - fluence_[std::size_t(other)]) *
                                                   conductance(thickness_[at], thickness_[std::size_t(other)]);
-            result[1 + n / 2] += (n % 2 == 0 ? -0.5f : 0.5f) * towards;
+            result.values[1 + n / 2] += (n % 2 == 0 ? -0.5f : 0.5f) * towards;
         }
         return result;
     }
 
+    bool is_beside_cloud(std::size_t at) const {
+        return std::ranges::any_of(neighbours_[at].cell, [](std::int32_t other) { return other >= 0; });
+    }
     bool holds_cloud(std::size_t at) const { return thickness_[at] > 0; }
 
   private:
@@ -121,25 +150,57 @@ class DiffusionCells {
         });
     }
 
-    // The balance of a cell: fluence = source + sum over neighbours of weight * theirs.
-    void set_coefficients(std::span<const float> sun_depths, float albedo) {
+    template <class What>
+    void for_cells(const What& what) const {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, thickness_.size(), 1024), [&](const auto& range) {
+            for (std::size_t at = range.begin(); at != range.end(); ++at) what(at);
+        });
+    }
+
+    template <class Number>
+    double sum_over_bricks(const Number& number) const {
+        std::vector<double> sums(bricks_);
+        tbb::parallel_for(std::size_t{0}, bricks_, [&](std::size_t brick) {
+            double sum = 0;
+            for (std::size_t at = brick * kOfBrick; at < (brick + 1) * kOfBrick; ++at) sum += number(at);
+            sums[brick] = sum;
+        });
+        return std::accumulate(sums.begin(), sums.end(), 0.0);
+    }
+
+    // What leaves a cell of this fluence, less what comes from its neighbours.
+    float balance(const std::vector<float>& fluence, std::size_t at) const {
+        float sum = diagonal_[at] * fluence[at];
+        const Neighbours& near = neighbours_[at];
+        for (std::size_t n = 0; n < 6; ++n)
+            if (near.cell[n] >= 0) sum -= weights_[at][n] * fluence[std::size_t(near.cell[n])];
+        return sum;
+    }
+
+    // Cells without cloud have no weights: their fluence stays 0.
+    void set_coefficients(std::span<const float> sun_depths, const float (&to_sun)[3], float albedo) {
         source_.assign(thickness_.size(), 0.0f);
         weights_.assign(thickness_.size(), {});
+        diagonal_.assign(thickness_.size(), 0.0f);
+        inverse_.assign(thickness_.size(), 0.0f);
+        const auto light_at = [&](std::size_t brick, std::size_t x, std::size_t y, std::size_t z) {
+            const float depth = sun_depths[brick * kLightNodesOfBrick + (z * kLightNodes + y) * kLightNodes + x];
+            return std::exp((mean_cosine_ - 1) * depth);
+        };
         tbb::parallel_for(std::size_t{0}, bricks_, [&](std::size_t brick) {
-            const float* const depths = &sun_depths[brick * kLightNodesOfBrick];
             for (std::size_t cell = 0; cell < kOfBrick; ++cell) {
                 const std::size_t at = brick * kOfBrick + cell;
                 const float thickness = thickness_[at];
                 if (!(thickness > 0)) continue;
-                float arriving = 0;  // of the corners
+                // What enters through faces and does not leave: exact, as neighbours share faces.
+                float lost = 0;
                 for (std::size_t n = 0; n < 8; ++n) {
-                    const std::size_t x = 2 * (cell % kSide + n % 2), y = 2 * (cell / kSide % kSide + n / 2 % 2),
-                                      z = 2 * (cell / kSide / kSide + n / 4);
-                    arriving += 0.125f * std::exp((mean_cosine_ - 1) *
-                                                  depths[(z * kLightNodes + y) * kLightNodes + x]);
+                    const std::size_t o[3] = {n % 2, n / 2 % 2, n / 4};
+                    const float light = light_at(brick, 2 * (cell % kSide + o[0]), 2 * (cell / kSide % kSide + o[1]),
+                                                 2 * (cell / kSide / kSide + o[2]));
+                    for (std::size_t axis = 0; axis < 3; ++axis)
+                        lost += 0.25f * light * (o[axis] == 1 ? to_sun[axis] : -to_sun[axis]);
                 }
-                // The mean over the cell of an exponential is less than that of its ends.
-                const float half = 0.5f * thickness, bend = half > 1e-3f ? std::tanh(half) / half : 1.0f;
                 float sum = (1 - albedo) * thickness / (1 - mean_cosine_);
                 for (std::size_t n = 0; n < 6; ++n) {
                     const std::int32_t other = neighbours_[at].cell[n];
@@ -148,23 +209,17 @@ class DiffusionCells {
                     sum += through;
                     if (other >= 0) weights_[at][n] = through;
                 }
-                for (float& weight : weights_[at]) weight /= sum;
-                source_[at] = albedo * thickness * bend * arriving / sum;
+                diagonal_[at] = sum;
+                inverse_[at] = 1 / sum;
+                source_[at] = albedo * std::max(lost, 0.0f);
             }
         });
     }
 
-    float balance(std::size_t at) const {
-        float sum = source_[at];
-        const Neighbours& near = neighbours_[at];
-        for (std::size_t n = 0; n < 6; ++n)
-            if (near.cell[n] >= 0) sum += weights_[at][n] * fluence_[std::size_t(near.cell[n])];
-        return sum;
-    }
-
     std::size_t bricks_;
     float mean_cosine_;
-    std::vector<float> thickness_, source_, fluence_;  // thickness: reduced optical, along an edge
+    std::vector<float> thickness_;  // reduced optical, along an edge
+    std::vector<float> source_, diagonal_, inverse_, fluence_;
     std::vector<std::array<float, 6>> weights_;
     std::vector<Neighbours> neighbours_;
 };
@@ -173,19 +228,19 @@ std::uint16_t packed(float low, float high) {
     return std::uint16_t(unsigned(low + 0.5f) | unsigned(high + 0.5f) << 8);
 }
 
-// Fluence and flux of the cells of a brick and of those around it, kAround on an edge, x fastest; -1 where there is no
-// cloud.
+// Fluence and flux of the cells of a brick and of those around it, kAround on an edge, x fastest; null where there is
+// neither cloud nor cloud beside.
 constexpr int kAround = kSide + 2;
-using Surroundings = std::array<std::array<float, 4>, std::size_t(kAround) * kAround * kAround>;
+using Surroundings = std::array<const CellLight*, std::size_t(kAround) * kAround * kAround>;
 
 Surroundings around_brick(const CoverageField& field, std::size_t brick, const DiffusionCells& cells,
-                          std::span<const std::array<float, 4>> values) {
+                          std::span<const CellLight> values) {
     const std::array<int, 3>& size = field.bricks();
     const std::int32_t place = field.places()[brick];
     const int at[3] = {place % size[0], place / size[0] % size[1], place / size[0] / size[1]};
     Surroundings result;
     for (std::size_t n = 0; n < result.size(); ++n) {
-        result[n][0] = -1;
+        result[n] = nullptr;
         const int o[3] = {int(n) % kAround - 1, int(n) / kAround % kAround - 1, int(n) / kAround / kAround - 1};
         int other[3];
         bool inside = true;
@@ -199,15 +254,15 @@ Surroundings around_brick(const CoverageField& field, std::size_t brick, const D
         const std::int32_t number = field.table()[std::size_t((other[2] * size[1] + other[1]) * size[0] + other[0])];
         if (number < 0) continue;
         const std::size_t index = std::size_t(number) * kOfBrick + cell;
-        if (cells.holds_cloud(index)) result[n] = values[index];
+        if (cells.holds_cloud(index) || cells.is_beside_cloud(index)) result[n] = &values[index];
     }
     return result;
 }
 
-// A node lies in the middle of a cell or between two on each axis. Returns the mean of those that hold cloud.
+// A node lies in the middle of a cell or between two on each axis. Returns the mean of those that there are.
 std::array<float, 4> at_node(const Surroundings& cells, const int (&node)[3]) {
     std::array<float, 4> sum{};
-    float count = 0;
+    float weights = 0;
     for (int n = 0; n < 8; ++n) {
         std::size_t index = 0, stride = 1;
         bool is_one = true;
@@ -216,25 +271,26 @@ std::array<float, 4> at_node(const Surroundings& cells, const int (&node)[3]) {
             is_one = is_one && (above == 0 || node[axis] % 2 == 0);
             index += stride * std::size_t((node[axis] + 1) / 2 + above);
         }
-        if (!is_one || cells[index][0] < 0) continue;
-        for (std::size_t i = 0; i < 4; ++i) sum[i] += cells[index][i];
-        ++count;
+        if (!is_one || cells[index] == nullptr) continue;
+        for (std::size_t i = 0; i < 4; ++i) sum[i] += cells[index]->weight * cells[index]->values[i];
+        weights += cells[index]->weight;
     }
-    for (float& number : sum) number /= std::max(count, 1.0f);
+    for (float& number : sum) number /= std::max(weights, 1e-9f);
     return sum;
 }
 
 }  // namespace
 
 DiffuseLight diffuse_sunlight(const CoverageField& field, std::span<const float> extinction,
-                              std::span<const float> sun_depths, double albedo, double mean_cosine) {
-    DiffusionCells cells(field, extinction, sun_depths, albedo, mean_cosine);
+                              std::span<const float> sun_depths, const Vec3& to_sun, double albedo,
+                              double mean_cosine) {
+    DiffusionCells cells(field, extinction, sun_depths, to_sun, albedo, mean_cosine);
     cells.solve();
     const std::size_t bricks = field.places().size();
-    std::vector<std::array<float, 4>> values(bricks * kOfBrick);
+    std::vector<CellLight> values(bricks * kOfBrick);
     tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
         for (std::size_t cell = brick * kOfBrick; cell < (brick + 1) * kOfBrick; ++cell)
-            values[cell] = cells.fluence_and_flux(cell);
+            values[cell] = cells.light_of(cell);
     });
     DiffuseLight light;
     light.upwards.assign(bricks * kLightNodesOfBrick + 1, 0);

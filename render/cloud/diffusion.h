@@ -28,9 +28,10 @@ struct DiffuseLight {
 // chapter 9; J. Stam 1995, "Multiple Scattering as a Diffusion Process"), with Marshak's condition of no incoming light
 // at faces of cells without cloud. The source is what the sunlight loses, attenuated by (1 - g) times its depth.
 // `extinction`: per metre, one number for each lattice cell of each brick, x fastest. `sun_depths`: at the corners of
-// cells. `albedo`: of single scattering. `mean_cosine`: g < 1. Results do not depend on the number of threads.
+// cells. `to_sun`: a unit direction. `albedo`: of single scattering. `mean_cosine`: g < 1. Results do not depend on the
+// number of threads.
 DiffuseLight diffuse_sunlight(const CoverageField& field, std::span<const float> extinction,
-                              std::span<const float> sun_depths, double albedo, double mean_cosine);
+                              std::span<const float> sun_depths, const Vec3& to_sun, double albedo, double mean_cosine);
 
 // Unpacks a node: what is scattered towards a unit direction of travel, as radiance under a sun of irradiance pi.
 float diffuse_radiance(const DiffuseLight& light, std::size_t node, double mean_cosine, const Vec3& direction);

@@ -33,9 +33,11 @@ MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& c
         throw Error(ErrorCode::usage, std::to_string(volumes.size()) + " clouds with detail: expected at most " +
                                           std::to_string(shader::kMostVolumes));
     per_unit = float(1 / pixels_per_unit);
-    double cell_m = double(shader::kFootprintCell_m);
-    for (const CloudVolume& volume : of) cell_m = std::min(cell_m, 2 * volume.field.node_m());
-    least_step = float(cell_m / double(shader::kFootprintCell_m)) * shader::kLeastStep_m;
+    // With detail a twentieth of a cell; without, half of one, the distance between two nodes.
+    double least_m = double(shader::kLeastStep_m);
+    for (const CloudVolume& volume : of)
+        least_m = std::min(least_m, volume.field.node_m() * (volume.field.erosion().whole > 0 ? 1 : 0.1));
+    least_step = float(least_m);
     const auto scale = float(footprint_scale(of));
     fade_begins = scale * shader::kMarchedFootprint_m / per_unit;
     fade_ends = scale * shader::kSplattedFootprint_m / per_unit;

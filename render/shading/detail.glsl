@@ -106,15 +106,14 @@ struct Eroded {
 // The detailed density of a node at a place relative to the field's corner, metres; its margin only if that is asked
 // for.
 Eroded eroded(uint v, Node node, vec3 place, float footprint, bool margins) {
-    float c = coverage_of(node.t), top = towards_top(place.z - march.volumes[v].base_m);
+    float coverage = coverage_of(node.t), c = coverage + march.volumes[v].whole, top = towards_top(place.z - march.volumes[v].base_m);
     float large = large_width(top, node.growth, march.volumes[v].base_width, march.volumes[v].top_width,
                               march.volumes[v].dissolving_width);
     footprint *= march.volumes[v].footprint_scale;
     float medium = medium_width(footprint, march.volumes[v].medium_width);
     float fine = fine_width(footprint, march.volumes[v].fine_width), soft = edge_softness(footprint);
     float others = 0.5 * (medium + fine + soft);
-    float low = max(0.5 - others - 0.5 * large, march.volumes[v].least_coverage);
-    bool needed = c > low;
+    bool needed = c > 0.5 - others - 0.5 * large && coverage > march.volumes[v].least_coverage;
     if (!needed && !margins) return Eroded(0.0, 0.0);
     vec3 tiles = vec3(turned(march.volumes[v].to_noise[0], place), turned(march.volumes[v].to_noise[1], place),
                       turned(march.volumes[v].to_noise[2], place));

@@ -14,7 +14,7 @@ NEPHOS_CONST uint kMostVolumes = 16u;                 // in a picture
 NEPHOS_CONST float kEventOpacity = 0.12f;             // of a point that is shaded
 NEPHOS_CONST float kLeavingOpacity = 0.004f;          // of one where the ray leaves cloud
 NEPHOS_CONST float kMarchOpaque = 1.0f / 256.0f;      // transmittance at which a ray ends
-NEPHOS_CONST float kLeastStep_m = 2.0f;               // in cloud, of cells of kFootprintCell_m and more,
+NEPHOS_CONST float kLeastStep_m = 2.0f;               // in cloud of cells of 40 m and more,
 NEPHOS_CONST float kStepPixels = 1.2f;                // ... or this many footprints of a pixel
 NEPHOS_CONST float kStepGrowth = 4.0f;                // of steps behind opaque cloud
 NEPHOS_CONST float kLongestStep_m = 30.0f;            // near cloud
@@ -34,12 +34,12 @@ NEPHOS_CONST float kTapsEnd_m = 30.5f;
 NEPHOS_CONST float kFoldShare = 0.55f, kFoldDecay = 0.5f;
 // Light that diffuses (render/cloud/diffusion.h): of fluence f and flux F, 1/4 (kDiffuseBase f + kDiffuseFlux g omega F)
 // is scattered towards omega. By Eddington's approximation the numbers are 1 and 3; with these the albedo of slabs of
-// optical depth 5, 20 and 80 and g of 0.5 to 0.85 is within 5 % of the exact one.
-NEPHOS_CONST float kDiffuseBase = 1.15f, kDiffuseFlux = 2.4f;
+// optical depth 5, 20 and 80 is within 5 % of the exact one for g of 0.85, and at smaller g of a finer lattice.
+NEPHOS_CONST float kDiffuseBase = 1.2f, kDiffuseFlux = 2.4f;
 // By how much diffuse light falls off with a depth that the lattice does not know: as 1 / (1 + kDiffuseDecay (1 - g)
 // depth), diffusion through a slab; and the most that a bump has more than the lattice.
 NEPHOS_CONST float kDiffuseDecay = 1.5f, kMostRelief = 2.0f;
-NEPHOS_CONST float kMostFluence = 4.0f;               // that a node can store
+NEPHOS_CONST float kMostFluence = 6.0f;               // that a node can store
 NEPHOS_CONST float kMostMarchedDepth = 64.0f;         // towards the sun: of more nothing arrives
 // Words of a brick: of its nodes, of the corners of its cells, and of its cells' clearance.
 NEPHOS_CONST uint kNodeEdge = 9u, kNodeWords = 729u;
@@ -76,6 +76,8 @@ struct MarchVolume {
     float medium_per_m, fine_per_m;
     float least_coverage;
     float footprint_scale;
+    float whole;
+    float unused0, unused1, unused2;
 };
 
 struct March {
@@ -90,7 +92,7 @@ struct March {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(MarchVolume) == 176 && offsetof(MarchVolume, first_table) == 80 &&
+static_assert(sizeof(MarchVolume) == 192 && offsetof(MarchVolume, first_table) == 80 &&
               offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 32);
 
 }  // namespace nephos::shader

@@ -151,7 +151,8 @@ shader::March march_constants(std::span<const CloudVolume> volumes, const Camera
         to.medium_per_m = e.medium_per_m;
         to.fine_per_m = e.fine_per_m;
         to.footprint_scale = e.footprint_scale;
-        to.least_coverage = kLeastCoverage;
+        to.least_coverage = e.least_coverage;
+        to.whole = e.whole;
     });
     return march;
 }

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sunlight that diffuses through clouds with detail (render/cloud/diffusion.h), against closed forms.
+
+#include <cmath>
+#include <cstdio>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/math.h"
+#include "density/density_grid.h"
+#include "density/metaballs.h"
+#include "render/cloud/cloud_volume.h"
+#include "render/renderer.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kCell_m = 20;
+constexpr Extent kSlab{160, 160, 40};
+constexpr double kThickness_m = kSlab.z * kCell_m;
+
+// A slab without detail, lit from the zenith, in the dark.
+DetailedVoxels slab(double depth) {
+    DetailedVoxels part;
+    part.density = DensityGrid::from_dense(std::vector<float>(kSlab.cells(), 1.0f), kSlab, {{0, 0, 1000}, kCell_m});
+    part.setting.options.strength = 0;
+    part.setting.options.thermals = 0;
+    part.setting.extinction_per_m = depth / kThickness_m;
+    return part;
+}
+
+RenderOptions lit_from_the_zenith(double g) {
+    RenderOptions options;
+    options.sun.elevation_deg = 90;
+    options.sun.colour = {1, 1, 1};
+    options.light.phase = {.kind = Phase::henyey_greenstein, .g = g};
+    options.light.ambient_top = options.light.ambient_base = {0, 0, 0};
+    options.air = {.extinction_per_m = {0, 0, 0}, .horizon = {0, 0, 0}, .zenith = {0, 0, 0}};
+    options.ground.albedo = {0, 0, 0};
+    options.level_of_detail.pixels = 0;
+    return options;
+}
+
+// Radiance of the middle of the slab towards an eye above it, whose direction has the cosine `mu` from the zenith.
+double radiance(Renderer& renderer, const DetailedVoxels& part, RenderOptions options, double mu) {
+    const std::vector<Metaball> balls = metaballs(part.density, part.setting.metaball_radius_cells);
+    std::vector<DetailedVoxels> parts{part};
+    parts[0].count = balls.size();
+    const Vec3 middle(0.5 * kSlab.x * kCell_m, 0.5 * kSlab.y * kCell_m, 1000 + kThickness_m);
+    options.camera.target_m = middle;
+    options.camera.position_m = middle + 3000.0 * Vec3(std::sqrt(1 - mu * mu), 0, mu);
+    options.camera.vertical_fov_deg = 2;
+    options.camera.width = options.camera.height = 16;
+    Splats splats;
+    splats.metaballs = {balls, part.setting.extinction_per_m, metaball_normalisation(2), parts};
+    const Picture picture = renderer.draw_splats(splats, options);
+    double sum = 0;
+    for (const float each : picture.beauty) sum += double(each);
+    return sum / double(picture.beauty.size());
+}
+
+// The two-stream solution for a slab without absorption under a sun in the zenith: Eddington's approximation (W. E.
+// Meador and W. R. Weaver 1980, "Two-Stream Approximations to Radiative Transfer in Planetary Atmospheres", equation 24),
+// with the forward peak g^2 cut off (J. H. Joseph, W. J. Wiscombe and J. A. Weinman 1976).
+double two_stream_albedo(double depth, double g) {
+    const double cut = g * g, scaled = (1 - cut) * depth, rest = (g - cut) / (1 - cut);
+    const double gamma1 = 0.75 * (1 - rest), gamma3 = (2 - 3 * rest) / 4;
+    return (gamma1 * scaled + (gamma3 - gamma1) * (1 - std::exp(-scaled))) / (1 + gamma1 * scaled);
+}
+
+// Radiance is per irradiance pi: the integral of radiance * cosine over the hemisphere is the albedo.
+TEST(DiffuseLight, SlabsHaveTheAlbedoOfTheTwoStreamSolution) {
+    Renderer renderer{DeviceOptions{.splatting = Splatting::cpu}};
+    // Gauss and Legendre's nodes and weights from 0 to 1; the lowest would look past the slab, and counts 1 %.
+    constexpr double kNodes[5] = {0.2308, 0.2308, 0.5, 0.7692, 0.9531}, kCosines[5] = {0.0469, 0.2308, 0.5, 0.7692, 0.9531},
+                     kWeights[5] = {0.1185, 0.2393, 0.2844, 0.2393, 0.1185};
+    // With cells of an optical depth of up to 2. What is left is the error of first-order spherical harmonics where light
+    // is scattered little forwards, and that of cells whose reduced optical depth is 2.
+    const std::pair<double, double> limits[] = {{0.85, 0.05}, {0.7, 0.08}, {0.5, 0.14}};
+    for (const auto& [g, limit] : limits) {
+        for (const double depth : {5.0, 20.0, 80.0}) {
+            const DetailedVoxels part = slab(depth);
+            double albedo = 0;
+            for (int n = 0; n < 5; ++n)
+                albedo += 2 * kWeights[n] * kCosines[n] * radiance(renderer, part, lit_from_the_zenith(g), kNodes[n]);
+            const double expected = two_stream_albedo(depth, g);
+            std::printf("g %.2f, optical depth %2.0f: albedo %.3f, two-stream %.3f (%+.1f %%)\n", g, depth, albedo,
+                        expected, 100 * (albedo / expected - 1));
+            EXPECT_NEAR(albedo, expected, limit * expected) << "g " << g << ", depth " << depth;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace nephos
