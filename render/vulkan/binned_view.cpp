@@ -79,8 +79,8 @@ struct BinnedView::Slot {
           shells(uniform_buffer<shader::Shells>(gpu)),
           march(uniform_buffer<shader::March>(gpu)),
           fence(gpu.device, vk::FenceCreateInfo()) {
-        nephos::upload(gpu, billboards, {});
-        nephos::upload(gpu, clouds, {});
+        upload(gpu, billboards, {});
+        upload(gpu, clouds, {});
         reserve_copy(gpu, counts, sizeof(shader::OrderCounts));
         const vk::CommandBufferAllocateInfo info(*gpu.pool, vk::CommandBufferLevel::ePrimary, 1);
         commands = std::move(vk::raii::CommandBuffers(gpu.device, info).front());
@@ -124,10 +124,8 @@ BinnedView::BinnedView(const GpuDevice& gpu, const GpuImage& unused, const vk::r
       clamped_(clamped),
       white_beyond_(white_beyond),
       lists_(gpu),
-      shade_light_(create_compute_pipeline(gpu, shaders().shade_light_comp)),
-      shade_sets_(gpu) {
+      shade_(gpu) {
     for (std::size_t n = 0; n < kFramesInFlight; ++n) slots_.push_back(std::make_unique<Slot>(gpu));
-    use_shade({}, 0);  // must be there, used or not
     use_cloud({});
 }
 
@@ -154,24 +152,12 @@ void BinnedView::wait() {
     for (const std::unique_ptr<Slot>& slot : slots_) slot->wait(gpu_);
 }
 
-void BinnedView::upload(const GpuBuffer& to, std::span<const std::byte> bytes) {
-    if (bytes.empty()) return;
-    const GpuBuffer staging =
-        create_buffer(gpu_, bytes.size(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    write(gpu_, staging, bytes);
-    submit_and_wait(gpu_, [&](const vk::raii::CommandBuffer& commands) {
-        full_barrier(commands);
-        copy(commands, staging, to, bytes.size());
-        full_barrier(commands);
-    });
-}
-
 void BinnedView::use_cloud(std::span<const shader::CloudBall> balls) {
     flush();
     balls_ = balls.size();
     batch_ = limits.batch;
     lists_.reserve_cloud(gpu_, balls_);
-    upload(lists_.cloud(), std::as_bytes(balls));
+    upload_staged(gpu_, lists_.cloud(), std::as_bytes(balls));
 }
 
 void BinnedView::light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles) {
@@ -183,34 +169,13 @@ void BinnedView::light(const ShadowFrame& frame, int shadow_size, float largest_
 
 void BinnedView::use_flash(std::span<const shader::uint> fractions) {
     flush();
-    upload(lists_.flash(), std::as_bytes(fractions));
+    upload_staged(gpu_, lists_.flash(), std::as_bytes(fractions));
 }
 
-void BinnedView::use_shade(std::span<const std::uint32_t> words, std::uint64_t serial,
-                           const GpuImage* shadow_map, const shader::ShadeStep& step) {
-    if (shade_.bytes != 0 && serial == shade_serial_) return;
+void BinnedView::use_shade(const ShadeInputs& shade) {
+    if (shade_.has(shade.serial)) return;
     flush();
-    const std::size_t bytes = std::max<std::size_t>(words.size_bytes(), 4);
-    if (shade_.bytes < bytes) {
-        shade_ = {};
-        shade_ = create_buffer(
-            gpu_, bytes, vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferDst,
-            HostAccess::none);
-    }
-    upload(shade_, std::as_bytes(words));
-    if (shadow_map != nullptr) {
-        const std::size_t texels = std::size_t(step.columns) * step.columns;
-        shade_sets_.reset();
-        const vk::DescriptorSet set =
-            shade_sets_.fill(shade_light_, {{4, *shadow_map, white_beyond_}, {14, shade_}});
-        submit_and_wait(gpu_, [&](const vk::raii::CommandBuffer& commands) {
-            full_barrier(commands);
-            begin_compute(commands, shade_light_, set, step);
-            dispatch_groups(commands, (texels + shader::kComputeGroup - 1) / shader::kComputeGroup);
-            full_barrier(commands);
-        });
-    }
-    shade_serial_ = serial;
+    shade_.use(gpu_, shade, white_beyond_);
 }
 
 Resources BinnedView::view_resources(const Slot& slot) const {
@@ -230,7 +195,7 @@ Resources BinnedView::view_resources(const Slot& slot) const {
             {11, what.sky != nullptr ? *what.sky : unused_, clamped_},
             {12, *what.scattering},
             {13, slot.shells},
-            {14, shade_},
+            {14, shade_.words()},
             {15, lists_.parts()},
             {16, slot.billboards},
             {17, slot.clouds}};
@@ -354,30 +319,18 @@ void BinnedView::complete(Slot& slot) {
                picture);
 }
 
-void BinnedView::download(const GpuBuffer& from, std::span<std::byte> bytes) {
-    if (bytes.empty()) return;
-    const GpuBuffer staging =
-        create_buffer(gpu_, bytes.size(), vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
-    submit_and_wait(gpu_, [&](const vk::raii::CommandBuffer& commands) {
-        full_barrier(commands);
-        copy(commands, from, staging, bytes.size());
-        host_barrier(commands);
-    });
-    std::ranges::copy(std::span(staging.mapped, bytes.size()), bytes.begin());
-}
-
 BinnedView::Lists BinnedView::read_lists(const Tile& tile) {
     wait();
     const std::size_t tiles = TileGrid{tile.width, tile.height}.tiles();
     shader::OrderCounts counts;
-    download(lists_.counts(), std::as_writable_bytes(std::span(&counts, 1)));
+    download_staged(gpu_, lists_.counts(), std::as_writable_bytes(std::span(&counts, 1)));
     Lists lists;
     lists.balls.resize(counts.visible);
     lists.ranges.resize(tiles);
     lists.list.resize(counts.entries);
-    download(lists_.balls(), std::as_writable_bytes(std::span(lists.balls)));
-    download(lists_.ranges(), std::as_writable_bytes(std::span(lists.ranges)));
-    download(lists_.list(tiles), std::as_writable_bytes(std::span(lists.list)));
+    download_staged(gpu_, lists_.balls(), std::as_writable_bytes(std::span(lists.balls)));
+    download_staged(gpu_, lists_.ranges(), std::as_writable_bytes(std::span(lists.ranges)));
+    download_staged(gpu_, lists_.list(tiles), std::as_writable_bytes(std::span(lists.list)));
     return lists;
 }
 
@@ -415,12 +368,8 @@ void BinnedView::reserve(const Tile& tile, Slot& slot) {
         wait();
         lists_.reserve(gpu_, sizes);
         ordered_ = nullptr;
-        const vk::BufferUsageFlags usage =
-            vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc;
-        radiance_ = {};
-        depth_ = {};
-        radiance_ = create_buffer(gpu_, 4 * sizeof(float) * pixels, usage, HostAccess::none);
-        depth_ = create_buffer(gpu_, sizeof(float) * pixels, usage, HostAccess::none);
+        make_storage(gpu_, radiance_, 4 * sizeof(float) * pixels);
+        make_storage(gpu_, depth_, sizeof(float) * pixels);
     }
     if (slot.what.variant.march && !slot.what.volumes->has_room(pixels)) {
         wait();
@@ -447,8 +396,8 @@ void BinnedView::begin_tile(const ViewInputs& what, const shader::Frame& frame, 
     write(gpu_, slot.frame, frame);
     write(gpu_, slot.order_frame, what.order);
     if (what.shells != nullptr) write(gpu_, slot.shells, *what.shells);
-    nephos::upload(gpu_, slot.billboards, std::as_bytes(what.billboards));
-    nephos::upload(gpu_, slot.clouds, std::as_bytes(what.clouds));
+    upload(gpu_, slot.billboards, std::as_bytes(what.billboards));
+    upload(gpu_, slot.clouds, std::as_bytes(what.clouds));
     if (what.march != nullptr) write(gpu_, slot.march, *what.march);
     slot.what.shells = nullptr;  // these are there
     slot.what.march = nullptr;

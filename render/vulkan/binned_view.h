@@ -20,6 +20,7 @@
 #include "render/gpu/gpu_pipeline.h"
 #include "render/image/picture.h"
 #include "render/vulkan/device_lists.h"
+#include "render/vulkan/device_shade.h"
 #include "render/vulkan/device_sun.h"
 #include "render/vulkan/march_volumes.h"
 
@@ -62,11 +63,8 @@ class BinnedView {
     void read_depths(std::span<float> depths) const { sun_->read_depths(depths); }
     // Sets the transmitted fraction of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> fractions);
-    // Uploads the shade map of the shells and the noise of the fog (air_shells.h), unless these are there
-    // already, and computes its plane of light from the shadow map. `shadow_map`: null: it is there, or there is no
-    // cloud.
-    void use_shade(std::span<const std::uint32_t> words, std::uint64_t serial,
-                   const GpuImage* shadow_map = nullptr, const shader::ShadeStep& step = {});
+    // Sets the shade map of later frames (device_shade.h).
+    void use_shade(const ShadeInputs& shade);
 
     // Begins to draw a tile into `picture`, which must stay where it is until it is finished. `first`: of it.
     void begin_tile(const ViewInputs& what, const shader::Frame& frame, const Tile& tile, Picture& picture,
@@ -108,8 +106,6 @@ class BinnedView {
                       std::size_t begin, std::size_t end);
     Resources view_resources(const Slot& slot) const;
     Pipelines& pipelines_for(const ShaderVariant& variant);
-    void upload(const GpuBuffer& to, std::span<const std::byte> bytes);
-    void download(const GpuBuffer& from, std::span<std::byte> bytes);
 
     const GpuDevice& gpu_;
     const GpuImage& unused_;
@@ -118,11 +114,9 @@ class BinnedView {
     std::optional<DeviceSun> sun_;  // created when it is needed
     std::size_t balls_ = 0;
     std::size_t batch_ = 0;  // splats of a batch for which the lists of this cloud had room
-    Pipeline shade_light_;
-    DescriptorSets shade_sets_;
-    GpuBuffer shade_, radiance_, depth_;
+    DeviceShade shade_;
+    GpuBuffer radiance_, depth_;
     GpuImage billboard_textures_;  // created with the first billboard
-    std::uint64_t shade_serial_ = 0;
     std::vector<std::unique_ptr<Pipelines>> pipelines_;
     std::vector<std::unique_ptr<Slot>> slots_;
     std::size_t next_ = 0;
