@@ -288,12 +288,5 @@ void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size,
     kept_.clear();
 }
 
-void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
-                       const Tile& part, const ViewSortedSplats& order, const AirShells& shells,
-                       Picture& picture, const BatchLimits& limits) {
-    ProcessorView(options, camera, frame, part, order, limits)
-        .draw(picture, picture.shadow.data(), picture.shadow_size, shells);
-}
-
 }  // namespace nephos
 #endif

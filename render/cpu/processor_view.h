@@ -78,9 +78,4 @@ class ProcessorView {
     std::vector<Batch> kept_;            // one, if find_visible() has made it
 };
 
-// Does both steps with light that is all there; the ground wears picture.shadow.
-void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
-                       const Tile& part, const ViewSortedSplats& order, const AirShells& shells,
-                       Picture& picture, const BatchLimits& limits = {});
-
 }  // namespace nephos

@@ -19,7 +19,7 @@
 #include "render/frame/view_sorting.h"
 #include "render/options/camera.h"
 #include "render/renderer.h"
-#include "render/renderer_test_access.h"
+#include "tests/render/renderer_test_access.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/random_billboards.h"
 #include "tests/render/reference_render.h"

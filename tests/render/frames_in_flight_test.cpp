@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "render/renderer.h"
-#include "render/renderer_test_access.h"
+#include "tests/render/renderer_test_access.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/random_billboards.h"
 #include "tests/render/reference_render.h"
