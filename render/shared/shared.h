@@ -165,7 +165,7 @@ struct Frame {
     vec4 flash;         // xyz: lightning relative to the eye; w: irradiance at 1 km, 0 = none
     vec4 flash_colour;  // rgb
     vec4 ground_flash;  // rgb: what it adds to ground 1 km below it
-    // The physical sky (air.glsl); zero with the gradient.
+    // The physical sky (air.h); zero with the gradient.
     vec4 rayleigh;  // rgb: extinction by molecules per metre on the ground; w: 1 / height of the layer
     vec4 haze;      // rgb: extinction by particles; w: likewise
     vec4 air;       // eye's altitude above the ground, m; asymmetry and albedo of particles; 1 = physical sky
