@@ -51,7 +51,7 @@ bool BlendedBackend::begin(const FrameDescription& frame, Picture& picture) {
     const StageTimer timer(&frame.times, DrawStage::view);
     ViewPass& pass = pass_for(frame, shells, order);
     for (const FramePart& part : frame.parts)
-        pass.draw_tile(scene_.gpu, part.frame, part.tile, order, picture);
+        pass.draw_part(scene_.gpu, part.frame, part.area, order, picture);
     return false;
 }
 

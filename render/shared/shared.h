@@ -150,7 +150,7 @@ struct Frame {
     vec4 up;              // xyz: likewise; w: pixels per unit at distance 1
     vec4 forward;         // xyz: unit
     vec4 picture;         // width, height of the picture; column and row of the tile's corner, pixels
-    vec4 tile;            // clip position in the tile = position in the picture * tile.xy + tile.zw
+    vec4 part;            // clip position in the part = position in the picture * part.xy + part.zw
     vec4 to_sun;          // xyz: unit
     vec4 sunlight;        // rgb: colour of the direct sun
     vec4 ambient_top;     // rgb; w: albedo of the cloud
@@ -229,7 +229,7 @@ static_assert(sizeof(ViewBillboard) == 32 && offsetof(ViewBillboard, half_size) 
 static_assert(sizeof(ViewCloud) == 32 && offsetof(ViewCloud, inverse_height) == 16);
 static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 10) &&
               offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 2));
-static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
+static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, part) == 64 && offsetof(Frame, shadow_v) == 240 &&
               offsetof(Frame, flash_colour) == 272 && offsetof(Frame, sun_fade) == 368);
 
 }  // namespace nephos::shader

@@ -35,7 +35,7 @@ void host_barrier(const vk::raii::CommandBuffer& commands) {
     commands.pipelineBarrier2(vk::DependencyInfo().setMemoryBarriers(change));
 }
 
-std::size_t pixels_of(const Tile& tile) { return std::size_t(tile.width) * std::size_t(tile.height); }
+std::size_t pixels_of(const PicturePart& part) { return std::size_t(part.width) * std::size_t(part.height); }
 
 }  // namespace
 
@@ -70,7 +70,7 @@ struct BinnedView::Pipelines {
     }
 };
 
-// One tile of a picture in flight.
+// One part of a picture in flight.
 struct BinnedView::Slot {
     explicit Slot(const GpuDevice& gpu)
         : sets(gpu),
@@ -94,7 +94,7 @@ struct BinnedView::Slot {
     bool submitted = false;      // and not known to be done: also after a wait that failed
     Picture* picture = nullptr;  // whose pixels are not stored yet
     ViewInputs what;
-    Tile tile;
+    PicturePart part;
     std::size_t billboard_count = 0;
     std::size_t capacity = 0, batch = 0;  // of the lists, in the commands
     bool with_order = true;               // else the order of the slot before
@@ -180,7 +180,7 @@ void BinnedView::use_shade(const ShadeInputs& shade) {
 
 Resources BinnedView::view_resources(const Slot& slot) const {
     const ViewInputs& what = slot.what;
-    const std::size_t tiles = TileGrid{slot.tile.width, slot.tile.height}.tiles();
+    const std::size_t tiles = TileGrid{slot.part.width, slot.part.height}.tiles();
     const GpuImage& textures = what.variant.billboards ? billboard_textures_ : unused_;
     Resources all{{0, slot.frame},
             {1, lists_.balls()},
@@ -208,10 +208,10 @@ Resources BinnedView::view_resources(const Slot& slot) const {
 void BinnedView::record_batch(const vk::raii::CommandBuffer& commands, Slot& slot, const Resources& resources,
                               std::size_t begin, std::size_t end) {
     const Pipelines& pipelines = pipelines_for(slot.what.variant);
-    const TileGrid grid{slot.tile.width, slot.tile.height};
+    const TileGrid grid{slot.part.width, slot.part.height};
     Resources of_order = lists_.resources();
     of_order.set({{0, slot.order_frame}, {14, slot.shells}, {15, slot.billboards}});
-    shader::OrderStep lists = lists_.step_of(slot.tile, slot.what.shell_count);
+    shader::OrderStep lists = lists_.step_of(slot.part, slot.what.shell_count);
     lists.count = shader::uint(balls_);
     lists.begin = shader::uint(begin);
     lists.end = shader::uint(end);
@@ -245,7 +245,7 @@ void BinnedView::record_batch(const vk::raii::CommandBuffer& commands, Slot& slo
 }
 
 void BinnedView::record(const vk::raii::CommandBuffer& commands, Slot& slot) {
-    const std::size_t pixels = pixels_of(slot.tile), splats = balls_ + slot.billboard_count;
+    const std::size_t pixels = pixels_of(slot.part), splats = balls_ + slot.billboard_count;
     const Pipelines& pipelines = pipelines_for(slot.what.variant);
     const Resources resources = view_resources(slot);
     Resources of_order = lists_.resources();
@@ -253,11 +253,11 @@ void BinnedView::record(const vk::raii::CommandBuffer& commands, Slot& slot) {
     full_barrier(commands);  // the picture before has the same buffers
     const OrderRecorder recorder = lists_.recorder(commands, slot.sets);
     if (slot.with_order) lists_.record_order(recorder, of_order, balls_, slot.billboard_count);
-    shader::OrderStep boxes = lists_.step_of(slot.tile, slot.what.shell_count);
+    shader::OrderStep boxes = lists_.step_of(slot.part, slot.what.shell_count);
     boxes.count = shader::uint(balls_);
     recorder.run_indirect(OrderPass::boxes, lists_.with_order(of_order), boxes,
                           offsetof(shader::OrderCounts, visible_each));
-    shader::TileStep step = step_over({slot.tile.width, slot.tile.height});
+    shader::TileStep step = step_over({slot.part.width, slot.part.height});
     step.tile_count = shader::uint(lists_.splat_capacity());
     begin_compute(commands, pipelines.project, slot.sets.fill(pipelines.project, resources), step);
     commands.dispatchIndirect(*lists_.counts().buffer, offsetof(shader::OrderCounts, splats));
@@ -314,14 +314,14 @@ void BinnedView::complete(Slot& slot) {
         submit(slot);
         slot.wait(gpu_);
     }
-    store_tile(reinterpret_cast<const float*>(slot.radiance.mapped),
-               slot.what.depth ? reinterpret_cast<const float*>(slot.depth.mapped) : nullptr, slot.tile,
+    store_part(reinterpret_cast<const float*>(slot.radiance.mapped),
+               slot.what.depth ? reinterpret_cast<const float*>(slot.depth.mapped) : nullptr, slot.part,
                picture);
 }
 
-BinnedView::Lists BinnedView::read_lists(const Tile& tile) {
+BinnedView::Lists BinnedView::read_lists(const PicturePart& part) {
     wait();
-    const std::size_t tiles = TileGrid{tile.width, tile.height}.tiles();
+    const std::size_t tiles = TileGrid{part.width, part.height}.tiles();
     shader::OrderCounts counts;
     download_staged(gpu_, lists_.counts(), std::as_writable_bytes(std::span(&counts, 1)));
     Lists lists;
@@ -357,8 +357,8 @@ void BinnedView::finish(const Picture& picture) {
     std::rethrow_exception(what);
 }
 
-void BinnedView::reserve(const Tile& tile, Slot& slot) {
-    const std::size_t pixels = pixels_of(tile), tiles = TileGrid{tile.width, tile.height}.tiles();
+void BinnedView::reserve(const PicturePart& part, Slot& slot) {
+    const std::size_t pixels = pixels_of(part), tiles = TileGrid{part.width, part.height}.tiles();
     const std::size_t splats = balls_ + slot.billboard_count;
     const ListSizes sizes{.splats = splats,
                           .billboards = slot.billboard_count,
@@ -379,7 +379,7 @@ void BinnedView::reserve(const Tile& tile, Slot& slot) {
     reserve_copy(gpu_, slot.depth, sizeof(float) * pixels);
 }
 
-void BinnedView::begin_tile(const ViewInputs& what, const shader::Frame& frame, const Tile& tile,
+void BinnedView::begin_part(const ViewInputs& what, const shader::Frame& frame, const PicturePart& part,
                             Picture& picture, bool first) {
     Slot& slot = *slots_[next_];
     next_ = (next_ + 1) % slots_.size();
@@ -388,11 +388,11 @@ void BinnedView::begin_tile(const ViewInputs& what, const shader::Frame& frame, 
     failures_.reserve(failures_.size() + slots_.size());  // flush() may not throw
     slot.what = what;
     slot.billboard_count = what.billboards.size();
-    reserve(tile, slot);
+    reserve(part, slot);
     pipelines_for(what.variant).prepare(gpu_, what.depth);
     if (what.variant.billboards && billboard_textures_.width == 0)
         billboard_textures_ = upload_billboard_textures(gpu_);
-    slot.tile = tile;
+    slot.part = part;
     write(gpu_, slot.frame, frame);
     write(gpu_, slot.order_frame, what.order);
     if (what.shells != nullptr) write(gpu_, slot.shells, *what.shells);

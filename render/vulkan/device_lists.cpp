@@ -189,18 +189,18 @@ Resources DeviceLists::with_order(const Resources& resources, std::size_t from) 
     return both;
 }
 
-shader::OrderStep DeviceLists::step_of(const Tile& tile, std::size_t shells) const {
-    const TileGrid grid{tile.width, tile.height};
+shader::OrderStep DeviceLists::step_of(const PicturePart& part, std::size_t shells) const {
+    const TileGrid grid{part.width, part.height};
     return {.count = 0,
             .billboards = 0,
             .begin = 0,
             .end = 0,
             .table = shader::kSeenSplats,
             .shift = 0,
-            .x = shader::uint(tile.x),
-            .y = shader::uint(tile.y),
-            .width = shader::uint(tile.width),
-            .height = shader::uint(tile.height),
+            .x = shader::uint(part.x),
+            .y = shader::uint(part.y),
+            .width = shader::uint(part.width),
+            .height = shader::uint(part.height),
             .columns = shader::uint(grid.columns()),
             .tiles = shader::uint(grid.tiles()),
             .capacity = shader::uint(entry_capacity_),

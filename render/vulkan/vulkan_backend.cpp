@@ -152,7 +152,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                           .depth = frame.splats.depth};
     try {
         for (const FramePart& part : frame.parts)
-            view().begin_tile(what, part.frame, part.tile, picture, &part == &frame.parts.front());
+            view().begin_part(what, part.frame, part.area, picture, &part == &frame.parts.front());
     } catch (...) {
         view().abandon(picture);  // the device may write into it
         throw;

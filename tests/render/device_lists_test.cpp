@@ -42,7 +42,7 @@ HostLists host_lists(const Splats& splats, const RenderOptions& options) {
     HostLists lists;
     lists.order = sort_for_view(prepare(splats.metaballs), splats, camera,
                                 pixels_per_unit(options.camera, camera), options.ground);
-    const Tile whole{0, 0, options.camera.width, options.camera.height};
+    const PicturePart whole{0, 0, options.camera.width, options.camera.height};
     lists.grid = {whole.width, whole.height};
     lists.splats = splats_near_to_far(lists.order);
     lists.boxes = screen_boxes(lists.order, camera, options.camera, whole, lists.splats);

@@ -36,7 +36,7 @@ Drawn draw(const Splats& splats, const RenderOptions& options, const BatchLimits
     ViewSortedSplats eye =
         sort_for_view(prepared, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
     set_light(eye, {drawn.light, {}});
-    const Tile whole{0, 0, picture.width, picture.height};
+    const PicturePart whole{0, 0, picture.width, picture.height};
     PictureFrame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);
     const std::vector<float> scattering = scattering_table(options.light);
     frame.scattering = scattering.data();
