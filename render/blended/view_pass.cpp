@@ -23,7 +23,7 @@ ViewPass::ViewPass(const GpuDevice& gpu, const ShaderVariant& variant)
                                                  kFormats, Blend::over,
                                                  {true, variant.physical_sky, variant.shells, variant.fog})),
       sets_(gpu),
-      frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
+      frame_(create_buffer(gpu, sizeof(shader::FrameUniforms), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
       balls_(create_buffer(gpu, kBatch * sizeof(shader::ViewBall), vk::BufferUsageFlagBits::eStorageBuffer,
                            HostAccess::write)),
@@ -160,7 +160,7 @@ void ViewPass::read_back(const GpuDevice& gpu, vk::Extent2D area) const {
     });
 }
 
-void ViewPass::draw_part(const GpuDevice& gpu, const shader::Frame& frame, const PicturePart& part,
+void ViewPass::draw_part(const GpuDevice& gpu, const shader::FrameUniforms& frame, const PicturePart& part,
                          const ViewSortedSplats& order, Picture& picture) {
     resize_targets(gpu, part);
     write(gpu, frame_, frame);

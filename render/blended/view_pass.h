@@ -25,7 +25,7 @@ class ViewPass {
     void use_shells(const GpuDevice& gpu, const AirShells& shells, const ViewSortedSplats& order);
 
     // Draws one part and stores its pixels in the picture.
-    void draw_part(const GpuDevice& gpu, const shader::Frame& frame, const PicturePart& part,
+    void draw_part(const GpuDevice& gpu, const shader::FrameUniforms& frame, const PicturePart& part,
                    const ViewSortedSplats& order, Picture& picture);
 
   private:

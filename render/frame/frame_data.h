@@ -33,7 +33,7 @@ struct Daylight {
 Daylight daylight(double sun_elevation_deg);
 
 // Uniforms with pointers to the data that is in images on the device, for back-ends on the processor.
-struct PictureFrame : shader::Frame {
+struct PictureFrame : shader::FrameUniforms {
     const float* sky = nullptr;         // SkyLight::texels; null: gradient
     const float* scattering = nullptr;  // scattering_table.h, for metaballs on the processor
     const AirShells* shells = nullptr;  // likewise; null: none

@@ -145,7 +145,7 @@ struct TileStep {
 };
 
 // Uniforms of one image, or of a tile of it.
-struct Frame {
+struct FrameUniforms {
     vec4 right;           // xyz: the camera's axis * half the image's width at distance 1
     vec4 up;              // xyz: likewise; w: pixels per unit at distance 1
     vec4 forward;         // xyz: unit
@@ -229,8 +229,9 @@ static_assert(sizeof(ViewBillboard) == 32 && offsetof(ViewBillboard, half_size) 
 static_assert(sizeof(ViewCloud) == 32 && offsetof(ViewCloud, inverse_height) == 16);
 static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 10) &&
               offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 2));
-static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, part) == 64 && offsetof(Frame, shadow_v) == 240 &&
-              offsetof(Frame, flash_colour) == 272 && offsetof(Frame, sun_fade) == 368);
+static_assert(sizeof(FrameUniforms) == 24 * 16 && offsetof(FrameUniforms, part) == 64 &&
+              offsetof(FrameUniforms, shadow_v) == 240 && offsetof(FrameUniforms, flash_colour) == 272 &&
+              offsetof(FrameUniforms, sun_fade) == 368);
 
 }  // namespace nephos::shader
 #endif

@@ -74,7 +74,7 @@ struct BinnedView::Pipelines {
 struct BinnedView::Slot {
     explicit Slot(const GpuDevice& gpu)
         : sets(gpu),
-          frame(uniform_buffer<shader::Frame>(gpu)),
+          frame(uniform_buffer<shader::FrameUniforms>(gpu)),
           order_frame(uniform_buffer<shader::OrderFrame>(gpu)),
           shells(uniform_buffer<shader::Shells>(gpu)),
           march(uniform_buffer<shader::March>(gpu)),
@@ -379,7 +379,7 @@ void BinnedView::reserve(const PicturePart& part, Slot& slot) {
     reserve_copy(gpu_, slot.depth, sizeof(float) * pixels);
 }
 
-void BinnedView::begin_part(const ViewInputs& what, const shader::Frame& frame, const PicturePart& part,
+void BinnedView::begin_part(const ViewInputs& what, const shader::FrameUniforms& frame, const PicturePart& part,
                             Picture& picture, bool first) {
     Slot& slot = *slots_[next_];
     next_ = (next_ + 1) % slots_.size();

@@ -67,7 +67,7 @@ class BinnedView {
     void use_shade(const ShadeInputs& shade);
 
     // Begins to draw a part into `picture`, which must stay where it is until it is finished. `first`: of it.
-    void begin_part(const ViewInputs& what, const shader::Frame& frame, const PicturePart& part, Picture& picture,
+    void begin_part(const ViewInputs& what, const shader::FrameUniforms& frame, const PicturePart& part, Picture& picture,
                     bool first);
     // Waits for the parts of a picture and stores their pixels. Parts that have more entries than there is room for are
     // drawn again, with longer lists or in smaller batches. Throws what failed while the picture was in flight.

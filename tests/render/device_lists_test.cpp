@@ -497,7 +497,7 @@ TEST_F(BinnedPictures, NothingElseIsSentWhenTheCameraMoves) {
         EXPECT_LE(difference(splats, options), kClose);
         return RendererTestAccess::uploaded_bytes(binned_) - before;
     };
-    constexpr std::size_t kCamera = sizeof(shader::Frame) + 12 * sizeof(shader::vec4);
+    constexpr std::size_t kCamera = sizeof(shader::FrameUniforms) + 12 * sizeof(shader::vec4);
     RenderOptions options = test::view({0, -4000, 800}, {0, 0, 1000});
     EXPECT_GE(sent(options), balls.size() * 32);
     options.camera.position_m = {2000, -3000, 500};
