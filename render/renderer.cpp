@@ -24,19 +24,19 @@ namespace {
 std::size_t square(std::size_t side) { return side * side; }
 
 // Bytes in main memory while a picture is drawn, on a device that shares it.
-std::size_t memory_needed(const Splats& splats, const RenderOptions& options, int tile_size) {
+std::size_t memory_needed(const Splats& splats, const RenderOptions& options, int part_size) {
     const std::size_t pixels = std::size_t(options.camera.width) * std::size_t(options.camera.height);
-    const std::size_t tile = std::min(pixels, square(std::size_t(tile_size)));
+    const std::size_t part = std::min(pixels, square(std::size_t(part_size)));
     // Orders, sort keys, light, box and splat of a metaball, and what is kept of it.
     constexpr std::size_t kPerMetaball = 36 + 16 + 4 * 5 + 16 + 64 + 16 + 24 + 24,
                           kPerBillboard = 32 + 16 + 4 * 5 + 16 + 64;
-    return 20 * pixels + 40 * tile + 12 * square(std::size_t(options.shadow_map_size)) +
+    return 20 * pixels + 40 * part + 12 * square(std::size_t(options.shadow_map_size)) +
            kPerMetaball * splats.metaballs.metaballs.size() + kPerBillboard * splats.billboards.size() +
            (std::size_t(96) << 20);
 }
 
-void check_memory(const Splats& splats, const RenderOptions& options, int tile_size) {
-    const std::size_t needed = memory_needed(splats, options, tile_size);
+void check_memory(const Splats& splats, const RenderOptions& options, int part_size) {
+    const std::size_t needed = memory_needed(splats, options, part_size);
     const AvailableMemory available = available_memory();
     if (needed <= available.bytes) return;
     throw Error(ErrorCode::usage, "a picture of " + std::to_string(options.camera.width) + " x " +
@@ -95,7 +95,7 @@ std::unique_ptr<Backend> open_backend(const DeviceOptions& options) {
 }  // namespace
 
 Renderer::Impl::Impl(const DeviceOptions& options)
-    : backend(open_backend(options)), tile_size(std::min(options.tile_size, backend->longest_part())) {}
+    : backend(open_backend(options)), part_size(std::min(options.part_size, backend->longest_part())) {}
 
 void Renderer::Impl::absorb_sunlight(LitCloud& cloud, const DensityBlocks& blocks,
                                      const RenderOptions& options) {
@@ -149,12 +149,12 @@ void Renderer::Impl::begin(Drawing& drawing) {
                            .air = air,
                            .times = times};
     if (frame.sky != nullptr) picture.air = air_of(*frame.sky);
-    for (int y = 0; y < picture.height; y += tile_size) {
-        for (int x = 0; x < picture.width; x += tile_size) {
-            const Tile tile{x, y, std::min(tile_size, picture.width - x),
-                            std::min(tile_size, picture.height - y)};
+    for (int y = 0; y < picture.height; y += part_size) {
+        for (int x = 0; x < picture.width; x += part_size) {
+            const PicturePart area{x, y, std::min(part_size, picture.width - x),
+                            std::min(part_size, picture.height - y)};
             frame.parts.push_back(
-                {tile, frame_data(options, frame.camera, lit.frame, flash, tile, frame.sky)});
+                {area, frame_data(options, frame.camera, lit.frame, flash, area, frame.sky)});
             frame.parts.back().frame.scattering = scattering.get().data();
         }
     }
@@ -229,8 +229,8 @@ const SkyLight* Renderer::Impl::sky_of(const Splats& splats, const RenderOptions
 }
 
 Renderer::Renderer(const DeviceOptions& options) {
-    if (options.tile_size < 16 || options.tile_size > 16384)
-        throw Error(ErrorCode::usage, "device: tile_size must be 16..16384 pixels");
+    if (options.part_size < 16 || options.part_size > 16384)
+        throw Error(ErrorCode::usage, "device: part_size must be 16..16384 pixels");
     impl_ = with_gpu_errors("preparing the renderer", [&] { return std::make_unique<Impl>(options); });
 }
 
@@ -254,7 +254,7 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
     if (options.shadow_map_size > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
     if (splats.ground_cover) check(*splats.ground_cover);
-    check_memory(splats, options, impl_->tile_size);
+    check_memory(splats, options, impl_->part_size);
     const auto work = [&] {
         auto state = std::make_unique<PendingPicture::State>(splats, options);
         impl_->times = {};

@@ -97,7 +97,7 @@ class Renderer {
     std::vector<std::string> validation_messages() const;
 
   private:
-    friend struct RendererTestAccess;  // render/renderer_test_access.h
+    friend struct RendererTestAccess;  // tests/render/renderer_test_access.h
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };

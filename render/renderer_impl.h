@@ -51,7 +51,7 @@ struct Renderer::Impl {
     const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
 
     std::unique_ptr<Backend> backend;
-    int tile_size;
+    int part_size;
     LitCloud lit;  // of the last picture
     StageTimes times;
     Versioned<std::vector<float>> scattering;  // table of `scattering_light`

@@ -26,7 +26,9 @@ void enclose(Cloud& cloud) {
     cloud.centre_m = low * 0.5 + high * 0.5;
     double corner2 = 0, farthest = 0;
     for (SeedBox& b : cloud.boxes) {
-        const Vec3 d = glm::abs(b.centre_m - cloud.centre_m), corner = d + b.size_m * 0.5;
+        const Vec3 to = b.centre_m - cloud.centre_m;
+        const Vec3 d(std::abs(to.x), std::abs(to.y), std::abs(to.z));  // glm::abs() has branches
+        const Vec3 corner = d + b.size_m * 0.5;
         corner2 = std::max(corner2, dot(corner, corner));
         b.distance = std::sqrt(dot(d, d));
         farthest = std::max(farthest, b.distance);

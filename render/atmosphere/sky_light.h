@@ -23,7 +23,7 @@ struct SkyLight {
     Rgb ground_sun{}, ground_sky{};     // of a white surface on the ground: sunlit; in sky light
     Rgb ambient_top{}, ambient_base{};  // ambient light at a cloud's top and base
     Rgb horizon{};                      // mean around the horizon
-    Rgb disc{}, disc_fade{};            // shader::Frame::sun_disc, sun_fade
+    Rgb disc{}, disc_fade{};            // shader::FrameUniforms::sun_disc, sun_fade
     bool has_disc = false;
 };
 

@@ -25,9 +25,9 @@
 
 namespace nephos {
 
-// A rectangle of the picture that is drawn at once.
+// A part of the picture, and its uniforms.
 struct FramePart {
-    Tile tile;
+    PicturePart area;
     PictureFrame frame;
 };
 

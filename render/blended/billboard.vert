@@ -33,7 +33,7 @@ void main() {
     vec2 reach = corner * unpackHalf2x16(billboard.half_size);
     float depth = dot(frame.forward.xyz, centre);
     vec2 picture = axes.per_metre * (vec2(dot(axes.right, centre), dot(axes.up, centre)) + reach) * vec2(1.0, -1.0);
-    gl_Position = vec4(picture * frame.tile.xy + depth * frame.tile.zw, 0.5 * depth, depth);
+    gl_Position = vec4(picture * frame.part.xy + depth * frame.part.zw, 0.5 * depth, depth);
 
     vec3 position = centre + reach.x * axes.right + reach.y * axes.up;
     BillboardAir air = billboard_air(billboard, centre, distance);

@@ -11,21 +11,10 @@ namespace {
 
 GpuImage upload_attenuation(const GpuDevice& gpu) {
     const std::vector<float> texels = attenuation_textures();
-    const std::size_t bytes = texels.size() * sizeof(float);
     constexpr std::uint32_t kSide = shader::kAttenuationTexels;
     GpuImage image = create_image(gpu, kSide, kSide, shader::kAttenuationLevels, vk::Format::eR32G32Sfloat,
                                   vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst);
-    const GpuBuffer staging =
-        create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    write(gpu, staging, std::as_bytes(std::span(texels)));
-    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-        begin_image(commands, image, access::copy_to);
-        const vk::BufferImageCopy region(0, 0, 0,
-                                         {vk::ImageAspectFlagBits::eColor, 0, 0, shader::kAttenuationLevels},
-                                         {0, 0, 0}, {kSide, kSide, 1});
-        commands.copyBufferToImage(*staging.buffer, *image.image, vk::ImageLayout::eGeneral, region);
-        image_barrier(commands, image, access::copy_to, access::sample);
-    });
+    upload_image(gpu, image, std::as_bytes(std::span(texels)));
     return image;
 }
 
@@ -62,7 +51,7 @@ bool BlendedBackend::begin(const FrameDescription& frame, Picture& picture) {
     const StageTimer timer(&frame.times, DrawStage::view);
     ViewPass& pass = pass_for(frame, shells, order);
     for (const FramePart& part : frame.parts)
-        pass.draw_tile(scene_.gpu, part.frame, part.tile, order, picture);
+        pass.draw_part(scene_.gpu, part.frame, part.area, order, picture);
     return false;
 }
 

@@ -23,7 +23,7 @@ ViewPass::ViewPass(const GpuDevice& gpu, const ShaderVariant& variant)
                                                  kFormats, Blend::over,
                                                  {true, variant.physical_sky, variant.shells, variant.fog})),
       sets_(gpu),
-      frame_(create_buffer(gpu, sizeof(shader::Frame), vk::BufferUsageFlagBits::eUniformBuffer,
+      frame_(create_buffer(gpu, sizeof(shader::FrameUniforms), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
       balls_(create_buffer(gpu, kBatch * sizeof(shader::ViewBall), vk::BufferUsageFlagBits::eStorageBuffer,
                            HostAccess::write)),
@@ -43,8 +43,8 @@ void ViewPass::use_shells(const GpuDevice& gpu, const AirShells& shells, const V
     runs_ = runs_between_shells(shells, order);
 }
 
-void ViewPass::resize_targets(const GpuDevice& gpu, const Tile& tile) {
-    const std::uint32_t width = std::uint32_t(tile.width), height = std::uint32_t(tile.height);
+void ViewPass::resize_targets(const GpuDevice& gpu, const PicturePart& part) {
+    const std::uint32_t width = std::uint32_t(part.width), height = std::uint32_t(part.height);
     if (radiance_.width >= width && radiance_.height >= height) return;
     using Usage = vk::ImageUsageFlagBits;
     const auto target = [&](vk::Format format) {
@@ -160,17 +160,17 @@ void ViewPass::read_back(const GpuDevice& gpu, vk::Extent2D area) const {
     });
 }
 
-void ViewPass::draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
+void ViewPass::draw_part(const GpuDevice& gpu, const shader::FrameUniforms& frame, const PicturePart& part,
                          const ViewSortedSplats& order, Picture& picture) {
-    resize_targets(gpu, tile);
+    resize_targets(gpu, part);
     write(gpu, frame_, frame);
     sets_.reset();
-    const vk::Extent2D area{std::uint32_t(tile.width), std::uint32_t(tile.height)};
+    const vk::Extent2D area{std::uint32_t(part.width), std::uint32_t(part.height)};
     draw_background(gpu, area);
     draw_splats(gpu, area, order);
     read_back(gpu, area);
-    store_tile(reinterpret_cast<const float*>(radiance_pixels_.mapped),
-               order.depth ? reinterpret_cast<const float*>(depth_pixels_.mapped) : nullptr, tile, picture);
+    store_part(reinterpret_cast<const float*>(radiance_pixels_.mapped),
+               order.depth ? reinterpret_cast<const float*>(depth_pixels_.mapped) : nullptr, part, picture);
 }
 
 }  // namespace nephos

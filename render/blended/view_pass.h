@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Step 2 of D, tile by tile: background, then metaballs, billboards and shells of air back to front. Two
+// Step 2 of D, part by part: background, then metaballs, billboards and shells of air back to front. Two
 // attachments in 32-bit floats: radiance with the clouds' transmittance in alpha, and the distance weighted
 // by what the eye sees of each metaball, which the same blending accumulates. Private to the module.
 
@@ -24,12 +24,12 @@ class ViewPass {
     // Sets the air between the clouds, in front of what `order` has; for a pass made for shells.
     void use_shells(const GpuDevice& gpu, const AirShells& shells, const ViewSortedSplats& order);
 
-    // Draws one tile and stores its pixels in the picture.
-    void draw_tile(const GpuDevice& gpu, const shader::Frame& frame, const Tile& tile,
+    // Draws one part and stores its pixels in the picture.
+    void draw_part(const GpuDevice& gpu, const shader::FrameUniforms& frame, const PicturePart& part,
                    const ViewSortedSplats& order, Picture& picture);
 
   private:
-    void resize_targets(const GpuDevice& gpu, const Tile& tile);
+    void resize_targets(const GpuDevice& gpu, const PicturePart& part);
     void draw_background(const GpuDevice& gpu, vk::Extent2D area);
     void draw_splats(const GpuDevice& gpu, vk::Extent2D area, const ViewSortedSplats& order);
     void draw_batch(const GpuDevice& gpu, vk::Extent2D area, const ViewSortedSplats& order,

@@ -35,7 +35,7 @@ vec4 clip_position(vec3 position, float radius) {
     float depth = dot(frame.forward.xyz, position);
     vec2 picture = vec2(dot(frame.right.xyz, position) / dot(frame.right.xyz, frame.right.xyz),
                         -dot(frame.up.xyz, position) / dot(frame.up.xyz, frame.up.xyz));
-    vec2 tile = picture * frame.tile.xy + depth * frame.tile.zw;
+    vec2 tile = picture * frame.part.xy + depth * frame.part.zw;
     // z keeps what is closer than a tiny fraction of the radius to the eye's plane out of the division.
     return vec4(tile, 0.5 * (depth - 1.0e-4 * radius), depth);
 }

@@ -100,7 +100,7 @@ bool CpuBackend::begin(const FrameDescription& frame, Picture& picture) {
     ViewSortedSplats order = frame.view_sorted();
     std::vector<ProcessorView> views;
     for (const FramePart& part : frame.parts)
-        views.emplace_back(frame.options, frame.camera, part.frame, part.tile, order, BatchLimits{},
+        views.emplace_back(frame.options, frame.camera, part.frame, part.area, order, BatchLimits{},
                            &frame.times);
     std::optional<VisibleSet> seen;
     if (!frame.splats.light && !cloud.all_known) {

@@ -57,7 +57,7 @@ ViewTile tile_at(std::size_t t, const TileGrid& grid, const TileBins& bins) {
             std::span(bins.list).subspan(range.begin, range.end - range.begin)};
 }
 
-void store(const TileSums& sums, const ViewTile& tile, const Tile& part, bool depth, Picture& picture) {
+void store(const TileSums& sums, const ViewTile& tile, const PicturePart& part, bool depth, Picture& picture) {
     const int columns = std::min(int(shader::kTileWidth), part.width - tile.x),
               rows = std::min(int(shader::kTileHeight), part.height - tile.y);
     for (int y = 0; y < rows; ++y) {
@@ -77,7 +77,7 @@ void store(const TileSums& sums, const ViewTile& tile, const Tile& part, bool de
 }  // namespace
 
 ProcessorView::ProcessorView(const RenderOptions& options, const CameraFrame& camera,
-                             const PictureFrame& frame, const Tile& part, const ViewSortedSplats& order,
+                             const PictureFrame& frame, const PicturePart& part, const ViewSortedSplats& order,
                              const BatchLimits& limits, StageTimes* times)
     : order_(&order), frame_(frame), part_(part), limits_(limits), times_(times) {
     const StageTimer timer(times_, DrawStage::eye_bins);
@@ -286,13 +286,6 @@ void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size,
         begin = end;
     } while (begin < boxes_.size());
     kept_.clear();
-}
-
-void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
-                       const Tile& part, const ViewSortedSplats& order, const AirShells& shells,
-                       Picture& picture, const BatchLimits& limits) {
-    ProcessorView(options, camera, frame, part, order, limits)
-        .draw(picture, picture.shadow.data(), picture.shadow_size, shells);
 }
 
 }  // namespace nephos

@@ -40,7 +40,7 @@ class ProcessorView {
   public:
     // `frame` is that of the part.
     ProcessorView(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
-                  const Tile& part, const ViewSortedSplats& order, const BatchLimits& limits = {},
+                  const PicturePart& part, const ViewSortedSplats& order, const BatchLimits& limits = {},
                   StageTimes* times = nullptr);
 
     // Adds what the part shows.
@@ -70,17 +70,12 @@ class ProcessorView {
 
     const ViewSortedSplats* order_;
     PictureFrame frame_;
-    Tile part_;
+    PicturePart part_;
     BatchLimits limits_;
     StageTimes* times_;
     std::vector<std::uint32_t> source_;  // splats_near_to_far(); empty without billboards
     std::vector<PixelBox> boxes_;        // of the splats, nearest first
     std::vector<Batch> kept_;            // one, if find_visible() has made it
 };
-
-// Does both steps with light that is all there; the ground wears picture.shadow.
-void view_by_processor(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
-                       const Tile& part, const ViewSortedSplats& order, const AirShells& shells,
-                       Picture& picture, const BatchLimits& limits = {});
 
 }  // namespace nephos

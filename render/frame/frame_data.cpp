@@ -69,7 +69,7 @@ double pixels_per_unit(const Camera& camera, const CameraFrame& frame) {
 }
 
 PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
-                        const Flash* flash, const Tile& tile, const SkyLight* sky) {
+                        const Flash* flash, const PicturePart& part, const SkyLight* sky) {
     const Vec3 to_sun = direction_to_sun(options.sun);
     const Daylight day = daylight(options.sun.elevation_deg);
     const CloudLight& light = options.light;
@@ -80,11 +80,11 @@ PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera,
     frame.right = to_vec4(camera.half_width * camera.right, 0);
     frame.up = to_vec4(camera.half_height * camera.up, pixels_per_unit(options.camera, camera));
     frame.forward = to_vec4(camera.forward, 0);
-    frame.picture = {float(width), float(height), float(tile.x), float(tile.y)};
-    // -1..1 across the picture to -1..1 across the tile.
-    frame.tile = {float(width / tile.width), float(height / tile.height),
-                  float((width - 2.0 * tile.x - tile.width) / tile.width),
-                  float((height - 2.0 * tile.y - tile.height) / tile.height)};
+    frame.picture = {float(width), float(height), float(part.x), float(part.y)};
+    // -1..1 across the picture to -1..1 across the part.
+    frame.part = {float(width / part.width), float(height / part.height),
+                  float((width - 2.0 * part.x - part.width) / part.width),
+                  float((height - 2.0 * part.y - part.height) / part.height)};
     frame.to_sun = to_vec4(to_sun, 0);
     frame.sunlight = scaled_colour(options.sun.colour, day.sun, 0);
     frame.ambient_top = scaled_colour(light.ambient_top, day.sky, light.albedo);
@@ -117,11 +117,11 @@ PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera,
     return frame;
 }
 
-void store_tile(const float* radiance, const float* depth, const Tile& tile, Picture& picture) {
-    for (int y = 0; y < tile.height; ++y) {
-        std::size_t to = std::size_t(tile.y + y) * std::size_t(picture.width) + std::size_t(tile.x);
-        std::size_t from = std::size_t(y) * std::size_t(tile.width);
-        for (int x = 0; x < tile.width; ++x, ++to, ++from) {
+void store_part(const float* radiance, const float* depth, const PicturePart& part, Picture& picture) {
+    for (int y = 0; y < part.height; ++y) {
+        std::size_t to = std::size_t(part.y + y) * std::size_t(picture.width) + std::size_t(part.x);
+        std::size_t from = std::size_t(y) * std::size_t(part.width);
+        for (int x = 0; x < part.width; ++x, ++to, ++from) {
             std::copy_n(radiance + 4 * from, 3, &picture.beauty[3 * to]);
             const float transmittance = radiance[4 * from + 3];
             picture.transmittance[to] = transmittance;

@@ -14,8 +14,8 @@ namespace nephos {
 
 struct AirShells;
 
-// A rectangle of the image that is drawn at once, in pixels.
-struct Tile {
+// A rectangle of the image that is drawn at once, in pixels; not one of the tiles of tile_bins.h.
+struct PicturePart {
     int x = 0, y = 0, width = 0, height = 0;
 };
 
@@ -33,7 +33,7 @@ struct Daylight {
 Daylight daylight(double sun_elevation_deg);
 
 // Uniforms with pointers to the data that is in images on the device, for back-ends on the processor.
-struct PictureFrame : shader::Frame {
+struct PictureFrame : shader::FrameUniforms {
     const float* sky = nullptr;         // SkyLight::texels; null: gradient
     const float* scattering = nullptr;  // scattering_table.h, for metaballs on the processor
     const AirShells* shells = nullptr;  // likewise; null: none
@@ -42,14 +42,14 @@ struct PictureFrame : shader::Frame {
 // Returns the uniforms of a frame. `flash` is null without lightning, `sky` with AirModel::gradient; the
 // latter must outlive the result.
 PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
-                        const Flash* flash, const Tile& tile, const SkyLight* sky = nullptr);
+                        const Flash* flash, const PicturePart& part, const SkyLight* sky = nullptr);
 
 // Returns a picture with its pixels allocated, without a shadow map.
 Picture blank_picture(const RenderOptions& options);
 
-// Stores the pixels of a tile: radiance with the clouds' transmittance (4 floats a pixel), and the
+// Stores the pixels of a part: radiance with the clouds' transmittance (4 floats a pixel), and the
 // opacity-weighted distance, which may be null.
-void store_tile(const float* radiance, const float* depth, const Tile& tile, Picture& picture);
+void store_part(const float* radiance, const float* depth, const PicturePart& part, Picture& picture);
 
 // Returns a shader vector.
 inline shader::vec4 to_vec4(const Vec3& v, double w) {

@@ -22,10 +22,10 @@ inline constexpr std::uint32_t kBillboardSplat = 1u << 31;
 std::vector<std::uint32_t> splats_near_to_far(const ViewSortedSplats& order);
 
 // Returns for each splat, from the nearest to the farthest (the reverse of `order`), a bounding box in pixels
-// relative to the tile's corner. `splats`: splats_near_to_far(); may be empty for an order without
+// relative to the part's corner. `splats`: splats_near_to_far(); may be empty for an order without
 // billboards.
 std::vector<PixelBox> screen_boxes(const ViewSortedSplats& order, const CameraFrame& camera,
-                                   const Camera& options, const Tile& tile,
+                                   const Camera& options, const PicturePart& part,
                                    std::span<const std::uint32_t> splats = {});
 
 }  // namespace nephos

@@ -24,7 +24,6 @@ class SkyImage {
 
   private:
     GpuImage image_;
-    GpuBuffer staging_;
     std::uint64_t serial_ = 0;
 };
 

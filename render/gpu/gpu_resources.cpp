@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <exception>
 #include <initializer_list>
+#include <vector>
 
 #include "core/error.h"
 
@@ -75,6 +76,42 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, std::span<const std::b
     gpu.uploaded_bytes += bytes.size();
 }
 
+void make_storage(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes, vk::BufferUsageFlags more) {
+    constexpr vk::BufferUsageFlags kUsage = vk::BufferUsageFlagBits::eStorageBuffer |
+                                            vk::BufferUsageFlagBits::eTransferSrc |
+                                            vk::BufferUsageFlagBits::eTransferDst;
+    buffer = {};  // the old one goes before the new one comes
+    buffer = create_buffer(gpu, bytes, kUsage | more, HostAccess::none);
+}
+
+void reserve_storage(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
+    if (buffer.bytes < bytes) make_storage(gpu, buffer, bytes);
+}
+
+void upload_staged(const GpuDevice& gpu, const GpuBuffer& to, std::span<const std::byte> bytes) {
+    if (bytes.empty()) return;
+    const GpuBuffer staging =
+        create_buffer(gpu, bytes.size(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    write(gpu, staging, bytes);
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        full_barrier(commands);
+        commands.copyBuffer(*staging.buffer, *to.buffer, vk::BufferCopy(0, 0, bytes.size()));
+        full_barrier(commands);
+    });
+}
+
+void download_staged(const GpuDevice& gpu, const GpuBuffer& from, std::span<std::byte> bytes) {
+    if (bytes.empty()) return;
+    const GpuBuffer staging =
+        create_buffer(gpu, bytes.size(), vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        full_barrier(commands);
+        commands.copyBuffer(*from.buffer, *staging.buffer, vk::BufferCopy(0, 0, bytes.size()));
+        buffer_barrier(commands, staging, access::copy_to, access::host);
+    });
+    std::ranges::copy(std::span(staging.mapped, bytes.size()), bytes.begin());
+}
+
 void reserve_copy(const GpuDevice& gpu, GpuBuffer& copy, std::size_t bytes) {
     if (copy.bytes >= bytes) return;
     copy = {};
@@ -141,6 +178,42 @@ void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& bu
                                           VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED, *buffer.buffer, 0,
                                           VK_WHOLE_SIZE);
     commands.pipelineBarrier2(vk::DependencyInfo().setBufferMemoryBarriers(change));
+}
+
+void full_barrier(const vk::raii::CommandBuffer& commands) {
+    const vk::MemoryBarrier2 change(vk::PipelineStageFlagBits2::eAllCommands,
+                                    vk::AccessFlagBits2::eMemoryWrite,
+                                    vk::PipelineStageFlagBits2::eAllCommands,
+                                    vk::AccessFlagBits2::eMemoryRead | vk::AccessFlagBits2::eMemoryWrite);
+    commands.pipelineBarrier2(vk::DependencyInfo().setMemoryBarriers(change));
+}
+
+void upload_image(const GpuDevice& gpu, const GpuImage& image, std::span<const std::byte> texels) {
+    std::size_t texels_of_all = 0;
+    for (std::uint32_t level = 0; level < image.levels; ++level)
+        texels_of_all += std::size_t(image.width >> level) * (image.height >> level) * image.layers;
+    const std::size_t texel_bytes = texels.size() / texels_of_all;
+    std::vector<vk::BufferImageCopy> regions;
+    std::size_t begin = 0;
+    for (std::uint32_t level = 0; level < image.levels; ++level) {
+        const std::uint32_t width = image.width >> level, height = image.height >> level;
+        regions.push_back({begin,
+                           0,
+                           0,
+                           {vk::ImageAspectFlagBits::eColor, level, 0, image.layers},
+                           {0, 0, 0},
+                           {width, height, 1}});
+        begin += texel_bytes * width * height * image.layers;
+    }
+    const GpuBuffer staging =
+        create_buffer(gpu, texels.size(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+    write(gpu, staging, texels);
+    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
+        full_barrier(commands);
+        begin_image(commands, image, access::copy_to);
+        commands.copyBufferToImage(*staging.buffer, *image.image, vk::ImageLayout::eGeneral, regions);
+        image_barrier(commands, image, access::copy_to, access::sample);
+    });
 }
 
 }  // namespace nephos

@@ -35,6 +35,15 @@ void write(const GpuDevice& gpu, const GpuBuffer& buffer, const T& value) {
     write(gpu, buffer, std::as_bytes(std::span(&value, 1)));
 }
 
+// Replaces a buffer by a storage buffer in the device's own memory, which can be copied into and from; `more`: its
+// other usages.
+void make_storage(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes, vk::BufferUsageFlags more = {});
+// The same, if it is not at least so large.
+void reserve_storage(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes);
+// Copy into such a buffer, after all that was submitted before, and from it; wait until that is done.
+void upload_staged(const GpuDevice& gpu, const GpuBuffer& to, std::span<const std::byte> bytes);
+void download_staged(const GpuDevice& gpu, const GpuBuffer& from, std::span<std::byte> bytes);
+
 // Makes a buffer at least so large that is copied into on the device and read by the processor; its content
 // is lost when it grows.
 void reserve_copy(const GpuDevice& gpu, GpuBuffer& copy, std::size_t bytes);
@@ -86,5 +95,10 @@ void image_barrier(const vk::raii::CommandBuffer& commands, const GpuImage& imag
                    const Access& after);
 void buffer_barrier(const vk::raii::CommandBuffer& commands, const GpuBuffer& buffer, const Access& before,
                     const Access& after);
+// Replaces the content of an image by texels, tightly packed, first of all layers of level 0, then of level 1, and so on;
+// waits until shaders can sample it.
+void upload_image(const GpuDevice& gpu, const GpuImage& image, std::span<const std::byte> texels);
+// Makes all memory accesses of earlier commands complete and visible to later ones.
+void full_barrier(const vk::raii::CommandBuffer& commands);
 
 }  // namespace nephos

@@ -65,16 +65,7 @@ void LightTiles::resize_map(const GpuDevice& gpu, int shadow_size) {
 
 void LightTiles::use(const GpuDevice& gpu, std::span<const float> shadow, int shadow_size) {
     resize_map(gpu, shadow_size);
-    const GpuBuffer staging =
-        create_buffer(gpu, shadow.size_bytes(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    write(gpu, staging, std::as_bytes(shadow));
-    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-        image_barrier(commands, map_, access::sample, access::copy_to);
-        const vk::BufferImageCopy region(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, 0, 0},
-                                         {map_.width, map_.height, 1});
-        commands.copyBufferToImage(*staging.buffer, *map_.image, vk::ImageLayout::eGeneral, region);
-        image_barrier(commands, map_, access::copy_to, access::sample);
-    });
+    upload_image(gpu, map_, std::as_bytes(shadow));
 }
 
 void LightTiles::record_map(const vk::raii::CommandBuffer& commands, DescriptorSets& sets,

@@ -24,9 +24,9 @@ struct DeviceOptions {
     // tests. No effect where the back-end cpu draws.
     bool validation = false;
     // Longest side of the part of a picture that is in device memory at once, 16..16384 pixels. No effect on
-    // the picture; memory on the device is about 24 bytes * tile_size^2, and with Splatting::vulkan 40 bytes more to
+    // the picture; memory on the device is about 24 bytes * part_size^2, and with Splatting::vulkan 40 bytes more to
     // read back two pictures. Less where the device allows no such buffers or images.
-    int tile_size = 2048;
+    int part_size = 2048;
     Splatting splatting = Splatting::automatic;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// render/shading/air.glsl for vectors of pixels: the tables of the sky, and clear air along rays.
+// render/shared/air.h for vectors of pixels: clear air along rays, and the tables of the sky.
 
 #if defined(NEPHOS_RENDER_AIR_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_RENDER_AIR_INL_H_
@@ -25,14 +25,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 
-// exp(-rgb distance)
-HWY_INLINE Floats3 decay(const shader::vec4& per_m, Floats distance_m) {
-    const Lanes d;
-    return {hn::Exp(d, hn::Mul(set(-per_m.x), distance_m)), hn::Exp(d, hn::Mul(set(-per_m.y), distance_m)),
-            hn::Exp(d, hn::Mul(set(-per_m.z), distance_m))};
-}
-
-// render/shading/air.glsl. A layer of the sky's tables between four texels; places are 0..1.
+// A layer of the sky's tables between four texels; places are 0..1.
 HWY_INLINE Floats3 sky_layer(const PictureFrame& frame, Floats across, Floats upwards, std::size_t layer) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
@@ -53,18 +46,6 @@ HWY_INLINE Floats3 sky_layer(const PictureFrame& frame, Floats across, Floats up
         return hn::MulAdd(fraction_y, hn::Sub(b, a), a);
     };
     return {channel(texels), channel(texels + 1), channel(texels + 2)};
-}
-
-HWY_INLINE Floats3 sky_scattered(const PictureFrame& frame, const Floats3& ray) {
-    const Floats one = set(1.0f);
-    const Floats level = hn::MulAdd(ray.x, ray.x, hn::Mul(ray.y, ray.y));
-    const float sun_level = frame.to_sun.x * frame.to_sun.x + frame.to_sun.y * frame.to_sun.y;
-    const Floats beside = hn::Div(hn::MulAdd(ray.x, set(frame.to_sun.x), hn::Mul(ray.y, set(frame.to_sun.y))),
-                                  hn::Sqrt(hn::Max(hn::Mul(level, set(sun_level)), set(1.0e-12f))));
-    const Floats across = sky_across(hn::Max(hn::Min(beside, one), hn::Neg(one))),
-                 upwards = sky_upwards(hn::Min(hn::Abs(ray.z), one));
-    const Floats phase = particle_phase(dot(set3(frame.to_sun), ray), frame.air.y);
-    return times_add(phase, sky_layer(frame, across, upwards, 1), sky_layer(frame, across, upwards, 0));
 }
 
 HWY_INLINE Floats3 sunlight_at(const PictureFrame& frame, Floats height) {
@@ -100,83 +81,64 @@ HWY_INLINE Floats3 sunlight_nearby(const PictureFrame& frame, Floats heights) {
     };
     return {channel(0), channel(1), channel(2)};
 }
-HWY_INLINE Floats3 air_transmittance(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
-    if (frame.sky == nullptr) return decay(frame.air_extinction, distance_m);
-    const Lanes d;
-    const Floats rayleigh = layer_column(frame.air.x, ray.z, distance_m, frame.rayleigh.w),
-                 haze = layer_column(frame.air.x, ray.z, distance_m, frame.haze.w);
-    const Floats3 depth = times_add(rayleigh, set3(frame.rayleigh), times(haze, set3(frame.haze)));
-    return {hn::Exp(d, hn::Neg(depth.x)), hn::Exp(d, hn::Neg(depth.y)), hn::Exp(d, hn::Neg(depth.z))};
+
+namespace formulas {
+
+using Real3 = Floats3;
+HWY_INLINE Floats3 operator*(Floats a, const Floats3& b) { return times(a, b); }
+HWY_INLINE Floats3 operator*(const Floats3& a, const Floats3& b) { return each_times(a, b); }
+HWY_INLINE Floats3 operator/(const Floats3& a, const Floats3& b) {
+    return {hn::Div(a.x, b.x), hn::Div(a.y, b.y), hn::Div(a.z, b.z)};
 }
-
-HWY_INLINE Floats3 endless_air(const PictureFrame& frame, const Floats3& ray) {
-    if (frame.sky == nullptr) return set3(frame.horizon);
-    const Lanes d;
-    const Floats one = set(1.0f), slope = hn::Max(hn::Abs(ray.z), set(1.0e-5f));
-    const auto column = [&](float per_height) {
-        return hn::Div(set(std::exp(-frame.air.x * per_height) / per_height), slope);
-    };
-    const Floats3 depth = times_add(column(frame.rayleigh.w), set3(frame.rayleigh),
-                                    times(column(frame.haze.w), set3(frame.haze)));
-    const auto fraction = [&](Floats part, Floats whole) {
-        return hn::Div(part, hn::Max(hn::Sub(one, hn::Exp(d, hn::Neg(whole))), set(1.0e-4f)));
-    };
-    const Floats3 sky = sky_scattered(frame, ray);
-    return {fraction(sky.x, depth.x), fraction(sky.y, depth.y), fraction(sky.z, depth.z)};
-}
-
-HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, const Floats3& beta) {
-    const Floats one = set(1.0f);
-    return each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)},
-                      endless_air(frame, ray));
-}
-
-HWY_INLINE Floats3 gradient_sky(const PictureFrame& frame, Floats height) {
-    constexpr float kFalloff = 4.0f;
-    const float least = std::exp(-kFalloff);
-    const Floats haze = hn::Mul(hn::Sub(hn::Exp(Lanes(), hn::Mul(set(-kFalloff), height)), set(least)),
-                                set(1.0f / (1.0f - least)));
-    return mix(set3(frame.zenith), set3(frame.horizon), {haze, haze, haze});
-}
-
-struct SunlitAir {
-    Floats3 endless, most;
-    Floats molecules, particles;
-};
-
-HWY_INLINE Floats3 least(const Floats3& a, const Floats3& b) {
+HWY_INLINE Floats3 operator+(const Floats3& a, const Floats3& b) { return add(a, b); }
+HWY_INLINE Floats3 operator-(float a, const Floats3& b) { return subtract({set(a), set(a), set(a)}, b); }
+HWY_INLINE Floats3 operator-(const Floats3& a) { return {hn::Neg(a.x), hn::Neg(a.y), hn::Neg(a.z)}; }
+HWY_INLINE Floats3 mul_add(Floats s, const Floats3& a, const Floats3& b) { return times_add(s, a, b); }
+HWY_INLINE Floats3 min(const Floats3& a, const Floats3& b) {
     return {hn::Min(a.x, b.x), hn::Min(a.y, b.y), hn::Min(a.z, b.z)};
 }
-
-HWY_INLINE SunlitAir sunlit_air(const PictureFrame& frame, const Floats3& ray) {
-    const Floats zero = hn::Zero(Lanes()), cosine = dot(set3(frame.to_sun), ray);
-    const Floats3 endless = endless_air(frame, ray);
-    if (frame.sky != nullptr)
-        return {endless, endless, hn::Mul(set(shader::kPi), molecule_phase(cosine)),
-                hn::Mul(set(shader::kPi * frame.air.z), particle_phase(cosine, frame.air.y))};
-    const Floats phase = particle_phase(cosine, frame.zenith.w);
-    const Floats direct = hn::Mul(set(frame.horizon.w * 4.0f * shader::kPi), phase);
-    const Floats fraction = hn::Div(direct, hn::Add(direct, set(1.0f - frame.horizon.w + 1.0e-6f)));
-    const Floats3 above = gradient_sky(frame, hn::Max(ray.z, zero));
-    return {endless, times(fraction, least(endless, above)), zero, zero};
+HWY_INLINE Floats3 max(const Floats3& a, Floats b) { return {hn::Max(a.x, b), hn::Max(a.y, b), hn::Max(a.z, b)}; }
+HWY_INLINE Floats3 mix(const Floats3& a, const Floats3& b, Floats fraction) {
+    return HWY_NAMESPACE::mix(a, b, {fraction, fraction, fraction});
 }
+HWY_INLINE Floats exp(Floats a) { return hn::Exp(Lanes(), a); }
+HWY_INLINE Floats3 exp(const Floats3& a) { return {exp(a.x), exp(a.y), exp(a.z)}; }
+HWY_INLINE Floats3 rgb(const shader::vec4& four) { return set3(four); }
+HWY_INLINE Floats3 xyz(const shader::vec4& four) { return set3(four); }
 
-HWY_INLINE Floats3 sunlit_at(const PictureFrame& frame, const SunlitAir& air, Floats height,
-                             const Floats3& sunlight) {
-    if (frame.sky == nullptr) return air.most;
-    const Lanes d;
-    const Floats altitude = hn::Max(hn::Add(set(frame.air.x), height), hn::Zero(d));
-    const auto density = [&](float per_height) { return fast_exp(hn::Mul(altitude, set(-per_height))); };
-    const Floats3 molecules = times(density(frame.rayleigh.w), set3(frame.rayleigh)),
-                  particles = times(density(frame.haze.w), set3(frame.haze));
-    const Floats3 scattered = times_add(air.molecules, molecules, times(air.particles, particles));
-    const Floats3 extinct = add(molecules, particles);
-    const auto source = [&](Floats light, Floats part, Floats whole) {
-        return hn::Div(hn::Mul(light, part), hn::Max(whole, set(1.0e-12f)));
-    };
-    return least({source(sunlight.x, scattered.x, extinct.x), source(sunlight.y, scattered.y, extinct.y),
-                  source(sunlight.z, scattered.z, extinct.z)},
-                 air.most);
+// The air of a frame.
+struct FrameAir {
+    const PictureFrame& frame;
+    const bool kPhysicalSky;
+    explicit FrameAir(const PictureFrame& of) : frame(of), kPhysicalSky(of.sky != nullptr) {}
+
+    HWY_INLINE Floats3 sky_layer(Floats across, Floats upwards, unsigned layer) {
+        return HWY_NAMESPACE::sky_layer(frame, across, upwards, layer);
+    }
+#pragma push_macro("NEPHOS_FUNCTION")
+#undef NEPHOS_FUNCTION
+#define NEPHOS_FUNCTION HWY_INLINE
+#define Real(value) set(value)
+#include "render/shared/air.h"
+#undef Real
+#pragma pop_macro("NEPHOS_FUNCTION")
+};
+
+}  // namespace formulas
+
+using formulas::FrameAir;
+using SunlitAir = FrameAir::SunlitAir;
+
+HWY_INLINE Floats3 air_transmittance(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
+    return FrameAir(frame).air_transmittance(ray, distance_m);
+}
+// The same to what fast_exp() is good for.
+HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
+    const Floats3 depth = FrameAir(frame).air_depth(ray, distance_m);
+    return {fast_exp(hn::Neg(depth.x)), fast_exp(hn::Neg(depth.y)), fast_exp(hn::Neg(depth.z))};
+}
+HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, const Floats3& beta) {
+    return FrameAir(frame).air_light(ray, beta);
 }
 
 }  // namespace nephos::HWY_NAMESPACE

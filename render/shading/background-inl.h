@@ -99,9 +99,9 @@ HWY_INLINE Floats3 sky(const PictureFrame& frame, const Floats3& ray) {
     const Floats height = hn::Max(ray.z, hn::Zero(Lanes()));
     if (frame.sky != nullptr) {
         const Floats3 upwards{ray.x, ray.y, height};
-        return add(sky_scattered(frame, upwards), sun_disc(frame, upwards));
+        return add(FrameAir(frame).sky_scattered(upwards), sun_disc(frame, upwards));
     }
-    return gradient_sky(frame, height);
+    return FrameAir(frame).gradient_sky(height);
 }
 
 // Returns the radiance of the ground at a point relative to the eye, without the air in front of it.

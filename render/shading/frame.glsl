@@ -2,5 +2,5 @@
 // The uniforms of the frame.
 
 layout(set = 0, binding = 0) uniform FrameBlock {
-    Frame frame;
+    FrameUniforms frame;
 };

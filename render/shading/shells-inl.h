@@ -62,25 +62,6 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
     return hn::NegMulAdd(part, hn::Sub(one, gamma), one);
 }
 
-// exp(-extinction distance) of clear air (render/shading/air.glsl), to what fast_exp() is good for.
-HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floats distance) {
-    const auto decayed = [](Floats x, Floats y, Floats z) {
-        return Floats3{fast_exp(hn::Neg(x)), fast_exp(hn::Neg(y)), fast_exp(hn::Neg(z))};
-    };
-    if (frame.sky == nullptr) {
-        const Floats3 depth = times(distance, set3(frame.air_extinction));
-        return decayed(depth.x, depth.y, depth.z);
-    }
-    const auto column = [&](float per_height) {
-        const float ground = std::exp(-frame.air.x * per_height);
-        const Floats x = hn::Mul(hn::Mul(ray.z, distance), set(per_height));
-        return hn::Mul(hn::Mul(set(ground), distance), mean_decay(x));
-    };
-    const Floats3 depth = times_add(column(frame.rayleigh.w), set3(frame.rayleigh),
-                                    times(column(frame.haze.w), set3(frame.haze)));
-    return decayed(depth.x, depth.y, depth.z);
-}
-
 // The terms common to all shells along rays.
 struct RayAir {
     Floats3 ray;
@@ -90,7 +71,7 @@ struct RayAir {
 
     RayAir(const PictureFrame& frame, const Floats3& direction)
         : ray(direction),
-          sunlit(sunlit_air(frame, direction)),
+          sunlit(FrameAir(frame).sunlit_air(direction)),
           once(hn::Zero(Lanes())),
           angle(hn::Zero(hn::RebindToSigned<Lanes>())) {
         if (!frame.shells->has_fog()) return;
@@ -168,7 +149,7 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
     if (shaded) {
         const Floats strength = hn::IfThenElseZero(inside, set(air.data.settings.y));
         light = times(hn::Mul(strength, hn::Sub(lit, one)),
-                      each_times(subtract(before, behind), sunlit_at(frame, of.sunlit, height, sunlight)));
+                      each_times(subtract(before, behind), FrameAir(frame).sunlit_at(of.sunlit, height, sunlight)));
     }
     if (!foggy) return {light, one, places.middle};
     const Floats patches = fog_patches(air, times(places.at, of.ray), begin, end);

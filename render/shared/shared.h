@@ -145,12 +145,12 @@ struct TileStep {
 };
 
 // Uniforms of one image, or of a tile of it.
-struct Frame {
+struct FrameUniforms {
     vec4 right;           // xyz: the camera's axis * half the image's width at distance 1
     vec4 up;              // xyz: likewise; w: pixels per unit at distance 1
     vec4 forward;         // xyz: unit
     vec4 picture;         // width, height of the picture; column and row of the tile's corner, pixels
-    vec4 tile;            // clip position in the tile = position in the picture * tile.xy + tile.zw
+    vec4 part;            // clip position in the part = position in the picture * part.xy + part.zw
     vec4 to_sun;          // xyz: unit
     vec4 sunlight;        // rgb: colour of the direct sun
     vec4 ambient_top;     // rgb; w: albedo of the cloud
@@ -165,7 +165,7 @@ struct Frame {
     vec4 flash;         // xyz: lightning relative to the eye; w: irradiance at 1 km, 0 = none
     vec4 flash_colour;  // rgb
     vec4 ground_flash;  // rgb: what it adds to ground 1 km below it
-    // The physical sky (air.glsl); zero with the gradient.
+    // The physical sky (air.h); zero with the gradient.
     vec4 rayleigh;  // rgb: extinction by molecules per metre on the ground; w: 1 / height of the layer
     vec4 haze;      // rgb: extinction by particles; w: likewise
     vec4 air;       // eye's altitude above the ground, m; asymmetry and albedo of particles; 1 = physical sky
@@ -229,8 +229,9 @@ static_assert(sizeof(ViewBillboard) == 32 && offsetof(ViewBillboard, half_size) 
 static_assert(sizeof(ViewCloud) == 32 && offsetof(ViewCloud, inverse_height) == 16);
 static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 10) &&
               offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 2));
-static_assert(sizeof(Frame) == 24 * 16 && offsetof(Frame, tile) == 64 && offsetof(Frame, shadow_v) == 240 &&
-              offsetof(Frame, flash_colour) == 272 && offsetof(Frame, sun_fade) == 368);
+static_assert(sizeof(FrameUniforms) == 24 * 16 && offsetof(FrameUniforms, part) == 64 &&
+              offsetof(FrameUniforms, shadow_v) == 240 && offsetof(FrameUniforms, flash_colour) == 272 &&
+              offsetof(FrameUniforms, sun_fade) == 368);
 
 }  // namespace nephos::shader
 #endif

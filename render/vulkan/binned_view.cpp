@@ -35,7 +35,7 @@ void host_barrier(const vk::raii::CommandBuffer& commands) {
     commands.pipelineBarrier2(vk::DependencyInfo().setMemoryBarriers(change));
 }
 
-std::size_t pixels_of(const Tile& tile) { return std::size_t(tile.width) * std::size_t(tile.height); }
+std::size_t pixels_of(const PicturePart& part) { return std::size_t(part.width) * std::size_t(part.height); }
 
 }  // namespace
 
@@ -70,17 +70,17 @@ struct BinnedView::Pipelines {
     }
 };
 
-// One tile of a picture in flight.
+// One part of a picture in flight.
 struct BinnedView::Slot {
     explicit Slot(const GpuDevice& gpu)
         : sets(gpu),
-          frame(uniform_buffer<shader::Frame>(gpu)),
+          frame(uniform_buffer<shader::FrameUniforms>(gpu)),
           order_frame(uniform_buffer<shader::OrderFrame>(gpu)),
           shells(uniform_buffer<shader::Shells>(gpu)),
           march(uniform_buffer<shader::March>(gpu)),
           fence(gpu.device, vk::FenceCreateInfo()) {
-        nephos::upload(gpu, billboards, {});
-        nephos::upload(gpu, clouds, {});
+        upload(gpu, billboards, {});
+        upload(gpu, clouds, {});
         reserve_copy(gpu, counts, sizeof(shader::OrderCounts));
         const vk::CommandBufferAllocateInfo info(*gpu.pool, vk::CommandBufferLevel::ePrimary, 1);
         commands = std::move(vk::raii::CommandBuffers(gpu.device, info).front());
@@ -94,7 +94,7 @@ struct BinnedView::Slot {
     bool submitted = false;      // and not known to be done: also after a wait that failed
     Picture* picture = nullptr;  // whose pixels are not stored yet
     ViewInputs what;
-    Tile tile;
+    PicturePart part;
     std::size_t billboard_count = 0;
     std::size_t capacity = 0, batch = 0;  // of the lists, in the commands
     bool with_order = true;               // else the order of the slot before
@@ -124,10 +124,8 @@ BinnedView::BinnedView(const GpuDevice& gpu, const GpuImage& unused, const vk::r
       clamped_(clamped),
       white_beyond_(white_beyond),
       lists_(gpu),
-      shade_light_(create_compute_pipeline(gpu, shaders().shade_light_comp)),
-      shade_sets_(gpu) {
+      shade_(gpu) {
     for (std::size_t n = 0; n < kFramesInFlight; ++n) slots_.push_back(std::make_unique<Slot>(gpu));
-    use_shade({}, 0);  // must be there, used or not
     use_cloud({});
 }
 
@@ -154,24 +152,12 @@ void BinnedView::wait() {
     for (const std::unique_ptr<Slot>& slot : slots_) slot->wait(gpu_);
 }
 
-void BinnedView::upload(const GpuBuffer& to, std::span<const std::byte> bytes) {
-    if (bytes.empty()) return;
-    const GpuBuffer staging =
-        create_buffer(gpu_, bytes.size(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    write(gpu_, staging, bytes);
-    submit_and_wait(gpu_, [&](const vk::raii::CommandBuffer& commands) {
-        full_barrier(commands);
-        copy(commands, staging, to, bytes.size());
-        full_barrier(commands);
-    });
-}
-
 void BinnedView::use_cloud(std::span<const shader::CloudBall> balls) {
     flush();
     balls_ = balls.size();
     batch_ = limits.batch;
     lists_.reserve_cloud(gpu_, balls_);
-    upload(lists_.cloud(), std::as_bytes(balls));
+    upload_staged(gpu_, lists_.cloud(), std::as_bytes(balls));
 }
 
 void BinnedView::light(const ShadowFrame& frame, int shadow_size, float largest_radius, LightTiles& tiles) {
@@ -183,39 +169,18 @@ void BinnedView::light(const ShadowFrame& frame, int shadow_size, float largest_
 
 void BinnedView::use_flash(std::span<const shader::uint> fractions) {
     flush();
-    upload(lists_.flash(), std::as_bytes(fractions));
+    upload_staged(gpu_, lists_.flash(), std::as_bytes(fractions));
 }
 
-void BinnedView::use_shade(std::span<const std::uint32_t> words, std::uint64_t serial,
-                           const GpuImage* shadow_map, const shader::ShadeStep& step) {
-    if (shade_.bytes != 0 && serial == shade_serial_) return;
+void BinnedView::use_shade(const ShadeInputs& shade) {
+    if (shade_.has(shade.serial)) return;
     flush();
-    const std::size_t bytes = std::max<std::size_t>(words.size_bytes(), 4);
-    if (shade_.bytes < bytes) {
-        shade_ = {};
-        shade_ = create_buffer(
-            gpu_, bytes, vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferDst,
-            HostAccess::none);
-    }
-    upload(shade_, std::as_bytes(words));
-    if (shadow_map != nullptr) {
-        const std::size_t texels = std::size_t(step.columns) * step.columns;
-        shade_sets_.reset();
-        const vk::DescriptorSet set =
-            shade_sets_.fill(shade_light_, {{4, *shadow_map, white_beyond_}, {14, shade_}});
-        submit_and_wait(gpu_, [&](const vk::raii::CommandBuffer& commands) {
-            full_barrier(commands);
-            begin_compute(commands, shade_light_, set, step);
-            dispatch_groups(commands, (texels + shader::kComputeGroup - 1) / shader::kComputeGroup);
-            full_barrier(commands);
-        });
-    }
-    shade_serial_ = serial;
+    shade_.use(gpu_, shade, white_beyond_);
 }
 
 Resources BinnedView::view_resources(const Slot& slot) const {
     const ViewInputs& what = slot.what;
-    const std::size_t tiles = TileGrid{slot.tile.width, slot.tile.height}.tiles();
+    const std::size_t tiles = TileGrid{slot.part.width, slot.part.height}.tiles();
     const GpuImage& textures = what.variant.billboards ? billboard_textures_ : unused_;
     Resources all{{0, slot.frame},
             {1, lists_.balls()},
@@ -230,7 +195,7 @@ Resources BinnedView::view_resources(const Slot& slot) const {
             {11, what.sky != nullptr ? *what.sky : unused_, clamped_},
             {12, *what.scattering},
             {13, slot.shells},
-            {14, shade_},
+            {14, shade_.words()},
             {15, lists_.parts()},
             {16, slot.billboards},
             {17, slot.clouds}};
@@ -243,10 +208,10 @@ Resources BinnedView::view_resources(const Slot& slot) const {
 void BinnedView::record_batch(const vk::raii::CommandBuffer& commands, Slot& slot, const Resources& resources,
                               std::size_t begin, std::size_t end) {
     const Pipelines& pipelines = pipelines_for(slot.what.variant);
-    const TileGrid grid{slot.tile.width, slot.tile.height};
+    const TileGrid grid{slot.part.width, slot.part.height};
     Resources of_order = lists_.resources();
     of_order.set({{0, slot.order_frame}, {14, slot.shells}, {15, slot.billboards}});
-    shader::OrderStep lists = lists_.step_of(slot.tile, slot.what.shell_count);
+    shader::OrderStep lists = lists_.step_of(slot.part, slot.what.shell_count);
     lists.count = shader::uint(balls_);
     lists.begin = shader::uint(begin);
     lists.end = shader::uint(end);
@@ -280,7 +245,7 @@ void BinnedView::record_batch(const vk::raii::CommandBuffer& commands, Slot& slo
 }
 
 void BinnedView::record(const vk::raii::CommandBuffer& commands, Slot& slot) {
-    const std::size_t pixels = pixels_of(slot.tile), splats = balls_ + slot.billboard_count;
+    const std::size_t pixels = pixels_of(slot.part), splats = balls_ + slot.billboard_count;
     const Pipelines& pipelines = pipelines_for(slot.what.variant);
     const Resources resources = view_resources(slot);
     Resources of_order = lists_.resources();
@@ -288,11 +253,11 @@ void BinnedView::record(const vk::raii::CommandBuffer& commands, Slot& slot) {
     full_barrier(commands);  // the picture before has the same buffers
     const OrderRecorder recorder = lists_.recorder(commands, slot.sets);
     if (slot.with_order) lists_.record_order(recorder, of_order, balls_, slot.billboard_count);
-    shader::OrderStep boxes = lists_.step_of(slot.tile, slot.what.shell_count);
+    shader::OrderStep boxes = lists_.step_of(slot.part, slot.what.shell_count);
     boxes.count = shader::uint(balls_);
     recorder.run_indirect(OrderPass::boxes, lists_.with_order(of_order), boxes,
                           offsetof(shader::OrderCounts, visible_each));
-    shader::TileStep step = step_over({slot.tile.width, slot.tile.height});
+    shader::TileStep step = step_over({slot.part.width, slot.part.height});
     step.tile_count = shader::uint(lists_.splat_capacity());
     begin_compute(commands, pipelines.project, slot.sets.fill(pipelines.project, resources), step);
     commands.dispatchIndirect(*lists_.counts().buffer, offsetof(shader::OrderCounts, splats));
@@ -349,35 +314,23 @@ void BinnedView::complete(Slot& slot) {
         submit(slot);
         slot.wait(gpu_);
     }
-    store_tile(reinterpret_cast<const float*>(slot.radiance.mapped),
-               slot.what.depth ? reinterpret_cast<const float*>(slot.depth.mapped) : nullptr, slot.tile,
+    store_part(reinterpret_cast<const float*>(slot.radiance.mapped),
+               slot.what.depth ? reinterpret_cast<const float*>(slot.depth.mapped) : nullptr, slot.part,
                picture);
 }
 
-void BinnedView::download(const GpuBuffer& from, std::span<std::byte> bytes) {
-    if (bytes.empty()) return;
-    const GpuBuffer staging =
-        create_buffer(gpu_, bytes.size(), vk::BufferUsageFlagBits::eTransferDst, HostAccess::read);
-    submit_and_wait(gpu_, [&](const vk::raii::CommandBuffer& commands) {
-        full_barrier(commands);
-        copy(commands, from, staging, bytes.size());
-        host_barrier(commands);
-    });
-    std::ranges::copy(std::span(staging.mapped, bytes.size()), bytes.begin());
-}
-
-BinnedView::Lists BinnedView::read_lists(const Tile& tile) {
+BinnedView::Lists BinnedView::read_lists(const PicturePart& part) {
     wait();
-    const std::size_t tiles = TileGrid{tile.width, tile.height}.tiles();
+    const std::size_t tiles = TileGrid{part.width, part.height}.tiles();
     shader::OrderCounts counts;
-    download(lists_.counts(), std::as_writable_bytes(std::span(&counts, 1)));
+    download_staged(gpu_, lists_.counts(), std::as_writable_bytes(std::span(&counts, 1)));
     Lists lists;
     lists.balls.resize(counts.visible);
     lists.ranges.resize(tiles);
     lists.list.resize(counts.entries);
-    download(lists_.balls(), std::as_writable_bytes(std::span(lists.balls)));
-    download(lists_.ranges(), std::as_writable_bytes(std::span(lists.ranges)));
-    download(lists_.list(tiles), std::as_writable_bytes(std::span(lists.list)));
+    download_staged(gpu_, lists_.balls(), std::as_writable_bytes(std::span(lists.balls)));
+    download_staged(gpu_, lists_.ranges(), std::as_writable_bytes(std::span(lists.ranges)));
+    download_staged(gpu_, lists_.list(tiles), std::as_writable_bytes(std::span(lists.list)));
     return lists;
 }
 
@@ -404,8 +357,8 @@ void BinnedView::finish(const Picture& picture) {
     std::rethrow_exception(what);
 }
 
-void BinnedView::reserve(const Tile& tile, Slot& slot) {
-    const std::size_t pixels = pixels_of(tile), tiles = TileGrid{tile.width, tile.height}.tiles();
+void BinnedView::reserve(const PicturePart& part, Slot& slot) {
+    const std::size_t pixels = pixels_of(part), tiles = TileGrid{part.width, part.height}.tiles();
     const std::size_t splats = balls_ + slot.billboard_count;
     const ListSizes sizes{.splats = splats,
                           .billboards = slot.billboard_count,
@@ -415,12 +368,8 @@ void BinnedView::reserve(const Tile& tile, Slot& slot) {
         wait();
         lists_.reserve(gpu_, sizes);
         ordered_ = nullptr;
-        const vk::BufferUsageFlags usage =
-            vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc;
-        radiance_ = {};
-        depth_ = {};
-        radiance_ = create_buffer(gpu_, 4 * sizeof(float) * pixels, usage, HostAccess::none);
-        depth_ = create_buffer(gpu_, sizeof(float) * pixels, usage, HostAccess::none);
+        make_storage(gpu_, radiance_, 4 * sizeof(float) * pixels);
+        make_storage(gpu_, depth_, sizeof(float) * pixels);
     }
     if (slot.what.variant.march && !slot.what.volumes->has_room(pixels)) {
         wait();
@@ -430,7 +379,7 @@ void BinnedView::reserve(const Tile& tile, Slot& slot) {
     reserve_copy(gpu_, slot.depth, sizeof(float) * pixels);
 }
 
-void BinnedView::begin_tile(const ViewInputs& what, const shader::Frame& frame, const Tile& tile,
+void BinnedView::begin_part(const ViewInputs& what, const shader::FrameUniforms& frame, const PicturePart& part,
                             Picture& picture, bool first) {
     Slot& slot = *slots_[next_];
     next_ = (next_ + 1) % slots_.size();
@@ -439,16 +388,16 @@ void BinnedView::begin_tile(const ViewInputs& what, const shader::Frame& frame, 
     failures_.reserve(failures_.size() + slots_.size());  // flush() may not throw
     slot.what = what;
     slot.billboard_count = what.billboards.size();
-    reserve(tile, slot);
+    reserve(part, slot);
     pipelines_for(what.variant).prepare(gpu_, what.depth);
     if (what.variant.billboards && billboard_textures_.width == 0)
         billboard_textures_ = upload_billboard_textures(gpu_);
-    slot.tile = tile;
+    slot.part = part;
     write(gpu_, slot.frame, frame);
     write(gpu_, slot.order_frame, what.order);
     if (what.shells != nullptr) write(gpu_, slot.shells, *what.shells);
-    nephos::upload(gpu_, slot.billboards, std::as_bytes(what.billboards));
-    nephos::upload(gpu_, slot.clouds, std::as_bytes(what.clouds));
+    upload(gpu_, slot.billboards, std::as_bytes(what.billboards));
+    upload(gpu_, slot.clouds, std::as_bytes(what.clouds));
     if (what.march != nullptr) write(gpu_, slot.march, *what.march);
     slot.what.shells = nullptr;  // these are there
     slot.what.march = nullptr;

@@ -6,7 +6,7 @@
 // their attenuation, until a tile is opaque. The cloud stays on the device; of a picture nothing but the camera, the
 // billboards and what else has changed is uploaded. The same picture as that of the blended billboards (view_pass.h).
 //
-// Pictures, or tiles of one, are in flight two at a time: each has frame data, billboards, descriptor sets, commands
+// Pictures, or parts of one, are in flight two at a time: each has frame data, billboards, descriptor sets, commands
 // and buffers to read back of its own; what the passes hand to each other is shared, as the device takes one after the
 // other. Private to the module.
 
@@ -20,12 +20,13 @@
 #include "render/gpu/gpu_pipeline.h"
 #include "render/image/picture.h"
 #include "render/vulkan/device_lists.h"
+#include "render/vulkan/device_shade.h"
 #include "render/vulkan/device_sun.h"
 #include "render/vulkan/march_volumes.h"
 
 namespace nephos {
 
-// The data shared by all tiles of a frame. Images and buffers must not change until the frame is finished.
+// The data shared by all parts of a frame. Images and buffers must not change until the frame is finished.
 struct ViewInputs {
     ShaderVariant variant;
     shader::OrderFrame order;
@@ -34,10 +35,10 @@ struct ViewInputs {
     const GpuBuffer* scattering = nullptr;   // scattering_table.h
     const shader::Shells* shells = nullptr;  // null: none
     std::size_t shell_count = 0;
-    // What the camera sees of T's billboards, nearest first, and their clouds: until begin_tile() returns.
+    // What the camera sees of T's billboards, nearest first, and their clouds: until begin_part() returns.
     std::span<const shader::SeenBillboard> billboards;
     std::span<const shader::ViewCloud> clouds;
-    const shader::March* march = nullptr;  // clouds with detail, see variant.march; until begin_tile() returns
+    const shader::March* march = nullptr;  // clouds with detail, see variant.march; until begin_part() returns
     MarchVolumes* volumes = nullptr;        // of these
     bool depth = true;
 };
@@ -62,36 +63,33 @@ class BinnedView {
     void read_depths(std::span<float> depths) const { sun_->read_depths(depths); }
     // Sets the transmitted fraction of the lightning at each metaball, 0..65535.
     void use_flash(std::span<const shader::uint> fractions);
-    // Uploads the shade map of the shells and the noise of the fog (air_shells.h), unless these are there
-    // already, and computes its plane of light from the shadow map. `shadow_map`: null: it is there, or there is no
-    // cloud.
-    void use_shade(std::span<const std::uint32_t> words, std::uint64_t serial,
-                   const GpuImage* shadow_map = nullptr, const shader::ShadeStep& step = {});
+    // Sets the shade map of later frames (device_shade.h).
+    void use_shade(const ShadeInputs& shade);
 
-    // Begins to draw a tile into `picture`, which must stay where it is until it is finished. `first`: of it.
-    void begin_tile(const ViewInputs& what, const shader::Frame& frame, const Tile& tile, Picture& picture,
+    // Begins to draw a part into `picture`, which must stay where it is until it is finished. `first`: of it.
+    void begin_part(const ViewInputs& what, const shader::FrameUniforms& frame, const PicturePart& part, Picture& picture,
                     bool first);
-    // Waits for the tiles of a picture and stores their pixels. Tiles that have more entries than there is room for are
+    // Waits for the parts of a picture and stores their pixels. Parts that have more entries than there is room for are
     // drawn again, with longer lists or in smaller batches. Throws what failed while the picture was in flight.
     void finish(const Picture& picture);
-    // Waits for all tiles in flight and stores their pixels; what fails is kept for finish(). To be called
+    // Waits for all parts in flight and stores their pixels; what fails is kept for finish(). To be called
     // before anything changes that they read.
     void flush() noexcept;
-    // Waits for the tiles of a picture and throws them away.
+    // Waits for the parts of a picture and throws them away.
     void abandon(const Picture& picture) noexcept;
 
     // Limits of the device; lower for tests.
     ListLimits limits;
-    // Tiles that were drawn again because of their lists, for tests.
+    // Parts that were drawn again because of their lists, for tests.
     std::size_t overflows = 0;
 
-    // The lists of the last tile that was drawn, for tests.
+    // The lists of the last part that was drawn, for tests.
     struct Lists {
         std::vector<shader::ViewBall> balls;  // nearest first
         std::vector<shader::TileRange> ranges;
         std::vector<shader::uint> list;
     };
-    Lists read_lists(const Tile& tile);
+    Lists read_lists(const PicturePart& part);
 
   private:
     struct Pipelines;
@@ -99,7 +97,7 @@ class BinnedView {
     // Waits for everything in flight; its pixels are stored by finish(). Throws when a wait fails:
     // what was waited for then fails in its own finish(), too.
     void wait();
-    void reserve(const Tile& tile, Slot& slot);
+    void reserve(const PicturePart& part, Slot& slot);
     void complete(Slot& slot);
     void flush(Slot& slot) noexcept;
     void submit(Slot& slot);
@@ -108,8 +106,6 @@ class BinnedView {
                       std::size_t begin, std::size_t end);
     Resources view_resources(const Slot& slot) const;
     Pipelines& pipelines_for(const ShaderVariant& variant);
-    void upload(const GpuBuffer& to, std::span<const std::byte> bytes);
-    void download(const GpuBuffer& from, std::span<std::byte> bytes);
 
     const GpuDevice& gpu_;
     const GpuImage& unused_;
@@ -118,11 +114,9 @@ class BinnedView {
     std::optional<DeviceSun> sun_;  // created when it is needed
     std::size_t balls_ = 0;
     std::size_t batch_ = 0;  // splats of a batch for which the lists of this cloud had room
-    Pipeline shade_light_;
-    DescriptorSets shade_sets_;
-    GpuBuffer shade_, radiance_, depth_;
+    DeviceShade shade_;
+    GpuBuffer radiance_, depth_;
     GpuImage billboard_textures_;  // created with the first billboard
-    std::uint64_t shade_serial_ = 0;
     std::vector<std::unique_ptr<Pipelines>> pipelines_;
     std::vector<std::unique_ptr<Slot>> slots_;
     std::size_t next_ = 0;

@@ -35,14 +35,6 @@ std::size_t whole_blocks(std::size_t count) {
     return std::max<std::size_t>(1, blocks_of(count)) * shader::kSortBlock;
 }
 
-void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes, vk::BufferUsageFlags more = {}) {
-    buffer = {};  // the old one goes before the new one comes
-    const vk::BufferUsageFlags usage = vk::BufferUsageFlagBits::eStorageBuffer |
-                                       vk::BufferUsageFlagBits::eTransferSrc |
-                                       vk::BufferUsageFlagBits::eTransferDst;
-    buffer = create_buffer(gpu, bytes, usage | more, HostAccess::none);
-}
-
 }  // namespace
 
 std::uint32_t bits_of(std::size_t tiles) { return std::uint32_t(std::bit_width(tiles - 1)); }
@@ -129,20 +121,20 @@ void DeviceLists::reserve_cloud(const GpuDevice& gpu, std::size_t balls) {
     if (cloud_.bytes != 0 && balls <= ball_capacity_) return;
     ball_capacity_ = 0;  // until both are there
     const std::size_t count = whole_blocks(balls);
-    make(gpu, cloud_, count * sizeof(shader::CloudBall));
-    make(gpu, flash_, count * sizeof(shader::uint));
+    make_storage(gpu, cloud_, count * sizeof(shader::CloudBall));
+    make_storage(gpu, flash_, count * sizeof(shader::uint));
     ball_capacity_ = count;
 }
 
 void DeviceLists::reserve_splats(const GpuDevice& gpu, std::size_t count, std::size_t billboards) {
     constexpr std::size_t kWord = sizeof(shader::uint);
     splat_capacity_ = 0;  // until all of them are there
-    make(gpu, balls_, count * sizeof(shader::ViewBall));
-    make(gpu, splats_, (count + 4 * billboards) * sizeof(shader::ViewSplat));
-    make(gpu, tails_, count * kWord);
-    make(gpu, boxes_, count * 2 * kWord);
+    make_storage(gpu, balls_, count * sizeof(shader::ViewBall));
+    make_storage(gpu, splats_, (count + 4 * billboards) * sizeof(shader::ViewSplat));
+    make_storage(gpu, tails_, count * kWord);
+    make_storage(gpu, boxes_, count * 2 * kWord);
     for (GpuBuffer* each : {&order_.keys[0], &order_.keys[1], &order_.values[0], &order_.values[1]})
-        make(gpu, *each, count * kWord);
+        make_storage(gpu, *each, count * kWord);
     splat_capacity_ = count;
     billboard_capacity_ = billboards;
 }
@@ -151,7 +143,7 @@ void DeviceLists::reserve_entries(const GpuDevice& gpu, std::size_t count) {
     constexpr std::size_t kWord = sizeof(shader::uint);
     entry_capacity_ = 0;
     for (GpuBuffer* each : {&entries_.keys[0], &entries_.keys[1], &entries_.values[0], &entries_.values[1]})
-        make(gpu, *each, count * kWord);
+        make_storage(gpu, *each, count * kWord);
     entry_capacity_ = count;
 }
 
@@ -159,9 +151,9 @@ void DeviceLists::reserve(const GpuDevice& gpu, const ListSizes& sizes) {
     if (has_room(sizes)) return;
     constexpr std::size_t kWord = sizeof(shader::uint);
     if (parts_.bytes == 0) {
-        make(gpu, counts_, sizeof(shader::OrderCounts), vk::BufferUsageFlagBits::eIndirectBuffer);
+        make_storage(gpu, counts_, sizeof(shader::OrderCounts), vk::BufferUsageFlagBits::eIndirectBuffer);
         // Between shells, before the first and behind the last; fog has one shell more.
-        make(gpu, parts_, sizeof(shader::ViewPart) * (shader::kMaxShells + 2),
+        make_storage(gpu, parts_, sizeof(shader::ViewPart) * (shader::kMaxShells + 2),
              vk::BufferUsageFlagBits::eIndirectBuffer);
     }
     if (balls_.bytes == 0 || sizes.splats > splat_capacity_ || sizes.billboards > billboard_capacity_)
@@ -170,15 +162,15 @@ void DeviceLists::reserve(const GpuDevice& gpu, const ListSizes& sizes) {
     if (sizes.entries > entry_capacity_) reserve_entries(gpu, whole_blocks(sizes.entries));
     if (sizes.tiles > tile_capacity_) {
         tile_capacity_ = 0;
-        make(gpu, ranges_, sizes.tiles * sizeof(shader::TileRange));
+        make_storage(gpu, ranges_, sizes.tiles * sizeof(shader::TileRange));
         tile_capacity_ = sizes.tiles;
     }
     // Marks or entries of splats, digits of entries, items of the tiles of a shadow map.
     const std::size_t numbers = std::max({splat_capacity_, digits_in_table(entry_capacity_), tile_capacity_});
     if (numbers * kWord > table_.bytes || sums_.bytes == 0) {
         sums_ = {};
-        make(gpu, table_, numbers * kWord);
-        make(gpu, sums_, blocks_of(numbers) * kWord);
+        make_storage(gpu, table_, numbers * kWord);
+        make_storage(gpu, sums_, blocks_of(numbers) * kWord);
     }
 }
 
@@ -197,18 +189,18 @@ Resources DeviceLists::with_order(const Resources& resources, std::size_t from) 
     return both;
 }
 
-shader::OrderStep DeviceLists::step_of(const Tile& tile, std::size_t shells) const {
-    const TileGrid grid{tile.width, tile.height};
+shader::OrderStep DeviceLists::step_of(const PicturePart& part, std::size_t shells) const {
+    const TileGrid grid{part.width, part.height};
     return {.count = 0,
             .billboards = 0,
             .begin = 0,
             .end = 0,
             .table = shader::kSeenSplats,
             .shift = 0,
-            .x = shader::uint(tile.x),
-            .y = shader::uint(tile.y),
-            .width = shader::uint(tile.width),
-            .height = shader::uint(tile.height),
+            .x = shader::uint(part.x),
+            .y = shader::uint(part.y),
+            .width = shader::uint(part.width),
+            .height = shader::uint(part.height),
             .columns = shader::uint(grid.columns()),
             .tiles = shader::uint(grid.tiles()),
             .capacity = shader::uint(entry_capacity_),

@@ -85,7 +85,7 @@ class DeviceLists {
     // Returns those with the order as it is, or to be moved.
     Resources with_order(const Resources& resources, std::size_t from = 0) const;
 
-    shader::OrderStep step_of(const Tile& tile, std::size_t shells) const;
+    shader::OrderStep step_of(const PicturePart& part, std::size_t shells) const;
     // Records the passes up to `view`, for metaballs in cloud() and billboards.
     void record_order(const OrderRecorder& recorder, const Resources& resources, std::size_t balls,
                       std::size_t billboards) const;

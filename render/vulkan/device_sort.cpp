@@ -129,14 +129,6 @@ void OrderRecorder::sort(const Resources& resources, const SortBuffers& buffers,
     }
 }
 
-void full_barrier(const vk::raii::CommandBuffer& commands) {
-    const vk::MemoryBarrier2 change(vk::PipelineStageFlagBits2::eAllCommands,
-                                    vk::AccessFlagBits2::eMemoryWrite,
-                                    vk::PipelineStageFlagBits2::eAllCommands,
-                                    vk::AccessFlagBits2::eMemoryRead | vk::AccessFlagBits2::eMemoryWrite);
-    commands.pipelineBarrier2(vk::DependencyInfo().setMemoryBarriers(change));
-}
-
 void pass_barrier(const vk::raii::CommandBuffer& commands) {
     constexpr auto kStages =
         vk::PipelineStageFlagBits2::eComputeShader | vk::PipelineStageFlagBits2::eDrawIndirect;

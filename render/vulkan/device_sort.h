@@ -96,9 +96,6 @@ class OrderRecorder {
     const GpuBuffer& counts_;
 };
 
-// Everything before, whatever it was, is done and visible to everything after. For the beginning of commands
-// that use buffers of others that may still run.
-void full_barrier(const vk::raii::CommandBuffer& commands);
 // Compute shaders and the arguments of their dispatches after those before.
 void pass_barrier(const vk::raii::CommandBuffer& commands);
 

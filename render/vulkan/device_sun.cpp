@@ -10,14 +10,6 @@
 namespace nephos {
 namespace {
 
-void make(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
-    if (buffer.bytes >= bytes) return;
-    buffer = {};
-    buffer = create_buffer(gpu, bytes,
-                           vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferDst,
-                           HostAccess::none);
-}
-
 // The most items of work that there may be.
 std::size_t items_in(const SunRequest& request, std::size_t per_item) {
     const TileGrid grid{request.shadow_size, request.shadow_size};
@@ -104,9 +96,9 @@ void DeviceSun::run(const GpuDevice& gpu, const SunRequest& request, DeviceLists
     const std::size_t count = request.metaballs;
     const TileGrid grid{request.shadow_size, request.shadow_size};
     write(gpu, frame_, sun_frame(request.frame, request.shadow_size));
-    make(gpu, places_, count * sizeof(shader::LightPlace));
-    make(gpu, queries_, count * sizeof(shader::LightQuery));
-    make(gpu, items_, items_in(request, per_item_) * sizeof(shader::LightItem));
+    reserve_storage(gpu, places_, count * sizeof(shader::LightPlace));
+    reserve_storage(gpu, queries_, count * sizeof(shader::LightQuery));
+    reserve_storage(gpu, items_, items_in(request, per_item_) * sizeof(shader::LightItem));
     reserve_copy(gpu, depths_, count * sizeof(float));
     tiles.resize_map(gpu, request.shadow_size);
     std::size_t required = std::min(4 * count, limits.entries), batch = std::min(count, limits.batch);

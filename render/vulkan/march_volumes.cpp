@@ -59,18 +59,8 @@ void replace(const GpuDevice& gpu, GpuBuffer& buffer, std::span<const std::uint3
                                           std::to_string(bytes.size()) + " bytes, but for at most " +
                                           std::to_string(gpu.properties.limits.maxStorageBufferRange) +
                                           ": choose the back-end cpu");
-    buffer = {};  // the old one goes before the new one comes
-    buffer = create_buffer(gpu, std::max<std::size_t>(bytes.size(), 4),
-                           vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferDst,
-                           HostAccess::none);
-    if (bytes.empty()) return;
-    const GpuBuffer staging =
-        create_buffer(gpu, bytes.size(), vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
-    write(gpu, staging, bytes);
-    submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
-        commands.copyBuffer(*staging.buffer, *buffer.buffer, vk::BufferCopy(0, 0, bytes.size()));
-        buffer_barrier(commands, buffer, access::copy_to, access::compute);
-    });
+    make_storage(gpu, buffer, std::max<std::size_t>(bytes.size(), 4));
+    upload_staged(gpu, buffer, bytes);
 }
 
 }  // namespace
@@ -164,9 +154,7 @@ MarchVolumes::MarchVolumes(const GpuDevice& gpu) {
 }
 
 void MarchVolumes::reserve(const GpuDevice& gpu, std::size_t pixels) {
-    states_ = {};  // the old one goes before the new one comes
-    states_ = create_buffer(gpu, 4 * sizeof(float) * pixels, vk::BufferUsageFlagBits::eStorageBuffer,
-                            HostAccess::none);
+    make_storage(gpu, states_, 4 * sizeof(float) * pixels);
 }
 
 void MarchVolumes::use(const GpuDevice& gpu, const LitCloud& cloud) {

@@ -125,8 +125,8 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
     const GpuImage& shadow_map = scene_.shadow_map(cloud);
     const AirShells shells = frame.shells_without_light();
     if (shells.any())
-        view().use_shade(shells.shade, shells.serial, cloud.cloud.visible.empty() ? nullptr : &shadow_map,
-                         shade_step(frame.air.shade, cloud.shadow_size));
+        view().use_shade({shells.shade, shells.serial, cloud.cloud.visible.empty() ? nullptr : &shadow_map,
+                          shade_step(frame.air.shade, cloud.shadow_size)});
     shader::March march{};
     if (!cloud.volumes.empty()) {
         march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera),
@@ -153,7 +153,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                           .depth = frame.splats.depth};
     try {
         for (const FramePart& part : frame.parts)
-            view().begin_tile(what, part.frame, part.tile, picture, &part == &frame.parts.front());
+            view().begin_part(what, part.frame, part.area, picture, &part == &frame.parts.front());
     } catch (...) {
         view().abandon(picture);  // the device may write into it
         throw;

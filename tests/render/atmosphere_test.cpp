@@ -130,7 +130,7 @@ class TwinPsi {
 };
 
 // Radiance along a ray: `sine` of its elevation (0..1), cosine of its azimuth from the sun's, cosine of the
-// angle to the sun. The twin of sky_scattered() in render/shading/air.glsl.
+// angle to the sun. The twin of sky_scattered() in render/shared/air.h.
 Rgb sky_radiance(const SkyTable& table, double sine, double cos_azimuth, double cos_to_sun, double mie_g) {
     constexpr std::size_t kColumns = shader::kSkyColumns, kRows = shader::kSkyRows;
     const double x = double(shader::sky_across(float(cos_azimuth))) * double(kColumns - 1),

@@ -19,7 +19,7 @@
 #include "render/frame/view_sorting.h"
 #include "render/options/camera.h"
 #include "render/renderer.h"
-#include "render/renderer_test_access.h"
+#include "tests/render/renderer_test_access.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/random_billboards.h"
 #include "tests/render/reference_render.h"
@@ -42,7 +42,7 @@ HostLists host_lists(const Splats& splats, const RenderOptions& options) {
     HostLists lists;
     lists.order = sort_for_view(prepare(splats.metaballs), splats, camera,
                                 pixels_per_unit(options.camera, camera), options.ground);
-    const Tile whole{0, 0, options.camera.width, options.camera.height};
+    const PicturePart whole{0, 0, options.camera.width, options.camera.height};
     lists.grid = {whole.width, whole.height};
     lists.splats = splats_near_to_far(lists.order);
     lists.boxes = screen_boxes(lists.order, camera, options.camera, whole, lists.splats);
@@ -497,7 +497,7 @@ TEST_F(BinnedPictures, NothingElseIsSentWhenTheCameraMoves) {
         EXPECT_LE(difference(splats, options), kClose);
         return RendererTestAccess::uploaded_bytes(binned_) - before;
     };
-    constexpr std::size_t kCamera = sizeof(shader::Frame) + 12 * sizeof(shader::vec4);
+    constexpr std::size_t kCamera = sizeof(shader::FrameUniforms) + 12 * sizeof(shader::vec4);
     RenderOptions options = test::view({0, -4000, 800}, {0, 0, 1000});
     EXPECT_GE(sent(options), balls.size() * 32);
     options.camera.position_m = {2000, -3000, 500};

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
-#include "render/renderer_test_access.h"
+#include "tests/render/renderer_test_access.h"
 
 namespace nephos {
 namespace {

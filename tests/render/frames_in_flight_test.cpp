@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "render/renderer.h"
-#include "render/renderer_test_access.h"
+#include "tests/render/renderer_test_access.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/random_billboards.h"
 #include "tests/render/reference_render.h"
@@ -43,9 +43,9 @@ TEST(FramesInFlight, HaveTheBitsOfThoseDrawnOneByOne) {
         if (n == 10) each.options.sun.elevation_deg = 20;
         if (n == 11) each.options.light.phase.g = 0.2;
     }
-    for (const int tile_size : {2048, 32}) {
-        Renderer one_by_one(test::validated(Splatting::vulkan, tile_size)),
-            renderer(test::validated(Splatting::vulkan, tile_size));
+    for (const int part_size : {2048, 32}) {
+        Renderer one_by_one(test::validated(Splatting::vulkan, part_size)),
+            renderer(test::validated(Splatting::vulkan, part_size));
         std::vector<Picture> expected;
         for (const Case& each : cases) expected.push_back(one_by_one.draw_splats(each.splats, each.options));
         std::vector<PendingPicture> pending;

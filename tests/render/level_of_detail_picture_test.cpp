@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "render/renderer.h"
-#include "render/renderer_test_access.h"
+#include "tests/render/renderer_test_access.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/voxel_cloud.h"
 

@@ -12,7 +12,7 @@
 #include "density/density_grid.h"
 #include "density/metaballs.h"
 #include "render/renderer.h"
-#include "render/renderer_test_access.h"
+#include "tests/render/renderer_test_access.h"
 #include "tests/render/picture_checks.h"
 #include "tests/render/random_billboards.h"
 #include "tests/render/voxel_cloud.h"

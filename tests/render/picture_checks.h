@@ -45,8 +45,8 @@ inline void expect_no_messages(const Renderer& renderer) {
 }
 
 // With the validation layer on.
-inline DeviceOptions validated(Splatting way, int tile_size = 2048) {
-    return {.device = {}, .validation = true, .tile_size = tile_size, .splatting = way};
+inline DeviceOptions validated(Splatting way, int part_size = 2048) {
+    return {.device = {}, .validation = true, .part_size = part_size, .splatting = way};
 }
 
 // Tests that draw in every way, with the validation layer on, and fail when it says anything.

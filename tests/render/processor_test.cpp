@@ -36,11 +36,12 @@ Drawn draw(const Splats& splats, const RenderOptions& options, const BatchLimits
     ViewSortedSplats eye =
         sort_for_view(prepared, splats, camera, pixels_per_unit(options.camera, camera), options.ground);
     set_light(eye, {drawn.light, {}});
-    const Tile whole{0, 0, picture.width, picture.height};
+    const PicturePart whole{0, 0, picture.width, picture.height};
     PictureFrame frame = frame_data(options, camera, picture.shadow_frame, nullptr, whole);
     const std::vector<float> scattering = scattering_table(options.light);
     frame.scattering = scattering.data();
-    view_by_processor(options, camera, frame, whole, eye, AirShells{}, picture, limits);
+    ProcessorView(options, camera, frame, whole, eye, limits)
+        .draw(picture, picture.shadow.data(), picture.shadow_size, AirShells{});
     for (float& each : drawn.light) each = std::exp(-each);
     return drawn;
 }

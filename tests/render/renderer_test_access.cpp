@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/renderer_test_access.h"
+#include "tests/render/renderer_test_access.h"
 
 #include <algorithm>
 #include <cstring>
