@@ -17,7 +17,7 @@ bool several_threads() {
 FrameOutput::FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&)> done)
     : settings_(settings),
       done_(std::move(done)),
-      writer_(settings.scene, {settings.folder, settings.scene.name}),
+      writer_(settings.scene, {settings.folder, settings.scene.name}, settings.range.first_frame),
       painter_(settings.render ? std::make_unique<FramePainter>(settings.scene, settings.device) : nullptr),
       writing_(kFramesWritten, several_threads(), [this](Drawn& drawn) { write(drawn); }),
       drawing_(kFramesDrawn, several_threads() && settings.render,

@@ -7,6 +7,7 @@
 #include "core/random.h"
 #include "density/combine.h"
 #include "density/metaballs.h"
+#include "render/image/exposure.h"
 #include "scenes/format/layers.h"
 #include "scenes/format/writer.h"
 #include "simulation/frame_detail.h"
@@ -14,8 +15,27 @@
 
 namespace nephos {
 
-FrameWriter::FrameWriter(const Scene& scene, RunFolder folder)
-    : scene_(scene), folder_(std::move(folder)), scene_hash_(scene_hash(scene)) {}
+FrameWriter::FrameWriter(const Scene& scene, RunFolder folder, int first_frame)
+    : scene_(scene), folder_(std::move(folder)), scene_hash_(scene_hash(scene)), first_frame_(first_frame) {}
+
+// The camera at the frame's time, with the exposure that the frame has.
+RenderOptions FrameWriter::exposed_options(const FrameResult& frame, const Picture& picture) {
+    RenderOptions options = scene_.render;
+    options.camera = camera_at(options.camera, frame.time_s);
+    const bool follows = options.camera.exposure == Exposure::automatic && options.camera.adaptation_s > 0 &&
+                         wants_png(scene_);
+    options = with_exposure(options, picture);
+    if (!follows) return options;
+    double& ev = options.camera.exposure_ev;
+    if (frame.number > first_frame_) {
+        if (exposed_frame_ != frame.number - 1)
+            exposed_ev_ = read_png_exposure(folder_.picture(frame.number - 1, ".png"));
+        ev = adapted_ev(exposed_ev_, ev, 1 / scene_.frames.per_second, options.camera.adaptation_s);
+    }
+    exposed_frame_ = frame.number;
+    exposed_ev_ = ev;
+    return options;
+}
 
 VdbMetadata density_metadata(const Scene& scene, std::string scene_hash, double time_s,
                              const StateHash& hash) {
@@ -98,7 +118,7 @@ void FrameWriter::write_layers(const FrameResult& frame) const {
 }
 
 Rgb8Image FrameWriter::write_picture(const FrameResult& frame, const Picture& picture,
-                                     const FramePainter& painter) const {
+                                     const FramePainter& painter) {
     PictureMetadata metadata;
     metadata.scene = scene_.name;
     metadata.seed = scene_.automaton.seed;
@@ -110,8 +130,7 @@ Rgb8Image FrameWriter::write_picture(const FrameResult& frame, const Picture& pi
     metadata.frames_per_second = scene_.frames.per_second;
     metadata.time_scale = scene_.frames.time_scale;
     metadata.extinction_per_m = scene_.density.extinction_per_m;
-    RenderOptions options = scene_.render;
-    options.camera = camera_at(options.camera, frame.time_s);
+    const RenderOptions options = exposed_options(frame, picture);
     if (scene_.frames.exr) write_exr(folder_.picture(frame.number, ".exr"), picture, options, metadata);
     if (!wants_png(scene_)) return {};
     Rgb8Image image = srgb8_image(picture, options);

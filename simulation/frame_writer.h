@@ -17,7 +17,8 @@ namespace nephos {
 
 class FrameWriter {
   public:
-    FrameWriter(const Scene& scene, RunFolder folder);
+    // Frame `first_frame` has no frame before it whose exposure it follows.
+    FrameWriter(const Scene& scene, RunFolder folder, int first_frame = 1);
 
     // Writes a density file, refined as the scene asks for; of a scene with layers one for each layer, with its
     // own voxels, bits and wind, and one of their densities together. Throws Error(io) naming the file.
@@ -25,8 +26,10 @@ class FrameWriter {
 
     // Writes the EXR and PNG files that the scene asks for of a picture of `painter`, whose back-end they name.
     // Returns what the PNG shows; empty without one. Throws Error(io) naming the file.
-    Rgb8Image write_picture(const FrameResult& frame, const Picture& picture,
-                            const FramePainter& painter) const;
+    //
+    // With an automatic exposure that adapts (Camera::adaptation_s) frames are written in order; the exposure
+    // of the frame before the first that is written, as after --resume, is read from its PNG file.
+    Rgb8Image write_picture(const FrameResult& frame, const Picture& picture, const FramePainter& painter);
 
   private:
     void write_layers(const FrameResult& frame) const;
@@ -36,7 +39,12 @@ class FrameWriter {
 
     Scene scene_;
     RunFolder folder_;
+    RenderOptions exposed_options(const FrameResult& frame, const Picture& picture);
+
     std::string scene_hash_;
+    int first_frame_ = 1;
+    int exposed_frame_ = 0;   // the last whose exposure is known; 0: none
+    double exposed_ev_ = 0;  // of that frame, stops
 };
 
 // Returns the metadata of a density file of a scene, of the moment `time_s` whose state has this hash.

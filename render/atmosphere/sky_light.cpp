@@ -12,7 +12,9 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr std::size_t kKept = 8;        // tables; 200 KB each
-constexpr double kBrightestDisc = 6;    // radiance: white in the picture, and its edge stays smooth
+// Radiance of the sun's disc at most: without glare white in the picture, with a smooth edge; with glare, which
+// hides the edge, what EXR files and devices hold as 16-bit floats.
+constexpr double kBrightestDisc = 6, kBrightestGlare = 6e4;
 constexpr double kLowestSun_deg = -18;  // astronomical twilight ends: below, the sky changes no more
 constexpr std::size_t kTexels = std::size_t{shader::kSkyColumns} * shader::kSkyRows;
 
@@ -28,7 +30,7 @@ Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] *
 Rgb times(double s, const Rgb& a) { return {s * a[0], s * a[1], s * a[2]}; }
 
 // Radiance of the disc's middle, bounded, and how it changes with the sine of the elevation near the sun.
-void set_disc(const Atmosphere& air, const RenderOptions& options, const Rgb& sun_above_air,
+void set_disc(const AirColours& air, const RenderOptions& options, const Rgb& sun_above_air,
               double elevation_deg, SkyLight& light) {
     // Radiance at the centre of a disc of mean radiance 1.
     constexpr Rgb kMiddle{1 + double(shader::kLimbDarkeningRed) / 2,
@@ -40,15 +42,18 @@ void set_disc(const Atmosphere& air, const RenderOptions& options, const Rgb& su
                  low = std::max(std::sin(radians(elevation_deg)) - radius, 0.0);
     const Rgb below = air.transmittance(light.eye_altitude_m, low),
               above = air.transmittance(light.eye_altitude_m, std::min(low + 2 * radius, 1.0));
+    // A channel that has faded away has no slope.
+    const double least = 1e-9 * std::max({above[0], above[1], above[2], 1e-20});
     double brightest = 0;
     for (std::size_t c = 0; c < 3; ++c) {
-        const double fade = std::log(std::max(above[c], 1e-30) / std::max(below[c], 1e-30)) / (2 * radius);
+        const double fade = std::log(std::max(above[c], least) / std::max(below[c], least)) / (2 * radius);
         light.disc_fade[c] = fade;
         light.disc[c] = sun_above_air[c] * kPi * kMiddle[c] * below[c] * std::exp(fade * radius) /
                         (kPi * radius * radius);
         brightest = std::max(brightest, light.disc[c]);
     }
-    if (brightest > kBrightestDisc) light.disc = times(kBrightestDisc / brightest, light.disc);
+    const double most = options.camera.glare > 0 ? kBrightestGlare : kBrightestDisc;
+    if (brightest > most) light.disc = times(most / brightest, light.disc);
 }
 
 }  // namespace
@@ -128,22 +133,25 @@ Rgb SkyLights::adapted_sun(const RenderOptions& options, double elevation_deg) c
 
 const SkyLight& SkyLights::at(const RenderOptions& options, const CloudHeights& clouds) {
     const AtmosphereModel model = atmosphere_model(options.atmosphere, options.ground.albedo);
-    if (!atmosphere_ || atmosphere_->model() != model) {
-        atmosphere_.emplace(model);
+    if (!atmosphere_ || made_of_ != model || atmosphere_->colours() != options.atmosphere.colours) {
+        atmosphere_.emplace(model, options.atmosphere.colours);
+        made_of_ = model;
         kept_.clear();
         light_.texels.clear();
     }
     const double elevation = std::clamp(options.sun.elevation_deg, kLowestSun_deg, 90.0);
     const double altitude = std::max(0.0, options.camera.position_m.z - options.ground.height_m);
     const bool same = !light_.texels.empty() && altitude == light_.eye_altitude_m &&
-                      options.sun == last_.sun && options.atmosphere == last_.atmosphere;
-    light_.model = model;
+                      options.sun == last_.sun && options.atmosphere == last_.atmosphere &&
+                      (options.camera.glare > 0) == (last_.camera.glare > 0);
+    light_.model = atmosphere_->model();
     light_.eye_altitude_m = altitude;
     if (!same) {
         mix_tables(options, elevation);
         set_disc(*atmosphere_, options, adapted_sun(options, elevation), elevation, light_);
         last_.sun = options.sun;
         last_.atmosphere = options.atmosphere;
+        last_.camera.glare = options.camera.glare;
     }
 
     // Irradiance / pi is the radiance of a white surface.

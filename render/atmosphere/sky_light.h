@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "render/atmosphere/atmosphere.h"
+#include "render/atmosphere/air_colours.h"
 
 namespace nephos {
 
@@ -54,7 +54,8 @@ class SkyLights {
     void mix_tables(const RenderOptions& options, double elevation_deg);
     Rgb adapted_sun(const RenderOptions& options, double elevation_deg) const;
 
-    std::optional<Atmosphere> atmosphere_;
+    std::optional<AirColours> atmosphere_;
+    AtmosphereModel made_of_;             // `atmosphere_`
     std::list<Kept> kept_;  // most recently used first
     RenderOptions last_;    // of `light_.texels`
     SkyLight light_;

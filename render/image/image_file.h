@@ -30,11 +30,15 @@
 
 namespace nephos {
 
+// Returns the options with the exposure that the picture has with them (exposure.h), as a manual one: the text
+// chunk and the attribute `exposure` say it.
+RenderOptions with_exposure(const RenderOptions& options, const Picture& picture);
+
 // Writes the picture with all its layers, and checks that the file is complete before renaming it.
 void write_exr(const std::filesystem::path& path, const Picture& picture, const RenderOptions& options,
                const PictureMetadata& metadata);
 
-// Writes the tone-mapped beauty with options.camera.exposure_ev. Throws Error(usage) on a picture whose layers
+// Writes the beauty as options.camera takes it: glare, exposure, tone curve. Throws Error(usage) on a picture whose layers
 // do not have its size.
 void write_png(const std::filesystem::path& path, const Picture& picture, const RenderOptions& options,
                const PictureMetadata& metadata);
@@ -50,8 +54,11 @@ struct Rgb8Image {
 void write_png(const std::filesystem::path& path, const Rgb8Image& image, const RenderOptions& options,
                const PictureMetadata& metadata);
 
-// Encodes the beauty layer as write_png() does. Throws Error(usage) as it.
+// Encodes the beauty layer as write_png() does. Throws Error(usage) as it does.
 Rgb8Image srgb8_image(const Picture& picture, const RenderOptions& options);
+
+// Returns the text chunk `exposure` of a PNG that write_png() wrote, stops. Throws Error(io) without one.
+double read_png_exposure(const std::filesystem::path& path);
 
 // Reads a PNG of any kind as 8-bit RGB in sRGB (what is transparent over black), up to 16384 on a side.
 Rgb8Image read_png(const std::filesystem::path& path);

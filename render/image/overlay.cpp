@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "core/vec.h"
+#include "render/image/exposure.h"
 #include "render/options/camera.h"
 
 namespace nephos {
@@ -96,7 +97,7 @@ void draw(Picture& picture, const Segment& segment, const Rgb& colour, double wi
 
 void draw_lines(Picture& picture, const Camera& camera, std::span<const WorldLine> lines) {
     const CameraFrame frame = camera_frame(camera);
-    const double scale = std::exp2(-camera.exposure_ev);
+    const double scale = std::exp2(-exposure_ev(picture, camera));
     for (const WorldLine& line : lines) {
         const std::optional<Segment> segment = projected(line, frame, camera);
         if (!segment) continue;

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cerrno>
+#include <charconv>
 #include <csetjmp>
 #include <cstdint>
+#include <cstring>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +14,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "render/image/exposure.h"
 #include "render/image/image_file.h"
 #include "render/image/tone_map.h"
 
@@ -102,15 +107,23 @@ Texts text_of(const PictureMetadata& metadata, const RenderOptions& options) {
 
 }  // namespace
 
+RenderOptions with_exposure(const RenderOptions& options, const Picture& picture) {
+    RenderOptions exposed = options;
+    exposed.camera.exposure_ev = exposure_ev(picture, options.camera);
+    exposed.camera.exposure = Exposure::manual;
+    return exposed;
+}
+
 Rgb8Image srgb8_image(const Picture& picture, const RenderOptions& options) {
     if (picture.width < 1 || picture.height < 1 || picture.beauty.size() != 3 * picture.pixels())
         throw Error(ErrorCode::usage, "picture: its layers do not have the size that it states");
-    return {picture.width, picture.height, to_srgb8(picture, options.camera.exposure_ev)};
+    return {picture.width, picture.height, to_srgb8(picture, options.camera)};
 }
 
 void write_png(const std::filesystem::path& path, const Picture& picture, const RenderOptions& options,
                const PictureMetadata& metadata) {
-    write_png(path, srgb8_image(picture, options), options, metadata);
+    const RenderOptions exposed = with_exposure(options, picture);
+    write_png(path, srgb8_image(picture, exposed), exposed, metadata);
 }
 
 void write_png(const std::filesystem::path& path, const Rgb8Image& image, const RenderOptions& options,
@@ -136,6 +149,34 @@ void write_png(const std::filesystem::path& path, const Rgb8Image& image, const 
     png_destroy_write_struct(&png, &info);
     if (!encoded) fail(path, "cannot write PNG", exchange.error.empty() ? "out of memory" : exchange.error);
     write_atomically(path, std::string_view(exchange.file));
+}
+
+// Chunks follow a signature of 8 bytes: length, most significant byte first; type; content; checksum. Content
+// of an iTXt chunk: keyword, 0, two flags, two texts that end with 0, text.
+double read_png_exposure(const std::filesystem::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    if (!stream) fail(path, "cannot read PNG", std::strerror(errno));
+    stream.seekg(8);
+    const std::string key = std::string("exposure") + std::string(5, '\0');
+    unsigned char head[8];
+    while (stream.read(reinterpret_cast<char*>(head), sizeof head)) {
+        const std::uint32_t length =
+            std::uint32_t(head[0]) << 24 | std::uint32_t(head[1]) << 16 | std::uint32_t(head[2]) << 8 | head[3];
+        const std::string type(reinterpret_cast<const char*>(head) + 4, 4);
+        if (type != "iTXt" || length > 4096) {
+            stream.seekg(std::streamoff(length) + 4, std::ios::cur);
+            continue;
+        }
+        std::string content(length + 4, '\0');
+        if (!stream.read(content.data(), std::streamsize(content.size()))) break;
+        content.resize(length);
+        if (!content.starts_with(key)) continue;
+        double value = 0;
+        const char *from = content.data() + key.size(), *end = content.data() + content.size();
+        if (const auto [rest, error] = std::from_chars(from, end, value); error == std::errc() && rest == end)
+            return value;
+    }
+    fail(path, "cannot read the exposure of the PNG", "it has no text chunk \"exposure\" with a number");
 }
 
 Rgb8Image read_png(const std::filesystem::path& path) {

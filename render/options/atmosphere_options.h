@@ -12,9 +12,16 @@ enum class AirModel {
     physical,  // scattering and absorption by molecules, haze and ozone around a spherical Earth
 };
 
+// How the physical sky gets its colours.
+enum class SkyColours {
+    primaries,  // light of 680, 550 and 440 nm is red, green and blue
+    spectral,   // six wavelengths, integrated to sRGB, with white balanced to the noon sun
+};
+
 // With AirModel::physical, RenderOptions::air has no effect, and Sun::colour is the colour above the air.
 struct AtmosphereOptions {
     AirModel model = AirModel::gradient;
+    SkyColours colours = SkyColours::primaries;
     // Aerosol, relative to clear air, 0..100: more whitens the horizon, widens the sun's aureole and reddens
     // low suns. 1 is a visibility of about 100 km, 10 of 20 km.
     double haze = 1.0;

@@ -121,6 +121,8 @@ void check(const RenderOptions& options) {
     require(within(camera.width, 1, 16384), "camera.width", "1..16384 pixels");
     require(within(camera.height, 1, 16384), "camera.height", "1..16384 pixels");
     require(within(camera.exposure_ev, -50, 50), "camera.exposure_ev", "-50..50 stops");
+    require(within(camera.adaptation_s, 0, 60), "camera.adaptation_s", "0..60 seconds");
+    require(within(camera.glare, 0, 1), "camera.glare", "0..1");
     check_path(camera);
     check(options.precipitation);
     check(options.level_of_detail);

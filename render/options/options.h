@@ -29,6 +29,18 @@ struct CameraKey {
     bool operator==(const CameraKey&) const = default;
 };
 
+// How a picture's exposure is found.
+enum class Exposure {
+    manual,     // Camera::exposure_ev
+    automatic,  // metered in the picture (render/image/exposure.h), plus Camera::exposure_ev
+};
+
+// The curve from radiance to what a screen shows.
+enum class ToneCurve {
+    exponential,  // each channel on its own: the identity up to 0.5, then an exponential shoulder
+    neutral,      // keeps hue: the channels are compressed together from 0.6 on (after Khronos PBR Neutral)
+};
+
 // A perspective camera. World z is up in the image; y (north) is when it looks straight up or down.
 struct Camera {
     Vec3 position_m{0, -4000, 300};
@@ -36,6 +48,14 @@ struct Camera {
     double vertical_fov_deg = 50.0;  // 1..170
     int width = 640, height = 480;   // pixels, 1..16384
     double exposure_ev = 0.0;        // stops; radiance is multiplied by 2^ev before tone mapping
+    Exposure exposure = Exposure::manual;
+    // Time constant with which an automatic exposure follows from frame to frame of a run, seconds of film,
+    // 0..60; 0: each frame has its own.
+    double adaptation_s = 0;
+    ToneCurve tone_curve = ToneCurve::exponential;
+    // Light that the camera scatters around bright things (render/image/glare.h), relative to the human eye,
+    // 0..1. 0: none, and the sun's disc is bounded to a radiance of 6; otherwise it is as bright as it is.
+    double glare = 0;
     // Key frames that replace position_m and target_m (camera_at()); empty: a static camera.
     std::vector<CameraKey> path;
     bool operator==(const Camera&) const = default;

@@ -19,6 +19,11 @@ const Section& atmosphere_section() {
              "`gradient`: the colours of `air`. `physical`: `air`, `light.ambient_top` and "
              "`light.ambient_base` have no effect, and `sun.colour` is the sun's above the air.",
              "S, atmosphere; Hillaire 2020"),
+         word<&Scene::render, &RenderOptions::atmosphere, &AtmosphereOptions::colours>(
+             "colours", {"primaries", "spectral"},
+             "`primaries`: light of 680, 550 and 440 nm is taken as red, green and blue. `spectral`: six "
+             "wavelengths are integrated to sRGB, and white is the sun at 60 degrees through clear air.",
+             "CIE 1931; ASTM G-173; Bruneton 2017"),
          render_key<&RenderOptions::atmosphere, &AtmosphereOptions::haze>(
              "haze", "", between(0, 100),
              "Particles in the air as a multiple of clear air: whitens the horizon, widens the sun's glow, "

@@ -168,6 +168,25 @@ const Section& camera_section() {
                                                              "Height of the picture."),
          render_key<&RenderOptions::camera, &Camera::exposure_ev>(
              "exposure_ev", "stops", between(-30, 30), "Each stop doubles the brightness of the picture."),
+         word<&Scene::render, &RenderOptions::camera, &Camera::exposure>(
+             "exposure", {"manual", "automatic"},
+             "`manual`: `exposure_ev`. `automatic`: by a histogram of each picture, to which `exposure_ev` is "
+             "added. EXR files are not changed by it.",
+             "Reinhard et al. 2002"),
+         render_key<&RenderOptions::camera, &Camera::adaptation_s>(
+             "adaptation_s", "s", between(0, 60),
+             "Time constant with which an automatic exposure follows from frame to frame of a run, in seconds "
+             "of film; 0: at once."),
+         word<&Scene::render, &RenderOptions::camera, &Camera::tone_curve>(
+             "tone_curve", {"exponential", "neutral"},
+             "Curve from light to what a screen shows. `exponential`: each channel on its own. `neutral`: "
+             "channels together, so that highlights keep their hue until they turn white.",
+             "after Khronos PBR Neutral, 2024"),
+         render_key<&RenderOptions::camera, &Camera::glare>(
+             "glare", "", between(0, 1),
+             "Light that lens and eye scatter around what is bright, relative to the human eye; a clean lens "
+             "has about 0.1. Above 0 the sun's disc has its own brightness, else a bounded one.",
+             "Spencer et al. 1995"),
          tables<&Scene::render, &RenderOptions::camera, &Camera::path>("path", camera_path_section(), 0,
                                                                        10'000)},
         &finish_camera};
