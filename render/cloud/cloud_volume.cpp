@@ -57,35 +57,8 @@ bool diffuses(const CloudLight& light) {
            light.multiple_scattering > 0;
 }
 
-// Ten of the fourteen directions of Lebedev's rule of order 5 (V. I. Lebedev 1976): the axes in the horizontal plane,
-// along which sky and ground meet, are left out. Light that is scattered often passes a slab of optical depth tau as
-// by diffusion, 1 / (1 + 3/4 (1 - g) tau).
 void see_surroundings(CloudVolume& volume, double mean_cosine) {
-    const double side = 1 / std::sqrt(3.0);
-    const std::array<Vec3, 10> directions{Vec3(0, 0, 1),          Vec3(side, side, side),   Vec3(-side, side, side),
-                                          Vec3(side, -side, side), Vec3(-side, -side, side), Vec3(0, 0, -1),
-                                          Vec3(side, side, -side), Vec3(-side, side, -side), Vec3(side, -side, -side),
-                                          Vec3(-side, -side, -side)};
-    constexpr float kAxis = 1.0f / 15, kCorner = 3.0f / 40, kSum = kAxis + 4 * kCorner;
-    const std::size_t count = volume.field.places().size() * kLightNodesOfBrick;
-    std::array<std::vector<float>, 10> depths;
-    tbb::parallel_for(std::size_t{0}, directions.size(), [&](std::size_t n) {
-        depths[n].resize(count);
-        sweep(volume.field, volume.extinction, directions[n], depths[n]);
-    });
-    const auto decay = float(0.75 * (1 - mean_cosine));
-    volume.surroundings.assign(count + 1, 0);
-    tbb::parallel_for(std::size_t{0}, volume.field.places().size(), [&](std::size_t brick) {
-        for (std::size_t i = brick * kLightNodesOfBrick; i < (brick + 1) * kLightNodesOfBrick; ++i) {
-            const auto seen = [&](std::size_t first) {
-                float sum = 0;
-                for (std::size_t n = first; n < first + 5; ++n)
-                    sum += (n == first ? kAxis : kCorner) / (1 + decay * depths[n][i]);
-                return unsigned(255 * sum / kSum + 0.5f);
-            };
-            volume.surroundings[i] = std::uint16_t(seen(0) | seen(5) << 8);
-        }
-    });
+    volume.surroundings = diffuse_surroundings(volume.field, volume.extinction, mean_cosine);
 }
 
 namespace {

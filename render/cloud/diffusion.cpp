@@ -35,8 +35,7 @@ struct CellLight {
 
 class DiffusionCells {
   public:
-    DiffusionCells(const CoverageField& field, std::span<const float> extinction, std::span<const float> sun_depths,
-                   const Vec3& to_sun, double albedo, double mean_cosine)
+    DiffusionCells(const CoverageField& field, std::span<const float> extinction, double albedo, double mean_cosine)
         : bricks_(field.places().size()), mean_cosine_(float(mean_cosine)) {
         const auto cell_m = float(4 * field.node_m());
         const std::size_t count = bricks_ * kOfBrick;
@@ -53,7 +52,41 @@ class DiffusionCells {
             }
         });
         find_neighbours(field);
-        set_coefficients(sun_depths, {float(to_sun.x), float(to_sun.y), float(to_sun.z)}, float(albedo));
+        set_coefficients(float(albedo));
+    }
+
+    // The light that the sun loses: what enters a cell through faces and does not leave it. Exact, as neighbours share
+    // faces.
+    void light_by_sun(std::span<const float> sun_depths, const Vec3& to_sun, double albedo) {
+        const float towards[3] = {float(to_sun.x), float(to_sun.y), float(to_sun.z)};
+        std::ranges::fill(outside_, 0.0f);
+        source_.assign(thickness_.size(), 0.0f);
+        tbb::parallel_for(std::size_t{0}, bricks_, [&](std::size_t brick) {
+            const float* const depths = &sun_depths[brick * kLightNodesOfBrick];
+            for (std::size_t cell = 0; cell < kOfBrick; ++cell) {
+                if (!(thickness_[brick * kOfBrick + cell] > 0)) continue;
+                float lost = 0;
+                for (std::size_t n = 0; n < 8; ++n) {
+                    const std::size_t o[3] = {n % 2, n / 2 % 2, n / 4}, x = 2 * (cell % kSide + o[0]),
+                                      y = 2 * (cell / kSide % kSide + o[1]), z = 2 * (cell / kSide / kSide + o[2]);
+                    const float light =
+                        std::exp((mean_cosine_ - 1) * depths[(z * kLightNodes + y) * kLightNodes + x]);
+                    for (std::size_t axis = 0; axis < 3; ++axis)
+                        lost += 0.25f * light * (o[axis] == 1 ? towards[axis] : -towards[axis]);
+                }
+                source_[brick * kOfBrick + cell] = float(albedo) * std::max(lost, 0.0f);
+            }
+        });
+    }
+
+    // A sky of fluence 1 above the horizon: faces at the side see half of it.
+    void light_by_sky() {
+        outside_ = {0.5f, 0.5f, 0.5f, 0.5f, 0.0f, 1.0f};
+        source_.assign(thickness_.size(), 0.0f);
+        for_cells([&](std::size_t at) {
+            for (std::size_t n = 0; thickness_[at] > 0 && n < 6; ++n)
+                if (neighbours_[at].cell[n] < 0) source_[at] += outside_[n] * loss(thickness_[at]);
+        });
     }
 
     // Conjugate gradients, with the diagonal as preconditioner (M. R. Hestenes and E. Stiefel 1952). Sums are those of
@@ -91,11 +124,13 @@ class DiffusionCells {
         if (!(thickness_[at] > 0)) {
             result.weight = 1 / kLeastThickness;
             float count = 0;
-            for (const std::int32_t other : neighbours_[at].cell) {
+            for (std::size_t n = 0; n < 6; ++n) {
+                const std::int32_t other = neighbours_[at].cell[n];
                 if (other < 0) continue;
                 const CellLight beside = light_of(std::size_t(other));
-                for (std::size_t n = 0; n < 4; ++n)
-                    result.values[n] += beside.values[n] * (n == 0 ? 2 * loss(thickness_[std::size_t(other)]) : 1.0f);
+                const float arriving = outside_[n ^ 1], through = 2 * loss(thickness_[std::size_t(other)]);
+                result.values[0] += arriving + through * (beside.values[0] - arriving);
+                for (std::size_t axis = 1; axis < 4; ++axis) result.values[axis] += beside.values[axis];
                 ++count;
             }
             for (float& number : result.values) number /= std::max(count, 1.0f);
@@ -105,7 +140,7 @@ class DiffusionCells {
         result.values[0] = fluence_[at];
         for (std::size_t n = 0; n < 6; ++n) {
             const std::int32_t other = neighbours_[at].cell[n];
-            const float towards = other < 0 ? fluence_[at] * loss(thickness_[at])
+            const float towards = other < 0 ? (fluence_[at] - outside_[n]) * loss(thickness_[at])
                                             : (fluence_[at] - fluence_[std::size_t(other)]) *
                                                   conductance(thickness_[at], thickness_[std::size_t(other)]);
             result.values[1 + n / 2] += (n % 2 == 0 ? -0.5f : 0.5f) * towards;
@@ -178,29 +213,15 @@ class DiffusionCells {
     }
 
     // Cells without cloud have no weights: their fluence stays 0.
-    void set_coefficients(std::span<const float> sun_depths, const float (&to_sun)[3], float albedo) {
-        source_.assign(thickness_.size(), 0.0f);
+    void set_coefficients(float albedo) {
         weights_.assign(thickness_.size(), {});
         diagonal_.assign(thickness_.size(), 0.0f);
         inverse_.assign(thickness_.size(), 0.0f);
-        const auto light_at = [&](std::size_t brick, std::size_t x, std::size_t y, std::size_t z) {
-            const float depth = sun_depths[brick * kLightNodesOfBrick + (z * kLightNodes + y) * kLightNodes + x];
-            return std::exp((mean_cosine_ - 1) * depth);
-        };
         tbb::parallel_for(std::size_t{0}, bricks_, [&](std::size_t brick) {
             for (std::size_t cell = 0; cell < kOfBrick; ++cell) {
                 const std::size_t at = brick * kOfBrick + cell;
                 const float thickness = thickness_[at];
                 if (!(thickness > 0)) continue;
-                // What enters through faces and does not leave: exact, as neighbours share faces.
-                float lost = 0;
-                for (std::size_t n = 0; n < 8; ++n) {
-                    const std::size_t o[3] = {n % 2, n / 2 % 2, n / 4};
-                    const float light = light_at(brick, 2 * (cell % kSide + o[0]), 2 * (cell / kSide % kSide + o[1]),
-                                                 2 * (cell / kSide / kSide + o[2]));
-                    for (std::size_t axis = 0; axis < 3; ++axis)
-                        lost += 0.25f * light * (o[axis] == 1 ? to_sun[axis] : -to_sun[axis]);
-                }
                 float sum = (1 - albedo) * thickness / (1 - mean_cosine_);
                 for (std::size_t n = 0; n < 6; ++n) {
                     const std::int32_t other = neighbours_[at].cell[n];
@@ -211,13 +232,13 @@ class DiffusionCells {
                 }
                 diagonal_[at] = sum;
                 inverse_[at] = 1 / sum;
-                source_[at] = albedo * std::max(lost, 0.0f);
             }
         });
     }
 
     std::size_t bricks_;
     float mean_cosine_;
+    std::array<float, 6> outside_{};  // fluence beyond faces without cloud, by direction
     std::vector<float> thickness_;  // reduced optical, along an edge
     std::vector<float> source_, diagonal_, inverse_, fluence_;
     std::vector<std::array<float, 6>> weights_;
@@ -259,7 +280,8 @@ Surroundings around_brick(const CoverageField& field, std::size_t brick, const D
     return result;
 }
 
-// A node lies in the middle of a cell or between two on each axis. Returns the mean of those that there are.
+// A node lies in the middle of a cell or between two on each axis. Returns the mean of those that there are; a fluence
+// of -1 if there is none.
 std::array<float, 4> at_node(const Surroundings& cells, const int (&node)[3]) {
     std::array<float, 4> sum{};
     float weights = 0;
@@ -275,8 +297,31 @@ std::array<float, 4> at_node(const Surroundings& cells, const int (&node)[3]) {
         for (std::size_t i = 0; i < 4; ++i) sum[i] += cells[index]->weight * cells[index]->values[i];
         weights += cells[index]->weight;
     }
-    for (float& number : sum) number /= std::max(weights, 1e-9f);
+    if (!(weights > 0)) return {-1, 0, 0, 0};
+    for (float& number : sum) number /= weights;
     return sum;
+}
+
+}  // namespace
+
+namespace {
+
+// Calls set(number of the node, fluence, flux to the east, north and up) for all corners of cells; -1 is the fluence
+// where there is no cloud near.
+template <class Set>
+void for_nodes(const CoverageField& field, const DiffusionCells& cells, const Set& set) {
+    const std::size_t bricks = field.places().size();
+    std::vector<CellLight> values(bricks * kOfBrick);
+    tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
+        for (std::size_t cell = brick * kOfBrick; cell < (brick + 1) * kOfBrick; ++cell)
+            values[cell] = cells.light_of(cell);
+    });
+    tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
+        const Surroundings around = around_brick(field, brick, cells, values);
+        for (int n = 0; n < int(kLightNodesOfBrick); ++n)
+            set(brick * kLightNodesOfBrick + std::size_t(n),
+                at_node(around, {n % kLightNodes, n / kLightNodes % kLightNodes, n / kLightNodes / kLightNodes}));
+    });
 }
 
 }  // namespace
@@ -284,32 +329,37 @@ std::array<float, 4> at_node(const Surroundings& cells, const int (&node)[3]) {
 DiffuseLight diffuse_sunlight(const CoverageField& field, std::span<const float> extinction,
                               std::span<const float> sun_depths, const Vec3& to_sun, double albedo,
                               double mean_cosine) {
-    DiffusionCells cells(field, extinction, sun_depths, to_sun, albedo, mean_cosine);
+    DiffusionCells cells(field, extinction, albedo, mean_cosine);
+    cells.light_by_sun(sun_depths, to_sun, albedo);
     cells.solve();
-    const std::size_t bricks = field.places().size();
-    std::vector<CellLight> values(bricks * kOfBrick);
-    tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
-        for (std::size_t cell = brick * kOfBrick; cell < (brick + 1) * kOfBrick; ++cell)
-            values[cell] = cells.light_of(cell);
-    });
     DiffuseLight light;
-    light.upwards.assign(bricks * kLightNodesOfBrick + 1, 0);
+    light.upwards.assign(sun_depths.size() + 1, 0);
     light.sideways.assign(light.upwards.size(), 0);
-    tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
-        const Surroundings around = around_brick(field, brick, cells, values);
-        for (int n = 0; n < int(kLightNodesOfBrick); ++n) {
-            const auto [fluence, east, north, up] =
-                at_node(around, {n % kLightNodes, n / kLightNodes % kLightNodes, n / kLightNodes / kLightNodes});
-            const auto ratio = [&, of = fluence](float flux) {
-                return 128 + 127 * std::clamp(flux / std::max(of, 1e-9f), -1.0f, 1.0f);
-            };
-            const std::size_t at = brick * kLightNodesOfBrick + std::size_t(n);
-            light.upwards[at] =
-                packed(255 * std::sqrt(std::clamp(fluence / shader::kMostFluence, 0.0f, 1.0f)), ratio(up));
-            light.sideways[at] = packed(ratio(east), ratio(north));
-        }
+    for_nodes(field, cells, [&](std::size_t node, const std::array<float, 4>& values) {
+        const float fluence = std::max(values[0], 0.0f);
+        const auto ratio = [&](float flux) {
+            return 128 + 127 * std::clamp(flux / std::max(fluence, 1e-9f), -1.0f, 1.0f);
+        };
+        light.upwards[node] =
+            packed(255 * std::sqrt(std::min(fluence / shader::kMostFluence, 1.0f)), ratio(values[3]));
+        light.sideways[node] = packed(ratio(values[1]), ratio(values[2]));
     });
     return light;
+}
+
+// What does not come from the sky comes from the ground: where nothing is absorbed, a cloud before a sky and a ground of
+// one radiance has that radiance.
+std::vector<std::uint16_t> diffuse_surroundings(const CoverageField& field, std::span<const float> extinction,
+                                                double mean_cosine) {
+    DiffusionCells cells(field, extinction, 1, mean_cosine);
+    cells.light_by_sky();
+    cells.solve();
+    std::vector<std::uint16_t> surroundings(field.places().size() * kLightNodesOfBrick + 1, 0);
+    for_nodes(field, cells, [&](std::size_t node, const std::array<float, 4>& values) {
+        const float sky = values[0] < 0 ? 0.5f : std::min(values[0], 1.0f);
+        surroundings[node] = packed(255 * sky, 255 * (1 - sky));
+    });
+    return surroundings;
 }
 
 float diffuse_radiance(const DiffuseLight& light, std::size_t node, double mean_cosine, const Vec3& direction) {

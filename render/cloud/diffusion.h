@@ -33,6 +33,12 @@ struct DiffuseLight {
 DiffuseLight diffuse_sunlight(const CoverageField& field, std::span<const float> extinction,
                               std::span<const float> sun_depths, const Vec3& to_sun, double albedo, double mean_cosine);
 
+// Solves the same for a sky that shines through all faces without cloud, of radiance 1 above the horizon. Returns pairs
+// of bytes at the corners of cells, like DiffuseLight: the fractions of light from the sky (lower byte) and from the
+// ground (upper byte) that are scattered there, 0..255.
+std::vector<std::uint16_t> diffuse_surroundings(const CoverageField& field, std::span<const float> extinction,
+                                                double mean_cosine);
+
 // Unpacks a node: what is scattered towards a unit direction of travel, as radiance under a sun of irradiance pi.
 float diffuse_radiance(const DiffuseLight& light, std::size_t node, double mean_cosine, const Vec3& direction);
 
