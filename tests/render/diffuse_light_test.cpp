@@ -3,12 +3,13 @@
 
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <utility>
 #include <vector>
 
+#include <glm/trigonometric.hpp>
 #include <gtest/gtest.h>
 
-#include "core/math.h"
 #include "density/density_grid.h"
 #include "density/metaballs.h"
 #include "render/cloud/cloud_volume.h"
@@ -31,9 +32,10 @@ DetailedVoxels slab(double depth) {
     return part;
 }
 
-RenderOptions lit_from_the_zenith(double g) {
+RenderOptions lit_from(double sun_elevation_deg, double g) {
     RenderOptions options;
-    options.sun.elevation_deg = 90;
+    options.sun.elevation_deg = sun_elevation_deg;
+    options.sun.azimuth_deg = 0;
     options.sun.colour = {1, 1, 1};
     options.light.phase = {.kind = Phase::henyey_greenstein, .g = g};
     options.light.ambient_top = options.light.ambient_base = {0, 0, 0};
@@ -44,13 +46,14 @@ RenderOptions lit_from_the_zenith(double g) {
 }
 
 // Radiance of the middle of the slab towards an eye above it, whose direction has the cosine `mu` from the zenith.
-double radiance(Renderer& renderer, const DetailedVoxels& part, RenderOptions options, double mu) {
+double radiance(Renderer& renderer, const DetailedVoxels& part, RenderOptions options, double mu, double azimuth) {
     const std::vector<Metaball> balls = metaballs(part.density, part.setting.metaball_radius_cells);
     std::vector<DetailedVoxels> parts{part};
     parts[0].count = balls.size();
     const Vec3 middle(0.5 * kSlab.x * kCell_m, 0.5 * kSlab.y * kCell_m, 1000 + kThickness_m);
     options.camera.target_m = middle;
-    options.camera.position_m = middle + 3000.0 * Vec3(std::sqrt(1 - mu * mu), 0, mu);
+    options.camera.position_m = middle + 3000.0 * Vec3(std::sqrt(1 - mu * mu) * std::sin(azimuth),
+                                                        std::sqrt(1 - mu * mu) * std::cos(azimuth), mu);
     options.camera.vertical_fov_deg = 2;
     options.camera.width = options.camera.height = 16;
     Splats splats;
@@ -61,13 +64,13 @@ double radiance(Renderer& renderer, const DetailedVoxels& part, RenderOptions op
     return sum / double(picture.beauty.size());
 }
 
-// The two-stream solution for a slab without absorption under a sun in the zenith: Eddington's approximation (W. E.
+// The two-stream solution for a slab without absorption, `mu` the cosine of the sun's zenith angle: Eddington's approximation (W. E.
 // Meador and W. R. Weaver 1980, "Two-Stream Approximations to Radiative Transfer in Planetary Atmospheres", equation 24),
 // with the forward peak g^2 cut off (J. H. Joseph, W. J. Wiscombe and J. A. Weinman 1976).
-double two_stream_albedo(double depth, double g) {
+double two_stream_albedo(double depth, double g, double mu = 1) {
     const double cut = g * g, scaled = (1 - cut) * depth, rest = (g - cut) / (1 - cut);
-    const double gamma1 = 0.75 * (1 - rest), gamma3 = (2 - 3 * rest) / 4;
-    return (gamma1 * scaled + (gamma3 - gamma1) * (1 - std::exp(-scaled))) / (1 + gamma1 * scaled);
+    const double gamma1 = 0.75 * (1 - rest), gamma3 = (2 - 3 * rest * mu) / 4;
+    return (gamma1 * scaled + (gamma3 - gamma1 * mu) * (1 - std::exp(-scaled / mu))) / (1 + gamma1 * scaled);
 }
 
 // Radiance is per irradiance pi: the integral of radiance * cosine over the hemisphere is the albedo.
@@ -84,11 +87,33 @@ TEST(DiffuseLight, SlabsHaveTheAlbedoOfTheTwoStreamSolution) {
             const DetailedVoxels part = slab(depth);
             double albedo = 0;
             for (int n = 0; n < 5; ++n)
-                albedo += 2 * kWeights[n] * kCosines[n] * radiance(renderer, part, lit_from_the_zenith(g), kNodes[n]);
+                albedo += 2 * kWeights[n] * kCosines[n] * radiance(renderer, part, lit_from(90, g), kNodes[n], 0);
             const double expected = two_stream_albedo(depth, g);
             std::printf("g %.2f, optical depth %2.0f: albedo %.3f, two-stream %.3f (%+.1f %%)\n", g, depth, albedo,
                         expected, 100 * (albedo / expected - 1));
             EXPECT_NEAR(albedo, expected, limit * expected) << "g " << g << ", depth " << depth;
+        }
+    }
+}
+
+// From the side the albedo is larger: less light gets deep. Irradiance is pi times the cosine of the sun's angle.
+TEST(DiffuseLight, SlabsAreBrighterUnderALowSun) {
+    Renderer renderer{DeviceOptions{.splatting = Splatting::cpu}};
+    constexpr double kCosines[4] = {0.2308, 0.5, 0.7692, 0.9531}, kWeights[4] = {0.3578, 0.2844, 0.2393, 0.1185};
+    const double mu = std::sin(glm::radians(35.0));
+    for (const double g : {0.5, 0.85}) {
+        for (const double depth : {5.0, 20.0}) {
+            const DetailedVoxels part = slab(depth);
+            double albedo = 0;
+            for (int n = 0; n < 4; ++n)
+                for (int side = 0; side < 4; ++side)
+                    albedo += 0.25 * 2 * kWeights[n] * kCosines[n] / mu *
+                              radiance(renderer, part, lit_from(35, g), kCosines[n], 0.25 * std::numbers::pi * (1 + 2 * side));
+            const double expected = two_stream_albedo(depth, g, mu);
+            std::printf("g %.2f, optical depth %2.0f, sun at 35 degrees: albedo %.3f, two-stream %.3f (%+.1f %%)\n", g,
+                        depth, albedo, expected, 100 * (albedo / expected - 1));
+            EXPECT_NEAR(albedo, expected, 0.15 * expected) << "g " << g << ", depth " << depth;
+            EXPECT_GT(albedo, two_stream_albedo(depth, g)) << "g " << g << ", depth " << depth;
         }
     }
 }
