@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kCells = CoverageField::kBrickCells, kSide = kCells / 2;  // cells of the equation on a brick's edge
 constexpr std::size_t kOfBrick = std::size_t(kSide) * kSide * kSide;
-constexpr double kSmallResidual = 2e-3;  // relative, which ends the iterations
+constexpr double kSmallResidual = 1e-3;  // relative, which ends the iterations
 constexpr int kMostRounds = 200;
 // Conductance between cells that hold next to nothing: of more the iterations would only take longer.
 constexpr float kMostConductance = 10;
@@ -85,7 +85,7 @@ class DiffusionCells {
         source_.assign(thickness_.size(), 0.0f);
         for_cells([&](std::size_t at) {
             for (std::size_t n = 0; thickness_[at] > 0 && n < 6; ++n)
-                if (neighbours_[at].cell[n] < 0) source_[at] += outside_[n] * loss(thickness_[at]);
+                if (neighbours_[at].cell[n] < 0) source_[at] += outside_[n] * area_of_faces(at) * loss(thickness_[at]);
         });
     }
 
@@ -138,9 +138,10 @@ class DiffusionCells {
         }
         result.weight = 1 / (thickness_[at] + kLeastThickness);
         result.values[0] = fluence_[at];
+        const float area = area_of_faces(at);
         for (std::size_t n = 0; n < 6; ++n) {
             const std::int32_t other = neighbours_[at].cell[n];
-            const float towards = other < 0 ? (fluence_[at] - outside_[n]) * loss(thickness_[at])
+            const float towards = other < 0 ? (fluence_[at] - outside_[n]) * area * loss(thickness_[at])
                                             : (fluence_[at] - fluence_[std::size_t(other)]) *
                                                   conductance(thickness_[at], thickness_[std::size_t(other)]);
             result.values[1 + n / 2] += (n % 2 == 0 ? -0.5f : 0.5f) * towards;
@@ -158,6 +159,13 @@ class DiffusionCells {
     // which there is no cloud.
     static float conductance(float a, float b) { return std::min(1 / (1.5f * (a + b)), kMostConductance); }
     static float loss(float thickness) { return 1 / (2 + 1.5f * thickness); }
+    // The area of a slanting surface over that of the faces that stand for it as stairs.
+    float area_of_faces(std::size_t at) const {
+        float open[3] = {};
+        for (std::size_t n = 0; n < 6; ++n) open[n / 2] += neighbours_[at].cell[n] < 0 ? 1.0f : 0.0f;
+        const float sum = open[0] + open[1] + open[2];
+        return sum > 0 ? std::sqrt(open[0] * open[0] + open[1] * open[1] + open[2] * open[2]) / sum : 1.0f;
+    }
 
     void find_neighbours(const CoverageField& field) {
         neighbours_.resize(thickness_.size());
@@ -226,7 +234,7 @@ class DiffusionCells {
                 for (std::size_t n = 0; n < 6; ++n) {
                     const std::int32_t other = neighbours_[at].cell[n];
                     const float through =
-                        other < 0 ? loss(thickness) : conductance(thickness, thickness_[std::size_t(other)]);
+                        other < 0 ? area_of_faces(at) * loss(thickness) : conductance(thickness, thickness_[std::size_t(other)]);
                     sum += through;
                     if (other >= 0) weights_[at][n] = through;
                 }

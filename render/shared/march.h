@@ -28,7 +28,7 @@ NEPHOS_CONST float kLeastMargin = 1.0e-4f;            // difference of two sampl
 // A shaded point samples the cloud towards the sun at these distances, which stand for these lengths; beyond the last
 // the volume's depths go on.
 NEPHOS_CONST float kTap0_m = 3.0f, kTap1_m = 10.0f, kTap2_m = 22.0f;
-NEPHOS_CONST float kTap0Length_m = 6.5f, kTap1Length_m = 9.5f, kTap2Length_m = 17.0f;
+NEPHOS_CONST float kTap0Length_m = 6.5f, kTap1Length_m = 9.5f, kTap2Length_m = 14.5f;
 NEPHOS_CONST float kTapsEnd_m = 30.5f;
 // The light of sky and ground in folds: this share of it falls off with the samples' optical depth times kFoldDecay.
 NEPHOS_CONST float kFoldShare = 0.0f, kFoldDecay = 0.5f;
