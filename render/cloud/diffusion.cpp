@@ -21,6 +21,7 @@ constexpr int kMostRounds = 200;
 // Conductance between cells that hold next to nothing: of more the iterations would only take longer.
 constexpr float kMostConductance = 10;
 
+constexpr float kFold = 1e-6f;           // reduced optical thickness of an empty cell in a fold
 constexpr float kLeastThickness = 0.1f;  // reduced optical, of cells in the weights of their light
 
 // The cells around one: below and above it on each axis.
@@ -51,6 +52,8 @@ class DiffusionCells {
                 thickness_[brick * kOfBrick + cell] = (1 - mean_cosine_) * 0.125f * sum * cell_m;
             }
         });
+        find_neighbours(field);
+        fill_folds();
         find_neighbours(field);
         set_coefficients(float(albedo));
     }
@@ -157,7 +160,10 @@ class DiffusionCells {
   private:
     // Flux per difference of fluence between two cells of reduced optical thickness a and b, and through a face beyond
     // which there is no cloud.
-    static float conductance(float a, float b) { return std::min(1 / (1.5f * (a + b)), kMostConductance); }
+    static float conductance(float a, float b) {
+        const bool folded = std::min(a, b) <= kFold;
+        return folded ? loss(std::max(a, b)) : std::min(1 / (1.5f * (a + b)), kMostConductance);
+    }
     static float loss(float thickness) { return 1 / (2 + 1.5f * thickness); }
     // The area of a slanting surface over that of the faces that stand for it as stairs.
     float area_of_faces(std::size_t at) const {
@@ -165,6 +171,17 @@ class DiffusionCells {
         for (std::size_t n = 0; n < 6; ++n) open[n / 2] += neighbours_[at].cell[n] < 0 ? 1.0f : 0.0f;
         const float sum = open[0] + open[1] + open[2];
         return sum > 0 ? std::sqrt(open[0] * open[0] + open[1] * open[1] + open[2] * open[2]) / sum : 1.0f;
+    }
+
+    // Light that leaves a cloud in a fold meets it again: empty cells between two or more of cloud exchange it.
+    void fill_folds() {
+        std::vector<float> filled = thickness_;
+        for_cells([&](std::size_t at) {
+            if (thickness_[at] > 0) return;
+            if (std::ranges::count_if(neighbours_[at].cell, [](std::int32_t other) { return other >= 0; }) > 1)
+                filled[at] = kFold;
+        });
+        thickness_ = std::move(filled);
     }
 
     void find_neighbours(const CoverageField& field) {
