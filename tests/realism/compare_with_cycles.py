@@ -36,7 +36,7 @@ CLOUDS = {
     "disney": {"up": "y", "extinction_per_m": 0.1, "eye_m": (-10, -650, 139), "target_m": (-10, 41, 75),
                "sun": (38, 270), "step_m": 3.0},
     "cumulus": {"scene": "scenes/cumulus.toml", "time_s": 900, "extinction_per_m": 0.15, "eye_m": (0, -3200, 250),
-                "target_m": (0, 1500, 1150), "sun": (38, 270), "step_m": 20.0},
+                "target_m": (0, 1500, 1150), "sun": (38, 270), "step_m": 6.0},
     "congestus": {"scene": "scenes/genera/Cb.toml", "time_s": 1500, "extinction_per_m": 0.02,
                   "eye_m": (-4000, -30000, 1500), "target_m": (0, 0, 6000), "sun": (30, 250), "step_m": 60.0},
 }
@@ -77,7 +77,8 @@ def volume_of(name, cloud, options):
     files = sorted(folder.glob("density/**/*.vdb"))
     if not files:
         run("nice", options.nephos, "run", ROOT / cloud["scene"], "--out", folder, "--no-render", "--quiet", "--set",
-            f"frames.start_s={cloud['time_s']}", "--set", "frames.count=1", "--set", f"time.steps={cloud['time_s'] // 10 + 10}")
+            f"frames.start_s={cloud['time_s']}", "--set", "frames.count=1", "--set", f"time.steps={cloud['time_s'] // 10 + 10}",
+            "--set", "density.refine=4")  # with its detail, so that both see the same cloud
         files = sorted(folder.glob("density/**/*.vdb"))
     return files[0]
 
