@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Interface of the render back-ends: CPU, Vulkan and blended. The renderer prepares what they share - the cloud at its
-// level of detail, sky, scattering table, lightning, parts of the picture - and hands it over as a FrameDescription;
-// a back-end completes the light of the cloud and draws.
+// Interface of the render back-ends: CPU, Vulkan and blended. The renderer prepares what they share - the cloud at
+// its level of detail, sky, scattering table, lightning, parts of the picture - and hands it over as a
+// FrameDescription; a back-end completes the light of the cloud and draws.
 //
 // The light of a cloud is the optical depth towards the sun at each visible metaball, and a shadow map of
 // transmittance. Multiple scattering is not part of it: that comes from a table when the cloud is drawn
@@ -29,8 +29,8 @@
 
 namespace nephos {
 
-// A rectangle of the picture that is drawn at once, and its uniforms. Larger than the tiles, into which back-ends cut it
-// again: at most DeviceOptions::part_size and Backend::longest_part() pixels wide and high.
+// A rectangle of the picture that is drawn at once, and its uniforms. Larger than the tiles, into which back-ends
+// cut it again: at most DeviceOptions::part_size and Backend::longest_part() pixels wide and high.
 struct FramePart {
     PicturePart area;
     PictureFrame frame;
