@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Detail below the voxel: one definition of density for pictures, light and files.
+// Sub-voxel detail by procedural noise erosion: one definition of density for pictures, light and files.
 //
-//     density(x) = mask(C(x) - e(x)) D(x) / G(C(x))
+//     density(x) = min(gain D / G(C), max(D, cap)) mask(C - e(x))
 //
-// D is the density of the metaballs (metaballs.h), C = D^2 / (D^2 + half^2) its coverage, half = 1 / (2 extinction
-// mean_free_path) the density at which half of the space is cloud. e is noise of mean 1/2: Worley noise of 160, 80
-// and 40 m (DetailOptions::size_m), with a medium one of 21 to 5 m and a fine one of 2.5 to 0.6 m near the eye, and
-// mask(u) = clamp(u / softness + 1/2, 0, 1). G(C) is the fraction of the noise below C, so that the mean over the
-// noise is D again: mass is conserved in closed form (cloudy_fraction() in detail_formulas.h), but for the thinnest
-// fringe, which holds no cloud, and for the few bumps that a small cloud has. For these the rest is denser by a gain,
-// so that the whole field has the mass of the grid.
+// D is the density of the metaballs (metaballs.h) times thermals, a low-frequency noise of mean 1 with bumps of 4,
+// 2 and 1 times DetailOptions::size_m. C = D^2 / (D^2 + half^2), 0..1, is the coverage: the local cloud fraction
+// before erosion. half = 1 / (2 extinction mean_free_path) is the density at which half of the space is cloud.
 //
-// The noise lies fixed in air that drifts with the wind. It varies with the height above the base (billows above,
-// wisps below) and with the growth of the cloud, -1 where it dissolves (shreds) to 1 where it grows (crisp bumps).
-// Detail smaller than a footprint, the size of a pixel or a voxel, fades.
+// e = 1/2 + the sum of width (n - 1/2) over three noises n, each distributed uniformly over 0..1 and low in the
+// middle of a bump (Worley noise; detail_noise.h). The large noise has bumps of 4, 2 and 1 cells by default (160,
+// 80 and 40 m in cells of 40 m); near the eye a medium one of 21 to 5 m and a fine one of 2.5 to 0.6 m follow, in
+// proportion to the large. mask(u) = clamp(u / softness + 1/2, 0, 1) cuts the cloud out where C > e.
+//
+// G(C) = P(e < C), of a sum of two uniform numbers, is known in closed form (cloudy_fraction() in
+// detail_formulas.h), so that the mean of the density over the noise is D. Mass is lost where C is too small to be
+// drawn, at the caps, and where a small cloud has few bumps: one gain for the whole field makes up for it, within
+// limits, so that conservation is approximate (tests measure 0.98 to 1.02 of the grid's mass).
+//
+// The noise is fixed in air that drifts with the wind. It varies with the height above the base (billows above, wisps
+// below) and with the growth of the cloud, -1 where it dissolves (shreds) to 1 where it grows (crisp bumps). Detail
+// smaller than the footprint, the filter width in metres (that of a pixel or a voxel), fades.
 
 #include <array>
 #include <cstddef>
@@ -29,15 +35,17 @@
 
 namespace nephos {
 
-// What detail depends on beside the density.
+// Inputs of detail beside the density.
 struct DetailSetting {
     DetailOptions options;
     double extinction_per_m = 0.02;      // at density 1
     double metaball_radius_cells = 2.0;  // 1..8
-    double opacity = 1;                  // density of saturated cells, 0..1
+    double opacity = 1;                  // density of a fully cloudy cell, 0..1
     Vec3 drift_m{};                      // how far the wind has carried the air
-    Vec2 along{1, 0};                    // unit direction of DetailOptions::stretch
-    Boundaries boundaries;               // of the grid; an open axis ends the cloud
+    // Direction of DetailOptions::stretch: east and north. Precondition: of length 1.
+    Vec2 along{1, 0};
+    // Sides of the grid: open, no cloud beyond; periodic, images of the grid beyond.
+    Boundaries boundaries;
 };
 
 // Largest number of clouds with detail in a picture.
@@ -46,58 +54,63 @@ inline constexpr std::size_t kMaxDetailedClouds = 16;
 class CoverageCells;
 class NodeSums;
 
-// ErosionConstants::whole of a field with DetailOptions::strength 0, whose density is that of the metaballs.
+// ErosionConstants::whole that disables erosion, of a field with DetailOptions::strength 0: a bias of the coverage
+// above any noise, so that mask and G are 1 and the density is that of the metaballs.
 inline constexpr float kWhole = 8;
 
 // The constants of the erosion, as kernels and shaders read them.
 struct ErosionConstants {
     float half_density = 0.1f;
-    float cap = 0.7f;  // the erosion makes nothing denser than this
+    float cap = 0.7f;  // largest density where cloud is eroded; where D is larger, D is the limit
+    // Widths of the noises, in coverage. The large one: at the base, from 160 m above it on, and where the cloud
+    // dissolves (large_width() in detail_formulas.h); then the medium and the fine one, for footprint 0.
     float base_width = 0.5f, top_width = 0.62f, dissolving_width = 0.9f, medium_width = 0.17f,
           fine_width = 0.03f;
-    float wisps = 1;
-    float least_coverage = 0.03f;  // of less there is no cloud, whatever the noise
-    float whole = 0;               // added to coverage: 0, or kWhole where nothing is eroded
-    float base_m = 0;              // of the cloud, above the field's corner
-    std::array<float, 2> gain{};   // for footprints up to 13 m, and from 25 m on
-    // Rows that turn a place relative to the field's corner into one in the large noise, in tiles; the fourth
-    // numbers are its offset.
+    float wisps = 1;               // DetailOptions::wisps
+    float least_coverage = 0.03f;  // where C is not larger there is no cloud, whatever the noise
+    float whole = 0;               // added to C in mask and G: 0, or kWhole to disable erosion
+    float base_m = 0;              // height of the cloud's base above corner_m()
+    std::array<float, 2> gain{};   // for scaled footprints up to 13 m, and from 25 m on; linear between
+    // 3x4 matrix, row by row, from metres relative to corner_m() to texture coordinates of the large noise: 1 is one
+    // period; drift and stretch are included.
     std::array<std::array<float, 4>, 3> to_noise{};
-    float medium_scale = 15, fine_scale = 128;  // tiles of the small noise in one of the large
-    // Voxels of the small noise per metre at its level 0, for bumps of 160 m; footprints times footprint_scale are those
-    // that detail with such bumps would have.
+    float medium_scale = 15, fine_scale = 128;  // periods of these noises in one of the large noise
+    // Voxels of these noises at mip level 0 per metre of a scaled footprint. A scaled footprint is footprint *
+    // footprint_scale, 160 m / size of the large bumps: the formulas are written for bumps of 160 m.
     float medium_per_m = 1, fine_per_m = 1, footprint_scale = 1;
     bool operator==(const ErosionConstants&) const = default;
 };
 
-// The density of a grid's metaballs, sampled at the corners of half cells, in bricks of 8 x 8 x 8 of them. An
-// immutable value after build; const functions are thread-safe.
+// The density of a grid's metaballs, sampled at the corners of half cells (nodes), in bricks of 8^3 half cells. A
+// brick stores its 9^3 nodes, so that it is interpolated without its neighbours: nodes of a common face are in
+// both. An immutable value after construction; const functions are thread-safe.
 class CoverageField {
   public:
-    static constexpr int kBrickNodes = 9;  // on an edge; those of a face belong to both bricks
+    static constexpr int kBrickNodes = 9;  // on an edge
     static constexpr int kBrickCells = 4;  // cells of the lattice on an edge
-    static constexpr std::size_t kBrickBytes = 1460;  // two for each node, and two more
+    static constexpr std::size_t kBrickBytes = 1460;  // 729 nodes of 2 bytes, and 2 of padding for reads of 4
 
-    // Samples D at all nodes where it is above 0. `moisture`, of the same extent, says how much the cloud grows: not at
-    // all where it has its mean over the cloud, by 1 from twice that on, by -1 at 0. Without it nothing grows or
-    // dissolves. Beyond open boundaries there is no cloud. Throws Error(usage) when a setting is out of range, and when
-    // the field has more than 2^31 bytes.
+    // Samples D at all nodes where it is above 0. `moisture`, of the same extent, gives the growth of the cloud:
+    // clamp(moisture / mean - 1, -1, 1), its mean over the cells weighted by their density. Without it growth is 0.
+    // Throws Error(usage) when a setting is out of range, and when the field has more than 2^31 bytes.
     CoverageField(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture = nullptr);
 
-    // World place of the first node, and the distance between nodes (half a cell), metres.
+    // World position of the first node, and the distance between nodes (half a cell), metres. The corner lies outside
+    // the grid, which is padded by whole bricks as far as metaballs reach: on periodic axes they hold image cloud.
     const Vec3& corner_m() const { return corner_m_; }
     double node_m() const { return node_m_; }
     // Bricks on each axis.
     const std::array<int, 3>& bricks() const { return bricks_; }
-    // For each brick, x fastest: its number among those that hold cloud; or -n where there is none within less
-    // than n bricks in any direction, at most -127.
+    // For each brick, x fastest: its number among those that hold cloud, from 0; or -n, n = 1..127 the Chebyshev
+    // distance in bricks to the nearest that does.
     const std::vector<std::int32_t>& table() const { return table_; }
-    // Index in table() of each brick that holds cloud, rising.
+    // For each brick that holds cloud, by its number: its index in table(), rising.
     const std::vector<std::int32_t>& places() const { return places_; }
-    // kBrickBytes of each of these: t of each node, x fastest (detail_formulas.h; 0..255 for 0..1), each followed by
-    // its growth (1..255 for -1..1).
+    // kBrickBytes of each of these: t = D / (D + half) of each node, x fastest (0..255 for 0..1; detail_formulas.h
+    // turns it into C and D), each followed by its growth (1..255 for -1..1).
     const std::vector<std::uint8_t>& nodes() const { return nodes_; }
-    // kBrickCells^3 of each of these, x fastest: the number of cells to the next that may hold cloud, at most 4.
+    // kBrickCells^3 bytes of each of these, x fastest: the Chebyshev distance in cells to the nearest cell that may
+    // hold cloud, 0..4. Three bytes of padding at the end, for reads of 4.
     const std::vector<std::uint8_t>& clearance() const { return clearance_; }
 
     // kBrickCells^3 of each of these, x fastest: the mean detailed density of each cell, of eight samples whose
@@ -124,24 +137,25 @@ class CoverageField {
     std::vector<std::uint8_t> nodes_, clearance_;
     std::vector<float> cell_density_;
     std::array<double, 256> histogram_{};  // of t over the nodes
-    double mass_ = 0;                      // sum of D over the nodes, without thermals
+    double mass_ = 0;                      // 8 nodes a cell times the sum of the grid's values
     ErosionConstants erosion_;
 };
 
 // Returns the detailed density at the middles of count[0] x count[1] x count[2] boxes of edge `footprint_m`, x
-// fastest; the first box begins at `corner_m` in the world.
+// fastest; the first box begins at `corner_m` in the world. Each value is a point sample, with noise limited to the
+// footprint and not a mean over the box; 0 outside of the field.
 std::vector<float> detailed_density(const CoverageField& field, const Vec3& corner_m,
                                     const std::array<int, 3>& count, double footprint_m);
 
-// The same in the middles of the 8 x 8 x 8 boxes between the nodes of a brick that holds cloud, by its number; x
-// fastest.
+// The same in the middles of the 8 x 8 x 8 boxes between the nodes of a brick, x fastest, with the footprint
+// node_m(). `number` indexes places(). Precondition: out.size() >= 512.
 void detailed_density_of_brick(const CoverageField& field, std::size_t number, std::span<float> out);
 
-// The same for one place, in double-free scalar code: the reference of the kernels.
+// The same for one point, in scalar code: the test reference of the SIMD kernels and shaders.
 float detailed_density_at(const CoverageField& field, const Vec3& place_m, float footprint_m);
 
-// Samples detailed density at the centres of voxels `refine` times smaller than those of the grid that `field` was
-// made of, whose extent and placement are given. Throws as resample() in metaballs.h.
+// Samples detailed density at the centres of voxels `refine` (1..8) times smaller than the cells of the grid that
+// `field` was made of; `extent` and `placement` are those of that coarse grid. Throws as resample() in metaballs.h.
 DensityGrid resample_with_detail(const CoverageField& field, Extent extent, const Placement& placement, int refine);
 
 // Throws Error(usage) naming the first option that is out of its range.

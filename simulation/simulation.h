@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// From a scene to its frames, without files, devices or a command line:
+// From a scene to its frames, without files, devices or a command line. A frame is the density at one moment here;
+// it is drawn by frame_painter.h.
 //
 //     step of every layer -> history of the last states -> density q at steps -> frames between steps
 //
-// q at step s needs the states s-t0 .. s+t0, and a frame between two steps needs q at both. The history keeps
-// exactly the states that something still needs; so the automaton runs up to t0 steps ahead of the results,
-// also beyond the scene's last step. A frame therefore never depends on where the run ends.
+// hum, act and cld are the automaton's bit planes: vapour, phase transition, cloud (docs/model.md). q is cld
+// smoothed in space and over 2 t0 + 1 steps (SmoothingOptions), so q at step s needs the states s-t0 .. s+t0, and a
+// frame between two steps needs q at both. The history keeps exactly the states that something still needs; the
+// automaton runs up to t0 steps ahead of the results, also beyond the scene's last step. A frame therefore never
+// depends on where the run ends.
 //
 //     Simulation simulation(scene);
 //     while (!simulation.finished()) simulation.advance(sink);
@@ -45,8 +48,9 @@ struct LayerStep {
     double state = 0;        // of the atmosphere, 0..1
     std::size_t clouds = 0;  // in the sky, those that form or dissolve included
     std::size_t rain_areas = 0;
-    double rain_mm_per_h = 0;    // the strongest of them
-    CloudStatistics statistics;  // of a veil, of its voxels; all 0 of clouds drawn directly
+    double rain_mm_per_h = 0;  // the strongest of them
+    // Of a veil, of its voxels; of clouds drawn directly all 0, with base_m and top_m NaN.
+    CloudStatistics statistics;
     StateHash hash;
 };
 
@@ -54,9 +58,9 @@ struct LayerStep {
 struct StepResult {
     std::uint64_t step = 0;
     double time_s = 0;
-    // mean_density is that of q at this step, NaN where no density is made (SimulationResults). Of several
-    // layers: sums of cells, the cover of layers that overlap at random (1 - product of 1 - cover), lowest base,
-    // highest top, mean density of all their boxes together.
+    // mean_density is that of q at this step, NaN where no density is made (SimulationResults). Of several layers:
+    // sums of cells; 1 - prod(1 - cover), which assumes random overlap; lowest base; highest top; mean density of
+    // all boxes.
     CloudStatistics statistics;
     StateHash hash;
     std::vector<LayerStep> layers;  // none in a scene without layers
@@ -65,41 +69,41 @@ struct StepResult {
 // One layer in a frame.
 struct LayerFrame {
     std::string name;
-    DensityGrid density;    // one voxel a cell; without automaton there are no voxels
+    DensityGrid density;    // one voxel a cell, also of a veil; empty if `direct`
     Boundaries boundaries;  // of the density's box
-    // How much vapour and phase transition there is around each voxel, 0..1: clouds grow where there is more than in
-    // the mean, and dissolve where there is less. None without automaton, and where the scene has no detail.
+    // Smoothed fraction of cells with hum or act set, 0..1: clouds grow where it exceeds its mean, and dissolve
+    // where it is lower (density/detail.h). None without automaton, and where the scene has no detail.
     std::optional<DensityGrid> moisture;
     StateHash hash;
     std::optional<BitPlaneView> hum, act, cld;  // as in FrameResult
-    std::shared_ptr<const Lattice> planes;      // what they look at
-    // Clouds at the frame's time; their shapes and models are those of `sky`, which itself stands at a later
-    // step.
-    const SkySimulation* sky = nullptr;  // null without clouds of its own; lives as long as the simulation
-    std::vector<SkyCloud> clouds;
-    bool direct = false;         // there is no density: clouds are drawn as billboards
-    std::vector<RainArea> rain;  // at the frame's time
+    std::shared_ptr<const Lattice> planes;      // storage that the views point into
+    // Null without clouds of its own; lives as long as the simulation. It has already advanced to a later step: use
+    // it only for shapes and models.
+    const SkySimulation* sky = nullptr;
+    std::vector<SkyCloud> clouds;  // of the sky, at the frame's time
+    bool direct = false;           // there is no density: clouds are drawn as billboards
+    std::vector<RainArea> rain;    // at the frame's time
 };
 
-// One frame: density at a moment that need not be a step. A copy is cheap, shares voxels and planes, and
-// stays valid while the simulation lives; another thread may use it while the simulation advances.
+// One frame: density at a moment that need not be a step; q is linear between steps, a veil is evaluated at the
+// time. A copy is cheap, shares voxels and planes, and stays valid while the simulation lives; another thread may
+// use it while the simulation advances.
 struct FrameResult {
     int number = 1;  // as in file names, counted from 1; 0: a moment that is no frame of the scene
     double time_s = 0;
     DensityGrid density;  // one voxel a cell (not refined); of layers, all together (density/combine.h)
     std::optional<DensityGrid> moisture;  // as in LayerFrame; a scene with layers has it in these
-    std::uint64_t step =
-        0;  // the last step at or before time_s, whose state the three planes and the hash are
+    std::uint64_t step = 0;  // the last at or before time_s: hash and planes are those of its state
     StateHash hash;
     // Only when the scene writes the state. A scene with layers has them in these.
     std::optional<BitPlaneView> hum, act, cld;
-    std::shared_ptr<const Lattice> planes;         // what they look at
+    std::shared_ptr<const Lattice> planes;         // storage that the views point into
     std::vector<LayerFrame> layers;                // none in a scene without layers
     std::shared_ptr<const GroundCoverMap> ground;  // at time_s; null when the scene does not ask for it
 };
 
-// Whether a simulation of the scene keeps hum and act of past states beside cld: for files, or for the growth that
-// detail shows.
+// Returns whether a simulation of the scene keeps hum and act of past states beside cld: for files, or for
+// LayerFrame::moisture.
 inline bool remembers_whole_state(const Scene& scene) {
     return scene.density.write_state || count_detailed(scene) > 0;
 }
@@ -108,12 +112,13 @@ inline bool remembers_whole_state(const Scene& scene) {
 enum class SimulationResults {
     everything,  // the density of every step and frame
     statistics,  // rows of statistics from the bits alone: no density but that of veils, and no frames
-    // Frames without density: clouds of the skies, rain and ground. Automata are stepped only where rain is
-    // looked for in them; statistics and state hashes are those of what is left.
+    // Frames without density: clouds of the skies, rain and ground. Automata are stepped only where rain is looked
+    // for in them; statistics and state hashes are those of this part, and do not match those of a full run.
     weather,
 };
 
-// Receives results in the order of time; a step comes before the frames at or after it.
+// Receives steps in order and frames in order. A frame arrives after both steps that it is interpolated from, and
+// before the step that follows these.
 class SimulationSink {
   public:
     virtual ~SimulationSink() = default;
@@ -129,15 +134,16 @@ struct SimulationRange {
     bool operator==(const SimulationRange&) const = default;
 };
 
-// Everything that the scene names; with a range of frames, these and the steps up to the last of them.
-// `last` = kLastFrame is the last that there is; throws Error(usage) when the scene has no such frame.
+// Return all steps and frames of the scene, or a range of frames and the steps up to the last of them. `last` =
+// kLastFrame is the last that there is; throws Error(usage) when the scene has no such frame.
 inline constexpr int kLastFrame = std::numeric_limits<int>::max();
 SimulationRange full_range(const Scene& scene);
 SimulationRange range_of_frames(const Scene& scene, int first, int last);
 
+// Not thread-safe: one call at a time. Works in parallel itself; results do not depend on the number of threads.
 class Simulation {
   public:
-    // Simulates everything of the scene, from its first state on. Throws as Automaton and read_state().
+    // Simulates all of full_range() from the scene's initial state on. Throws as Automaton and read_state().
     explicit Simulation(const Scene& scene);
     // Starts at step 0: from the scene's own initial state, or from `initial`. Throws as Automaton; Error(usage) when
     // a frame of the range lies after its last step, or frames are wanted of SimulationResults::statistics.
@@ -157,13 +163,14 @@ class Simulation {
     // a step. Precondition: not finished().
     void advance(SimulationSink& sink);
 
-    // Gives back the densities, to make room for the copy; they are computed again when they are needed.
+    // Returns the complete state. First frees the cached densities, to make room for it; they are computed again when
+    // they are needed.
     Checkpoint save();
 
     std::uint64_t steps_taken() const { return layers_.front().steps(); }
     std::uint64_t next_step() const { return next_step_; }  // the first that was not reported yet
     int next_frame() const { return next_frame_; }          // the first that was not reported yet
-    // Steps that the automaton takes in all, those ahead included.
+    // Total number of steps of the automaton, the look-ahead of t0 after the last step included.
     std::uint64_t steps_in_all() const;
 
   private:
@@ -186,7 +193,7 @@ class Simulation {
         std::vector<PastLayer> layers;
         std::shared_ptr<const GroundCoverMap> ground;  // null without ground cover
     };
-    // q of all layers at a step; empty grids where there is no automaton.
+    // q of all layers at a step, or the density of a veil; empty grids where no density is made.
     struct Densities {
         std::uint64_t step = 0;
         std::vector<DensityGrid> layers;

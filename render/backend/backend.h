@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The interface of what draws: the CPU, Vulkan and blended back-ends. The renderer prepares what they share - the
-// cloud at its level of detail, sky, scattering table, lightning, parts of the picture - and hands it over as a
+// Interface of the render back-ends: CPU, Vulkan and blended. The renderer prepares what they share - the cloud at
+// its level of detail, sky, scattering table, lightning, parts of the picture - and hands it over as a
 // FrameDescription; a back-end completes the light of the cloud and draws.
+//
+// The light of a cloud is the optical depth towards the sun at each visible metaball, and a shadow map of
+// transmittance. Multiple scattering is not part of it: that comes from a table when the cloud is drawn
+// (render/frame/scattering_table.h), and for volumes with detail from render/cloud/cloud_volume.h.
 //
 // Every resource that a back-end may hold a copy of has a version (render/frame/versioned.h). A back-end compares
 // it with the version that it holds and waits for its own frames in flight before it replaces what they read.
@@ -25,7 +29,8 @@
 
 namespace nephos {
 
-// A part of the picture, and its uniforms.
+// A rectangle of the picture that is drawn at once, and its uniforms. Larger than the tiles, into which back-ends
+// cut it again: at most DeviceOptions::part_size and Backend::longest_part() pixels wide and high.
 struct FramePart {
     PicturePart area;
     PictureFrame frame;
@@ -37,26 +42,28 @@ struct AirCache {
     ShadeCache shade;
 };
 
-// One picture to draw. All that it refers to outlives Backend::begin(); metaballs and billboards, until the
-// picture is finished.
+// One picture to draw. The caller keeps everything referenced alive until Backend::begin() returns; metaballs and
+// billboards until finish() or abandon().
 struct FrameDescription {
     const Splats& splats;
     const RenderOptions& options;
     CameraFrame camera;
     std::vector<FramePart> parts;
-    LitCloud& cloud;                             // whose light the back-end completes
-    std::vector<float> lightning;                // fraction of it at each of cloud.cloud.visible; empty: none
-    const SkyLight* sky = nullptr;               // null: gradient
+    LitCloud& cloud;  // the back-end completes its light
+    // Transmittance from the flash, 0..1, one for each entry of cloud.cloud.visible; empty: no lightning.
+    std::vector<float> lightning;
+    const SkyLight* sky = nullptr;               // null: the gradient sky model (AirModel::gradient)
     const Versioned<std::vector<float>>& table;  // scattering_table.h
     AirCache& air;
     StageTimes& times;
 
-    // Returns what the camera sees of the splats, the metaballs still without their light. Throws Error(usage)
-    // naming a billboard that is not as splats.h wants it.
+    // Returns the splats that the camera sees in view order, the metaballs still without their light. Throws
+    // Error(usage) naming a billboard that is not as splats.h requires.
     ViewSortedSplats view_sorted() const { return view_sorted(cloud.cloud); }
     // The same of the billboards alone.
     ViewSortedSplats view_sorted_billboards() const { return view_sorted(PreparedCloud{}); }
-    // Returns the shells of air between the clouds, for which the light of `cloud` must be on the host.
+    // Returns the concentric shells of air around the eye that light shafts and fog are integrated over; none where a
+    // scene has neither. Precondition: the light of `cloud` is on the host.
     AirShells shells() const { return shells(cloud.shadow); }
     // The same without the plane of the shade map that is made of the shadow map, which may be on a device.
     AirShells shells_without_light() const { return shells({}); }
@@ -79,32 +86,33 @@ struct FrameDescription {
     }
 };
 
-// Not thread-safe. Every function throws Error(gpu) or vk::SystemError when a device fails.
+// Not thread-safe. Every function throws Error(gpu) or vk::SystemError when a device fails; begin() also Error(usage)
+// when the picture exceeds a limit of the device, such as its number of splats.
 class Backend {
   public:
     virtual ~Backend() = default;
 
     virtual std::string name() const = 0;  // "cpu", "vulkan" or "blended"
-    virtual std::string device_name()
-        const = 0;                         // of the Vulkan device, or the processor's vectors and threads
-    virtual int longest_part() const = 0;  // side of a part of the picture, pixels
-    virtual int largest_shadow_map() const = 0;  // side, texels
+    // The Vulkan device's name; of cpu, the SIMD instruction set and the number of threads: "cpu (AVX2, 8 threads)".
+    virtual std::string device_name() const = 0;
+    virtual int longest_part() const = 0;        // largest supported side of a FramePart, pixels
+    virtual int largest_shadow_map() const = 0;  // largest supported side, texels
 
     // Computes all light of a cloud, whether a picture shows it or not, and leaves it on the host.
     virtual void light_all(LitCloud& cloud, StageTimes& times) = 0;
-    // Copies the light of a cloud to the host unless it is there: that which the last begin() or light_all()
-    // computed.
+    // Copies the light of a cloud from the device to the host unless it is there. Precondition: the cloud is the one
+    // last passed to begin() or light_all(); that is not checked.
     virtual void fetch_light(LitCloud&) {}
 
-    // Draws a picture, or begins to: then returns true, and the picture must stay where it is until finish()
-    // or abandon(). At most two are in flight; begin() waits for earlier ones.
+    // Draws a picture. Returns false if it is complete, true if it is in flight: then `picture` must not move until
+    // finish() or abandon(). Two parts may be in flight; begin() blocks until a slot is free.
     virtual bool begin(const FrameDescription& frame, Picture& picture) = 0;
-    // Waits until a picture in flight is complete. Throws what failed in flight.
+    // Waits until a picture in flight is complete. Throws the error of a part that failed in flight.
     virtual void finish(Picture&) {}
-    // Waits for a picture in flight and throws it away.
+    // Waits for a picture in flight and discards it.
     virtual void abandon(const Picture&) noexcept {}
 
-    // Whether it marches through clouds with detail (LitCloud::volumes); otherwise it draws their metaballs.
+    // Returns whether it ray-marches volumes with detail (LitCloud::volumes); otherwise it draws their metaballs.
     virtual bool marches() const { return false; }
 
     virtual std::vector<std::string> validation_messages() const { return {}; }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A voxel cloud with detail (density/detail.h) as back-ends march it, and the light in it: optical depths towards
-// the sun and how much of sky and ground is seen, at the corners of the lattice's cells. Private to the module.
+// A voxel cloud with detail (density/detail.h) as back-ends march it, and the light in it: optical depths towards the
+// sun, diffuse sunlight, and the light of sky and ground, at the corners of the lattice's cells. Private to the module.
 
 #include <cstdint>
 #include <span>
@@ -28,7 +28,7 @@ struct CloudVolume {
     // Mean extinction of each cell of each brick that holds cloud, per metre.
     std::vector<float> extinction;
     // kLightNodesOfBrick numbers for each such brick and one more: 65535 sqrt(depth / kMostMarchedDepth), and the
-    // fractions of the sky (lower byte) and of the ground (upper byte) that are seen, 0..255.
+    // fractions of light from the sky (lower byte) and from the ground (upper byte), 0..255 (diffuse_surroundings()).
     std::vector<std::uint16_t> sun_depths, surroundings;
     // Sunlight that this volume alone attenuates: on the way out, at the corners of all bricks (x fastest, bricks + 1 on
     // each axis), and like sun_depths, where there are other volumes.
@@ -46,7 +46,7 @@ struct CloudVolume {
 // the largest cells; at least 1, and 0 without volumes.
 double footprint_scale(std::span<const CloudVolume> volumes);
 
-// Whether sunlight that is scattered often diffuses from cell to cell: with MultipleScattering::diffusion, but for the
+// Returns whether multiply scattered sunlight diffuses from cell to cell: with MultipleScattering::diffusion, but for the
 // absorption of T.
 bool diffuses(const CloudLight& light);
 

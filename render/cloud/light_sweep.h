@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Optical depth towards a distant light, through the cells of a CoverageField: one sweep over the lattice, slice by
-// slice away from the light. Every line along the light is carried from slice to slice without being resampled, so
-// that depth does not spread sideways. Private to the module.
+// Optical depth towards a directional light, by a sweep over the lattice of a CoverageField, slice by slice away
+// from the light. It is accumulated along lines parallel to the light, one for each cell of a slice, that are
+// sheared against the lattice. The sum of a line is never interpolated onto another, as it is where each slice is
+// resampled from the one before: no numerical diffusion widens shadows with the distance. Extinction that enters a
+// line, and depths that are read out at nodes, are interpolated, once.
+//
+// Serves sunlight; the light of sky and ground diffuses (diffusion.h). Private to the module.
 
 #include <array>
 #include <span>
@@ -14,35 +18,41 @@
 
 namespace nephos {
 
-inline constexpr int kLightNodes = 5;  // on an edge of a brick: the corners of its cells
+// Light is stored at the corners of cells, not at the nodes of CoverageField, which are half a cell apart.
+inline constexpr int kLightNodes = 5;  // on an edge of a brick
 inline constexpr std::size_t kLightNodesOfBrick = std::size_t(kLightNodes) * kLightNodes * kLightNodes;
 
-// The lines of a sweep as they leave the lattice.
+// The accumulated depth behind the lattice: a two-dimensional shadow, extruded along the light.
 class LightFront {
   public:
-    // Returns the optical depth of the whole line through a point.
+    // Returns the optical depth of the whole line through a point, wherever on it the point lies, also between the
+    // light and the cloud; 0 beside the cloud's shadow.
     float depth_at(const Vec3& point_m) const;
 
   private:
     friend LightFront sweep(const CoverageField&, std::span<const float>, const Vec3&, std::span<float>,
                             std::span<float>);
     float at(double u, double v) const;
-    // Fills width x height numbers, x fastest, for lines (u, v), (u + 1, v) ...
+    // Interpolates depths at the width x height points (u, v), (u + 1, v) ..., x fastest.
     void resample(double u, double v, int width, int height, std::vector<float>& to) const;
 
     Vec3 corner_m_{};
-    double cell_m_ = 1, plane_ = 0;  // of the face that the light leaves by, cells
-    int axes_[3] = {0, 1, 2};        // across, across, along
-    double shift_[2] = {};           // across by each cell along, cells
-    double first_[2] = {};           // number of the first line on each axis
-    int lines_[2] = {};
-    bool downwards_ = true;  // along the axis
-    std::vector<float> depth_;
+    double cell_m_ = 1, plane_ = 0;  // plane_: number of cells along the sweep axis
+    int axes_[3] = {0, 1, 2};        // two transverse axes, and the sweep axis
+    double shift_[2] = {};           // shear: cells across for each cell along the sweep
+    double first_[2] = {};           // number of the first line on each transverse axis
+    int lines_[2] = {};              // number of lines on each of these
+    bool downwards_ = true;          // the light travels towards negative coordinates of the sweep axis
+    std::vector<float> depth_;       // of each line, the first transverse axis fastest
 };
 
-// Sums extinction (per metre; one number a cell of each brick that holds cloud, x fastest) from the light on.
-// `depths` gets the optical depth at the corners of cells: kLightNodesOfBrick for each such brick, x fastest.
-// `corners`, unless it is empty, gets those at the corners of all bricks: (bricks + 1) on each axis, x fastest.
+// Integrates extinction from the light on. With n = field.places().size(), the bricks that hold cloud:
+//   extinction  per metre, 64 n numbers: one for each cell of each such brick, x fastest
+//   to_light    unit vector towards the light
+//   depths      gets kLightNodesOfBrick n optical depths: at the corners of cells of each such brick, x fastest
+//   corners     empty, or gets those at the corners of all bricks: (bricks + 1) on each axis, x fastest
+// These sizes and the length of `to_light` are preconditions. Periodic sides are not wrapped around: beyond the
+// padding of the field (CoverageField::corner_m()) there is no cloud. Serial; sweeps may run in parallel.
 LightFront sweep(const CoverageField& field, std::span<const float> extinction, const Vec3& to_light,
                  std::span<float> depths, std::span<float> corners = {});
 
