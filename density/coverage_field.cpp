@@ -201,34 +201,75 @@ void CoverageField::sample_nodes(const CoverageCells& cells, const NodeSums& sum
     nodes_.resize(kept * kBrickBytes);
 }
 
-// The cells are those of the closed form; what they lack of the grid's mass then makes all denser.
+namespace {
+
+constexpr std::size_t kSamples = 2 * kCells;  // on an edge of a brick
+constexpr std::size_t kOfBrick = std::size_t(kCells) * kCells * kCells;
+using CellSums = std::array<float, kOfBrick>;
+
+// Sums the eight samples of each cell.
+CellSums sums_of_cells(std::span<const float> samples) {
+    CellSums sums;
+    for (std::size_t cell = 0; cell < sums.size(); ++cell) {
+        const std::size_t x = cell % kCells, y = cell / kCells % kCells, z = cell / kCells / kCells;
+        const float* const from = &samples[((2 * z) * kSamples + 2 * y) * kSamples + 2 * x];
+        sums[cell] = 0;
+        for (const std::size_t row : {std::size_t{0}, kSamples, kSamples * kSamples, kSamples * (kSamples + 1)})
+            sums[cell] += from[row] + from[row + 1];
+    }
+    return sums;
+}
+
+// Adds up the cells of a brick that are counted.
+double mass_of(const CellSums& sums, const std::array<int, 3>& brick,
+               const std::array<std::vector<std::uint8_t>, 3>& counted) {
+    double mass = 0;
+    for (std::size_t cell = 0; cell < kOfBrick; ++cell) {
+        const std::size_t at[3] = {cell % kCells, cell / kCells % kCells, cell / kCells / kCells};
+        bool is_counted = true;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            is_counted = is_counted && counted[axis][std::size_t(brick[axis]) * kCells + at[axis]] != 0;
+        if (is_counted) mass += double(sums[cell]);
+    }
+    return mass;
+}
+
+}  // namespace
+
+// The cells are those of the closed form; what they lack of the grid's mass then makes all denser: as measured with a
+// footprint of half a cell, and with one at which all of the medium noise is there.
 void CoverageField::measure_cells(const std::array<std::vector<std::uint8_t>, 3>& counted) {
-    constexpr std::size_t kSamples = 2 * kCells, kOfBrick = kCells * kCells * kCells;
+    constexpr double kFineFootprint_m = 13, kCoarseFootprint_m = 25;  // of ErosionConstants::gain, scaled
+    const std::size_t stride = places_.size() < 1024 ? 1 : 4;          // of bricks with fine samples
     cell_density_.assign(places_.size() * kOfBrick, 0.0f);
-    std::vector<double> sums(places_.size(), 0);
+    std::vector<std::array<double, 3>> masses(places_.size(), {0, 0, 0});  // coarse, and both where there are fine ones
     tbb::parallel_for(std::size_t{0}, places_.size(), [&](std::size_t n) {
         std::array<float, kSamples * kSamples * kSamples> samples;
-        detailed_density_of_brick(*this, n, samples);
-        float* const to = &cell_density_[n * kOfBrick];
         const auto at = unpacked(std::size_t(places_[n]), bricks_);
-        for (std::size_t cell = 0; cell < kOfBrick; ++cell) {
-            const std::size_t x = cell % kCells, y = cell / kCells % kCells, z = cell / kCells / kCells;
-            const float* const from = &samples[((2 * z) * kSamples + 2 * y) * kSamples + 2 * x];
-            float sum = 0;
-            for (const std::size_t row : {std::size_t{0}, kSamples, kSamples * kSamples, kSamples * (kSamples + 1)})
-                sum += from[row] + from[row + 1];
-            to[cell] = 0.125f * sum;
-            const bool is_counted = counted[0][std::size_t(at[0]) * kCells + x] != 0 &&
-                                    counted[1][std::size_t(at[1]) * kCells + y] != 0 &&
-                                    counted[2][std::size_t(at[2]) * kCells + z] != 0;
-            if (is_counted) sums[n] += double(sum);
-        }
+        detailed_density_of_brick(*this, n, node_m_, BrickSamples::middles, samples);
+        const CellSums sums = sums_of_cells(samples);
+        for (std::size_t cell = 0; cell < kOfBrick; ++cell) cell_density_[n * kOfBrick + cell] = 0.125f * sums[cell];
+        masses[n][0] = mass_of(sums, at, counted);
+        if (n % stride != 0) return;
+        masses[n][1] = masses[n][0];
+        detailed_density_of_brick(*this, n, kFineFootprint_m / double(erosion_.footprint_scale), BrickSamples::quarters,
+                                  samples);
+        masses[n][2] = mass_of(sums_of_cells(samples), at, counted);
     });
-    const double sum = std::accumulate(sums.begin(), sums.end(), 0.0);
-    if (!(sum > 0)) return;
-    const auto more = float(std::clamp(mass_ / sum, 0.5, 2.0));
-    for (float& gain : erosion_.gain) gain *= more;
-    for (float& density : cell_density_) density *= more;
+    std::array<double, 3> sums{};
+    for (const auto& each : masses)
+        for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += each[i];
+    if (!(sums[0] > 0) || !(sums[2] > 0)) return;
+    const double more = std::clamp(mass_ / sums[0], 0.5, 2.0), fine = std::clamp(more * sums[1] / sums[2], 0.5, 2.0);
+    // The footprint of half a cell lies between those of the two gains; all three are to have the mass.
+    const double between = std::clamp((node_m_ * double(erosion_.footprint_scale) - kFineFootprint_m) /
+                                          (kCoarseFootprint_m - kFineFootprint_m), 0.0, 1.0);
+    const double here = erosion_.gain[0] + between * (erosion_.gain[1] - erosion_.gain[0]),
+                 fine_gain = erosion_.gain[0] * fine;
+    erosion_.gain[0] = float(fine_gain);
+    erosion_.gain[1] =
+        float(between > 0.25 ? (more * here - (1 - between) * fine_gain) / between : more * erosion_.gain[1]);
+    for (float& density : cell_density_) density *= float(more);
 }
 
 // Mass of the field to that of the detailed field with gain 1, in the mean over the noise.

@@ -51,7 +51,8 @@ void sample_places(const DetailKernel& field, std::int32_t brick, const float* c
 
 // Detailed density in the middles of the 8 x 8 x 8 boxes between the nodes of a brick, x fastest; `corner`: of the
 // brick, metres from that of the field.
-void sample_brick(const DetailKernel& field, std::int32_t brick, const float* corner, float* out) {
+void sample_brick(const DetailKernel& field, std::int32_t brick, const float* corner, float footprint,
+                  BrickSamples samples, float* out) {
     using namespace erosion;
     const Lanes d;
     constexpr std::size_t kSide = CoverageField::kBrickNodes - 1, kCount = kSide * kSide * kSide,
@@ -67,15 +68,18 @@ void sample_brick(const DetailKernel& field, std::int32_t brick, const float* co
             continue;
         }
         for (std::size_t i = 0; i < lanes; ++i) {
-            middle[0][i] = float((n + i) % kSide) + 0.5f;
-            middle[1][i] = float((n + i) / kSide % kSide) + 0.5f;
-            middle[2][i] = float((n + i) / kSide / kSide) + 0.5f;
+            const std::size_t at[3] = {(n + i) % kSide, (n + i) / kSide % kSide, (n + i) / kSide / kSide};
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                const std::size_t others = at[(axis + 1) % 3] + at[(axis + 2) % 3];
+                const float inside = samples == BrickSamples::middles ? 0.5f : others % 2 == 0 ? 0.25f : 0.75f;
+                middle[axis][i] = float(at[axis]) + inside;
+            }
         }
         const Floats x = hn::Load(d, middle[0]), y = hn::Load(d, middle[1]), z = hn::Load(d, middle[2]);
         const Node node = node_at(field, integer(brick), x, y, z);
         const Floats metres = number(field.node_m);
         const auto place = [&](Floats local, int axis) { return hn::MulAdd(local, metres, number(corner[axis])); };
-        const Eroded result = eroded(field, node, place(x, 0), place(y, 1), place(z, 2), metres,
+        const Eroded result = eroded(field, node, place(x, 0), place(y, 1), place(z, 2), number(footprint),
                                      hn::FirstN(d, lanes));
         hn::StoreU(result.density, d, out + n);
     }
@@ -178,12 +182,13 @@ std::vector<float> detailed_density(const CoverageField& field, const Vec3& corn
     return result;
 }
 
-void detailed_density_of_brick(const CoverageField& field, std::size_t number, std::span<float> out) {
+void detailed_density_of_brick(const CoverageField& field, std::size_t number, double footprint_m,
+                               BrickSamples samples, std::span<float> out) {
     const DetailKernel kernel(field);
     const auto at = unpacked(field.places()[number], field.bricks());
     float corner[3];
     for (std::size_t axis = 0; axis < 3; ++axis) corner[axis] = float(at[axis] * field.node_m() * (kEdge - 1));
-    HWY_DYNAMIC_DISPATCH(sample_brick)(kernel, std::int32_t(number), corner, out.data());
+    HWY_DYNAMIC_DISPATCH(sample_brick)(kernel, std::int32_t(number), corner, float(footprint_m), samples, out.data());
 }
 
 float detailed_density_at(const CoverageField& field, const Vec3& place_m, float footprint) {

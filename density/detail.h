@@ -147,9 +147,14 @@ class CoverageField {
 std::vector<float> detailed_density(const CoverageField& field, const Vec3& corner_m,
                                     const std::array<int, 3>& count, double footprint_m);
 
-// The same in the middles of the 8 x 8 x 8 boxes between the nodes of a brick, x fastest, with the footprint
-// node_m(). `number` indexes places(). Precondition: out.size() >= 512.
-void detailed_density_of_brick(const CoverageField& field, std::size_t number, std::span<float> out);
+// Where a brick is sampled: in the middle of the boxes between its nodes, or a quarter of one away from it on each axis,
+// to either side, which stands for samples finer than the boxes.
+enum class BrickSamples { middles, quarters };
+
+// Returns the detailed density in each of the 8 x 8 x 8 boxes between the nodes of a brick, x fastest. `number` indexes
+// places(); `footprint_m`: filter width of the noise; `out` has at least 512 numbers.
+void detailed_density_of_brick(const CoverageField& field, std::size_t number, double footprint_m,
+                               BrickSamples samples, std::span<float> out);
 
 // The same for one point, in scalar code: the test reference of the SIMD kernels and shaders.
 float detailed_density_at(const CoverageField& field, const Vec3& place_m, float footprint_m);
