@@ -55,16 +55,59 @@ HWY_INLINE Floats3 sky_layer(const PictureFrame& frame, Floats across, Floats up
     return {channel(texels), channel(texels + 1), channel(texels + 2)};
 }
 
-HWY_INLINE Floats3 sky_scattered(const PictureFrame& frame, const Floats3& ray) {
+// Returns the cosine of the azimuth between rays and the sun.
+HWY_INLINE Floats beside_sun(const PictureFrame& frame, const Floats3& ray) {
     const Floats one = set(1.0f);
     const Floats level = hn::MulAdd(ray.x, ray.x, hn::Mul(ray.y, ray.y));
     const float sun_level = frame.to_sun.x * frame.to_sun.x + frame.to_sun.y * frame.to_sun.y;
     const Floats beside = hn::Div(hn::MulAdd(ray.x, set(frame.to_sun.x), hn::Mul(ray.y, set(frame.to_sun.y))),
                                   hn::Sqrt(hn::Max(hn::Mul(level, set(sun_level)), set(1.0e-12f))));
-    const Floats across = sky_across(hn::Max(hn::Min(beside, one), hn::Neg(one))),
-                 upwards = sky_upwards(hn::Min(hn::Abs(ray.z), one));
+    return hn::Max(hn::Min(beside, one), hn::Neg(one));
+}
+
+HWY_INLINE Floats3 sky_scattered(const PictureFrame& frame, const Floats3& ray) {
+    const Floats across = sky_across(beside_sun(frame, ray)),
+                 upwards = air_row(hn::Max(ray.z, set(frame.earth.x)), frame.earth.x);
     const Floats phase = particle_phase(dot(set3(frame.to_sun), ray), frame.air.y);
     return times_add(phase, sky_layer(frame, across, upwards, 1), sky_layer(frame, across, upwards, 0));
+}
+
+// A place in the table of air between four texels.
+struct AirPlace {
+    hn::Vec<hn::RebindToSigned<Lanes>> index;
+    Floats across, upwards;  // fractions
+};
+
+HWY_INLINE AirPlace air_place(const PictureFrame& frame, const Floats3& ray, Floats distance) {
+    const hn::RebindToSigned<Lanes> di;
+    constexpr int kColumns = int(shader::kSkyColumns), kRows = int(shader::kAirRows);
+    const float horizon = frame.earth.x;
+    const Floats x =
+                     hn::Mul(air_distance(distance, ray.z, horizon, frame.earth.y), set(float(kColumns - 1))),
+                 y = hn::Mul(air_row(ray.z, horizon), set(float(kRows - 1)));
+    const Floats x0 = hn::Min(hn::Floor(x), set(float(kColumns - 2))),
+                 y0 = hn::Min(hn::Floor(y), set(float(kRows - 2)));
+    const Floats first = hn::IfThenElseZero(hn::Ge(ray.z, set(horizon)), set(float(kRows)));
+    const auto row = hn::ConvertTo(di, hn::Add(y0, first));
+    return {hn::ShiftLeft<2>(hn::Add(hn::Mul(row, hn::Set(di, kColumns)), hn::ConvertTo(di, x0))),
+            hn::Sub(x, x0), hn::Sub(y, y0)};
+}
+
+// `layer`: from shader::kAirLayer on.
+HWY_INLINE Floats3 air_layer_at(const PictureFrame& frame, const AirPlace& place, std::size_t layer) {
+    const Lanes d;
+    constexpr std::size_t kColumns = shader::kSkyColumns, kTexels = kColumns * shader::kSkyRows;
+    const float* const texels = frame.sky + 4 * layer * kTexels;
+    const auto channel = [&](const float* from) {
+        const auto row = [&](const float* first) {
+            const Floats a = hn::GatherIndex(d, first, place.index),
+                         b = hn::GatherIndex(d, first + 4, place.index);
+            return hn::MulAdd(place.across, hn::Sub(b, a), a);
+        };
+        const Floats a = row(from), b = row(from + 4 * kColumns);
+        return hn::MulAdd(place.upwards, hn::Sub(b, a), a);
+    };
+    return {channel(texels), channel(texels + 1), channel(texels + 2)};
 }
 
 HWY_INLINE Floats3 sunlight_at(const PictureFrame& frame, Floats height) {
@@ -100,35 +143,38 @@ HWY_INLINE Floats3 sunlight_nearby(const PictureFrame& frame, Floats heights) {
     };
     return {channel(0), channel(1), channel(2)};
 }
+
 HWY_INLINE Floats3 air_transmittance(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
     if (frame.sky == nullptr) return decay(frame.air_extinction, distance_m);
     const Lanes d;
-    const Floats rayleigh = layer_column(frame.air.x, ray.z, distance_m, frame.rayleigh.w),
-                 haze = layer_column(frame.air.x, ray.z, distance_m, frame.haze.w);
-    const Floats3 depth = times_add(rayleigh, set3(frame.rayleigh), times(haze, set3(frame.haze)));
+    const Floats3 extinction =
+        air_layer_at(frame, air_place(frame, ray, distance_m), std::size_t(shader::kAirLayer));
+    const Floats3 depth = times(distance_m, extinction);
     return {hn::Exp(d, hn::Neg(depth.x)), hn::Exp(d, hn::Neg(depth.y)), hn::Exp(d, hn::Neg(depth.z))};
 }
 
-HWY_INLINE Floats3 endless_air(const PictureFrame& frame, const Floats3& ray) {
+HWY_INLINE Floats3 air_source(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
     if (frame.sky == nullptr) return set3(frame.horizon);
-    const Lanes d;
-    const Floats one = set(1.0f), slope = hn::Max(hn::Abs(ray.z), set(1.0e-5f));
-    const auto column = [&](float per_height) {
-        return hn::Div(set(std::exp(-frame.air.x * per_height) / per_height), slope);
+    const AirPlace place = air_place(frame, ray, distance_m);
+    const Floats cosine = beside_sun(frame, ray), square = hn::Mul(cosine, cosine), half = set(0.5f);
+    const Floats towards = hn::Mul(half, hn::Add(square, cosine)), beside = hn::Sub(set(1.0f), square),
+                 away = hn::Mul(half, hn::Sub(square, cosine));
+    const auto around = [&](std::size_t first) {
+        const auto layer = [&](std::size_t number) {
+            return air_layer_at(frame, place, std::size_t(shader::kAirLayer) + number);
+        };
+        return times_add(away, layer(first + 2),
+                         times_add(beside, layer(first + 1), times(towards, layer(first))));
     };
-    const Floats3 depth = times_add(column(frame.rayleigh.w), set3(frame.rayleigh),
-                                    times(column(frame.haze.w), set3(frame.haze)));
-    const auto fraction = [&](Floats part, Floats whole) {
-        return hn::Div(part, hn::Max(hn::Sub(one, hn::Exp(d, hn::Neg(whole))), set(1.0e-4f)));
-    };
-    const Floats3 sky = sky_scattered(frame, ray);
-    return {fraction(sky.x, depth.x), fraction(sky.y, depth.y), fraction(sky.z, depth.z)};
+    const Floats3 scattered = around(1), haze = around(4);
+    return times_add(particle_phase(dot(set3(frame.to_sun), ray), frame.air.y), haze, scattered);
 }
 
-HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, const Floats3& beta) {
+HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, Floats distance_m,
+                             const Floats3& beta) {
     const Floats one = set(1.0f);
     return each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)},
-                      endless_air(frame, ray));
+                      air_source(frame, ray, distance_m));
 }
 
 HWY_INLINE Floats3 gradient_sky(const PictureFrame& frame, Floats height) {
@@ -140,7 +186,7 @@ HWY_INLINE Floats3 gradient_sky(const PictureFrame& frame, Floats height) {
 }
 
 struct SunlitAir {
-    Floats3 endless, most;
+    Floats3 source, most;
     Floats molecules, particles;
 };
 
@@ -150,15 +196,15 @@ HWY_INLINE Floats3 least(const Floats3& a, const Floats3& b) {
 
 HWY_INLINE SunlitAir sunlit_air(const PictureFrame& frame, const Floats3& ray) {
     const Floats zero = hn::Zero(Lanes()), cosine = dot(set3(frame.to_sun), ray);
-    const Floats3 endless = endless_air(frame, ray);
+    const Floats3 source = air_source(frame, ray, set(shader::kShaftsReach));
     if (frame.sky != nullptr)
-        return {endless, endless, hn::Mul(set(shader::kPi), molecule_phase(cosine)),
+        return {source, source, hn::Mul(set(shader::kPi), molecule_phase(cosine)),
                 hn::Mul(set(shader::kPi * frame.air.z), particle_phase(cosine, frame.air.y))};
     const Floats phase = particle_phase(cosine, frame.zenith.w);
     const Floats direct = hn::Mul(set(frame.horizon.w * 4.0f * shader::kPi), phase);
     const Floats fraction = hn::Div(direct, hn::Add(direct, set(1.0f - frame.horizon.w + 1.0e-6f)));
     const Floats3 above = gradient_sky(frame, hn::Max(ray.z, zero));
-    return {endless, times(fraction, least(endless, above)), zero, zero};
+    return {source, times(fraction, least(source, above)), zero, zero};
 }
 
 HWY_INLINE Floats3 sunlit_at(const PictureFrame& frame, const SunlitAir& air, Floats height,

@@ -62,7 +62,7 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
     return hn::NegMulAdd(part, hn::Sub(one, gamma), one);
 }
 
-// exp(-extinction distance) of clear air (render/shading/air.glsl), to what fast_exp() is good for.
+// clear_air() of render/shading/air.glsl, to what fast_exp() is good for.
 HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floats distance) {
     const auto decayed = [](Floats x, Floats y, Floats z) {
         return Floats3{fast_exp(hn::Neg(x)), fast_exp(hn::Neg(y)), fast_exp(hn::Neg(z))};
@@ -71,9 +71,11 @@ HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floa
         const Floats3 depth = times(distance, set3(frame.air_extinction));
         return decayed(depth.x, depth.y, depth.z);
     }
+    const Floats level = hn::NegMulAdd(ray.z, ray.z, set(1.0f));
+    const Floats slope = hn::MulAdd(hn::Mul(level, set(frame.earth.z)), distance, ray.z);
     const auto column = [&](float per_height) {
         const float ground = std::exp(-frame.air.x * per_height);
-        const Floats x = hn::Mul(hn::Mul(ray.z, distance), set(per_height));
+        const Floats x = hn::Mul(hn::Mul(slope, distance), set(per_height));
         return hn::Mul(hn::Mul(set(ground), distance), mean_decay(x));
     };
     const Floats3 depth = times_add(column(frame.rayleigh.w), set3(frame.rayleigh),
@@ -174,10 +176,19 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
     const Floats patches = fog_patches(air, times(places.at, of.ray), begin, end);
     const Floats transmittance = fast_exp(hn::Neg(hn::Mul(fog.depth, patches)));
     const Floats way = hn::Div(hn::Sub(places.middle, begin), hn::Max(hn::Sub(end, begin), set(1.0e-6f)));
-    const Floats3 beta = hn::AllTrue(d, inside) ? mix(before, behind, {way, way, way})
-                                                : clear_air(frame, of.ray, places.middle);
+    Floats3 beta = hn::AllTrue(d, inside) ? mix(before, behind, {way, way, way})
+                                          : clear_air(frame, of.ray, places.middle);
+    Floats3 source = of.sunlit.source;
+    if (frame.sky != nullptr && !hn::AllTrue(d, inside)) {  // far away
+        const auto chosen = [&](const Floats3& near, const Floats3& far) {
+            return Floats3{hn::IfThenElse(inside, near.x, far.x), hn::IfThenElse(inside, near.y, far.y),
+                           hn::IfThenElse(inside, near.z, far.z)};
+        };
+        beta = chosen(beta, air_transmittance(frame, of.ray, places.middle));
+        source = chosen(source, air_source(frame, of.ray, places.middle));
+    }
     const Floats3 veil =
-        each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)}, of.sunlit.endless);
+        each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)}, source);
     const Floats3 of_fog = add(each_times(beta, fog_radiance(frame, of, places.middle, sunlight, lit)), veil);
     light = times(hn::MulAdd(set(0.5f), transmittance, set(0.5f)), light);
     return {times_add(hn::Sub(one, transmittance), of_fog, light), transmittance, places.middle};
