@@ -202,9 +202,11 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
     const CameraFrame camera = camera_frame(options.camera);
     const DetailView detail{camera.position_m, pixels_per_unit(options.camera, camera)};
     Picture picture = draw(splats, options, detail);
-    WetGround ground{options, *splats.ground_cover, splats.flash ? &*splats.flash : nullptr, splats.time_s};
+    static const GroundCoverView kDry;
+    const GroundCoverView& cover = splats.ground_cover ? *splats.ground_cover : kDry;
+    WetGround ground{options, cover, splats.flash ? &*splats.flash : nullptr, splats.time_s};
     std::optional<MirrorView> mirror;
-    if (shows_reflections(options, *splats.ground_cover)) {
+    if (shows_reflections(options, cover)) {
         RenderOptions below = options;
         below.camera =
             mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
@@ -258,7 +260,8 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
     const auto work = [&] {
         auto state = std::make_unique<PendingPicture::State>(splats, options);
         impl_->times = {};
-        if (splats.ground_cover && shows_wet_ground(options, *splats.ground_cover)) {
+        const bool wet = splats.ground_cover && shows_wet_ground(options, *splats.ground_cover);
+        if (wet || shows_country(options)) {
             state->picture = impl_->draw_with_ground(splats, options);
         } else {
             const CameraFrame camera = camera_frame(options.camera);

@@ -120,4 +120,19 @@ SkyTable AirColours::sky(double eye_altitude_m, double sun_elevation_deg) const 
     return {mixed(first.scattered, second.scattered), mixed(first.haze, second.haze)};
 }
 
+AirTable AirColours::air(double eye_altitude_m, double sun_elevation_deg) const {
+    AirTable air = bands_.front().air(eye_altitude_m, sun_elevation_deg);
+    if (bands_.size() == 1) return air;
+    const AirTable second = bands_.back().air(eye_altitude_m, sun_elevation_deg);
+    air.transmittance = mixed(air.transmittance, second.transmittance);
+    const Rgb white = above_air();
+    for (std::size_t i = 0; i < air.transmittance.size(); ++i)
+        if (i % 4 < 3) air.transmittance[i] = std::min(1.0f, air.transmittance[i] / float(white[i % 4]));
+    for (std::size_t a = 0; a < 3; ++a) {
+        air.scattered[a] = mixed(air.scattered[a], second.scattered[a]);
+        air.haze[a] = mixed(air.haze[a], second.haze[a]);
+    }
+    return air;
+}
+
 }  // namespace nephos

@@ -20,12 +20,14 @@ class AirColours {
     const AtmosphereModel& model() const { return model_; }
     SkyColours colours() const { return colours_; }
 
-    // The functions of Atmosphere, as colours.
+    // The functions of Atmosphere, as colours. Transmittances of AirTable are those of the sun's light above the
+    // air, for which they are 1 without air.
     Rgb above_air() const;  // of the sun
     Rgb transmittance(double altitude_m, double sine) const;
     Rgb sunlight(double altitude_m, double sun_elevation_deg) const;
     SkyIrradiance irradiance(double altitude_m, double sun_elevation_deg) const;
     SkyTable sky(double eye_altitude_m, double sun_elevation_deg) const;
+    AirTable air(double eye_altitude_m, double sun_elevation_deg) const;
 
   private:
     template <class Light>

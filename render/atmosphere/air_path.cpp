@@ -203,8 +203,8 @@ Densities densities(const SphericalAir& air, double radius) {
             std::max(0.0, 1 - std::abs(altitude - air.ozone_centre) * air.per_ozone_half_width)};
 }
 
-// One part from `begin` to `end`; `transmittance` is that from the eye to its begin and becomes that to its
-// end.
+}  // namespace
+
 AirPart air_part(const SphericalAir& air, double radius, double sine, double begin, double end,
                  double (&transmittance)[3]) {
     constexpr int kFine = 4;
@@ -238,8 +238,6 @@ AirPart air_part(const SphericalAir& air, double radius, double sine, double beg
     }
     return result;
 }
-
-}  // namespace
 
 SphericalAir::SphericalAir(const AtmosphereModel& m)
     : ground(m.ground_radius_m / kKilometre),

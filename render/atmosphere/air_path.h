@@ -62,6 +62,11 @@ struct AirPath {
 // the ray is lowest, 1 equal.
 AirPath air_path(const SphericalAir& air, double radius, double sine, std::size_t parts, double even = 0);
 
+// Returns one part of a path, from `begin` to `end`; `transmittance` is that from the eye to its begin and becomes
+// that to its end.
+AirPart air_part(const SphericalAir& air, double radius, double sine, double begin, double end,
+                 double (&transmittance)[3]);
+
 // Tables in the kernel's layout: planes for red, green, blue (of `columns`: rayleigh, mie, ozone), rows of
 // radii.
 struct AirTables {

@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "render/atmosphere/air_path.h"
+#include "render/atmosphere/atmosphere_tables.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
@@ -80,7 +81,8 @@ struct Suns {
 
 double mix(double a, double b, double fraction) { return a + fraction * (b - a); }
 
-// Samples a plane of logarithms bilinearly and returns the exponential.
+}  // namespace
+
 double between_logs(const float* plane, double column, double row, std::size_t rows) {
     const double x = std::clamp(column, 0.0, double(kSunSines - 1) - 1e-9),
                  y = std::clamp(row, 0.0, double(rows - 1) - 1e-9);
@@ -89,31 +91,6 @@ double between_logs(const float* plane, double column, double row, std::size_t r
     return std::exp(mix(mix(double(a[0]), double(a[1]), x - double(i)),
                         mix(double(b[0]), double(b[1]), x - double(i)), y - double(j)));
 }
-
-}  // namespace
-
-struct Atmosphere::Tables {
-    explicit Tables(const AtmosphereModel& m);
-
-    Rgb optical_depth(double radius, double sine) const;
-    Rgb sunlight(double radius, double sine) const;
-    Rgb from_sun_on_ground(double sine) const;
-    Rgb irradiance(std::size_t kind, double altitude_km, double sine) const;
-    void make_columns();
-    void make_psi();
-    void make_psi_row(std::size_t row, std::vector<float>& psi) const;
-    void make_irradiances();
-    void make_irradiance_row(std::size_t row, std::size_t first_kind, std::size_t end_kind);
-    Rgb ground_radiance(const AirPath& path, double sun, double cos_to_sun, bool with_sky) const;
-
-    AtmosphereModel model;
-    SphericalAir air;
-    AirTables tables;
-    std::vector<float> ground_sun;  // irradiance on the ground, by the sun's sine: kGroundSuns, 3 planes
-    // Logarithms, by height and sun: 3 planes each of light from above, from below and sideways.
-    std::array<std::vector<float>, 3> irradiances;
-    static constexpr std::size_t kGroundSuns = 4 * kSunSines;
-};
 
 Atmosphere::Tables::Tables(const AtmosphereModel& m) : model(m), air(m) {
     make_columns();
@@ -338,15 +315,6 @@ Atmosphere& Atmosphere::operator=(Atmosphere&&) noexcept = default;
 
 const AtmosphereModel& Atmosphere::model() const { return tables_->model; }
 
-namespace {
-
-double radius_at(const SphericalAir& air, double altitude_m) {
-    return std::clamp(air.ground + altitude_m / 1000, air.ground, air.top - 1e-3);
-}
-double sine_of(double degrees) { return std::sin(degrees * kPi / 180); }
-
-}  // namespace
-
 Rgb Atmosphere::transmittance(double altitude_m, double sine) const {
     const double radius = radius_at(tables_->air, altitude_m);
     if (sine < tables_->air.horizon_sine(radius)) return {};
@@ -377,6 +345,7 @@ SkyTable Atmosphere::sky(double eye_altitude_m, double sun_elevation_deg) const 
     const SphericalAir& air = tables_->air;
     const double radius = radius_at(air, eye_altitude_m), sun = sine_of(sun_elevation_deg),
                  sun_cosine = std::sqrt(1 - sun * sun);
+    const double horizon = air.horizon_sine(radius) + 1e-7;  // misses the ground
     constexpr std::size_t kColumns = shader::kSkyColumns, kRows = shader::kSkyRows;
     static_assert(kColumns % kAirLanes == 0);
     SkyTable sky;
@@ -386,7 +355,8 @@ SkyTable Atmosphere::sky(double eye_altitude_m, double sun_elevation_deg) const 
     const bool twilight = sun_elevation_deg < -3;
     const std::vector<float> suns(kColumns, float(sun));
     tbb::parallel_for(std::size_t{0}, kRows, [&](std::size_t row) {
-        const double v = double(row) / double(kRows - 1), q = v * v, sine = q * (2 - q);
+        const double v = double(row) / double(kRows - 1), q = v * v;
+        const double sine = horizon + (1 - horizon) * q * (2 - q);
         const AirPath path = twilight ? air_path(air, radius, sine, kTwilightParts, 0.5)
                                       : air_path(air, radius, sine, kDayParts);
         std::vector<float> cos_to_sun(kColumns);

@@ -71,6 +71,19 @@ struct SkyTable {
     std::vector<float> haze;       // single scattering by particles, without their phase function
 };
 
+// The air along rays up to a distance, for one elevation of the sun and one height of the eye, four numbers a
+// texel: kSkyColumns distances by kSkyRows elevations, by air_distance() and air_row(). Radiances are those of
+// SkyTable, towards the azimuth of the sun, at right angles to it and away from it; between, they are square in
+// its cosine, as the phase function of molecules is.
+struct AirTable {
+    std::vector<float> transmittance;
+    std::array<std::vector<float>, 3> scattered, haze;
+};
+
+// Returns the distance of a column of an AirTable, metres; `row` says the side of the horizon.
+double air_table_distance_m(const AtmosphereModel& model, double eye_altitude_m, std::size_t row,
+                            std::size_t column);
+
 class Atmosphere {
   public:
     explicit Atmosphere(const AtmosphereModel& model);
@@ -89,8 +102,10 @@ class Atmosphere {
     Rgb multiple_scattering(double altitude_m, double sun_sine) const;
     SkyIrradiance irradiance(double altitude_m, double sun_elevation_deg) const;
 
-    // Computes the sky for directions from the horizontal to the zenith.
+    // Computes the sky for directions from the horizon, which dips with the eye's height, to the zenith.
     SkyTable sky(double eye_altitude_m, double sun_elevation_deg) const;
+    // Computes the air up to distances, for directions from straight down to straight up.
+    AirTable air(double eye_altitude_m, double sun_elevation_deg) const;
 
   private:
     struct Tables;

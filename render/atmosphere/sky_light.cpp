@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "render/shared/shared.h"
@@ -36,10 +37,13 @@ void set_disc(const AirColours& air, const RenderOptions& options, const Rgb& su
     constexpr Rgb kMiddle{1 + double(shader::kLimbDarkeningRed) / 2,
                           1 + double(shader::kLimbDarkeningGreen) / 2,
                           1 + double(shader::kLimbDarkeningBlue) / 2};
-    light.has_disc = options.atmosphere.sun_disc && elevation_deg > -kSunRadius_deg - 0.01;
+    const double eye = air.model().ground_radius_m + light.eye_altitude_m,
+                 horizon = -std::sqrt(1 - std::pow(air.model().ground_radius_m / eye, 2)) + 1e-6;
+    light.has_disc =
+        options.atmosphere.sun_disc && std::sin(radians(elevation_deg + kSunRadius_deg + 0.01)) > horizon;
     if (!light.has_disc) return;
     const double radius = radians(kSunRadius_deg),
-                 low = std::max(std::sin(radians(elevation_deg)) - radius, 0.0);
+                 low = std::max(std::sin(radians(elevation_deg)) - radius, horizon);
     const Rgb below = air.transmittance(light.eye_altitude_m, low),
               above = air.transmittance(light.eye_altitude_m, std::min(low + 2 * radius, 1.0));
     // A channel that has faded away has no slope.
@@ -76,23 +80,26 @@ double elevation_of_node(double node) {
     return elevation;
 }
 
-const SkyTable& SkyLights::table(int node, double eye_altitude_m) {
+const SkyLights::Kept& SkyLights::table(int node, double eye_altitude_m) {
     const auto found = std::ranges::find_if(
         kept_, [&](const Kept& kept) { return kept.node == node && kept.eye_altitude_m == eye_altitude_m; });
     if (found != kept_.end()) {
         kept_.splice(kept_.begin(), kept_, found);
     } else {
-        kept_.push_front({node, eye_altitude_m, atmosphere_->sky(eye_altitude_m, elevation_of_node(node))});
+        const double elevation = elevation_of_node(node);
+        kept_.push_front({node, eye_altitude_m, atmosphere_->sky(eye_altitude_m, elevation),
+                          atmosphere_->air(eye_altitude_m, elevation)});
         if (kept_.size() > kKept) kept_.pop_back();
     }
-    return kept_.front().table;
+    return kept_.front();
 }
 
 void SkyLights::mix_tables(const RenderOptions& options, double elevation_deg) {
     const double node = sun_node(elevation_deg), low = std::floor(node);
     const auto fraction = float(node - low);
-    const SkyTable& a = table(int(low), light_.eye_altitude_m);
-    const SkyTable& b = fraction > 0 ? table(int(low) + 1, light_.eye_altitude_m) : a;
+    const Kept& first = table(int(low), light_.eye_altitude_m);
+    const Kept& second = fraction > 0 ? table(int(low) + 1, light_.eye_altitude_m) : first;
+    const SkyTable &a = first.table, &b = second.table;
     const Rgb sun_above_air = adapted_sun(options, elevation_deg);
     light_.texels.assign(4 * kTexels * shader::kSkyLayers, 0.0f);
     float *scattered = light_.texels.data(), *haze = scattered + 4 * kTexels, *sun = haze + 4 * kTexels;
@@ -116,7 +123,34 @@ void SkyLights::mix_tables(const RenderOptions& options, double elevation_deg) {
             for (std::size_t c = 0; c < 3; ++c)
                 sun[4 * (row * shader::kSkyColumns + i) + c] = float(light[c]);
     }
+    mix_air(first.air, second.air, fraction, times(kPi, sun_above_air), options.atmosphere.night);
     ++light_.serial;
+}
+
+// Fills the layers of the air up to distances: the extinction, and the sources, of which 1 - transmittance is seen.
+void SkyLights::mix_air(const AirTable& a, const AirTable& b, float fraction, const Rgb& sun, const Rgb& night) {
+    constexpr std::size_t kLayer = 4 * kTexels;
+    const std::vector<float>* const first[] = {&a.scattered[0], &a.scattered[1], &a.scattered[2], &a.haze[0],
+                                               &a.haze[1],      &a.haze[2]};
+    const std::vector<float>* const second[] = {&b.scattered[0], &b.scattered[1], &b.scattered[2], &b.haze[0],
+                                                &b.haze[1],      &b.haze[2]};
+    float* const extinction = light_.texels.data() + std::size_t(shader::kAirLayer) * kLayer;
+    for (std::size_t i = 0; i < kLayer; ++i) {
+        const std::size_t c = i % 4, column = i / 4 % shader::kSkyColumns,
+                          row = i / 4 / shader::kSkyColumns;
+        if (c == 3) continue;
+        const double left = std::clamp(double(a.transmittance[i]), 1e-12, 1 - 1e-9);
+        const double distance_m =
+            air_table_distance_m(light_.model, light_.eye_altitude_m, row, column);
+        extinction[i] = float(-std::log(left) / distance_m);
+        for (std::size_t layer = 0; layer < std::size(first); ++layer) {
+            const float low = (*first[layer])[i], high = (*second[layer])[i];
+            const double light = double(low + fraction * (high - low));
+            // The night shines in what is scattered.
+            extinction[(layer + 1) * kLayer + i] =
+                float(sun[c] * light / (1 - left) + (layer < 3 ? night[c] : 0.0));
+        }
+    }
 }
 
 // Returns the sun's colour above the air, in units of radiance, with the adaptation of exposure.

@@ -49,9 +49,11 @@ class SkyLights {
         int node = 0;
         double eye_altitude_m = 0;
         SkyTable table;
+        AirTable air;
     };
-    const SkyTable& table(int node, double eye_altitude_m);
+    const Kept& table(int node, double eye_altitude_m);
     void mix_tables(const RenderOptions& options, double elevation_deg);
+    void mix_air(const AirTable& a, const AirTable& b, float fraction, const Rgb& sun, const Rgb& night);
     Rgb adapted_sun(const RenderOptions& options, double elevation_deg) const;
 
     std::optional<AirColours> atmosphere_;

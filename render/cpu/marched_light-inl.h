@@ -218,7 +218,7 @@ HWY_INLINE Floats3 marched_radiance(const ViewScene& scene, const MarchedVolume&
         arriving = times_add(hn::Mul(falloff, fold), set3(frame.flash_colour), arriving);
     }
     const Floats3 beta = air_transmittance(frame, ray, distance);
-    Floats3 radiance = add(each_times(beta, times(albedo, arriving)), air_light(frame, ray, beta));
+    Floats3 radiance = add(each_times(beta, times(albedo, arriving)), air_light(frame, ray, distance, beta));
     if (frame.shells != nullptr) {
         const AirLayer layer = layer_in_front(frame, ray, shell_begins(frame.shells->data, distance), distance);
         radiance = add(times(layer.transmittance, radiance), layer.light);

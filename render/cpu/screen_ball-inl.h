@@ -77,7 +77,7 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
     }
     const Floats3 beta = air_transmittance(frame, ray, distance);
     const Floats light = hn::Exp(d, hn::Neg(sun_depth));
-    return {add(each_times(beta, times(albedo, arriving)), air_light(frame, ray, beta)),
+    return {add(each_times(beta, times(albedo, arriving)), air_light(frame, ray, distance, beta)),
             each_times(times(hn::Mul(albedo, light), beta), sunlight)};
 }
 

@@ -170,7 +170,7 @@ struct BillboardLight {
         const Floats distance = hn::Sqrt(dot(centre, centre));
         const Floats3 ray = times(hn::Div(one, hn::Max(distance, set(1.0e-6f))), centre);
         Floats3 beta = air_transmittance(frame, ray, distance);
-        Floats3 air = air_light(frame, ray, beta);
+        Floats3 air = air_light(frame, ray, distance, beta);
         if (frame.shells != nullptr) {
             const AirLayer layer =
                 layer_in_front(frame, ray, shell_begins(frame.shells->data, distance), distance);

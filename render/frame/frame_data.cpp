@@ -34,6 +34,9 @@ void use_sky(const RenderOptions& options, const SkyLight& sky, PictureFrame& fr
     frame.haze = scaled_colour(Rgb{haze, haze, haze}, 1.0, 1.0 / air.mie_height_m);
     frame.air = {float(sky.eye_altitude_m), float(air.mie_g),
                  haze > 0 ? float(air.mie_scattering_per_m / haze) : 0.0f, 1.0f};
+    const double radius = air.ground_radius_m + sky.eye_altitude_m,
+                 across = sky.eye_altitude_m * (air.ground_radius_m + radius) / radius;
+    frame.earth = {-float(std::sqrt(across / radius)), float(across), float(0.5 / radius), 0};
     frame.sun_disc = scaled_colour(sky.disc, 1.0, sky.has_disc ? 1.0 : 0.0);
     frame.sun_fade = scaled_colour(sky.disc_fade, 1.0, 0.0);
     const double sine = std::max(0.0, direction_to_sun(options.sun).z);
@@ -104,6 +107,7 @@ PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera,
     const bool has_ground = eye.z > options.ground.height_m;
     frame.ground = scaled_colour(skylit, 1.0, options.ground.height_m - eye.z);
     frame.ground_sun = scaled_colour(sunlit, 1.0, has_ground ? 1.0 : 0.0);
+    frame.earth = {0, -2 * frame.ground.w, 0, 0};  // a plane
     frame.shadow_u = shadow_row(shadow.u_axis_m, shadow, eye);
     frame.shadow_v = shadow_row(shadow.v_axis_m, shadow, eye);
     if (flash != nullptr) {

@@ -37,6 +37,14 @@ HWY_INLINE Floats3 soaked_albedo(const shader::vec4& dry) {
     return {of(dry.x), of(dry.y), of(dry.z)};
 }
 
+HWY_INLINE Floats3 soaked_albedo(const Floats3& dry) {
+    const float back = float(nephos::soaked_back_reflectance());
+    const auto of = [back](Floats albedo) {
+        return hn::Div(hn::Mul(set(1 - back), albedo), hn::NegMulAdd(set(back), albedo, set(1.0f)));
+    };
+    return {of(dry.x), of(dry.y), of(dry.z)};
+}
+
 // Fraction of the ground that lies below a film (see wet_ground.h), where noise is the height of
 // the hollows and tufts in standard deviations.
 HWY_INLINE Floats covered(Floats film_mm, float half_mm, const ResolvedNoise& noise) {

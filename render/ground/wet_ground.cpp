@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "render/frame/frame_data.h"
+#include "render/ground/country.h"
 #include "render/ground/ground_noise.h"
 #include "render/ground/ripples.h"
 
@@ -19,6 +20,7 @@
 // foreach_target.h must come first
 #include <hwy/highway.h>
 
+#include "render/ground/country-inl.h"
 #include "render/ground/ground_look-inl.h"
 #include "render/ground/ripples-inl.h"
 
@@ -36,7 +38,8 @@ struct CoverTexels {
 struct GroundPass {
     const WetGroundOptions* look = nullptr;
     PictureFrame white;  // of ground with an albedo of 1
-    shader::vec4 dry;    // its albedo
+    shader::vec4 dry;    // its albedo where it is plain
+    Country country;
     const float* shadow = nullptr;
     int shadow_size = 0;
     CoverTexels cover;
@@ -96,6 +99,7 @@ HWY_INLINE Lying lying_at(const CoverTexels& texels, const Floats3& point) {
 struct Seen {
     Floats3 ray, point, beta, veil;  // veil: light of the air up to the ground
     Floats pixel_m;                  // size of the pixel there, the geometric mean of both directions
+    Floats3 dry;                     // albedo
 };
 
 // Returns the light that a surface of this roughness reflects to the eye. Light of the sky is attenuated by
@@ -153,8 +157,9 @@ HWY_INLINE Surface wet_surface(const GroundPass& pass, const Seen& seen, const L
     const Floats soaked_part = hn::Mul(hn::Sub(one, puddle), hn::Sub(soaked, of_soil));
     const Floats under_water = hn::Mul(puddle, hn::Sub(one, of_water));
     Surface surface;
-    surface.albedo = times_add(dry_part, set3(pass.dry),
-                               times(hn::Add(soaked_part, under_water), soaked_albedo(pass.dry)));
+    const Floats3 soaked_soil = pass.country.enabled ? soaked_albedo(seen.dry) : soaked_albedo(pass.dry);
+    surface.albedo =
+        times_add(dry_part, seen.dry, times(hn::Add(soaked_part, under_water), soaked_soil));
     surface.reflected = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     if (pass.mirror == nullptr) return surface;
     const Floats strength = set(pass.reflection);
@@ -194,15 +199,23 @@ HWY_INLINE Floats3 changed(const GroundPass& pass, const Floats3& direction) {
     const Floats near = hn::IfThenElse(meets, distance, set(1.0f));
     seen.point = times(near, seen.ray);
     const Lying lying = lying_at(pass.cover, seen.point);
-    const auto some = hn::And(meets, hn::Gt(hn::Max(lying.water_mm, lying.snow_mm), hn::Zero(d)));
+    const auto covers = hn::And(meets, hn::Gt(hn::Max(lying.water_mm, lying.snow_mm), hn::Zero(d)));
+    const auto some = pass.country.enabled ? meets : covers;
     if (hn::AllFalse(d, some)) return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     seen.beta = air_transmittance(pass.white, seen.ray, near);
-    seen.veil = air_light(pass.white, seen.ray, seen.beta);
+    seen.veil = air_light(pass.white, seen.ray, near, seen.beta);
     const Floats slant = hn::Sqrt(hn::Max(hn::Neg(seen.ray.z), set(1.0e-6f)));
     seen.pixel_m = hn::Div(hn::Mul(near, set(1.0f / pass.white.up.w)), slant);
-    const ResolvedNoise hollows = resolved_noise(pass.hollows, seen.point, seen.pixel_m);
-    Surface surface = wet_surface(pass, seen, lying, hollows);
-    lay_snow(pass, seen, lying, surface);
+    seen.dry = set3(pass.dry);
+    if (pass.country.enabled)
+        seen.dry = each_times(seen.dry, country_albedo(pass.country, seen.point,
+                                                       footprint(seen.ray, near, pass.white.up.w)));
+    Surface surface{seen.dry, {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
+    if (!hn::AllFalse(d, covers)) {
+        const ResolvedNoise hollows = resolved_noise(pass.hollows, seen.point, seen.pixel_m);
+        surface = wet_surface(pass, seen, lying, hollows);
+        lay_snow(pass, seen, lying, surface);
+    }
     const ShadowTexels shadow{pass.shadow, pass.shadow_size};
     const Floats3 light = each_times(seen.beta, ground_light(pass.white, shadow, seen.point));
     const Floats3 more = add(each_times(light, subtract(surface.albedo, set3(pass.dry))), surface.reflected);
@@ -273,10 +286,18 @@ double water_reflectance(double cosine, double slope_variance) {
     return kWaterNormalReflectance + (1 - kWaterNormalReflectance) * grazing / hidden;
 }
 
-double soaked_albedo(double dry_albedo) {
+double soaked_back_reflectance() {
     constexpr double kIndex = 1.333, kDiffuseReflectance = 0.066;
-    constexpr double kBack = 1 - (1 - kDiffuseReflectance) / (kIndex * kIndex);
-    return (1 - kBack) * dry_albedo / (1 - kBack * dry_albedo);
+    return 1 - (1 - kDiffuseReflectance) / (kIndex * kIndex);
+}
+
+double soaked_albedo(double dry_albedo) {
+    const double back = soaked_back_reflectance();
+    return (1 - back) * dry_albedo / (1 - back * dry_albedo);
+}
+
+bool shows_country(const RenderOptions& options) {
+    return options.ground.pattern == GroundPattern::country && ground_in_view(options);
 }
 
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover) {
@@ -316,6 +337,7 @@ void draw_wet_ground(const WetGround& ground, Picture& picture) {
                             {0, 0, picture.width, picture.height}, ground.sky);
     const Rgb& albedo = options.ground.albedo;
     pass.dry = {float(albedo[0]), float(albedo[1]), float(albedo[2]), 0};
+    pass.country = country_of(options.ground, eye);
     pass.shadow = ground.shadow;
     pass.shadow_size = ground.shadow_size;
     pass.cover = texels_of(ground.cover, eye);

@@ -44,7 +44,10 @@ double water_reflectance(double cosine, double slope_variance);
 // reflected back down with the probability p = 1 - (1 - 0.066) / n^2, which gives (1 - p) a / (1 - p a) for
 // the dry albedo a. Lekner and Dorf 1988, with Angstrom's absorption.
 double soaked_albedo(double dry_albedo);
+double soaked_back_reflectance();  // p
 
+// Returns true when ground is in view and is country (country.h), which draw_wet_ground() draws, too.
+bool shows_country(const RenderOptions& options);
 // Returns true when water or snow and ground are in view.
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover);
 // Returns true when reflections need a mirrored view.

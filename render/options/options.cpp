@@ -151,6 +151,7 @@ void check(const RenderOptions& options) {
     check_colour(options.air.zenith, "air.zenith");
     check(options.atmosphere);
     require(std::isfinite(options.ground.height_m), "ground.height_m", "finite metres");
+    require(within(options.ground.field_m, 20, 5000), "ground.field_m", "20..5000 metres");
     require(within(options.ground.albedo, 0, 1), "ground.albedo", "three numbers from 0 to 1");
     check(options.wet_ground);
     require(within(options.shadow_map_size, 16, 8192), "shadow_map_size", "16..8192 texels");

@@ -143,9 +143,16 @@ struct Air {
     bool operator==(const Air&) const = default;
 };
 
+enum class GroundPattern {
+    plain,    // one albedo
+    country,  // fields, hedges and woods of noise, with that albedo in the mean (render/ground/country.h)
+};
+
 struct Ground {
-    double height_m = 0.0;         // world z of the plane
+    double height_m = 0.0;  // world z of the plane; under the physical sky of the sphere below the eye
     Rgb albedo{0.12, 0.15, 0.07};  // 0..1
+    GroundPattern pattern = GroundPattern::plain;
+    double field_m = 260;  // size of a field of the country, 20..5000 m
     bool operator==(const Ground&) const = default;
 };
 

@@ -84,6 +84,10 @@ HWY_INLINE Floats3 sunlight_nearby(const PictureFrame& frame, Floats heights) {
 
 namespace formulas {
 
+using shader::kAirLayer;
+using shader::kAirRows;
+using shader::kShaftsReach;
+using shader::kSkyRows;
 using Real3 = Floats3;
 HWY_INLINE Floats3 operator*(Floats a, const Floats3& b) { return times(a, b); }
 HWY_INLINE Floats3 operator*(const Floats3& a, const Floats3& b) { return each_times(a, b); }
@@ -137,8 +141,11 @@ HWY_INLINE Floats3 clear_air(const PictureFrame& frame, const Floats3& ray, Floa
     const Floats3 depth = FrameAir(frame).air_depth(ray, distance_m);
     return {fast_exp(hn::Neg(depth.x)), fast_exp(hn::Neg(depth.y)), fast_exp(hn::Neg(depth.z))};
 }
-HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, const Floats3& beta) {
-    return FrameAir(frame).air_light(ray, beta);
+HWY_INLINE Floats3 air_source(const PictureFrame& frame, const Floats3& ray, Floats distance_m) {
+    return FrameAir(frame).air_source(ray, distance_m);
+}
+HWY_INLINE Floats3 air_light(const PictureFrame& frame, const Floats3& ray, Floats distance_m, const Floats3& beta) {
+    return FrameAir(frame).air_light(ray, distance_m, beta);
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -36,6 +36,11 @@ HWY_INLINE Floats3 pixel_direction(const PictureFrame& frame, Floats x, Floats y
 inline constexpr float kNowhere = 1.0e30f;  // distance of the ground where a ray does not meet it
 
 HWY_INLINE Floats ground_distance(const PictureFrame& frame, Floats ray_z) {
+    if (frame.sky != nullptr) {
+        const auto below = hn::Lt(ray_z, set(frame.ground_sun.w > 0 ? frame.earth.x : -2.0f));
+        const Floats way = hn::Min(sphere_distance(ray_z, frame.earth.x, frame.earth.y), set(kNowhere));
+        return hn::IfThenElse(below, way, set(kNowhere));
+    }
     const auto meets = hn::Lt(ray_z, set(frame.ground_sun.w > 0 ? 0.0f : -2.0f));
     const Floats distance = hn::Min(hn::Div(set(frame.ground.w), ray_z), set(kNowhere));
     return hn::IfThenElse(meets, distance, set(kNowhere));
@@ -96,12 +101,8 @@ HWY_INLINE Floats3 sun_disc(const PictureFrame& frame, const Floats3& ray) {
 }
 
 HWY_INLINE Floats3 sky(const PictureFrame& frame, const Floats3& ray) {
-    const Floats height = hn::Max(ray.z, hn::Zero(Lanes()));
-    if (frame.sky != nullptr) {
-        const Floats3 upwards{ray.x, ray.y, height};
-        return add(FrameAir(frame).sky_scattered(upwards), sun_disc(frame, upwards));
-    }
-    return FrameAir(frame).gradient_sky(height);
+    if (frame.sky != nullptr) return add(FrameAir(frame).sky_scattered(ray), sun_disc(frame, ray));
+    return FrameAir(frame).gradient_sky(hn::Max(ray.z, hn::Zero(Lanes())));
 }
 
 // Returns the radiance of the ground at a point relative to the eye, without the air in front of it.
@@ -120,7 +121,7 @@ HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& m
 HWY_INLINE Floats3 ground(const PictureFrame& frame, const ShadowTexels& map, const Floats3& ray,
                           Floats distance) {
     const Floats3 beta = air_transmittance(frame, ray, distance);
-    return add(each_times(beta, ground_light(frame, map, times(distance, ray))), air_light(frame, ray, beta));
+    return add(each_times(beta, ground_light(frame, map, times(distance, ray))), air_light(frame, ray, distance, beta));
 }
 
 // Returns the radiance behind the clouds along unit rays: sky or ground, with the air in front of it.

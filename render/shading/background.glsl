@@ -16,12 +16,8 @@ vec3 sun_disc(vec3 ray) {
 
 // Returns the radiance of the sky; below the horizon that of the horizon.
 vec3 sky(vec3 ray) {
-    float height = max(ray.z, 0.0);
-    if (kPhysicalSky) {
-        vec3 upwards = vec3(ray.xy, height);
-        return sky_scattered(upwards) + sun_disc(upwards);
-    }
-    return gradient_sky(height);
+    if (kPhysicalSky) return sky_scattered(ray) + sun_disc(ray);
+    return gradient_sky(max(ray.z, 0.0));
 }
 
 vec3 ground(vec3 ray, float distance) {
@@ -34,7 +30,7 @@ vec3 ground(vec3 ray, float distance) {
     float squared = dot(way, way);
     colour += frame.ground_flash.rgb * flash_falloff(squared) * max(way.z, 0.0) * inversesqrt(max(squared, 1.0e-6));
     vec3 beta = air_transmittance(ray, distance);
-    return beta * colour + air_light(ray, beta);
+    return beta * colour + air_light(ray, distance, beta);
 }
 
 vec3 background(vec3 ray) {

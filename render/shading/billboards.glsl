@@ -33,7 +33,7 @@ BillboardAir billboard_air(ViewBillboard billboard, vec3 centre, float distance)
     vec3 beta = air_transmittance(ray, distance);
     AirLayer air = layer_in_front(centre, distance);
     return BillboardAir(billboard.opacity * air.transmittance * beta,
-                   billboard.opacity * (air.transmittance * air_light(ray, beta) + air.light));
+                   billboard.opacity * (air.transmittance * air_light(ray, distance, beta) + air.light));
 }
 
 // Unit vectors to the right and up across all billboards, and the size of each unit in the picture at distance 1, in

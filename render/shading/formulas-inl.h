@@ -45,6 +45,7 @@ HWY_INLINE Floats fast_exp(Floats x) {
 // The functions that formulas.h needs, in a namespace of their own so that no other code finds them.
 namespace formulas {
 
+using shader::kAirScale;
 using shader::kPi;
 using shader::kScatterAngles;
 using shader::kScatterDepths;
@@ -78,6 +79,8 @@ HWY_INLINE float exp(float a) { return std::exp(a); }
 }  // namespace formulas
 
 using formulas::flash_falloff;
+using formulas::air_distance;
+using formulas::air_row;
 using formulas::fog_column;
 using formulas::layer_column;
 using formulas::line_integral;
@@ -87,6 +90,7 @@ using formulas::partial_line_integral;
 using formulas::particle_phase;
 using formulas::sky_across;
 using formulas::sky_upwards;
+using formulas::sphere_distance;
 
 inline constexpr std::size_t kTilePixels = shader::kTileWidth * shader::kTileHeight;
 

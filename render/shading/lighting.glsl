@@ -18,7 +18,7 @@ Scattered scattered_light(ViewBall ball, float distance) {
     float share = float(ball.flags >> 16) / 65535.0;
     arriving += frame.flash.w * flash_falloff(dot(way, way)) * share * frame.flash_colour.rgb;
     Scattered light;
-    light.diffuse = beta * albedo * arriving + air_light(ray, beta);
+    light.diffuse = beta * albedo * arriving + air_light(ray, distance, beta);
     light.direct = beta * albedo * exp(-ball.sun_depth) * sunlight;
     return light;
 }

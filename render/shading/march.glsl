@@ -90,7 +90,7 @@ vec3 marched_radiance(uint v, vec3 ray, float distance) {
     vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark
     arriving += frame.flash.w * flash_falloff(dot(way, way)) * fold * frame.flash_colour.rgb;
     vec3 beta = air_transmittance(ray, distance);
-    vec3 radiance = beta * (frame.ambient_top.w * arriving) + air_light(ray, beta);
+    vec3 radiance = beta * (frame.ambient_top.w * arriving) + air_light(ray, distance, beta);
     AirLayer air = layer_in_front(point, distance);
     return air.transmittance * radiance + air.light;
 }

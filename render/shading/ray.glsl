@@ -10,8 +10,9 @@ vec3 pixel_direction(vec2 point) {
 
 vec3 pixel_ray(vec2 point) { return normalize(pixel_direction(point)); }
 
-// Returns the distance at which a ray meets the ground; a very large number when it does not.
+// Returns the distance at which a ray meets the ground, a sphere under the physical sky, else a plane; a very large
+// number when it does not. No branch on a uniform: see lighting.glsl.
 float ground_distance(vec3 ray) {
-    bool meets = frame.ground_sun.w > 0.0 && ray.z < 0.0;
-    return meets ? min(frame.ground.w / ray.z, 1.0e30) : 1.0e30;
+    bool meets = frame.ground_sun.w > 0.0 && ray.z < frame.earth.x;
+    return meets ? min(sphere_distance(ray.z, frame.earth.x, frame.earth.y), 1.0e30) : 1.0e30;
 }

@@ -155,10 +155,19 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
     const Floats patches = fog_patches(air, times(places.at, of.ray), begin, end);
     const Floats transmittance = fast_exp(hn::Neg(hn::Mul(fog.depth, patches)));
     const Floats way = hn::Div(hn::Sub(places.middle, begin), hn::Max(hn::Sub(end, begin), set(1.0e-6f)));
-    const Floats3 beta = hn::AllTrue(d, inside) ? mix(before, behind, {way, way, way})
-                                                : clear_air(frame, of.ray, places.middle);
+    Floats3 beta = hn::AllTrue(d, inside) ? mix(before, behind, {way, way, way})
+                                          : clear_air(frame, of.ray, places.middle);
+    Floats3 source = of.sunlit.source;
+    if (frame.sky != nullptr && !hn::AllTrue(d, inside)) {  // far away
+        const auto chosen = [&](const Floats3& near, const Floats3& far) {
+            return Floats3{hn::IfThenElse(inside, near.x, far.x), hn::IfThenElse(inside, near.y, far.y),
+                           hn::IfThenElse(inside, near.z, far.z)};
+        };
+        beta = chosen(beta, air_transmittance(frame, of.ray, places.middle));
+        source = chosen(source, air_source(frame, of.ray, places.middle));
+    }
     const Floats3 veil =
-        each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)}, of.sunlit.endless);
+        each_times({hn::Sub(one, beta.x), hn::Sub(one, beta.y), hn::Sub(one, beta.z)}, source);
     const Floats3 of_fog = add(each_times(beta, fog_radiance(frame, of, places.middle, sunlight, lit)), veil);
     light = times(hn::MulAdd(set(0.5f), transmittance, set(0.5f)), light);
     return {times_add(hn::Sub(one, transmittance), of_fog, light), transmittance, places.middle};

@@ -121,12 +121,16 @@ AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float sha
     float height = ray.z * middle, strength = last ? 0.0 : shells.settings.y;
     vec3 sunlight = sunlight_at(height);
     float lit = sunlight_left(at * ray);
-    vec3 lost = air_transmittance(ray, begin) - air_transmittance(ray, end);
+    vec3 lost = clear_air(ray, begin) - clear_air(ray, end);
     vec3 light = (strength * (lit - 1.0)) * sunlit_at(sunlit, height, sunlight) * lost;
     if (!kFog) return AirLayer(light, 1.0, middle);
     float transmittance = exp(-fog.depth * fog_patches(at * ray, begin, end));
-    vec3 beta = air_transmittance(ray, middle);
-    vec3 of_fog = beta * fog_radiance(ray, middle, sunlight, lit) + (1.0 - beta) * sunlit.endless;
+    vec3 beta = clear_air(ray, middle), source = sunlit.source;
+    if (kPhysicalSky && last) {  // far away
+        beta = air_transmittance(ray, middle);
+        source = air_source(ray, middle);
+    }
+    vec3 of_fog = beta * fog_radiance(ray, middle, sunlight, lit) + (1.0 - beta) * source;
     light *= 0.5 + 0.5 * transmittance;  // half of the fog is in front
     return AirLayer(light + (1.0 - transmittance) * of_fog, transmittance, middle);
 }

@@ -8,45 +8,74 @@
 //
 // and therefore has no include guard. Beside what formulas.h needs, the including file has `frame` (shared.h) and
 // kPhysicalSky; sky_layer(across, upwards, layer), a texel of the tables of atmosphere.h, whose layers are: light
-// scattered by molecules and many times; by particles, without their phase function; and the operators of Real3 with
+// scattered by molecules and many times; by particles, without their phase function; sunlight by altitude; and from
+// kAirLayer on the table of air; and the operators of Real3 with
 // rgb() and xyz() of a vec4. Rays are unit vectors, distances and heights metres, heights above the eye's.
 //
-// Without kPhysicalSky the air has two colours. With it, it is two exponential layers over a flat Earth.
+// Without kPhysicalSky the air has two colours. With it the tables have it over a round Earth.
 
-// Returns the radiance of the sky along a ray; below the horizon along the ray mirrored at it, with its own angle to
-// the sun.
-NEPHOS_FUNCTION Real3 sky_scattered(Real3 ray) {
+// Returns the cosine of the azimuth between a ray and the sun.
+NEPHOS_FUNCTION Real beside_sun(Real3 ray) {
     float sun_level = frame.to_sun.x * frame.to_sun.x + frame.to_sun.y * frame.to_sun.y;
     Real level = mul_add(ray.x, ray.x, ray.y * ray.y);
     Real beside = mul_add(ray.x, Real(frame.to_sun.x), ray.y * frame.to_sun.y) /
                   sqrt(max(level * sun_level, Real(1.0e-12f)));
-    Real across = sky_across(max(min(beside, Real(1.0f)), Real(-1.0f)));
-    Real upwards = sky_upwards(min(abs(ray.z), Real(1.0f)));
+    return max(min(beside, Real(1.0f)), Real(-1.0f));
+}
+
+// Returns the radiance of the sky along a ray; below the horizon that of the horizon.
+NEPHOS_FUNCTION Real3 sky_scattered(Real3 ray) {
+    Real across = sky_across(beside_sun(ray));
+    Real upwards = air_row(max(ray.z, Real(frame.earth.x)), frame.earth.x);
     Real phase = particle_phase(dot(xyz(frame.to_sun), ray), frame.air.y);
     return mul_add(phase, sky_layer(across, upwards, 1u), sky_layer(across, upwards, 0u));
 }
 
-// Returns the optical depth of the air over a distance, and the transmittance: D's beta.
+// Returns the place of a ray and a distance in the table of air: column, and row of those below the horizon or, behind
+// them, above it; 0..1 over all columns and rows.
+NEPHOS_FUNCTION Real air_column(Real3 ray, Real distance) {
+    return air_distance(distance, ray.z, frame.earth.x, frame.earth.y);
+}
+NEPHOS_FUNCTION Real air_upwards(Real3 ray) {
+    Real first = select(ray.z < Real(frame.earth.x), Real(0.0f), Real(float(kAirRows)));
+    return (float(kAirRows - 1u) * air_row(ray.z, frame.earth.x) + first) * (1.0f / float(kSkyRows - 1u));
+}
+
+// Returns the transmittance of the air over a distance: D's beta.
+NEPHOS_FUNCTION Real3 air_transmittance(Real3 ray, Real distance) {
+    if (!kPhysicalSky) return exp(-(distance * rgb(frame.air_extinction)));
+    return exp(-(distance * sky_layer(air_column(ray, distance), air_upwards(ray), kAirLayer)));
+}
+
+// Returns the optical depth of what lies within some tens of kilometres, in closed form: two exponential layers, and a
+// ray whose altitude is as that over a round Earth at both ends and changes steadily between.
 NEPHOS_FUNCTION Real3 air_depth(Real3 ray, Real distance) {
     if (!kPhysicalSky) return distance * rgb(frame.air_extinction);
-    return mul_add(layer_column(frame.air.x, ray.z, distance, frame.rayleigh.w), rgb(frame.rayleigh),
-                   layer_column(frame.air.x, ray.z, distance, frame.haze.w) * rgb(frame.haze));
+    Real slope = mul_add(frame.earth.z * (1.0f - ray.z * ray.z), distance, ray.z);
+    return mul_add(layer_column(frame.air.x, slope, distance, frame.rayleigh.w), rgb(frame.rayleigh),
+                   layer_column(frame.air.x, slope, distance, frame.haze.w) * rgb(frame.haze));
 }
-NEPHOS_FUNCTION Real3 air_transmittance(Real3 ray, Real distance) { return exp(-air_depth(ray, distance)); }
+NEPHOS_FUNCTION Real3 clear_air(Real3 ray, Real distance) { return exp(-air_depth(ray, distance)); }
 
-// Returns the radiance of infinitely much sunlit air along a ray. With tables it is the sky's, so that the air becomes
-// the sky far away.
-NEPHOS_FUNCTION Real3 endless_air(Real3 ray) {
+// Returns the source of the light of sunlit air along a ray, up to a distance: light / (1 - transmittance).
+NEPHOS_FUNCTION Real3 air_source(Real3 ray, Real distance) {
     if (!kPhysicalSky) return rgb(frame.horizon);
-    Real slope = max(abs(ray.z), Real(1.0e-5f));
-    Real molecules = Real(exp(-frame.air.x * frame.rayleigh.w) / frame.rayleigh.w) / slope;
-    Real particles = Real(exp(-frame.air.x * frame.haze.w) / frame.haze.w) / slope;
-    Real3 depth = mul_add(molecules, rgb(frame.rayleigh), particles * rgb(frame.haze));
-    return sky_scattered(ray) / max(1.0f - exp(-depth), Real(1.0e-4f));
+    Real column = air_column(ray, distance), row = air_upwards(ray);
+    Real cosine = beside_sun(ray), square = cosine * cosine;
+    Real towards = 0.5f * (square + cosine), beside = 1.0f - square, away = 0.5f * (square - cosine);
+    Real3 scattered = mul_add(away, sky_layer(column, row, kAirLayer + 3u),
+                              mul_add(beside, sky_layer(column, row, kAirLayer + 2u),
+                                      towards * sky_layer(column, row, kAirLayer + 1u)));
+    Real3 haze = mul_add(away, sky_layer(column, row, kAirLayer + 6u),
+                         mul_add(beside, sky_layer(column, row, kAirLayer + 5u),
+                                 towards * sky_layer(column, row, kAirLayer + 4u)));
+    return mul_add(particle_phase(dot(xyz(frame.to_sun), ray), frame.air.y), haze, scattered);
 }
 
 // Returns the radiance of sunlit air over a distance; `beta` is its transmittance.
-NEPHOS_FUNCTION Real3 air_light(Real3 ray, Real3 beta) { return (1.0f - beta) * endless_air(ray); }
+NEPHOS_FUNCTION Real3 air_light(Real3 ray, Real distance, Real3 beta) {
+    return (1.0f - beta) * air_source(ray, distance);
+}
 
 // Gradient: the air is thickest at the horizon; its colour falls off exponentially with height, and reaches zero at the
 // zenith. `height`: sine of the elevation.
@@ -58,24 +87,24 @@ NEPHOS_FUNCTION Real3 gradient_sky(Real height) {
 
 // The radiance of the air along a ray: in total, and the part that clouds can shade, single scattering of sunlight.
 struct SunlitAir {
-    Real3 endless;
+    Real3 source;
     Real3 most;                 // no more than the air and the sky have, so that none is negative
     Real molecules, particles;  // with tables: pi times the phase functions, and the albedo
 };
 
 NEPHOS_FUNCTION SunlitAir sunlit_air(Real3 ray) {
     SunlitAir air;
-    air.endless = endless_air(ray);
+    air.source = air_source(ray, Real(kShaftsReach));
     Real cosine = dot(xyz(frame.to_sun), ray);
     if (kPhysicalSky) {
-        air.most = air.endless;
+        air.most = air.source;
         air.molecules = kPi * molecule_phase(cosine);
         air.particles = kPi * frame.air.z * particle_phase(cosine, frame.air.y);
         return air;
     }
     Real direct = frame.horizon.w * 4.0f * kPi * particle_phase(cosine, frame.zenith.w);
     Real fraction = direct / (direct + Real(1.0f - frame.horizon.w + 1.0e-6f));
-    air.most = fraction * min(air.endless, gradient_sky(max(ray.z, Real(0.0f))));
+    air.most = fraction * min(air.source, gradient_sky(max(ray.z, Real(0.0f))));
     air.molecules = Real(0.0f);
     air.particles = Real(0.0f);
     return air;

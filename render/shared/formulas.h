@@ -44,6 +44,28 @@ NEPHOS_FUNCTION Real sky_upwards(Real sine) {
     return sqrt(sine / (1.0f + sqrt(max(1.0f - sine, Real(0.0f)))));
 }
 
+// Returns the distance along rays to a sphere of ground below the eye. `horizon`: sine of the elevation of the
+// ray that touches it, above which nothing is met; `across` = altitude (2 R + altitude) / (R + altitude),
+// metres, R the sphere's radius.
+NEPHOS_FUNCTION Real sphere_distance(Real sine, float horizon, float across) {
+    Real below = max(Real(horizon) - sine, Real(0.0f));
+    return Real(across) / max(sqrt(below * max(Real(-horizon) - sine, Real(0.0f))) - sine, Real(1.0e-9f));
+}
+
+// Map a ray and a distance to the coordinates, 0..1, of the tables of air (atmosphere.h): the share of the way
+// to the ground below the horizon, distance / (distance + 80 km) above; and rows, densest at the horizon, in
+// the lower half of the table below it, in the upper half above.
+NEPHOS_FUNCTION Real air_distance(Real distance, Real sine, float horizon, float across) {
+    Real way = max(sphere_distance(sine, horizon, across), Real(1.0e-3f));
+    Real share = select(sine < Real(horizon), distance / way, distance / (distance + Real(kAirScale)));
+    return min(max(share, Real(0.0f)), Real(1.0f));
+}
+NEPHOS_FUNCTION Real air_row(Real sine, float horizon) {
+    Real away = select(sine < Real(horizon), (horizon - sine) * (1.0f / (1.0f + horizon)),
+                       (sine - Real(horizon)) * (1.0f / (1.0f - horizon)));
+    return sky_upwards(min(max(away, Real(0.0f)), Real(1.0f)));
+}
+
 // Returns the mean of exp(-t) for t from 0 to x, (1 - exp(-x)) / x, x >= -80; by its series where x is small,
 // with the accuracy of the exponential.
 NEPHOS_FUNCTION Real mean_decay(Real x) {

@@ -46,7 +46,14 @@ NEPHOS_CONST uint kBillboardFlag =
 NEPHOS_CONST uint kAround = 2u;  // flag: around or close to the eye, covers the whole picture
 NEPHOS_CONST uint kSkyColumns = 64u;  // of the tables of the sky (atmosphere.h)
 NEPHOS_CONST uint kSkyRows = 96u;
-NEPHOS_CONST uint kSkyLayers = 3u;            // scattered, haze, and sunlight by altitude
+// Scattered, haze, sunlight by altitude; and of the air up to a distance: extinction, the source of what is
+// scattered and of haze, each towards the sun, beside it and away from it.
+NEPHOS_CONST uint kSkyLayers = 10u;
+NEPHOS_CONST uint kAirLayer = 3u;             // the first of the latter
+NEPHOS_CONST uint kAirRows = 48u;             // of those above the horizon, and of those below
+// Metres within which light shafts lie: what they take away is no more than the source of this air.
+NEPHOS_CONST float kShaftsReach = 8000.0f;
+NEPHOS_CONST float kAirScale = 80000.0f;      // metres, see air_distance()
 NEPHOS_CONST float kSunlightTop = 16000.0f;   // metres above the ground: sunlight changes no more
 NEPHOS_CONST float kSunRadius = 0.00462512f;  // radians
 // Radiance of the sun's disc falls off towards its limb as cosine^exponent; red, green, blue (near 680, 550
@@ -171,6 +178,9 @@ struct FrameUniforms {
     vec4 air;       // eye's altitude above the ground, m; asymmetry and albedo of particles; 1 = physical sky
     vec4 sun_disc;  // rgb: radiance of its middle; w: 1 = there is a disc
     vec4 sun_fade;  // rgb: change of the logarithm of its radiance with the sine of the elevation
+    vec4 earth;  // x: sine of the horizon's elevation; y: altitude (2 R + altitude) / (R + altitude), metres (of a
+                 // plane 2 altitude); z:
+                 // 1 / (2 (R + altitude))
 };
 
 // Shells of air around the eye (air_shells.h).
@@ -190,11 +200,23 @@ struct Shells {
     vec4 fog_limits;  // x: height above the base beyond which there is no fog worth drawing
 };
 
-// Returns the position in a shell, 0..1, at which a pixel samples it: an additive recurrence in two
-// dimensions (Roberts 2018, "R2") distributes the samples of neighbouring pixels evenly. In integers: the
-// same on every machine.
+// Returns the position in a shell, 0..1, at which a pixel samples it: multiples of the golden ratio along a
+// Hilbert curve through blocks of 64 x 64 pixels. Neighbours on the curve are neighbours in the picture, so that
+// the offsets of any few pixels near each other are spread evenly and what is left has no coarse grain and no
+// weave, as lattices in two dimensions have. In integers: the same on every machine.
 NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
-    return float((x * 3242174889u + y * 2447445414u) >> 8) * (1.0f / 16777216.0f);
+    uint column = x & 63u, row = y & 63u, along = 0u;
+    for (uint side = 32u; side > 0u; side >>= 1u) {
+        uint right = (column & side) != 0u ? 1u : 0u, up = (row & side) != 0u ? 1u : 0u;
+        along += side * side * ((3u * right) ^ up);
+        if (up == 0u) {
+            uint other = right == 1u ? 63u - column : column;
+            column = right == 1u ? 63u - row : row;
+            row = other;
+        }
+    }
+    uint block = (x >> 6u) * 3242174889u + (y >> 6u) * 2447445414u;
+    return float((along * 2654435769u + block) >> 8u) * (1.0f / 16777216.0f);
 }
 
 // The scattering angle varies over the disc of a metaball: weighted by opacity, the mean of 1 - cos exceeds
@@ -229,9 +251,9 @@ static_assert(sizeof(ViewBillboard) == 32 && offsetof(ViewBillboard, half_size) 
 static_assert(sizeof(ViewCloud) == 32 && offsetof(ViewCloud, inverse_height) == 16);
 static_assert(sizeof(Shells) == 16 * (kMaxShells / 4 + 10) &&
               offsetof(Shells, shade_u) == 16 * (kMaxShells / 4 + 2));
-static_assert(sizeof(FrameUniforms) == 24 * 16 && offsetof(FrameUniforms, part) == 64 &&
+static_assert(sizeof(FrameUniforms) == 25 * 16 && offsetof(FrameUniforms, part) == 64 &&
               offsetof(FrameUniforms, shadow_v) == 240 && offsetof(FrameUniforms, flash_colour) == 272 &&
-              offsetof(FrameUniforms, sun_fade) == 368);
+              offsetof(FrameUniforms, sun_fade) == 368 && offsetof(FrameUniforms, earth) == 384);
 
 }  // namespace nephos::shader
 #endif

@@ -280,12 +280,18 @@ const Section& air_section() {
 const Section& ground_section() {
     static const Section section{
         "Ground",
-        "The plane that wears the clouds' shadow.",
+        "What wears the clouds' shadow: a plane, and under the physical sky the sphere of the Earth below the eye.",
         {render_key<&RenderOptions::ground, &Ground::height_m>("height_m", "m", between(-1e5, 1e5),
                                                                "Its height."),
          render_key<&RenderOptions::ground, &Ground::albedo>(
              "albedo", "", between(0, 1), "Fraction of the light that it reflects: red, green, blue.",
-             "D, step 2")},
+             "D, step 2"),
+         word<&Scene::render, &RenderOptions::ground, &Ground::pattern>(
+             "pattern", {"plain", "country"},
+             "`plain`: `albedo` everywhere. `country`: fields, hedges and woods of noise, whose mean is `albedo`. "
+             "See docs/ground.md."),
+         render_key<&RenderOptions::ground, &Ground::field_m>("field_m", "m", between(20, 5000),
+                                                              "Size of a field of the country.")},
         nullptr};
     return section;
 }

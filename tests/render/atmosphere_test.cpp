@@ -131,10 +131,11 @@ class TwinPsi {
 
 // Radiance along a ray: `sine` of its elevation (0..1), cosine of its azimuth from the sun's, cosine of the
 // angle to the sun. The twin of sky_scattered() in render/shared/air.h.
-Rgb sky_radiance(const SkyTable& table, double sine, double cos_azimuth, double cos_to_sun, double mie_g) {
+Rgb sky_radiance(const SkyTable& table, double horizon, double sine, double cos_azimuth, double cos_to_sun,
+                 double mie_g) {
     constexpr std::size_t kColumns = shader::kSkyColumns, kRows = shader::kSkyRows;
     const double x = double(shader::sky_across(float(cos_azimuth))) * double(kColumns - 1),
-                 y = double(shader::sky_upwards(float(sine))) * double(kRows - 1);
+                 y = double(shader::air_row(float(sine), float(horizon))) * double(kRows - 1);
     const auto i = std::min(std::size_t(x), kColumns - 2), j = std::min(std::size_t(y), kRows - 2);
     const auto at = [&](const std::vector<float>& texels, std::size_t c) {
         const float *a = &texels[4 * (j * kColumns + i) + c], *b = a + 4 * kColumns;
@@ -157,15 +158,16 @@ TEST(Atmosphere, SkyEqualsBruteForce) {
     const AtmosphereModel& m = earth().model();
     double worst = 0, sum = 0;
     int count = 0;
+    const double altitude = 300;
+    const double horizon = -std::sqrt(1 - std::pow(m.ground_radius_m / (m.ground_radius_m + altitude), 2));
     for (const double elevation : kSuns) {
-        const double altitude = 300;
         const SkyTable table = earth().sky(altitude, elevation);
         std::vector<std::pair<Rgb, Rgb>> pairs;
         double brightest = 0;
         for (int n = 0; n < 200; ++n) {
-            const double up = n < 40 ? 0.03 * uniform() : uniform(), azimuth = kPi * uniform();
+            const double up = n < 40 ? horizon + 0.03 * uniform() : uniform(), azimuth = kPi * uniform();
             const double cosine = reference::cosine_between(up, sine(elevation), azimuth);
-            const Rgb found = sky_radiance(table, up, std::cos(azimuth), cosine, m.mie_g);
+            const Rgb found = sky_radiance(table, horizon, up, std::cos(azimuth), cosine, m.mie_g);
             const Rgb expected =
                 reference::sky_radiance(m, m.ground_radius_m + altitude, up, azimuth, sine(elevation),
                                         {elevation < -10 ? 300 : 120, 40}, psi);
@@ -182,11 +184,94 @@ TEST(Atmosphere, SkyEqualsBruteForce) {
                 ++count;
                 EXPECT_TRUE(found[c] >= 0 && std::isfinite(found[c]));
             }
-        EXPECT_LE(worst_here, 0.02) << "sun at " << elevation;
+        // At -18 the sky has a thousandth of the night's radiance.
+        EXPECT_LE(worst_here, elevation < -15 ? 0.05 : 0.02) << "sun at " << elevation;
         std::printf("sun at %g: largest relative error %.4f\n", elevation, worst_here);
         worst = std::max(worst, worst_here);
     }
     std::printf("sky against brute force: largest %.4f, mean %.5f\n", worst, sum / count);
+}
+
+// A texel of the layers of the air, with the interpolation of render/shading/air.glsl.
+Rgb air_layer_at(const SkyLight& light, std::size_t layer, double sine, double horizon, double across,
+                 double distance) {
+    constexpr std::size_t kColumns = shader::kSkyColumns, kRows = shader::kAirRows;
+    const double x = double(shader::air_distance(float(distance), float(sine), float(horizon), float(across))) *
+                     double(kColumns - 1),
+                 y = double(shader::air_row(float(sine), float(horizon))) * double(kRows - 1);
+    const auto i = std::min(std::size_t(x), kColumns - 2), j = std::min(std::size_t(y), kRows - 2);
+    const std::size_t row = j + (float(sine) < float(horizon) ? 0 : kRows);
+    Rgb value{};
+    for (std::size_t c = 0; c < 3; ++c) {
+        const float* a = &light.texels[4 * (((shader::kAirLayer + layer) * shader::kSkyRows + row) * kColumns + i) + c];
+        const float* b = a + 4 * kColumns;
+        value[c] = std::lerp(std::lerp(double(a[0]), double(a[4]), x - double(i)),
+                             std::lerp(double(b[0]), double(b[4]), x - double(i)), y - double(j));
+    }
+    return value;
+}
+
+// Aerial perspective from three heights, along rays from -30 to +5 degrees up to the ground or 300 km: within 3 %
+// (with the sun at 4 degrees 3.5 %) of naive integration, relative to the light of each channel or, where that is less, to a fiftieth of a white
+// surface's in the sun; and transmittance within 0.01.
+TEST(Atmosphere, AerialPerspectiveEqualsBruteForce) {
+    std::mt19937 engine(5);
+    const auto uniform = [&] { return engine() / 4294967296.0; };
+    RenderOptions options;
+    options.atmosphere.model = AirModel::physical;
+    options.atmosphere.haze = 5;
+    options.atmosphere.adaptation = 0;
+    options.atmosphere.night = {};
+    options.sun.colour = {1, 1, 1};
+    options.ground.albedo = {0.3, 0.3, 0.3};
+    const AtmosphereModel m = atmosphere_model(options.atmosphere, options.ground.albedo);
+    const TwinPsi psi(m);
+    SkyLights lights;
+    for (const double altitude : {100.0, 3'000.0, 11'000.0})
+        for (const double elevation : {4.0, 16.0, 50.0}) {  // nodes of the tables
+            options.camera.position_m.z = altitude;
+            options.sun.elevation_deg = elevation;
+            const SkyLight& light = lights.at(options, {});
+            const double radius = m.ground_radius_m + altitude;
+            const double across = altitude * (2 * m.ground_radius_m + altitude) / radius;
+            const double horizon = -std::sqrt(across / radius);
+            double worst = 0, worst_left = 0;
+            for (int n = 0; n < 60; ++n) {
+                const double up = sine(n < 15 ? -6 + 8 * uniform() : -30 + 35 * uniform()), azimuth = kPi * uniform();
+                bool ground = false;
+                const double whole = reference::ray_length(m, radius, up, ground);
+                const double distance = std::min(n % 3 == 0 ? whole : whole * uniform(), 300e3);
+                const reference::AirUpTo expected = reference::air_up_to(
+                    m, radius, up, azimuth, sine(elevation), distance, {400, 40}, psi);
+                const double phase = double(shader::particle_phase(
+                    float(reference::cosine_between(up, sine(elevation), azimuth)), float(m.mie_g)));
+                const auto layer = [&](std::size_t number) {
+                    return air_layer_at(light, number, up, horizon, across, distance);
+                };
+                const Rgb extinction = layer(0), to = layer(1), beside = layer(2), away = layer(3),
+                          haze_to = layer(4), haze_beside = layer(5), haze_away = layer(6);
+                const double cosine = std::cos(azimuth), square = cosine * cosine;
+                for (std::size_t c = 0; c < 3; ++c) {
+                    const double left = std::exp(-extinction[c] * distance);
+                    const double source = 0.5 * (square + cosine) * to[c] + (1 - square) * beside[c] +
+                                          0.5 * (square - cosine) * away[c] +
+                                          phase * (0.5 * (square + cosine) * haze_to[c] +
+                                                   (1 - square) * haze_beside[c] +
+                                                   0.5 * (square - cosine) * haze_away[c]);
+                    const double seen = source * (1 - left);
+                    const double true_light = kPi * kSunAboveAir * expected.light[c];
+                    const double error = std::abs(seen - true_light) / std::max(true_light, 0.02);
+                    if (error > worst) worst = error;
+                    worst_left = std::max(worst_left, std::abs(left - expected.transmittance[c]));
+                    EXPECT_LE(error, elevation < 5 ? 0.035 : 0.03) << altitude << " m, sun " << elevation << ", ray "
+                                           << std::asin(up) * 180 / kPi << ", azimuth " << azimuth * 180 / kPi
+                                           << ", " << distance << " of " << whole << " m, channel " << c;
+                    EXPECT_NEAR(left, expected.transmittance[c], 0.01) << altitude << ' ' << distance;
+                }
+            }
+            std::printf("from %g m, sun at %g: light %.4f, transmittance %.4f\n", altitude, elevation, worst,
+                        worst_left);
+        }
 }
 
 // What enters leaves: without absorption and over white ground the fluxes down and up are equal at every
@@ -264,6 +349,7 @@ TEST(Atmosphere, DoesNotDependOnThreads) {
 RenderOptions physical(double elevation_deg) {
     RenderOptions options;
     options.atmosphere.model = AirModel::physical;
+    options.atmosphere.haze = 1;
     options.sun.elevation_deg = elevation_deg;
     return options;
 }

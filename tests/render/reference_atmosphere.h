@@ -163,6 +163,34 @@ inline double mie_phase(double c, double g) {
            ((2 + g * g) * std::pow(1 + g * g - 2 * g * c, 1.5));
 }
 
+// Light of the air and its transmittance up to a distance, by `steps` equal parts.
+struct AirUpTo {
+    Rgb light{}, transmittance{};
+};
+template <class Psi>
+AirUpTo air_up_to(const AtmosphereModel& m, double radius, double sine, double azimuth, double sun,
+                  double distance, Steps steps, const Psi& psi) {
+    const double cos_to_sun = cosine_between(sine, sun, azimuth), step = distance / steps.view;
+    AirUpTo air;
+    Rgb depth{};
+    for (int i = 0; i < steps.view; ++i) {
+        const double t = (i + 0.5) * step, r = radius_along(radius, sine, t);
+        const double local = (radius * sun + t * cos_to_sun) / r;
+        const Densities d = densities(m, r);
+        const Rgb e = extinction(m, d), light = sunlight(m, r, local, steps.sun), many = psi(r, local);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double arrives = std::exp(-depth[c] - 0.5 * e[c] * step) * step;
+            const double rayleigh = m.rayleigh_per_m[c] * d.rayleigh, mie = m.mie_scattering_per_m * d.mie;
+            air.light[c] += arrives * (light[c] * (rayleigh * rayleigh_phase(cos_to_sun) +
+                                                   mie * mie_phase(cos_to_sun, m.mie_g)) +
+                                       many[c] * (rayleigh + mie));
+            depth[c] += e[c] * step;
+        }
+    }
+    for (std::size_t c = 0; c < 3; ++c) air.transmittance[c] = std::exp(-depth[c]);
+    return air;
+}
+
 // Radiance along a ray; `psi(radius, sine of the sun)` is the multiple scattering there.
 template <class Psi>
 Rgb sky_radiance(const AtmosphereModel& m, double radius, double sine, double azimuth, double sun,

@@ -53,11 +53,13 @@ TEST(Sky, IsTheSameInEveryBackend) {
     for (const Renderer* renderer : {&processor, &tiles, &billboards}) test::expect_no_messages(*renderer);
 }
 
-// The ground melts into the sky: up a column of pixels across the horizon nothing jumps.
+// In hazy air the ground melts into the sky: up a column of pixels across the horizon, which lies 0.45 degrees
+// low, nothing jumps.
 TEST(Sky, HasNoSeamAtTheHorizon) {
     Renderer renderer({{}, false, 2048, Splatting::cpu});
     for (const double elevation : {-4.0, 3.0, 50.0}) {
         RenderOptions options = under_sky(elevation, {0, 0, 200}, {0, 1000, 200});
+        options.atmosphere.haze = 30;
         options.sun.azimuth_deg = 120;
         options.camera.vertical_fov_deg = 1;
         options.camera.width = 1;
@@ -65,12 +67,79 @@ TEST(Sky, HasNoSeamAtTheHorizon) {
         const Picture picture = renderer.draw({}, options);
         float most = 0;
         for (const float value : picture.beauty) most = std::max(most, value);
-        for (std::size_t row = 390; row < 410; ++row)
+        for (std::size_t row = 700; row < 799; ++row)
             for (std::size_t c = 0; c < 3; ++c)
                 EXPECT_LE(std::abs(picture.beauty[3 * row + c] - picture.beauty[3 * row + 3 + c]),
                           0.02f * most)
                     << "row " << row << ", sun at " << elevation;
     }
+}
+
+// The horizon dips as on a sphere of the Earth's radius: below it there is ground, above it sky.
+TEST(Sky, HorizonDipsWithHeight) {
+    Renderer renderer({{}, false, 2048, Splatting::cpu});
+    for (const double altitude : {100.0, 3'000.0, 11'000.0}) {
+        RenderOptions options = under_sky(40, {0, 0, altitude}, {0, 0, 0});
+        const double dip = std::acos(6'360'000 / (6'360'000 + altitude));
+        options.camera.target_m = {0, 1000, altitude - 1000 * std::tan(dip)};
+        options.camera.vertical_fov_deg = 1;
+        options.camera.width = 1;
+        options.camera.height = 200;
+        options.atmosphere.haze = 0;
+        options.ground.albedo = {1, 0, 0};
+        const Picture red = renderer.draw({}, options);
+        options.ground.albedo = {0, 0, 0};
+        const Picture black = renderer.draw({}, options);
+        // The ground also lights the sky.
+        const auto of_ground = [&](std::size_t row) { return red.beauty[3 * row] - black.beauty[3 * row]; };
+        std::printf("ground from %g m: %.4f above, %.4f below the horizon\n", altitude, double(of_ground(97)),
+                    double(of_ground(104)));
+        EXPECT_GT(of_ground(104), 1.2f * of_ground(97)) << altitude;
+        EXPECT_NEAR(of_ground(97) / of_ground(90), 1, 0.05) << altitude;
+    }
+}
+
+// Country is the same in every back-end, keeps the mean of the albedo, and does not shimmer: a picture is hardly
+// different from the mean of one with sixteen times the pixels.
+TEST(Sky, CountryIsFilteredAndTheSameInEveryBackend) {
+    Renderer processor(test::validated(Splatting::cpu)), tiles(test::validated(Splatting::vulkan)),
+        billboards(test::validated(Splatting::blended));
+    const std::vector<Metaball> balls = reference::random_metaballs(7, 50, 80, 250);
+    const MetaballCloud cloud{balls, 0.01, 0.7};
+    for (const double altitude : {40.0, 400.0, 4'000.0}) {
+        RenderOptions options = under_sky(40, {0, -4000, altitude}, {0, 0, 0.5 * altitude});
+        const Picture plain = processor.draw(cloud, options);
+        options.ground.pattern = GroundPattern::country;
+        const Picture picture = processor.draw(cloud, options);
+        EXPECT_LE(test::largest_difference(tiles.draw(cloud, options).beauty, picture.beauty), 1.0f / 255);
+        EXPECT_LE(test::largest_difference(billboards.draw(cloud, options).beauty, picture.beauty), 1.0f / 255);
+        EXPECT_GT(test::largest_difference(plain.beauty, picture.beauty), 0.01f);
+        options.camera.width *= 4;
+        options.camera.height *= 4;
+        options.light_shafts.strength = 0;
+        const Picture fine = processor.draw({}, options);
+        options.camera.width /= 4;
+        options.camera.height /= 4;
+        const Picture coarse = processor.draw({}, options);
+        double square = 0, mean_fine = 0, mean_coarse = 0;
+        std::size_t count = 0;
+        for (std::size_t y = 22; y < std::size_t(coarse.height); ++y)  // below the horizon
+            for (std::size_t x = 0; x < std::size_t(coarse.width); ++x, ++count) {
+                double mean = 0;
+                for (std::size_t k = 0; k < 16; ++k)
+                    mean += double(fine.beauty[3 * ((4 * y + k / 4) * std::size_t(fine.width) + 4 * x + k % 4) + 1]) / 16;
+                const double here = double(coarse.beauty[3 * (y * std::size_t(coarse.width) + x) + 1]);
+                square += (here - mean) * (here - mean);
+                mean_fine += mean;
+                mean_coarse += here;
+            }
+        const double deviation = std::sqrt(square / double(count));
+        std::printf("country from %g m: deviation of a pixel %.5f, means %.5f and %.5f\n", altitude, deviation,
+                    mean_fine / double(count), mean_coarse / double(count));
+        EXPECT_LT(deviation, 0.015);
+        EXPECT_NEAR(mean_coarse / mean_fine, 1, 0.02);
+    }
+    for (const Renderer* renderer : {&processor, &tiles, &billboards}) test::expect_no_messages(*renderer);
 }
 
 // A disc of the sun's size where the sun stands, and none when it is switched off.

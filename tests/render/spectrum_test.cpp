@@ -144,6 +144,7 @@ TEST(Spectrum, ALowSunGlows) {
 TEST(Spectrum, PrimariesAreTheAtmosphereItself) {
     const AirColours air = air_with(1, SkyColours::primaries);
     AtmosphereOptions options;
+    options.haze = 1;
     const Atmosphere plain(atmosphere_model(options, {0.12, 0.15, 0.07}));
     EXPECT_EQ(air.above_air(), (Rgb{1, 1, 1}));
     EXPECT_EQ(air.sunlight(500, 12), plain.sunlight(500, 12));
