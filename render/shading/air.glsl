@@ -58,8 +58,11 @@ vec3 air_source(vec3 ray, float distance) {
     const float first = float(kAirLayer);
     vec3 around = vec3(0.5 * (square + cosine), 1.0 - square, 0.5 * (square - cosine));
     float phase = particle_phase(dot(frame.to_sun.xyz, ray), frame.air.y);
+    // No compiler knows that there are six layers: lavapipe writes out the code of a look-up wherever one stands, and
+    // shaders with many of them would take gigabytes to compile.
+    uint layers = ray.z > -2.0 ? 6u : 0u;
     vec3 sum = vec3(0.0);
-    for (uint n = 0u; n < 6u; ++n)
+    for (uint n = 0u; n < layers; ++n)
         sum += around[n % 3u] * (n < 3u ? 1.0 : phase) * air_layer_at(place, first + 1.0 + float(n));
     return sum;
 }

@@ -14,5 +14,7 @@ vec3 pixel_ray(vec2 point) { return normalize(pixel_direction(point)); }
 // number when it does not. No branch on a uniform: see lighting.glsl.
 float ground_distance(vec3 ray) {
     bool meets = frame.ground_sun.w > 0.0 && ray.z < frame.earth.x;
-    return meets ? min(sphere_distance(ray.z, frame.earth.x, frame.earth.y), 1.0e30) : 1.0e30;
+    float slope = sqrt(max((frame.earth.x - ray.z) * (-frame.earth.x - ray.z), 0.0)) - ray.z;
+    float way = min(frame.earth.y / max(slope, 1.0e-9), 1.0e30);
+    return meets ? way : 1.0e30;
 }
