@@ -119,6 +119,13 @@ struct FrameAir {
     HWY_INLINE Floats3 sky_layer(Floats across, Floats upwards, unsigned layer) {
         return HWY_NAMESPACE::sky_layer(frame, across, upwards, layer);
     }
+    HWY_INLINE Floats3 light_of_air(Floats column, Floats row, const Floats3& around, Floats phase) {
+        const auto layers = [&](unsigned first) {
+            const auto layer = [&](unsigned n) { return sky_layer(column, row, kAirLayer + first + n); };
+            return times_add(around.z, layer(2), times_add(around.y, layer(1), times(around.x, layer(0))));
+        };
+        return times_add(phase, layers(4), layers(1));
+    }
 #pragma push_macro("NEPHOS_FUNCTION")
 #undef NEPHOS_FUNCTION
 #define NEPHOS_FUNCTION HWY_INLINE

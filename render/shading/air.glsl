@@ -16,6 +16,17 @@ vec3 sunlight_at(float height) {
     return sky_layer(clamp((frame.air.x + height) / kSunlightTop, 0.0, 1.0), 0.0, 2u);
 }
 
+// Returns the light of six layers of the table of air: of molecules and of particles, by the azimuth from the sun.
+// No compiler knows that there are six: lavapipe writes out the code of a look-up wherever one stands, and shaders with
+// many of them would take gigabytes to compile.
+vec3 light_of_air(float column, float row, vec3 around, float phase) {
+    uint layers = row > -2.0 ? 6u : 0u;
+    vec3 sum = vec3(0.0);
+    for (uint n = 0u; n < layers; ++n)
+        sum += around[n % 3u] * (n < 3u ? 1.0 : phase) * sky_layer(column, row, kAirLayer + 1u + n);
+    return sum;
+}
+
 #define Real3 vec3
 #define rgb(four) ((four).rgb)
 #define xyz(four) ((four).xyz)

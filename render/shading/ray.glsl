@@ -11,8 +11,11 @@ vec3 pixel_direction(vec2 point) {
 vec3 pixel_ray(vec2 point) { return normalize(pixel_direction(point)); }
 
 // Returns the distance at which a ray meets the ground, a sphere under the physical sky, else a plane; a very large
-// number when it does not. No branch on a uniform: see lighting.glsl.
+// number when it does not. Without a branch: lavapipe would recompile the shader for each height of the eye.
 float ground_distance(vec3 ray) {
-    bool meets = frame.ground_sun.w > 0.0 && ray.z < frame.earth.x;
-    return meets ? min(sphere_distance(ray.z, frame.earth.x, frame.earth.y), 1.0e30) : 1.0e30;
+    float below = frame.earth.x - ray.z;
+    float slope = sqrt(max(below * (-frame.earth.x - ray.z), 0.0)) - ray.z;
+    float way = min(frame.earth.y / max(slope, 1.0e-9), 1.0e30);
+    float meets = clamp(below * 1.0e30, 0.0, 1.0) * frame.ground_sun.w;
+    return mix(1.0e30, way, meets);
 }

@@ -9,7 +9,7 @@
 // and therefore has no include guard. Beside what formulas.h needs, the including file has `frame` (shared.h) and
 // kPhysicalSky; sky_layer(across, upwards, layer), a texel of the tables of atmosphere.h, whose layers are: light
 // scattered by molecules and many times; by particles, without their phase function; sunlight by altitude; and from
-// kAirLayer on the table of air; and the operators of Real3 with
+// kAirLayer on the table of air; light_of_air(), which sums its layers; and the operators of Real3 with
 // rgb() and xyz() of a vec4. Rays are unit vectors, distances and heights metres, heights above the eye's.
 //
 // Without kPhysicalSky the air has two colours. With it the tables have it over a round Earth.
@@ -60,16 +60,10 @@ NEPHOS_FUNCTION Real3 clear_air(Real3 ray, Real distance) { return exp(-air_dept
 // Returns the source of the light of sunlit air along a ray, up to a distance: light / (1 - transmittance).
 NEPHOS_FUNCTION Real3 air_source(Real3 ray, Real distance) {
     if (!kPhysicalSky) return rgb(frame.horizon);
-    Real column = air_column(ray, distance), row = air_upwards(ray);
     Real cosine = beside_sun(ray), square = cosine * cosine;
-    Real towards = 0.5f * (square + cosine), beside = 1.0f - square, away = 0.5f * (square - cosine);
-    Real3 scattered = mul_add(away, sky_layer(column, row, kAirLayer + 3u),
-                              mul_add(beside, sky_layer(column, row, kAirLayer + 2u),
-                                      towards * sky_layer(column, row, kAirLayer + 1u)));
-    Real3 haze = mul_add(away, sky_layer(column, row, kAirLayer + 6u),
-                         mul_add(beside, sky_layer(column, row, kAirLayer + 5u),
-                                 towards * sky_layer(column, row, kAirLayer + 4u)));
-    return mul_add(particle_phase(dot(xyz(frame.to_sun), ray), frame.air.y), haze, scattered);
+    Real3 around = Real3(0.5f * (square + cosine), 1.0f - square, 0.5f * (square - cosine));
+    return light_of_air(air_column(ray, distance), air_upwards(ray), around,
+                        particle_phase(dot(xyz(frame.to_sun), ray), frame.air.y));
 }
 
 // Returns the radiance of sunlit air over a distance; `beta` is its transmittance.
