@@ -86,7 +86,7 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
     const AirInterval part = interval_with_air(*frame.shells, ray);
     if (part.begin >= part.end) return;
     const RayAir of(frame, ray);
-    const Floats ground = hn::Load(d, rays.ground + at), offset = hn::Load(d, rays.shell_offset + at);
+    const Floats ground = air_end(frame, ray.z, hn::Load(d, rays.ground + at)), offset = hn::Load(d, rays.shell_offset + at);
     Floats3 sum{hn::Load(d, sums.red + at), hn::Load(d, sums.green + at), hn::Load(d, sums.blue + at)};
     const Floats first_m = air_begin(frame, ray);
     const auto within = [&](float distance_m) { return hn::Min(hn::Max(set(distance_m), first_m), ground); };

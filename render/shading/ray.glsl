@@ -17,5 +17,5 @@ float ground_distance(vec3 ray) {
     float slope = sqrt(max(below * (-frame.earth.x - ray.z), 0.0)) - ray.z;
     float way = min(frame.earth.y / max(slope, 1.0e-9), 1.0e30);
     float meets = clamp(below * 1.0e30, 0.0, 1.0) * frame.ground_sun.w;
-    return mix(1.0e30, way, meets);
+    return max(way, (1.0 - meets) * 1.0e30);
 }

@@ -179,6 +179,14 @@ HWY_INLINE Floats air_begin(const PictureFrame& frame, const Floats3& ray) {
     return hn::Div(set(frame.ground.w), hn::Max(ray.z, set(1.0e-6f)));
 }
 
+// Returns the distance at which air ends: at the ground, but no farther than where a ray meets the plane of the fog,
+// which over a round Earth it may do without meeting the ground.
+HWY_INLINE Floats air_end(const PictureFrame& frame, Floats ray_z, Floats ground) {
+    if (!(frame.ground_sun.w > 0)) return ground;
+    const Floats plane = hn::Div(set(-std::abs(frame.ground.w)), hn::Min(ray_z, set(-1.0e-9f)));
+    return hn::IfThenElse(hn::Lt(ray_z, hn::Zero(Lanes())), hn::Min(ground, plane), ground);
+}
+
 // The part of the shells of splats that lies in front of their centres; beyond the last shell, they begin at
 // `distance` itself.
 HWY_INLINE AirLayer layer_in_front(const PictureFrame& frame, const Floats3& ray, Floats shell_begins,

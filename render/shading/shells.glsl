@@ -138,9 +138,16 @@ AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float sha
 // Returns the distance at which a ray of a mirrored eye, which is below the ground, leaves the ground.
 float air_begin(vec3 ray) { return frame.ground.w > 0.0 ? frame.ground.w / max(ray.z, 1.0e-6) : 0.0; }
 
+// Returns the distance at which it ends: at the ground, but no farther than where a ray meets the plane of the fog, which
+// over a round Earth it may do without meeting the ground.
+float air_end(vec3 ray) {
+    float plane = ray.z < 0.0 ? -abs(frame.ground.w) / min(ray.z, -1.0e-9) : 1.0e30;
+    return min(ground_distance(ray), plane + (1.0 - frame.ground_sun.w) * 1.0e30);
+}
+
 // Returns shell k along the ray of a pixel, cut off by the ground.
 AirLayer air_shell(uint k, SunlitAir sunlit, vec3 ray, uvec2 pixel) {
-    float first = air_begin(ray), last = ground_distance(ray);
+    float first = air_begin(ray), last = air_end(ray);
     float begin = clamp(shell_begin(k), first, last), end = clamp(shell_end(k), first, last);
     return air_layer(sunlit, ray, begin, end, shell_offset(pixel.x, pixel.y));
 }

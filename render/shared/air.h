@@ -91,7 +91,7 @@ NEPHOS_FUNCTION SunlitAir sunlit_air(Real3 ray) {
     air.source = air_source(ray, Real(kShaftsReach));
     Real cosine = dot(xyz(frame.to_sun), ray);
     if (kPhysicalSky) {
-        air.most = air.source;
+        air.most = Real(0.94f) * air.source;  // clear_air() may take up to 6 % more away than the tables have
         air.molecules = kPi * molecule_phase(cosine);
         air.particles = kPi * frame.air.z * particle_phase(cosine, frame.air.y);
         return air;

@@ -242,6 +242,7 @@ TEST_F(BinnedPictures, AreThoseOfTheProcessor) {
 TEST_F(BinnedPictures, WithAirBetweenTheSplats) {
     const std::vector<Metaball> balls = reference::random_metaballs(8, 700);
     for (const test::View& view : test::views()) {
+        SCOPED_TRACE(view.name);
         RenderOptions options = view.options;
         options.light_shafts.strength = 1;
         for (const double fog : {0.0, 0.0004}) {
@@ -250,7 +251,8 @@ TEST_F(BinnedPictures, WithAirBetweenTheSplats) {
             EXPECT_LE(difference(splats_of(balls, 0.02), options), kClose) << view.name << ", fog " << fog;
         }
         options.atmosphere.model = AirModel::physical;
-        EXPECT_LE(difference(splats_of(balls, 0.02), options), kClose) << view.name << ", physical sky";
+        SCOPED_TRACE("physical sky");
+        EXPECT_LE(difference(splats_of(balls, 0.02), options), kClose) << view.name;
     }
 }
 

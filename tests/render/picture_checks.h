@@ -81,7 +81,8 @@ inline std::size_t expect_same_depths(const Picture& picture, const Picture& ref
     for (std::size_t i = 0; i < picture.depth_m.size(); ++i) {
         const float opacity = 1.0f - reference.transmittance[i];
         if (opacity < least_opacity || 1.0f - picture.transmittance[i] < least_opacity) continue;
-        EXPECT_NEAR(picture.depth_m[i] / reference.depth_m[i], 1.0f, tolerance / opacity) << "pixel " << i;
+        EXPECT_NEAR(picture.depth_m[i] / reference.depth_m[i], 1.0f, tolerance / opacity)
+            << "pixel " << i << ": " << picture.depth_m[i] << " m, expected " << reference.depth_m[i] << " m";
         ++compared;
     }
     return compared;
