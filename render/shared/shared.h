@@ -27,25 +27,21 @@ using std::sqrt;
 #define NEPHOS_FUNCTION
 #endif
 
-NEPHOS_CONST uint kAttenuationLevels = 64u;   // textures in the array
-NEPHOS_CONST uint kAttenuationTexels = 64u;   // on each side of one texture
+NEPHOS_CONST uint kAttenuationLevels = 64u, kAttenuationTexels = 64u;  // textures in the array, texels on a side
 NEPHOS_CONST float kMaxDepthScale = 32.0f;    // depth scale of the last level, see level_of()
 NEPHOS_CONST float kNearDistance = 1.5f;      // in radii: nearer metaballs are integrated, not textured
 NEPHOS_CONST float kMinRadiusPixels = 1.25f;  // smaller billboards are widened to it and thinned out
 NEPHOS_CONST float kPi = 3.14159265358979f;
 NEPHOS_CONST uint kComputeGroup = 64u;  // invocations in a work group, where nothing else decides
-NEPHOS_CONST uint kTileWidth = 8u;      // pixels
-NEPHOS_CONST uint kTileHeight = 16u;
+NEPHOS_CONST uint kTileWidth = 8u, kTileHeight = 16u;  // pixels
 NEPHOS_CONST uint kQueriesPerLane = 4u;
 NEPHOS_CONST float kDistanceUnit = 16.0f;     // metres
 NEPHOS_CONST float kOpaque = 1.0f / 4096.0f;  // transmittance below which splats behind are skipped
 NEPHOS_CONST uint kIntegrate = 1u;  // flag: evaluate the integral along the ray, do not use the textures
 NEPHOS_CONST uint kNotFitted = 4u;  // flag: the tiles evaluate the integral, whatever the billboards do
-NEPHOS_CONST uint kBillboardFlag =
-    8u;                          // flag, of no metaball: a billboard, whose index is in the bits from 4 on
+NEPHOS_CONST uint kBillboardFlag = 8u;  // flag, of no metaball: a billboard, whose index is in the bits from 4 on
 NEPHOS_CONST uint kAround = 2u;  // flag: around or close to the eye, covers the whole picture
-NEPHOS_CONST uint kSkyColumns = 64u;  // of the tables of the sky (atmosphere.h)
-NEPHOS_CONST uint kSkyRows = 96u;
+NEPHOS_CONST uint kSkyColumns = 64u, kSkyRows = 96u;  // of the tables of the sky (atmosphere.h)
 // Scattered, haze, sunlight by altitude; and of the air up to a distance: extinction, the source of what is
 // scattered and of haze, each towards the sun, beside it and away from it.
 NEPHOS_CONST uint kSkyLayers = 10u;
@@ -58,9 +54,7 @@ NEPHOS_CONST float kSunlightTop = 16000.0f;   // metres above the ground: sunlig
 NEPHOS_CONST float kSunRadius = 0.00462512f;  // radians
 // Radiance of the sun's disc falls off towards its limb as cosine^exponent; red, green, blue (near 680, 550
 // and 440 nm): D. Hestroffer and C. Magnan, "Wavelength dependency of the Solar limb darkening", 1998.
-NEPHOS_CONST float kLimbDarkeningRed = 0.397f;
-NEPHOS_CONST float kLimbDarkeningGreen = 0.503f;
-NEPHOS_CONST float kLimbDarkeningBlue = 0.652f;
+NEPHOS_CONST float kLimbDarkeningRed = 0.397f, kLimbDarkeningGreen = 0.503f, kLimbDarkeningBlue = 0.652f;
 NEPHOS_CONST uint kFogVoxels = 32u;       // of the noise of fog, on a side; a power of two
 NEPHOS_CONST float kFarShell_m = 1.0e6f;  // with fog, a last shell of all the air beyond the others ends here
 NEPHOS_CONST uint kMaxShells = 128u;
@@ -178,21 +172,18 @@ struct FrameUniforms {
     vec4 air;       // eye's altitude above the ground, m; asymmetry and albedo of particles; 1 = physical sky
     vec4 sun_disc;  // rgb: radiance of its middle; w: 1 = there is a disc
     vec4 sun_fade;  // rgb: change of the logarithm of its radiance with the sine of the elevation
-    vec4 earth;  // x: sine of the horizon's elevation; y: altitude (2 R + altitude) / (R + altitude), metres (of a
-                 // plane 2 altitude); z:
-                 // 1 / (2 (R + altitude))
+    vec4 earth;  // x: sine of the horizon's elevation; y: altitude (2 R + altitude) / (R + altitude), m, of a
+                 // plane twice the altitude; z: 1 / (2 (R + altitude))
 };
 
 // Shells of air around the eye (air_shells.h).
 struct Shells {
     vec4 ends[kMaxShells / 4u + 1u];  // metres from the eye at which each shell ends and the next begins
-    vec4 settings;  // x: number of shells; y: strength of light shafts; z: texels in a row of the shade map;
-                    // w: in all
+    vec4 settings;  // x: number of shells; y: strength of shafts; z: texels in a row of the shade map; w: in all
     vec4 shade_u;   // shade map: column of a point p relative to the eye, dot(xyz, p) + w, texels
     vec4 shade_v;   // row
     vec4 shade_along;  // downwards, or along the light: 0 where the first cloud begins, 1 where the last ends
-    vec4 shade;  // x, y: largest column and row; z: along `shade_along`, where the first shade begins; w:
-                 // metres from the eye at which shafts end
+    vec4 shade;  // x, y: largest column and row; z: along `shade_along`, where shade begins; w: m to the end of shafts
     vec4 fog;    // x: extinction at the base, per metre; y: 1 / height over which it falls off; z: height of
                  // the eye above the base; w: how much it varies
     vec4 fog_coarse;  // xyz: where in the noise the eye is, 0..1; w: 1 / size of the noise in metres
@@ -201,9 +192,8 @@ struct Shells {
 };
 
 // Returns the position in a shell, 0..1, at which a pixel samples it: multiples of the golden ratio along a
-// Hilbert curve through blocks of 64 x 64 pixels. Neighbours on the curve are neighbours in the picture, so that
-// the offsets of any few pixels near each other are spread evenly and what is left has no coarse grain and no
-// weave, as lattices in two dimensions have. In integers: the same on every machine.
+// Hilbert curve through blocks of 64 x 64 pixels. Neighbours on the curve are neighbours in the picture, so that the
+// offsets of a few pixels near each other are spread evenly. In integers: the same on every machine.
 NEPHOS_FUNCTION float shell_offset(uint x, uint y) {
     uint column = x & 63u, row = y & 63u, along = 0u;
     for (uint side = 32u; side > 0u; side >>= 1u) {
