@@ -39,11 +39,6 @@ void require(bool good, const char* name, double value, const char* expected) {
 
 bool within(double value, double low, double high) { return value >= low && value <= high; }
 
-std::array<int, 3> unpacked(std::size_t place, const std::array<int, 3>& size) {
-    const auto at = int(place);
-    return {at % size[0], at / size[0] % size[1], at / size[0] / size[1]};
-}
-
 void check(const DetailSetting& setting) {
     nephos::check(setting.options);
     require(within(setting.metaball_radius_cells, 1, 8), "metaball radius", setting.metaball_radius_cells, "1..8 cells");
@@ -163,7 +158,7 @@ void CoverageField::sample_nodes(const CoverageCells& cells, const NodeSums& sum
         std::vector<float> density(sums.size()), growing(cells.grows() ? density.size() : 0);
         std::array<float, kEdge * kEdge * kEdge> means, growths{};
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
-            const auto at = unpacked(std::size_t(places_[n]), bricks_);
+            const auto at = brick_at(places_[n], bricks_);
             int corner[3];
             for (std::size_t axis = 0; axis < 3; ++axis) corner[axis] = at[axis] * kCells - before - sums.reach();
             if (!cells.copy(corner, sums.side(), sums.pitch(), density.data(),
@@ -245,7 +240,7 @@ void CoverageField::measure_cells(const std::array<std::vector<std::uint8_t>, 3>
     std::vector<std::array<double, 3>> masses(places_.size(), {0, 0, 0});  // coarse, and both where there are fine ones
     tbb::parallel_for(std::size_t{0}, places_.size(), [&](std::size_t n) {
         std::array<float, kSamples * kSamples * kSamples> samples;
-        const auto at = unpacked(std::size_t(places_[n]), bricks_);
+        const auto at = brick_at(places_[n], bricks_);
         detailed_density_of_brick(*this, n, node_m_, BrickSamples::middles, samples);
         const CellSums sums = sums_of_cells(samples);
         for (std::size_t cell = 0; cell < kOfBrick; ++cell) cell_density_[n * kOfBrick + cell] = 0.125f * sums[cell];

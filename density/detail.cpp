@@ -101,10 +101,6 @@ namespace text = detail_text;
 
 constexpr int kEdge = CoverageField::kBrickNodes;
 
-std::array<int, 3> unpacked(std::int32_t place, const std::array<int, 3>& size) {
-    return {place % size[0], place / size[0] % size[1], place / size[0] / size[1]};
-}
-
 constexpr std::size_t kLanesBehind = 16;  // that sample_places() reads
 float scalar_small_noise(float level, float x, float y, float z) {
     const int below = std::min(int(level), 2);
@@ -185,7 +181,7 @@ std::vector<float> detailed_density(const CoverageField& field, const Vec3& corn
 void detailed_density_of_brick(const CoverageField& field, std::size_t number, double footprint_m,
                                BrickSamples samples, std::span<float> out) {
     const DetailKernel kernel(field);
-    const auto at = unpacked(field.places()[number], field.bricks());
+    const auto at = brick_at(field.places()[number], field.bricks());
     float corner[3];
     for (std::size_t axis = 0; axis < 3; ++axis) corner[axis] = float(at[axis] * field.node_m() * (kEdge - 1));
     HWY_DYNAMIC_DISPATCH(sample_brick)(kernel, std::int32_t(number), corner, float(footprint_m), samples, out.data());
@@ -272,7 +268,7 @@ DensityGrid resample_with_detail(const CoverageField& field, Extent coarse, cons
     const double brick_voxels = field.node_m() * (kEdge - 1) / finer.cell_size_m;
     std::vector<openvdb::Coord> origins;
     for (const std::int32_t place : field.places()) {
-        const auto at = unpacked(place, bricks);
+        const auto at = brick_at(place, bricks);
         int low[3], high[3];
         const int sizes[3] = {fine.x, fine.y, fine.z};
         for (int axis = 0; axis < 3; ++axis) {

@@ -11,6 +11,11 @@
 
 namespace nephos {
 
+// Returns the coordinates of an index in CoverageField::table(), x fastest. `size`: CoverageField::bricks().
+inline std::array<int, 3> brick_at(std::int32_t index, const std::array<int, 3>& size) {
+    return {index % size[0], index / size[0] % size[1], index / size[0] / size[1]};
+}
+
 struct DetailKernel {
     const std::uint8_t* nodes = nullptr;
     const std::int32_t* table = nullptr;

@@ -16,11 +16,6 @@ namespace text = detail_text;
 constexpr int kEdge = CoverageField::kBrickNodes, kCells = CoverageField::kBrickCells;
 constexpr std::size_t kBrickBytes = CoverageField::kBrickBytes;
 
-std::array<int, 3> unpacked(std::size_t place, const std::array<int, 3>& size) {
-    const auto at = int(place);
-    return {at % size[0], at / size[0] % size[1], at / size[0] / size[1]};
-}
-
 }  // namespace
 
 // Cells as bits: a row of three bricks' cells along x in a word.
@@ -50,7 +45,7 @@ std::vector<std::uint8_t> clearance_of_cells(std::span<const std::uint8_t> nodes
     constexpr int kSide = 3 * kCells;
     using Rows = std::array<std::uint16_t, kSide * kSide>;
     tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
-        const auto at = unpacked(std::size_t(places[n]), bricks);
+        const auto at = brick_at(places[n], bricks);
         std::uint8_t* const out = &clearance[n * kCells * kCells * kCells];
         if (std::ranges::all_of(occupied[n], [](std::uint8_t row) { return row == (1u << kCells) - 1; })) return;
         Rows near{};

@@ -387,14 +387,4 @@ std::vector<std::uint16_t> diffuse_surroundings(const CoverageField& field, std:
     return surroundings;
 }
 
-float diffuse_radiance(const DiffuseLight& light, std::size_t node, double mean_cosine, const Vec3& direction) {
-    const auto ratio = [](unsigned byte) { return (double(byte) - 128) / 127; };
-    const double root = double(light.upwards[node] & 255u) / 255;
-    const Vec3 flux(ratio(light.sideways[node] & 255u), ratio(light.sideways[node] >> 8u),
-                    ratio(light.upwards[node] >> 8u));
-    const double directed = double(shader::kDiffuseBase) +
-                            double(shader::kDiffuseFlux) * mean_cosine * glm::dot(flux, direction);
-    return float(0.25 * double(shader::kMostFluence) * root * root * std::max(directed, 0.0));
-}
-
 }  // namespace nephos

@@ -39,7 +39,4 @@ DiffuseLight diffuse_sunlight(const CoverageField& field, std::span<const float>
 std::vector<std::uint16_t> diffuse_surroundings(const CoverageField& field, std::span<const float> extinction,
                                                 double mean_cosine);
 
-// Unpacks a node: what is scattered towards a unit direction of travel, as radiance under a sun of irradiance pi.
-float diffuse_radiance(const DiffuseLight& light, std::size_t node, double mean_cosine, const Vec3& direction);
-
 }  // namespace nephos

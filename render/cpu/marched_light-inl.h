@@ -202,20 +202,17 @@ HWY_INLINE Floats3 marched_radiance(const ViewScene& scene, const MarchedVolume&
     const TwoBytes seen = bytes_at(volume.surroundings, here);
     const Floats unit = set(1.0f / 255.0f), sky = hn::IfThenElse(in_brick, hn::Mul(unit, seen.low), set(1.0f)),
                  ground_seen = hn::IfThenElse(in_brick, hn::Mul(unit, seen.high), set(1.0f));
-    const Floats fold = hn::MulAdd(
-        set(shader::kFoldShare), fast_exp(hn::Mul(own, set(-shader::kFoldDecay))), set(1 - shader::kFoldShare));
-
     const Floats albedo = set(frame.ambient_top.w);
     const Floats3 sunlight = sunlight_at(frame, point.z);
-    Floats3 arriving = times(hn::Mul(sky, fold), set3(frame.ambient_top));
-    arriving = times_add(hn::Mul(ground_seen, fold), set3(frame.ambient_base), arriving);
+    Floats3 arriving = times(sky, set3(frame.ambient_top));
+    arriving = times_add(ground_seen, set3(frame.ambient_base), arriving);
     arriving = times_add(scattered_in_volume(scene, volume, ray, sun_depth, here, in_brick), sunlight, arriving);
     const Floats once = hn::Mul(scattered_once(frame, dot(to_sun, ray)), hn::Exp(d, hn::Neg(sun_depth)));
     arriving = times_add(once, sunlight, arriving);
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), point);
         const Floats falloff = hn::Mul(set(frame.flash.w), flash_falloff(dot(way, way)));
-        arriving = times_add(hn::Mul(falloff, fold), set3(frame.flash_colour), arriving);
+        arriving = times_add(falloff, set3(frame.flash_colour), arriving);
     }
     const Floats3 beta = air_transmittance(frame, ray, distance);
     Floats3 radiance = add(each_times(beta, times(albedo, arriving)), air_light(frame, ray, distance, beta));

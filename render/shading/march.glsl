@@ -82,13 +82,12 @@ vec3 marched_radiance(uint v, vec3 ray, float distance) {
     float sun_depth = holds_cloud(beyond) ? own + volume_sun_depth(v, beyond)
                                           : max(own, holds_cloud(here) ? volume_sun_depth(v, here) : 0.0);
     vec2 seen = holds_cloud(here) ? volume_bytes(v, 1u, here) * (1.0 / 255.0) : vec2(1.0);
-    float fold = kFoldShare * exp(-kFoldDecay * own) + (1.0 - kFoldShare);
     vec3 sunlight = sunlight_at(point.z);
-    vec3 arriving = seen.x * fold * frame.ambient_top.rgb + seen.y * fold * frame.ambient_base.rgb;
+    vec3 arriving = seen.x * frame.ambient_top.rgb + seen.y * frame.ambient_base.rgb;
     arriving += scattered_in_volume(v, ray, sun_depth, here) * sunlight;
     arriving += scattered_once(dot(to_sun, ray)) * exp(-sun_depth) * sunlight;
     vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark
-    arriving += frame.flash.w * flash_falloff(dot(way, way)) * fold * frame.flash_colour.rgb;
+    arriving += frame.flash.w * flash_falloff(dot(way, way)) * frame.flash_colour.rgb;
     vec3 beta = air_transmittance(ray, distance);
     vec3 radiance = beta * (frame.ambient_top.w * arriving) + air_light(ray, distance, beta);
     AirLayer air = layer_in_front(point, distance);

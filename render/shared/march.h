@@ -30,8 +30,6 @@ NEPHOS_CONST float kLeastMargin = 1.0e-4f;            // difference of two sampl
 NEPHOS_CONST float kTap0_m = 3.0f, kTap1_m = 10.0f, kTap2_m = 22.0f;
 NEPHOS_CONST float kTap0Length_m = 6.5f, kTap1Length_m = 9.5f, kTap2Length_m = 14.5f;
 NEPHOS_CONST float kTapsEnd_m = 30.5f;
-// The light of sky and ground in folds: this share of it falls off with the samples' optical depth times kFoldDecay.
-NEPHOS_CONST float kFoldShare = 0.0f, kFoldDecay = 0.5f;
 // Light that diffuses (render/cloud/diffusion.h): of fluence f and flux F, 1/4 (kDiffuseBase f + kDiffuseFlux g omega F)
 // is scattered towards omega. By Eddington's approximation the numbers are 1 and 3; with these the albedo of slabs of
 // optical depth 5, 20 and 80 is within 5 % of the exact one for g of 0.85, and at smaller g of a finer lattice.
