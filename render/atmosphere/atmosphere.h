@@ -64,7 +64,7 @@ struct SkyIrradiance {
 };
 
 // Radiances, RGB and one unused number a texel; rows are elevations, columns azimuths from the sun's, by
-// sky_across() and sky_upwards() of render/shared/shared.h. The first and last columns and rows are at the
+// sky_across() and air_row() of render/shared/formulas.h. The first and last columns and rows are at the
 // ends of the range.
 struct SkyTable {
     std::vector<float> scattered;  // molecules with their phase function, plus multiple scattering

@@ -57,9 +57,9 @@ const Section& light_section() {
              "Jendersie and d'Eon 2023"),
          word<&Scene::render, &RenderOptions::light, &CloudLight::multiple>(
              "multiple", {"diffusion", "octaves"},
-             "Sunlight that arrives after many scatterings: a term without direction that decays like "
-             "diffusion "
-             "through a slab, or octaves of the direct light.",
+             "Sunlight that arrives after many scatterings. `diffusion`: in clouds with detail the diffusion equation on "
+             "the lattice, elsewhere a term without direction that decays like diffusion through a slab. `octaves`: "
+             "of the direct light. See docs/lighting.md.",
              "Wrenninge, Kulla and Lundqvist 2013"),
          table<&Scene::render, &RenderOptions::light, &CloudLight::octaves>("octaves", octaves_section(),
                                                                             octaves_section().effect),
