@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 
@@ -14,19 +15,37 @@
 namespace nephos {
 namespace {
 
+// Whole numbers of periods near those of an edge, with the cost of their distance: not all 0.
+struct Periods {
+    Vec3 whole{};
+    double cost = 0;
+};
+
+std::vector<Periods> periods_near(const Vec3& exact) {
+    std::vector<Periods> result;
+    const double squared = glm::dot(exact, exact);
+    for (int n = 0; n < 27; ++n) {
+        const Vec3 whole = glm::round(exact) + Vec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1), apart = whole - exact;
+        if (glm::dot(whole, whole) > 0) result.push_back({whole, glm::dot(apart, apart) / squared});
+    }
+    return result;
+}
+
 // Large noise of mean 1 that multiplies densities: hollows and towers between the bumps and the voxels' field.
 class Thermals {
   public:
-    Thermals(const DetailSetting& setting, double cell_m)
-        : strength_(float(setting.options.thermals)),
-          drift_m_(setting.drift_m),
-          per_m_(1 / (4 * kBumpsOfTile * bump_size_m(setting.options, cell_m))) {}
+    Thermals(const DetailSetting& setting, const Extent& extent, double cell_m)
+        : strength_(float(setting.options.thermals)), drift_m_(setting.drift_m) {
+        const double per_m = 1 / (4 * kBumpsOfTile * bump_size_m(setting.options, cell_m));
+        for (std::size_t row = 0; row < 3; ++row)  // other axes than those of the erosion
+            rows_[row] = per_m * Vec3(kNoiseTurn[row][1], -kNoiseTurn[row][2], kNoiseTurn[row][0]);
+        rows_ = repeating(rows_, setting.boundaries, extent, cell_m);
+    }
 
     float factor(const Vec3& place) const {
         if (!(strength_ > 0)) return 1;
-        const Vec3 p = per_m_ * (place - drift_m_);
-        const auto turned = [&](int row) {  // other axes than those of the erosion
-            const double tiles = kNoiseTurn[row][1] * p.x - kNoiseTurn[row][2] * p.y + kNoiseTurn[row][0] * p.z;
+        const auto turned = [&](std::size_t row) {
+            const double tiles = glm::dot(rows_[row], place - drift_m_);
             return float((tiles - std::floor(tiles)) * kLargeNoiseVoxels);
         };
         return 1 + strength_ * (1 - 2 * scalar_noise(detail_noise().large, kLargeNoiseVoxels, turned(0), turned(1),
@@ -36,10 +55,48 @@ class Thermals {
   private:
     float strength_;
     Vec3 drift_m_;
-    double per_m_;
+    std::array<Vec3, 3> rows_;
 };
 
+// The part of a cell's cloud that is left, by its place between two open sides.
+float apron_at(int cell, int count, Boundary boundary, int apron_cells) {
+    if (boundary == Boundary::periodic || apron_cells == 0) return 1;
+    const double in = std::min({1.0, (cell + 0.5) / apron_cells, (count - cell - 0.5) / apron_cells});
+    return float(in * in * (3 - 2 * in));
+}
+
 }  // namespace
+
+std::array<Vec3, 3> repeating(const std::array<Vec3, 3>& rows, const Boundaries& boundaries, const Extent& extent,
+                              double cell_m) {
+    const double edges_m[2] = {boundaries.x == Boundary::periodic ? cell_m * extent.x : 0,
+                               boundaries.y == Boundary::periodic ? cell_m * extent.y : 0};
+    std::vector<Periods> along[2];
+    for (int axis = 0; axis < 2; ++axis)
+        along[axis] = edges_m[axis] > 0
+                          ? periods_near(edges_m[axis] * Vec3(rows[0][axis], rows[1][axis], rows[2][axis]))
+                          : std::vector<Periods>{{Vec3(rows[0][axis], rows[1][axis], rows[2][axis]), 0}};
+    // The nearest that are not nearly parallel.
+    const Periods *best_x = &along[0].front(), *best_y = &along[1].front();
+    double least = std::numeric_limits<double>::infinity();
+    for (const Periods& x : along[0]) {
+        for (const Periods& y : along[1]) {
+            const Vec3 across = glm::cross(x.whole, y.whole);
+            const double sine_squared =
+                glm::dot(across, across) / (glm::dot(x.whole, x.whole) * glm::dot(y.whole, y.whole));
+            if (sine_squared < 0.25 || x.cost + y.cost >= least) continue;
+            least = x.cost + y.cost;
+            best_x = &x;
+            best_y = &y;
+        }
+    }
+    std::array<Vec3, 3> result = rows;
+    for (int row = 0; row < 3; ++row) {
+        if (edges_m[0] > 0) result[std::size_t(row)].x = best_x->whole[row] / edges_m[0];
+        if (edges_m[1] > 0) result[std::size_t(row)].y = best_y->whole[row] / edges_m[1];
+    }
+    return result;
+}
 
 double bump_size_m(const DetailOptions& options, double cell_m) {
     return options.size_m > 0 ? options.size_m : 4 * cell_m;
@@ -56,7 +113,12 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
     if (moisture != nullptr) growth_.resize(density_.size());
     masses_.resize(blocks_.size());
     std::vector<double> moist(blocks_.size(), 0), cloudy(blocks_.size(), 0);
-    const Thermals thermals(setting, grid.placement().cell_size_m);
+    const Thermals thermals(setting, extent, grid.placement().cell_size_m);
+    std::vector<float> aprons[2];
+    for (int i = 0; i < size_[0] * kBlock; ++i)
+        aprons[0].push_back(apron_at(i, extent.x, boundaries_.x, setting.options.apron_cells));
+    for (int j = 0; j < size_[1] * kBlock; ++j)
+        aprons[1].push_back(apron_at(j, extent.y, boundaries_.y, setting.options.apron_cells));
     const Vec3 origin = grid.placement().origin_m;
     const double cell = grid.placement().cell_size_m;
     tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t n) {
@@ -68,7 +130,8 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
         masses_[n].fill(0);
         for (int v = 0; v < kBlockVoxels; ++v) {
             const openvdb::Coord voxel = block.origin.offsetBy(v & 7, v >> 3 & 7, v >> 6);
-            const float q = block.value(leaf_offset(v & 7, v >> 3 & 7, v >> 6));
+            const float inside = aprons[0][std::size_t(voxel.x())] * aprons[1][std::size_t(voxel.y())];
+            const float q = inside * block.value(leaf_offset(v & 7, v >> 3 & 7, v >> 6));
             if (!(q > 0)) continue;
             masses_[n][std::size_t(v >> 6)] += double(q);
             const std::size_t at = n * kBlockVoxels + std::size_t(v);

@@ -23,6 +23,12 @@ inline constexpr double kNoiseTurn[3][3] = {{.8, .6, 0}, {-.48, .64, .6}, {.36, 
 // Returns the size of the largest bumps, metres, in cells with edges of `cell_m`.
 double bump_size_m(const DetailOptions& options, double cell_m);
 
+// Returns a matrix near the given one, rows from metres to periods of a noise, that takes the edges of a grid along its
+// periodic axes to whole numbers of periods: the noise then repeats with the grid. Bumps are skewed a little by that:
+// for n periods along an edge by up to 1 / (2 n).
+std::array<Vec3, 3> repeating(const std::array<Vec3, 3>& rows, const Boundaries& boundaries, const Extent& extent,
+                              double cell_m);
+
 // An immutable value; const functions are thread-safe.
 class CoverageCells {
   public:

@@ -63,6 +63,7 @@ void check(const DetailOptions& o) {
     require(within(o.thermals, 0, 1), "thermals", o.thermals, "0..1");
     require(o.mean_free_path_m == 0 || within(o.mean_free_path_m, 1, 10000), "mean_free_path_m", o.mean_free_path_m,
             "0 or 1..10000");
+    require(o.apron_cells >= 0 && o.apron_cells <= 64, "apron_cells", o.apron_cells, "0..64");
 }
 
 namespace {
@@ -91,6 +92,9 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     // Whole bricks around all that the metaballs reach.
     const int before = (sums.reach() + kCells - 1) / kCells * kCells;
     corner_m_ = grid.placement().origin_m - Vec3(before * cell);
+    home_m_ = before * cell;
+    if (repeats(setting))
+        period_m_ = cell * Vec2(extent[0], extent[1]);
     double bricks = 1;
     for (std::size_t axis = 0; axis < 3; ++axis)
         bricks *= bricks_[axis] = (extent[axis] + 2 * before + kCells - 1) / kCells;
@@ -101,11 +105,11 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     const std::vector<double> masses = cells.masses();
     mass_ = std::accumulate(masses.begin(), masses.end(), 0.0);
     const double base_m = (before + base_cells(masses, mass_)) * cell;
-    set_erosion(setting, base_m);
+    set_erosion(setting, grid.extent(), base_m);
     find_places(cells, setting.boundaries, extent, before, sums.reach());
     sample_nodes(cells, sums, before);
     mass_ *= 8;  // nodes for each cell
-    set_erosion(setting, base_m);
+    set_erosion(setting, grid.extent(), base_m);
     clearance_ = clearance_of_cells(nodes_, places_, table_, bricks_, erosion_.least_coverage);
     set_distances(table_, bricks_);
 
@@ -285,7 +289,7 @@ float CoverageField::gain_at(double footprint_m) const {
     return drawn > 0 ? float(std::clamp(mass_ / drawn, 0.5, 4.0)) : 1.0f;
 }
 
-void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
+void CoverageField::set_erosion(const DetailSetting& setting, const Extent& extent, double base_m) {
     const DetailOptions& o = setting.options;
     ErosionConstants& e = erosion_;
     // Extinction of zero: nothing shows; any number will do.
@@ -310,11 +314,16 @@ void CoverageField::set_erosion(const DetailSetting& setting, double base_m) {
     e.base_m = float(base_m);
     const double size_m = bump_size_m(o, 2 * node_m_), tile = kBumpsOfTile * size_m;
     const Vec2 along = setting.along;
+    std::array<Vec3, 3> rows;
     for (std::size_t row = 0; row < 3; ++row) {
         const Vec3 turn(kNoiseTurn[row][0], kNoiseTurn[row][1], kNoiseTurn[row][2]);
         // Places are squeezed along the wind before they are turned.
         const double shrink = 1 / o.stretch - 1, of_along = turn.x * along.x + turn.y * along.y;
-        const Vec3 to = (turn + Vec3(along * (shrink * of_along), 0.0)) / tile;
+        rows[row] = (turn + Vec3(along * (shrink * of_along), 0.0)) / tile;
+    }
+    rows = repeating(rows, setting.boundaries, extent, 2 * node_m_);
+    for (std::size_t row = 0; row < 3; ++row) {
+        const Vec3& to = rows[row];
         const double offset = glm::dot(to, corner_m_ - setting.drift_m);
         e.to_noise[row] = {float(to.x), float(to.y), float(to.z), float(offset - std::floor(offset))};
     }

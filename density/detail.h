@@ -24,6 +24,7 @@
 // smaller than the footprint, the filter width in metres (that of a pixel or a voxel), fades.
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -44,9 +45,16 @@ struct DetailSetting {
     Vec3 drift_m{};                      // how far the wind has carried the air
     // Direction of DetailOptions::stretch: east and north. Precondition: of length 1.
     Vec2 along{1, 0};
-    // Sides of the grid: open, no cloud beyond; periodic, images of the grid beyond.
+    // Sides of the grid: open, no cloud beyond, and cloud thins out towards them over DetailOptions::apron_cells cells;
+    // periodic, images of the grid beyond.
     Boundaries boundaries;
 };
+
+// Returns whether the cloud goes on to the horizon in pictures.
+inline bool repeats(const DetailSetting& setting) {
+    return setting.options.to_horizon && setting.boundaries.x == Boundary::periodic &&
+           setting.boundaries.y == Boundary::periodic;
+}
 
 // Largest number of clouds with detail in a picture.
 inline constexpr std::size_t kMaxDetailedClouds = 16;
@@ -72,7 +80,8 @@ struct ErosionConstants {
     float base_m = 0;              // height of the cloud's base above corner_m()
     std::array<float, 2> gain{};   // for scaled footprints up to 13 m, and from 25 m on; linear between
     // 3x4 matrix, row by row, from metres relative to corner_m() to texture coordinates of the large noise: 1 is one
-    // period; drift and stretch are included.
+    // period; drift and stretch are included. A grid's edge along a periodic axis has a whole number of periods, so
+    // that the noise repeats with the grid.
     std::array<std::array<float, 4>, 3> to_noise{};
     float medium_scale = 15, fine_scale = 128;  // periods of these noises in one of the large noise
     // Voxels of these noises at mip level 0 per metre of a scaled footprint. A scaled footprint is footprint *
@@ -99,6 +108,20 @@ class CoverageField {
     // the grid, which is padded by whole bricks as far as metaballs reach: on periodic axes they hold image cloud.
     const Vec3& corner_m() const { return corner_m_; }
     double node_m() const { return node_m_; }
+    // The edges of the grid along x and y, metres, along which it repeats to the horizon; 0: it does not. Its
+    // first cell begins home_m() from corner_m(), on each axis.
+    const Vec2& period_m() const { return period_m_; }
+    double home_m() const { return home_m_; }
+    // World height of the top of the highest brick that holds cloud; that of corner_m() without one.
+    double top_m() const {
+        return corner_m_.z + (places_.empty() ? 0 : 8 * node_m_ * (places_.back() / bricks_[0] / bricks_[1] + 1));
+    }
+    // Returns the place in the grid that has the same cloud as a place of its repetitions; both from corner_m().
+    Vec3 at_home(Vec3 place_m) const {
+        for (int axis = 0; axis < 2 && period_m_[axis] > 0; ++axis)
+            place_m[axis] -= period_m_[axis] * std::floor((place_m[axis] - home_m_) / period_m_[axis]);
+        return place_m;
+    }
     // Bricks on each axis.
     const std::array<int, 3>& bricks() const { return bricks_; }
     // For each brick, x fastest: its number among those that hold cloud, from 0; or -n, n = 1..127 the Chebyshev
@@ -127,11 +150,12 @@ class CoverageField {
     void sample_nodes(const CoverageCells& cells, const NodeSums& sums, int before);
     // `counted`: 1 for each layer of cells on each axis whose mass is that of the grid, not of an image.
     void measure_cells(const std::array<std::vector<std::uint8_t>, 3>& counted);
-    void set_erosion(const DetailSetting& setting, double base_m);
+    void set_erosion(const DetailSetting& setting, const Extent& extent, double base_m);
     float gain_at(double footprint_m) const;
 
     Vec3 corner_m_{};
-    double node_m_ = 1, extinction_per_m_ = 0;
+    double node_m_ = 1, extinction_per_m_ = 0, home_m_ = 0;
+    Vec2 period_m_{0, 0};
     std::array<int, 3> bricks_{};
     std::vector<std::int32_t> table_, places_;
     std::vector<std::uint8_t> nodes_, clearance_;

@@ -34,6 +34,8 @@ struct DetailOptions {
     double thermals = 0.5;         // 0..1: strength of towers and hollows of two and four times size_m
     // Of light where half of the space is cloud, 1..10000: less is crisper; 0: three quarters of a cell.
     double mean_free_path_m = 0;
+    bool to_horizon = true;  // pictures: a lattice that is periodic in x and y goes on to the horizon
+    int apron_cells = 8;     // 0..64: from an open side inwards, over which cloud thins out
     bool operator==(const DetailOptions&) const = default;
 };
 

@@ -13,6 +13,8 @@
 #include "core/text.h"
 #include "render/blended/blended_backend.h"
 #include "render/cpu/cpu_backend.h"
+#include "render/frame/frame_data.h"
+#include "render/frame/marched_scene.h"
 #include "render/frame/scattering_table.h"
 #include "render/ground/wet_ground.h"
 #include "render/renderer_impl.h"
@@ -220,6 +222,8 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
     ground.shadow = lit.shadow.data();  // the mirrored view may have completed it
     ground.shadow_size = lit.shadow_size;
     ground.sky = sky_of(splats, options);  // the mirrored view has another
+    const MarchedScene marched(lit.volumes, camera, detail.pixels_per_unit, options.light, earth_bend(ground.sky));
+    if (marched.repeats) ground.endless = &marched;
     draw_wet_ground(ground, picture);
     return picture;
 }

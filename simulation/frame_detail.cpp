@@ -9,6 +9,18 @@
 
 namespace nephos {
 
+namespace {
+
+// Whether a grid has the box of a lattice, in whichever voxels.
+bool is_box_of(const DensityGrid& grid, const AutomatonOptions& lattice) {
+    const Placement &a = grid.placement(), &b = lattice.placement;
+    const Extent &m = grid.extent(), &n = lattice.extent;
+    return a.origin_m == b.origin_m && a.cell_size_m * m.x == b.cell_size_m * n.x &&
+           a.cell_size_m * m.y == b.cell_size_m * n.y && a.cell_size_m * m.z == b.cell_size_m * n.z;
+}
+
+}  // namespace
+
 DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> layer, const DensityGrid& density,
                              double time_s) {
     const bool calm = scene.automaton.wind.keyframes.empty() && !scene.layers.empty();
@@ -20,6 +32,11 @@ DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> laye
     setting.extinction_per_m = scene.density.extinction_per_m;
     setting.metaball_radius_cells = scene.density.metaball_radius_cells;
     if (layer) setting.opacity = scene.layers[*layer].opacity;
+    // A file with another box than the lattice is not cut by its sides.
+    const bool whole = layer || is_box_of(density, scene.automaton);
+    if (!whole) setting.options.apron_cells = 0;
+    if (whole && setting.options.to_horizon)
+        setting.boundaries = layer ? scene.layers[*layer].boundaries : scene.automaton.boundaries;
     setting.drift_m = wind_displacement_m(wind, height, time_s);
     const Velocity now = wind_at(wind, height, time_s);
     const double speed = std::hypot(now.east_m_per_s, now.north_m_per_s);

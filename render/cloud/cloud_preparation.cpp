@@ -135,7 +135,8 @@ PreparedCloud prepare(const MetaballCloud& cloud) {
         prepared.detailed.resize(prepared.visible.size(), 0);
         for (std::size_t i = 0; i < prepared.visible.size(); ++i)
             for (const DetailedVoxels& part : cloud.detailed)
-                if (prepared.visible[i] - part.first < part.count) prepared.detailed[i] = 1;
+                if (prepared.visible[i] - part.first < part.count)
+                    prepared.detailed[i] = repeats(part.setting) ? kNeverSplatted : kSplattedFarAway;
     }
     if (!prepared.visible.empty()) {
         prepared.base_m = height.min;

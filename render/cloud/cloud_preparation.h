@@ -13,17 +13,24 @@
 
 #include "render/cloud/splats.h"
 #include "render/image/picture.h"
+#include "render/shared/order.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
+
+// Values of PreparedCloud::detailed, beside 0: metaballs that take over far away from voxels that are marched, and those
+// of voxels that are marched to the horizon.
+inline constexpr std::uint8_t kSplattedFarAway = 1, kNeverSplatted = shader::kNeverSplattedBall;
 
 // The metaballs of a cloud with a non-zero extinction.
 struct PreparedCloud {
     std::span<const Metaball> metaballs;
     std::vector<std::uint32_t> visible;  // indices into metaballs, rising
     std::vector<float> depth_scale;      // one for each of `visible`: extinction at the centre * radius
-    std::vector<std::uint8_t> detailed;  // likewise: 1 if it stands for DetailedVoxels; empty: none does
-    bool is_detailed(std::size_t i) const { return !detailed.empty() && detailed[i] != 0; }
+    // Likewise: whether it stands for DetailedVoxels; empty: none does.
+    std::vector<std::uint8_t> detailed;
+    std::uint8_t detail_of(std::size_t i) const { return detailed.empty() ? std::uint8_t{0} : detailed[i]; }
+    bool is_detailed(std::size_t i) const { return detail_of(i) != 0; }
     double base_m = 0, top_m = 0;        // world z of the lowest and highest centre
 };
 

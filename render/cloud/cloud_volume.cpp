@@ -65,6 +65,8 @@ namespace {
 
 // Whether the line from a point towards the light passes the box of a field's bricks.
 bool looks_through(const CoverageField& field, const Vec3& place_m, const Vec3& to_light) {
+    if (field.period_m().x > 0)
+        return place_m.z < field.corner_m().z + 2 * kCells * field.node_m() * field.bricks()[2];
     double begin = 0, end = std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
         const double low = field.corner_m()[axis] - place_m[axis],
@@ -93,6 +95,25 @@ float trilinear(const Number* corner, std::size_t width, std::size_t plane, cons
     return sum;
 }
 
+std::vector<std::uint32_t> shade_words(const LightFront& front) {
+    const auto columns = std::size_t(front.columns()), rows = std::size_t(front.rows());
+    std::vector<std::uint8_t> bytes(columns * rows);
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+        const float share = std::min(front.depths()[i] / shader::kMostShadeDepth, 1.0f);
+        bytes[i] = std::uint8_t(255 * std::sqrt(share) + 0.5f);
+    }
+    std::vector<std::uint32_t> words(bytes.size());
+    for (std::size_t y = 0; y < rows; ++y) {
+        for (std::size_t x = 0; x < columns; ++x) {
+            const std::size_t x1 = (x + 1) % columns, y1 = (y + 1) % rows;
+            words[y * columns + x] = bytes[y * columns + x] | std::uint32_t(bytes[y * columns + x1]) << 8 |
+                                     std::uint32_t(bytes[y1 * columns + x]) << 16 |
+                                     std::uint32_t(bytes[y1 * columns + x1]) << 24;
+        }
+    }
+    return words;
+}
+
 }  // namespace
 
 void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light) {
@@ -106,6 +127,8 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
         volume.corner_depths.resize(std::size_t(bricks[0] + 1) * std::size_t(bricks[1] + 1) * std::size_t(bricks[2] + 1));
         volume.to_sun = to_sun;
         volume.front = sweep(volume.field, volume.extinction, to_sun, depths[n], volume.corner_depths);
+        volume.shade.clear();
+        if (volume.front.is_periodic()) volume.shade = shade_words(volume.front);
         for (std::size_t i = 0; i < volume.own_depths.size(); ++i) volume.own_depths[i] = packed_depth(depths[n][i]);
     });
     for (std::size_t n = 0; n < volumes.size(); ++n) {
@@ -146,7 +169,7 @@ struct PlaceInField {
 
     PlaceInField(const CoverageField& field, const Vec3& place_m) {
         const auto& bricks = field.bricks();
-        const Vec3 cells = (place_m - field.corner_m()) / (2 * field.node_m());
+        const Vec3 cells = field.at_home(place_m - field.corner_m()) / (2 * field.node_m());
         for (int axis = 0; axis < 3; ++axis) {
             const double at = std::floor(cells[axis] / kCells);
             inside = inside && at >= 0 && at < bricks[std::size_t(axis)];

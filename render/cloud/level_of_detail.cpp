@@ -363,7 +363,7 @@ std::optional<MergedCloud> merge_voxels(const PreparedCloud& given, const Metaba
             const BlockTree tree(merging, balls, blocks.hidden[b]);
             tree.emit(parts[p].cloud);
             if (!given.detailed.empty())
-                parts[p].cloud.detailed.resize(parts[p].cloud.metaballs.size(), balls.lattice.detailed ? 1 : 0);
+                parts[p].cloud.detailed.resize(parts[p].cloud.metaballs.size(), balls.lattice.detailed);
             parts[p].merges = parts[p].merges || tree.merges();
         }
     });

@@ -25,7 +25,26 @@ float bilinear(const std::vector<float>& values, int width, int height, double u
 
 }  // namespace
 
+namespace {
+
+int wrapped(int number, int count) {
+    const int rest = number % count;
+    return rest < 0 ? rest + count : rest;
+}
+
+}  // namespace
+
 float LightFront::at(double u, double v) const {
+    if (periodic_) {
+        const double u0 = std::floor(u), v0 = std::floor(v);
+        const auto fu = float(u - u0), fv = float(v - v0);
+        const int i = wrapped(int(u0), lines_[0]), j = wrapped(int(v0), lines_[1]);
+        const int i1 = i + 1 == lines_[0] ? 0 : i + 1, j1 = j + 1 == lines_[1] ? 0 : j + 1;
+        const auto line = [&](int x, int y) { return depth_[std::size_t(y) * std::size_t(lines_[0]) + std::size_t(x)]; };
+        const float low = line(i, j) + fu * (line(i1, j) - line(i, j)),
+                    high = line(i, j1) + fu * (line(i1, j1) - line(i, j1));
+        return low + fv * (high - low);
+    }
     return bilinear(depth_, lines_[0], lines_[1], u - first_[0], v - first_[1]);
 }
 
@@ -45,16 +64,115 @@ void LightFront::resample(double u, double v, int width, int height, std::vector
     }
 }
 
+// Number of the line: where it crosses the plane at which the light enters.
+Vec2 LightFront::place_of(const Vec3& point_m) const {
+    const Vec3 cells = (point_m - corner_m_) / cell_m_;
+    const double along = downwards_ ? plane_ - cells[axes_[2]] : cells[axes_[2]];
+    return {cells[axes_[0]] - shift_[0] * along, cells[axes_[1]] - shift_[1] * along};
+}
+
 float LightFront::depth_at(const Vec3& point_m) const {
     if (depth_.empty()) return 0;
-    const Vec3 cells = (point_m - corner_m_) / cell_m_;
-    // Number of the line: where it crosses the plane at which the light enters.
-    const double along = downwards_ ? plane_ - cells[axes_[2]] : cells[axes_[2]];
-    return at(cells[axes_[0]] - shift_[0] * along, cells[axes_[1]] - shift_[1] * along);
+    const Vec2 place = place_of(point_m);
+    return at(place.x, place.y);
+}
+
+// Lines are those of one period, on a torus: those that begin beside each other stay beside each other. In a slice a
+// line crosses several cells where the light is low; it is sampled once for each.
+LightFront periodic_sweep(const CoverageField& field, std::span<const float> extinction, const Vec3& to_light,
+                          std::span<float> depths, std::span<float> corners) {
+    constexpr double kLeastSine = 0.02;
+    LightFront front;
+    const auto& bricks = field.bricks();
+    front.cell_m_ = 2 * field.node_m();
+    front.corner_m_ = field.corner_m() + Vec3(field.home_m(), field.home_m(), 0);
+    front.periodic_ = true;
+    const int planes = bricks[2] * kCells, before = int(std::lround(field.home_m() / front.cell_m_));
+    front.plane_ = planes;
+    const double sine = std::max(to_light.z, kLeastSine);
+    int parts = 1;
+    for (int n = 0; n < 2; ++n) {
+        front.shift_[n] = -to_light[n] / sine;
+        front.lines_[n] = int(std::lround(field.period_m()[n] / front.cell_m_));
+        parts = std::max(parts, int(std::ceil(std::abs(front.shift_[n]))));
+    }
+    const int width = front.lines_[0], height = front.lines_[1];
+    const auto row_of = [width](auto& values, int row) { return values.data() + std::size_t(row) * std::size_t(width); };
+    front.depth_.assign(std::size_t(width) * std::size_t(height), 0.0f);
+    const auto length = float(front.cell_m_ * std::sqrt(1 + front.shift_[0] * front.shift_[0] + front.shift_[1] * front.shift_[1]) / parts);
+    std::vector<float> slice(front.depth_.size()), nodes(front.depth_.size()), across(std::size_t(width) + 1);
+    std::vector<std::vector<std::int32_t>> layers(static_cast<std::size_t>(bricks[2]));
+    for (std::size_t n = 0; n < field.places().size(); ++n)
+        layers[std::size_t(field.places()[n] / bricks[0] / bricks[1])].push_back(std::int32_t(n));
+    const auto corner_of = [&](std::int32_t n, int axis) {  // in cells of the home period
+        const std::int32_t at = field.places()[std::size_t(n)];
+        return (axis == 0 ? at % bricks[0] : at / bricks[0] % bricks[1]) * kCells - before;
+    };
+    // Adds `scale` times a table at the places of all lines, displaced by (u, v) cells: bilinearly, on the torus.
+    const auto add_displaced = [&](const std::vector<float>& from, double u, double v, float scale,
+                                   std::vector<float>& to) {
+        const int i = int(std::floor(u)), j = int(std::floor(v));
+        const auto fu = float(u - i), fv = float(v - j);
+        const int begin = wrapped(i, width);
+        for (int y = 0; y < height; ++y) {
+            const float* const a = row_of(from, wrapped(y + j, height));
+            const float* const b = row_of(from, wrapped(y + j + 1, height));
+            for (int x = 0; x < width; ++x) across[std::size_t(x)] = scale * (a[x] + fv * (b[x] - a[x]));
+            across[std::size_t(width)] = across[0];
+            float* const out = row_of(to, y);
+            const float* const row = across.data();
+            for (int x = 0; x < width - begin; ++x)
+                out[x] += row[x + begin] + fu * (row[x + begin + 1] - row[x + begin]);
+            for (int x = width - begin; x < width; ++x)
+                out[x] += row[x + begin - width] + fu * (row[x + begin - width + 1] - row[x + begin - width]);
+        }
+    };
+    const auto store_nodes = [&](int plane) {  // its depths, into the bricks on both sides
+        const double b = planes - plane;
+        std::ranges::fill(nodes, 0.0f);
+        add_displaced(front.depth_, -front.shift_[0] * b, -front.shift_[1] * b, 1, nodes);
+        for (const int layer : {plane / kCells, plane / kCells - 1}) {
+            const int local = plane - layer * kCells;
+            if (layer < 0 || layer >= int(layers.size()) || local > kCells) continue;
+            for (const std::int32_t n : layers[std::size_t(layer)])
+                for (int v = 0; v < kLightNodes; ++v)
+                    for (int u = 0; u < kLightNodes; ++u)
+                        depths[std::size_t(n) * kLightNodesOfBrick +
+                               std::size_t((local * kLightNodes + v) * kLightNodes + u)] =
+                            row_of(nodes, wrapped(corner_of(n, 1) + v, height))[wrapped(corner_of(n, 0) + u, width)];
+        }
+        if (corners.empty() || plane % kCells != 0) return;
+        float* to = &corners[std::size_t(plane / kCells) * std::size_t((bricks[0] + 1) * (bricks[1] + 1))];
+        for (int v = 0; v <= bricks[1]; ++v)
+            for (int u = 0; u <= bricks[0]; ++u)
+                *to++ = row_of(nodes, wrapped(v * kCells - before, height))[wrapped(u * kCells - before, width)];
+    };
+    for (int step = 0; step < planes; ++step) {
+        const int s = planes - 1 - step;
+        store_nodes(s + 1);
+        const auto& layer = layers[std::size_t(s / kCells)];
+        if (layer.empty()) continue;
+        std::ranges::fill(slice, 0.0f);
+        for (const std::int32_t n : layer) {
+            const float* const from = &extinction[std::size_t(n) * 64] + s % kCells * kCells * kCells;
+            for (int v = 0; v < kCells; ++v)
+                for (int u = 0; u < kCells; ++u) {
+                    const int x = corner_of(n, 0) + u, y = corner_of(n, 1) + v;
+                    if (x >= 0 && y >= 0 && x < width && y < height) row_of(slice, y)[x] = from[v * kCells + u];
+                }
+        }
+        for (int part = 0; part < parts; ++part) {
+            const double along = step + (part + 0.5) / parts;
+            add_displaced(slice, front.shift_[0] * along - 0.5, front.shift_[1] * along - 0.5, length, front.depth_);
+        }
+    }
+    store_nodes(0);
+    return front;
 }
 
 LightFront sweep(const CoverageField& field, std::span<const float> extinction, const Vec3& to_light,
                  std::span<float> depths, std::span<float> corners) {
+    if (field.period_m().x > 0) return periodic_sweep(field, extinction, to_light, depths, corners);
     LightFront front;
     int along = 2;
     for (int axis = 0; axis < 2; ++axis)

@@ -30,15 +30,15 @@ double phase_of(double coordinate_in_voxels) {
 std::vector<std::uint32_t> first_of_radii(const PreparedCloud& cloud, std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> first;
     float last = -1;
-    bool last_detailed = false;
+    std::uint8_t last_detailed = 0;
     for (std::size_t i = begin; i < end && first.size() <= kMostLattices; ++i) {
         const float radius = cloud.metaballs[cloud.visible[i]].radius;
-        const bool detailed = cloud.is_detailed(i);
+        const std::uint8_t detailed = cloud.detail_of(i);
         if (radius == last && detailed == last_detailed) continue;
         last = radius;
         last_detailed = detailed;
         const auto is_alike = [&](std::uint32_t n) {
-            return cloud.metaballs[cloud.visible[n]].radius == radius && cloud.is_detailed(n) == detailed;
+            return cloud.metaballs[cloud.visible[n]].radius == radius && cloud.detail_of(n) == detailed;
         };
         if (std::ranges::none_of(first, is_alike)) first.push_back(std::uint32_t(i));
     }
@@ -56,7 +56,8 @@ RunPart runs_of_part(const PreparedCloud& cloud, std::span<const VoxelLattice> l
     std::size_t lattice = 0;
     for (std::size_t i = begin; i < end; ++i) {
         const Metaball& ball = cloud.metaballs[cloud.visible[i]];
-        while (lattices[lattice].radius != ball.radius || lattices[lattice].detailed != cloud.is_detailed(i)) lattice = (lattice + 1) % lattices.size();
+        while (lattices[lattice].radius != ball.radius || lattices[lattice].detailed != cloud.detail_of(i))
+            lattice = (lattice + 1) % lattices.size();
         const VoxelLattice& of = lattices[lattice];
         const double x = ball.x * of.per_edge - of.phase[0], y = ball.y * of.per_edge - of.phase[1],
                      z = ball.z * of.per_edge - of.phase[2];
@@ -91,7 +92,7 @@ std::vector<VoxelLattice> voxel_lattices(const PreparedCloud& cloud, double radi
     for (const std::vector<std::uint32_t>& part : found) {
         for (const std::uint32_t n : part) {
             const Metaball& ball = cloud.metaballs[cloud.visible[n]];
-            const bool detailed = cloud.is_detailed(n);
+            const std::uint8_t detailed = cloud.detail_of(n);
             if (std::ranges::any_of(lattices, [&](const VoxelLattice& known) {
                     return known.radius == ball.radius && known.detailed == detailed;
                 }))

@@ -20,7 +20,7 @@ inline constexpr int kBlockSide = 8;  // voxels
 // Voxels of one size; a metaball at x is in voxel floor(x per_edge - phase).
 struct VoxelLattice {
     float radius = 0;  // of its metaballs, metres
-    bool detailed = false;  // they stand for DetailedVoxels
+    std::uint8_t detailed = 0;  // PreparedCloud::detailed
     double edge_m = 1, per_edge = 1;
     double phase[3] = {};
 };

@@ -113,7 +113,7 @@ bool CpuBackend::begin(const FrameDescription& frame, Picture& picture) {
     set_light(order, {cloud.depths_to_draw(), frame.lightning});
     const AirShells shells = frame.shells();
     const MarchedScene march(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera),
-                             frame.options.light);
+                             frame.options.light, earth_bend(frame.sky));
     for (ProcessorView& view : views)
         view.draw(picture, cloud.shadow.data(), cloud.shadow_size, shells, known,
                   march.volumes.empty() ? nullptr : &march);

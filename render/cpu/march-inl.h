@@ -73,11 +73,11 @@ inline void shade_queue(const ViewScene& scene, const MarchedVolume& volume, con
 inline void begin_march(const MarchedScene& march, const TileRays& rays, MarchState& state) {
     const Lanes d;
     for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(d)) {
-        const Floats3 per_ray{inverse(hn::Load(d, rays.x + at)), inverse(hn::Load(d, rays.y + at)),
-                              inverse(hn::Load(d, rays.z + at))};
+        const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
+        const Floats3 per_ray{inverse(ray.x), inverse(ray.y), inverse(ray.z)};
         Floats first = set(std::numeric_limits<float>::max());
         for (const MarchedVolume& volume : march.volumes) {
-            const BoxPart part = part_in_box(volume, per_ray);
+            const BoxPart part = part_in_box(volume, ray, per_ray);
             first = hn::Min(first, hn::IfThenElse(hn::Lt(part.begin, part.end), part.begin, first));
         }
         hn::Store(first, d, state.distance + at);
@@ -99,10 +99,11 @@ HWY_INLINE bool march_vector(const ViewScene& scene, const TileRays& rays, std::
     BoxPart parts[shader::kMostVolumes];
     Floats end = zero;
     for (std::size_t v = 0; v < march.volumes.size(); ++v) {
-        parts[v] = part_in_box(march.volumes[v], per_ray);
+        parts[v] = part_in_box(march.volumes[v], ray, per_ray);
+        if (!march.volumes[v].repeats) parts[v].end = hn::Min(parts[v].end, set(march.fade_ends));
         end = hn::Max(end, hn::IfThenElseZero(hn::Lt(parts[v].begin, parts[v].end), parts[v].end));
     }
-    end = hn::Min(end, hn::Min(hn::Load(d, rays.ground + at), set(march.fade_ends)));
+    end = hn::Min(end, hn::Load(d, rays.ground + at));
     const Floats stop = hn::Min(end, set(limit_m));
     Mask active = hn::And(hn::Lt(distance, stop), hn::Gt(left, opaque));
     if (hn::AllFalse(d, active)) return !hn::AllFalse(d, hn::And(hn::Lt(distance, end), hn::Gt(left, opaque)));
@@ -127,11 +128,7 @@ HWY_INLINE bool march_vector(const ViewScene& scene, const TileRays& rays, std::
     };
     while (!hn::AllFalse(d, active)) {
         const MarchSample now = sample_volumes(march, ray, per_ray, parts, distance, left, active);
-        const Floats fade = hn::Div(hn::Sub(distance, set(march.fade_begins)),
-                                    set(march.fade_ends - march.fade_begins));
-        const Floats share = hn::Max(hn::Min(fade, one), zero);
-        const Floats kept = hn::NegMulAdd(hn::Mul(share, share), hn::NegMulAdd(set(2.0f), share, set(3.0f)), one);
-        const Floats found = hn::Mul(now.extinction, kept);
+        const Floats found = now.extinction;
         // The step before counts as cloud; where it came from outside, only from the surface on: where the margin
         // of the two samples passes zero, or about one fine step where empty space was skipped.
         const Floats finest =

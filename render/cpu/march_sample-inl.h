@@ -39,7 +39,36 @@ struct BoxPart {
     Floats begin, end;
 };
 
-HWY_INLINE BoxPart part_in_box(const MarchedVolume& volume, const Floats3& per_ray) {
+// The part of rays in a slab that goes on to the horizon, between two heights above the eye: a ray rises above the ground
+// by ray.z t + bend_t t^2.
+HWY_INLINE BoxPart part_in_slab(float base, float top, Floats ray_z, Floats bend) {
+    const Floats zero = hn::Zero(Lanes()), least = set(1.0e-9f);
+    const auto root_at = [&](float height) {
+        return hn::Sqrt(hn::Max(hn::MulAdd(set(4 * height), bend, hn::Mul(ray_z, ray_z)), zero));
+    };
+    const auto rising_at = [&](float height, Floats root) {  // the later crossing
+        const Floats sum = hn::Add(ray_z, root);
+        return hn::Div(set(2 * height), height > 0 ? hn::Max(sum, least) : hn::Min(sum, hn::Neg(least)));
+    };
+    const Floats root = root_at(top);
+    BoxPart part{zero, hn::Min(rising_at(top, root), set(shader::kHorizon_m))};
+    if (base > 0) part.begin = rising_at(base, root_at(base));
+    if (top < 0) {
+        const Floats falling = hn::Sub(ray_z, root);
+        const Mask meets = hn::And(hn::Lt(ray_z, zero), hn::Gt(root, zero));
+        part.begin = hn::IfThenElse(meets, hn::Div(set(2 * top), hn::Min(falling, hn::Neg(least))),
+                                    set(shader::kFarAway_m));
+    }
+    return part;
+}
+
+HWY_INLINE BoxPart part_in_box(const MarchedVolume& volume, const Floats3& ray, const Floats3& per_ray) {
+    if (volume.repeats) {
+        const Floats level = hn::NegMulAdd(ray.z, ray.z, set(1.0f));
+        return part_in_slab(volume.corner[2],
+                            volume.corner[2] + 8 * volume.kernel.node_m * float(volume.kernel.bricks[2]), ray.z,
+                            hn::Mul(set(volume.bend), level));
+    }
     const float edge = 8 * volume.kernel.node_m;
     BoxPart part{hn::Zero(Lanes()), set(std::numeric_limits<float>::max())};
     const Floats per[3] = {per_ray.x, per_ray.y, per_ray.z};
@@ -58,28 +87,40 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
     const hn::RebindToSigned<Lanes> di;
     const Floats zero = hn::Zero(d), one = set(1.0f);
     const Floats footprint = hn::Mul(distance, set(march.per_unit));
+    const Floats fade = hn::Div(hn::Sub(distance, set(march.fade_begins)), set(march.fade_ends - march.fade_begins));
+    const Floats share = hn::Max(hn::Min(fade, one), zero);
+    const Floats kept = hn::NegMulAdd(hn::Mul(share, share), hn::NegMulAdd(set(2.0f), share, set(3.0f)), one);
     const Floats finest = hn::Max(set(march.least_step), hn::Mul(set(shader::kStepPixels), footprint));
     const Floats least_step = hn::Mul(finest, hn::MulAdd(hn::Sub(one, transmittance), set(shader::kStepGrowth), one));
     MarchSample sample{zero, one, set(shader::kFarAway_m), zero, hn::Lt(one, zero)};
     for (std::size_t v = 0; v < march.volumes.size(); ++v) {
         const MarchedVolume& volume = march.volumes[v];
-        const Floats3 corner{set(volume.corner[0]), set(volume.corner[1]), set(volume.corner[2])};
-        const Floats3 offset = subtract(times(distance, ray), corner);
+        const Floats3 offset = offset_in(volume, times(distance, ray));
         const BrickPlace place = brick_place(volume, offset);
         const Mask before = hn::Lt(distance, parts[v].begin);
-        // At the faces of the box rounding decides what is inside: there rays go on by a metre.
-        const Floats beside = hn::IfThenElse(hn::Lt(distance, parts[v].end), one, set(shader::kFarAway_m));
+        const Floats3 along = way_in(volume, ray, distance);
+        const Floats3 per_way =
+            volume.repeats ? Floats3{inverse(along.x), inverse(along.y), inverse(along.z)} : per_ray;
+        // At the faces of the box rounding decides what is inside: there rays go on by a metre. Below a cloud that
+        // repeats they go on to its base.
+        Floats on = one;
+        if (volume.repeats) {
+            const Floats rising = hn::IfThenElse(hn::Gt(per_way.z, zero), per_way.z, set(shader::kLongestLeap_m));
+            on = hn::Max(one, hn::Min(hn::Mul(hn::Neg(offset.z), rising), set(shader::kLongestLeap_m)));
+        }
+        const Floats beside = hn::IfThenElse(hn::Lt(distance, parts[v].end), on, set(shader::kFarAway_m));
         Floats step = hn::IfThenElse(before, hn::Add(hn::Sub(parts[v].begin, distance), set(shader::kBeyondFace_m)), beside);
-        const Mask within = hn::And(place.within, active);
+        Mask within = hn::And(place.within, active);
+        if (!volume.repeats) within = hn::And(within, hn::Lt(distance, set(march.fade_ends)));
         const Mask holds = hn::And(within, hn::RebindMask(d, hn::Gt(place.number, hn::Set(di, -1))));
         // Cells of the brick, and how far away the next with cloud is.
         const Floats half = set(0.5f), three = set(3.0f);
         const auto cell_of = [&](Floats local) { return hn::Min(hn::Floor(hn::Mul(local, half)), three); };
         const Floats3 cell{cell_of(place.local.x), cell_of(place.local.y), cell_of(place.local.z)};
         const Floats in_brick = hn::MulAdd(hn::MulAdd(cell.z, set(4.0f), cell.y), set(4.0f), cell.x);
-        const auto at = hn::Add(hn::ShiftLeft<6>(hn::Max(place.number, hn::Zero(di))), hn::ConvertTo(di, in_brick));
+        const auto byte = hn::Add(hn::ShiftLeft<6>(hn::Max(place.number, hn::Zero(di))), hn::ConvertTo(di, in_brick));
         const auto clear_word = hn::GatherOffset(
-            di, reinterpret_cast<const std::int32_t*>(volume.kernel.clearance), at);
+            di, reinterpret_cast<const std::int32_t*>(volume.kernel.clearance), byte);
         const Floats clear = hn::ConvertTo(d, hn::And(clear_word, hn::Set(di, 255)));
         const Mask sampled = hn::And(holds, hn::Eq(clear, zero));
         // Out of the cube of empty bricks or cells around the place.
@@ -91,17 +132,27 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
                                                hn::Sub(hn::Add(own, one), count));
             return hn::Mul(hn::MulSub(edge, size, offset_m), per);
         };
-        const Floats out = hn::Min(way_out(place.brick.x, cell.x, offset.x, per_ray.x),
-                                   hn::Min(way_out(place.brick.y, cell.y, offset.y, per_ray.y),
-                                           way_out(place.brick.z, cell.z, offset.z, per_ray.z)));
+        Floats out = hn::Min(way_out(place.brick.x, cell.x, offset.x, per_way.x),
+                             hn::Min(way_out(place.brick.y, cell.y, offset.y, per_way.y),
+                                     way_out(place.brick.z, cell.z, offset.z, per_way.z)));
+        if (volume.repeats) {  // the next period is another place in the bricks
+            const auto to_face = [&](Floats at, std::size_t axis, Floats per) {
+                const Floats face =
+                    hn::IfThenElse(hn::Gt(per, zero), set(volume.home + volume.period[axis]), set(volume.home));
+                return hn::Mul(hn::Sub(face, at), per);
+            };
+            out = hn::Min(out, hn::Min(to_face(offset.x, 0, per_way.x), to_face(offset.y, 1, per_way.y)));
+        }
         step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), set(shader::kBeyondFace_m)), step);
         if (!hn::AllFalse(d, sampled)) {
             const auto number = hn::Max(place.number, hn::Zero(di));
-            const erosion::Node node =
+            erosion::Node node =
                 erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z);
+            if (volume.repeats) node.t = scaled_share(node.t, patches_of(volume, times(distance, ray)));
             const erosion::Eroded found = erosion::eroded<true>(volume.kernel, node, offset.x, offset.y, offset.z,
                                                           hn::Max(footprint, set(shader::kLeastFootprint_m)), sampled);
-            const Floats extinction = hn::Mul(found.density, set(volume.kernel.extinction_per_m));
+            Floats extinction = hn::Mul(found.density, set(volume.kernel.extinction_per_m));
+            if (!volume.repeats) extinction = hn::Mul(extinction, kept);
             sample.extinction = hn::Add(sample.extinction, extinction);
             sample.which = hn::IfThenElse(hn::Gt(extinction, zero), set(float(v)), sample.which);
             sample.margin = hn::IfThenElse(sampled, hn::Min(sample.margin, found.margin), sample.margin);

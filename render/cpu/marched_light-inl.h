@@ -22,6 +22,7 @@
 #include "render/cpu/view_scene.h"
 #include "render/frame/marched_scene.h"
 #include "render/shading/background-inl.h"
+#include "render/shading/endless-inl.h"
 #include "render/shading/scattering-inl.h"
 #include "render/shading/shells-inl.h"
 #include "render/shared/march.h"
@@ -71,14 +72,15 @@ HWY_INLINE Mask holds_cloud(const BrickPlace& place) {
     return hn::And(place.within, hn::RebindMask(Lanes(), hn::Gt(place.number, hn::Set(di, -1))));
 }
 
-HWY_INLINE erosion::Eroded density_at(const MarchedVolume& volume, const Floats3& offset_m, Floats footprint,
-                                      Mask asked) {
+// `patches`: patches_at() there.
+HWY_INLINE erosion::Eroded density_at(const MarchedVolume& volume, const Floats3& offset_m, Floats patches,
+                                      Floats footprint, Mask asked) {
     const hn::RebindToSigned<Lanes> di;
     const BrickPlace place = brick_place(volume, offset_m);
     asked = hn::And(asked, holds_cloud(place));
     const auto number = hn::Max(place.number, hn::Zero(di));
-    const erosion::Node node =
-        erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z);
+    erosion::Node node = erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z);
+    if (volume.repeats) node.t = scaled_share(node.t, patches);
     return erosion::eroded(volume.kernel, node, offset_m.x, offset_m.y, offset_m.z, footprint, asked);
 }
 
@@ -179,24 +181,23 @@ HWY_INLINE Floats3 marched_radiance(const ViewScene& scene, const MarchedVolume&
     const Lanes d;
     const PictureFrame& frame = *scene.frame;
     const Floats footprint = hn::Mul(distance, set(scene.march->per_unit)), zero = hn::Zero(d);
-    const Floats3 point = times(distance, ray), corner{set(volume.corner[0]), set(volume.corner[1]),
-                                                       set(volume.corner[2])};
-    const Floats3 offset = subtract(point, corner), to_sun = set3(frame.to_sun);
+    const Floats3 point = times(distance, ray), offset = offset_in(volume, point), to_sun = set3(frame.to_sun);
     constexpr float kTap_m[] = {shader::kTap0_m, shader::kTap1_m, shader::kTap2_m},
                     kTapLength_m[] = {shader::kTap0Length_m, shader::kTap1Length_m, shader::kTap2Length_m};
+    const Floats patches = patches_of(volume, point);
     Floats own = zero;
     for (std::size_t tap = 0; tap < 3; ++tap) {
         const Floats extinction =
-            density_at(volume, times_add(set(kTap_m[tap]), to_sun, offset), footprint, asked).density;
+            density_at(volume, times_add(set(kTap_m[tap]), to_sun, offset), patches, footprint, asked).density;
         own = hn::MulAdd(set(kTapLength_m[tap] * volume.kernel.extinction_per_m), extinction, own);
     }
     // Bricks without cloud have no depths: what is beyond them shows in those of the point itself.
     const BrickPlace here = brick_place(volume, offset),
                      beyond = brick_place(volume, times_add(set(shader::kTapsEnd_m), to_sun, offset));
     const Mask known = holds_cloud(beyond), in_brick = holds_cloud(here);
-    Floats sun_depth = hn::Add(own, sun_depth_at(volume, beyond));
+    Floats sun_depth = hn::MulAdd(patches, sun_depth_at(volume, beyond), own);
     if (!hn::AllTrue(d, known)) {
-        const Floats depth_here = hn::IfThenElseZero(in_brick, sun_depth_at(volume, here));
+        const Floats depth_here = hn::IfThenElseZero(in_brick, hn::Mul(patches, sun_depth_at(volume, here)));
         sun_depth = hn::IfThenElse(known, sun_depth, hn::Max(own, depth_here));
     }
     const TwoBytes seen = bytes_at(volume.surroundings, here);

@@ -241,6 +241,7 @@ void ProcessorView::find_visible_ground(int shadow_size, VisibleSet& seen) const
 void ProcessorView::draw(Picture& picture, const float* shadow, int shadow_size, const AirShells& shells,
                          const VisibleSet* seen, const MarchedScene* march) {
     frame_.shells = shells.any() ? &shells : nullptr;
+    frame_.endless = march != nullptr && march->repeats ? march : nullptr;
     const std::vector<std::uint32_t> before_shells = splats_before_shells(shells, *order_);
     const TileGrid grid{part_.width, part_.height};
     std::vector<TileSums> sums_between;  // batches

@@ -83,7 +83,7 @@ HWY_INLINE void add_shells_to(const ViewScene& scene, const TileRays& rays, std:
     Floats transmittance = hn::Load(d, sums.transmittance + at);
     if (hn::AllTrue(d, hn::Lt(transmittance, set(shader::kOpaque)))) return;
     const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
-    const AirInterval part = interval_with_air(*frame.shells, ray);
+    const AirInterval part = interval_with_air(*frame.shells, frame.endless, ray);
     if (part.begin >= part.end) return;
     const RayAir of(frame, ray);
     const Floats ground = air_end(frame, ray.z, hn::Load(d, rays.ground + at)), offset = hn::Load(d, rays.shell_offset + at);

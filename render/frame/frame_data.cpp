@@ -36,7 +36,7 @@ void use_sky(const RenderOptions& options, const SkyLight& sky, PictureFrame& fr
                  haze > 0 ? float(air.mie_scattering_per_m / haze) : 0.0f, 1.0f};
     const double radius = air.ground_radius_m + sky.eye_altitude_m,
                  across = sky.eye_altitude_m * (air.ground_radius_m + radius) / radius;
-    frame.earth = {-float(std::sqrt(across / radius)), float(across), float(0.5 / radius), 0};
+    frame.earth = {-float(std::sqrt(across / radius)), float(across), earth_bend(&sky), 0};
     frame.sun_disc = scaled_colour(sky.disc, 1.0, sky.has_disc ? 1.0 : 0.0);
     frame.sun_fade = scaled_colour(sky.disc_fade, 1.0, 0.0);
     const double sine = std::max(0.0, direction_to_sun(options.sun).z);

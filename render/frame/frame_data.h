@@ -13,6 +13,7 @@
 namespace nephos {
 
 struct AirShells;
+struct MarchedScene;
 
 // A rectangle of the image that is drawn at once, in pixels; not one of the tiles of tile_bins.h.
 struct PicturePart {
@@ -37,12 +38,19 @@ struct PictureFrame : shader::FrameUniforms {
     const float* sky = nullptr;         // SkyLight::texels; null: gradient
     const float* scattering = nullptr;  // scattering_table.h, for metaballs on the processor
     const AirShells* shells = nullptr;  // likewise; null: none
+    const MarchedScene* endless = nullptr;  // clouds that repeat to the horizon; null: none does
 };
 
 // Returns the uniforms of a frame. `flash` is null without lightning, `sky` with AirModel::gradient; the
 // latter must outlive the result.
 PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
                         const Flash* flash, const PicturePart& part, const SkyLight* sky = nullptr);
+
+// Returns 1 / m: by this times the square of its distance a place on the ground's plane lies above the round Earth; 0
+// without a sky, when the ground is a plane.
+inline float earth_bend(const SkyLight* sky) {
+    return sky == nullptr ? 0.0f : float(0.5 / (sky->model.ground_radius_m + sky->eye_altitude_m));
+}
 
 // Returns a picture with its pixels allocated, without a shadow map.
 Picture blank_picture(const RenderOptions& options);

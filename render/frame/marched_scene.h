@@ -20,9 +20,21 @@ struct MarchedVolume {
     DetailKernel kernel;
     float corner[3] = {};  // of its field, relative to the eye, metres
     float reach = 80;      // metres to cloud per missing coverage, at most
+    // As in shader::MarchVolume.
+    float home = 0, period[2] = {}, per_period[2] = {}, bend = 0;
+    bool repeats = false;
+    float to_patches[4] = {}, patch_ramp = 0;
+    shader::vec4 shade_u{}, shade_v{};
+    float shade_mid[2] = {}, shade_top = 0, per_shade_height = 1;
+    int shade_columns = 1, shade_rows = 1;
+    const std::uint32_t* shade = nullptr;
     const std::uint16_t *sun_depths = nullptr, *surroundings = nullptr, *upwards = nullptr, *sideways = nullptr;
 
-    MarchedVolume(const CloudVolume& volume, const Vec3& eye_m);
+    // `bend`: of the round Earth, 1 / m (shader::FrameUniforms::earth); 0 over a plane.
+    MarchedVolume(const CloudVolume& volume, const Vec3& eye_m, float bend);
+
+  private:
+    void set_repeats(const CloudVolume& volume, const Vec3& eye_m);
 };
 
 struct MarchedScene {
@@ -30,12 +42,13 @@ struct MarchedScene {
     float per_unit = 1;                    // footprint of a pixel at distance 1
     float fade_begins = 1, fade_ends = 1;  // metres from the eye
     float least_step = 1;                  // in cloud, metres
+    bool repeats = false;                  // one of them does
     float diffuse = 0, mean_cosine = 0;    // as in shader::March
 
     MarchedScene() = default;
     // Throws Error(usage) when there are more than shader::kMostVolumes that hold cloud.
     MarchedScene(std::span<const CloudVolume> of, const CameraFrame& camera, double pixels_per_unit,
-                 const CloudLight& light);
+                 const CloudLight& light, float bend);
 };
 
 // The rays of a tile's pixels, row by row, between two parts of the march.

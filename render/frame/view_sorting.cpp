@@ -145,6 +145,7 @@ class Collector {
     // Weight of the ball with an index in `visible`, beside what is marched in its place.
     float weight_of(std::uint32_t index, double distance) const {
         if (!(footprint_scale_ > 0) || !cloud_.is_detailed(index)) return 1;
+        if (cloud_.detailed[index] == kNeverSplatted) return 0;
         return shader::splatted_weight(float(distance / (pixels_per_unit_ * footprint_scale_)));
     }
 

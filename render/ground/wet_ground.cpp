@@ -335,6 +335,7 @@ void draw_wet_ground(const WetGround& ground, Picture& picture) {
     white.ground.albedo = {1, 1, 1};
     pass.white = frame_data(white, camera_frame(options.camera), picture.shadow_frame, ground.flash,
                             {0, 0, picture.width, picture.height}, ground.sky);
+    pass.white.endless = ground.endless;
     const Rgb& albedo = options.ground.albedo;
     pass.dry = {float(albedo[0]), float(albedo[1]), float(albedo[2]), 0};
     pass.country = country_of(options.ground, eye);

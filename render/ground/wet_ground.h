@@ -53,6 +53,8 @@ bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover
 // Returns true when reflections need a mirrored view.
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover);
 
+struct MarchedScene;
+
 struct WetGround {
     const RenderOptions& options;
     const GroundCoverView& cover;
@@ -62,6 +64,7 @@ struct WetGround {
     const float* shadow = nullptr;       // shadow map, valid on visible ground
     int shadow_size = 0;
     const SkyLight* sky = nullptr;  // of the picture; null: gradient
+    const MarchedScene* endless = nullptr;  // as PictureFrame::endless
 };
 
 // Replaces the light of the ground, rows in parallel; the result does not depend on the number of threads.

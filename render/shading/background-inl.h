@@ -17,6 +17,7 @@
 
 #include "render/frame/frame_data.h"
 #include "render/shading/air-inl.h"
+#include "render/shading/endless-inl.h"
 #include "render/shading/floats3-inl.h"
 #include "render/shading/formulas-inl.h"
 #include "render/shared/shared.h"
@@ -109,7 +110,13 @@ HWY_INLINE Floats3 sky(const PictureFrame& frame, const Floats3& ray) {
 HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& map, const Floats3& point) {
     const Floats u = hn::Add(dot(set3(frame.shadow_u), point), set(frame.shadow_u.w)),
                  v = hn::Add(dot(set3(frame.shadow_v), point), set(frame.shadow_v.w));
-    const Floats3 colour = times_add(shadow_at(map, u, v), set3(frame.ground_sun), set3(frame.ground));
+    Floats shadow = shadow_at(map, u, v);
+    if (frame.endless != nullptr) {
+        const auto inside = [](Floats at) { return hn::And(hn::Gt(at, set(0.01f)), hn::Lt(at, set(0.99f))); };
+        const auto known = hn::And(inside(u), inside(v));
+        if (!hn::AllTrue(Lanes(), known)) shadow = hn::IfThenElse(known, shadow, sunlight_beyond(*frame.endless, point));
+    }
+    const Floats3 colour = times_add(shadow, set3(frame.ground_sun), set3(frame.ground));
     if (!(frame.flash.w > 0)) return colour;
     const Floats3 way = subtract(set3(frame.flash), point);
     const Floats squared = dot(way, way);

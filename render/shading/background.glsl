@@ -25,6 +25,10 @@ vec3 ground(vec3 ray, float distance) {
     vec2 coordinate = vec2(dot(frame.shadow_u.xyz, point) + frame.shadow_u.w,
                            dot(frame.shadow_v.xyz, point) + frame.shadow_v.w);
     float shadow = textureLod(shadow_map, coordinate, 0.0).r;
+#ifdef NEPHOS_ENDLESS
+    vec2 inner = step(vec2(0.01), coordinate) * step(coordinate, vec2(0.99));
+    if (endless() && inner.x * inner.y == 0.0) shadow = sunlight_beyond(point);
+#endif
     vec3 colour = frame.ground.rgb + frame.ground_sun.rgb * shadow;
     vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark, no branch: see lighting.glsl
     float squared = dot(way, way);

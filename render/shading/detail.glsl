@@ -139,8 +139,13 @@ Eroded eroded(uint v, Node node, vec3 place, float footprint, bool margins) {
     return Eroded(mask * min(gain * mean / fraction, max(mean, march.volumes[v].cap)), margin);
 }
 
-float density_at(uint v, vec3 offset_m, float footprint) {
+#include "render/shading/endless.glsl"
+
+// `patches`: patches_at() there.
+float density_at(uint v, vec3 offset_m, float patches, float footprint) {
     BrickPlace place = brick_place(v, offset_m);
     if (!holds_cloud(place)) return 0.0;
-    return eroded(v, node_at(v, place), offset_m, footprint, false).density;
+    Node node = node_at(v, place);
+    node.t = scaled_share(node.t, patches);
+    return eroded(v, node, offset_m, footprint, false).density;
 }

@@ -71,16 +71,16 @@ float scattered_in_volume(uint v, vec3 ray, float sun_depth, BrickPlace here) {
 // the sun, which see the detail, and beyond them by the volume's depths.
 vec3 marched_radiance(uint v, vec3 ray, float distance) {
     float footprint = distance * march.per_unit, extinction_per_m = march.volumes[v].extinction_per_m;
-    vec3 point = distance * ray, offset = point - march.volumes[v].corner.xyz, to_sun = frame.to_sun.xyz;
+    vec3 point = distance * ray, offset = offset_in(v, point), to_sun = frame.to_sun.xyz;
     const float taps_m[3] = float[3](kTap0_m, kTap1_m, kTap2_m);
     const float lengths_m[3] = float[3](kTap0Length_m, kTap1Length_m, kTap2Length_m);
-    float own = 0.0;
+    float own = 0.0, patches = patches_of(v, point);
     [[dont_unroll]] for (uint tap = 0u; tap < 3u; ++tap)
-        own += lengths_m[tap] * extinction_per_m * density_at(v, offset + taps_m[tap] * to_sun, footprint);
+        own += lengths_m[tap] * extinction_per_m * density_at(v, offset + taps_m[tap] * to_sun, patches, footprint);
     BrickPlace here = brick_place(v, offset), beyond = brick_place(v, offset + kTapsEnd_m * to_sun);
     // Bricks without cloud have no depths: what is beyond them shows in those of the point itself.
-    float sun_depth = holds_cloud(beyond) ? own + volume_sun_depth(v, beyond)
-                                          : max(own, holds_cloud(here) ? volume_sun_depth(v, here) : 0.0);
+    float sun_depth = holds_cloud(beyond) ? own + patches * volume_sun_depth(v, beyond)
+                                          : max(own, holds_cloud(here) ? patches * volume_sun_depth(v, here) : 0.0);
     vec2 seen = holds_cloud(here) ? volume_bytes(v, 1u, here) * (1.0 / 255.0) : vec2(1.0);
     vec3 sunlight = sunlight_at(point.z);
     vec3 arriving = seen.x * frame.ambient_top.rgb + seen.y * frame.ambient_base.rgb;
@@ -107,20 +107,34 @@ vec3 inverse_of(vec3 direction) {
     return 1.0 / mix(direction, vec3(1.0e-6), lessThan(abs(direction), vec3(1.0e-6)));
 }
 
+// Returns the part of a ray in a slab that goes on to the horizon, between two heights above the eye: it rises above the
+// ground by ray_z t + bend t^2.
+vec2 part_in_slab(float base, float top, float ray_z, float bend) {
+    float root = sqrt(max(4.0 * top * bend + ray_z * ray_z, 0.0)), sum = ray_z + root;
+    vec2 part = vec2(0.0, min(2.0 * top / (top > 0.0 ? max(sum, 1.0e-9) : min(sum, -1.0e-9)), kHorizon_m));
+    float base_root = sqrt(max(4.0 * base * bend + ray_z * ray_z, 0.0));
+    if (base > 0.0) part.x = 2.0 * base / max(ray_z + base_root, 1.0e-9);
+    if (top < 0.0) part.x = ray_z < 0.0 && root > 0.0 ? 2.0 * top / min(ray_z - root, -1.0e-9) : kFarAway_m;
+    return part;
+}
+
 // Returns the part of a ray in the box of a volume's bricks.
-vec2 part_in_box(uint v, vec3 per_ray) {
+vec2 part_in_box(uint v, vec3 ray, vec3 per_ray) {
     vec4 corner = march.volumes[v].corner;
+    if (march.volumes[v].repeats > 0.0)
+        return part_in_slab(corner.z, corner.z + 8.0 * corner.w * float(march.volumes[v].bricks_z), ray.z,
+                            march.volumes[v].bend * (1.0 - ray.z * ray.z));
     vec3 bricks = vec3(march.volumes[v].bricks_x, march.volumes[v].bricks_y, march.volumes[v].bricks_z);
     vec3 a = corner.xyz * per_ray, b = (corner.xyz + 8.0 * corner.w * bricks) * per_ray;
     vec3 low = min(a, b), high = max(a, b);
-    return vec2(max(max(low.x, low.y), max(low.z, 0.0)), min(min(high.x, high.y), high.z));
+    return vec2(max(max(low.x, low.y), max(low.z, 0.0)), min(min(high.x, high.y), min(high.z, march.fade_ends)));
 }
 
 MarchState begin_march(vec3 ray) {
     vec3 per_ray = inverse_of(ray);
     float first = 3.0e38;
     for (uint v = 0u; v < march.count; ++v) {
-        vec2 part = part_in_box(v, per_ray);
+        vec2 part = part_in_box(v, ray, per_ray);
         if (part.x < part.y) first = min(first, part.x);
     }
     return MarchState(first, 0.0, 0.0, -1.0);
@@ -136,14 +150,17 @@ struct MarchSample {
 // A place of a ray in a volume, and the way out of the cube of empty bricks or cells around it.
 struct MarchPlace {
     bool within;  // the bricks' box
-    float out_m;
+    float out_m, on_m;  // the latter from beside the box, below a cloud that repeats to its base
     bool near;
 };
 
 MarchPlace march_place(uint v, vec3 ray, vec3 per_ray, float distance) {
     vec4 corner = march.volumes[v].corner;
-    vec3 offset = distance * ray - corner.xyz;
+    vec3 offset = offset_in(v, distance * ray);
     BrickPlace place = brick_place(v, offset);
+    bool endless = march.volumes[v].repeats > 0.0;
+    place.within = place.within && (endless || distance < march.fade_ends);
+    per_ray = inverse_of(way_in(v, ray, distance));
     bool holds = holds_cloud(place);
     vec3 cell = min(floor(0.5 * place.local), vec3(3.0));
     uint byte = 64u * uint(max(place.number, 0)) + uint((cell.z * 4.0 + cell.y) * 4.0 + cell.x);
@@ -152,7 +169,14 @@ MarchPlace march_place(uint v, vec3 ray, vec3 per_ray, float distance) {
     vec3 own = holds ? place.brick * 4.0 + cell : place.brick;
     vec3 edge = mix(own + 1.0 - count, own + count, greaterThan(per_ray, vec3(0.0)));
     vec3 out_m = (edge * size - offset) * per_ray;
-    return MarchPlace(place.within, min(out_m.x, min(out_m.y, out_m.z)), holds && clear == 0u);
+    // The next period is another place in the bricks.
+    vec2 period = vec2(march.volumes[v].period_x, march.volumes[v].period_y);
+    vec2 face = march.volumes[v].home + mix(vec2(0.0), period, greaterThan(per_ray.xy, vec2(0.0)));
+    vec2 to_face = (face - offset.xy) * per_ray.xy;
+    if (endless) out_m.xy = min(out_m.xy, to_face);
+    float on_m = max(1.0, min(-offset.z * (per_ray.z > 0.0 ? per_ray.z : kLongestLeap_m), kLongestLeap_m));
+    return MarchPlace(place.within, min(out_m.x, min(out_m.y, out_m.z)), endless ? on_m : 1.0,
+                      holds && place.within && clear == 0u);
 }
 
 // Sets the step to where cloud may be, as far as nothing is to be sampled.
@@ -160,9 +184,10 @@ MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
     MarchSample result = MarchSample(0.0, 1.0, kFarAway_m, 0u, 0u);
     for (uint v = 0u; v < march.count; ++v) {
         MarchPlace at = march_place(v, ray, per_ray, distance);
-        vec2 part = part_in_box(v, per_ray);
-        // At the faces of the box rounding decides what is inside: there rays go on by a metre.
-        float step = distance < part.y ? 1.0 : kFarAway_m;
+        vec2 part = part_in_box(v, ray, per_ray);
+        // At the faces of the box rounding decides what is inside: there rays go on by a metre. Below a cloud that
+        // repeats they go on to its base.
+        float step = distance < part.y ? at.on_m : kFarAway_m;
         if (distance < part.x) step = part.x - distance + kBeyondFace_m;
         if (at.within) step = max(at.out_m, 0.0) + kBeyondFace_m;
         if (at.near)
@@ -176,11 +201,16 @@ MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
 void sample_near(inout MarchSample result, vec3 ray, float distance, float transmittance) {
     float footprint = distance * march.per_unit, finest = max(march.least_step, kStepPixels * footprint);
     float least_step = finest * ((1.0 - transmittance) * kStepGrowth + 1.0);
+    float share = clamp((distance - march.fade_begins) / (march.fade_ends - march.fade_begins), 0.0, 1.0);
+    float kept = 1.0 - share * share * (3.0 - 2.0 * share);
     for (uint v = 0u; v < march.count; ++v) {
         if ((result.near >> v & 1u) != 0u) {
-            vec3 offset = distance * ray - march.volumes[v].corner.xyz;
-            Eroded found = eroded(v, node_at(v, brick_place(v, offset)), offset, max(footprint, kLeastFootprint_m), true);
+            vec3 offset = offset_in(v, distance * ray);
+            Node node = node_at(v, brick_place(v, offset));
+            node.t = scaled_share(node.t, patches_of(v, distance * ray));
+            Eroded found = eroded(v, node, offset, max(footprint, kLeastFootprint_m), true);
             float extinction = found.density * march.volumes[v].extinction_per_m;
+            if (march.volumes[v].repeats == 0.0) extinction *= kept;
             result.extinction += extinction;
             if (extinction > 0.0) result.which = v;
             result.margin = min(result.margin, found.margin);
@@ -199,8 +229,7 @@ struct MarchEvent {
 
 // Takes a sample into account and goes on to the next place.
 void advance(MarchSample now, inout MarchState state, inout MarchEvent event, inout float left) {
-    float share = clamp((state.distance - march.fade_begins) / (march.fade_ends - march.fade_begins), 0.0, 1.0);
-    float found = now.extinction * (1.0 - share * share * (3.0 - 2.0 * share));
+    float found = now.extinction;
     // The step before counts as cloud; where it came from outside, only from the surface on: where the margin of the
     // two samples passes zero, or about one fine step where empty space was skipped.
     float finest = max(march.least_step, kStepPixels * march.per_unit * state.distance);
@@ -231,10 +260,10 @@ float march_end(vec3 ray) {
     vec3 per_ray = inverse_of(ray);
     float end = 0.0;
     for (uint v = 0u; v < march.count; ++v) {
-        vec2 part = part_in_box(v, per_ray);
+        vec2 part = part_in_box(v, ray, per_ray);
         if (part.x < part.y) end = max(end, part.y);
     }
-    return min(end, min(ground_distance(ray), march.fade_ends));
+    return min(end, ground_distance(ray));
 }
 
 // Marches a ray up to a distance. `sum`: radiance and transmittance. Where there is nothing to march, do not call it:

@@ -18,6 +18,7 @@
 #include "render/frame/air_shells.h"
 #include "render/shading/air-inl.h"
 #include "render/shading/background-inl.h"
+#include "render/shading/endless-inl.h"
 #include "render/shading/fog-inl.h"
 #include "render/shading/formulas-inl.h"
 #include "render/shading/scattering-inl.h"
@@ -38,7 +39,7 @@ HWY_INLINE Floats along_row(const shader::vec4& row, const Floats3& point) {
 
 // Fraction of the sunlight that the clouds leave at points relative to the eye: D's gamma. The shade of a cloud
 // begins at its top and is complete at its base.
-HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
+HWY_INLINE Floats sunlight_left(const AirShells& air, const MarchedScene* endless, const Floats3& point) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
     const shader::Shells& data = air.data;
@@ -46,6 +47,17 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
         return hn::Min(hn::Max(along_row(row, point), hn::Zero(d)), set(largest));
     };
     const Floats u = place(data.shade_u, data.shade.x), v = place(data.shade_v, data.shade.y);
+    auto known = hn::Eq(u, u);  // by the shade map: elsewhere by what repeats
+    if (endless != nullptr) {
+        const auto inner = [&](Floats at, float largest) {
+            return hn::And(hn::Gt(at, set(2.0f)), hn::Lt(at, set(largest - 2)));
+        };
+        known = hn::And(inner(u, data.shade.x), inner(v, data.shade.y));
+    }
+    if (hn::AllFalse(d, known)) return sunlight_beyond(*endless, point);
+    const auto with_beyond = [&](Floats left) {
+        return hn::AllTrue(d, known) ? left : hn::IfThenElse(known, left, sunlight_beyond(*endless, point));
+    };
     const auto column = hn::ConvertTo(di, u), row = hn::ConvertTo(di, v);
     const Floats weight_u = hn::Sub(u, hn::ConvertTo(d, column)),
                  weight_v = hn::Sub(v, hn::ConvertTo(d, row));
@@ -56,10 +68,10 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const Floats3& point) {
         return between_bytes(hn::GatherIndex(di, words + number * plane, index), weight_u, weight_v);
     };
     const Floats gamma = of_plane(0), along = along_row(data.shade_along, point), one = set(1.0f);
-    if (hn::AllTrue(d, hn::Ge(along, one))) return gamma;  // below all clouds
+    if (hn::AllTrue(d, hn::Ge(along, one))) return with_beyond(gamma);  // below all clouds
     const Floats begin = of_plane(1), length = hn::Max(hn::Sub(of_plane(2), begin), set(1.0f / 255.0f));
     const Floats part = hn::Min(hn::Max(hn::Div(hn::Sub(along, begin), length), hn::Zero(d)), one);
-    return hn::NegMulAdd(part, hn::Sub(one, gamma), one);
+    return with_beyond(hn::NegMulAdd(part, hn::Sub(one, gamma), one));
 }
 
 // The terms common to all shells along rays.
@@ -143,7 +155,7 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
     const Floats height = hn::Mul(of.ray.z, places.middle);
     const Floats3 sunlight =
         kHeights == Heights::alike ? sunlight_nearby(frame, height) : sunlight_at(frame, height);
-    const Floats lit = sunlight_left(air, times(places.at, of.ray));
+    const Floats lit = sunlight_left(air, frame.endless, times(places.at, of.ray));
     const auto inside = hn::Lt(begin, set(air.data.shade.w));
     Floats3 light{zero, zero, zero};
     if (shaded) {
@@ -209,7 +221,7 @@ struct AirInterval {
 };
 
 // Shade of clouds, and fog.
-HWY_INLINE AirInterval interval_with_air(const AirShells& air, const Floats3& ray) {
+HWY_INLINE AirInterval interval_with_air(const AirShells& air, const MarchedScene* endless, const Floats3& ray) {
     const Lanes d;
     const shader::Shells& data = air.data;
     AirInterval part;
@@ -228,6 +240,17 @@ HWY_INLINE AirInterval interval_with_air(const AirShells& air, const Floats3& ra
         clip(data.shade_v, 0, data.shade.y);
         clip(data.shade_along, data.shade.z, 1.0e12f);
         part.add(begin, end);
+        if (endless != nullptr) {  // below the tops of what repeats
+            for (const MarchedVolume& volume : endless->volumes) {
+                if (!volume.repeats) continue;
+                const Floats crossing = hn::Div(set(volume.shade_top), steep(ray.z));
+                const auto up = hn::Gt(ray.z, hn::Zero(d));
+                if (volume.shade_top > 0)
+                    part.add(hn::Zero(d), hn::IfThenElse(up, crossing, set(kNowhere)));
+                else
+                    part.add(hn::IfThenElse(up, set(kNowhere), crossing), set(kNowhere));
+            }
+        }
     }
     if (air.has_fog()) {
         const float below_top = data.fog_limits.x - data.fog.z;

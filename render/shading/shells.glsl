@@ -34,6 +34,10 @@ float between_texels(uint word, vec2 share) {
 // cloud begins at its top and is complete at its base.
 float sunlight_left(vec3 point) {
     vec2 place = vec2(dot(shells.shade_u.xyz, point) + shells.shade_u.w, dot(shells.shade_v.xyz, point) + shells.shade_v.w);
+#ifdef NEPHOS_ENDLESS
+    bool known = !endless() || all(greaterThan(place, vec2(2.0))) && all(lessThan(place, shells.shade.xy - 2.0));
+    if (!known) return sunlight_beyond(point);
+#endif
     place = clamp(place, vec2(0.0), shells.shade.xy);
     uvec2 texel = uvec2(place);
     vec2 share = place - vec2(texel);
@@ -172,6 +176,10 @@ vec2 part_with_air(vec3 ray) {
         vec3 first = min(a, b), last = max(a, b);
         part = vec2(max(max(first.x, first.y), max(first.z, 0.0)), min(min(last.x, last.y), last.z));
         if (part.x >= part.y) part = vec2(1.0e30, 0.0);
+#ifdef NEPHOS_ENDLESS
+        vec2 below = part_below_endless(ray);
+        if (below.x < below.y) part = vec2(min(part.x, below.x), max(part.y, below.y));
+#endif
     }
     if (!kFog) return part;
     float below_top = shells.fog_limits.x - shells.fog.z, crossing = below_top / (abs(ray.z) < 1.0e-9 ? 1.0e-9 : ray.z);

@@ -20,7 +20,15 @@ NEPHOS_CONST float kStepGrowth = 4.0f;                // of steps behind opaque 
 NEPHOS_CONST float kLongestStep_m = 30.0f;            // near cloud
 NEPHOS_CONST float kBeyondFace_m = 0.01f;             // where a ray goes on behind the face of a cell or a box
 NEPHOS_CONST float kLeastAdvance = 1.0000005f;         // of a distance in any step: far away floats are coarse
+// Images of a cloud that repeats are drawn aside along a wave, so that gaps do not line up: wave lengths across and along,
+// and how far and how steeply, in lengths of MarchVolume::patch_ramp and of the wave.
+NEPHOS_CONST float kWaveAcross = 45.0f, kWaveAlong = 35.0f, kWaveHeight = 0.03125f;
+NEPHOS_CONST float kPatchLevel = 0.37f;               // of the noise of patches: its third coordinate
+NEPHOS_CONST float kPatchSpread = 1.5f;               // cloud in images is up to 1 + this times as dense
+NEPHOS_CONST float kMostShadeDepth = 8.0f;            // that a word of shade stores: four bytes of 255 sqrt(depth / this)
 NEPHOS_CONST float kFarAway_m = 1.0e9f;
+NEPHOS_CONST float kHorizon_m = 2.5e5f;               // where a cloud that repeats ends; it is below the horizon there
+NEPHOS_CONST float kLongestLeap_m = 2.0e3f;           // of a ray below such a cloud: it is straight over that
 NEPHOS_CONST float kLeastFootprint_m = 0.05f;
 NEPHOS_CONST float kSkippedSteps = 1.5f;              // of cloud before a sample behind empty space, in finest steps
 NEPHOS_CONST float kSurfaceSteps = 0.3f;              // ... beyond the surface between two samples
@@ -75,7 +83,21 @@ struct MarchVolume {
     float least_coverage;
     float footprint_scale;
     float whole;
-    float unused0, unused1, unused2;
+    float home;                   // where its first period begins, metres from the corner
+    float period_x, period_y;     // edges of a field that repeats to the horizon; 0: it does not, nor do the next
+    float per_period_x, per_period_y;
+    float bend;                   // 1 / m: a place at distance d on the ground's plane lies bend d^2 above the round Earth
+    float repeats;                // 1 or 0
+    // Of a field that repeats: how much cloud there is in its images (patches.glsl), and its shade on all beyond the
+    // shade map (endless_shade.glsl). Points are relative to the eye, over a plane ground.
+    vec4 to_patches;              // periods of the noise per metre: across, x: east, y: north; along, z and w likewise
+    vec4 shade_u, shade_v;        // column and row of a point p: dot(xyz, p) + w
+    float shade_mid_x, shade_mid_y;  // metres from the corner of column 0 and row 0, in the middle of the cloud's height
+    float patch_ramp;             // 1 / metres from the first period to where patches are full
+    float shade_top;              // where shade begins, metres above the eye
+    float per_shade_height;       // 1 / metres from there down to where it is complete
+    uint first_shade;             // word
+    uint shade_columns, shade_rows;
 };
 
 struct March {
@@ -90,7 +112,7 @@ struct March {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(MarchVolume) == 192 && offsetof(MarchVolume, first_table) == 80 &&
+static_assert(sizeof(MarchVolume) == 288 && offsetof(MarchVolume, first_table) == 80 &&
               offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 32);
 
 }  // namespace nephos::shader

@@ -22,6 +22,7 @@ NEPHOS_CONST uint kAllSplats = 0u;   // OrderStep::count + billboards
 NEPHOS_CONST uint kSeenSplats = 1u;  // OrderCounts::visible
 NEPHOS_CONST uint kSeenDigits = 2u;  // digits of their keys, for each block
 NEPHOS_CONST uint kListDigits = 3u;  // digits of the entries' keys, for each block
+NEPHOS_CONST uint kNeverSplattedBall = 2u;  // a value of CloudBall::detailed
 NEPHOS_CONST uint kMapTiles = 4u;    // items of work in the tiles of the shadow map: OrderStep::tiles
 
 // A metaball in device memory; 32 bytes.
@@ -31,7 +32,7 @@ struct CloudBall {
     float depth_scale;  // as in ViewBall, and the next two
     float sun_depth;
     float height;
-    uint detailed;  // 1 = it stands for a cloud with detail
+    uint detailed;  // PreparedCloud::detailed
 };
 
 // One of T's billboards as the camera sees it; 36 bytes.

@@ -3,5 +3,6 @@
 
 // Weight of a metaball beside what is marched in its place.
 float splatted_weight(CloudBall ball, float distance) {
-    return frame.march.x > 0.0 && ball.detailed != 0u ? splatted_weight(distance * frame.march.x / frame.forward.w) : 1.0;
+    if (!(frame.march.x > 0.0) || ball.detailed == 0u) return 1.0;
+    return ball.detailed == kNeverSplattedBall ? 0.0 : splatted_weight(distance * frame.march.x / frame.forward.w);
 }

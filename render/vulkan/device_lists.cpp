@@ -87,7 +87,7 @@ std::vector<shader::CloudBall> cloud_balls(const PreparedCloud& cloud, std::span
                         cloud.depth_scale[i],
                         sun_depths[i],
                         float((ball.z - cloud.base_m) * scale),
-                        cloud.is_detailed(i) ? 1u : 0u};
+                        cloud.detail_of(i)};
         }
     });
     return balls;

@@ -5,11 +5,11 @@
 // view_finish.comp where rays march through clouds with detail: to their ends, before the background.
 #include "render/shading/frame.glsl"
 #include "render/shading/ray.glsl"
+#include "render/shading/detail.glsl"
 #include "render/shading/air.glsl"
 #include "render/shading/background.glsl"
 #include "render/shading/scattering.glsl"
 #include "render/shading/shells.glsl"
-#include "render/shading/detail.glsl"
 #include "render/shading/march.glsl"
 
 layout(local_size_x = kComputeGroup) in;

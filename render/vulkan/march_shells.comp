@@ -6,10 +6,10 @@
 // view_shells.comp where rays march through clouds with detail: up to the end of each shell, before it.
 #include "render/shading/frame.glsl"
 #include "render/shading/ray.glsl"
+#include "render/shading/detail.glsl"
 #include "render/shading/air.glsl"
 #include "render/shading/scattering.glsl"
 #include "render/shading/shells.glsl"
-#include "render/shading/detail.glsl"
 #include "render/shading/march.glsl"
 
 layout(local_size_x = kComputeGroup) in;

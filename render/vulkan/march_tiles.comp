@@ -7,12 +7,12 @@
 // takes many turns of loops, of which lavapipe allows few.
 #include "render/shading/frame.glsl"
 #include "render/shading/ray.glsl"
+#include "render/shading/detail.glsl"
 #include "render/shading/integral.glsl"
 #include "render/shading/air.glsl"
 #include "render/shading/scattering.glsl"
 #include "render/shading/shells.glsl"
 #include "render/shading/lighting.glsl"
-#include "render/shading/detail.glsl"
 #include "render/shading/march.glsl"
 #include "render/gpu/tiles.glsl"
 #include "render/vulkan/parts.glsl"

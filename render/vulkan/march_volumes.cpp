@@ -23,7 +23,7 @@ static_assert(shader::kLargeNoiseWords == kLargeNoiseVoxels * kLargeNoiseVoxels 
 
 // Where the words of a volume begin.
 struct Places {
-    std::size_t table = 0, clearance = 0, nodes = 0, light = 0;
+    std::size_t table = 0, clearance = 0, nodes = 0, light = 0, shade = 0;
     std::size_t cells_end = 0, light_end = 0;
 };
 
@@ -35,7 +35,8 @@ Places places_after(const Places& before, const CloudVolume& volume) {
     at.nodes = at.clearance + bricks * shader::kClearanceWords;
     at.cells_end = at.nodes + bricks * kNodes;
     at.light = before.light_end;
-    at.light_end = at.light + 4 * bricks * kLightNodesOfBrick;
+    at.shade = at.light + 4 * bricks * kLightNodesOfBrick;
+    at.light_end = at.shade + volume.shade.size();
     return at;
 }
 
@@ -97,13 +98,14 @@ std::vector<std::uint32_t> march_light(std::span<const CloudVolume> volumes) {
             words[at.light + 2 * count + i] = pair(volume.diffuse.upwards);
             words[at.light + 3 * count + i] = pair(volume.diffuse.sideways);
         }
+        std::ranges::copy(volume.shade, words.begin() + std::ptrdiff_t(at.shade));
     });
     return words;
 }
 
 shader::March march_constants(std::span<const CloudVolume> volumes, const CameraFrame& camera,
-                              double pixels_per_unit, const CloudLight& light) {
-    const MarchedScene scene(volumes, camera, pixels_per_unit, light);
+                              double pixels_per_unit, const CloudLight& light, float bend) {
+    const MarchedScene scene(volumes, camera, pixels_per_unit, light, bend);
     shader::March march{shader::uint(scene.volumes.size()), scene.per_unit, scene.fade_begins, scene.fade_ends,
                          scene.least_step, scene.diffuse, scene.mean_cosine, 0, {}};
     std::size_t n = 0;
@@ -122,7 +124,7 @@ shader::March march_constants(std::span<const CloudVolume> volumes, const Camera
         to.first_clearance = shader::uint(at.clearance);
         to.first_nodes = shader::uint(at.nodes);
         to.first_light = shader::uint(at.light);
-        to.light_words = shader::uint((at.light_end - at.light) / 4);
+        to.light_words = shader::uint((at.shade - at.light) / 4);
         to.reach = from.reach;
         to.extinction_per_m = from.kernel.extinction_per_m;
         to.half_density = e.half_density;
@@ -143,6 +145,24 @@ shader::March march_constants(std::span<const CloudVolume> volumes, const Camera
         to.footprint_scale = e.footprint_scale;
         to.least_coverage = e.least_coverage;
         to.whole = e.whole;
+        to.home = from.home;
+        to.period_x = from.period[0];
+        to.period_y = from.period[1];
+        to.per_period_x = from.per_period[0];
+        to.per_period_y = from.per_period[1];
+        to.bend = from.bend;
+        to.repeats = from.repeats ? 1.0f : 0.0f;
+        to.to_patches = {from.to_patches[0], from.to_patches[1], from.to_patches[2], from.to_patches[3]};
+        to.shade_u = from.shade_u;
+        to.shade_v = from.shade_v;
+        to.shade_mid_x = from.shade_mid[0];
+        to.shade_mid_y = from.shade_mid[1];
+        to.patch_ramp = from.patch_ramp;
+        to.shade_top = from.shade_top;
+        to.per_shade_height = from.per_shade_height;
+        to.first_shade = shader::uint(at.shade);
+        to.shade_columns = shader::uint(from.shade_columns);
+        to.shade_rows = shader::uint(from.shade_rows);
     });
     return march;
 }

@@ -22,7 +22,7 @@ std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes);
 std::vector<std::uint32_t> march_light(std::span<const CloudVolume> volumes);
 // What shaders know of these volumes and words. Throws Error(usage) when there are more than shader::kMostVolumes.
 shader::March march_constants(std::span<const CloudVolume> volumes, const CameraFrame& camera,
-                              double pixels_per_unit, const CloudLight& light);
+                              double pixels_per_unit, const CloudLight& light, float bend);
 
 class MarchVolumes {
   public:

@@ -130,7 +130,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
     shader::March march{};
     if (!cloud.volumes.empty()) {
         march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera),
-                                frame.options.light);
+                                frame.options.light, earth_bend(frame.sky));
         use_volumes(cloud);
     }
     const StageTimer timer(&frame.times, DrawStage::view);

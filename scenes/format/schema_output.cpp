@@ -322,7 +322,14 @@ const Section& detail_section() {
              "mean_free_path_m", "m", between(0, 10'000),
              "Mean free path of light in cloud where half of the space is cloud; 0: three quarters of a cell. Smaller "
              "makes crisper, denser clouds of the same mass; in real cumulus it is 10 to 20 m. Sheets and thin clouds "
-             "want more: less than one in two places of theirs would be cloud otherwise.")},
+             "want more: less than one in two places of theirs would be cloud otherwise."),
+         key<&DetailOptions::to_horizon>(
+             "to_horizon", "", kAny,
+             "Pictures: a lattice with periodic sides in x and y goes on to the horizon, with its shadows. Off: there is "
+             "nothing beyond it."),
+         key<&DetailOptions::apron_cells>(
+             "apron_cells", "cells", between(0, 64),
+             "How far from an open side cloud begins to thin out, so that no side cuts it straight.")},
         nullptr};
     return section;
 }

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// render/shading/endless.glsl for vectors of places.
+
+#if defined(NEPHOS_RENDER_ENDLESS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHOS_RENDER_ENDLESS_INL_H_
+#undef NEPHOS_RENDER_ENDLESS_INL_H_
+#else
+#define NEPHOS_RENDER_ENDLESS_INL_H_
+#endif
+
+#include <cstddef>
+#include <cstdint>
+
+#include <hwy/highway.h>
+
+#include "density/detail-inl.h"
+#include "render/frame/frame_data.h"
+#include "render/frame/marched_scene.h"
+#include "render/shading/floats3-inl.h"
+#include "render/shading/formulas-inl.h"
+#include "render/shared/march.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos::HWY_NAMESPACE {
+
+// A place relative to the eye, as if the round Earth were a plane.
+HWY_INLINE Floats3 above_plane(const Floats3& point, float bend) {
+    return {point.x, point.y, hn::MulAdd(set(bend), hn::MulAdd(point.x, point.x, hn::Mul(point.y, point.y)), point.z)};
+}
+
+// How far images are drawn aside, metres, and what that adds to the slope of lines.
+struct Wave {
+    Floats height, slope;
+};
+
+// `along`: place on the axis across which they are drawn; `length`: kWaveAcross or kWaveAlong.
+HWY_INLINE Wave wave_at(const MarchedVolume& volume, Floats along, std::size_t axis, float length) {
+    const Lanes d;
+    const Floats zero = hn::Zero(d), one = set(1.0f), home = set(volume.home);
+    const Floats beyond = hn::Sub(hn::Max(hn::Sub(along, set(volume.home + volume.period[axis])), zero),
+                                  hn::Max(hn::Sub(home, along), zero));
+    const float per_wave = volume.patch_ramp / length;
+    const Floats turns = hn::Mul(beyond, set(per_wave)), half = hn::Sub(hn::Sub(turns, hn::Floor(turns)), set(0.5f));
+    const Floats q = hn::MulSub(hn::Abs(half), set(4.0f), one), rest = hn::Sub(set(2.0f), hn::Abs(q));
+    const Floats slope = hn::Mul(set(-8 * shader::kWaveHeight), hn::CopySign(hn::Sub(rest, one), half));
+    return {hn::Mul(set(shader::kWaveHeight / per_wave), hn::NegMulAdd(q, rest, one)),
+            hn::IfThenElseZero(hn::Ne(beyond, zero), slope)};
+}
+
+// Places relative to a volume's corner. Of a volume that repeats: those with the same cloud in its first period, over a
+// plane ground.
+HWY_INLINE Floats3 offset_in(const MarchedVolume& volume, const Floats3& point) {
+    const Floats3 corner{set(volume.corner[0]), set(volume.corner[1]), set(volume.corner[2])};
+    if (!volume.repeats) return subtract(point, corner);
+    Floats3 offset = subtract(above_plane(point, volume.bend), corner);
+    const Floats x = offset.x;
+    offset.x = hn::Add(offset.x, wave_at(volume, offset.y, 1, shader::kWaveAcross).height);
+    offset.y = hn::Add(offset.y, wave_at(volume, x, 0, shader::kWaveAlong).height);
+    const auto at_home = [&](Floats along, std::size_t axis) {
+        const Floats periods = hn::Floor(hn::Mul(hn::Sub(along, set(volume.home)), set(volume.per_period[axis])));
+        return hn::NegMulAdd(periods, set(volume.period[axis]), along);
+    };
+    offset.x = at_home(offset.x, 0);
+    offset.y = at_home(offset.y, 1);
+    return offset;
+}
+
+// The direction of rays at a distance from the eye, as such places go on along it.
+HWY_INLINE Floats3 way_in(const MarchedVolume& volume, const Floats3& ray, Floats distance) {
+    if (!volume.repeats) return ray;
+    const Floats x = hn::MulSub(distance, ray.x, set(volume.corner[0])),
+                 y = hn::MulSub(distance, ray.y, set(volume.corner[1]));
+    const Floats level = hn::NegMulAdd(ray.z, ray.z, set(1.0f));
+    return {hn::MulAdd(wave_at(volume, y, 1, shader::kWaveAcross).slope, ray.y, ray.x),
+            hn::MulAdd(wave_at(volume, x, 0, shader::kWaveAlong).slope, ray.x, ray.y),
+            hn::MulAdd(hn::Mul(set(2 * volume.bend), distance), level, ray.z)};
+}
+
+// How much cloud there is, relative to the first period, at places relative to the corner that are not taken back
+// to it.
+HWY_INLINE Floats patches_at(const MarchedVolume& volume, Floats x, Floats y) {
+    const Lanes d;
+    const Floats zero = hn::Zero(d), one = set(1.0f), home = set(volume.home);
+    const auto beyond = [&](Floats along, std::size_t axis) {
+        return hn::Max(hn::Sub(home, along), hn::Sub(along, set(volume.home + volume.period[axis])));
+    };
+    const Floats away = hn::Max(hn::Max(beyond(x, 0), beyond(y, 1)), zero);
+    const Floats share = hn::Min(hn::Mul(away, set(volume.patch_ramp)), one);
+    if (hn::AllTrue(d, hn::Eq(share, zero))) return one;
+    const float* const to = volume.to_patches;
+    const Floats voxels = set(float(kLargeNoiseVoxels));
+    const Floats across = hn::MulAdd(set(to[0]), x, hn::Mul(set(to[1]), y)),
+                 along = hn::MulAdd(set(to[2]), x, hn::Mul(set(to[3]), y));
+    const Floats noise = erosion::noise_at(volume.kernel.large_noise, erosion::integer(0), erosion::integer(7),
+                                           hn::Mul(across, voxels), hn::Mul(along, voxels),
+                                           set(shader::kPatchLevel * float(kLargeNoiseVoxels)));
+    return hn::Max(hn::MulAdd(hn::Mul(share, set(shader::kPatchSpread)), hn::NegMulAdd(set(2.0f), noise, one), one), zero);
+}
+
+// Of places of a ray relative to the eye.
+HWY_INLINE Floats patches_of(const MarchedVolume& volume, const Floats3& point) {
+    if (!volume.repeats) return set(1.0f);
+    return patches_at(volume, hn::Sub(point.x, set(volume.corner[0])), hn::Sub(point.y, set(volume.corner[1])));
+}
+
+// D times a factor, as the share t of D and the density of half coverage that nodes store.
+HWY_INLINE Floats scaled_share(Floats t, Floats factor) {
+    const Floats scaled = hn::Mul(t, factor);
+    return hn::Div(scaled, hn::Max(hn::Add(hn::Sub(set(1.0f), t), scaled), set(1.0e-6f)));
+}
+
+// Fraction of the sunlight that clouds which repeat leave at points relative to the eye.
+HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& point) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    Floats left = set(1.0f);
+    for (const MarchedVolume& volume : march.volumes) {
+        if (!volume.repeats) continue;
+        const Floats3 place = above_plane(point, volume.bend);
+        const Floats column = hn::Add(dot(set3(volume.shade_u), place), set(volume.shade_u.w)),
+                     row = hn::Add(dot(set3(volume.shade_v), place), set(volume.shade_v.w));
+        const Floats cell = set(2 * volume.kernel.node_m), per_cell = set(0.5f / volume.kernel.node_m);
+        const Floats x = hn::MulAdd(column, cell, set(volume.shade_mid[0])),
+                     y = hn::MulAdd(row, cell, set(volume.shade_mid[1]));
+        const auto wrapped = [&](Floats at, int count) {
+            const Floats size = set(float(count));
+            return hn::NegMulAdd(hn::Floor(hn::Mul(at, set(1.0f / float(count)))), size, at);
+        };
+        const Floats across = wave_at(volume, y, 1, shader::kWaveAcross).height,
+                     along = wave_at(volume, x, 0, shader::kWaveAlong).height;
+        const Floats u = wrapped(hn::MulAdd(across, per_cell, column), volume.shade_columns),
+                     v = wrapped(hn::MulAdd(along, per_cell, row), volume.shade_rows);
+        const auto texel = [&](Floats at, int count) {
+            return hn::Min(hn::ConvertTo(di, at), hn::Set(di, count - 1));
+        };
+        const auto i = texel(u, volume.shade_columns), j = texel(v, volume.shade_rows);
+        const auto words = hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(volume.shade),
+                                           hn::Add(hn::Mul(j, hn::Set(di, volume.shade_columns)), i));
+        const Floats root = hn::Mul(erosion::of_word(words, hn::Sub(u, hn::ConvertTo(d, i)), hn::Sub(v, hn::ConvertTo(d, j))),
+                                    set(1.0f / 255.0f));
+        const Floats patches = patches_at(volume, x, y);
+        const Floats below = hn::Mul(hn::Sub(set(volume.shade_top), place.z), set(volume.per_shade_height));
+        const Floats part = hn::Max(hn::Min(below, set(1.0f)), hn::Zero(d));
+        const Floats depth = hn::Mul(hn::Mul(hn::Mul(root, root), set(shader::kMostShadeDepth)), hn::Mul(patches, part));
+        left = hn::Mul(left, fast_exp(hn::Neg(depth)));
+    }
+    return left;
+}
+
+}  // namespace nephos::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
