@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
+#include "render/cloud/table_rows.h"
 #include "render/shared/march.h"
 #include "render/shared/shared.h"
 
@@ -223,14 +224,14 @@ float equivalent_depth_at(const CloudVolume& volume, const Vec3& place_m, float 
 void cast_shadows(std::span<const CloudVolume> volumes, const ShadowFrame& frame, int size,
                   std::span<float> shadow) {
     // Where lines leave the world of clouds: as far down the light as no cloud reaches.
+    const auto columns = std::size_t(size);
     tbb::parallel_for(0, size, [&](int row) {
-        for (int column = 0; column < size; ++column) {
-            const Vec3 point = frame.origin_m + (column + 0.5) / size * frame.u_axis_m +
-                               (row + 0.5) / size * frame.v_axis_m;
-            float depth = 0;
-            for (const CloudVolume& volume : volumes) depth += volume.front.depth_at(point);
-            shadow[std::size_t(row) * std::size_t(size) + std::size_t(column)] *= std::exp(-depth);
-        }
+        std::vector<float> depths(columns, 0.0f);
+        const Vec3 first =
+            frame.origin_m + 0.5 / size * frame.u_axis_m + (row + 0.5) / size * frame.v_axis_m;
+        for (const CloudVolume& volume : volumes)
+            volume.front.add_depths(first, frame.u_axis_m / double(size), depths);
+        attenuate(depths, shadow.subspan(std::size_t(row) * columns, columns));
     });
 }
 

@@ -189,7 +189,8 @@ BrickOfCells lost_by_sun(const DiffusionCells& cells, std::size_t brick, const f
 DiffuseLight diffuse_sunlight(const DiffusionCells& cells, std::span<const float> sun_depths, const Vec3& to_sun,
                               double albedo) {
     std::vector<BrickOfCells> source(cells.bricks);
-    tbb::parallel_for(std::size_t{0}, cells.bricks, [&](std::size_t brick) {
+    tbb::parallel_for(std::size_t{0}, cells.active.size(), [&](std::size_t n) {
+        const auto brick = std::size_t(cells.active[n]);
         source[brick] = lost_by_sun(cells, brick, &sun_depths[brick * kLightNodesOfBrick], to_sun, albedo);
     });
     const std::vector<LightOfCells> light = light_of_cells(cells, solve(cells, source, albedo), {});

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <numeric>
 #include <type_traits>
 #include <utility>
@@ -18,10 +19,8 @@ constexpr float kMostConductance = 10;
 constexpr float kFold = 1e-6f;           // reduced optical thickness of an empty cell in a fold
 constexpr float kLeastThickness = 0.1f;  // reduced optical, of cells in the weights of their light
 
-// Bricks [begin, end).
-struct BrickRange {
-    std::size_t begin = 0, end = 0;
-};
+// Numbers of some bricks.
+using Bricks = std::span<const std::int32_t>;
 
 // What conjugate gradients keep of each cell; `inverse`: of the diagonal of the equations.
 struct Iteration {
@@ -54,12 +53,12 @@ Cells times(float a, const Cells& b) { return times(same(a), b); }
 // Lanes of `yes` where `test` is above 0, else of `no`.
 Quad pick(Quad test, Quad yes, Quad no) { return test > 0 ? yes : no; }
 Cells where_positive(const Cells& test, const Cells& values) {
-    const auto one = [](Quad t, Quad v) { return pick(t, v, number(0)); };
-    return each(one, test, values);
+    const auto lanes = [](Quad t, Quad v) { return pick(t, v, number(0)); };
+    return each(lanes, test, values);
 }
 Cells where_not_positive(const Cells& test, const Cells& values) {
-    const auto one = [](Quad t, Quad v) { return pick(t, number(0), v); };
-    return each(one, test, values);
+    const auto lanes = [](Quad t, Quad v) { return pick(t, number(0), v); };
+    return each(lanes, test, values);
 }
 bool any_positive(const Cells& cells) {
     const Quad most = cells.low > cells.high ? cells.low : cells.high;
@@ -91,23 +90,21 @@ Cells exchanged(const Cells& cells) {
         return {cells.high, cells.low};
 }
 
-constexpr std::size_t kBelow[3] = {12, 10, 4}, kAbove[3] = {14, 16, 22};  // in DiffusionCells::around
-
 // The outer neighbours: of the upper cells in the brick above, of the lower ones in that below.
 template <int kAxis, class Load>
-Cells outer(const std::array<std::int32_t, 27>& around, const Load& of_brick) {
-    return exchanged<kAxis>(halves<kAxis>(of_brick(std::size_t(around[kBelow[kAxis]])),
-                                          of_brick(std::size_t(around[kAbove[kAxis]]))));
+Cells outer(const std::array<std::int32_t, 6>& beside, const Load& of_brick) {
+    return exchanged<kAxis>(halves<kAxis>(of_brick(std::size_t(beside[2 * kAxis])),
+                                          of_brick(std::size_t(beside[2 * kAxis + 1]))));
 }
 
 // Calls what(axis, cells that are inner neighbours, those that are outer ones) for the three axes.
 template <class Load, class What>
 void for_neighbours(const DiffusionCells& cells, std::size_t brick, const Load& of_brick, const What& what) {
-    const auto& around = cells.around[brick];
+    const auto& beside = cells.beside[brick];
     const Cells own = of_brick(brick);
-    what(std::integral_constant<int, 0>(), exchanged<0>(own), outer<0>(around, of_brick));
-    what(std::integral_constant<int, 1>(), exchanged<1>(own), outer<1>(around, of_brick));
-    what(std::integral_constant<int, 2>(), exchanged<2>(own), outer<2>(around, of_brick));
+    what(std::integral_constant<int, 0>(), exchanged<0>(own), outer<0>(beside, of_brick));
+    what(std::integral_constant<int, 1>(), exchanged<1>(own), outer<1>(beside, of_brick));
+    what(std::integral_constant<int, 2>(), exchanged<2>(own), outer<2>(beside, of_brick));
 }
 
 Quad loss(Quad thickness) {
@@ -115,18 +112,19 @@ Quad loss(Quad thickness) {
 }
 
 // Light that leaves a cloud in a fold meets it again: empty cells between two or more of cloud exchange it.
-void fill_folds(const DiffusionCells& cells, BrickRange range, std::vector<BrickOfCells>& filled) {
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+void fill_folds(const DiffusionCells& cells, Bricks some, std::vector<BrickOfCells>& filled) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         Cells count = same(0);
         const auto of_brick = [&](std::size_t n) { return load(cells.thickness[n]); };
         for_neighbours(cells, brick, of_brick, [&](auto, const Cells& inner, const Cells& beyond) {
             count = plus(count, plus(where_positive(inner, same(1)), where_positive(beyond, same(1))));
         });
         const Cells own = of_brick(brick);
-        const auto one = [](Quad thickness, Quad number_of_them) {
+        const auto lanes = [](Quad thickness, Quad number_of_them) {
             return pick(thickness, thickness, pick(number_of_them - 1.5f, number(kFold), number(0)));
         };
-        store(each(one, own, count), filled[brick]);
+        store(each(lanes, own, count), filled[brick]);
     }
 }
 
@@ -138,8 +136,9 @@ Quad conductance(Quad a, Quad b) {
 }
 
 // The area of a slanting surface is less than that of the faces that stand for it as stairs.
-void set_conductances(BrickRange range, DiffusionCells& cells) {
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+void set_conductances(Bricks some, DiffusionCells& cells) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         const auto of_brick = [&](std::size_t n) { return load(cells.thickness[n]); };
         const Cells own = of_brick(brick);
         Cells open_faces = same(0), squares = same(0);
@@ -162,13 +161,14 @@ void set_conductances(BrickRange range, DiffusionCells& cells) {
 }
 
 // Cells without cloud have a fluence of 0.
-void set_diagonal(const DiffusionCells& cells, float absorbed, BrickRange range, Iteration& it) {
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+void set_diagonal(const DiffusionCells& cells, float absorbed, Bricks some, Iteration& it) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         const Cells thickness = load(cells.thickness[brick]), outside = load(cells.to_outside[brick]);
         Cells sum = times(absorbed, thickness);
         for (const BrickOfCells& to : cells.to_neighbours[brick]) {
-            const auto one = [](Quad conducted, Quad open) { return pick(conducted, conducted, open); };
-            sum = plus(sum, each(one, load(to), outside));
+            const auto lanes = [](Quad conducted, Quad open) { return pick(conducted, conducted, open); };
+            sum = plus(sum, each(lanes, load(to), outside));
         }
         const auto inverse = [](Quad of) { return 1 / of; };
         store(where_positive(thickness, sum), it.diagonal[brick]);
@@ -181,27 +181,31 @@ double sum_of(Quad lanes) {
 }
 void add_product(const Cells& a, const Cells& b, Quad& sum) { sum += a.low * b.low + a.high * b.high; }
 
-double residual_product(BrickRange range, const Iteration& it) {
+double residual_product(Bricks some, const Iteration& it) {
     Quad sum = number(0);
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         const Cells residual = load(it.residual[brick]);
         add_product(times(residual, load(it.inverse[brick])), residual, sum);
     }
     return sum_of(sum);
 }
 
-void turn(float keep, BrickRange range, Iteration& it) {
-    for (std::size_t brick = range.begin; brick < range.end; ++brick)
+void turn(float keep, Bricks some, Iteration& it) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         store(plus(times(load(it.inverse[brick]), load(it.residual[brick])),
                    times(keep, load(it.direction[brick]))),
               it.direction[brick]);
+    }
 }
 
 // What leaves a cell whose fluence is the direction, less what comes from its neighbours. Returns its product with the
 // direction.
-double set_image(const DiffusionCells& cells, BrickRange range, Iteration& it) {
+double set_image(const DiffusionCells& cells, Bricks some, Iteration& it) {
     Quad product = number(0);
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         const auto of_brick = [&](std::size_t n) { return load(it.direction[n]); };
         const auto& to = cells.to_neighbours[brick];
         const Cells own = of_brick(brick);
@@ -216,9 +220,10 @@ double set_image(const DiffusionCells& cells, BrickRange range, Iteration& it) {
 }
 
 // Returns residual_product().
-double step(float length, BrickRange range, Iteration& it) {
+double step(float length, Bricks some, Iteration& it) {
     Quad product = number(0);
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         store(plus(load(it.fluence[brick]), times(length, load(it.direction[brick]))), it.fluence[brick]);
         const Cells residual = minus(load(it.residual[brick]), times(length, load(it.image[brick])));
         store(residual, it.residual[brick]);
@@ -237,9 +242,10 @@ Cells beyond_outer(const FluenceOutside& outside) {
     return halves<kAxis>(same(outside[2 * kAxis + 1]), same(outside[2 * kAxis]));
 }
 
-void take_light(const DiffusionCells& cells, const FluenceOutside& outside, BrickRange range,
+void take_light(const DiffusionCells& cells, const FluenceOutside& outside, Bricks some,
                 std::vector<BrickOfCells>& source) {
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         const auto& to = cells.to_neighbours[brick];
         Cells sum = same(0);
         const auto add = [&](const BrickOfCells& conducted, const Cells& light) {
@@ -259,8 +265,9 @@ using Fluxes = std::array<BrickOfCells, 3>;
 
 // Net flux through the middle of cells, half of that through both faces.
 void find_fluxes(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence, const FluenceOutside& outside,
-                 BrickRange range, std::vector<Fluxes>& fluxes) {
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+                 Bricks some, std::vector<Fluxes>& fluxes) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         const auto of_brick = [&](std::size_t n) { return load(fluence[n]); };
         const Cells own = of_brick(brick), open = load(cells.to_outside[brick]);
         for_neighbours(cells, brick, of_brick, [&](auto axis, const Cells& inner, const Cells& beyond) {
@@ -285,27 +292,27 @@ void add_light_of_faces(const DiffusionCells& cells, const std::vector<BrickOfCe
     const auto load_flux = [&](std::size_t axis) {
         return [&fluxes, axis](std::size_t n) { return load(fluxes[n][axis]); };
     };
-    const auto add = [&](const Cells& thickness, const Cells& beside, const Cells (&flux)[3], const Cells& arriving) {
+    const auto add = [&](const Cells& thickness, const Cells& there, const Cells (&flux)[3], const Cells& arriving) {
         const auto through = [](Quad of) { return 2 * loss(of); };
-        const Cells fluence_there = plus(arriving, times(each(through, thickness), minus(beside, arriving)));
+        const Cells fluence_there = plus(arriving, times(each(through, thickness), minus(there, arriving)));
         values[0] = plus(values[0], where_positive(thickness, fluence_there));
         for (int axis = 0; axis < 3; ++axis)
             values[axis + 1] = plus(values[axis + 1], where_positive(thickness, flux[axis]));
         count = plus(count, where_positive(thickness, same(1)));
     };
-    const auto& around = cells.around[brick];
+    const auto& beside = cells.beside[brick];
     const auto thickness_of = [&](std::size_t n) { return load(cells.thickness[n]); };
     const auto fluence_of = [&](std::size_t n) { return load(fluence[n]); };
     for_neighbours(cells, brick, thickness_of, [&](auto axis, const Cells& inner, const Cells& beyond) {
         constexpr int kAxis = decltype(axis)::value;
         const auto inner_of = [&](std::size_t n) { return exchanged<kAxis>(load_flux(n)(brick)); };
-        const auto outer_of = [&](std::size_t n) { return outer<kAxis>(around, load_flux(n)); };
+        const auto outer_of = [&](std::size_t n) { return outer<kAxis>(beside, load_flux(n)); };
         // What arrives at the neighbour's face comes from where the cell itself looks away from.
         if (any_positive(inner))
             add(inner, exchanged<kAxis>(fluence_of(brick)), {inner_of(0), inner_of(1), inner_of(2)},
                 beyond_outer<kAxis>(outside));
         if (any_positive(beyond))
-            add(beyond, outer<kAxis>(around, fluence_of), {outer_of(0), outer_of(1), outer_of(2)},
+            add(beyond, outer<kAxis>(beside, fluence_of), {outer_of(0), outer_of(1), outer_of(2)},
                 beyond_inner<kAxis>(outside));
     });
     constexpr float kWeight = 1 / kLeastThickness;
@@ -319,8 +326,9 @@ void add_light_of_faces(const DiffusionCells& cells, const std::vector<BrickOfCe
 }
 
 void collect_light(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence, const FluenceOutside& outside,
-                   const std::vector<Fluxes>& fluxes, BrickRange range, std::vector<LightOfCells>& light) {
-    for (std::size_t brick = range.begin; brick < range.end; ++brick) {
+                   const std::vector<Fluxes>& fluxes, Bricks some, std::vector<LightOfCells>& light) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
         LightOfCells& to = light[brick];
         const Cells thickness = load(cells.thickness[brick]);
         const auto weight_of = [](Quad of) { return 1 / (of + kLeastThickness); };
@@ -339,18 +347,24 @@ constexpr double kSmallResidual = 1e-3;  // relative, which ends the iterations
 constexpr int kMostRounds = 200;
 
 template <class What>
-void for_parts(std::size_t bricks, const What& what) {
-    tbb::parallel_for(std::size_t{0}, (bricks + kPart - 1) / kPart, [&](std::size_t part) {
-        what(part, BrickRange{part * kPart, std::min((part + 1) * kPart, bricks)});
+void for_parts(Bricks bricks, const What& what) {
+    tbb::parallel_for(std::size_t{0}, (bricks.size() + kPart - 1) / kPart, [&](std::size_t part) {
+        what(part, bricks.subspan(part * kPart, std::min(kPart, bricks.size() - part * kPart)));
     });
 }
 
 // Sums are those of parts in their order, whatever the number of threads.
 template <class Number>
-double sum_over_parts(std::size_t bricks, const Number& number) {
-    std::vector<double> sums((bricks + kPart - 1) / kPart);
-    for_parts(bricks, [&](std::size_t part, BrickRange range) { sums[part] = number(range); });
+double sum_over_parts(Bricks bricks, const Number& number) {
+    std::vector<double> sums((bricks.size() + kPart - 1) / kPart);
+    for_parts(bricks, [&](std::size_t part, Bricks some) { sums[part] = number(some); });
     return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
+std::vector<std::int32_t> first_numbers(std::size_t count) {
+    std::vector<std::int32_t> numbers(count);
+    std::iota(numbers.begin(), numbers.end(), 0);
+    return numbers;
 }
 
 std::array<std::int32_t, 27> bricks_around(const CoverageField& field, std::size_t brick) {
@@ -389,22 +403,27 @@ DiffusionCells::DiffusionCells(const CoverageField& field, std::span<const float
     const float scale = (1 - mean_cosine) * float(4 * field.node_m());
     thickness.resize(bricks + 1);
     around.resize(bricks);
+    beside.resize(bricks);
     tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
         thickness[brick] = coarser(&extinction[brick * kCells * kCells * kCells], scale);
-        around[brick] = bricks_around(field, brick);
+        const auto& all = around[brick] = bricks_around(field, brick);
+        beside[brick] = {all[12], all[14], all[10], all[16], all[4], all[22]};
     });
     std::vector<BrickOfCells> filled(bricks + 1);
-    for_parts(bricks, [&](std::size_t, BrickRange range) { fill_folds(*this, range, filled); });
+    const std::vector<std::int32_t> all = first_numbers(bricks);
+    for_parts(all, [&](std::size_t, Bricks some) { fill_folds(*this, some, filled); });
     thickness = std::move(filled);
+    std::ranges::copy_if(all, std::back_inserter(active),
+                         [&](std::int32_t n) { return any_positive(load(thickness[std::size_t(n)])); });
     to_neighbours.resize(bricks + 1);
     to_outside.resize(bricks + 1);
-    for_parts(bricks, [&](std::size_t, BrickRange range) { set_conductances(range, *this); });
+    for_parts(active, [&](std::size_t, Bricks some) { set_conductances(some, *this); });
 }
 
 std::vector<BrickOfCells> light_from_outside(const DiffusionCells& cells, const FluenceOutside& outside) {
     std::vector<BrickOfCells> source(cells.bricks);
-    for_parts(cells.bricks, [&](std::size_t, BrickRange range) {
-        take_light(cells, outside, range, source);
+    for_parts(cells.active, [&](std::size_t, Bricks some) {
+        take_light(cells, outside, some, source);
     });
     return source;
 }
@@ -416,20 +435,20 @@ std::vector<BrickOfCells> solve(const DiffusionCells& cells, const std::vector<B
     for (auto* each : {&it.inverse, &it.diagonal, &it.fluence, &it.direction, &it.image}) each->resize(bricks + 1);
     it.residual = source;
     const float absorbed = (1 - float(albedo)) / (1 - cells.mean_cosine);
-    for_parts(bricks, [&](std::size_t, BrickRange range) {
-        set_diagonal(cells, absorbed, range, it);
+    for_parts(cells.active, [&](std::size_t, Bricks some) {
+        set_diagonal(cells, absorbed, some, it);
     });
     double product = sum_over_parts(
-        bricks, [&](BrickRange range) { return residual_product(range, it); });
+        cells.active, [&](Bricks some) { return residual_product(some, it); });
     const double small = kSmallResidual * kSmallResidual * product;
     float keep = 0;
     for (int round = 0; round < kMostRounds && product > small; ++round) {
-        for_parts(bricks, [&](std::size_t, BrickRange range) { turn(keep, range, it); });
+        for_parts(cells.active, [&](std::size_t, Bricks some) { turn(keep, some, it); });
         const double curvature = sum_over_parts(
-            bricks, [&](BrickRange range) { return set_image(cells, range, it); });
+            cells.active, [&](Bricks some) { return set_image(cells, some, it); });
         const auto length = float(product / curvature);
         const double next = sum_over_parts(
-            bricks, [&](BrickRange range) { return step(length, range, it); });
+            cells.active, [&](Bricks some) { return step(length, some, it); });
         keep = float(next / product);
         product = next;
     }
@@ -439,12 +458,12 @@ std::vector<BrickOfCells> solve(const DiffusionCells& cells, const std::vector<B
 std::vector<LightOfCells> light_of_cells(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence,
                                          const FluenceOutside& outside) {
     std::vector<Fluxes> fluxes(cells.bricks + 1);
-    for_parts(cells.bricks, [&](std::size_t, BrickRange range) {
-        find_fluxes(cells, fluence, outside, range, fluxes);
+    for_parts(cells.active, [&](std::size_t, Bricks some) {
+        find_fluxes(cells, fluence, outside, some, fluxes);
     });
     std::vector<LightOfCells> light(cells.bricks + 1);
-    for_parts(cells.bricks, [&](std::size_t, BrickRange range) {
-        collect_light(cells, fluence, outside, fluxes, range, light);
+    for_parts(first_numbers(cells.bricks), [&](std::size_t, Bricks some) {
+        collect_light(cells, fluence, outside, fluxes, some, light);
     });
     return light;
 }

@@ -23,7 +23,7 @@ struct alignas(32) BrickOfCells {
     std::array<float, kDiffusionCells> of{};
 };
 
-// An immutable value once made. All vectors but the last have an element more, for bricks without cloud.
+// An immutable value once made. Those of its vectors that hold cells have an element more, for bricks without cloud.
 struct DiffusionCells {
     // `extinction`: per metre, one number for each lattice cell of each brick, x fastest. `mean_cosine`: g < 1.
     DiffusionCells(const CoverageField& field, std::span<const float> extinction, double mean_cosine);
@@ -35,8 +35,11 @@ struct DiffusionCells {
     // through each face beyond which there is none.
     std::vector<std::array<BrickOfCells, 6>> to_neighbours;
     std::vector<BrickOfCells> to_outside;
-    // The 27 bricks around each and itself, x fastest; `bricks` where there is none.
+    // The bricks below and above each on each axis, and the 27 around each and itself, x fastest; `bricks` where there is
+    // none.
+    std::vector<std::array<std::int32_t, 6>> beside;
     std::vector<std::array<std::int32_t, 27>> around;
+    std::vector<std::int32_t> active;  // bricks with a thickness above 0, rising
 };
 
 // Fluence beyond faces without cloud: below and above a cell on each axis.
