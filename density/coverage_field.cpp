@@ -3,6 +3,7 @@
 // How a CoverageField is made of a grid (detail.h).
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -155,12 +156,13 @@ void CoverageField::find_places(const CoverageCells& cells, const Boundaries& bo
 // Fills nodes_, histogram_ and table_, and drops places without cloud.
 void CoverageField::sample_nodes(const CoverageCells& cells, const NodeSums& sums, int before) {
     nodes_.assign(places_.size() * kBrickBytes, 0);
-    std::vector<std::array<std::uint16_t, 256>> histograms(places_.size());
+    std::array<std::atomic<std::uint64_t>, 256> histogram{};
     std::vector<std::uint8_t> empty(places_.size(), 0);
     const float half_density = erosion_.half_density;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places_.size(), 16), [&](const auto& range) {
         std::vector<float> density(sums.size()), growing(cells.grows() ? density.size() : 0);
-        std::array<float, kEdge * kEdge * kEdge> means, growths{};
+        NodeSums::Nodes means{}, growths{};
+        std::array<std::uint32_t, 256> counts{};
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
             const auto at = brick_at(places_[n], bricks_);
             int corner[3];
@@ -173,23 +175,19 @@ void CoverageField::sample_nodes(const CoverageCells& cells, const NodeSums& sum
             sums.sum(density.data(), means.data());
             if (cells.grows()) sums.sum(growing.data(), growths.data());
             std::uint8_t* const out = &nodes_[n * kBrickBytes];
-            for (std::size_t node = 0; node < means.size(); ++node) {
-                const float d = means[node], growth = growths[node] / std::max(d, 1e-30f);
-                out[2 * node] = std::uint8_t(int(255 * (d / (d + half_density)) + 0.5f));
-                out[2 * node + 1] = std::uint8_t(int(128.5f + 127 * std::min(std::max(growth, -1.0f), 1.0f)));
-            }
-            histograms[n].fill(0);
+            NodeSums::to_bytes(means, growths, half_density, out);
             for (std::size_t row = 0; row < kEdge * (kEdge - 1); ++row) {  // the last ones are those of other bricks
                 if (row % kEdge == kEdge - 1) continue;
-                for (std::size_t x = 0; x < kEdge - 1; ++x) ++histograms[n][out[2 * (row * kEdge + x)]];
+                for (std::size_t x = 0; x < kEdge - 1; ++x) ++counts[out[2 * (row * kEdge + x)]];
             }
         }
+        for (std::size_t t = 0; t < counts.size(); ++t)
+            if (counts[t] > 0) histogram[t] += counts[t];
     });
+    std::ranges::transform(histogram, histogram_.begin(), [](const auto& count) { return double(count.load()); });
     std::size_t kept = 0;
-    histogram_.fill(0);
     for (std::size_t n = 0; n < places_.size(); ++n) {
         if (empty[n] != 0) continue;
-        for (std::size_t t = 0; t < histogram_.size(); ++t) histogram_[t] += histograms[n][t];
         if (kept != n)
             std::copy_n(nodes_.begin() + std::ptrdiff_t(n * kBrickBytes), kBrickBytes,
                         nodes_.begin() + std::ptrdiff_t(kept * kBrickBytes));

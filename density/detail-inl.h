@@ -141,7 +141,8 @@ struct Eroded {
 };
 
 // The detailed density of nodes at places relative to the field's corner, metres. Lanes that are not `asked` are 0. No
-// lane depends on the others; without kMargins the margins are of no use.
+// lane depends on the others; without kMargins the margins are of no use, and lanes that are cloud or clear whatever the
+// noise do not look it up: they read its first voxel, which is in the cache.
 template <bool kMargins = false>
 HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, Floats y, Floats z, Floats footprint,
                          Mask asked) {
@@ -163,11 +164,20 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
         return hn::MulAdd(number(to[0]), x,
                           hn::MulAdd(number(to[1]), y, hn::MulAdd(number(to[2]), z, number(to[3]))));
     };
-    const Floats u = turned(0), v = turned(1), w = turned(2), edge = number(float(kLargeNoiseVoxels));
+    Floats u = turned(0), v = turned(1), w = turned(2);
+    const Floats edge = number(float(kLargeNoiseVoxels));
+    Mask unsure = needed;
+    if (!kMargins) {
+        const Floats most = hn::MulAdd(half, large, hn::Add(number(0.5001f), others));
+        unsure = hn::And(needed, hn::Lt(c, most));
+        u = hn::IfThenElseZero(unsure, u);
+        v = hn::IfThenElseZero(unsure, v);
+        w = hn::IfThenElseZero(unsure, w);
+    }
     Floats noise = noise_at(field.large_noise, integer(0), integer(7), hn::Mul(u, edge), hn::Mul(v, edge),
                             hn::Mul(w, edge));
     noise = hn::MulAdd(large, hn::Sub(noise, half), half);
-    const Mask near = hn::And(needed, hn::Lt(hn::Abs(hn::Sub(c, noise)), others));
+    const Mask near = hn::And(unsure, hn::Lt(hn::Abs(hn::Sub(c, noise)), others));
     if (!hn::AllFalse(d, hn::And(near, hn::Gt(medium, zero)))) {
         const auto level_of = [&](float voxels_per_m) {
             const Floats voxels = hn::Max(hn::Mul(footprint, number(voxels_per_m)), number(1.0f));

@@ -49,6 +49,56 @@ void sample_places(const DetailKernel& field, std::int32_t brick, const float* c
     }
 }
 
+// t and growth in the middles of the boxes between the nodes of a brick, as node_at() has them, without its gathers.
+struct Middles {
+    static constexpr std::size_t kSide = CoverageField::kBrickNodes - 1;
+    HWY_ALIGN float t[kSide * kSide * kSide], growth[kSide * kSide * kSide];
+};
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+void find_middles(const DetailKernel& field, std::int32_t brick, Middles& middles) {
+    constexpr std::size_t kSide = Middles::kSide, kEdge = kSide + 1;
+    const hn::CappedTag<float, kSide> d;
+    const hn::Rebind<std::int32_t, decltype(d)> di;
+    const hn::Rebind<std::uint16_t, decltype(d)> dh;
+    using Row = hn::Vec<decltype(d)>;
+    const std::size_t lanes = hn::Lanes(d);
+    const auto* const nodes = reinterpret_cast<const std::uint16_t*>(
+        field.nodes + std::size_t(brick) * CoverageField::kBrickBytes);
+    const Row half = hn::Set(d, 0.5f);
+    const auto between = [&](Row a, Row b) { return hn::MulAdd(half, hn::Sub(b, a), a); };
+    HWY_ALIGN float along_x[2][kEdge][kSide], planes[2][2][kSide * kSide];  // t and growth; planes of two z
+    for (std::size_t z = 0; z < kEdge; ++z) {
+        for (std::size_t y = 0; y < kEdge; ++y) {
+            for (std::size_t x = 0; x < kSide; x += lanes) {
+                const std::uint16_t* const row = nodes + (z * kEdge + y) * kEdge + x;
+                const auto a = hn::PromoteTo(di, hn::LoadU(dh, row)), b = hn::PromoteTo(di, hn::LoadU(dh, row + 1));
+                const auto low = [&](hn::Vec<decltype(di)> pair) {
+                    return hn::ConvertTo(d, hn::And(pair, hn::Set(di, 255)));
+                };
+                const auto high = [&](hn::Vec<decltype(di)> pair) { return hn::ConvertTo(d, hn::ShiftRight<8>(pair)); };
+                hn::Store(between(low(a), low(b)), d, &along_x[0][y][x]);
+                hn::Store(between(high(a), high(b)), d, &along_x[1][y][x]);
+            }
+        }
+        for (std::size_t n = 0; n < 2; ++n)
+            for (std::size_t i = 0; i < kSide * kSide; i += lanes)
+                hn::Store(between(hn::Load(d, &along_x[n][0][0] + i), hn::Load(d, &along_x[n][0][0] + kSide + i)), d,
+                          &planes[z % 2][n][i]);
+        if (z == 0) continue;
+        for (std::size_t i = 0; i < kSide * kSide; i += lanes) {
+            const auto middle = [&](std::size_t n) {
+                return between(hn::Load(d, &planes[(z - 1) % 2][n][i]), hn::Load(d, &planes[z % 2][n][i]));
+            };
+            const std::size_t to = (z - 1) * kSide * kSide + i;
+            hn::Store(hn::Mul(middle(0), hn::Set(d, 1.0f / 255.0f)), d, middles.t + to);
+            hn::Store(hn::MulSub(middle(1), hn::Set(d, 1.0f / 127.0f), hn::Set(d, 128.0f / 127.0f)), d,
+                      middles.growth + to);
+        }
+    }
+}
+
 // Detailed density in the middles of the 8 x 8 x 8 boxes between the nodes of a brick, x fastest; `corner`: of the
 // brick, metres from that of the field.
 void sample_brick(const DetailKernel& field, std::int32_t brick, const float* corner, float footprint,
@@ -61,6 +111,8 @@ void sample_brick(const DetailKernel& field, std::int32_t brick, const float* co
     const std::uint8_t* const clearance = field.clearance + std::size_t(brick) * kCells * kCells * kCells;
     const std::size_t lanes = hn::Lanes(d);
     HWY_ALIGN float middle[3][kMaxLanes];
+    Middles middles;
+    if (samples == BrickSamples::middles) find_middles(field, brick, middles);
     for (std::size_t n = 0; n < kCount; n += lanes) {
         const std::size_t row = (n / kSide / kSide / 2 * kCells + n / kSide % kSide / 2) * kCells;
         if (clearance[row] > 0 && clearance[row + 1] > 0 && clearance[row + 2] > 0 && clearance[row + 3] > 0) {
@@ -76,7 +128,9 @@ void sample_brick(const DetailKernel& field, std::int32_t brick, const float* co
             }
         }
         const Floats x = hn::Load(d, middle[0]), y = hn::Load(d, middle[1]), z = hn::Load(d, middle[2]);
-        const Node node = node_at(field, integer(brick), x, y, z);
+        const Node node = samples == BrickSamples::middles
+                              ? Node{hn::Load(d, middles.t + n), hn::Load(d, middles.growth + n)}
+                              : node_at(field, integer(brick), x, y, z);
         const Floats metres = number(field.node_m);
         const auto place = [&](Floats local, int axis) { return hn::MulAdd(local, metres, number(corner[axis])); };
         const Eroded result = eroded(field, node, place(x, 0), place(y, 1), place(z, 2), number(footprint),

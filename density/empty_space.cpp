@@ -2,6 +2,7 @@
 #include "density/empty_space.h"
 
 #include <algorithm>
+#include <bit>
 
 #include <tbb/parallel_for.h>
 
@@ -18,75 +19,111 @@ constexpr std::size_t kBrickBytes = CoverageField::kBrickBytes;
 
 }  // namespace
 
-// Cells as bits: a row of three bricks' cells along x in a word.
+namespace {
+
+// Bits of the rows of cells at one z: 16 for each of four y. Those of a brick fill the lowest four of each.
+using Rows = std::uint64_t;
+using BrickRows = std::array<Rows, kCells>;  // by z
+static_assert(kCells == 4);
+constexpr int kRowBits = 16;
+
+// A cell may hold cloud when one of its nodes does: then t is at least `least`.
+BrickRows occupied_cells(const std::uint8_t* nodes, unsigned least) {
+    std::array<std::uint16_t, kEdge * kEdge> rows;  // a bit for each node
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+        unsigned bits = 0;
+        for (std::size_t x = 0; x < kEdge; ++x) bits |= unsigned(nodes[2 * (row * kEdge + x)] >= least) << x;
+        rows[row] = std::uint16_t(bits);
+    }
+    BrickRows occupied{};
+    for (std::size_t z = 0; z < kCells; ++z) {
+        for (std::size_t y = 0; y < kCells; ++y) {
+            unsigned any = 0;
+            for (std::size_t m = 0; m < 9; ++m) any |= rows[(2 * z + m / 3) * kEdge + 2 * y + m % 3];
+            any |= any >> 1 | any >> 2;  // the three nodes of a cell
+            const unsigned cells = (any & 1) | (any >> 1 & 2) | (any >> 2 & 4) | (any >> 3 & 8);
+            occupied[z] |= Rows(cells) << (kRowBits * y);
+        }
+    }
+    return occupied;
+}
+
+// Rows of a brick, and of those beside it in x, at 12 y and 12 z: those of a word are next to each other.
+struct RowsAround {
+    std::array<std::array<std::uint16_t, 3 * kCells>, 3 * kCells> of{};  // z, y
+
+    Rows at(int z, int y) const {
+        Rows rows = 0;
+        for (int n = 0; n < kCells; ++n)
+            rows |= Rows(of[std::size_t(z)][std::size_t(y + n)]) << (kRowBits * n);
+        return rows;
+    }
+    void set(int z, int y, Rows rows) {
+        for (int n = 0; n < kCells; ++n)
+            of[std::size_t(z)][std::size_t(y + n)] = std::uint16_t(rows >> (kRowBits * n));
+    }
+};
+
+// Chessboard distances of a brick's cells: the least half edge of a cube around a cell that meets one with cloud. The
+// cubes grow by one on all axes at a time; bits that leave a row of 16 do not get as far as the brick's own.
+void set_clearance(const RowsAround& near, std::uint8_t* out) {
+    std::array<Rows, 3 * kCells> along_y;  // of the brick's own y: what is up to `distance` away
+    for (int z = 0; z < 3 * kCells; ++z) along_y[std::size_t(z)] = near.at(z, kCells);
+    std::fill_n(out, kCells * kCells * kCells, std::uint8_t(kCells));
+    std::array<Rows, kCells> left;  // bits of cells without a distance
+    left.fill(0x000F000F000F000Full);
+    for (int distance = 0; distance < kCells; ++distance) {
+        for (int z = 0; distance > 0 && z < 3 * kCells; ++z)
+            along_y[std::size_t(z)] |= near.at(z, kCells - distance) | near.at(z, kCells + distance);
+        for (int z = 0; z < kCells; ++z) {
+            Rows any = 0;
+            for (int k = kCells + z - distance; k <= kCells + z + distance; ++k) any |= along_y[std::size_t(k)];
+            for (int n = 0; n < distance; ++n) any |= any << 1 | any >> 1;
+            Rows found = any >> kCells & left[std::size_t(z)];
+            left[std::size_t(z)] &= ~found;
+            for (; found != 0; found &= found - 1) {
+                const int bit = std::countr_zero(found);
+                out[(z * kCells + bit / kRowBits) * kCells + bit % kRowBits] = std::uint8_t(distance);
+            }
+        }
+    }
+}
+
+}  // namespace
+
 std::vector<std::uint8_t> clearance_of_cells(std::span<const std::uint8_t> nodes, std::span<const std::int32_t> places,
                                              std::span<const std::int32_t> table, const std::array<int, 3>& bricks,
                                              float least_coverage) {
-    std::array<bool, 256> cloud{};
-    for (std::size_t t = 0; t < cloud.size(); ++t) cloud[t] = text::coverage_of(float(t) / 255) > least_coverage;
-    // Four bits for each row of cells of each brick: a cell may hold cloud when one of its nodes does.
-    std::vector<std::array<std::uint8_t, kCells * kCells>> occupied(places.size());
-    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
-        const std::uint8_t* const of_brick = &nodes[n * kBrickBytes];
-        std::array<std::uint16_t, kEdge * kEdge> rows{};  // a bit for each node
-        for (std::size_t row = 0; row < rows.size(); ++row)
-            for (std::size_t x = 0; x < kEdge; ++x)
-                rows[row] = std::uint16_t(rows[row] | (cloud[of_brick[2 * (row * kEdge + x)]] ? 1u << x : 0u));
-        for (std::size_t cell = 0; cell < kCells * kCells; ++cell) {
-            const std::size_t y = cell % kCells, z = cell / kCells;
-            unsigned any = 0;
-            for (std::size_t m = 0; m < 9; ++m) any |= rows[(2 * z + m / 3) * kEdge + 2 * y + m % 3];
-            occupied[n][cell] = 0;
-            for (unsigned x = 0; x < kCells; ++x)
-                if ((any >> 2 * x & 7u) != 0) occupied[n][cell] = std::uint8_t(occupied[n][cell] | 1u << x);
-        }
-    });
+    unsigned least = 0;  // t of cloud; coverage rises with it
+    while (least < 256 && !(text::coverage_of(float(least) / 255) > least_coverage)) ++least;
+    std::vector<BrickRows> occupied(places.size());
+    tbb::parallel_for(std::size_t{0}, places.size(),
+                      [&](std::size_t n) { occupied[n] = occupied_cells(&nodes[n * kBrickBytes], least); });
+    constexpr BrickRows kNone{}, kAll{0x000F000F000F000Full, 0x000F000F000F000Full, 0x000F000F000F000Full,
+                                      0x000F000F000F000Full};
     std::vector<std::uint8_t> clearance(places.size() * kCells * kCells * kCells + 3, 0);  // kernels read words
-    constexpr int kSide = 3 * kCells;
-    using Rows = std::array<std::uint16_t, kSide * kSide>;
     tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
+        if (occupied[n] == kAll) return;
         const auto at = brick_at(places[n], bricks);
-        std::uint8_t* const out = &clearance[n * kCells * kCells * kCells];
-        if (std::ranges::all_of(occupied[n], [](std::uint8_t row) { return row == (1u << kCells) - 1; })) return;
-        Rows near{};
-        for (int m = 0; m < 27; ++m) {
-            const int o[3] = {m % 3, m / 3 % 3, m / 9};
-            int b[3];
-            bool inside = true;
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                b[axis] = at[axis] + o[axis] - 1;
-                inside = inside && b[axis] >= 0 && b[axis] < bricks[axis];
-            }
-            if (!inside) continue;
+        const auto rows_of = [&](int x, int y, int z) -> const BrickRows& {
+            if (x < 0 || y < 0 || z < 0 || x >= bricks[0] || y >= bricks[1] || z >= bricks[2]) return kNone;
             const std::int32_t number =
-                table[(std::size_t(b[2]) * std::size_t(bricks[1]) + std::size_t(b[1])) * std::size_t(bricks[0]) +
-                       std::size_t(b[0])];
-            if (number < 0) continue;
-            for (int cell = 0; cell < kCells * kCells; ++cell) {
-                std::uint16_t& to =
-                    near[std::size_t((o[2] * kCells + cell / kCells) * kSide + o[1] * kCells + cell % kCells)];
-                to = std::uint16_t(to | occupied[std::size_t(number)][std::size_t(cell)] << kCells * o[0]);
+                table[(std::size_t(z) * std::size_t(bricks[1]) + std::size_t(y)) * std::size_t(bricks[0]) +
+                      std::size_t(x)];
+            return number < 0 ? kNone : occupied[std::size_t(number)];
+        };
+        RowsAround near;
+        for (int z = 0; z < 3; ++z) {
+            for (int y = 0; y < 3; ++y) {
+                const int by = at[1] + y - 1, bz = at[2] + z - 1;
+                const BrickRows &low = rows_of(at[0] - 1, by, bz), &own = rows_of(at[0], by, bz),
+                                &high = rows_of(at[0] + 1, by, bz);
+                for (std::size_t k = 0; k < kCells; ++k)
+                    near.set(kCells * z + int(k), kCells * y,
+                             low[k] | own[k] << kCells | high[k] << (2 * kCells));
             }
         }
-        std::fill_n(out, kCells * kCells * kCells, std::uint8_t(kCells));
-        for (int distance = 0; distance < kCells; ++distance) {
-            for (int cell = 0; cell < kCells * kCells * kCells; ++cell) {
-                const unsigned row = near[std::size_t((kCells + cell / 16) * kSide + kCells + cell / 4 % 4)];
-                if (out[cell] == kCells && (row >> (kCells + cell % 4) & 1u) != 0) out[cell] = std::uint8_t(distance);
-            }
-            Rows wider = near;
-            for (std::uint16_t& row : wider) row = std::uint16_t(row | row << 1 | row >> 1);
-            near = wider;
-            for (std::size_t i = 0; i < near.size(); ++i) {
-                if (i % kSide > 0) near[i] |= wider[i - 1];
-                if (i % kSide + 1 < kSide) near[i] |= wider[i + 1];
-            }
-            wider = near;
-            for (std::size_t i = 0; i < near.size(); ++i) {
-                if (i >= kSide) near[i] |= wider[i - kSide];
-                if (i + kSide < near.size()) near[i] |= wider[i + kSide];
-            }
-        }
+        set_clearance(near, &clearance[n * kCells * kCells * kCells]);
     });
     return clearance;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <span>
 
 #include "density/metaballs.h"
@@ -47,6 +48,23 @@ void sum_rows(std::span<const NodeSums::Tap> taps, const float* cells, int strid
     }
 }
 
+// `growths` are those times the means.
+void nodes_as_bytes(const float* means, const float* growths, float half_density, std::uint16_t* out) {
+    const hn::ScalableTag<float> d;
+    const hn::Rebind<std::int32_t, decltype(d)> di;
+    const hn::Rebind<std::uint16_t, decltype(d)> dh;
+    const auto number = [&](float value) { return hn::Set(d, value); };
+    for (std::size_t n = 0; n < NodeSums::kNodes; n += hn::Lanes(d)) {
+        const auto mean = hn::LoadU(d, means + n);
+        const auto t = hn::Div(mean, hn::Add(mean, number(half_density)));
+        const auto growth = hn::Div(hn::LoadU(d, growths + n), hn::Max(mean, number(1e-30f)));
+        const auto within = hn::Min(hn::Max(growth, number(-1.0f)), number(1.0f));
+        const auto low = hn::ConvertTo(di, hn::Add(hn::Mul(number(255), t), number(0.5f))),
+                   high = hn::ConvertTo(di, hn::Add(number(128.5f), hn::Mul(number(127), within)));
+        hn::StoreU(hn::DemoteTo(dh, hn::Or(low, hn::ShiftLeft<8>(high))), dh, out + n);
+    }
+}
+
 }  // namespace nephos::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -54,6 +72,7 @@ HWY_AFTER_NAMESPACE();
 namespace nephos {
 
 HWY_EXPORT(sum_rows);
+HWY_EXPORT(nodes_as_bytes);
 
 namespace {
 
@@ -81,17 +100,30 @@ NodeSums::NodeSums(double radius) : reach_(int(std::ceil(radius)) + 1), side_(2 
 }
 
 void NodeSums::sum(const float* cells, float* nodes) const {
-    float rows[(kEdge / 2 + 1) * kRow];
-    for (int parity = 0; parity < 8; ++parity) {
-        const int x0 = parity & 1, y0 = parity >> 1 & 1, count = (kEdge - y0 + 1) / 2;
-        for (int z = parity >> 2; z < kEdge; z += 2) {
+    float rows[2][(kEdge / 2 + 1) * kRow];  // of even and odd nodes along x
+    for (int parity = 0; parity < 4; ++parity) {
+        const int y0 = parity & 1, count = (kEdge - y0 + 1) / 2;
+        for (int z = parity >> 1; z < kEdge; z += 2) {
             const float* const from = cells + ((z / 2 + reach_) * side_ + reach_) * pitch() + reach_;
-            HWY_DYNAMIC_DISPATCH(sum_rows)(taps_[parity], from, pitch(), count, rows);
-            for (int row = 0; row < count; ++row)
-                for (int x = x0; x < kEdge; x += 2)
-                    nodes[(z * kEdge + y0 + 2 * row) * kEdge + x] = rows[row * kRow + x / 2];
+            for (int x0 = 0; x0 < 2; ++x0)
+                HWY_DYNAMIC_DISPATCH(sum_rows)(taps_[2 * parity + x0], from, pitch(), count, rows[x0]);
+            for (int row = 0; row < count; ++row) {
+                float* const to = nodes + (z * kEdge + y0 + 2 * row) * kEdge;
+                const float *const even = rows[0] + row * kRow, *const odd = rows[1] + row * kRow;
+                for (int x = 0; x < kEdge / 2; ++x) {
+                    to[2 * x] = even[x];
+                    to[2 * x + 1] = odd[x];
+                }
+                to[kEdge - 1] = even[kEdge / 2];
+            }
         }
     }
+}
+
+void NodeSums::to_bytes(const Nodes& means, const Nodes& growths, float half_density, std::uint8_t* out) {
+    std::uint16_t pairs[kNodes + kBehind];
+    HWY_DYNAMIC_DISPATCH(nodes_as_bytes)(means.data(), growths.data(), half_density, pairs);
+    std::memcpy(out, pairs, 2 * kNodes);
 }
 
 }  // namespace nephos

@@ -3,7 +3,9 @@
 
 // Means over the cells around the nodes of a brick, weighted by the field of a metaball (not installed).
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "density/detail.h"
@@ -22,8 +24,17 @@ class NodeSums {
     int pitch() const { return side_ + kRow; }     // of its rows; kRow numbers behind the last one are read
     std::size_t size() const { return std::size_t(side_ * side_ * pitch() + kRow); }
 
-    // Computes the means at all kBrickNodes^3 nodes, x fastest, of size() numbers.
+    // Numbers of all nodes of a brick, x fastest, and of no meaning behind them.
+    static constexpr std::size_t kNodes =
+        std::size_t(CoverageField::kBrickNodes) * CoverageField::kBrickNodes * CoverageField::kBrickNodes;
+    static constexpr std::size_t kBehind = 64;
+    using Nodes = std::array<float, kNodes + kBehind>;
+
+    // Computes the means at all nodes of size() numbers.
     void sum(const float* cells, float* nodes) const;
+
+    // Writes the bytes of CoverageField::nodes(): t of the means, and growth. `growths`: means of growth times density.
+    static void to_bytes(const Nodes& means, const Nodes& growths, float half_density, std::uint8_t* out);
 
     struct Tap {
         int offset;  // from the cell at or below the node, in the rows of cells

@@ -89,19 +89,17 @@ CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, cons
 void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options) {
     if (cloud.detailed.empty() && cached.volumes.empty()) return;
     const CacheKey key = volumes_key(cached.metaballs_key, cloud, options);
-    if (key != cached.volumes_key) {
+    const bool are_new = key != cached.volumes_key;
+    if (are_new) {
         cached.volumes.clear();
         cached.volumes_key = {};
-        for (const DetailedVoxels& part : cloud.detailed) {
-            CloudVolume& volume = cached.volumes.emplace_back(part);
-            see_surroundings(volume, mean_cosine(options.light.phase));
-        }
+        for (const DetailedVoxels& part : cloud.detailed) cached.volumes.emplace_back(part);
         cached.volumes_key = key;
         cached.volumes_light_key = {};
         cached.volumes_version = next_version();
     }
     if (cached.light_key == cached.volumes_light_key) return;
-    light_volumes(cached.volumes, direction_to_sun(options.sun), options.light);
+    light_volumes(cached.volumes, direction_to_sun(options.sun), options.light, are_new);
     cached.volumes_light_key = cached.light_key;
     cached.volumes_light = next_version();
 }

@@ -7,7 +7,9 @@
 #include <limits>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
+#include "render/cloud/table_rows.h"
 #include "render/shared/march.h"
 #include "render/shared/shared.h"
 
@@ -55,10 +57,6 @@ double footprint_scale(std::span<const CloudVolume> volumes) {
 bool diffuses(const CloudLight& light) {
     return light.multiple == MultipleScattering::diffusion && light.lighting == Lighting::light_pass &&
            light.multiple_scattering > 0;
-}
-
-void see_surroundings(CloudVolume& volume, double mean_cosine) {
-    volume.surroundings = diffuse_surroundings(volume.field, volume.extinction, mean_cosine);
 }
 
 namespace {
@@ -116,7 +114,24 @@ std::vector<std::uint32_t> shade_words(const LightFront& front) {
 
 }  // namespace
 
-void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light) {
+namespace {
+
+// What the other volumes take away at the corners of a brick's cells.
+void add_other_depths(std::span<const CloudVolume> volumes, std::size_t n, std::size_t brick, std::span<float> depths) {
+    const CoverageField& field = volumes[n].field;
+    const auto& bricks = field.bricks();
+    const std::int32_t at = field.places()[brick];
+    const Vec3 corner(at % bricks[0], at / bricks[0] % bricks[1], at / bricks[0] / bricks[1]);
+    for (std::size_t i = 0; i < kLightNodesOfBrick; ++i) {
+        const Vec3 node(i % kLightNodes, i / kLightNodes % kLightNodes, i / kLightNodes / kLightNodes);
+        const Vec3 place = field.corner_m() + 2 * field.node_m() * (double(kCells) * corner + node);
+        for (std::size_t m = 0; m < volumes.size(); ++m)
+            if (m != n) depths[i] += sun_depth_at(volumes[m], place);
+    }
+}
+
+void light_by_sun(std::span<CloudVolume> volumes, std::span<const DiffusionCells> cells, const Vec3& to_sun,
+                  const CloudLight& light) {
     // First each by itself, then what the others add.
     std::vector<std::vector<float>> depths(volumes.size());
     tbb::parallel_for(std::size_t{0}, volumes.size(), [&](std::size_t n) {
@@ -133,29 +148,37 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
     });
     for (std::size_t n = 0; n < volumes.size(); ++n) {
         CloudVolume& volume = volumes[n];
-        volume.diffuse = {};
         volume.mean_cosine = mean_cosine(light.phase);
-        volume.sun_depths.assign(depths[n].size() + 1, 0);
-        const auto& bricks = volume.field.bricks();
-        tbb::parallel_for(std::size_t{0}, volume.field.places().size(), [&](std::size_t brick) {
-            const std::int32_t at = volume.field.places()[brick];
-            const Vec3 corner(at % bricks[0], at / bricks[0] % bricks[1], at / bricks[0] / bricks[1]);
-            for (std::size_t i = 0; i < kLightNodesOfBrick; ++i) {
-                const Vec3 node(i % kLightNodes, i / kLightNodes % kLightNodes, i / kLightNodes / kLightNodes);
-                const Vec3 place = volume.field.corner_m() + 2 * volume.field.node_m() * (double(kCells) * corner + node);
-                float& total = depths[n][brick * kLightNodesOfBrick + i];
-                for (std::size_t m = 0; m < volumes.size(); ++m)
-                    if (m != n) total += sun_depth_at(volumes[m], place);
-                float depth = total;
-                if (light.lighting == Lighting::cfa)
-                    depth = absorbed_depth(depth, volume.field.extinction_per_m(), light.light_distance_m);
-                volume.sun_depths[brick * kLightNodesOfBrick + i] = packed_depth(depth);
-            }
-        });
-        if (diffuses(light))
-            volume.diffuse =
-                diffuse_sunlight(volume.field, volume.extinction, depths[n], to_sun, light.albedo, volume.mean_cosine);
+        volume.sun_depths.resize(depths[n].size() + 1);
+        volume.sun_depths.back() = 0;
+        const auto pack = [&](std::size_t brick) {
+            const std::size_t first = brick * kLightNodesOfBrick;
+            if (volumes.size() > 1)
+                add_other_depths(volumes, n, brick, std::span(depths[n]).subspan(first, kLightNodesOfBrick));
+            const float* const from = &depths[n][first];
+            std::uint16_t* const to = &volume.sun_depths[first];
+            const bool absorbs = light.lighting == Lighting::cfa;
+            for (std::size_t i = 0; absorbs && i < kLightNodesOfBrick; ++i)
+                to[i] = packed_depth(
+                    absorbed_depth(from[i], volume.field.extinction_per_m(), light.light_distance_m));
+            for (std::size_t i = 0; !absorbs && i < kLightNodesOfBrick; ++i) to[i] = packed_depth(from[i]);
+        };
+        tbb::parallel_for(std::size_t{0}, volume.field.places().size(), pack);
+        volume.diffuse = diffuses(light) ? diffuse_sunlight(cells[n], depths[n], to_sun, light.albedo) : DiffuseLight{};
     }
+}
+
+}  // namespace
+
+void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light, bool are_new) {
+    std::vector<DiffusionCells> cells;
+    for (std::size_t n = 0; n < volumes.size() && (are_new || diffuses(light)); ++n)
+        cells.emplace_back(volumes[n].field, volumes[n].extinction, mean_cosine(light.phase));
+    const auto see_surroundings = [&] {
+        for (std::size_t n = 0; n < volumes.size() && are_new; ++n)
+            volumes[n].surroundings = diffuse_surroundings(cells[n]);
+    };
+    tbb::parallel_invoke(see_surroundings, [&] { light_by_sun(volumes, cells, to_sun, light); });
 }
 
 namespace {
@@ -224,14 +247,14 @@ float equivalent_depth_at(const CloudVolume& volume, const Vec3& place_m, float 
 void cast_shadows(std::span<const CloudVolume> volumes, const ShadowFrame& frame, int size,
                   std::span<float> shadow) {
     // Where lines leave the world of clouds: as far down the light as no cloud reaches.
+    const auto columns = std::size_t(size);
     tbb::parallel_for(0, size, [&](int row) {
-        for (int column = 0; column < size; ++column) {
-            const Vec3 point = frame.origin_m + (column + 0.5) / size * frame.u_axis_m +
-                               (row + 0.5) / size * frame.v_axis_m;
-            float depth = 0;
-            for (const CloudVolume& volume : volumes) depth += volume.front.depth_at(point);
-            shadow[std::size_t(row) * std::size_t(size) + std::size_t(column)] *= std::exp(-depth);
-        }
+        std::vector<float> depths(columns, 0.0f);
+        const Vec3 first =
+            frame.origin_m + 0.5 / size * frame.u_axis_m + (row + 0.5) / size * frame.v_axis_m;
+        for (const CloudVolume& volume : volumes)
+            volume.front.add_depths(first, frame.u_axis_m / double(size), depths);
+        attenuate(depths, shadow.subspan(std::size_t(row) * columns, columns));
     });
 }
 

@@ -53,11 +53,9 @@ double footprint_scale(std::span<const CloudVolume> volumes);
 // absorption of T.
 bool diffuses(const CloudLight& light);
 
-// Computes the surroundings, which do not depend on the sun. `mean_cosine`: of the phase function.
-void see_surroundings(CloudVolume& volume, double mean_cosine);
-
-// Computes the sunlight in all volumes; they shade each other. With Lighting::cfa its absorption is that of T.
-void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light);
+// Computes the sunlight in all volumes; they shade each other. With Lighting::cfa its absorption is that of T. Where they
+// are new, also the surroundings, which do not depend on the sun.
+void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light, bool are_new);
 
 // Returns the optical depth of a volume alone towards the sun, at any place of the world. After light_volumes().
 float sun_depth_at(const CloudVolume& volume, const Vec3& place_m);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/vec.h"
-#include "density/detail.h"
+#include "render/cloud/diffusion_cells.h"
 
 namespace nephos {
 
@@ -27,16 +27,14 @@ struct DiffuseLight {
 // harmonics of the equation of radiative transfer (A. Ishimaru 1978, "Wave Propagation and Scattering in Random Media",
 // chapter 9; J. Stam 1995, "Multiple Scattering as a Diffusion Process"), with Marshak's condition of no incoming light
 // at faces of cells without cloud. The source is what the sunlight loses, attenuated by (1 - g) times its depth.
-// `extinction`: per metre, one number for each lattice cell of each brick, x fastest. `sun_depths`: at the corners of
-// cells. `to_sun`: a unit direction. `albedo`: of single scattering. `mean_cosine`: g < 1. Results do not depend on the
-// number of threads.
-DiffuseLight diffuse_sunlight(const CoverageField& field, std::span<const float> extinction,
-                              std::span<const float> sun_depths, const Vec3& to_sun, double albedo, double mean_cosine);
+// `sun_depths`: at the corners of cells. `to_sun`: a unit direction. `albedo`: of single scattering. Results do not
+// depend on the number of threads.
+DiffuseLight diffuse_sunlight(const DiffusionCells& cells, std::span<const float> sun_depths, const Vec3& to_sun,
+                              double albedo);
 
 // Solves the same for a sky that shines through all faces without cloud, of radiance 1 above the horizon. Returns pairs
 // of bytes at the corners of cells, like DiffuseLight: the fractions of light from the sky (lower byte) and from the
 // ground (upper byte) that are scattered there, 0..255.
-std::vector<std::uint16_t> diffuse_surroundings(const CoverageField& field, std::span<const float> extinction,
-                                                double mean_cosine);
+std::vector<std::uint16_t> diffuse_surroundings(const DiffusionCells& cells);
 
 }  // namespace nephos

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/cloud/table_rows.h"
+
 namespace nephos {
 namespace {
 
@@ -168,6 +170,20 @@ LightFront periodic_sweep(const CoverageField& field, std::span<const float> ext
     }
     store_nodes(0);
     return front;
+}
+
+void LightFront::add_depths(const Vec3& first_m, const Vec3& step_m, std::span<float> depths) const {
+    if (depth_.empty()) return;
+    // Numbers of the lines, as in depth_at().
+    const auto line_of = [&](const Vec3& cells, double plane, int n) {
+        const double along = downwards_ ? plane - cells[axes_[2]] : cells[axes_[2]];
+        return cells[axes_[n]] - shift_[n] * along;
+    };
+    const Vec3 first = (first_m - corner_m_) / cell_m_, step = step_m / cell_m_;
+    add_along({depth_, lines_[0], lines_[1]},
+              {line_of(first, plane_, 0) - first_[0], line_of(first, plane_, 1) - first_[1], line_of(step, 0, 0),
+               line_of(step, 0, 1)},
+              depths);
 }
 
 LightFront sweep(const CoverageField& field, std::span<const float> extinction, const Vec3& to_light,

@@ -37,6 +37,8 @@ class LightFront {
     // Returns the optical depth of the whole line through a point, wherever on it the point lies, also between the
     // light and the cloud; 0 beside the cloud's shadow.
     float depth_at(const Vec3& point_m) const;
+    // Adds the depths at the points first_m + n step_m.
+    void add_depths(const Vec3& first_m, const Vec3& step_m, std::span<float> depths) const;
 
   private:
     friend LightFront sweep(const CoverageField&, std::span<const float>, const Vec3&, std::span<float>,

@@ -19,6 +19,7 @@
 #include "tests/bench/automaton_bench.h"
 #include "tests/bench/billboard_bench.h"
 #include "tests/bench/density_bench.h"
+#include "tests/bench/detail_bench.h"
 #include "tests/bench/ground_bench.h"
 #include "tests/bench/memory_bench.h"
 #include "tests/bench/rain_bench.h"
@@ -71,6 +72,7 @@ int main(int argc, char** argv) {
         {"atmosphere", [] { return atmosphere_rows(); }},
         {"air", [&] { return air_rows(source); }},
         {"billboards", [] { return billboard_rows(); }},
+        {"detail", [&] { return detail_rows(source); }},
         {"render", [&] { return render_rows(source, data); }},
     };
     if (argc > 1 && (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0)) {

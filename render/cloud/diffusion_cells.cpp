@@ -1,0 +1,471 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/cloud/diffusion_cells.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+#include <numeric>
+#include <type_traits>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+namespace nephos {
+namespace {
+
+// Conductance between cells that hold next to nothing: of more the iterations would only take longer.
+constexpr float kMostConductance = 10;
+constexpr float kFold = 1e-6f;           // reduced optical thickness of an empty cell in a fold
+constexpr float kLeastThickness = 0.1f;  // reduced optical, of cells in the weights of their light
+
+// Numbers of some bricks.
+using Bricks = std::span<const std::int32_t>;
+
+// What conjugate gradients keep of each cell; `inverse`: of the diagonal of the equations.
+struct Iteration {
+    std::vector<BrickOfCells> inverse, diagonal, fluence, residual, direction, image;
+};
+
+// Half a brick, the lower or the upper four cells. Every processor has vectors of four: longer ones would gain little,
+// as loops over all bricks wait for memory, and all instruction sets compute alike.
+using Quad = float __attribute__((vector_size(16)));
+struct Cells {
+    Quad low, high;
+};
+
+Quad number(float value) { return Quad{value, value, value, value}; }
+Cells same(float value) { return {number(value), number(value)}; }
+Cells load(const BrickOfCells& from) {
+    Cells cells;
+    std::memcpy(&cells, from.of.data(), sizeof cells);
+    return cells;
+}
+void store(const Cells& cells, BrickOfCells& to) { std::memcpy(to.of.data(), &cells, sizeof cells); }
+template <class What, class... More>
+Cells each(const What& what, const Cells& first, const More&... more) {
+    return {what(first.low, more.low...), what(first.high, more.high...)};
+}
+Cells plus(const Cells& a, const Cells& b) { return {a.low + b.low, a.high + b.high}; }
+Cells minus(const Cells& a, const Cells& b) { return {a.low - b.low, a.high - b.high}; }
+Cells times(const Cells& a, const Cells& b) { return {a.low * b.low, a.high * b.high}; }
+Cells times(float a, const Cells& b) { return times(same(a), b); }
+// Lanes of `yes` where `test` is above 0, else of `no`.
+Quad pick(Quad test, Quad yes, Quad no) { return test > 0 ? yes : no; }
+Cells where_positive(const Cells& test, const Cells& values) {
+    const auto lanes = [](Quad t, Quad v) { return pick(t, v, number(0)); };
+    return each(lanes, test, values);
+}
+Cells where_not_positive(const Cells& test, const Cells& values) {
+    const auto lanes = [](Quad t, Quad v) { return pick(t, number(0), v); };
+    return each(lanes, test, values);
+}
+bool any_positive(const Cells& cells) {
+    const Quad most = cells.low > cells.high ? cells.low : cells.high;
+    return most[0] > 0 || most[1] > 0 || most[2] > 0 || most[3] > 0;
+}
+
+// Cells of the upper half along an axis from `upper`, the others from `lower`.
+template <int kAxis>
+Cells halves(const Cells& upper, const Cells& lower) {
+    if constexpr (kAxis == 0)
+        return {__builtin_shufflevector(lower.low, upper.low, 0, 5, 2, 7),
+                __builtin_shufflevector(lower.high, upper.high, 0, 5, 2, 7)};
+    else if constexpr (kAxis == 1)
+        return {__builtin_shufflevector(lower.low, upper.low, 0, 1, 6, 7),
+                __builtin_shufflevector(lower.high, upper.high, 0, 1, 6, 7)};
+    else
+        return {lower.low, upper.high};
+}
+// The inner neighbours.
+template <int kAxis>
+Cells exchanged(const Cells& cells) {
+    if constexpr (kAxis == 0)
+        return {__builtin_shufflevector(cells.low, cells.low, 1, 0, 3, 2),
+                __builtin_shufflevector(cells.high, cells.high, 1, 0, 3, 2)};
+    else if constexpr (kAxis == 1)
+        return {__builtin_shufflevector(cells.low, cells.low, 2, 3, 0, 1),
+                __builtin_shufflevector(cells.high, cells.high, 2, 3, 0, 1)};
+    else
+        return {cells.high, cells.low};
+}
+
+// The outer neighbours: of the upper cells in the brick above, of the lower ones in that below.
+template <int kAxis, class Load>
+Cells outer(const std::array<std::int32_t, 6>& beside, const Load& of_brick) {
+    return exchanged<kAxis>(halves<kAxis>(of_brick(std::size_t(beside[2 * kAxis])),
+                                          of_brick(std::size_t(beside[2 * kAxis + 1]))));
+}
+
+// Calls what(axis, cells that are inner neighbours, those that are outer ones) for the three axes.
+template <class Load, class What>
+void for_neighbours(const DiffusionCells& cells, std::size_t brick, const Load& of_brick, const What& what) {
+    const auto& beside = cells.beside[brick];
+    const Cells own = of_brick(brick);
+    what(std::integral_constant<int, 0>(), exchanged<0>(own), outer<0>(beside, of_brick));
+    what(std::integral_constant<int, 1>(), exchanged<1>(own), outer<1>(beside, of_brick));
+    what(std::integral_constant<int, 2>(), exchanged<2>(own), outer<2>(beside, of_brick));
+}
+
+Quad loss(Quad thickness) {
+    return 1 / (2 + 1.5f * thickness);
+}
+
+// Light that leaves a cloud in a fold meets it again: empty cells between two or more of cloud exchange it.
+void fill_folds(const DiffusionCells& cells, Bricks some, std::vector<BrickOfCells>& filled) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        Cells count = same(0);
+        const auto of_brick = [&](std::size_t n) { return load(cells.thickness[n]); };
+        for_neighbours(cells, brick, of_brick, [&](auto, const Cells& inner, const Cells& beyond) {
+            count = plus(count, plus(where_positive(inner, same(1)), where_positive(beyond, same(1))));
+        });
+        const Cells own = of_brick(brick);
+        const auto lanes = [](Quad thickness, Quad number_of_them) {
+            return pick(thickness, thickness, pick(number_of_them - 1.5f, number(kFold), number(0)));
+        };
+        store(each(lanes, own, count), filled[brick]);
+    }
+}
+
+// Flux per difference of fluence between two cells of reduced optical thickness a and b; 0 if one is no cloud.
+Quad conductance(Quad a, Quad b) {
+    const Quad least = a < b ? a : b, most = a < b ? b : a;
+    const Quad whole = 1 / (1.5f * (a + b)), between = whole < kMostConductance ? whole : number(kMostConductance);
+    return pick(least, least <= kFold ? loss(most) : between, number(0));
+}
+
+// The area of a slanting surface is less than that of the faces that stand for it as stairs.
+void set_conductances(Bricks some, DiffusionCells& cells) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        const auto of_brick = [&](std::size_t n) { return load(cells.thickness[n]); };
+        const Cells own = of_brick(brick);
+        Cells open_faces = same(0), squares = same(0);
+        for_neighbours(cells, brick, of_brick, [&](auto axis, const Cells& inner, const Cells& beyond) {
+            const auto to = [](Quad a, Quad b) { return conductance(a, b); };
+            store(each(to, own, inner), cells.to_neighbours[brick][2 * axis]);
+            store(each(to, own, beyond), cells.to_neighbours[brick][2 * axis + 1]);
+            const Cells open = plus(where_not_positive(inner, same(1)), where_not_positive(beyond, same(1)));
+            open_faces = plus(open_faces, open);
+            squares = plus(squares, times(open, open));
+        });
+        const auto area = [](Quad sum, Quad sum_of_squares) {
+            const Quad root{std::sqrt(sum_of_squares[0]), std::sqrt(sum_of_squares[1]), std::sqrt(sum_of_squares[2]),
+                            std::sqrt(sum_of_squares[3])};
+            return root / (sum > 1 ? sum : number(1));
+        };
+        const auto through = [](Quad thickness) { return loss(thickness); };
+        store(where_positive(own, times(each(area, open_faces, squares), each(through, own))), cells.to_outside[brick]);
+    }
+}
+
+// Cells without cloud have a fluence of 0.
+void set_diagonal(const DiffusionCells& cells, float absorbed, Bricks some, Iteration& it) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        const Cells thickness = load(cells.thickness[brick]), outside = load(cells.to_outside[brick]);
+        Cells sum = times(absorbed, thickness);
+        for (const BrickOfCells& to : cells.to_neighbours[brick]) {
+            const auto lanes = [](Quad conducted, Quad open) { return pick(conducted, conducted, open); };
+            sum = plus(sum, each(lanes, load(to), outside));
+        }
+        const auto inverse = [](Quad of) { return 1 / of; };
+        store(where_positive(thickness, sum), it.diagonal[brick]);
+        store(where_positive(thickness, each(inverse, sum)), it.inverse[brick]);
+    }
+}
+
+double sum_of(Quad lanes) {
+    return (double(lanes[0]) + double(lanes[1])) + (double(lanes[2]) + double(lanes[3]));
+}
+void add_product(const Cells& a, const Cells& b, Quad& sum) { sum += a.low * b.low + a.high * b.high; }
+
+double residual_product(Bricks some, const Iteration& it) {
+    Quad sum = number(0);
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        const Cells residual = load(it.residual[brick]);
+        add_product(times(residual, load(it.inverse[brick])), residual, sum);
+    }
+    return sum_of(sum);
+}
+
+void turn(float keep, Bricks some, Iteration& it) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        store(plus(times(load(it.inverse[brick]), load(it.residual[brick])),
+                   times(keep, load(it.direction[brick]))),
+              it.direction[brick]);
+    }
+}
+
+// What leaves a cell whose fluence is the direction, less what comes from its neighbours. Returns its product with the
+// direction.
+double set_image(const DiffusionCells& cells, Bricks some, Iteration& it) {
+    Quad product = number(0);
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        const auto of_brick = [&](std::size_t n) { return load(it.direction[n]); };
+        const auto& to = cells.to_neighbours[brick];
+        const Cells own = of_brick(brick);
+        Cells sum = times(load(it.diagonal[brick]), own);
+        for_neighbours(cells, brick, of_brick, [&](auto axis, const Cells& inner, const Cells& beyond) {
+            sum = minus(sum, plus(times(load(to[2 * axis]), inner), times(load(to[2 * axis + 1]), beyond)));
+        });
+        store(sum, it.image[brick]);
+        add_product(own, sum, product);
+    }
+    return sum_of(product);
+}
+
+// Returns residual_product().
+double step(float length, Bricks some, Iteration& it) {
+    Quad product = number(0);
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        store(plus(load(it.fluence[brick]), times(length, load(it.direction[brick]))), it.fluence[brick]);
+        const Cells residual = minus(load(it.residual[brick]), times(length, load(it.image[brick])));
+        store(residual, it.residual[brick]);
+        add_product(times(residual, load(it.inverse[brick])), residual, product);
+    }
+    return sum_of(product);
+}
+
+// What lies beyond the inner and the outer faces on an axis: the inner face of an upper cell is its lower one.
+template <int kAxis>
+Cells beyond_inner(const FluenceOutside& outside) {
+    return halves<kAxis>(same(outside[2 * kAxis]), same(outside[2 * kAxis + 1]));
+}
+template <int kAxis>
+Cells beyond_outer(const FluenceOutside& outside) {
+    return halves<kAxis>(same(outside[2 * kAxis + 1]), same(outside[2 * kAxis]));
+}
+
+void take_light(const DiffusionCells& cells, const FluenceOutside& outside, Bricks some,
+                std::vector<BrickOfCells>& source) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        const auto& to = cells.to_neighbours[brick];
+        Cells sum = same(0);
+        const auto add = [&](const BrickOfCells& conducted, const Cells& light) {
+            sum = plus(sum, where_not_positive(load(conducted), light));
+        };
+        add(to[0], beyond_inner<0>(outside));
+        add(to[1], beyond_outer<0>(outside));
+        add(to[2], beyond_inner<1>(outside));
+        add(to[3], beyond_outer<1>(outside));
+        add(to[4], beyond_inner<2>(outside));
+        add(to[5], beyond_outer<2>(outside));
+        store(times(load(cells.to_outside[brick]), sum), source[brick]);
+    }
+}
+
+using Fluxes = std::array<BrickOfCells, 3>;
+
+// Net flux through the middle of cells, half of that through both faces.
+void find_fluxes(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence, const FluenceOutside& outside,
+                 Bricks some, std::vector<Fluxes>& fluxes) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        const auto of_brick = [&](std::size_t n) { return load(fluence[n]); };
+        const Cells own = of_brick(brick), open = load(cells.to_outside[brick]);
+        for_neighbours(cells, brick, of_brick, [&](auto axis, const Cells& inner, const Cells& beyond) {
+            constexpr int kAxis = decltype(axis)::value;
+            const auto towards = [&](const BrickOfCells& conducted, const Cells& other, const Cells& light) {
+                const Cells by = load(conducted);
+                return each(pick, by, times(by, minus(own, other)), times(open, minus(own, light)));
+            };
+            const Cells in = towards(cells.to_neighbours[brick][2 * kAxis], inner, beyond_inner<kAxis>(outside)),
+                        out = towards(cells.to_neighbours[brick][2 * kAxis + 1], beyond, beyond_outer<kAxis>(outside));
+            const Cells upwards = times(0.5f, minus(out, in));
+            store(halves<kAxis>(upwards, minus(same(0), upwards)), fluxes[brick][std::size_t(kAxis)]);
+        });
+    }
+}
+
+// The light of cells without cloud.
+void add_light_of_faces(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence,
+                        const FluenceOutside& outside, const std::vector<Fluxes>& fluxes, std::size_t brick,
+                        const Cells& empty, LightOfCells& light) {
+    Cells count = same(0), values[4] = {count, count, count, count};
+    const auto load_flux = [&](std::size_t axis) {
+        return [&fluxes, axis](std::size_t n) { return load(fluxes[n][axis]); };
+    };
+    const auto add = [&](const Cells& thickness, const Cells& there, const Cells (&flux)[3], const Cells& arriving) {
+        const auto through = [](Quad of) { return 2 * loss(of); };
+        const Cells fluence_there = plus(arriving, times(each(through, thickness), minus(there, arriving)));
+        values[0] = plus(values[0], where_positive(thickness, fluence_there));
+        for (int axis = 0; axis < 3; ++axis)
+            values[axis + 1] = plus(values[axis + 1], where_positive(thickness, flux[axis]));
+        count = plus(count, where_positive(thickness, same(1)));
+    };
+    const auto& beside = cells.beside[brick];
+    const auto thickness_of = [&](std::size_t n) { return load(cells.thickness[n]); };
+    const auto fluence_of = [&](std::size_t n) { return load(fluence[n]); };
+    for_neighbours(cells, brick, thickness_of, [&](auto axis, const Cells& inner, const Cells& beyond) {
+        constexpr int kAxis = decltype(axis)::value;
+        const auto inner_of = [&](std::size_t n) { return exchanged<kAxis>(load_flux(n)(brick)); };
+        const auto outer_of = [&](std::size_t n) { return outer<kAxis>(beside, load_flux(n)); };
+        // What arrives at the neighbour's face comes from where the cell itself looks away from.
+        if (any_positive(inner))
+            add(inner, exchanged<kAxis>(fluence_of(brick)), {inner_of(0), inner_of(1), inner_of(2)},
+                beyond_outer<kAxis>(outside));
+        if (any_positive(beyond))
+            add(beyond, outer<kAxis>(beside, fluence_of), {outer_of(0), outer_of(1), outer_of(2)},
+                beyond_inner<kAxis>(outside));
+    });
+    constexpr float kWeight = 1 / kLeastThickness;
+    const auto mean = [](Quad sum, Quad number_of) { return kWeight * sum / (number_of > 1 ? number_of : number(1)); };
+    const auto replace = [&](BrickOfCells& to, const Cells& by) {
+        store(plus(load(to), where_positive(empty, by)), to);
+    };
+    replace(light[0], where_positive(count, same(kWeight)));
+    for (std::size_t n = 0; n < 4; ++n)
+        replace(light[n + 1], each(mean, values[n], count));
+}
+
+void collect_light(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence, const FluenceOutside& outside,
+                   const std::vector<Fluxes>& fluxes, Bricks some, std::vector<LightOfCells>& light) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        LightOfCells& to = light[brick];
+        const Cells thickness = load(cells.thickness[brick]);
+        const auto weight_of = [](Quad of) { return 1 / (of + kLeastThickness); };
+        const Cells weight = where_positive(thickness, each(weight_of, thickness));
+        store(weight, to[0]);
+        store(times(weight, load(fluence[brick])), to[1]);
+        for (std::size_t axis = 0; axis < 3; ++axis) store(times(weight, load(fluxes[brick][axis])), to[axis + 2]);
+        const Cells empty = where_not_positive(thickness, same(1));
+        if (any_positive(empty)) add_light_of_faces(cells, fluence, outside, fluxes, brick, empty, to);
+    }
+}
+
+constexpr std::size_t kCells = std::size_t(CoverageField::kBrickCells);
+constexpr std::size_t kPart = 256;          // bricks that one thread works on, whose products are added up first
+constexpr double kSmallResidual = 1e-3;  // relative, which ends the iterations
+constexpr int kMostRounds = 200;
+
+template <class What>
+void for_parts(Bricks bricks, const What& what) {
+    tbb::parallel_for(std::size_t{0}, (bricks.size() + kPart - 1) / kPart, [&](std::size_t part) {
+        what(part, bricks.subspan(part * kPart, std::min(kPart, bricks.size() - part * kPart)));
+    });
+}
+
+// Sums are those of parts in their order, whatever the number of threads.
+template <class Number>
+double sum_over_parts(Bricks bricks, const Number& number) {
+    std::vector<double> sums((bricks.size() + kPart - 1) / kPart);
+    for_parts(bricks, [&](std::size_t part, Bricks some) { sums[part] = number(some); });
+    return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
+std::vector<std::int32_t> first_numbers(std::size_t count) {
+    std::vector<std::int32_t> numbers(count);
+    std::iota(numbers.begin(), numbers.end(), 0);
+    return numbers;
+}
+
+std::array<std::int32_t, 27> bricks_around(const CoverageField& field, std::size_t brick) {
+    const std::array<int, 3>& size = field.bricks();
+    const std::int32_t place = field.places()[brick];
+    const int at[3] = {place % size[0], place / size[0] % size[1], place / size[0] / size[1]};
+    std::array<std::int32_t, 27> around;
+    around.fill(std::int32_t(field.places().size()));
+    for (int n = 0; n < 27; ++n) {
+        const int x = at[0] + n % 3 - 1, y = at[1] + n / 3 % 3 - 1, z = at[2] + n / 9 - 1;
+        if (x < 0 || y < 0 || z < 0 || x >= size[0] || y >= size[1] || z >= size[2]) continue;
+        const std::int32_t number = field.table()[std::size_t((z * size[1] + y) * size[0] + x)];
+        if (number >= 0) around[std::size_t(n)] = number;
+    }
+    return around;
+}
+
+// Means of 2 x 2 x 2 lattice cells, times `scale`.
+BrickOfCells coarser(const float* extinction, float scale) {
+    BrickOfCells result;
+    for (std::size_t cell = 0; cell < kDiffusionCells; ++cell) {
+        float sum = 0;
+        for (std::size_t n = 0; n < 8; ++n) {
+            const std::size_t x = 2 * (cell % 2) + n % 2, y = 2 * (cell / 2 % 2) + n / 2 % 2, z = 2 * (cell / 4) + n / 4;
+            sum += extinction[(z * kCells + y) * kCells + x];
+        }
+        result.of[cell] = scale * 0.125f * sum;
+    }
+    return result;
+}
+
+}  // namespace
+
+DiffusionCells::DiffusionCells(const CoverageField& field, std::span<const float> extinction, double cosine)
+    : bricks(field.places().size()), mean_cosine(float(cosine)) {
+    const float scale = (1 - mean_cosine) * float(4 * field.node_m());
+    thickness.resize(bricks + 1);
+    around.resize(bricks);
+    beside.resize(bricks);
+    tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
+        thickness[brick] = coarser(&extinction[brick * kCells * kCells * kCells], scale);
+        const auto& all = around[brick] = bricks_around(field, brick);
+        beside[brick] = {all[12], all[14], all[10], all[16], all[4], all[22]};
+    });
+    std::vector<BrickOfCells> filled(bricks + 1);
+    const std::vector<std::int32_t> all = first_numbers(bricks);
+    for_parts(all, [&](std::size_t, Bricks some) { fill_folds(*this, some, filled); });
+    thickness = std::move(filled);
+    std::ranges::copy_if(all, std::back_inserter(active),
+                         [&](std::int32_t n) { return any_positive(load(thickness[std::size_t(n)])); });
+    to_neighbours.resize(bricks + 1);
+    to_outside.resize(bricks + 1);
+    for_parts(active, [&](std::size_t, Bricks some) { set_conductances(some, *this); });
+}
+
+std::vector<BrickOfCells> light_from_outside(const DiffusionCells& cells, const FluenceOutside& outside) {
+    std::vector<BrickOfCells> source(cells.bricks);
+    for_parts(cells.active, [&](std::size_t, Bricks some) {
+        take_light(cells, outside, some, source);
+    });
+    return source;
+}
+
+// Conjugate gradients, with the diagonal as preconditioner (M. R. Hestenes and E. Stiefel 1952).
+std::vector<BrickOfCells> solve(const DiffusionCells& cells, const std::vector<BrickOfCells>& source, double albedo) {
+    const std::size_t bricks = cells.bricks;
+    Iteration it;
+    for (auto* each : {&it.inverse, &it.diagonal, &it.fluence, &it.direction, &it.image}) each->resize(bricks + 1);
+    it.residual = source;
+    const float absorbed = (1 - float(albedo)) / (1 - cells.mean_cosine);
+    for_parts(cells.active, [&](std::size_t, Bricks some) {
+        set_diagonal(cells, absorbed, some, it);
+    });
+    double product = sum_over_parts(
+        cells.active, [&](Bricks some) { return residual_product(some, it); });
+    const double small = kSmallResidual * kSmallResidual * product;
+    float keep = 0;
+    for (int round = 0; round < kMostRounds && product > small; ++round) {
+        for_parts(cells.active, [&](std::size_t, Bricks some) { turn(keep, some, it); });
+        const double curvature = sum_over_parts(
+            cells.active, [&](Bricks some) { return set_image(cells, some, it); });
+        const auto length = float(product / curvature);
+        const double next = sum_over_parts(
+            cells.active, [&](Bricks some) { return step(length, some, it); });
+        keep = float(next / product);
+        product = next;
+    }
+    return std::move(it.fluence);
+}
+
+std::vector<LightOfCells> light_of_cells(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence,
+                                         const FluenceOutside& outside) {
+    std::vector<Fluxes> fluxes(cells.bricks + 1);
+    for_parts(cells.active, [&](std::size_t, Bricks some) {
+        find_fluxes(cells, fluence, outside, some, fluxes);
+    });
+    std::vector<LightOfCells> light(cells.bricks + 1);
+    for_parts(first_numbers(cells.bricks), [&](std::size_t, Bricks some) {
+        collect_light(cells, fluence, outside, fluxes, some, light);
+    });
+    return light;
+}
+
+}  // namespace nephos
