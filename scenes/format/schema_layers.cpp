@@ -357,7 +357,7 @@ const Section& layer_section() {
              table<&LayerOptions::coupling>("coupling", coupling_section(), coupling_section().effect),
              table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect),
              default_is(table<&LayerOptions::detail>("detail", detail_section(), detail_section().effect),
-                        "that of `[detail]`"),
+                        "that of `[detail]`; a veil has none"),
              written_if(&of_veils,
                         table<&LayerOptions::veil>("veil", veil_section(), veil_section().effect))},
             &finish_layer};
@@ -376,8 +376,7 @@ const Section& layer_section() {
 std::span<const std::string_view> keys_of_clouds() {
     static constexpr std::string_view kKeys[] = {
         "skies",       "automaton",     "background",         "base_height_m",     "genus",    "climate",
-        "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole", "coupling", "rain",
-        "detail"};
+        "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole", "coupling", "rain"};
     return kKeys;
 }
 

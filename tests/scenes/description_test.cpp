@@ -108,6 +108,7 @@ TEST(Description, EveryOptionOfCloudsHasAKey) {
     // Whether it is a veil is said by the table of that name, as is whether it has detail of its own.
     EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 4);
     EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 1);  // the seed is the layer's
+    EXPECT_EQ(keys_at({"layer", "veil", "area"}), member_count<VeilArea>());
     EXPECT_EQ(keys_at({"layer", "veil", "octave"}), member_count<VeilOctave>());
     EXPECT_EQ(keys_at({"layer", "lattice"}), 4u);
     EXPECT_EQ(keys_at({"layer", "climate"}), 1u);
