@@ -120,7 +120,7 @@ AutomatonOptions automaton_options(const Scene& scene, std::size_t layer) {
     options.placement = given.placement;
     options.boundaries = given.boundaries;
     options.seed = layer_seed(scene.automaton.seed, layer);
-    options.field = {given.background, {}, {}};
+    options.field = {given.background, {}, given.scatters};
     options.wind = layer_wind(scene, layer);
     return options;
 }

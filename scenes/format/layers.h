@@ -83,6 +83,7 @@ struct LayerOptions {
     Placement placement;
     Boundaries boundaries;
     Probabilities background{0, 0, 0.1};  // of the field, everywhere (field.h)
+    std::vector<EllipsoidScatter> scatters;  // of the field, beside the clouds of the skies
 
     Range base_height_m{1000, 1000};   // world z of a cloud's base, drawn for each cloud
     Wind wind;                         // without keyframes: the scene's wind

@@ -86,6 +86,7 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());
     EXPECT_EQ(keys_at({"field", "scatters"}), member_count<EllipsoidScatter>());
+    EXPECT_EQ(keys_at({"field", "scatters", "thermals"}), member_count<ThermalPlume>());
     EXPECT_EQ(keys_at({"wind"}), member_count<WindKeyframe>());
     // A level's velocity has two keys.
     EXPECT_EQ(keys_at({"wind", "levels"}), member_count<WindLevel>() - 1 + member_count<Velocity>());
