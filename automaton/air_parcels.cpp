@@ -10,7 +10,9 @@ namespace nephos {
 namespace {
 
 // Order of the numbers drawn for one parcel; each has its own place in the counter.
-enum ParcelDraw : std::uint32_t { kX, kY, kZ, kAxisX, kAxisY, kAxisZ, kYaw, kBirth, kLife, kSide, kAlong };
+enum ParcelDraw : std::uint32_t { kX, kY, kZ, kAxisX, kAxisY, kAxisZ, kYaw, kBirth, kLife, kSide, kAlong, kRise };
+
+constexpr std::uint32_t kFirstOfThermals = 16;  // sub-index of the numbers of thermal 0; one for each thermal
 
 double draw(const AutomatonOptions& options, const AirParcel& parcel, ParcelDraw what, Range range) {
     if (range.min == range.max) return range.min;  // also for infinite ones
@@ -49,6 +51,44 @@ std::int64_t carry(std::int64_t sum, std::int64_t step, Boundary boundary, int e
     sum += step;
     return boundary == Boundary::periodic ? sum % (std::int64_t{extent} << 32)
                                           : std::clamp(sum, -kFarAway, kFarAway);
+}
+
+// Appends the thermals of a plume with its root at `root`, released at the plume's birth and later.
+void append_thermals(const AutomatonOptions& options, const AirParcel& plume, const Vec3& root, double time_s,
+                     std::vector<ActiveEllipsoid>& to) {
+    const EllipsoidScatter& scatter = options.field.scatters[std::size_t(plume.scatter)];
+    const ThermalPlume& o = scatter.thermals;
+    const Ellipsoid& e = plume.ellipsoid;
+    const double age = time_s - e.birth_s, last = std::floor((e.life_s - o.life_s) / o.interval_s);
+    const double first = std::max(0.0, std::floor((age - o.life_s) / o.interval_s));
+    const double rise = draw(options, plume, kRise, o.rise_m);
+    const Velocity below = wind_at(options.wind, e.centre_m.z, time_s);
+    for (double n = first; n <= last && n * o.interval_s <= age; ++n) {
+        Ellipsoid thermal = e;
+        thermal.birth_s = e.birth_s + n * o.interval_s;
+        thermal.life_s = o.life_s;
+        const double weight = fade_weight(thermal, time_s);
+        if (weight <= 0) continue;
+        const auto words = philox(options.seed,
+                                  item_counter(Domain::field, std::uint32_t(plume.scatter), plume.index,
+                                               plume.generation, kFirstOfThermals + std::uint32_t(n) % 65520u));
+        const double of_size = 1 - o.variety * unit_interval(words[0]);
+        const double of_rise = 1 - o.variety * unit_interval(words[1]);
+        const double lived = (time_s - thermal.birth_s) / o.life_s;
+        const double risen = rise * of_rise * lived * (2 - lived);
+        const Vec3 released = Vec3(o.width, o.width, 1) * e.semi_axes_m * of_size;
+        thermal.semi_axes_m = released * std::max(0.2, 1 + o.spread * risen / (0.5 * (released.x + released.y)));
+        // Within the ellipse of the plume, at the same angle as its semi-axes.
+        const Rotation turn = rotation_of_degrees(e.yaw_deg);
+        const double a = o.wander * e.semi_axes_m.x * (2 * unit_interval(words[2]) - 1),
+                     b = o.wander * e.semi_axes_m.y * (2 * unit_interval(words[3]) - 1);
+        const Velocity wind = e.carried ? wind_at(options.wind, e.centre_m.z + 0.5 * risen, time_s) : below;
+        const double since = time_s - thermal.birth_s;
+        thermal.centre_m = root + Vec3(a * turn.cos - b * turn.sin + (wind.east_m_per_s - below.east_m_per_s) * since,
+                                       a * turn.sin + b * turn.cos + (wind.north_m_per_s - below.north_m_per_s) * since,
+                                       risen);
+        to.push_back({thermal, weight});
+    }
 }
 
 Vec3 present_centre(const AirParcel& parcel, double cell_size_m) {
@@ -130,10 +170,14 @@ AirParcels::AirParcels(const AutomatonOptions& options) {
 std::vector<ActiveEllipsoid> AirParcels::active(const AutomatonOptions& options, double time_s) const {
     std::vector<ActiveEllipsoid> result;
     for (const AirParcel& parcel : parcels_) {
+        const Vec3 centre = present_centre(parcel, options.placement.cell_size_m);
         const double weight = fade_weight(parcel.ellipsoid, time_s);
-        if (weight <= 0) continue;
-        result.push_back({parcel.ellipsoid, weight});
-        result.back().ellipsoid.centre_m = present_centre(parcel, options.placement.cell_size_m);
+        if (weight > 0) {
+            result.push_back({parcel.ellipsoid, weight});
+            result.back().ellipsoid.centre_m = centre;
+        }
+        if (parcel.scatter >= 0 && is_plume(options.field.scatters[std::size_t(parcel.scatter)]))
+            append_thermals(options, parcel, centre, time_s, result);
     }
     return result;
 }

@@ -45,6 +45,31 @@ struct Ellipsoid {
     bool operator==(const Ellipsoid&) const = default;
 };
 
+// A plume of thermals instead of one ellipsoid: bubbles of warm air that leave the condensation level one after the
+// other and rise (the bubble theory of convection: Scorer and Ludlam, Q. J. R. Meteorol. Soc. 79, 1953).
+//
+// The scatter's ellipsoid stays at its height: the base. Thermal n is released `interval_s` n after the birth of the
+// plume, in it and as high as it, `width` times as wide, and lives for `life_s`; the last one dies with the plume. At
+// the fraction u of its life it has risen by
+//
+//     h = rise_m u (2 - u)
+//
+// so it slows down evenly and comes to rest. Its semi-axes change by `spread` h in proportion to the mean of the two
+// horizontal ones, down to a fifth. In air of the same stability a thermal's radius grows by a quarter of its rise
+// (Scorer, J. Fluid Mech. 2, 1957; Woodward, Q. J. R. Meteorol. Soc. 85, 1959); of a cloud in dry air the rim
+// evaporates, and what is left of a bubble shrinks: spread < 0. The wind carries a thermal by its value at the middle of
+// the way that it has risen, the plume by that at the level of release: towers lean with the shear.
+struct ThermalPlume {
+    double interval_s = 0;  // between releases; 0: no plume
+    double life_s = 900;    // of a thermal, > 0
+    Range rise_m{800, 800};  // height gained, drawn for each plume; >= 0
+    double width = 0.6;      // 0.05..1: of a thermal, in widths of the base
+    double spread = -0.1;    // -1..1
+    double variety = 0.4;    // 0..0.9: size and rise of a thermal are 1 - variety to 1 of those above
+    double wander = 0.5;     // 0..10: largest distance of a release from the axis, in semi-axes of the base
+    bool operator==(const ThermalPlume&) const = default;
+};
+
 // Ellipsoids with parameters drawn uniformly from ranges, by the scene's seed.
 struct EllipsoidScatter {
     int count = 0;        // alive at any time when `replace`, else in total; 0..100000
@@ -59,6 +84,7 @@ struct EllipsoidScatter {
     bool carried = true;
     // Redraws an ellipsoid that left the box (upwind of it) or died (anywhere).
     bool replace = false;
+    ThermalPlume thermals;
     bool operator==(const EllipsoidScatter&) const = default;
 };
 

@@ -80,6 +80,22 @@ void check_periodic_reach(const Vec3& reach, const AutomatonOptions& o, const Na
     }
 }
 
+void check(const ThermalPlume& p, const Range& life_s, const std::string& name) {
+    const auto check_number = [&](double value, double low, double high, const char* part) {
+        if (!(value >= low && value <= high))
+            refuse({name, part}, " = " + number(value) + ": expected " + number(low) + " to " + number(high));
+    };
+    check_number(p.interval_s, 0.001, 1e9, ".interval_s");
+    check_number(p.life_s, 0.001, life_s.min, ".life_s");
+    check(p.rise_m, name + ".rise_m");
+    check_number(p.rise_m.min, 0, 1e7, ".rise_m");
+    check_number(p.width, 0.05, 1, ".width");
+    check_number(p.spread, -1, 1, ".spread");
+    check_number(p.variety, 0, 0.9, ".variety");
+    check_number(p.wander, 0, 10, ".wander");
+    check_number(thermals_at_once(p), 1, kMaxThermalsAtOnce, ": thermals at once");
+}
+
 void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::string& name) {
     constexpr int kMaxCount = 100000;
     require(s.count >= 0 && s.count <= kMaxCount,
@@ -107,6 +123,7 @@ void check(const EllipsoidScatter& s, const AutomatonOptions& o, const std::stri
                       .fade_out_s = s.fade_out_s},
             o, name);
     }
+    if (is_plume(s)) check(s.thermals, s.life_s, name + ".thermals");
     check_periodic_reach(reach_m(s), o, name);
 }
 
@@ -151,10 +168,18 @@ Vec3 largest_reach_m(const Extent& extent, double cell_size_m, const Boundaries&
     return {along(boundaries.x, extent.x), along(boundaries.y, extent.y), along(boundaries.z, extent.z)};
 }
 
+double thermals_at_once(const ThermalPlume& plume) { return std::floor(plume.life_s / plume.interval_s) + 1; }
+
 Vec3 reach_m(const Ellipsoid& e) { return reach_of(e.semi_axes_m, sin_cos_deg(e.yaw_deg)); }
 
 Vec3 reach_m(const EllipsoidScatter& s) {
-    const Vec3 largest{s.semi_axis_x_m.max, s.semi_axis_y_m.max, s.semi_axis_z_m.max};
+    Vec3 largest{s.semi_axis_x_m.max, s.semi_axis_y_m.max, s.semi_axis_z_m.max};
+    if (is_plume(s) && s.thermals.spread > 0) {
+        // The smaller a thermal, the more a given rise adds to it.
+        const double narrowest =
+            0.5 * s.thermals.width * (1 - s.thermals.variety) * (s.semi_axis_x_m.min + s.semi_axis_y_m.min);
+        largest *= 1 + s.thermals.spread * s.thermals.rise_m.max / narrowest;
+    }
     Vec3 reach{};
     const auto turn_to = [&](double yaw_deg) {
         reach = glm::max(reach, reach_m(Ellipsoid{.semi_axes_m = largest, .yaw_deg = yaw_deg}));
@@ -189,7 +214,7 @@ std::uint64_t ellipsoid_count(const AutomatonOptions& o) {
     double count = 0;
     for (const Ellipsoid& e : o.field.ellipsoids) count += images_of(reach_m(e), o);
     for (const EllipsoidScatter& s : o.field.scatters) {
-        count += s.count * images_of(reach_m(s), o);
+        count += s.count * (is_plume(s) ? 1 + thermals_at_once(s.thermals) : 1) * images_of(reach_m(s), o);
     }
     return std::uint64_t(std::min(count, 1e18));
 }

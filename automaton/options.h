@@ -42,6 +42,11 @@ inline constexpr std::size_t kMaxScatters = 65536;
 // scatter, the maximum over all ellipsoids that can be drawn from it.
 Vec3 reach_m(const Ellipsoid& ellipsoid);
 Vec3 reach_m(const EllipsoidScatter& scatter);
+// Returns true when a scatter's ellipsoids are plumes of thermals.
+inline bool is_plume(const EllipsoidScatter& scatter) { return scatter.thermals.interval_s > 0; }
+// Returns how many thermals of a plume live at the same time, at most.
+double thermals_at_once(const ThermalPlume& plume);
+inline constexpr int kMaxThermalsAtOnce = 1000;
 // Largest reach of an ellipsoid along a periodic axis, in lengths of that axis: every image of it that meets
 // the box is visited in every step, 33 of them along an axis at this limit.
 inline constexpr double kMaxPeriodicReach = 16;

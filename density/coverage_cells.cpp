@@ -112,6 +112,7 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
     density_.resize(blocks_.size() * kBlockVoxels);
     if (moisture != nullptr) growth_.resize(density_.size());
     masses_.resize(blocks_.size());
+    squares_.assign(blocks_.size(), 0);
     std::vector<double> moist(blocks_.size(), 0), cloudy(blocks_.size(), 0);
     const Thermals thermals(setting, extent, grid.placement().cell_size_m);
     std::vector<float> aprons[2];
@@ -128,12 +129,14 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
         std::optional<openvdb::FloatGrid::ConstAccessor> growing;
         if (moisture != nullptr) growing.emplace(OpenvdbAccess::grid(*moisture).getConstAccessor());
         masses_[n].fill(0);
+        std::array<double, 8> of_cubes{};
         for (int v = 0; v < kBlockVoxels; ++v) {
             const openvdb::Coord voxel = block.origin.offsetBy(v & 7, v >> 3 & 7, v >> 6);
             const float inside = aprons[0][std::size_t(voxel.x())] * aprons[1][std::size_t(voxel.y())];
             const float q = inside * block.value(leaf_offset(v & 7, v >> 3 & 7, v >> 6));
             if (!(q > 0)) continue;
             masses_[n][std::size_t(v >> 6)] += double(q);
+            of_cubes[std::size_t((v >> 2 & 1) | (v >> 5 & 1) << 1 | v >> 8 << 2)] += double(q);
             const std::size_t at = n * kBlockVoxels + std::size_t(v);
             density_[at] = q * thermals.factor(origin + cell * Vec3(voxel.x() + 0.5, voxel.y() + 0.5,
                                                                     voxel.z() + 0.5));
@@ -142,6 +145,7 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
             moist[n] += double(growth_[at] * density_[at]);
             cloudy[n] += double(density_[at]);
         }
+        for (const double mass : of_cubes) squares_[n] += mass * mass / 64;
     });
     if (moisture == nullptr) return;
     const double sum = std::accumulate(moist.begin(), moist.end(), 0.0),
@@ -157,6 +161,15 @@ std::vector<double> CoverageCells::masses() const {
         for (std::size_t z = 0; z < kBlock; ++z)
             result[std::size_t(blocks_[n].origin.z()) + z] += masses_[n][z];
     return result;
+}
+
+double CoverageCells::mean_density() const {
+    double mass = 0, squares = 0;
+    for (std::size_t n = 0; n < blocks_.size(); ++n) {
+        mass = std::accumulate(masses_[n].begin(), masses_[n].end(), mass);
+        squares += squares_[n];
+    }
+    return mass > 0 ? squares / mass : 0;
 }
 
 bool CoverageCells::copy_images(const int (&corner)[3], int side, int pitch, float* density, float* growth) const {

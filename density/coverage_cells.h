@@ -42,6 +42,11 @@ class CoverageCells {
     // Returns the sums of the grid's own values in each layer of cells.
     std::vector<double> masses() const;
 
+    // Returns the mean over the mass of the grid's own density in cubes of four cells, within which a droplet lies; 0
+    // without cloud. Single cells would not do: a mean of two steps varies less from cell to cell than either, so frames
+    // between steps would differ. Sums are in a fixed order.
+    double mean_density() const;
+
     // Copies a cube of cells with its lowest corner at (i, j, k) into rows of `pitch` numbers: densities, and, unless it
     // is null, growth times density. Returns false if all are 0; then what was copied is not complete.
     bool copy(const int (&corner)[3], int side, int pitch, float* density, float* growth) const;
@@ -60,6 +65,7 @@ class CoverageCells {
     std::vector<std::int32_t> table_;
     std::vector<float> density_, growth_;
     std::vector<std::array<double, kBlock>> masses_;
+    std::vector<double> squares_;  // of a block: mass times mean density, summed over its cubes of four cells
 };
 
 }  // namespace nephos

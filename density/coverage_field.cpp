@@ -30,6 +30,7 @@ constexpr double kUsualBumps_m = 160;  // of which detail_formulas.h says when t
 // Tiles of the medium noise in one of the large: 0.6 and 0.8 of it, by which it is turned, are whole, too, so that
 // nothing changes when the drift passes a tile.
 constexpr float kMediumTiles = 15;
+constexpr double kHalfOfMean = 0.7;  // largest half density that is not a scene's own, in mean densities
 constexpr double kFraction = 0.01;  // of the mass that lies below the base
 
 void require(bool good, const char* name, double value, const char* expected) {
@@ -106,6 +107,7 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     const std::vector<double> masses = cells.masses();
     mass_ = std::accumulate(masses.begin(), masses.end(), 0.0);
     const double base_m = (before + base_cells(masses, mass_)) * cell;
+    mean_density_ = cells.mean_density();
     set_erosion(setting, grid.extent(), base_m);
     find_places(cells, setting.boundaries, extent, before, sums.reach());
     sample_nodes(cells, sums, before);
@@ -296,7 +298,10 @@ void CoverageField::set_erosion(const DetailSetting& setting, const Extent& exte
     // Of a layer's opacity, which is the density of its saturated cells, at most a quarter: those are cloud throughout,
     // however thin; and at least as much as nodes of a byte can tell from it.
     const double opacity = std::max(setting.opacity, 1e-6);
-    e.half_density = float(std::clamp(1 / (2 * extinction * free_path_m), 0.004 * opacity, 0.25 * opacity));
+    double half_density = 1 / (2 * extinction * free_path_m);
+    // By itself below what the cloud has in the mean: a thin one would be torn to crumbs.
+    if (o.mean_free_path_m == 0) half_density = std::min(half_density, kHalfOfMean * mean_density_);
+    e.half_density = float(std::clamp(half_density, 0.004 * opacity, 0.25 * opacity));
     e.cap = std::min(10 * e.half_density, float(opacity));
     const auto strength = float(o.strength);
     e.base_width = std::max(0.5f * strength, 0.02f);

@@ -7,7 +7,8 @@
 //
 // D is the density of the metaballs (metaballs.h) times thermals, a low-frequency noise of mean 1 with bumps of 4,
 // 2 and 1 times DetailOptions::size_m. C = D^2 / (D^2 + half^2), 0..1, is the coverage: the local cloud fraction
-// before erosion. half = 1 / (2 extinction mean_free_path) is the density at which half of the space is cloud.
+// before erosion. half = 1 / (2 extinction mean_free_path) is the density at which half of the space is cloud; where
+// the scene leaves the mean free path open, it is at most 0.7 of the mean density within four cells, weighted by mass.
 //
 // e = 1/2 + the sum of width (n - 1/2) over three noises n, each distributed uniformly over 0..1 and low in the
 // middle of a bump (Worley noise; detail_noise.h). The large noise has bumps of 4, 2 and 1 cells by default (160,
@@ -162,6 +163,7 @@ class CoverageField {
     std::vector<float> cell_density_;
     std::array<double, 256> histogram_{};  // of t over the nodes
     double mass_ = 0;                      // 8 nodes a cell times the sum of the grid's values
+    double mean_density_ = 0;              // CoverageCells::mean_density()
     ErosionConstants erosion_;
 };
 

@@ -32,7 +32,8 @@ struct DetailOptions {
     double stretch = 1;            // of the bumps along the wind, 1..50: fibres
     double wisps = 1;              // 0..1: hanging shreds at the base instead of round bumps
     double thermals = 0.5;         // 0..1: strength of towers and hollows of two and four times size_m
-    // Of light where half of the space is cloud, 1..10000: less is crisper; 0: three quarters of a cell.
+    // Of light where half of the space is cloud, 1..10000: less is crisper; 0: three quarters of a cell, but more in
+    // clouds so thin that more than half of them would be lost.
     double mean_free_path_m = 0;
     bool to_horizon = true;  // pictures: a lattice that is periodic in x and y goes on to the horizon
     int apron_cells = 8;     // 0..64: from an open side inwards, over which cloud thins out

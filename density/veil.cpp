@@ -142,6 +142,10 @@ struct VeilField {
     std::vector<float> by_x, by_y, by_z;  // weights 0..1 of columns and levels
     std::vector<double> up_m, behind_m;   // of levels: height above the base, and displacement along
     float sheet = 0;
+    VeilArea area;
+    bool is_limited = false;      // by the area
+    Rotation of_area;
+    double area_x_m = 0, area_y_m = 0;  // of its centre from the lattice's corner
 };
 
 std::vector<float> side_weights(int cells, double cell_m, double margin_m) {
@@ -178,7 +182,21 @@ VeilField field_of(const VeilOptions& options, const Wind& wind, const Extent& e
         field.behind_m.push_back(options.fallstreak_m * fallen * fallen);
     }
     field.sheet = float(options.sheet);
+    field.area = options.area;
+    field.is_limited = std::isfinite(options.area.semi_a_m) || std::isfinite(options.area.semi_b_m);
+    field.of_area = rotation_of_degrees(options.area.yaw_deg);
+    field.area_x_m = options.area.x_m + (options.area.carried ? carried.x : 0) - placement.origin_m.x;
+    field.area_y_m = options.area.y_m + (options.area.carried ? carried.y : 0) - placement.origin_m.y;
     return field;
+}
+
+// The weight of a column by the area.
+float area_weight(const VeilField& field, int i, int j) {
+    if (!field.is_limited) return 1;
+    const double east = (i + 0.5) * field.cell_m - field.area_x_m, north = (j + 0.5) * field.cell_m - field.area_y_m;
+    const double a = (east * field.of_area.cos + north * field.of_area.sin) / field.area.semi_a_m,
+                 b = (north * field.of_area.cos - east * field.of_area.sin) / field.area.semi_b_m;
+    return float(fade(1 - std::sqrt(a * a + b * b), field.area.softness));
 }
 
 // The voxels of a block whose weight is above 0, side by side.
@@ -219,8 +237,8 @@ void collect(const VeilField& field, const openvdb::Coord& origin, BlockPoints& 
     const int nz = std::min(kBlock, field.extent.z - origin.z());
     for (int x = 0; x < nx; ++x) {
         for (int y = 0; y < ny; ++y) {
-            const float side =
-                field.by_x[std::size_t(origin.x() + x)] * field.by_y[std::size_t(origin.y() + y)];
+            const float side = field.by_x[std::size_t(origin.x() + x)] * field.by_y[std::size_t(origin.y() + y)] *
+                               area_weight(field, origin.x() + x, origin.y() + y);
             const double dx = x * field.cell_m, dy = y * field.cell_m;
             const double along = dx * r.cos + dy * r.sin, across = dy * r.cos - dx * r.sin;
             for (int z = 0; z < nz; ++z) {

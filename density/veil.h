@@ -23,13 +23,15 @@
 // From q to density. Two thresholds are quantiles of q: the veil covers the fraction `coverage` of the sky,
 // and its density rises from 0 to 1, by a smoothstep, over the fraction `softness` of the covered part.
 // `sheet` is a minimum: the pattern fills the range from it to 1. The result is multiplied by the profile in
-// height (0 at base_m and top_m, 1 between the soft ends) and by the fade towards the sides of the lattice.
+// height (0 at base_m and top_m, 1 between the soft ends), by the fade towards the sides of the lattice and by that
+// towards the rim of the area, smoothstep((1 - r) / softness), r = 1 being the rim.
 // Densities below 2^-10 are 0.
 //
 // The bits are the same on every machine, for any number of threads and any vector width: see core/noise.h.
 // All functions are pure and thread-safe.
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/wind.h"
@@ -48,6 +50,16 @@ struct VeilOctave {
     double gain = 1.5, offset = 0.5;  // [b], [c]: X lies about 0..1
     double ridge = 0.5, crest = 0.5;  // [r], [o]: of the ridged form alone
     bool operator==(const VeilOctave&) const = default;
+};
+
+// The ellipse of the ground above which there is a veil: an anvil, a patch. Outside it is clear.
+struct VeilArea {
+    double x_m = 0, y_m = 0;  // centre, world east and north, at time 0
+    double semi_a_m = std::numeric_limits<double>::infinity(), semi_b_m = semi_a_m;  // > 0; infinite: no limit
+    double yaw_deg = 0;   // of the first semi-axis, counter-clockwise from east
+    double softness = 1;  // fraction of the radius over which the density falls to 0 at the rim; 0..1
+    bool carried = false;  // by the wind at the veil's `top_m`, as the pattern is; otherwise it stands
+    bool operator==(const VeilArea&) const = default;
 };
 
 struct VeilOptions {
@@ -70,6 +82,7 @@ struct VeilOptions {
     double soft_base_m = 200, soft_top_m = 200;  // heights over which density fades in from the ends, >= 0
     double fallstreak_m = 0;                     // displacement of streaks at the base, against the wind
     double margin_m = 0;  // width along the sides of the lattice over which density fades; >= 0
+    VeilArea area;
     std::uint64_t seed = 1;
     bool operator==(const VeilOptions&) const = default;
 };

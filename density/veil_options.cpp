@@ -119,6 +119,12 @@ void check(const VeilOptions& o, const Extent& extent, const Placement& placemen
     require_range("sheet", o.sheet, 0, 1);
     require_range("fallstreak_m", o.fallstreak_m, -1e6, 1e6);
     require_range("margin_m", o.margin_m, 0, 1e7);
+    require_range("area.x_m", o.area.x_m, -1e7, 1e7);
+    require_range("area.y_m", o.area.y_m, -1e7, 1e7);
+    require(o.area.semi_a_m > 0, "area.semi_a_m", o.area.semi_a_m, "above 0");
+    require(o.area.semi_b_m > 0, "area.semi_b_m", o.area.semi_b_m, "above 0");
+    require_range("area.yaw_deg", o.area.yaw_deg, -360, 360);
+    require_range("area.softness", o.area.softness, 0, 1);
     require(o.wavelength_m > 0 && o.wavelength_m <= 1e7, "wavelength_m", o.wavelength_m,
             "above 0, at most 1e7");
     require(o.persistence > 0 && o.persistence < 1, "persistence", o.persistence, "above 0, below 1");

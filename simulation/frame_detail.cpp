@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/math.h"
 #include "core/wind.h"
 #include "density/veil.h"
 #include "scenes/format/layers.h"
@@ -26,7 +27,9 @@ DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> laye
     const bool calm = scene.automaton.wind.keyframes.empty() && !scene.layers.empty();
     const Wind& wind = layer || calm ? layer_wind(scene, layer.value_or(0)) : scene.automaton.wind;
     const Placement& placement = density.placement();
-    const double height = placement.origin_m.z + 0.5 * density.extent().z * placement.cell_size_m;
+    const bool veil = layer && scene.layers[*layer].is_veil;
+    const double height = veil ? scene.layers[*layer].veil.top_m
+                               : placement.origin_m.z + 0.5 * density.extent().z * placement.cell_size_m;
     DetailSetting setting;
     setting.options = layer ? layer_detail(scene, *layer) : scene.density.detail;
     setting.extinction_per_m = scene.density.extinction_per_m;
@@ -38,6 +41,11 @@ DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> laye
     if (whole && setting.options.to_horizon)
         setting.boundaries = layer ? scene.layers[*layer].boundaries : scene.automaton.boundaries;
     setting.drift_m = wind_displacement_m(wind, height, time_s);
+    if (veil) {
+        const Rotation fibres = rotation_of_degrees(scene.layers[*layer].veil.direction_deg);
+        setting.along = Vec2(fibres.cos, fibres.sin);
+        return setting;
+    }
     const Velocity now = wind_at(wind, height, time_s);
     const double speed = std::hypot(now.east_m_per_s, now.north_m_per_s);
     if (speed > 0) setting.along = Vec2(now.east_m_per_s, now.north_m_per_s) / speed;

@@ -48,6 +48,7 @@ std::string text_of_veil(const Scene& scene, std::size_t layer) {
     alone.automaton.wind = layer_wind(scene, layer);
     alone.layers = {scene.layers[layer]};
     alone.layers.front().wind = {};
+    alone.layers.front().own_detail = false;
     return to_toml(alone);
 }
 

@@ -120,11 +120,11 @@ MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& latt
 }
 
 // A veil has grids alone: nothing of it is remembered.
-MemoryEstimate veil_estimate(const Scene& scene, const AutomatonOptions& lattice, double under_way) {
+MemoryEstimate veil_estimate(const Scene& scene, const AutomatonOptions& lattice, bool detail, double under_way) {
     DensityOptions density = scene.density;
     density.write_state = false;
     MemoryEstimate estimate;
-    estimate.density = saturated(grid_bytes(lattice.extent, density, false, under_way));
+    estimate.density = saturated(grid_bytes(lattice.extent, density, detail, under_way));
     return estimate;
 }
 
@@ -178,13 +178,14 @@ MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
         if (!scene.layers.empty() && !has_density(scene.layers[n])) continue;
         const AutomatonOptions options = automaton_options(scene, n);
         const bool veil = !scene.layers.empty() && scene.layers[n].is_veil;
-        const MemoryEstimate lattice = veil     ? veil_estimate(scene, options, under_way)
+        const bool detail = veil ? layer_detail(scene, n).enabled : count_detailed(scene) > 0;
+        const MemoryEstimate lattice = veil     ? veil_estimate(scene, options, detail, under_way)
                                        : frames ? lattice_estimate(scene, options, under_way)
                                                 : statistics_estimate(scene, options);
         estimate.automaton = sum(estimate.automaton, lattice.automaton);
         estimate.density = sum(estimate.density, lattice.density);
         cells += double(options.extent.x) * options.extent.y * options.extent.z;
-        if (count_detailed(scene) > 0 && !veil) detailed += cells_with_detail(options.extent);
+        if (detail) detailed += cells_with_detail(options.extent);
     }
     const double combined = frames ? combined_bytes(scene, under_way) : 0;
     estimate.density = sum(estimate.density, saturated(combined + ground_bytes(scene, under_way)));

@@ -246,7 +246,7 @@ void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOpt
     for (const std::string_view key : keys_of_clouds()) {
         if (reader.find(key) == nullptr) continue;
         reader.report(key, reader.quoted(key) + " stands beside `veil`",
-                      "expected `name`, `opacity`, `lattice`, `wind` and `veil` alone: a veil has no clouds "
+                      "expected `name`, `opacity`, `lattice`, `wind`, `veil` and `detail` alone: a veil has no clouds "
                       "and no automaton");
     }
     const SectionReader lattice = below(reader, "lattice"), veil = below(reader, "veil");
@@ -345,7 +345,7 @@ void check_count_of_detailed(const SectionReader& reader, const Scene& scene) {
     if (count_detailed(scene) <= kMaxDetailedClouds) return;
     std::size_t count = 0;
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
-        if (!scene.layers[n].automaton || !layer_detail(scene, n).enabled) continue;
+        if (!has_density(scene.layers[n]) || !layer_detail(scene, n).enabled) continue;
         if (++count <= kMaxDetailedClouds) continue;
         item_of(reader, "layer", n)
             .report("detail", std::to_string(count_detailed(scene)) + " layers with detail are too many",

@@ -112,6 +112,15 @@ void replace_infinite(Range& range, double low, double size) {
     if (std::isinf(range.min)) range = {low, low + size};
 }
 
+// Centres that are drawn in the whole lattice, now that it is known.
+void fill_in_centres(std::vector<EllipsoidScatter>& scatters, const Extent& extent, const Placement& placement) {
+    for (EllipsoidScatter& scatter : scatters) {
+        replace_infinite(scatter.x_m, placement.origin_m.x, extent.x * placement.cell_size_m);
+        replace_infinite(scatter.y_m, placement.origin_m.y, extent.y * placement.cell_size_m);
+        replace_infinite(scatter.z_m, placement.origin_m.z, extent.z * placement.cell_size_m);
+    }
+}
+
 }  // namespace
 
 void check_periodic_reach(const SectionReader& reader, const std::string& what, const Vec3& largest_m,
@@ -153,12 +162,9 @@ void finish_scene(const SectionReader& reader, void* owner) {
     check_periodic_sizes(reader, scene);
     check_frames(reader, scene);
     finish_layers(reader, scene);
-    const Placement& placement = scene.automaton.placement;
-    for (EllipsoidScatter& scatter : scene.automaton.field.scatters) {
-        replace_infinite(scatter.x_m, placement.origin_m.x, scene.automaton.extent.x * placement.cell_size_m);
-        replace_infinite(scatter.y_m, placement.origin_m.y, scene.automaton.extent.y * placement.cell_size_m);
-        replace_infinite(scatter.z_m, placement.origin_m.z, scene.automaton.extent.z * placement.cell_size_m);
-    }
+    const AutomatonOptions& automaton = scene.automaton;
+    fill_in_centres(scene.automaton.field.scatters, automaton.extent, automaton.placement);
+    for (LayerOptions& layer : scene.layers) fill_in_centres(layer.scatters, layer.extent, layer.placement);
 }
 
 }  // namespace nephos

@@ -47,7 +47,8 @@ bool has_density(const Scene& scene) {
 
 DetailOptions layer_detail(const Scene& scene, std::size_t layer) {
     const LayerOptions& options = scene.layers[layer];
-    DetailOptions detail = options.own_detail ? options.detail : scene.density.detail;
+    if (options.own_detail) return options.detail;
+    DetailOptions detail = scene.density.detail;
     if (options.is_veil) detail.enabled = false;
     return detail;
 }
@@ -56,7 +57,7 @@ std::size_t count_detailed(const Scene& scene) {
     if (scene.layers.empty()) return scene.density.detail.enabled ? 1 : 0;
     std::size_t count = 0;
     for (std::size_t n = 0; n < scene.layers.size(); ++n)
-        count += scene.layers[n].automaton && layer_detail(scene, n).enabled ? 1 : 0;
+        count += has_density(scene.layers[n]) && layer_detail(scene, n).enabled ? 1 : 0;
     return count;
 }
 
@@ -119,7 +120,7 @@ AutomatonOptions automaton_options(const Scene& scene, std::size_t layer) {
     options.placement = given.placement;
     options.boundaries = given.boundaries;
     options.seed = layer_seed(scene.automaton.seed, layer);
-    options.field = {given.background, {}, {}};
+    options.field = {given.background, {}, given.scatters};
     options.wind = layer_wind(scene, layer);
     return options;
 }

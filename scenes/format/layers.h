@@ -71,7 +71,7 @@ struct LayerRain {
 struct LayerOptions {
     std::string name;  // letters, digits, '-' and '_': part of file names; no two layers share one
     // True: the density is that of `veil`, a function of position and time, without skies, clouds and
-    // automaton. Of the fields below such a layer uses lattice, opacity and wind alone.
+    // automaton. Of the fields below such a layer uses lattice, opacity, wind and detail alone.
     bool is_veil = false;
     VeilOptions veil;                // its seed is that of veil_options()
     std::vector<std::string> skies;  // names, at least one
@@ -83,6 +83,7 @@ struct LayerOptions {
     Placement placement;
     Boundaries boundaries;
     Probabilities background{0, 0, 0.1};  // of the field, everywhere (field.h)
+    std::vector<EllipsoidScatter> scatters;  // of the field, beside the clouds of the skies
 
     Range base_height_m{1000, 1000};   // world z of a cloud's base, drawn for each cloud
     Wind wind;                         // without keyframes: the scene's wind
@@ -122,10 +123,10 @@ VeilOptions veil_options(const Scene& scene, std::size_t layer);
 // Returns the bounding rectangle of the worlds of all layers, which the map of the ground covers. Pure.
 WorldRectangle whole_world(const Scene& scene);
 
-// Returns the detail of a layer: its own, or the scene's; none of a veil.
+// Returns the detail of a layer: its own, or the scene's; a veil has only its own.
 DetailOptions layer_detail(const Scene& scene, std::size_t layer);
 
-// Returns the number of automata of the scene whose clouds have detail.
+// Returns the number of lattices of the scene, automata and veils, whose clouds have detail.
 std::size_t count_detailed(const Scene& scene);
 
 // Returns the wind of a layer: its own, or the scene's if it has none.

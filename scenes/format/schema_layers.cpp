@@ -333,6 +333,7 @@ const Section& layer_section() {
                             "Probabilities everywhere, inside clouds' ellipsoids as well; keys that "
                             "are missing are those of `[field.background]`."),
                         "that of `[field.background]`"),
+             tables<&LayerOptions::scatters>("scatters", scatter_section(), 0, 1000),
              default_is(key<&LayerOptions::base_height_m>("base_height_m", "m", between(-1e5, 1e5),
                                                           "Height of clouds' bases, drawn for each.", "T, 2"),
                         "by `genus`"),
@@ -357,7 +358,7 @@ const Section& layer_section() {
              table<&LayerOptions::coupling>("coupling", coupling_section(), coupling_section().effect),
              table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect),
              default_is(table<&LayerOptions::detail>("detail", detail_section(), detail_section().effect),
-                        "that of `[detail]`"),
+                        "that of `[detail]`; a veil has none"),
              written_if(&of_veils,
                         table<&LayerOptions::veil>("veil", veil_section(), veil_section().effect))},
             &finish_layer};
@@ -377,7 +378,7 @@ std::span<const std::string_view> keys_of_clouds() {
     static constexpr std::string_view kKeys[] = {
         "skies",       "automaton",     "background",         "base_height_m",     "genus",    "climate",
         "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole", "coupling", "rain",
-        "detail"};
+        "scatters"};
     return kKeys;
 }
 

@@ -300,7 +300,7 @@ const Section& detail_section() {
     static const Section section{
         "Detail",
         "Detail below the voxel in pictures, their light, and files that are refined: noise erodes the edge of "
-        "voxel clouds, from bumps of `size_m` down to half a metre, and keeps their mean density. Veils have none. "
+        "voxel clouds, from bumps of `size_m` down to half a metre, and keeps their mean density. Veils have only `layer.detail`. "
         "See docs/detail.md.",
         {key<&DetailOptions::enabled>("enabled", "", kAny,
                                              "Draw it. Off: the smooth field of metaballs, everywhere as far away."),
@@ -320,9 +320,9 @@ const Section& detail_section() {
              "Strength of towers and hollows of two and four times `size_m`, between the bumps and the clouds."),
          key<&DetailOptions::mean_free_path_m>(
              "mean_free_path_m", "m", between(0, 10'000),
-             "Mean free path of light in cloud where half of the space is cloud; 0: three quarters of a cell. Smaller "
-             "makes crisper, denser clouds of the same mass; in real cumulus it is 10 to 20 m. Sheets and thin clouds "
-             "want more: less than one in two places of theirs would be cloud otherwise."),
+             "Mean free path of light in cloud where half of the space is cloud; 0: three quarters of a cell, or in thin "
+             "clouds that at 0.7 of the density that they have in the mean, lest they be torn. Smaller makes "
+             "crisper, denser clouds of the same mass; in real cumulus it is 10 to 20 m. Even sheets want more."),
          key<&DetailOptions::to_horizon>(
              "to_horizon", "", kAny,
              "Pictures: a lattice with periodic sides in x and y goes on to the horizon, with its shadows. Off: there is "

@@ -37,6 +37,8 @@ const Section& level_of_detail_section();
 const Section& camera_path_section();
 // Owner: WindKeyframe.
 const Section& wind_section();
+// Ellipsoids at random: of the field, or of a layer.
+const Section& scatter_section();
 // Owner: Probabilities.
 const Section& probabilities_section();
 // Owner: BaseModel, NamedSky, ClimateOptions, LayerOptions.

@@ -200,6 +200,77 @@ TEST(AirParcels, AreReplacedUpwind) {
     }
 }
 
+AutomatonOptions plume_options() {
+    AutomatonOptions o{.extent = {100, 80, 30}};
+    o.boundaries = {Boundary::periodic, Boundary::periodic, Boundary::open};
+    o.wind.keyframes = {{0, {{0, {4, 1}}, {1000, {12, -3}}}}};
+    o.field.scatters = {{.count = 3,
+                         .x_m = {0, 5000},
+                         .y_m = {0, 4000},
+                         .z_m = {0, 0},
+                         .semi_axis_x_m = {400, 600},
+                         .semi_axis_y_m = {300, 300},
+                         .semi_axis_z_m = {200, 250},
+                         .yaw_deg = {0, 180},
+                         .life_s = {1000, 1000},
+                         .fade_in_s = 20,
+                         .fade_out_s = 40,
+                         .replace = true,
+                         .thermals = {.interval_s = 100, .life_s = 600, .rise_m = {500, 700}, .spread = -0.2}}};
+    return o;
+}
+
+// Thermals leave the base one after the other, rise by u (2 - u), taper, and lean with the shear; the last dies with
+// the plume.
+TEST(AirParcels, ThermalsRiseFromTheirBase) {
+    const AutomatonOptions o = plume_options();
+    const AirParcels parcels(o);
+    const auto at = [&](double time_s) { return parcels.active(o, time_s); };
+    // Of each plume the base and as many thermals as have been released: at 0, 100 .. 400 s.
+    for (const auto& [time_s, thermals] : {std::pair{5.0, 1u}, {105.0, 2u}, {305.0, 4u}, {590.0, 5u}, {605.0, 4u},
+                                           {995.0, 1u}, {1005.0, 0u}})
+        EXPECT_EQ(at(time_s).size(), 3 * thermals + (time_s < 1000 ? 3 : 0)) << time_s;
+    const auto now = at(305), later = at(310);
+    const auto per_plume = now.size() / 3;
+    for (std::size_t n = 0; n < now.size(); ++n) {
+        const Ellipsoid &e = now[n].ellipsoid, &base = now[n - n % per_plume].ellipsoid;
+        const double age = 305 - e.birth_s;
+        if (n % per_plume == 0) {
+            EXPECT_EQ(e.centre_m.z, 0);
+            continue;
+        }
+        EXPECT_EQ(e.birth_s, 100.0 * double(n % per_plume - 1));
+        EXPECT_EQ(now[n].weight, std::min(age / 20, 1.0));
+        const double u = age / 600, most = 700 * u * (2 - u), least = 0.6 * 500 * u * (2 - u);
+        EXPECT_GE(e.centre_m.z, least);
+        EXPECT_LE(e.centre_m.z, most);
+        EXPECT_GE(later[n].ellipsoid.centre_m.z, e.centre_m.z);
+        EXPECT_LT(later[n].ellipsoid.semi_axes_m.x, e.semi_axes_m.x);
+        EXPECT_LE(e.semi_axes_m.x, 0.6 * base.semi_axes_m.x);
+        EXPECT_NEAR(e.semi_axes_m.x / e.semi_axes_m.z, 0.6 * base.semi_axes_m.x / base.semi_axes_m.z, 1e-9);
+        // The wind is linear in height, its value half way up that at the base and 0.004 m/s a metre more.
+        const double shear = 0.5 * e.centre_m.z * 0.008 * age, farthest = 0.5 * std::hypot(600, 300);
+        EXPECT_NEAR(e.centre_m.x - base.centre_m.x, shear, farthest);
+        EXPECT_NEAR(e.centre_m.y - base.centre_m.y, -0.5 * shear, farthest);
+    }
+}
+
+// The same bits again, also from a checkpoint amid the life of plumes and their successors.
+TEST(AirParcels, ThermalsAreReproduced) {
+    const AutomatonOptions o = plume_options();
+    Automaton whole(o), first(o);
+    for (int step = 0; step < 130; ++step) {
+        whole.step();
+        if (step < 77) first.step();
+    }
+    Automaton resumed(o);
+    resumed.restore(first.save());
+    while (resumed.steps() < whole.steps()) resumed.step();
+    EXPECT_EQ(resumed.hash(), whole.hash());
+    EXPECT_EQ(whole.steps(), 130u);
+    EXPECT_EQ(ellipsoid_count(o), 3u * 8u * 9u);  // bases and seven thermals, with their images
+}
+
 TEST(Options, TheNumberOfEllipsoidsIsLimited) {
     AutomatonOptions o = carried_options({1, 1});
     EXPECT_EQ(ellipsoid_count(o), 20u);
@@ -232,6 +303,18 @@ TEST(Options, EachProblemIsNamed) {
         return "accepted";
     };
     EXPECT_EQ(reason([](auto&) {}), "accepted");
+    const auto thermals = [&](const char* expected, auto change) {
+        const std::string text = reason([&](auto& o) {
+            o.field.scatters[0].thermals.interval_s = 100;
+            change(o.field.scatters[0].thermals);
+        });
+        EXPECT_NE(text.find(expected), std::string::npos) << text;
+    };
+    thermals("accepted", [](auto&) {});
+    thermals("scatters[0].thermals.life_s", [](auto& t) { t.life_s = 0; });
+    thermals("thermals.rise_m", [](auto& t) { t.rise_m = {-5, 5}; });
+    thermals("thermals.variety = 0.95: expected 0 to 0.9", [](auto& t) { t.variety = 0.95; });
+    thermals("thermals at once", [](auto& t) { t.interval_s = 0.1; });
     EXPECT_NE(reason([](auto& o) { o.extent.y = 0; }).find("1..65536"), std::string::npos);
     EXPECT_NE(reason([](auto& o) { o.placement.cell_size_m = 0; }).find("cell_size_m"), std::string::npos);
     EXPECT_NE(reason([](auto& o) { o.time_step_s = std::nan(""); }).find("time_step_s"), std::string::npos);

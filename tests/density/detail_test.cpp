@@ -313,6 +313,36 @@ TEST(Detail, RefusesOptionsOutOfRange) {
     EXPECT_THROW(resample_with_detail(field, grid.extent(), grid.placement(), 9), Error);
 }
 
+// A tenth of the density: with the mean free path of three quarters of a cell next to nothing would be cloud. By itself
+// the half density follows the cloud, a scene's own does not.
+TEST(Detail, ThinCloudIsNotTorn) {
+    const DensityGrid grid = domes({40, 40, 20}, 29);
+    std::vector<float> thin = grid.to_dense(), thick = thin;
+    for (float& q : thin) q *= 0.1f;
+    for (float& q : thick) q = std::min(3 * q, 1.0f);
+    const DensityGrid veil = DensityGrid::from_dense(thin, grid.extent(), grid.placement());
+    DetailSetting setting = cumulus_setting();
+    const double usual = 1 / (2 * 0.15 * 30);
+    const DensityGrid dense = DensityGrid::from_dense(thick, grid.extent(), grid.placement());
+    EXPECT_FLOAT_EQ(CoverageField(dense, setting).erosion().half_density, float(usual));
+    const CoverageField field(veil, setting);
+    double mass = 0, squares = 0;
+    for (int k = 0; k < 20; k += 4)
+        for (int j = 0; j < 40; j += 4)
+            for (int i = 0; i < 40; i += 4) {
+                double sum = 0;
+                for (int n = 0; n < 64; ++n) sum += double(veil.value(i + n % 4, j + n / 4 % 4, k + n / 16));
+                mass += sum;
+                squares += sum * sum / 64;
+            }
+    EXPECT_NEAR(double(field.erosion().half_density), 0.7 * squares / mass, 1e-7);
+    EXPECT_LT(double(field.erosion().half_density), 0.5 * usual);
+    // The mass is kept.
+    EXPECT_NEAR(mass_of(field, 20) / (kCell * kCell * kCell), veil.sum(), 0.03 * veil.sum());
+    setting.options.mean_free_path_m = 30;
+    EXPECT_FLOAT_EQ(CoverageField(veil, setting).erosion().half_density, float(usual));
+}
+
 TEST(Detail, EmptyGridHasNone) {
     const CoverageField field(DensityGrid::from_dense(std::vector<float>(512, 0.0f), {8, 8, 8}, {Vec3(0), 40}),
                               cumulus_setting());

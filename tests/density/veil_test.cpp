@@ -245,6 +245,41 @@ TEST(Veil, FadesTowardsTheSidesAndTheEnds) {
     for (int k = 0; k < 5; ++k) EXPECT_LT(grid.value(30, 20, k), grid.value(30, 20, k + 1));
 }
 
+// The area in a formula of its own: full inside, clear outside, in between a smoothstep; it stands or drifts.
+TEST(Veil, IsLimitedToItsArea) {
+    VeilOptions options;
+    options.form = VeilForm::stratus;
+    options.sheet = 1;
+    options.soft_base_m = options.soft_top_m = 0;
+    options.base_m = 5000;
+    options.top_m = 6600;
+    options.area = {.x_m = 900, .y_m = 1900, .semi_a_m = 1500, .semi_b_m = 700, .yaw_deg = 30, .softness = 0.4};
+    const Wind wind = steady_wind(8, -4);
+    for (const bool carried : {false, true}) {
+        options.area.carried = carried;
+        const double time_s = 50, x = carried ? 1300 : 900, y = carried ? 1700 : 1900;
+        const DensityGrid grid = veil_density(options, wind, kExtent, kPlacement, time_s);
+        int inside = 0, between = 0;
+        for (int j = 0; j < kExtent.y; ++j) {
+            for (int i = 0; i < kExtent.x; ++i) {
+                const Vec3 from = centre(i, j, 5) - Vec3(x, y, 0);
+                const double c = std::sqrt(0.75), s = 0.5;
+                const double r = std::hypot((from.x * c + from.y * s) / 1500, (from.y * c - from.x * s) / 700);
+                const double t = std::clamp((1 - r) / 0.4, 0.0, 1.0), expected = t * t * (3 - 2 * t);
+                EXPECT_NEAR(double(grid.value(i, j, 5)), expected, 0.002);
+                inside += expected == 1;
+                between += expected > 0 && expected < 1;
+            }
+        }
+        EXPECT_GT(inside, 50);
+        EXPECT_GT(between, 100);
+    }
+    options.area.semi_b_m = std::numeric_limits<double>::infinity();  // a strip
+    const DensityGrid strip = veil_density(options, {}, kExtent, kPlacement, 0);
+    EXPECT_EQ(strip.value(23, 15, 5), 1);
+    EXPECT_EQ(strip.value(44, 36, 5), 0);
+}
+
 // A head of the pattern is found again below, behind by the parabola.
 TEST(Veil, TrailsBehindAsAParabola) {
     VeilOptions options;
@@ -317,6 +352,8 @@ TEST(Veil, RefusesBadOptionsByName) {
     EXPECT_PRED2(contains, message([](VeilOptions& o) { o.octave_count = 13; }), "octaves");
     EXPECT_PRED2(contains, message([](VeilOptions& o) { o.persistence = 1; }), "persistence");
     EXPECT_PRED2(contains, message([](VeilOptions& o) { o.wavelength_m = 300; }), "two cells");
+    EXPECT_PRED2(contains, message([](VeilOptions& o) { o.area.semi_a_m = 0; }), "area.semi_a_m");
+    EXPECT_PRED2(contains, message([](VeilOptions& o) { o.area.softness = 2; }), "area.softness");
     EXPECT_PRED2(contains, message([](VeilOptions& o) { o.top_m = o.base_m; }), "top_m");
     EXPECT_PRED2(contains, message([](VeilOptions& o) { o.base_m = 7000, o.top_m = 8000; }),
                  "no cell's centre");

@@ -104,6 +104,8 @@ class Parcel:
         self.fade_in_s, self.fade_out_s = fade_in_s, fade_out_s
         self.carried = carried
         self.scatter = scatter
+        self.rise_m = 0.0
+        self.drawn_of_thermals, self.random = {}, None
 
     def weight(self, time_s):
         age, left = time_s - self.birth_s, self.birth_s + self.life_s - time_s
@@ -174,7 +176,41 @@ def probability_field(scene, parcels, time_s):
         weight = parcel.weight(time_s)
         if weight > 0:
             add_parcel(field, scene, parcel, weight)
+        for thermal in thermals_of(scene, parcel, time_s):
+            add_parcel(field, scene, thermal, thermal.weight(time_s))
     return field
+
+
+def thermals_of(scene, plume, time_s):
+    """The bubbles that have risen from an ellipsoid of a scatter with `thermals`, and still live."""
+    table = (plume.scatter or {}).get("thermals")
+    if table is None:
+        return
+    interval_s, life_s, variety = table["interval_s"], table.get("life_s", 900), table.get("variety", 0.4)
+    for n in range(int((plume.life_s - life_s) // interval_s) + 1 if math.isfinite(plume.life_s) else 10**6):
+        birth_s = plume.birth_s + n * interval_s
+        if birth_s > time_s:
+            return
+        if birth_s + life_s <= time_s:
+            continue
+        size, rise, a, b = plume.drawn_of_thermals.setdefault(n, plume.random.random(4))
+        u = (time_s - birth_s) / life_s
+        risen = plume.rise_m * (1 - variety * rise) * u * (2 - u)
+        wide = table.get("width", 0.6)
+        axes = [f * s * (1 - variety * size) for f, s in zip((wide, wide, 1), plume.semi_axes_m)]
+        factor = max(0.2, 1 + table.get("spread", -0.1) * risen / (0.5 * (axes[0] + axes[1])))
+        z = plume.centre_m[2]
+        lean = [0.0, 0.0]
+        if plume.carried:
+            above, below = scene.wind_at(z + 0.5 * risen, time_s), scene.wind_at(z, time_s)
+            lean = [(v - w) * (time_s - birth_s) for v, w in zip(above, below)]
+        wander = table.get("wander", 0.5)
+        a, b = wander * plume.semi_axes_m[0] * (2 * a - 1), wander * plume.semi_axes_m[1] * (2 * b - 1)
+        cos, sin = math.cos(plume.yaw), math.sin(plume.yaw)
+        centre = (plume.centre_m[0] + a * cos - b * sin + lean[0], plume.centre_m[1] + a * sin + b * cos + lean[1],
+                  z + risen)
+        yield Parcel(centre, [axis * factor for axis in axes], math.degrees(plume.yaw), plume.centre, plume.rim,
+                     birth_s, life_s, plume.fade_in_s, plume.fade_out_s, plume.carried)
 
 
 # --- a scene --------------------------------------------------------------------------------------------------
@@ -260,11 +296,17 @@ class Simulation:
         centre = [draw(key, self.scene.box_m(axis)) for axis, key in enumerate(("x_m", "y_m", "z_m"))]
         axes = (draw("semi_axis_x_m", (400, 900)), draw("semi_axis_y_m", (400, 900)),
                 draw("semi_axis_z_m", (200, 500)))
-        return Parcel(centre, axes, draw("yaw_deg", (0, 180)),
+        parcel = Parcel(centre, axes, draw("yaw_deg", (0, 180)),
                       probabilities(scatter.get("centre", {}), (0.1, 0.001, 0.1)),
                       probabilities(scatter.get("rim", {}), (0, 0, 0.1)),
                       draw("birth_s", 0) if birth_s is None else birth_s, draw("life_s", math.inf),
                       scatter.get("fade_in_s", 0), scatter.get("fade_out_s", 0), scatter.get("carried", True), scatter)
+        if "thermals" in scatter:
+            rise = scatter["thermals"].get("rise_m", 800)
+            low, high = rise if isinstance(rise, (list, tuple)) else (rise, rise)
+            parcel.rise_m = low if low == high else self.random.uniform(low, high)
+        parcel.random = self.random
+        return parcel
 
     def step(self):
         scene, time_s = self.scene, self.steps * self.scene.step_s

@@ -86,6 +86,7 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());
     EXPECT_EQ(keys_at({"field", "scatters"}), member_count<EllipsoidScatter>());
+    EXPECT_EQ(keys_at({"field", "scatters", "thermals"}), member_count<ThermalPlume>());
     EXPECT_EQ(keys_at({"wind"}), member_count<WindKeyframe>());
     // A level's velocity has two keys.
     EXPECT_EQ(keys_at({"wind", "levels"}), member_count<WindLevel>() - 1 + member_count<Velocity>());
@@ -108,6 +109,7 @@ TEST(Description, EveryOptionOfCloudsHasAKey) {
     // Whether it is a veil is said by the table of that name, as is whether it has detail of its own.
     EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 4);
     EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 1);  // the seed is the layer's
+    EXPECT_EQ(keys_at({"layer", "veil", "area"}), member_count<VeilArea>());
     EXPECT_EQ(keys_at({"layer", "veil", "octave"}), member_count<VeilOctave>());
     EXPECT_EQ(keys_at({"layer", "lattice"}), 4u);
     EXPECT_EQ(keys_at({"layer", "climate"}), 1u);

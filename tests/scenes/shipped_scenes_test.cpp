@@ -63,9 +63,10 @@ TEST(ShippedScenes, BeginWithTheirSchema) {
 // The lattices of the examples of Dobashi et al., and their probabilities at the centre of an ellipsoid.
 TEST(ShippedScenes, HaveTheNumbersOfTheirSource) {
     const Scene cumulus = read_scene(kFolder / "cumulus.toml");
-    EXPECT_EQ(cumulus.automaton.extent, (Extent{256, 128, 20}));
-    ASSERT_EQ(cumulus.automaton.field.scatters.size(), 1u);
-    EXPECT_EQ(cumulus.automaton.field.scatters[0].centre, (Probabilities{0.1, 0.001, 0.1}));
+    EXPECT_EQ(cumulus.automaton.extent, (Extent{256, 128, 32}));  // theirs is 20 cells high
+    ASSERT_EQ(cumulus.automaton.field.scatters.size(), 2u);
+    for (const EllipsoidScatter& scatter : cumulus.automaton.field.scatters)
+        EXPECT_EQ(scatter.centre, (Probabilities{0.1, 0.001, 0.1}));
     EXPECT_TRUE(cumulus.automaton.field.ellipsoids.empty());
     const Scene by_hand = read_scene(kFolder / "cumulus-by-hand.toml");
     EXPECT_EQ(by_hand.automaton.extent, (Extent{256, 128, 20}));

@@ -4,6 +4,7 @@
 // steps, an interruption leaves no trace, and every file of a layer is there.
 
 #include <bit>
+#include <cmath>
 #include <filesystem>
 #include <string>
 
@@ -12,11 +13,13 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "core/wind.h"
 #include "density/combine.h"
 #include "density/vdb/vdb_file.h"
 #include "density/veil.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/writer.h"
+#include "simulation/frame_detail.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/memory.h"
 #include "simulation/run_folder.h"
@@ -121,6 +124,30 @@ TEST(VeilLayer, FramesAreTheVeilAtTheirOwnTime) {
                     0.03 * frame.density.sum());
     }
     EXPECT_NE(listing.frames[0].density.to_dense(), listing.frames[8].density.to_dense());
+}
+
+// Only a table of its own gives a veil detail: along its fibres, carried by the wind of its top; its bits are those
+// without.
+TEST(VeilLayer, HasDetailByATableOfItsOwn) {
+    const Scene plain = scene_of();
+    EXPECT_FALSE(layer_detail(plain, 0).enabled);
+    EXPECT_TRUE(layer_detail(plain, 1).enabled);
+    EXPECT_EQ(count_detailed(plain), 1u);
+    const Scene scene = scene_of({"layer[0].detail.stretch=12", "layer[0].veil.direction_deg=30"});
+    EXPECT_TRUE(layer_detail(scene, 0).enabled);
+    EXPECT_EQ(count_detailed(scene), 2u);
+    const DensityGrid density = LayerSimulation(scene, 0).veil_at(40);
+    const DetailSetting setting = detail_setting(scene, 0, density, 40);
+    EXPECT_EQ(setting.options.stretch, 12);
+    EXPECT_EQ(setting.opacity, 0.25);
+    EXPECT_NEAR(setting.along.x, std::sqrt(0.75), 1e-12);
+    EXPECT_NEAR(setting.along.y, 0.5, 1e-12);
+    const Vec3 carried = wind_displacement_m(scene.automaton.wind, scene.layers[0].veil.top_m, 40);
+    EXPECT_EQ(setting.drift_m.x, carried.x);
+    EXPECT_EQ(setting.drift_m.y, carried.y);
+    const Scene turned = scene_of({"layer[0].veil.direction_deg=30"});
+    EXPECT_EQ(LayerSimulation(scene, 0).hash(), LayerSimulation(turned, 0).hash());
+    EXPECT_GT(memory_estimate(scene, RunParts::pictures).pictures, memory_estimate(turned, RunParts::pictures).pictures);
 }
 
 TEST(VeilLayer, StepsHaveItsStatisticsAndAHashOfTheirOwn) {
