@@ -10,6 +10,7 @@
 
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
+#include "scenes/format/warnings.h"
 #include "scenes/format/reader.h"
 
 namespace nephos {
@@ -197,11 +198,8 @@ void print_scene_errors(const SceneErrors& errors) {
     if (!text.ends_with('\n')) print_message("\n");
 }
 
-void note_unused_models(const Scene& scene) {
-    if (scene.models.empty() || !scene.layers.empty()) return;
-    print_note(
-        "the scene has base models but no [[layer]] whose skies use them: nothing of them is simulated "
-        "(scenes/genera/Cu.toml shows a sky and a layer)");
+void print_warnings(const Scene& scene) {
+    for (const std::string& warning : warnings(scene)) print_note(warning);
 }
 
 ThreadLimit::ThreadLimit(int threads) {

@@ -79,8 +79,8 @@ Scene load_scene(const SceneArguments& arguments, SceneUse use = SceneUse::every
 // Prints every problem on standard error, "error:" in colour on a terminal.
 void print_scene_errors(const SceneErrors& errors);
 
-// Says so on standard error when a scene has base models but no layer: nothing of them would be simulated.
-void note_unused_models(const Scene& scene);
+// Prints what a scene may not mean (scenes/format/warnings.h) on standard error.
+void print_warnings(const Scene& scene);
 
 // Limits the threads of oneTBB while it lives; 0 = no limit.
 class ThreadLimit {

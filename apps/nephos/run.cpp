@@ -33,7 +33,7 @@ struct RunArguments {
 
 Scene scene_of(const RunArguments& a) {
     Scene scene = load_scene(a.scene, a.statistics_only ? SceneUse::without_frames : SceneUse::everything);
-    if (!a.needs && !a.work.quiet) note_unused_models(scene);
+    if (!a.needs && !a.work.quiet) print_warnings(scene);
     if (a.video && !scene.frames.enabled)
         throw Error(
             ErrorCode::usage,

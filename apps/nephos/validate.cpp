@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "scenes/format/errors.h"
+#include "scenes/format/warnings.h"
 #include "scenes/format/writer.h"
 #include "simulation/layer_simulation.h"
 #include "simulation/memory.h"
@@ -53,6 +54,7 @@ Json scene_json(const std::string& file, const Scene& scene) {
             {"steps", scene.steps},
             {"frames", frame_count(scene)},
             {"scene_hash", scene_hash(scene)},
+            {"warnings", warnings(scene)},
             {"memory_bytes", memory_estimate_bytes(scene)},
             {"memory_bytes_without_pictures", memory_estimate_bytes(scene, RunParts::density)},
             {"memory_bytes_statistics_only", memory_estimate_bytes(scene, RunParts::statistics)}};
@@ -88,7 +90,7 @@ int validate(const ValidateArguments& a) {
         one.file = file;
         try {
             const Scene scene = load_scene(one);
-            note_unused_models(scene);
+            print_warnings(scene);
             if (a.print) {
                 output.write(to_toml(scene));
             } else if (a.work.json) {

@@ -11,6 +11,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "density/detail_kernels.h"
+
 namespace nephos {
 namespace {
 
@@ -367,14 +369,38 @@ std::vector<std::int32_t> first_numbers(std::size_t count) {
     return numbers;
 }
 
-std::array<std::int32_t, 27> bricks_around(const CoverageField& field, std::size_t brick) {
+// Bricks of the first period of a field that repeats, in x and y: as many as its edges are long; 0 where they are not
+// whole bricks, or it does not repeat.
+struct HomeBricks {
+    int first = 0, count[2] = {};
+
+    explicit HomeBricks(const CoverageField& field) {
+        const double edge_m = 2 * CoverageField::kBrickCells * field.node_m();
+        const Vec2 exact = field.period_m() / edge_m;
+        if (exact.x != std::floor(exact.x) || exact.y != std::floor(exact.y)) return;
+        first = int(std::lround(field.home_m() / edge_m));
+        for (int axis = 0; axis < 2; ++axis) count[axis] = int(exact[axis]);
+    }
+    bool any() const { return count[0] > 0; }
+    // Returns the coordinate of the brick with the same cloud in the first period.
+    int at_home(int at, int axis) const {
+        const int rest = (at - first) % count[axis];
+        return first + (rest < 0 ? rest + count[axis] : rest);
+    }
+};
+
+std::array<std::int32_t, 27> bricks_around(const CoverageField& field, const HomeBricks& home, std::size_t brick) {
     const std::array<int, 3>& size = field.bricks();
-    const std::int32_t place = field.places()[brick];
-    const int at[3] = {place % size[0], place / size[0] % size[1], place / size[0] / size[1]};
+    const auto at = brick_at(field.places()[brick], size);
     std::array<std::int32_t, 27> around;
     around.fill(std::int32_t(field.places().size()));
     for (int n = 0; n < 27; ++n) {
-        const int x = at[0] + n % 3 - 1, y = at[1] + n / 3 % 3 - 1, z = at[2] + n / 9 - 1;
+        int x = at[0] + n % 3 - 1, y = at[1] + n / 3 % 3 - 1;
+        const int z = at[2] + n / 9 - 1;
+        if (home.any()) {
+            x = home.at_home(x, 0);
+            y = home.at_home(y, 1);
+        }
         if (x < 0 || y < 0 || z < 0 || x >= size[0] || y >= size[1] || z >= size[2]) continue;
         const std::int32_t number = field.table()[std::size_t((z * size[1] + y) * size[0] + x)];
         if (number >= 0) around[std::size_t(n)] = number;
@@ -404,14 +430,18 @@ DiffusionCells::DiffusionCells(const CoverageField& field, std::span<const float
     thickness.resize(bricks + 1);
     around.resize(bricks);
     beside.resize(bricks);
+    const HomeBricks home(field);
     tbb::parallel_for(std::size_t{0}, bricks, [&](std::size_t brick) {
         thickness[brick] = coarser(&extinction[brick * kCells * kCells * kCells], scale);
-        const auto& all = around[brick] = bricks_around(field, brick);
+        const auto& all = around[brick] = bricks_around(field, home, brick);
         beside[brick] = {all[12], all[14], all[10], all[16], all[4], all[22]};
     });
     std::vector<BrickOfCells> filled(bricks + 1);
     const std::vector<std::int32_t> all = first_numbers(bricks);
     for_parts(all, [&](std::size_t, Bricks some) { fill_folds(*this, some, filled); });
+    // The light of images is that of the bricks of the first period, which are their own neighbours.
+    for (std::size_t brick = 0; brick < bricks; ++brick)
+        if (around[brick][13] != std::int32_t(brick)) filled[brick] = {};
     thickness = std::move(filled);
     std::ranges::copy_if(all, std::back_inserter(active),
                          [&](std::int32_t n) { return any_positive(load(thickness[std::size_t(n)])); });

@@ -36,7 +36,7 @@ struct DiffusionCells {
     std::vector<std::array<BrickOfCells, 6>> to_neighbours;
     std::vector<BrickOfCells> to_outside;
     // The bricks below and above each on each axis, and the 27 around each and itself, x fastest; `bricks` where there is
-    // none.
+    // none. Of a field that repeats, with edges of whole bricks, they are those of the first period throughout.
     std::vector<std::array<std::int32_t, 6>> beside;
     std::vector<std::array<std::int32_t, 27>> around;
     std::vector<std::int32_t> active;  // bricks with a thickness above 0, rising

@@ -47,6 +47,7 @@ DetailSetting cumulus_setting() {
     DetailSetting setting;
     setting.extinction_per_m = 0.15;
     setting.metaball_radius_cells = 1.5;
+    setting.options.apron_cells = 0;
     return setting;
 }
 
@@ -299,12 +300,65 @@ TEST(Detail, PeriodicSidesMeet) {
     EXPECT_GT(some, 20);
 }
 
+// With the same noise on both sides: no seam where a periodic lattice meets its image.
+TEST(Detail, RepeatsWithPeriodicSides) {
+    const DensityGrid grid = domes({40, 32, 20}, 29);
+    DetailSetting setting = cumulus_setting();
+    setting.boundaries.x = setting.boundaries.y = Boundary::periodic;
+    setting.drift_m = {777, -333, 0};
+    const CoverageField field(grid, setting);
+    EXPECT_DOUBLE_EQ(field.period_m().x, 40 * kCell);
+    EXPECT_DOUBLE_EQ(field.period_m().y, 32 * kCell);
+    const Vec3 corner = grid.placement().origin_m;
+    int some = 0;
+    for (int n = 0; n < 4000; ++n) {
+        const double along = n * 7.3, up = 40 + n * 31 % 700;
+        const Vec3 west = corner + Vec3(n % 60 - 20, std::fmod(along, 32 * kCell), up),
+                   south = corner + Vec3(std::fmod(along, 40 * kCell), n % 60 - 20, up);
+        for (const float footprint : {1.0f, 20.0f}) {
+            const float density = detailed_density_at(field, west, footprint);
+            some += density > 0 ? 1 : 0;
+            EXPECT_NEAR(density, detailed_density_at(field, west + Vec3(40 * kCell, 0, 0), footprint), 0.01);
+            EXPECT_NEAR(detailed_density_at(field, south, footprint),
+                        detailed_density_at(field, south + Vec3(0, 32 * kCell, 0), footprint), 0.01);
+        }
+        const Vec3 far = field.at_home(west - field.corner_m() + Vec3(-3 * 40, 7 * 32, 0) * kCell),
+                   near = field.at_home(west - field.corner_m());
+        EXPECT_NEAR(glm::length(far - near), 0, 1e-6);
+    }
+    EXPECT_GT(some, 300);
+    setting.options.to_horizon = false;
+    EXPECT_EQ(CoverageField(grid, setting).period_m().x, 0);
+}
+
+TEST(Detail, ThinsOutTowardsOpenSides) {
+    const DensityGrid grid = DensityGrid::from_dense(std::vector<float>(64 * 64 * 8, 0.5f), {64, 64, 8}, {Vec3(0), kCell});
+    DetailSetting setting = cumulus_setting();
+    setting.options.strength = setting.options.thermals = 0;
+    setting.options.apron_cells = 8;
+    setting.boundaries.y = Boundary::periodic;
+    const CoverageField field(grid, setting);
+    const auto at = [&](double x, double y) {
+        return double(detailed_density_at(field, Vec3(x, y, 4) * kCell, 10));
+    };
+    const double whole = at(32, 32);
+    EXPECT_NEAR(whole, 0.5, 0.02);
+    EXPECT_LT(at(0.5, 32), 0.02 * whole);
+    EXPECT_NEAR(at(4, 32), 0.5 * whole, 0.1 * whole);
+    EXPECT_NEAR(at(60, 32), 0.5 * whole, 0.1 * whole);
+    EXPECT_NEAR(at(12, 32), whole, 0.02 * whole);
+    EXPECT_NEAR(at(32, 1), whole, 0.02 * whole);  // periodic
+    setting.options.apron_cells = 0;
+    EXPECT_GT(detailed_density_at(CoverageField(grid, setting), Vec3(1, 32, 4) * kCell, 10), 0.4f);
+}
+
 TEST(Detail, RefusesOptionsOutOfRange) {
     const DensityGrid grid = domes({16, 16, 8}, 1);
     for (const auto change : {+[](DetailOptions& o) { o.size_m = 1; }, +[](DetailOptions& o) { o.strength = 2; },
                               +[](DetailOptions& o) { o.stretch = 0.5; }, +[](DetailOptions& o) { o.wisps = -1; },
                               +[](DetailOptions& o) { o.thermals = 1.5; },
-                              +[](DetailOptions& o) { o.mean_free_path_m = 0.5; }}) {
+                              +[](DetailOptions& o) { o.mean_free_path_m = 0.5; },
+                              +[](DetailOptions& o) { o.apron_cells = 65; }}) {
         DetailSetting setting = cumulus_setting();
         change(setting.options);
         EXPECT_THROW(CoverageField(grid, setting), Error);

@@ -105,7 +105,7 @@ def by_nephos(name, cloud, volume, options):
             "sun.elevation_deg": cloud["sun"][0], "sun.azimuth_deg": cloud["sun"][1], "sun.colour": listed(SUN),
             "atmosphere.model": '"gradient"', "air.extinction_per_m": "[0, 0, 0]", "air.horizon": listed(SKY), "air.zenith": listed(SKY),
             "ground.height_m": "100000", "light.ambient_top": listed(SKY), "light.ambient_base": listed(SKY),
-            "light.g": options.g, "camera.exposure": '"manual"', "camera.tone_curve": '"exponential"', "camera.glare": 0,
+            "light.phase": '"henyey_greenstein"', "light.g": options.g, "camera.exposure": '"manual"', "camera.tone_curve": '"exponential"', "camera.glare": 0,
             "ground.pattern": '"plain"', "detail.strength": 0, "detail.thermals": 0}  # Cycles draws the voxels as they are
     words = [each for key, value in keys.items() for each in ("--set", f"{key}={value}")]
     words += [each for setting in options.set for each in ("--set", setting)]

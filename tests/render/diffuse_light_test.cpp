@@ -28,6 +28,7 @@ DetailedVoxels slab(double depth) {
     part.density = DensityGrid::from_dense(std::vector<float>(kSlab.cells(), 1.0f), kSlab, {{0, 0, 1000}, kCell_m});
     part.setting.options.strength = 0;
     part.setting.options.thermals = 0;
+    part.setting.options.apron_cells = 0;
     part.setting.extinction_per_m = depth / kThickness_m;
     return part;
 }

@@ -123,6 +123,28 @@ TEST_F(MarchBackends, AgreeOnSeveralVolumes) {
         expect_same(cloud.splats(), test::view(each.from, each.to, each.fov_deg, 96, 72), each.name);
 }
 
+TEST_F(MarchBackends, AgreeOnCloudsToTheHorizon) {
+    DetailedCloud cloud;
+    cloud.add({0, 0, 1000}, 1);
+    DetailOptions no_images;
+    no_images.to_horizon = false;
+    cloud.add({200, 300, 1900}, 2, no_images);
+    for (DetailedVoxels& part : cloud.detailed)
+        part.setting.boundaries.x = part.setting.boundaries.y = Boundary::periodic;
+    for (const AirModel model : {AirModel::gradient, AirModel::physical}) {
+        for (const MarchView& each : {MarchView{"over land", {0, -2000, 300}, {480, 4000, 1250}, 60},
+                                      MarchView{"from above", {300, -3000, 6000}, {900, 9000, 0}, 50},
+                                      MarchView{"within", {9480, 7300, 1250}, {9500, 9000, 1250}, 40}}) {
+            RenderOptions options = test::view(each.from, each.to, each.fov_deg, 96, 72);
+            options.atmosphere.model = model;
+            options.shells.count = 24;
+            options.light_shafts.strength = 1;
+            options.ground.pattern = GroundPattern::country;
+            expect_same(cloud.splats(), options, each.name);
+        }
+    }
+}
+
 TEST_F(MarchBackends, AgreeThroughAir) {
     DetailedCloud cloud;
     cloud.add({0, 0, 1000}, 1);

@@ -27,6 +27,36 @@ class Scenes(Case):
         self.assertFalse(wrong["valid"])
         self.assertEqual([p["line"] for p in wrong["problems"]], [2, 3, 5])
 
+    def test_warns_of_clouds_that_the_lattice_cuts(self):
+        high = self.write("high.toml", """name = "high"
+[lattice]
+cells = [64, 64, 16]
+cell_size_m = 50
+[[field.ellipsoids]]
+centre_m = [1600, 1600, 500]
+semi_axes_m = [500, 500, 400]
+[[field.scatters]]
+count = 3
+x_m = [0, 3200]
+y_m = [1000, 2000]
+z_m = [100, 200]
+semi_axis_x_m = [300, 300]
+semi_axis_y_m = [300, 300]
+semi_axis_z_m = [200, 300]
+[detail]
+apron_cells = 0
+""")
+        result = self.call("validate", high)
+        notes = [line for line in result.stderr.splitlines() if line.startswith("note:")]
+        self.assertEqual(len(notes), 3, result.stderr)
+        self.assertIn("[[field.ellipsoids]] number 1 reaches up to 100 m above the lattice's top at 800 m", notes[0])
+        self.assertIn("[[field.scatters]] number 1 reaches up to 300 m beyond the lattice's west side", notes[1])
+        self.assertIn("east side", notes[2])
+        report, = json.loads(self.call("validate", high, "--json").stdout)
+        self.assertEqual(len(report["warnings"]), 3)
+        quiet = self.call("validate", high, "--set", "lattice.cells=[64, 64, 20]", "--set", "detail.apron_cells=4")
+        self.assertNotIn("note:", quiet.stderr)
+
     def test_the_printed_scene_is_the_scene(self):
         text = self.call("validate", self.scene, "--print").stdout
         self.write("again/tiny.toml", text)

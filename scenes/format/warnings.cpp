@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scenes/format/warnings.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "automaton/options.h"
+
+namespace nephos {
+namespace {
+
+// The lattice that parcels belong to.
+struct Box {
+    Vec3 low_m, high_m;
+    Boundaries boundaries;
+    bool has_apron = true;
+};
+
+Box box_of(const Extent& extent, const Placement& placement, const Boundaries& boundaries, const DetailOptions& detail) {
+    const Vec3 edges = placement.cell_size_m * Vec3(extent.x, extent.y, extent.z);
+    return {placement.origin_m, placement.origin_m + edges, boundaries, !detail.enabled || detail.apron_cells > 0};
+}
+
+// Adds what a parcel whose centre lies between `low_m` and `high_m` has beyond the box.
+void add_cuts(const std::string& key, const Vec3& low_m, const Vec3& high_m, const Vec3& reach_m, const Box& box,
+              std::vector<std::string>& to) {
+    const double above = high_m.z + reach_m.z - box.high_m.z;
+    if (box.boundaries.z == Boundary::open && above > 0)
+        to.push_back(fmt::format("{} reaches up to {:.0f} m above the lattice's top at {:.0f} m, which cuts its clouds "
+                                 "flat: raise the third number of `cells`, or lower the parcels",
+                                 key, std::ceil(above), box.high_m.z));
+    if (box.has_apron) return;
+    const char* const names[] = {"west", "east", "south", "north"};
+    for (int axis = 0; axis < 2; ++axis) {
+        if ((axis == 0 ? box.boundaries.x : box.boundaries.y) != Boundary::open) continue;
+        const double beyond[] = {box.low_m[axis] - (low_m[axis] - reach_m[axis]),
+                                 high_m[axis] + reach_m[axis] - box.high_m[axis]};
+        for (int side = 0; side < 2; ++side)
+            if (beyond[side] > 0)
+                to.push_back(fmt::format("{} reaches up to {:.0f} m beyond the lattice's {} side, which cuts its clouds "
+                                         "straight: set detail.apron_cells, or move the parcels",
+                                         key, std::ceil(beyond[side]), names[2 * axis + side]));
+    }
+}
+
+// `table`: "[[field.scatters]]", and of which layer.
+void add_scatters(const std::vector<EllipsoidScatter>& scatters, const std::string& table, const Box& box,
+                  std::vector<std::string>& to) {
+    for (std::size_t n = 0; n < scatters.size(); ++n) {
+        const EllipsoidScatter& s = scatters[n];
+        const double rise = is_plume(s) ? s.thermals.rise_m.max : 0;
+        add_cuts(fmt::format("{} number {}", table, n + 1), {s.x_m.min, s.y_m.min, s.z_m.min},
+                 {s.x_m.max, s.y_m.max, s.z_m.max + rise}, reach_m(s), box, to);
+    }
+}
+
+}  // namespace
+
+std::vector<std::string> warnings(const Scene& scene) {
+    std::vector<std::string> result;
+    if (!scene.models.empty() && scene.layers.empty())
+        result.emplace_back("the scene has base models but no [[layer]] whose skies use them: nothing of them is "
+                            "simulated (scenes/genera/Cu.toml shows a sky and a layer)");
+    if (scene.layers.empty()) {
+        const AutomatonOptions& a = scene.automaton;
+        const Box box = box_of(a.extent, a.placement, a.boundaries, scene.density.detail);
+        for (std::size_t n = 0; n < a.field.ellipsoids.size(); ++n) {
+            const Ellipsoid& e = a.field.ellipsoids[n];
+            add_cuts(fmt::format("[[field.ellipsoids]] number {}", n + 1), e.centre_m, e.centre_m, reach_m(e), box, result);
+        }
+        add_scatters(a.field.scatters, "[[field.scatters]]", box, result);
+    }
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        const LayerOptions& layer = scene.layers[n];
+        if (layer.is_veil || !layer.automaton) continue;
+        add_scatters(layer.scatters, fmt::format("[[layer.scatters]] of layer '{}',", layer.name),
+                     box_of(layer.extent, layer.placement, layer.boundaries, layer_detail(scene, n)), result);
+    }
+    return result;
+}
+
+}  // namespace nephos
