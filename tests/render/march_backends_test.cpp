@@ -74,7 +74,9 @@ class MarchBackends : public ::testing::Test {
   protected:
     void TearDown() override { test::expect_no_messages(vulkan_); }
 
-    void expect_same(const Splats& splats, const RenderOptions& options, const std::string& what) {
+    // `every_depth`: otherwise single rays may pass an edge, which they meet in a picture of the other.
+    void expect_same(const Splats& splats, const RenderOptions& options, const std::string& what,
+                     bool every_depth = true) {
         const Picture slow = cpu_.draw_splats(splats, options), fast = vulkan_.draw_splats(splats, options);
         const std::size_t count = different(fast, slow);
         std::printf("%s: %zu of %zu pixels differ, beauty by up to %.5f, transmittance %.5f\n", what.c_str(), count,
@@ -85,7 +87,14 @@ class MarchBackends : public ::testing::Test {
         std::size_t covered = 0;
         for (const float each : slow.transmittance) covered += each < 0.5f ? 1 : 0;
         EXPECT_GT(covered, slow.pixels() / 100) << what;
-        test::expect_same_depths(fast, slow, 0.1f, 0.01f);
+        if (every_depth) {
+            test::expect_same_depths(fast, slow, 0.1f, 0.01f);
+            return;
+        }
+        std::size_t apart = 0;
+        for (std::size_t i = 0; i < slow.pixels(); ++i)
+            apart += slow.transmittance[i] < 0.9f && std::abs(fast.depth_m[i] / slow.depth_m[i] - 1) > 0.01f ? 1 : 0;
+        EXPECT_LE(apart, slow.pixels() / 1000) << what;
     }
 
     Renderer cpu_{test::validated(Splatting::cpu)}, vulkan_{test::validated(Splatting::vulkan)};
@@ -140,7 +149,7 @@ TEST_F(MarchBackends, AgreeOnCloudsToTheHorizon) {
             options.shells.count = 24;
             options.light_shafts.strength = 1;
             options.ground.pattern = GroundPattern::country;
-            expect_same(cloud.splats(), options, each.name);
+            expect_same(cloud.splats(), options, each.name, false);
         }
     }
 }

@@ -179,7 +179,7 @@ TEST(ScatteringTable, OneOctaveIsSingleScattering) {
 TEST(ScatteringTable, ScattersOftenByDiffusion) {
     CloudLight light;
     light.multiple = MultipleScattering::diffusion;
-    light.phase.g = 0.5;
+    light.phase = {.kind = Phase::henyey_greenstein, .g = 0.5};
     for (const float depth : {0.0f, 0.2f, 1.0f, 7.0f, 300.0f}) {
         light.lighting = Lighting::light_pass;
         EXPECT_NEAR(scattered_often(scattering_table(light), -0.2f, depth), 1 / (1 + 0.75f * depth), 0.002f);
