@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 
 #include <tbb/parallel_for.h>
 
@@ -55,6 +54,7 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
     density_.resize(blocks_.size() * kBlockVoxels);
     if (moisture != nullptr) growth_.resize(density_.size());
     masses_.resize(blocks_.size());
+    boxes_.resize(blocks_.size(), {{extent.x, extent.y, extent.z}, {-1, -1, -1}});
     std::vector<double> moist(blocks_.size(), 0), cloudy(blocks_.size(), 0);
     const Thermals thermals(setting, grid.placement().cell_size_m);
     const Vec3 origin = grid.placement().origin_m;
@@ -63,19 +63,26 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
         const Block& block = blocks_[n];
         table_[index_of(block.origin.x() / kBlock, block.origin.y() / kBlock, block.origin.z() / kBlock)] =
             std::int32_t(n);
-        std::optional<openvdb::FloatGrid::ConstAccessor> growing;
-        if (moisture != nullptr) growing.emplace(OpenvdbAccess::grid(*moisture).getConstAccessor());
+        Block growing;
+        if (moisture != nullptr) {
+            const auto accessor = OpenvdbAccess::grid(*moisture).getConstAccessor();
+            growing = {block.origin, accessor.probeConstLeaf(block.origin), accessor.getValue(block.origin)};
+        }
         masses_[n].fill(0);
         for (int v = 0; v < kBlockVoxels; ++v) {
             const openvdb::Coord voxel = block.origin.offsetBy(v & 7, v >> 3 & 7, v >> 6);
             const float q = block.value(leaf_offset(v & 7, v >> 3 & 7, v >> 6));
             if (!(q > 0)) continue;
             masses_[n][std::size_t(v >> 6)] += double(q);
+            for (int axis = 0; axis < 3; ++axis) {
+                boxes_[n].min[std::size_t(axis)] = std::min(boxes_[n].min[std::size_t(axis)], voxel[axis]);
+                boxes_[n].max[std::size_t(axis)] = std::max(boxes_[n].max[std::size_t(axis)], voxel[axis]);
+            }
             const std::size_t at = n * kBlockVoxels + std::size_t(v);
             density_[at] = q * thermals.factor(origin + cell * Vec3(voxel.x() + 0.5, voxel.y() + 0.5,
                                                                     voxel.z() + 0.5));
-            if (!growing) continue;
-            growth_[at] = growing->getValue(voxel);
+            if (moisture == nullptr) continue;
+            growth_[at] = growing.value(leaf_offset(v & 7, v >> 3 & 7, v >> 6));
             moist[n] += double(growth_[at] * density_[at]);
             cloudy[n] += double(density_[at]);
         }
