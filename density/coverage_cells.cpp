@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <optional>
 
 #include <tbb/parallel_for.h>
 
@@ -113,6 +112,7 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
     if (moisture != nullptr) growth_.resize(density_.size());
     masses_.resize(blocks_.size());
     squares_.assign(blocks_.size(), 0);
+    boxes_.resize(blocks_.size(), {{extent.x, extent.y, extent.z}, {-1, -1, -1}});
     std::vector<double> moist(blocks_.size(), 0), cloudy(blocks_.size(), 0);
     const Thermals thermals(setting, extent, grid.placement().cell_size_m);
     std::vector<float> aprons[2];
@@ -126,8 +126,11 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
         const Block& block = blocks_[n];
         table_[index_of(block.origin.x() / kBlock, block.origin.y() / kBlock, block.origin.z() / kBlock)] =
             std::int32_t(n);
-        std::optional<openvdb::FloatGrid::ConstAccessor> growing;
-        if (moisture != nullptr) growing.emplace(OpenvdbAccess::grid(*moisture).getConstAccessor());
+        Block growing;
+        if (moisture != nullptr) {
+            const auto accessor = OpenvdbAccess::grid(*moisture).getConstAccessor();
+            growing = {block.origin, accessor.probeConstLeaf(block.origin), accessor.getValue(block.origin)};
+        }
         masses_[n].fill(0);
         std::array<double, 8> of_cubes{};
         for (int v = 0; v < kBlockVoxels; ++v) {
@@ -137,11 +140,15 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
             if (!(q > 0)) continue;
             masses_[n][std::size_t(v >> 6)] += double(q);
             of_cubes[std::size_t((v >> 2 & 1) | (v >> 5 & 1) << 1 | v >> 8 << 2)] += double(q);
+            for (int axis = 0; axis < 3; ++axis) {
+                boxes_[n].min[std::size_t(axis)] = std::min(boxes_[n].min[std::size_t(axis)], voxel[axis]);
+                boxes_[n].max[std::size_t(axis)] = std::max(boxes_[n].max[std::size_t(axis)], voxel[axis]);
+            }
             const std::size_t at = n * kBlockVoxels + std::size_t(v);
             density_[at] = q * thermals.factor(origin + cell * Vec3(voxel.x() + 0.5, voxel.y() + 0.5,
                                                                     voxel.z() + 0.5));
-            if (!growing) continue;
-            growth_[at] = growing->getValue(voxel);
+            if (moisture == nullptr) continue;
+            growth_[at] = growing.value(leaf_offset(v & 7, v >> 3 & 7, v >> 6));
             moist[n] += double(growth_[at] * density_[at]);
             cloudy[n] += double(density_[at]);
         }

@@ -35,8 +35,8 @@ class CoverageCells {
     // `moisture` may be null: then nothing grows. Cells beyond periodic sides repeat; beyond open ones there are none.
     CoverageCells(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture);
 
-    // Those that hold cloud.
-    const std::vector<Block>& blocks() const { return blocks_; }
+    // Returns a box around the cells with cloud of each block that has such.
+    const std::vector<VoxelBox>& boxes() const { return boxes_; }
     bool grows() const { return !growth_.empty(); }
 
     // Returns the sums of the grid's own values in each layer of cells.
@@ -59,6 +59,7 @@ class CoverageCells {
     bool copy_images(const int (&corner)[3], int side, int pitch, float* density, float* growth) const;
 
     std::vector<Block> blocks_;
+    std::vector<VoxelBox> boxes_;
     Boundaries boundaries_;
     Extent extent_;
     std::array<int, 3> size_{};  // in blocks

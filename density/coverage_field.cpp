@@ -126,15 +126,16 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     measure_cells(counted);
 }
 
-// The bricks near blocks with cloud: some of them may hold none.
+// The bricks near the boxes of cloud in blocks: some of them may hold none.
 void CoverageField::find_places(const CoverageCells& cells, const Boundaries& boundaries,
                                 const std::array<int, 3>& extent, int before, int reach) {
     std::vector<std::uint8_t> reached(table_.size(), 0);
-    const auto reach_around = [&](const openvdb::Coord& origin) {
+    const auto reach_around = [&](const VoxelBox& cloud, const openvdb::Coord& move) {
         int low[3], high[3];
         for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = std::max((origin[axis] + before - reach) / kCells, 0);
-            high[axis] = std::min((origin[axis] + before + kBlock + reach) / kCells, bricks_[std::size_t(axis)] - 1);
+            const auto n = std::size_t(axis);
+            low[axis] = std::max((cloud.min[n] + move[axis] + before - reach - 1) / kCells, 0);
+            high[axis] = std::min((cloud.max[n] + move[axis] + before + reach) / kCells, bricks_[n] - 1);
         }
         for (int z = low[2]; z <= high[2]; ++z)
             for (int y = low[1]; y <= high[1]; ++y)
@@ -144,11 +145,11 @@ void CoverageField::find_places(const CoverageCells& cells, const Boundaries& bo
     };
     // Images of blocks beyond periodic sides reach into the lattice, too.
     const auto images = [](Boundary boundary) { return boundary == Boundary::periodic ? 1 : 0; };
-    for (const Block& block : cells.blocks())
+    for (const VoxelBox& cloud : cells.boxes())
         for (int k = -images(boundaries.z); k <= images(boundaries.z); ++k)
             for (int j = -images(boundaries.y); j <= images(boundaries.y); ++j)
                 for (int i = -images(boundaries.x); i <= images(boundaries.x); ++i)
-                    reach_around(block.origin.offsetBy(i * extent[0], j * extent[1], k * extent[2]));
+                    reach_around(cloud, {i * extent[0], j * extent[1], k * extent[2]});
     for (std::size_t n = 0; n < table_.size(); ++n)
         if (reached[n] != 0) places_.push_back(std::int32_t(n));
     if (places_.size() > std::size_t(std::numeric_limits<std::int32_t>::max()) / kBrickBytes)

@@ -2,6 +2,7 @@
 #include "density/density_grid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <tuple>
@@ -211,12 +212,26 @@ float DensityGrid::max_value() const {
     return largest;
 }
 
+// Four blocks at a time, as their sums do not wait for each other; each has the bits that it has alone.
 double DensityGrid::sum() const {
+    constexpr std::size_t kTogether = 4;
+    const std::vector<Block> blocks = blocks_of(*this);
+    const std::array<float, kBlockVoxels> none{};
     double total = 0;
-    for (const Block& block : blocks_of(*this)) {
-        double part = 0;
-        for (int n = 0; n < kBlockVoxels; ++n) part += double(block.value(n));
-        total += part;
+    for (std::size_t first = 0; first < blocks.size(); first += kTogether) {
+        const std::size_t count = std::min(kTogether, blocks.size() - first);
+        std::array<const float*, kTogether> values;
+        values.fill(none.data());
+        for (std::size_t n = 0; n < count; ++n)
+            if (blocks[first + n].leaf) values[n] = blocks[first + n].leaf->buffer().data();
+        std::array<double, kTogether> parts{};
+        for (std::size_t v = 0; v < kBlockVoxels; ++v)
+            for (std::size_t n = 0; n < kTogether; ++n) parts[n] += double(values[n][v]);
+        for (std::size_t n = 0; n < count; ++n) {
+            if (!blocks[first + n].leaf)
+                for (int v = 0; v < kBlockVoxels; ++v) parts[n] += double(blocks[first + n].tile);
+            total += parts[n];
+        }
     }
     return total;
 }

@@ -110,6 +110,10 @@ void sample_brick(const DetailKernel& field, std::int32_t brick, const float* co
     static_assert(kMaxLanes <= 2 * kSide, "all lanes lie in one row of cells");
     const std::uint8_t* const clearance = field.clearance + std::size_t(brick) * kCells * kCells * kCells;
     const std::size_t lanes = hn::Lanes(d);
+    if (std::find(clearance, clearance + kCells * kCells * kCells, 0) == clearance + kCells * kCells * kCells) {
+        std::fill_n(out, kCount, 0.0f);
+        return;
+    }
     HWY_ALIGN float middle[3][kMaxLanes];
     Middles middles;
     if (samples == BrickSamples::middles) find_middles(field, brick, middles);

@@ -90,7 +90,7 @@ CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, cons
 
 void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options) {
     if (cloud.detailed.empty() && cached.volumes.empty()) return;
-    const CacheKey key = volumes_key(cached.metaballs_key, cloud, options);
+    const CacheKey& key = cached.given_volumes_key;
     const bool are_new = key != cached.volumes_key;
     if (are_new) {
         cached.volumes.clear();
@@ -109,7 +109,9 @@ void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOpt
 void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options,
                  const DetailView& view) {
     const CacheKey metaballs = metaballs_key(cloud),
-                   light = light_key(cloud.detailed.empty() ? metaballs : volumes_key(metaballs, cloud, options), options);
+                   volumes = cloud.detailed.empty() ? metaballs : volumes_key(metaballs, cloud, options),
+                   light = light_key(volumes, options);
+    cached.given_volumes_key = volumes;
     const bool was_cached = cached.shadow_size != 0;
     const bool is_known = was_cached && light == cached.light_key;
     if (is_known) cached.given.metaballs = cloud.metaballs;  // the same values, perhaps elsewhere

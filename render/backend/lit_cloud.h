@@ -52,6 +52,7 @@ struct LitCloud {
     // The parts with detail, in their order, with their light. See DetailedVoxels.
     std::vector<CloudVolume> volumes;
     CacheKey volumes_key{}, volumes_light_key{};
+    CacheKey given_volumes_key{};  // of the cloud that cache_cloud() was given last
     Version volumes_version = 0, volumes_light = 0;
 
     // What metaballs are drawn with.

@@ -97,7 +97,8 @@ HWY_INLINE Lying lying_at(const CoverTexels& texels, const Floats3& point) {
 
 // A pixel's ray and the ground that it meets.
 struct Seen {
-    Floats3 ray, point, beta, veil;  // veil: light of the air up to the ground
+    Floats3 ray, point, beta;
+    Floats3 veil;    // light of the air up to the ground; where there is a mirror
     Floats pixel_m;                  // size of the pixel there, the geometric mean of both directions
     Floats3 dry;                     // albedo
 };
@@ -203,7 +204,6 @@ HWY_INLINE Floats3 changed(const GroundPass& pass, const Floats3& direction) {
     const auto some = pass.country.enabled ? meets : covers;
     if (hn::AllFalse(d, some)) return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     seen.beta = air_transmittance(pass.white, seen.ray, near);
-    seen.veil = air_light(pass.white, seen.ray, near, seen.beta);
     const Floats slant = hn::Sqrt(hn::Max(hn::Neg(seen.ray.z), set(1.0e-6f)));
     seen.pixel_m = hn::Div(hn::Mul(near, set(1.0f / pass.white.up.w)), slant);
     seen.dry = set3(pass.dry);
@@ -212,6 +212,7 @@ HWY_INLINE Floats3 changed(const GroundPass& pass, const Floats3& direction) {
                                                        footprint(seen.ray, near, pass.white.up.w)));
     Surface surface{seen.dry, {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
     if (!hn::AllFalse(d, covers)) {
+        if (pass.mirror != nullptr) seen.veil = air_light(pass.white, seen.ray, near, seen.beta);
         const ResolvedNoise hollows = resolved_noise(pass.hollows, seen.point, seen.pixel_m);
         surface = wet_surface(pass, seen, lying, hollows);
         lay_snow(pass, seen, lying, surface);
@@ -228,18 +229,19 @@ void draw_row(const GroundPass& pass, int y, Picture& picture) {
     const std::size_t lanes = hn::Lanes(d), width = std::size_t(picture.width);
     HWY_ALIGN float red[hn::MaxLanes(d)], green[hn::MaxLanes(d)], blue[hn::MaxLanes(d)];
     for (std::size_t x = 0; x < width; x += lanes) {
+        const std::size_t first = std::size_t(y) * width + x;
+        const float* const left = &picture.transmittance[first];
+        if (std::all_of(left, left + std::min(lanes, width - x), [](float part) { return part == 0; })) continue;
         const Floats across = hn::Add(hn::Iota(d, float(x)), set(0.5f));
         const Floats3 more = changed(pass, pixel_direction(pass.white, across, set(float(y) + 0.5f)));
         hn::Store(more.x, d, red);
         hn::Store(more.y, d, green);
         hn::Store(more.z, d, blue);
-        const std::size_t first = std::size_t(y) * width + x;
         for (std::size_t lane = 0; lane < std::min(lanes, width - x); ++lane) {
-            const float left = picture.transmittance[first + lane];
             float* beauty = &picture.beauty[3 * (first + lane)];
-            beauty[0] = std::max(0.0f, beauty[0] + left * red[lane]);
-            beauty[1] = std::max(0.0f, beauty[1] + left * green[lane]);
-            beauty[2] = std::max(0.0f, beauty[2] + left * blue[lane]);
+            beauty[0] = std::max(0.0f, beauty[0] + left[lane] * red[lane]);
+            beauty[1] = std::max(0.0f, beauty[1] + left[lane] * green[lane]);
+            beauty[2] = std::max(0.0f, beauty[2] + left[lane] * blue[lane]);
         }
     }
 }
