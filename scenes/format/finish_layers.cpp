@@ -187,6 +187,7 @@ void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& laye
     const SectionReader lattice = below(reader, "lattice"), background = below(reader, "background");
     const AutomatonOptions& shared = scene.automaton;
     fill_in_lattice(reader, scene, layer);
+    fill_in_centres(layer.scatters, layer.extent, layer.placement);
     if (!lattice.find("boundaries")) layer.boundaries = shared.boundaries;
     if (!background.find("hum")) layer.background.hum = shared.field.background.hum;
     if (!background.find("act")) layer.background.act = shared.field.background.act;

@@ -112,7 +112,8 @@ void replace_infinite(Range& range, double low, double size) {
     if (std::isinf(range.min)) range = {low, low + size};
 }
 
-// Centres that are drawn in the whole lattice, now that it is known.
+}  // namespace
+
 void fill_in_centres(std::vector<EllipsoidScatter>& scatters, const Extent& extent, const Placement& placement) {
     for (EllipsoidScatter& scatter : scatters) {
         replace_infinite(scatter.x_m, placement.origin_m.x, extent.x * placement.cell_size_m);
@@ -120,8 +121,6 @@ void fill_in_centres(std::vector<EllipsoidScatter>& scatters, const Extent& exte
         replace_infinite(scatter.z_m, placement.origin_m.z, extent.z * placement.cell_size_m);
     }
 }
-
-}  // namespace
 
 void check_periodic_reach(const SectionReader& reader, const std::string& what, const Vec3& largest_m,
                           const Vec3& reach_m, std::string_view horizontal, std::string_view vertical) {
@@ -164,7 +163,6 @@ void finish_scene(const SectionReader& reader, void* owner) {
     finish_layers(reader, scene);
     const AutomatonOptions& automaton = scene.automaton;
     fill_in_centres(scene.automaton.field.scatters, automaton.extent, automaton.placement);
-    for (LayerOptions& layer : scene.layers) fill_in_centres(layer.scatters, layer.extent, layer.placement);
 }
 
 }  // namespace nephos

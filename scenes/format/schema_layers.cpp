@@ -12,6 +12,10 @@ namespace nephos {
 
 using namespace schema_build;
 
+// In schema_automaton.cpp.
+template <>
+const EllipsoidScatter& schema_build::default_element<EllipsoidScatter>();
+
 namespace {
 
 constexpr double kFarthest_m = 1e7;

@@ -167,6 +167,43 @@ TEST(Layers, TakeWhatTheySayNotFromTheScene) {
 }
 
 // A camera looks beyond the edge of a world of clouds that are drawn directly: they must not pop up there.
+// Scatters of a layer are those of its automaton, with the defaults of a field's and in its own lattice; the canonical
+// scene has them too.
+TEST(Layers, HaveScattersOfTheirOwn) {
+    const Scene scene = read_scene_text(R"(
+[[sky]]
+name = "clear"
+state = 0
+[[layer]]
+name = "Cu"
+skies = "clear"
+base_height_m = 900
+lattice = { cells = [40, 30, 20], cell_size_m = 50, origin_m = [-100, 300, 800] }
+[[layer.scatters]]
+count = 4
+z_m = 800
+life_s = 2000
+thermals = { interval_s = 90, rise_m = [300, 500] }
+[[layer.scatters]]
+count = 2
+)",
+                                        "scatters.toml");
+    const AutomatonOptions options = automaton_options(scene, 0);
+    ASSERT_EQ(options.field.scatters.size(), 2u);
+    const EllipsoidScatter& plumes = options.field.scatters[0];
+    EXPECT_EQ(plumes.x_m, (Range{-100, 1900}));
+    EXPECT_EQ(plumes.y_m, (Range{300, 1800}));
+    EXPECT_EQ(plumes.z_m, (Range{800, 800}));
+    EXPECT_EQ(plumes.semi_axis_x_m, (Range{400, 900}));
+    EXPECT_EQ(plumes.thermals.interval_s, 90);
+    EXPECT_EQ(plumes.thermals.rise_m, (Range{300, 500}));
+    EXPECT_TRUE(is_plume(plumes));
+    EXPECT_FALSE(is_plume(options.field.scatters[1]));
+    EXPECT_EQ(options.field.scatters[1].z_m, (Range{800, 1800}));
+    EXPECT_NO_THROW(check(options));
+    EXPECT_EQ(read_scene_text(to_toml(scene), "again.toml"), scene);
+}
+
 TEST(Layers, CloudsDrawnDirectlyFormAndDissolveAtTheEdges) {
     const auto whole = [](std::vector<std::string> overrides) {
         const Scene scene = read_scene_text(kTwoLayers, "two.toml", {}, overrides);
