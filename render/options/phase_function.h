@@ -17,7 +17,7 @@ enum class Phase {
 };
 
 struct PhaseFunction {
-    Phase kind = Phase::hg_draine;
+    Phase kind = Phase::henyey_greenstein;
     double g = 0.5;                   // of Henyey-Greenstein and Cornette-Shanks, -0.99..0.99
     double droplet_diameter_um = 20;  // of hg_draine, 5..50
     bool operator==(const PhaseFunction&) const = default;
