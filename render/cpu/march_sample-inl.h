@@ -95,12 +95,15 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
     MarchSample sample{zero, one, set(shader::kFarAway_m), zero, hn::Lt(one, zero)};
     for (std::size_t v = 0; v < march.volumes.size(); ++v) {
         const MarchedVolume& volume = march.volumes[v];
-        const Floats3 offset = offset_in(volume, times(distance, ray));
+        const PlaceIn in_volume = place_in(volume, times(distance, ray));
+        const Floats3& offset = in_volume.offset;
         const BrickPlace place = brick_place(volume, offset);
         const Mask before = hn::Lt(distance, parts[v].begin);
-        const Floats3 along = way_in(volume, ray, distance);
-        const Floats3 per_way =
-            volume.repeats ? Floats3{inverse(along.x), inverse(along.y), inverse(along.z)} : per_ray;
+        Floats3 per_way = per_ray;
+        if (volume.repeats) {
+            const Floats3 way = way_in(volume, in_volume, ray, distance);
+            per_way = {inverse(way.x), inverse(way.y), inverse(way.z)};
+        }
         // At the faces of the box rounding decides what is inside: there rays go on by a metre. Below a cloud that
         // repeats they go on to its base.
         Floats on = one;
@@ -142,13 +145,14 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
                 return hn::Mul(hn::Sub(face, at), per);
             };
             out = hn::Min(out, hn::Min(to_face(offset.x, 0, per_way.x), to_face(offset.y, 1, per_way.y)));
+            out = hn::Max(out, hn::Mul(set(shader::kStepPixels), footprint));  // what is less than a pixel wide may be missed
         }
         step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), set(shader::kBeyondFace_m)), step);
         if (!hn::AllFalse(d, sampled)) {
             const auto number = hn::Max(place.number, hn::Zero(di));
             erosion::Node node =
                 erosion::node_at(volume.kernel, number, place.local.x, place.local.y, place.local.z);
-            if (volume.repeats) node.t = scaled_share(node.t, patches_of(volume, times(distance, ray)));
+            if (volume.repeats) node.t = scaled_share(node.t, patches_at(volume, in_volume));
             const erosion::Eroded found = erosion::eroded<true>(volume.kernel, node, offset.x, offset.y, offset.z,
                                                           hn::Max(footprint, set(shader::kLeastFootprint_m)), sampled);
             Floats extinction = hn::Mul(found.density, set(volume.kernel.extinction_per_m));

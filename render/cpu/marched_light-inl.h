@@ -181,10 +181,12 @@ HWY_INLINE Floats3 marched_radiance(const ViewScene& scene, const MarchedVolume&
     const Lanes d;
     const PictureFrame& frame = *scene.frame;
     const Floats footprint = hn::Mul(distance, set(scene.march->per_unit)), zero = hn::Zero(d);
-    const Floats3 point = times(distance, ray), offset = offset_in(volume, point), to_sun = set3(frame.to_sun);
+    const Floats3 point = times(distance, ray), to_sun = set3(frame.to_sun);
+    const PlaceIn place = place_in(volume, point);
+    const Floats3& offset = place.offset;
     constexpr float kTap_m[] = {shader::kTap0_m, shader::kTap1_m, shader::kTap2_m},
                     kTapLength_m[] = {shader::kTap0Length_m, shader::kTap1Length_m, shader::kTap2Length_m};
-    const Floats patches = patches_of(volume, point);
+    const Floats patches = patches_at(volume, place);
     Floats own = zero;
     for (std::size_t tap = 0; tap < 3; ++tap) {
         const Floats extinction =

@@ -34,74 +34,87 @@ struct Wave {
     Floats height, slope;
 };
 
-// `along`: place on the axis across which they are drawn; `length`: kWaveAcross or kWaveAlong.
-HWY_INLINE Wave wave_at(const MarchedVolume& volume, Floats along, std::size_t axis, float length) {
+// `beyond`: from the first period, along the axis across which they are drawn; `length`: kWaveAcross or kWaveAlong.
+HWY_INLINE Wave wave_at(const MarchedVolume& volume, Floats beyond, float length) {
     const Lanes d;
-    const Floats zero = hn::Zero(d), one = set(1.0f), home = set(volume.home);
-    const Floats beyond = hn::Sub(hn::Max(hn::Sub(along, set(volume.home + volume.period[axis])), zero),
-                                  hn::Max(hn::Sub(home, along), zero));
+    const Floats one = set(1.0f);
     const float per_wave = volume.patch_ramp / length;
     const Floats turns = hn::Mul(beyond, set(per_wave)), half = hn::Sub(hn::Sub(turns, hn::Floor(turns)), set(0.5f));
     const Floats q = hn::MulSub(hn::Abs(half), set(4.0f), one), rest = hn::Sub(set(2.0f), hn::Abs(q));
     const Floats slope = hn::Mul(set(-8 * shader::kWaveHeight), hn::CopySign(hn::Sub(rest, one), half));
     return {hn::Mul(set(shader::kWaveHeight / per_wave), hn::NegMulAdd(q, rest, one)),
-            hn::IfThenElseZero(hn::Ne(beyond, zero), slope)};
+            hn::IfThenElseZero(hn::Ne(beyond, hn::Zero(d)), slope)};
 }
 
-// Places relative to a volume's corner. Of a volume that repeats: those with the same cloud in its first period, over a
-// plane ground.
-HWY_INLINE Floats3 offset_in(const MarchedVolume& volume, const Floats3& point) {
-    const Floats3 corner{set(volume.corner[0]), set(volume.corner[1]), set(volume.corner[2])};
-    if (!volume.repeats) return subtract(point, corner);
-    Floats3 offset = subtract(above_plane(point, volume.bend), corner);
-    const Floats x = offset.x;
-    offset.x = hn::Add(offset.x, wave_at(volume, offset.y, 1, shader::kWaveAcross).height);
-    offset.y = hn::Add(offset.y, wave_at(volume, x, 0, shader::kWaveAlong).height);
-    const auto at_home = [&](Floats along, std::size_t axis) {
-        const Floats periods = hn::Floor(hn::Mul(hn::Sub(along, set(volume.home)), set(volume.per_period[axis])));
-        return hn::NegMulAdd(periods, set(volume.period[axis]), along);
+// Places in a volume.
+struct PlaceIn {
+    // Relative to its corner. Of a volume that repeats: those with the same cloud in its first period, over a plane
+    // ground.
+    Floats3 offset;
+    // Of a volume that repeats: relative to its corner, not taken back; how far beyond the first period in x and y; and
+    // the waves there, of the first axis by the second and the other way round.
+    Floats x, y, beyond_x, beyond_y;
+    Wave across, along;
+};
+
+HWY_INLINE PlaceIn endless_place(const MarchedVolume& volume, Floats x, Floats y) {
+    const Lanes d;
+    const Floats zero = hn::Zero(d);
+    const auto beyond = [&](Floats at, std::size_t axis) {
+        return hn::Sub(hn::Max(hn::Sub(at, set(volume.home + volume.period[axis])), zero),
+                       hn::Max(hn::Sub(set(volume.home), at), zero));
     };
-    offset.x = at_home(offset.x, 0);
-    offset.y = at_home(offset.y, 1);
-    return offset;
+    PlaceIn place{{}, x, y, beyond(x, 0), beyond(y, 1), {zero, zero}, {zero, zero}};
+    if (!hn::AllTrue(d, hn::Eq(hn::Or(place.beyond_x, place.beyond_y), zero))) {
+        place.across = wave_at(volume, place.beyond_y, shader::kWaveAcross);
+        place.along = wave_at(volume, place.beyond_x, shader::kWaveAlong);
+    }
+    const auto at_home = [&](Floats at, std::size_t axis) {
+        const Floats periods = hn::Floor(hn::Mul(hn::Sub(at, set(volume.home)), set(volume.per_period[axis])));
+        return hn::NegMulAdd(periods, set(volume.period[axis]), at);
+    };
+    place.offset.x = at_home(hn::Add(x, place.across.height), 0);
+    place.offset.y = at_home(hn::Add(y, place.along.height), 1);
+    return place;
 }
 
-// The direction of rays at a distance from the eye, as such places go on along it.
-HWY_INLINE Floats3 way_in(const MarchedVolume& volume, const Floats3& ray, Floats distance) {
-    if (!volume.repeats) return ray;
-    const Floats x = hn::MulSub(distance, ray.x, set(volume.corner[0])),
-                 y = hn::MulSub(distance, ray.y, set(volume.corner[1]));
+// Of points relative to the eye.
+HWY_INLINE PlaceIn place_in(const MarchedVolume& volume, const Floats3& point) {
+    const Floats3 corner{set(volume.corner[0]), set(volume.corner[1]), set(volume.corner[2])};
+    if (!volume.repeats) {
+        const Floats zero = hn::Zero(Lanes());
+        return {subtract(point, corner), zero, zero, zero, zero, {zero, zero}, {zero, zero}};
+    }
+    const Floats3 apart = subtract(above_plane(point, volume.bend), corner);
+    PlaceIn place = endless_place(volume, apart.x, apart.y);
+    place.offset.z = apart.z;
+    return place;
+}
+
+// The direction of rays at a distance from the eye, as such places go on along it. The volume repeats.
+HWY_INLINE Floats3 way_in(const MarchedVolume& volume, const PlaceIn& place, const Floats3& ray, Floats distance) {
     const Floats level = hn::NegMulAdd(ray.z, ray.z, set(1.0f));
-    return {hn::MulAdd(wave_at(volume, y, 1, shader::kWaveAcross).slope, ray.y, ray.x),
-            hn::MulAdd(wave_at(volume, x, 0, shader::kWaveAlong).slope, ray.x, ray.y),
+    return {hn::MulAdd(place.across.slope, ray.y, ray.x), hn::MulAdd(place.along.slope, ray.x, ray.y),
             hn::MulAdd(hn::Mul(set(2 * volume.bend), distance), level, ray.z)};
 }
 
-// How much cloud there is, relative to the first period, at places relative to the corner that are not taken back
-// to it.
-HWY_INLINE Floats patches_at(const MarchedVolume& volume, Floats x, Floats y) {
+// How much cloud there is, relative to the first period.
+HWY_INLINE Floats patches_at(const MarchedVolume& volume, const PlaceIn& place) {
     const Lanes d;
-    const Floats zero = hn::Zero(d), one = set(1.0f), home = set(volume.home);
-    const auto beyond = [&](Floats along, std::size_t axis) {
-        return hn::Max(hn::Sub(home, along), hn::Sub(along, set(volume.home + volume.period[axis])));
-    };
-    const Floats away = hn::Max(hn::Max(beyond(x, 0), beyond(y, 1)), zero);
+    const Floats zero = hn::Zero(d), one = set(1.0f);
+    if (!volume.repeats) return one;
+    const Floats away = hn::Max(hn::Abs(place.beyond_x), hn::Abs(place.beyond_y));
     const Floats share = hn::Min(hn::Mul(away, set(volume.patch_ramp)), one);
     if (hn::AllTrue(d, hn::Eq(share, zero))) return one;
     const float* const to = volume.to_patches;
     const Floats voxels = set(float(kLargeNoiseVoxels));
-    const Floats across = hn::MulAdd(set(to[0]), x, hn::Mul(set(to[1]), y)),
-                 along = hn::MulAdd(set(to[2]), x, hn::Mul(set(to[3]), y));
+    const Floats across = hn::MulAdd(set(to[0]), place.x, hn::Mul(set(to[1]), place.y)),
+                 along = hn::MulAdd(set(to[2]), place.x, hn::Mul(set(to[3]), place.y));
     const Floats noise = erosion::noise_at(volume.kernel.large_noise, erosion::integer(0), erosion::integer(7),
                                            hn::Mul(across, voxels), hn::Mul(along, voxels),
                                            set(shader::kPatchLevel * float(kLargeNoiseVoxels)));
-    return hn::Max(hn::MulAdd(hn::Mul(share, set(shader::kPatchSpread)), hn::NegMulAdd(set(2.0f), noise, one), one), zero);
-}
-
-// Of places of a ray relative to the eye.
-HWY_INLINE Floats patches_of(const MarchedVolume& volume, const Floats3& point) {
-    if (!volume.repeats) return set(1.0f);
-    return patches_at(volume, hn::Sub(point.x, set(volume.corner[0])), hn::Sub(point.y, set(volume.corner[1])));
+    const Floats more = hn::NegMulAdd(set(2.0f), noise, one);
+    return hn::Max(hn::MulAdd(hn::Mul(share, set(shader::kPatchSpread)), more, one), zero);
 }
 
 // D times a factor, as the share t of D and the density of half coverage that nodes store.
@@ -127,10 +140,9 @@ HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& poin
             const Floats size = set(float(count));
             return hn::NegMulAdd(hn::Floor(hn::Mul(at, set(1.0f / float(count)))), size, at);
         };
-        const Floats across = wave_at(volume, y, 1, shader::kWaveAcross).height,
-                     along = wave_at(volume, x, 0, shader::kWaveAlong).height;
-        const Floats u = wrapped(hn::MulAdd(across, per_cell, column), volume.shade_columns),
-                     v = wrapped(hn::MulAdd(along, per_cell, row), volume.shade_rows);
+        const PlaceIn middle = endless_place(volume, x, y);
+        const Floats u = wrapped(hn::MulAdd(middle.across.height, per_cell, column), volume.shade_columns),
+                     v = wrapped(hn::MulAdd(middle.along.height, per_cell, row), volume.shade_rows);
         const auto texel = [&](Floats at, int count) {
             return hn::Min(hn::ConvertTo(di, at), hn::Set(di, count - 1));
         };
@@ -139,7 +151,7 @@ HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& poin
                                            hn::Add(hn::Mul(j, hn::Set(di, volume.shade_columns)), i));
         const Floats root = hn::Mul(erosion::of_word(words, hn::Sub(u, hn::ConvertTo(d, i)), hn::Sub(v, hn::ConvertTo(d, j))),
                                     set(1.0f / 255.0f));
-        const Floats patches = patches_at(volume, x, y);
+        const Floats patches = patches_at(volume, middle);
         const Floats below = hn::Mul(hn::Sub(set(volume.shade_top), place.z), set(volume.per_shade_height));
         const Floats part = hn::Max(hn::Min(below, set(1.0f)), hn::Zero(d));
         const Floats depth = hn::Mul(hn::Mul(hn::Mul(root, root), set(shader::kMostShadeDepth)), hn::Mul(patches, part));
