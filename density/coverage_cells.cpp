@@ -102,7 +102,7 @@ double bump_size_m(const DetailOptions& options, double cell_m) {
 }
 
 CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture)
-    : blocks_(blocks_of(grid)), boundaries_(setting.boundaries), extent_(grid.extent()) {
+    : blocks_(blocks_of(grid)), boundaries_(setting.images ? setting.boundaries : Boundaries{}), extent_(grid.extent()) {
     std::erase_if(blocks_, [](const Block& block) { return block.positive_count() == 0; });
     const Extent extent = grid.extent();
     const int size[3] = {extent.x, extent.y, extent.z};
@@ -117,9 +117,9 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
     const Thermals thermals(setting, extent, grid.placement().cell_size_m);
     std::vector<float> aprons[2];
     for (int i = 0; i < size_[0] * kBlock; ++i)
-        aprons[0].push_back(apron_at(i, extent.x, boundaries_.x, setting.options.apron_cells));
+        aprons[0].push_back(apron_at(i, extent.x, setting.boundaries.x, setting.options.apron_cells));
     for (int j = 0; j < size_[1] * kBlock; ++j)
-        aprons[1].push_back(apron_at(j, extent.y, boundaries_.y, setting.options.apron_cells));
+        aprons[1].push_back(apron_at(j, extent.y, setting.boundaries.y, setting.options.apron_cells));
     const Vec3 origin = grid.placement().origin_m;
     const double cell = grid.placement().cell_size_m;
     tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t n) {

@@ -109,14 +109,15 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     const double base_m = (before + base_cells(masses, mass_)) * cell;
     mean_density_ = cells.mean_density();
     set_erosion(setting, grid.extent(), base_m);
-    find_places(cells, setting.boundaries, extent, before, sums.reach());
+    const Boundaries beyond = setting.images ? setting.boundaries : Boundaries{};
+    find_places(cells, beyond, extent, before, sums.reach());
     sample_nodes(cells, sums, before);
     mass_ *= 8;  // nodes for each cell
     set_erosion(setting, grid.extent(), base_m);
     clearance_ = clearance_of_cells(nodes_, places_, table_, bricks_, erosion_.least_coverage);
     set_distances(table_, bricks_);
 
-    const Boundary boundaries[3] = {setting.boundaries.x, setting.boundaries.y, setting.boundaries.z};
+    const Boundary boundaries[3] = {beyond.x, beyond.y, beyond.z};
     std::array<std::vector<std::uint8_t>, 3> counted;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         counted[axis].assign(std::size_t(bricks_[axis]) * kCells, 1);

@@ -47,13 +47,14 @@ struct DetailSetting {
     // Direction of DetailOptions::stretch: east and north. Precondition: of length 1.
     Vec2 along{1, 0};
     // Sides of the grid: open, no cloud beyond, and cloud thins out towards them over DetailOptions::apron_cells cells;
-    // periodic, images of the grid beyond.
+    // periodic, images of the grid beyond, and noise that repeats with it.
     Boundaries boundaries;
+    bool images = true;  // false: no cloud beyond periodic sides either
 };
 
 // Returns whether the cloud goes on to the horizon in pictures.
 inline bool repeats(const DetailSetting& setting) {
-    return setting.options.to_horizon && setting.boundaries.x == Boundary::periodic &&
+    return setting.images && setting.options.to_horizon && setting.boundaries.x == Boundary::periodic &&
            setting.boundaries.y == Boundary::periodic;
 }
 

@@ -38,8 +38,8 @@ DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> laye
     // A file with another box than the lattice is not cut by its sides.
     const bool whole = layer || is_box_of(density, scene.automaton);
     if (!whole) setting.options.apron_cells = 0;
-    if (whole && setting.options.to_horizon)
-        setting.boundaries = layer ? scene.layers[*layer].boundaries : scene.automaton.boundaries;
+    if (whole) setting.boundaries = layer ? scene.layers[*layer].boundaries : scene.automaton.boundaries;
+    setting.images = repeats(setting);
     setting.drift_m = wind_displacement_m(wind, height, time_s);
     if (veil) {
         const Rotation fibres = rotation_of_degrees(scene.layers[*layer].veil.direction_deg);

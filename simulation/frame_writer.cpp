@@ -61,6 +61,7 @@ DensityGrid FrameWriter::refined(const DensityGrid& density, const std::optional
     DetailSetting setting = detail_setting(scene_, layer, density, time_s);
     if (setting.options.enabled) {
         setting.boundaries = boundaries;
+        setting.images = true;
         const CoverageField field(density, setting, moisture ? &*moisture : nullptr);
         return resample_with_detail(field, density.extent(), density.placement(), options.refine);
     }

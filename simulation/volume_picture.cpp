@@ -102,6 +102,10 @@ VolumePicture draw_volume(const std::string& file, const LoadedDensity& loaded,
     // Voxels that are as fine as the bumps, or were refined with detail, have what it would add. Very many are drawn as
     // metaballs alone: fields of them would take 45 bytes a voxel.
     if (loaded.density.active_voxels() > kMostMarchedVoxels) drawn.density.detail.enabled = false;
+    if (drawn.density.detail.enabled && loaded.refine > 1) {  // rays march through the voxels as they are
+        drawn.density.metaball_radius_cells = result.metaball_radius_voxels = 1;
+        drawn.density.detail.apron_cells = 0;
+    }
     if (loaded.refine > 1 || loaded.density.placement().cell_size_m < kLeastVoxelWithDetail_m)
         drawn.density.detail.strength = drawn.density.detail.thermals = 0;
     FramePainter painter(drawn, device);

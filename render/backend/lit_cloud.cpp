@@ -78,7 +78,7 @@ CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, cons
         for (const double number : {double(part.first), double(part.count), s.metaball_radius_cells, s.extinction_per_m, s.drift_m.x,
                                     s.drift_m.y, s.drift_m.z, s.along.x, s.along.y, o.strength, o.size_m,
                                     o.stretch, o.wisps, o.thermals, o.mean_free_path_m,
-                                    double(repeats(s)), double(s.boundaries.x), double(s.boundaries.y),
+                                    double(repeats(s)), double(s.images), double(s.boundaries.x), double(s.boundaries.y),
                                     double(s.boundaries.z), double(o.apron_cells), s.opacity, origin.x, origin.y, origin.z,
                                     part.density.placement().cell_size_m, part.moisture ? part.moisture->sum() : -1.0})
             rest.push_back(number);

@@ -242,13 +242,17 @@ class Pictures(Case):
         differences = [abs(x - y) for x, y in zip(pictures[1], png_pixels(self.folder / "still.png"))]
         self.assertGreater(max(differences), 10, "the fog drifts")
 
-    def test_refined_grids_are_drawn_with_metaballs_of_the_same_size(self):
-        """The radius is in cells: a refined file looks as the run's own picture, which is of the cells."""
+    def test_refined_grids_look_as_the_runs_own_picture(self):
+        """They have the detail that the run drew: rays march through their voxels as they are. Without detail they are
+        drawn with metaballs of the same size, whose radius is in cells."""
         changes = ["--set", "density.refine=2", "--set", "density.metaball_radius_cells=2.5", "--set", "lattice.cells=[48,32,24]"]
         self.call("run", self.scene, *changes, "--out", "out")
         result = self.call("render", "out/density/tiny_0005.vdb", "--scene", self.scene, *changes, "--out", "again.png",
                            "--json")
-        self.assertEqual(json.loads(result.stdout)["metaball_radius_voxels"], 5)
+        self.assertEqual(json.loads(result.stdout)["metaball_radius_voxels"], 1)
+        smooth = self.call("render", "out/density/tiny_0005.vdb", "--scene", self.scene, *changes, "--set",
+                           "detail.enabled=false", "--out", "smooth.png", "--json")
+        self.assertEqual(json.loads(smooth.stdout)["metaball_radius_voxels"], 5)
         a, b = [png_pixels(self.folder / p) for p in ("out/frames/tiny_0005.png", "again.png")]
         differences = sorted(abs(x - y) for x, y in zip(a, b))
         self.assertLess(sum(differences) / len(differences), 3)
