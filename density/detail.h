@@ -29,6 +29,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/vec.h"
@@ -141,6 +142,8 @@ class CoverageField {
     // kBrickCells^3 of each of these, x fastest: the mean detailed density of each cell, of eight samples whose
     // footprint is half a cell.
     const std::vector<float>& cell_density() const { return cell_density_; }
+    // Returns it and keeps none.
+    std::vector<float> take_cell_density() { return std::exchange(cell_density_, {}); }
 
     const ErosionConstants& erosion() const { return erosion_; }
     double extinction_per_m() const { return extinction_per_m_; }

@@ -18,8 +18,9 @@ namespace {
 
 constexpr int kCells = CoverageField::kBrickCells;
 
-std::vector<float> mean_extinction(const CoverageField& field) {
-    std::vector<float> result = field.cell_density();
+// Takes the densities of cells, which nothing else needs.
+std::vector<float> mean_extinction(CoverageField& field) {
+    std::vector<float> result = field.take_cell_density();
     for (float& number : result) number *= float(field.extinction_per_m());
     return result;
 }

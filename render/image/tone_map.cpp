@@ -2,8 +2,11 @@
 #include "render/image/tone_map.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "render/image/exposure.h"
@@ -32,23 +35,64 @@ std::array<float, 3> toned(const std::array<float, 3>& radiance, ToneCurve curve
     return {tone_map(radiance[0]), tone_map(radiance[1]), tone_map(radiance[2])};
 }
 
+// Thresholds of the matrix, rows from the top.
+std::array<float, 64> dither_matrix() {
+    std::array<float, 64> matrix{};
+    for (int y = 0; y < 8; ++y)
+        for (int x = 0; x < 8; ++x) matrix[std::size_t(8 * y + x)] = dither(x, y);
+    return matrix;
+}
+
+// A channel as a byte. Black stays black and white stays white: only what lies between is dithered.
+std::uint8_t byte_of(float shown, float offset) {
+    const float value = 255.0f * encode_srgb(shown);
+    const bool end = value <= 0.0f || value >= 255.0f;
+    return std::uint8_t(std::clamp(std::floor(value + (end ? 0.0f : offset) + 0.5f), 0.0f, 255.0f));
+}
+
+// byte_of() without a power for nearly all numbers: 255 encode_srgb() between points whose mantissas have eight bits, to
+// within 2e-4, unless that leaves a doubt about the byte.
+class ByteTable {
+  public:
+    ByteTable() {
+        for (std::uint32_t n = 0; n < kPoints; ++n) {
+            const float x = point(n);
+            values_[n] = 255.0f * encode_srgb(x);
+            slopes_[n] = (255.0f * encode_srgb(point(n + 1)) - values_[n]) / (point(n + 1) - x);
+        }
+    }
+
+    std::uint8_t byte_of(float shown, float offset) const {
+        if (!(shown >= kLowest && shown < kHighest)) return nephos::byte_of(shown, offset);
+        const std::uint32_t n = (std::bit_cast<std::uint32_t>(shown) >> kDropped) - kFirst;
+        const float raised = values_[n] + slopes_[n] * (shown - point(n)) + offset + 0.5f, whole = std::floor(raised);
+        if (std::abs(raised - whole - 0.5f) > 0.5f - kDoubt) return nephos::byte_of(shown, offset);
+        return std::uint8_t(whole);
+    }
+
+  private:
+    static constexpr float kLowest = 1.0f / 256, kHighest = 0.999f, kDoubt = 1e-3f;
+    static constexpr std::uint32_t kDropped = 15, kFirst = std::bit_cast<std::uint32_t>(kLowest) >> kDropped,
+                                   kPoints = (std::bit_cast<std::uint32_t>(1.0f) >> kDropped) - kFirst;
+    static float point(std::uint32_t n) { return std::bit_cast<float>((n + kFirst) << kDropped); }
+
+    std::array<float, kPoints> values_{}, slopes_{};
+};
+
 std::vector<std::uint8_t> encoded(std::span<const float> beauty, int width, double exposure_ev,
                                   ToneCurve curve) {
     const float gain = float(std::exp2(exposure_ev));
     std::vector<std::uint8_t> rgb(beauty.size());
     const std::size_t pixels = beauty.size() / 3;
+    static const std::array<float, 64> matrix = dither_matrix();
+    static const ByteTable bytes;
     for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
         const std::size_t at = 3 * pixel;
-        const float offset = dither(int(pixel % std::size_t(width)), int(pixel / std::size_t(width)));
+        const float offset = matrix[pixel / std::size_t(width) % 8 * 8 + pixel % std::size_t(width) % 8];
         const std::array<float, 3> shown =
             toned({gain * beauty[at], gain * beauty[at + 1], gain * beauty[at + 2]}, curve);
-        for (std::size_t channel = 0; channel < 3; ++channel) {
-            const float value = 255.0f * encode_srgb(shown[channel]);
-            // Black stays black and white stays white: only what lies between is dithered.
-            const bool end = value <= 0.0f || value >= 255.0f;
-            rgb[at + channel] =
-                std::uint8_t(std::clamp(std::floor(value + (end ? 0.0f : offset) + 0.5f), 0.0f, 255.0f));
-        }
+        for (std::size_t channel = 0; channel < 3; ++channel)
+            rgb[at + channel] = bytes.byte_of(shown[channel], offset);
     }
     return rgb;
 }

@@ -111,6 +111,35 @@ TEST(ToneMap, DitherKeepsTheMean) {
     for (const std::uint8_t byte : to_srgb8(picture, 0)) ASSERT_EQ(byte, 0);
 }
 
+// Ordered dithering: each matrix is four of half its size, with their thresholds between each other.
+int bayer(int x, int y, int size) {
+    constexpr int kSmallest[2][2] = {{0, 2}, {3, 1}};
+    if (size == 1) return 0;
+    return 4 * bayer(x % (size / 2), y % (size / 2), size / 2) + kSmallest[y / (size / 2)][x / (size / 2)];
+}
+
+// Bytes come from a table where there is no doubt about them: all are those of the formulas.
+TEST(ToneMap, BytesAreThoseOfTheFormulas) {
+    Picture picture;
+    picture.width = 640;
+    picture.height = 512;
+    std::uint32_t state = 12345;  // seed
+    for (std::size_t i = 0; i < 3 * picture.pixels(); ++i) {
+        state = state * 1664525u + 1013904223u;
+        const float random = float(state >> 8) * 0x1p-24f;
+        picture.beauty.push_back(i % 3 == 0 ? random * 0.02f : i % 3 == 1 ? random : 3 * random);
+    }
+    const std::vector<std::uint8_t> bytes = to_srgb8(picture, 0);
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+        const int x = int(i / 3) % picture.width % 8, y = int(i / 3) / picture.width % 8;
+        const float value = 255.0f * encode_srgb(tone_map(picture.beauty[i])),
+                    offset = (float(bayer(x, y, 8)) + 0.5f) / 64.0f - 0.5f;
+        wrong += int(bytes[i]) != int(std::clamp(std::floor(value + offset + 0.5f), 0.0f, 255.0f)) ? 1 : 0;
+    }
+    EXPECT_EQ(wrong, 0u);
+}
+
 TEST(ToneMap, AppliesTheExposure) {
     Picture picture;
     picture.width = picture.height = 1;
