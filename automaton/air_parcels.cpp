@@ -10,7 +10,20 @@ namespace nephos {
 namespace {
 
 // Order of the numbers drawn for one parcel; each has its own place in the counter.
-enum ParcelDraw : std::uint32_t { kX, kY, kZ, kAxisX, kAxisY, kAxisZ, kYaw, kBirth, kLife, kSide, kAlong, kRise };
+enum ParcelDraw : std::uint32_t {
+    kX,
+    kY,
+    kZ,
+    kAxisX,
+    kAxisY,
+    kAxisZ,
+    kYaw,
+    kBirth,
+    kLife,
+    kSide,
+    kAlong,
+    kRise
+};
 
 constexpr std::uint32_t kFirstOfThermals = 16;  // sub-index of the numbers of thermal 0; one for each thermal
 
@@ -69,24 +82,26 @@ void append_thermals(const AutomatonOptions& options, const AirParcel& plume, co
         thermal.life_s = o.life_s;
         const double weight = fade_weight(thermal, time_s);
         if (weight <= 0) continue;
-        const auto words = philox(options.seed,
-                                  item_counter(Domain::field, std::uint32_t(plume.scatter), plume.index,
-                                               plume.generation, kFirstOfThermals + std::uint32_t(n) % 65520u));
+        const auto words = philox(
+            options.seed, item_counter(Domain::field, std::uint32_t(plume.scatter), plume.index,
+                                       plume.generation, kFirstOfThermals + std::uint32_t(n) % 65520u));
         const double of_size = 1 - o.variety * unit_interval(words[0]);
         const double of_rise = 1 - o.variety * unit_interval(words[1]);
         const double lived = (time_s - thermal.birth_s) / o.life_s;
         const double risen = rise * of_rise * lived * (2 - lived);
         const Vec3 released = Vec3(o.width, o.width, 1) * e.semi_axes_m * of_size;
-        thermal.semi_axes_m = released * std::max(0.2, 1 + o.spread * risen / (0.5 * (released.x + released.y)));
+        thermal.semi_axes_m =
+            released * std::max(0.2, 1 + o.spread * risen / (0.5 * (released.x + released.y)));
         // Within the ellipse of the plume, at the same angle as its semi-axes.
         const Rotation turn = rotation_of_degrees(e.yaw_deg);
         const double a = o.wander * e.semi_axes_m.x * (2 * unit_interval(words[2]) - 1),
                      b = o.wander * e.semi_axes_m.y * (2 * unit_interval(words[3]) - 1);
         const Velocity wind = e.carried ? wind_at(options.wind, e.centre_m.z + 0.5 * risen, time_s) : below;
         const double since = time_s - thermal.birth_s;
-        thermal.centre_m = root + Vec3(a * turn.cos - b * turn.sin + (wind.east_m_per_s - below.east_m_per_s) * since,
-                                       a * turn.sin + b * turn.cos + (wind.north_m_per_s - below.north_m_per_s) * since,
-                                       risen);
+        thermal.centre_m =
+            root + Vec3(a * turn.cos - b * turn.sin + (wind.east_m_per_s - below.east_m_per_s) * since,
+                        a * turn.sin + b * turn.cos + (wind.north_m_per_s - below.north_m_per_s) * since,
+                        risen);
         to.push_back({thermal, weight});
     }
 }

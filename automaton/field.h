@@ -60,8 +60,8 @@ struct Ellipsoid {
 // evaporates, and what is left of a bubble shrinks: spread < 0. The wind carries a thermal by its value at the middle of
 // the way that it has risen, the plume by that at the level of release: towers lean with the shear.
 struct ThermalPlume {
-    double interval_s = 0;  // between releases; 0: no plume
-    double life_s = 900;    // of a thermal, > 0
+    double interval_s = 0;   // between releases; 0: no plume
+    double life_s = 900;     // of a thermal, > 0
     Range rise_m{800, 800};  // height gained, drawn for each plume; >= 0
     double width = 0.6;      // 0.05..1: of a thermal, in widths of the base
     double spread = -0.1;    // -1..1

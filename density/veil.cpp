@@ -143,7 +143,7 @@ struct VeilField {
     std::vector<double> up_m, behind_m;   // of levels: height above the base, and displacement along
     float sheet = 0;
     VeilArea area;
-    bool is_limited = false;      // by the area
+    bool is_limited = false;  // by the area
     Rotation of_area;
     double area_x_m = 0, area_y_m = 0;  // of its centre from the lattice's corner
 };
@@ -193,7 +193,8 @@ VeilField field_of(const VeilOptions& options, const Wind& wind, const Extent& e
 // The weight of a column by the area.
 float area_weight(const VeilField& field, int i, int j) {
     if (!field.is_limited) return 1;
-    const double east = (i + 0.5) * field.cell_m - field.area_x_m, north = (j + 0.5) * field.cell_m - field.area_y_m;
+    const double east = (i + 0.5) * field.cell_m - field.area_x_m,
+                 north = (j + 0.5) * field.cell_m - field.area_y_m;
     const double a = (east * field.of_area.cos + north * field.of_area.sin) / field.area.semi_a_m,
                  b = (north * field.of_area.cos - east * field.of_area.sin) / field.area.semi_b_m;
     return float(fade(1 - std::sqrt(a * a + b * b), field.area.softness));
@@ -237,7 +238,8 @@ void collect(const VeilField& field, const openvdb::Coord& origin, BlockPoints& 
     const int nz = std::min(kBlock, field.extent.z - origin.z());
     for (int x = 0; x < nx; ++x) {
         for (int y = 0; y < ny; ++y) {
-            const float side = field.by_x[std::size_t(origin.x() + x)] * field.by_y[std::size_t(origin.y() + y)] *
+            const float side = field.by_x[std::size_t(origin.x() + x)] *
+                               field.by_y[std::size_t(origin.y() + y)] *
                                area_weight(field, origin.x() + x, origin.y() + y);
             const double dx = x * field.cell_m, dy = y * field.cell_m;
             const double along = dx * r.cos + dy * r.sin, across = dy * r.cos - dx * r.sin;

@@ -55,10 +55,11 @@ struct VeilOctave {
 // The ellipse of the ground above which there is a veil: an anvil, a patch. Outside it is clear.
 struct VeilArea {
     double x_m = 0, y_m = 0;  // centre, world east and north, at time 0
-    double semi_a_m = std::numeric_limits<double>::infinity(), semi_b_m = semi_a_m;  // > 0; infinite: no limit
-    double yaw_deg = 0;   // of the first semi-axis, counter-clockwise from east
-    double softness = 1;  // fraction of the radius over which the density falls to 0 at the rim; 0..1
-    bool carried = false;  // by the wind at the veil's `top_m`, as the pattern is; otherwise it stands
+    double semi_a_m = std::numeric_limits<double>::infinity(),
+           semi_b_m = semi_a_m;  // > 0; infinite: no limit
+    double yaw_deg = 0;          // of the first semi-axis, counter-clockwise from east
+    double softness = 1;         // fraction of the radius over which the density falls to 0 at the rim; 0..1
+    bool carried = false;        // by the wind at the veil's `top_m`, as the pattern is; otherwise it stands
     bool operator==(const VeilArea&) const = default;
 };
 

@@ -120,7 +120,8 @@ MemoryEstimate lattice_estimate(const Scene& scene, const AutomatonOptions& latt
 }
 
 // A veil has grids alone: nothing of it is remembered.
-MemoryEstimate veil_estimate(const Scene& scene, const AutomatonOptions& lattice, bool detail, double under_way) {
+MemoryEstimate veil_estimate(const Scene& scene, const AutomatonOptions& lattice, bool detail,
+                             double under_way) {
     DensityOptions density = scene.density;
     density.write_state = false;
     MemoryEstimate estimate;

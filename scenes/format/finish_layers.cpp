@@ -246,9 +246,10 @@ void check_rain(const SectionReader& reader, const LayerOptions& layer) {
 void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
     for (const std::string_view key : keys_of_clouds()) {
         if (reader.find(key) == nullptr) continue;
-        reader.report(key, reader.quoted(key) + " stands beside `veil`",
-                      "expected `name`, `opacity`, `lattice`, `wind`, `veil` and `detail` alone: a veil has no clouds "
-                      "and no automaton");
+        reader.report(
+            key, reader.quoted(key) + " stands beside `veil`",
+            "expected `name`, `opacity`, `lattice`, `wind`, `veil` and `detail` alone: a veil has no clouds "
+            "and no automaton");
     }
     const SectionReader lattice = below(reader, "lattice"), veil = below(reader, "veil");
     if (lattice.find("boundaries") != nullptr) {

@@ -114,7 +114,8 @@ void replace_infinite(Range& range, double low, double size) {
 
 }  // namespace
 
-void fill_in_centres(std::vector<EllipsoidScatter>& scatters, const Extent& extent, const Placement& placement) {
+void fill_in_centres(std::vector<EllipsoidScatter>& scatters, const Extent& extent,
+                     const Placement& placement) {
     for (EllipsoidScatter& scatter : scatters) {
         replace_infinite(scatter.x_m, placement.origin_m.x, extent.x * placement.cell_size_m);
         replace_infinite(scatter.y_m, placement.origin_m.y, extent.y * placement.cell_size_m);

@@ -50,11 +50,12 @@ void finish_ellipsoid(const SectionReader& reader, void* owner) {
 void finish_scatter(const SectionReader& reader, void* owner) {
     const auto& scatter = *static_cast<const EllipsoidScatter*>(owner);
     const bool plume = scatter.thermals.interval_s > 0;
-    check_fades(reader, scatter.fade_in_s + scatter.fade_out_s, plume ? scatter.thermals.life_s : scatter.life_s.min);
+    check_fades(reader, scatter.fade_in_s + scatter.fade_out_s,
+                plume ? scatter.thermals.life_s : scatter.life_s.min);
     if (plume && scatter.thermals.life_s > scatter.life_s.min)
         reader.report("thermals",
-                      "thermals live " + number_text(scatter.thermals.life_s) + " s, longer than the shortest plume with " +
-                          number_text(scatter.life_s.min) + " s",
+                      "thermals live " + number_text(scatter.thermals.life_s) +
+                          " s, longer than the shortest plume with " + number_text(scatter.life_s.min) + " s",
                       "expected `thermals.life_s` <= `life_s`");
 }
 
@@ -106,38 +107,46 @@ const Section& ellipsoid_section() {
 void finish_thermals(const SectionReader& reader, void* owner) {
     const auto& plume = *static_cast<const ThermalPlume*>(owner);
     if (!(plume.interval_s > 0) || thermals_at_once(plume) <= kMaxThermalsAtOnce) return;
-    reader.report("interval_s",
-                  "a plume has " + number_text(thermals_at_once(plume)) + " thermals at the same time",
-                  "expected at most " + number_text(kMaxThermalsAtOnce) + ": a longer interval or a shorter life");
+    reader.report(
+        "interval_s", "a plume has " + number_text(thermals_at_once(plume)) + " thermals at the same time",
+        "expected at most " + number_text(kMaxThermalsAtOnce) + ": a longer interval or a shorter life");
 }
 
 const Section& thermals_section() {
     constexpr const char* kBubbles = "Scorer and Ludlam 1953";
     static const Section section{
         "Plumes of thermals",
-        "Makes each ellipsoid the base of a plume: thermals as high as it leave it one after the other, rise, slow "
-        "down, lean with the shear of the wind, and die. `fade_in_s` and `fade_out_s` are those of each of them, the "
-        "scatter's `life_s` is the plume's. With its centre on the bottom of the lattice, the condensation level, the "
+        "Makes each ellipsoid the base of a plume: thermals as high as it leave it one after the other, "
+        "rise, slow "
+        "down, lean with the shear of the wind, and die. `fade_in_s` and `fade_out_s` are those of each of "
+        "them, the "
+        "scatter's `life_s` is the plume's. With its centre on the bottom of the lattice, the condensation "
+        "level, the "
         "base is flat: nothing is born below it.",
         {required(key<&ThermalPlume::interval_s>("interval_s", "s", above(0, kLongest_s),
                                                  "Time from one release to the next.", kBubbles)),
-         key<&ThermalPlume::life_s>("life_s", "s", above(0, kLongest_s),
-                                    "Life of a thermal; at most the shortest of the plume. The last one dies with it."),
-         key<&ThermalPlume::rise_m>("rise_m", "m", between(0, kFarthest_m),
-                                    "Height that a thermal gains in its life, drawn for each plume. It starts with twice "
-                                    "its mean speed and comes to rest.",
-                                    kBubbles),
+         key<&ThermalPlume::life_s>(
+             "life_s", "s", above(0, kLongest_s),
+             "Life of a thermal; at most the shortest of the plume. The last one dies with it."),
+         key<&ThermalPlume::rise_m>(
+             "rise_m", "m", between(0, kFarthest_m),
+             "Height that a thermal gains in its life, drawn for each plume. It starts with twice "
+             "its mean speed and comes to rest.",
+             kBubbles),
          key<&ThermalPlume::width>("width", "", between(0.05, 1),
                                    "Width of a thermal at its release, in widths of the ellipsoid."),
-         key<&ThermalPlume::spread>("spread", "", between(-1, 1),
-                                    "Growth of the radius per metre risen: 0.25 in air of neutral stability; below 0 "
-                                    "towers taper, as in dry air, which evaporates their rims.",
-                                    "Scorer 1957, Woodward 1959"),
-         key<&ThermalPlume::variety>("variety", "", between(0, 0.9),
-                                     "Size and rise of a thermal are drawn between 1 less this and 1 of the plume's."),
-         key<&ThermalPlume::wander>("wander", "", between(0, 10),
-                                    "How far from the plume's axis thermals are released, in its semi-axes: turrets "
-                                    "beside each other.")},
+         key<&ThermalPlume::spread>(
+             "spread", "", between(-1, 1),
+             "Growth of the radius per metre risen: 0.25 in air of neutral stability; below 0 "
+             "towers taper, as in dry air, which evaporates their rims.",
+             "Scorer 1957, Woodward 1959"),
+         key<&ThermalPlume::variety>(
+             "variety", "", between(0, 0.9),
+             "Size and rise of a thermal are drawn between 1 less this and 1 of the plume's."),
+         key<&ThermalPlume::wander>(
+             "wander", "", between(0, 10),
+             "How far from the plume's axis thermals are released, in its semi-axes: turrets "
+             "beside each other.")},
         &finish_thermals};
     return section;
 }
@@ -148,7 +157,9 @@ const Section& scatter_section() {
     Key thermals = default_is(
         table<&EllipsoidScatter::thermals>("thermals", thermals_section(), thermals_section().effect),
         "none: ellipsoids that stay at their height");
-    thermals.written = [](const void* scatter) { return is_plume(*static_cast<const EllipsoidScatter*>(scatter)); };
+    thermals.written = [](const void* scatter) {
+        return is_plume(*static_cast<const EllipsoidScatter*>(scatter));
+    };
     static const Section section{
         "Ellipsoids at random",
         "Parcels of humid air, drawn at random from the scene's seed. Each value is drawn uniformly from its "

@@ -380,9 +380,9 @@ const Section& layer_section() {
 
 std::span<const std::string_view> keys_of_clouds() {
     static constexpr std::string_view kKeys[] = {
-        "skies",       "automaton",     "background",         "base_height_m",     "genus",    "climate",
-        "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole", "coupling", "rain",
-        "scatters"};
+        "skies",    "automaton",   "background",    "base_height_m",      "genus",
+        "climate",  "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole",
+        "coupling", "rain",        "scatters"};
     return kKeys;
 }
 

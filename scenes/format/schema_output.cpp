@@ -299,28 +299,31 @@ const Section& ground_section() {
 const Section& detail_section() {
     static const Section section{
         "Detail",
-        "Detail below the voxel in pictures, their light, and files that are refined: noise erodes the edge of "
-        "voxel clouds, from bumps of `size_m` down to half a metre, and keeps their mean density. Veils have only `layer.detail`. "
+        "Detail below the voxel in pictures, their light, and files that are refined: noise erodes the edge "
+        "of "
+        "voxel clouds, from bumps of `size_m` down to half a metre, and keeps their mean density. Veils have "
+        "only `layer.detail`. "
         "See docs/detail.md.",
         {key<&DetailOptions::enabled>("enabled", "", kAny,
-                                             "Draw it. Off: the smooth field of metaballs, everywhere as far away."),
+                                      "Draw it. Off: the smooth field of metaballs, everywhere as far away."),
          key<&DetailOptions::strength>(
              "strength", "", between(0, 1.4),
              "Depth of the erosion; cumulus has 1, stratus a third. 0: a smooth surface with a crisp edge."),
-         key<&DetailOptions::size_m>("size_m", "m", between(0, 5000),
-                                            "Size of the largest bumps, at least 20 m; each next kind has half of it. "
-                                            "0: four cells."),
+         key<&DetailOptions::size_m>(
+             "size_m", "m", between(0, 5000),
+             "Size of the largest bumps, at least 20 m; each next kind has half of it. "
+             "0: four cells."),
          key<&DetailOptions::stretch>("stretch", "", between(1, 50),
-                                             "How much longer the bumps are along the wind: fibres."),
-         key<&DetailOptions::wisps>(
-             "wisps", "", between(0, 1),
-             "1: shreds hang below the base; 0: there are round bumps as above."),
-         key<&DetailOptions::thermals>(
-             "thermals", "", between(0, 1),
-             "Strength of towers and hollows of two and four times `size_m`, between the bumps and the clouds."),
+                                      "How much longer the bumps are along the wind: fibres."),
+         key<&DetailOptions::wisps>("wisps", "", between(0, 1),
+                                    "1: shreds hang below the base; 0: there are round bumps as above."),
+         key<&DetailOptions::thermals>("thermals", "", between(0, 1),
+                                       "Strength of towers and hollows of two and four times `size_m`, "
+                                       "between the bumps and the clouds."),
          key<&DetailOptions::mean_free_path_m>(
              "mean_free_path_m", "m", between(0, 10'000),
-             "Mean free path of light in cloud where half of the space is cloud; 0: three quarters of a cell, or in thin "
+             "Mean free path of light in cloud where half of the space is cloud; 0: three quarters of a "
+             "cell, or in thin "
              "clouds that at 0.7 of the density that they have in the mean, lest they be torn. Smaller makes "
              "crisper, denser clouds of the same mass; in real cumulus it is 10 to 20 m. Even sheets want more."),
          key<&DetailOptions::to_horizon>(

@@ -75,6 +75,7 @@ void check_periodic_reach(const SectionReader& reader, const std::string& what, 
 void finish_layers(const SectionReader& reader, Scene& scene);
 
 // Sets the ranges of centres that the scene leaves out to the whole lattice.
-void fill_in_centres(std::vector<EllipsoidScatter>& scatters, const Extent& extent, const Placement& placement);
+void fill_in_centres(std::vector<EllipsoidScatter>& scatters, const Extent& extent,
+                     const Placement& placement);
 
 }  // namespace nephos

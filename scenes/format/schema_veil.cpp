@@ -47,7 +47,8 @@ const Section& octave_section() {
 const Section& area_section() {
     static const Section section{
         "Area of a veil",
-        "The ellipse above which there is a veil: an anvil, a patch of cirrocumulus. Without it the veil covers its "
+        "The ellipse above which there is a veil: an anvil, a patch of cirrocumulus. Without it the veil "
+        "covers its "
         "lattice.",
         {key<&VeilArea::x_m>("x_m", "m", between(-kLargest_m, kLargest_m), "Centre, east, at the start."),
          key<&VeilArea::y_m>("y_m", "m", between(-kLargest_m, kLargest_m), "Centre, north, at the start."),
@@ -55,12 +56,14 @@ const Section& area_section() {
          key<&VeilArea::semi_b_m>("semi_b_m", "m", or_infinite(above(0, 0)), "Semi-axis across it."),
          key<&VeilArea::yaw_deg>("yaw_deg", "deg", between(-360, 360),
                                  "Direction of the first semi-axis, counter-clockwise from east."),
-         key<&VeilArea::softness>("softness", "", between(0, 1),
-                                  "Fraction of the radius over which the density falls to 0 at the rim: 1 begins "
-                                  "at the centre, 0 cuts."),
-         key<&VeilArea::carried>("carried", "", kAny,
-                                 "Whether it moves with the wind at `top_m`; otherwise it stands, as an anvil does "
-                                 "above the tower that feeds it.")},
+         key<&VeilArea::softness>(
+             "softness", "", between(0, 1),
+             "Fraction of the radius over which the density falls to 0 at the rim: 1 begins "
+             "at the centre, 0 cuts."),
+         key<&VeilArea::carried>(
+             "carried", "", kAny,
+             "Whether it moves with the wind at `top_m`; otherwise it stands, as an anvil does "
+             "above the tower that feeds it.")},
         nullptr};
     return section;
 }
@@ -89,11 +92,11 @@ void finish_veil(const SectionReader& reader, void* owner) {
 }
 
 std::vector<Key> pattern_keys() {
-    return {word<&VeilOptions::form>(
-                "form", {"cumulus", "stratus", "cirrus", "cirrostratus"},
-                "Which noise: `stratus` plain, `cumulus` ridged, `cirrostratus` plain and displaced by itself, `cirrus` ridged "
-                "and displaced.",
-                kSource),
+    return {word<&VeilOptions::form>("form", {"cumulus", "stratus", "cirrus", "cirrostratus"},
+                                     "Which noise: `stratus` plain, `cumulus` ridged, `cirrostratus` plain "
+                                     "and displaced by itself, `cirrus` ridged "
+                                     "and displaced.",
+                                     kSource),
             of_powers(key<&VeilOptions::octave_count>("octaves", "", between(1, 12), "Number of octaves.",
                                                       kSource)),
             of_powers(key<&VeilOptions::wavelength_m>("wavelength_m", "m", above(0, kLargest_m),

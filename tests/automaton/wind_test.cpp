@@ -204,19 +204,20 @@ AutomatonOptions plume_options() {
     AutomatonOptions o{.extent = {100, 80, 30}};
     o.boundaries = {Boundary::periodic, Boundary::periodic, Boundary::open};
     o.wind.keyframes = {{0, {{0, {4, 1}}, {1000, {12, -3}}}}};
-    o.field.scatters = {{.count = 3,
-                         .x_m = {0, 5000},
-                         .y_m = {0, 4000},
-                         .z_m = {0, 0},
-                         .semi_axis_x_m = {400, 600},
-                         .semi_axis_y_m = {300, 300},
-                         .semi_axis_z_m = {200, 250},
-                         .yaw_deg = {0, 180},
-                         .life_s = {1000, 1000},
-                         .fade_in_s = 20,
-                         .fade_out_s = 40,
-                         .replace = true,
-                         .thermals = {.interval_s = 100, .life_s = 600, .rise_m = {500, 700}, .spread = -0.2}}};
+    o.field.scatters = {
+        {.count = 3,
+         .x_m = {0, 5000},
+         .y_m = {0, 4000},
+         .z_m = {0, 0},
+         .semi_axis_x_m = {400, 600},
+         .semi_axis_y_m = {300, 300},
+         .semi_axis_z_m = {200, 250},
+         .yaw_deg = {0, 180},
+         .life_s = {1000, 1000},
+         .fade_in_s = 20,
+         .fade_out_s = 40,
+         .replace = true,
+         .thermals = {.interval_s = 100, .life_s = 600, .rise_m = {500, 700}, .spread = -0.2}}};
     return o;
 }
 
@@ -227,8 +228,8 @@ TEST(AirParcels, ThermalsRiseFromTheirBase) {
     const AirParcels parcels(o);
     const auto at = [&](double time_s) { return parcels.active(o, time_s); };
     // Of each plume the base and as many thermals as have been released: at 0, 100 .. 400 s.
-    for (const auto& [time_s, thermals] : {std::pair{5.0, 1u}, {105.0, 2u}, {305.0, 4u}, {590.0, 5u}, {605.0, 4u},
-                                           {995.0, 1u}, {1005.0, 0u}})
+    for (const auto& [time_s, thermals] :
+         {std::pair{5.0, 1u}, {105.0, 2u}, {305.0, 4u}, {590.0, 5u}, {605.0, 4u}, {995.0, 1u}, {1005.0, 0u}})
         EXPECT_EQ(at(time_s).size(), 3 * thermals + (time_s < 1000 ? 3 : 0)) << time_s;
     const auto now = at(305), later = at(310);
     const auto per_plume = now.size() / 3;

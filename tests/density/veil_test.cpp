@@ -253,7 +253,8 @@ TEST(Veil, IsLimitedToItsArea) {
     options.soft_base_m = options.soft_top_m = 0;
     options.base_m = 5000;
     options.top_m = 6600;
-    options.area = {.x_m = 900, .y_m = 1900, .semi_a_m = 1500, .semi_b_m = 700, .yaw_deg = 30, .softness = 0.4};
+    options.area = {
+        .x_m = 900, .y_m = 1900, .semi_a_m = 1500, .semi_b_m = 700, .yaw_deg = 30, .softness = 0.4};
     const Wind wind = steady_wind(8, -4);
     for (const bool carried : {false, true}) {
         options.area.carried = carried;
@@ -264,7 +265,8 @@ TEST(Veil, IsLimitedToItsArea) {
             for (int i = 0; i < kExtent.x; ++i) {
                 const Vec3 from = centre(i, j, 5) - Vec3(x, y, 0);
                 const double c = std::sqrt(0.75), s = 0.5;
-                const double r = std::hypot((from.x * c + from.y * s) / 1500, (from.y * c - from.x * s) / 700);
+                const double r =
+                    std::hypot((from.x * c + from.y * s) / 1500, (from.y * c - from.x * s) / 700);
                 const double t = std::clamp((1 - r) / 0.4, 0.0, 1.0), expected = t * t * (3 - 2 * t);
                 EXPECT_NEAR(double(grid.value(i, j, 5)), expected, 0.002);
                 inside += expected == 1;

@@ -24,7 +24,7 @@ SCENE = ROOT / "scenes/cumulus.toml"
 SIZE = (1280, 720)
 FRAME = 40
 # Of cumulus.toml's own camera, of an eye 300 m from a cloud, and of one on the ground.
-VIEWS = {"scene": {}, "near": {"camera.position_m": "[-1200, 1600, 1350]", "camera.target_m": "[-1200, 2600, 1380]"},
+VIEWS = {"scene": {}, "near": {"camera.position_m": "[-2000, -900, 1300]", "camera.target_m": "[-1900, 900, 1350]"},
          "below": {"camera.position_m": "[0, 500, 2]", "camera.target_m": "[0, 2200, 1100]"}}
 LUMINANCE = numpy.array([0.2126, 0.7152, 0.0722])
 

@@ -147,7 +147,8 @@ TEST(VeilLayer, HasDetailByATableOfItsOwn) {
     EXPECT_EQ(setting.drift_m.y, carried.y);
     const Scene turned = scene_of({"layer[0].veil.direction_deg=30"});
     EXPECT_EQ(LayerSimulation(scene, 0).hash(), LayerSimulation(turned, 0).hash());
-    EXPECT_GT(memory_estimate(scene, RunParts::pictures).pictures, memory_estimate(turned, RunParts::pictures).pictures);
+    EXPECT_GT(memory_estimate(scene, RunParts::pictures).pictures,
+              memory_estimate(turned, RunParts::pictures).pictures);
 }
 
 TEST(VeilLayer, StepsHaveItsStatisticsAndAHashOfTheirOwn) {
