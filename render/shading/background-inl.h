@@ -113,7 +113,7 @@ HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& m
     Floats shadow = shadow_at(map, u, v);
     if (frame.endless != nullptr) {
         const auto inside = [](Floats at) { return hn::And(hn::Gt(at, set(0.01f)), hn::Lt(at, set(0.99f))); };
-        const auto known = hn::And(inside(u), inside(v));
+        const auto known = hn::And(hn::And(inside(u), inside(v)), sees_first_period(*frame.endless, point));
         if (!hn::AllTrue(Lanes(), known)) shadow = hn::IfThenElse(known, shadow, sunlight_beyond(*frame.endless, point));
     }
     const Floats3 colour = times_add(shadow, set3(frame.ground_sun), set3(frame.ground));

@@ -27,7 +27,8 @@ vec3 ground(vec3 ray, float distance) {
     float shadow = textureLod(shadow_map, coordinate, 0.0).r;
 #ifdef NEPHOS_ENDLESS
     vec2 inner = step(vec2(0.01), coordinate) * step(coordinate, vec2(0.99));
-    if (endless() && inner.x * inner.y == 0.0) shadow = sunlight_beyond(point);
+    bool known = inner.x * inner.y > 0.0 && sees_first_period(point);
+    if (endless() && !known) shadow = sunlight_beyond(point);
 #endif
     vec3 colour = frame.ground.rgb + frame.ground_sun.rgb * shadow;
     vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark, no branch: see lighting.glsl

@@ -123,6 +123,36 @@ HWY_INLINE Floats scaled_share(Floats t, Floats factor) {
     return hn::Div(scaled, hn::Max(hn::Add(hn::Sub(set(1.0f), t), scaled), set(1.0e-6f)));
 }
 
+// Where lines from points towards the sun cross a volume that repeats, in the middle of its height: column and row of its
+// shade, and metres from its corner.
+struct SunCrossing {
+    Floats3 above;  // the points, over a plane ground
+    Floats column, row, x, y;
+};
+
+HWY_INLINE SunCrossing sun_crossing(const MarchedVolume& volume, const Floats3& point) {
+    const Floats3 above = above_plane(point, volume.bend);
+    const Floats column = hn::Add(dot(set3(volume.shade_u), above), set(volume.shade_u.w)),
+                 row = hn::Add(dot(set3(volume.shade_v), above), set(volume.shade_v.w));
+    const Floats cell = set(2 * volume.kernel.node_m);
+    return {above, column, row, hn::MulAdd(column, cell, set(volume.shade_mid[0])),
+            hn::MulAdd(row, cell, set(volume.shade_mid[1]))};
+}
+
+// Whether these lines cross the first period, which the shade map and the shadow map know, of all such volumes.
+HWY_INLINE hn::Mask<Lanes> sees_first_period(const MarchedScene& march, const Floats3& point) {
+    hn::Mask<Lanes> first = hn::Eq(point.x, point.x);
+    for (const MarchedVolume& volume : march.volumes) {
+        if (!volume.repeats) continue;
+        const SunCrossing at = sun_crossing(volume, point);
+        const auto inside = [&](Floats along, std::size_t axis) {
+            return hn::And(hn::Ge(along, set(volume.home)), hn::Le(along, set(volume.home + volume.period[axis])));
+        };
+        first = hn::And(first, hn::And(inside(at.x, 0), inside(at.y, 1)));
+    }
+    return first;
+}
+
 // Fraction of the sunlight that clouds which repeat leave at points relative to the eye.
 HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& point) {
     const Lanes d;
@@ -130,21 +160,17 @@ HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& poin
     Floats left = set(1.0f);
     for (const MarchedVolume& volume : march.volumes) {
         if (!volume.repeats) continue;
-        const Floats3 place = above_plane(point, volume.bend);
-        const Floats column = hn::Add(dot(set3(volume.shade_u), place), set(volume.shade_u.w)),
-                     row = hn::Add(dot(set3(volume.shade_v), place), set(volume.shade_v.w));
-        const Floats cell = set(2 * volume.kernel.node_m), per_cell = set(0.5f / volume.kernel.node_m);
-        const Floats x = hn::MulAdd(column, cell, set(volume.shade_mid[0])),
-                     y = hn::MulAdd(row, cell, set(volume.shade_mid[1]));
-        const auto wrapped = [&](Floats at, int count) {
+        const SunCrossing at = sun_crossing(volume, point);
+        const Floats per_cell = set(0.5f / volume.kernel.node_m);
+        const auto wrapped = [&](Floats along, int count) {
             const Floats size = set(float(count));
-            return hn::NegMulAdd(hn::Floor(hn::Mul(at, set(1.0f / float(count)))), size, at);
+            return hn::NegMulAdd(hn::Floor(hn::Mul(along, set(1.0f / float(count)))), size, along);
         };
-        const PlaceIn middle = endless_place(volume, x, y);
-        const Floats u = wrapped(hn::MulAdd(middle.across.height, per_cell, column), volume.shade_columns),
-                     v = wrapped(hn::MulAdd(middle.along.height, per_cell, row), volume.shade_rows);
-        const auto texel = [&](Floats at, int count) {
-            return hn::Min(hn::ConvertTo(di, at), hn::Set(di, count - 1));
+        const PlaceIn middle = endless_place(volume, at.x, at.y);
+        const Floats u = wrapped(hn::MulAdd(middle.across.height, per_cell, at.column), volume.shade_columns),
+                     v = wrapped(hn::MulAdd(middle.along.height, per_cell, at.row), volume.shade_rows);
+        const auto texel = [&](Floats along, int count) {
+            return hn::Min(hn::ConvertTo(di, along), hn::Set(di, count - 1));
         };
         const auto i = texel(u, volume.shade_columns), j = texel(v, volume.shade_rows);
         const auto words = hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(volume.shade),
@@ -152,7 +178,7 @@ HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& poin
         const Floats root = hn::Mul(erosion::of_word(words, hn::Sub(u, hn::ConvertTo(d, i)), hn::Sub(v, hn::ConvertTo(d, j))),
                                     set(1.0f / 255.0f));
         const Floats patches = patches_at(volume, middle);
-        const Floats below = hn::Mul(hn::Sub(set(volume.shade_top), place.z), set(volume.per_shade_height));
+        const Floats below = hn::Mul(hn::Sub(set(volume.shade_top), at.above.z), set(volume.per_shade_height));
         const Floats part = hn::Max(hn::Min(below, set(1.0f)), hn::Zero(d));
         const Floats depth = hn::Mul(hn::Mul(hn::Mul(root, root), set(shader::kMostShadeDepth)), hn::Mul(patches, part));
         left = hn::Mul(left, fast_exp(hn::Neg(depth)));

@@ -87,18 +87,35 @@ vec2 part_below_endless(vec3 ray) {
     return part;
 }
 
+// Returns where the line from a point, over a plane ground, towards the sun crosses a volume that repeats, in the middle
+// of its height: column and row of its shade; metres from its corner.
+vec4 sun_crossing(uint v, vec3 above) {
+    vec2 at = vec2(dot(march.volumes[v].shade_u.xyz, above) + march.volumes[v].shade_u.w,
+                   dot(march.volumes[v].shade_v.xyz, above) + march.volumes[v].shade_v.w);
+    vec2 middle = vec2(march.volumes[v].shade_mid_x, march.volumes[v].shade_mid_y);
+    return vec4(at, 2.0 * march.volumes[v].corner.w * at + middle);
+}
+
+// Returns whether that line crosses the first period, which the shade map and the shadow map know, of all such volumes.
+bool sees_first_period(vec3 point) {
+    bool first = true;
+    for (uint v = 0u; v < march.count; ++v) {
+        vec2 at = sun_crossing(v, above_plane(point, march.volumes[v].bend)).zw;
+        first = first && (march.volumes[v].repeats == 0.0 || beyond_home(v, at) == vec2(0.0));
+    }
+    return first;
+}
+
 // Returns the fraction of the sunlight that clouds which repeat leave at a point relative to the eye.
 float sunlight_beyond(vec3 point) {
     float left = 1.0;
     for (uint v = 0u; v < march.count; ++v) {
         if (march.volumes[v].repeats == 0.0) continue;
         vec3 place = above_plane(point, march.volumes[v].bend);
-        vec2 at = vec2(dot(march.volumes[v].shade_u.xyz, place) + march.volumes[v].shade_u.w,
-                       dot(march.volumes[v].shade_v.xyz, place) + march.volumes[v].shade_v.w);
+        vec4 crossing = sun_crossing(v, place);
+        vec2 at = crossing.xy, middle = crossing.zw;
         uvec2 count = uvec2(march.volumes[v].shade_columns, march.volumes[v].shade_rows);
-        float cell = 2.0 * march.volumes[v].corner.w;
-        vec2 middle = at * cell + vec2(march.volumes[v].shade_mid_x, march.volumes[v].shade_mid_y);
-        at += drawn_aside(v, middle) / cell;
+        at += drawn_aside(v, middle) / (2.0 * march.volumes[v].corner.w);
         vec2 size = vec2(count), wrapped = at - floor(at / size) * size;
         uvec2 texel = min(uvec2(wrapped), count - 1u);
         uint word = march_light[march.volumes[v].first_shade + texel.y * count.x + texel.x];

@@ -52,7 +52,7 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const MarchedScene* endles
         const auto inner = [&](Floats at, float largest) {
             return hn::And(hn::Gt(at, set(2.0f)), hn::Lt(at, set(largest - 2)));
         };
-        known = hn::And(inner(u, data.shade.x), inner(v, data.shade.y));
+        known = hn::And(hn::And(inner(u, data.shade.x), inner(v, data.shade.y)), sees_first_period(*endless, point));
     }
     if (hn::AllFalse(d, known)) return sunlight_beyond(*endless, point);
     const auto with_beyond = [&](Floats left) {

@@ -35,7 +35,8 @@ float between_texels(uint word, vec2 share) {
 float sunlight_left(vec3 point) {
     vec2 place = vec2(dot(shells.shade_u.xyz, point) + shells.shade_u.w, dot(shells.shade_v.xyz, point) + shells.shade_v.w);
 #ifdef NEPHOS_ENDLESS
-    bool known = !endless() || all(greaterThan(place, vec2(2.0))) && all(lessThan(place, shells.shade.xy - 2.0));
+    bool known = !endless() || (all(greaterThan(place, vec2(2.0))) && all(lessThan(place, shells.shade.xy - 2.0)) &&
+                                sees_first_period(point));
     if (!known) return sunlight_beyond(point);
 #endif
     place = clamp(place, vec2(0.0), shells.shade.xy);
