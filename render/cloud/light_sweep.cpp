@@ -174,6 +174,10 @@ LightFront periodic_sweep(const CoverageField& field, std::span<const float> ext
 
 void LightFront::add_depths(const Vec3& first_m, const Vec3& step_m, std::span<float> depths) const {
     if (depth_.empty()) return;
+    if (periodic_) {
+        for (std::size_t n = 0; n < depths.size(); ++n) depths[n] += depth_at(first_m + double(n) * step_m);
+        return;
+    }
     // Numbers of the lines, as in depth_at().
     const auto line_of = [&](const Vec3& cells, double plane, int n) {
         const double along = downwards_ ? plane - cells[axes_[2]] : cells[axes_[2]];
