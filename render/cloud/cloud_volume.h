@@ -34,7 +34,7 @@ struct CloudVolume {
     // each axis), and like sun_depths, where there are other volumes.
     Vec3 to_sun{0, 0, 1};
     LightFront front;
-    // Of a field that repeats: its depths as endless_shade.glsl reads them, a word for each: with those of the next
+    // Of a field that repeats: its depths as endless.glsl reads them, a word for each: with those of the next
     // column, the next row, and both.
     std::vector<std::uint32_t> shade;
     DiffuseLight diffuse;  // where diffuses(light)

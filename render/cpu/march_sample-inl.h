@@ -145,7 +145,6 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
                 return hn::Mul(hn::Sub(face, at), per);
             };
             out = hn::Min(out, hn::Min(to_face(offset.x, 0, per_way.x), to_face(offset.y, 1, per_way.y)));
-            out = hn::Max(out, hn::Mul(set(shader::kStepPixels), footprint));  // what is less than a pixel wide may be missed
         }
         step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), set(shader::kBeyondFace_m)), step);
         if (!hn::AllFalse(d, sampled)) {

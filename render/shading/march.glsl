@@ -189,8 +189,7 @@ MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
         // repeats they go on to its base.
         float step = distance < part.y ? at.on_m : kFarAway_m;
         if (distance < part.x) step = part.x - distance + kBeyondFace_m;
-        float least = march.volumes[v].repeats * kStepPixels * march.per_unit * distance;
-        if (at.within) step = max(at.out_m, least) + kBeyondFace_m;  // what is less than a pixel wide may be missed
+        if (at.within) step = max(at.out_m, 0.0) + kBeyondFace_m;
         if (at.near)
             result.near |= 1u << v;
         else

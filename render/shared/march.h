@@ -88,8 +88,8 @@ struct MarchVolume {
     float per_period_x, per_period_y;
     float bend;                   // 1 / m: a place at distance d on the ground's plane lies bend d^2 above the round Earth
     float repeats;                // 1 or 0
-    // Of a field that repeats: how much cloud there is in its images (patches.glsl), and its shade on all beyond the
-    // shade map (endless_shade.glsl). Points are relative to the eye, over a plane ground.
+    // Of a field that repeats: how much cloud there is in its images (endless.glsl), and its shade on all beyond the
+    // shade map. Points are relative to the eye, over a plane ground.
     vec4 to_patches;              // periods of the noise per metre: across, x: east, y: north; along, z and w likewise
     vec4 shade_u, shade_v;        // column and row of a point p: dot(xyz, p) + w
     float shade_mid_x, shade_mid_y;  // metres from the corner of column 0 and row 0, in the middle of the cloud's height
