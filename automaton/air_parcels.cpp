@@ -84,7 +84,7 @@ void append_thermals(const AutomatonOptions& options, const AirParcel& plume, co
         if (weight <= 0) continue;
         const auto words = philox(
             options.seed, item_counter(Domain::field, std::uint32_t(plume.scatter), plume.index,
-                                       plume.generation, kFirstOfThermals + std::uint32_t(n) % 65520u));
+                                       plume.generation, kFirstOfThermals + std::uint32_t(std::fmod(n, 65520.0))));
         const double of_size = 1 - o.variety * unit_interval(words[0]);
         const double of_rise = 1 - o.variety * unit_interval(words[1]);
         const double lived = (time_s - thermal.birth_s) / o.life_s;

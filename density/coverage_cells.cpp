@@ -76,7 +76,9 @@ std::array<Vec3, 3> repeating(const std::array<Vec3, 3>& rows, const Boundaries&
                           ? periods_near(edges_m[axis] * Vec3(rows[0][axis], rows[1][axis], rows[2][axis]))
                           : std::vector<Periods>{{Vec3(rows[0][axis], rows[1][axis], rows[2][axis]), 0}};
     // The nearest that are not nearly parallel.
-    const Periods *best_x = &along[0].front(), *best_y = &along[1].front();
+    const auto cheaper = [](const Periods& a, const Periods& b) { return a.cost < b.cost; };
+    const Periods *best_x = &*std::ranges::min_element(along[0], cheaper),
+                  *best_y = &*std::ranges::min_element(along[1], cheaper);
     double least = std::numeric_limits<double>::infinity();
     for (const Periods& x : along[0]) {
         for (const Periods& y : along[1]) {
@@ -115,11 +117,14 @@ CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setti
     boxes_.resize(blocks_.size(), {{extent.x, extent.y, extent.z}, {-1, -1, -1}});
     std::vector<double> moist(blocks_.size(), 0), cloudy(blocks_.size(), 0);
     const Thermals thermals(setting, extent, grid.placement().cell_size_m);
+    // Without images a side beside an open one is open, too.
+    const bool soft = !setting.images && (setting.boundaries.x == Boundary::open) != (setting.boundaries.y == Boundary::open);
+    const Boundaries sides = soft ? Boundaries{} : setting.boundaries;
     std::vector<float> aprons[2];
     for (int i = 0; i < size_[0] * kBlock; ++i)
-        aprons[0].push_back(apron_at(i, extent.x, setting.boundaries.x, setting.options.apron_cells));
+        aprons[0].push_back(apron_at(i, extent.x, sides.x, setting.options.apron_cells));
     for (int j = 0; j < size_[1] * kBlock; ++j)
-        aprons[1].push_back(apron_at(j, extent.y, setting.boundaries.y, setting.options.apron_cells));
+        aprons[1].push_back(apron_at(j, extent.y, sides.y, setting.options.apron_cells));
     const Vec3 origin = grid.placement().origin_m;
     const double cell = grid.placement().cell_size_m;
     tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t n) {

@@ -25,7 +25,7 @@ double bump_size_m(const DetailOptions& options, double cell_m);
 
 // Returns a matrix near the given one, rows from metres to periods of a noise, that takes the edges of a grid along its
 // periodic axes to whole numbers of periods: the noise then repeats with the grid. Bumps are skewed a little by that:
-// for n periods along an edge by up to 1 / (2 n).
+// for n periods along an edge by up to 1 / (2 n), for n >= 1; on smaller grids they are stretched and turned.
 std::array<Vec3, 3> repeating(const std::array<Vec3, 3>& rows, const Boundaries& boundaries, const Extent& extent,
                               double cell_m);
 

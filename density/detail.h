@@ -53,6 +53,9 @@ struct DetailSetting {
     bool images = true;  // false: no cloud beyond periodic sides either
 };
 
+// How many times as dense cloud is at most in the images of a grid that repeats.
+inline constexpr float kMostInImages = 2.5f;
+
 // Returns whether the cloud goes on to the horizon in pictures.
 inline bool repeats(const DetailSetting& setting) {
     return setting.images && setting.options.to_horizon && setting.boundaries.x == Boundary::periodic &&

@@ -93,9 +93,10 @@ void set_clearance(const RowsAround& near, std::uint8_t* out) {
 
 std::vector<std::uint8_t> clearance_of_cells(std::span<const std::uint8_t> nodes, std::span<const std::int32_t> places,
                                              std::span<const std::int32_t> table, const std::array<int, 3>& bricks,
-                                             float least_coverage) {
+                                             float least_coverage, float most) {
     unsigned least = 0;  // t of cloud; coverage rises with it
-    while (least < 256 && !(text::coverage_of(float(least) / 255) > least_coverage)) ++least;
+    const auto coverage = [most](float t) { return text::coverage_of(most * t / (1 - t + most * t)); };
+    while (least < 256 && !(coverage(float(least) / 255) > least_coverage)) ++least;
     std::vector<BrickRows> occupied(places.size());
     tbb::parallel_for(std::size_t{0}, places.size(),
                       [&](std::size_t n) { occupied[n] = occupied_cells(&nodes[n * kBrickBytes], least); });

@@ -79,7 +79,8 @@ CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, cons
                                     s.drift_m.y, s.drift_m.z, s.along.x, s.along.y, o.strength, o.size_m,
                                     o.stretch, o.wisps, o.thermals, o.mean_free_path_m,
                                     double(repeats(s)), double(s.images), double(s.boundaries.x), double(s.boundaries.y),
-                                    double(s.boundaries.z), double(o.apron_cells), s.opacity, origin.x, origin.y, origin.z,
+                                    double(s.boundaries.z), double(o.apron_cells), s.opacity, double(part.density.extent().x),
+                                    double(part.density.extent().y), double(part.density.extent().z), origin.x, origin.y, origin.z,
                                     part.density.placement().cell_size_m, part.moisture ? part.moisture->sum() : -1.0})
             rest.push_back(number);
     }
@@ -96,12 +97,12 @@ void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOpt
         cached.volumes.clear();
         cached.volumes_key = {};
         for (const DetailedVoxels& part : cloud.detailed) cached.volumes.emplace_back(part);
-        cached.volumes_key = key;
         cached.volumes_light_key = {};
         cached.volumes_version = next_version();
     }
     if (cached.light_key == cached.volumes_light_key) return;
     light_volumes(cached.volumes, direction_to_sun(options.sun), options.light, are_new);
+    cached.volumes_key = key;  // only now: if light fails, all is new again
     cached.volumes_light_key = cached.light_key;
     cached.volumes_light = next_version();
 }

@@ -14,7 +14,7 @@ void complete_light_of_volumes(LitCloud& cloud, std::span<const std::uint8_t> ba
                                std::span<const std::uint8_t> tiles, StageTimes& times) {
     const StageTimer timer(&times, DrawStage::light);
     cloud.drawn_depths.resize(cloud.sun_depths.size());
-    if (std::ranges::count(cloud.cloud.detailed, 1) < std::ptrdiff_t(cloud.cloud.visible.size())) {
+    if (cloud.cloud.detailed.empty() || std::ranges::count(cloud.cloud.detailed, 0) > 0) {
         PreparedCloud others = cloud.cloud;
         for (std::size_t i = 0; i < others.visible.size(); ++i)
             if (others.is_detailed(i)) others.depth_scale[i] = 0;

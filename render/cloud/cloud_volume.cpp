@@ -43,7 +43,7 @@ CloudVolume::CloudVolume(const DetailedVoxels& voxels)
       extinction(mean_extinction(field)) {}
 
 std::size_t CloudVolume::memory_bytes() const {
-    return field.memory_bytes() + 4 * (extinction.size() + corner_depths.size()) +
+    return field.memory_bytes() + 4 * (extinction.size() + corner_depths.size() + front.depths().size() + shade.size()) +
            2 * (sun_depths.size() + own_depths.size() + surroundings.size() + diffuse.upwards.size() +
                 diffuse.sideways.size());
 }

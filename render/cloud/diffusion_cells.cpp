@@ -295,10 +295,12 @@ struct HomeBricks {
 
     explicit HomeBricks(const CoverageField& field) {
         const double edge_m = 2 * CoverageField::kBrickCells * field.node_m();
-        const Vec2 exact = field.period_m() / edge_m;
-        if (exact.x != std::floor(exact.x) || exact.y != std::floor(exact.y)) return;
+        int cells[2];
+        for (int axis = 0; axis < 2; ++axis)
+            cells[axis] = int(std::lround(CoverageField::kBrickCells * field.period_m()[axis] / edge_m));
+        if (cells[0] % CoverageField::kBrickCells != 0 || cells[1] % CoverageField::kBrickCells != 0) return;
         first = int(std::lround(field.home_m() / edge_m));
-        for (int axis = 0; axis < 2; ++axis) count[axis] = int(exact[axis]);
+        for (int axis = 0; axis < 2; ++axis) count[axis] = cells[axis] / CoverageField::kBrickCells;
     }
     bool any() const { return count[0] > 0; }
     // Returns the coordinate of the brick with the same cloud in the first period.

@@ -130,6 +130,11 @@ LightFront periodic_sweep(const CoverageField& field, std::span<const float> ext
         }
     };
     const auto store_nodes = [&](int plane) {  // its depths, into the bricks on both sides
+        const auto is_empty = [&](int layer) {
+            return layer < 0 || layer >= int(layers.size()) || layers[std::size_t(layer)].empty();
+        };
+        const bool of_corners = !corners.empty() && plane % kCells == 0;
+        if (!of_corners && is_empty(plane / kCells) && (plane % kCells != 0 || is_empty(plane / kCells - 1))) return;
         const double b = planes - plane;
         std::ranges::fill(nodes, 0.0f);
         add_displaced(front.depth_, -front.shift_[0] * b, -front.shift_[1] * b, 1, nodes);
@@ -143,7 +148,7 @@ LightFront periodic_sweep(const CoverageField& field, std::span<const float> ext
                                std::size_t((local * kLightNodes + v) * kLightNodes + u)] =
                             row_of(nodes, wrapped(corner_of(n, 1) + v, height))[wrapped(corner_of(n, 0) + u, width)];
         }
-        if (corners.empty() || plane % kCells != 0) return;
+        if (!of_corners) return;
         float* to = &corners[std::size_t(plane / kCells) * std::size_t((bricks[0] + 1) * (bricks[1] + 1))];
         for (int v = 0; v <= bricks[1]; ++v)
             for (int u = 0; u <= bricks[0]; ++u)

@@ -67,7 +67,7 @@ class LightFront {
 //   corners     empty, or gets those at the corners of all bricks: (bricks + 1) on each axis, x fastest
 // These sizes and the length of `to_light` are preconditions. A field that repeats (CoverageField::period_m()) is
 // swept downwards, lines that leave it through a side come back through the opposite one, and light comes from at least
-// 1 degree above the horizon. Otherwise there is no cloud beyond the padding of the field (CoverageField::corner_m()).
+// 1.15 degrees above the horizon. Otherwise there is no cloud beyond the padding of the field (CoverageField::corner_m()).
 // Serial; sweeps may run in parallel.
 LightFront sweep(const CoverageField& field, std::span<const float> extinction, const Vec3& to_light,
                  std::span<float> depths, std::span<float> corners = {});

@@ -43,6 +43,7 @@ struct BoxPart {
 // by ray.z t + bend_t t^2.
 HWY_INLINE BoxPart part_in_slab(float base, float top, Floats ray_z, Floats bend) {
     const Floats zero = hn::Zero(Lanes()), least = set(1.0e-9f);
+    if (top == 0) top = shader::kLeastHeight_m;
     const auto root_at = [&](float height) {
         return hn::Sqrt(hn::Max(hn::MulAdd(set(4 * height), bend, hn::Mul(ray_z, ray_z)), zero));
     };
@@ -145,8 +146,11 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
                 return hn::Mul(hn::Sub(face, at), per);
             };
             out = hn::Min(out, hn::Min(to_face(offset.x, 0, per_way.x), to_face(offset.y, 1, per_way.y)));
+            out = hn::Min(out, set(shader::kStraightWay_m));
         }
-        step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), set(shader::kBeyondFace_m)), step);
+        const Floats beyond = hn::Max(set(shader::kBeyondFace_m), hn::Mul(distance, set(shader::kBeyondFacePart)));
+        step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), volume.repeats ? beyond : set(shader::kBeyondFace_m)),
+                              step);
         if (!hn::AllFalse(d, sampled)) {
             const auto number = hn::Max(place.number, hn::Zero(di));
             erosion::Node node =

@@ -206,7 +206,7 @@ HWY_INLINE Floats3 marched_radiance(const ViewScene& scene, const MarchedVolume&
     const Floats unit = set(1.0f / 255.0f), sky = hn::IfThenElse(in_brick, hn::Mul(unit, seen.low), set(1.0f)),
                  ground_seen = hn::IfThenElse(in_brick, hn::Mul(unit, seen.high), set(1.0f));
     const Floats albedo = set(frame.ambient_top.w);
-    const Floats3 sunlight = sunlight_at(frame, point.z);
+    const Floats3 sunlight = sunlight_at(frame, above_plane(point, volume.bend).z);
     Floats3 arriving = times(sky, set3(frame.ambient_top));
     arriving = times_add(ground_seen, set3(frame.ambient_base), arriving);
     arriving = times_add(scattered_in_volume(scene, volume, ray, sun_depth, here, in_brick), sunlight, arriving);

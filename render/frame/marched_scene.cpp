@@ -9,7 +9,7 @@
 
 namespace nephos {
 
-static_assert(shader::kMostVolumes == kMaxDetailedClouds);
+static_assert(shader::kMostVolumes == kMaxDetailedClouds && 1 + shader::kPatchSpread == kMostInImages);
 
 MarchedVolume::MarchedVolume(const CloudVolume& volume, const Vec3& eye_m, float bend_per_m)
     : kernel(volume.field), sun_depths(volume.sun_depths.data()), surroundings(volume.surroundings.data()),

@@ -141,7 +141,7 @@ HWY_INLINE SunCrossing sun_crossing(const MarchedVolume& volume, const Floats3& 
 
 // Whether these lines cross the first period, which the shade map and the shadow map know, of all such volumes.
 HWY_INLINE hn::Mask<Lanes> sees_first_period(const MarchedScene& march, const Floats3& point) {
-    hn::Mask<Lanes> first = hn::Eq(point.x, point.x);
+    hn::Mask<Lanes> first = hn::FirstN(Lanes(), hn::Lanes(Lanes()));
     for (const MarchedVolume& volume : march.volumes) {
         if (!volume.repeats) continue;
         const SunCrossing at = sun_crossing(volume, point);
@@ -170,7 +170,7 @@ HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& poin
         const Floats u = wrapped(hn::MulAdd(middle.across.height, per_cell, at.column), volume.shade_columns),
                      v = wrapped(hn::MulAdd(middle.along.height, per_cell, at.row), volume.shade_rows);
         const auto texel = [&](Floats along, int count) {
-            return hn::Min(hn::ConvertTo(di, along), hn::Set(di, count - 1));
+            return hn::Min(hn::Max(hn::ConvertTo(di, along), hn::Zero(di)), hn::Set(di, count - 1));
         };
         const auto i = texel(u, volume.shade_columns), j = texel(v, volume.shade_rows);
         const auto words = hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(volume.shade),

@@ -116,7 +116,7 @@ float sunlight_beyond(vec3 point) {
         vec2 at = crossing.xy, middle = crossing.zw;
         uvec2 count = uvec2(march.volumes[v].shade_columns, march.volumes[v].shade_rows);
         at += drawn_aside(v, middle) / (2.0 * march.volumes[v].corner.w);
-        vec2 size = vec2(count), wrapped = at - floor(at / size) * size;
+        vec2 size = vec2(count), wrapped = max(at - floor(at / size) * size, 0.0);
         uvec2 texel = min(uvec2(wrapped), count - 1u);
         uint word = march_light[march.volumes[v].first_shade + texel.y * count.x + texel.x];
         float root = of_word(word, wrapped - vec2(texel)) * (1.0 / 255.0);

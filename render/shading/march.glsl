@@ -82,7 +82,7 @@ vec3 marched_radiance(uint v, vec3 ray, float distance) {
     float sun_depth = holds_cloud(beyond) ? own + patches * volume_sun_depth(v, beyond)
                                           : max(own, holds_cloud(here) ? patches * volume_sun_depth(v, here) : 0.0);
     vec2 seen = holds_cloud(here) ? volume_bytes(v, 1u, here) * (1.0 / 255.0) : vec2(1.0);
-    vec3 sunlight = sunlight_at(point.z);
+    vec3 sunlight = sunlight_at(above_plane(point, march.volumes[v].bend).z);
     vec3 arriving = seen.x * frame.ambient_top.rgb + seen.y * frame.ambient_base.rgb;
     arriving += scattered_in_volume(v, ray, sun_depth, here) * sunlight;
     arriving += scattered_once(dot(to_sun, ray)) * exp(-sun_depth) * sunlight;
@@ -110,6 +110,7 @@ vec3 inverse_of(vec3 direction) {
 // Returns the part of a ray in a slab that goes on to the horizon, between two heights above the eye: it rises above the
 // ground by ray_z t + bend t^2.
 vec2 part_in_slab(float base, float top, float ray_z, float bend) {
+    if (top == 0.0) top = kLeastHeight_m;
     float root = sqrt(max(4.0 * top * bend + ray_z * ray_z, 0.0)), sum = ray_z + root;
     vec2 part = vec2(0.0, min(2.0 * top / (top > 0.0 ? max(sum, 1.0e-9) : min(sum, -1.0e-9)), kHorizon_m));
     float base_root = sqrt(max(4.0 * base * bend + ray_z * ray_z, 0.0));
@@ -173,7 +174,7 @@ MarchPlace march_place(uint v, vec3 ray, vec3 per_ray, float distance) {
     vec2 period = vec2(march.volumes[v].period_x, march.volumes[v].period_y);
     vec2 face = march.volumes[v].home + mix(vec2(0.0), period, greaterThan(per_ray.xy, vec2(0.0)));
     vec2 to_face = (face - offset.xy) * per_ray.xy;
-    if (endless) out_m.xy = min(out_m.xy, to_face);
+    if (endless) out_m = min(out_m, vec3(to_face, kStraightWay_m));
     float on_m = max(1.0, min(-offset.z * (per_ray.z > 0.0 ? per_ray.z : kLongestLeap_m), kLongestLeap_m));
     return MarchPlace(place.within, min(out_m.x, min(out_m.y, out_m.z)), endless ? on_m : 1.0,
                       holds && place.within && clear == 0u);
@@ -189,7 +190,8 @@ MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
         // repeats they go on to its base.
         float step = distance < part.y ? at.on_m : kFarAway_m;
         if (distance < part.x) step = part.x - distance + kBeyondFace_m;
-        if (at.within) step = max(at.out_m, 0.0) + kBeyondFace_m;
+        float beyond = max(kBeyondFace_m, march.volumes[v].repeats * kBeyondFacePart * distance);
+        if (at.within) step = max(at.out_m, 0.0) + beyond;
         if (at.near)
             result.near |= 1u << v;
         else

@@ -47,7 +47,7 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const MarchedScene* endles
         return hn::Min(hn::Max(along_row(row, point), hn::Zero(d)), set(largest));
     };
     const Floats u = place(data.shade_u, data.shade.x), v = place(data.shade_v, data.shade.y);
-    auto known = hn::Eq(u, u);  // by the shade map: elsewhere by what repeats
+    auto known = hn::FirstN(d, hn::Lanes(d));  // by the shade map: elsewhere by what repeats
     if (endless != nullptr) {
         const auto inner = [&](Floats at, float largest) {
             return hn::And(hn::Gt(at, set(2.0f)), hn::Lt(at, set(largest - 2)));

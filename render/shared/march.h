@@ -19,9 +19,11 @@ NEPHOS_CONST float kStepPixels = 1.2f;                // ... or this many footpr
 NEPHOS_CONST float kStepGrowth = 4.0f;                // of steps behind opaque cloud
 NEPHOS_CONST float kLongestStep_m = 30.0f;            // near cloud
 NEPHOS_CONST float kBeyondFace_m = 0.01f;             // where a ray goes on behind the face of a cell or a box
+NEPHOS_CONST float kBeyondFacePart = 1.0e-6f;         // ... of a cloud that repeats at least, in distances: beyond rounding
+NEPHOS_CONST float kLeastHeight_m = 1.0e-3f;          // of such a cloud's top above the eye, if they are at one height
 NEPHOS_CONST float kLeastAdvance = 1.0000005f;         // of a distance in any step: far away floats are coarse
 // Images of a cloud that repeats are drawn aside along a wave, so that gaps do not line up: wave lengths across and along,
-// and how far and how steeply, in lengths of MarchVolume::patch_ramp and of the wave.
+// in units of 1 / MarchVolume::patch_ramp, and half of how far, in wave lengths.
 NEPHOS_CONST float kWaveAcross = 45.0f, kWaveAlong = 35.0f, kWaveHeight = 0.03125f;
 NEPHOS_CONST float kPatchLevel = 0.37f;               // of the noise of patches: its third coordinate
 NEPHOS_CONST float kPatchSpread = 1.5f;               // cloud in images is up to 1 + this times as dense
@@ -29,6 +31,7 @@ NEPHOS_CONST float kMostShadeDepth = 8.0f;            // that a word of shade st
 NEPHOS_CONST float kFarAway_m = 1.0e9f;
 NEPHOS_CONST float kHorizon_m = 2.5e5f;               // where a cloud that repeats ends; it is below the horizon there
 NEPHOS_CONST float kLongestLeap_m = 2.0e3f;           // of a ray below such a cloud: it is straight over that
+NEPHOS_CONST float kStraightWay_m = 1.0e3f;           // ... and in it, where waves bend it: by 8 m in cells of 40 m
 NEPHOS_CONST float kLeastFootprint_m = 0.05f;
 NEPHOS_CONST float kSkippedSteps = 1.5f;              // of cloud before a sample behind empty space, in finest steps
 NEPHOS_CONST float kSurfaceSteps = 0.3f;              // ... beyond the surface between two samples

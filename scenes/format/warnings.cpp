@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scenes/format/warnings.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -19,7 +20,7 @@ struct Box {
 
 Box box_of(const Extent& extent, const Placement& placement, const Boundaries& boundaries, const DetailOptions& detail) {
     const Vec3 edges = placement.cell_size_m * Vec3(extent.x, extent.y, extent.z);
-    return {placement.origin_m, placement.origin_m + edges, boundaries, !detail.enabled || detail.apron_cells > 0};
+    return {placement.origin_m, placement.origin_m + edges, boundaries, detail.enabled && detail.apron_cells > 0};
 }
 
 // Adds what a parcel whose centre lies between `low_m` and `high_m` has beyond the box.
@@ -50,8 +51,10 @@ void add_scatters(const std::vector<EllipsoidScatter>& scatters, const std::stri
     for (std::size_t n = 0; n < scatters.size(); ++n) {
         const EllipsoidScatter& s = scatters[n];
         const double rise = is_plume(s) ? s.thermals.rise_m.max : 0;
-        add_cuts(fmt::format("{} number {}", table, n + 1), {s.x_m.min, s.y_m.min, s.z_m.min},
-                 {s.x_m.max, s.y_m.max, s.z_m.max + rise}, reach_m(s), box, to);
+        const double wander_m = is_plume(s) ? s.thermals.wander * std::max(s.semi_axis_x_m.max, s.semi_axis_y_m.max) : 0;
+        const Vec3 around(wander_m, wander_m, 0);
+        add_cuts(fmt::format("{} number {}", table, n + 1), Vec3(s.x_m.min, s.y_m.min, s.z_m.min) - around,
+                 Vec3(s.x_m.max, s.y_m.max, s.z_m.max + rise) + around, reach_m(s), box, to);
     }
 }
 

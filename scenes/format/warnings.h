@@ -11,7 +11,7 @@
 namespace nephos {
 
 // Returns a sentence for each finding: base models that nothing uses; parcels that reach above an open top of their
-// lattice, which cuts their clouds flat; and, where clouds do not thin out towards open sides (detail.apron_cells), those
+// lattice, which cuts their clouds flat; and, where clouds do not thin out towards open sides (detail.apron_cells, with detail), those
 // that reach beyond them. Ellipsoids count as far as their radius. Pure.
 std::vector<std::string> warnings(const Scene& scene);
 
