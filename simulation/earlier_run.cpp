@@ -152,8 +152,10 @@ void remove_leftovers(const RunFolder& folder) {
         }
     };
     remove_if(".", [&](const std::string& name) {
-        return name == folder.manifest().filename() || name == folder.checkpoint().filename();
+        return name == folder.manifest().filename() || name == folder.checkpoint().filename() ||
+               name == folder.statistics().filename();
     });
+    remove_if("statistics", [](const std::string& name) { return name.ends_with(".csv"); });
     const auto is_frame = [&](const std::string& name) {
         return is_frame_of(name, folder.name) || name == folder.video().filename();
     };
@@ -177,7 +179,8 @@ void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
     const auto is_there = [&](const std::filesystem::path& file) {
         return std::ranges::count(files, file) > 0;
     };
-    if (is_there(folder.statistics()) && !is_statistics(folder.statistics())) {
+    if (is_there(folder.statistics()) && !is_statistics(folder.statistics()) &&
+        !is_begun_statistics(folder.statistics())) {
         refuse(folder, "the folder holds a statistics.csv that is not of a run");
     }
     if (earlier.scene_hash != scene_hash) {

@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 
+#include "core/atomic_file.h"
 #include "core/error.h"
 
 namespace nephos {
@@ -88,14 +89,24 @@ bool is_statistics(const std::filesystem::path& path, std::string_view header) {
     }
 }
 
+bool is_begun_statistics(const std::filesystem::path& path, std::string_view header) {
+    try {
+        const Descriptor file = open_regular_file(path, O_RDONLY);
+        std::string text(header.size() + 1, '\0');
+        const ssize_t size = ::pread(file.get(), text.data(), text.size(), 0);
+        return size >= 0 && header.starts_with(std::string_view(text).substr(0, std::size_t(size)));
+    } catch (const Error&) {
+        return false;
+    }
+}
+
 StatisticsFile::StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size)
     : path_(std::move(path)), file_(std::move(file)), size_(size) {}
 
 StatisticsFile StatisticsFile::create(const std::filesystem::path& path, std::string_view header) {
-    StatisticsFile file(path, open_regular_file(path, O_WRONLY | O_APPEND | O_CREAT | O_TRUNC), 0);
-    file.gathered_ = header;
-    file.write_out();
-    return file;
+    ::unlink(path.c_str());  // so that no link is followed
+    write_atomically(path, header);
+    return StatisticsFile(path, open_regular_file(path, O_WRONLY | O_APPEND | O_NOFOLLOW), header.size());
 }
 
 StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::uint64_t steps,

@@ -41,11 +41,15 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
 // Returns true when a file begins with the header; false also when it cannot be read.
 bool is_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
 
+// Returns true for a file that is empty or holds a part of the header and no more: nothing of value is in it.
+bool is_begun_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
+
 // The file while a run appends to it. It holds whole rows at any moment, except while rows are being written:
 // then a power cut may leave a part of them, which resume() takes away.
 class StatisticsFile {
   public:
-    // Creates a file with the header alone, in the place of any other. Throws Error(io).
+    // Creates a file with the header alone, in the place of any other or of a link, atomically: a kill or a full disk
+    // leaves none without its header. Throws Error(io).
     static StatisticsFile create(const std::filesystem::path& path,
                                  std::string_view header = kStatisticsHeader);
     // Opens the file as read_statistics() has checked it, later rows cut off. Throws Error(io).
