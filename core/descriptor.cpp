@@ -32,6 +32,13 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
 
 void require_regular_file(const std::filesystem::path& path) { open_regular_file(path, O_RDONLY); }
 
+bool is_same_file(int fd, const std::filesystem::path& path) {
+    struct stat opened {
+    }, found{};
+    return ::fstat(fd, &opened) == 0 && ::stat(path.c_str(), &found) == 0 && opened.st_dev == found.st_dev &&
+           opened.st_ino == found.st_ino;
+}
+
 bool is_named_pipe(const std::filesystem::path& path) {
     std::error_code error;
     if (!std::filesystem::is_fifo(path, error)) return false;

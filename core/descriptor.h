@@ -52,6 +52,9 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags);
 // Throws Error(io) unless open_regular_file() can read it.
 void require_regular_file(const std::filesystem::path& path);
 
+// Returns true when `path`, links followed, leads to the file or folder that is open.
+bool is_same_file(int fd, const std::filesystem::path& path);
+
 // Returns true for a FIFO with a name in the file system, which blocks its reader until somebody opens it to
 // write. The anonymous pipe of a running command (/dev/stdin, a shell's `<(command)`) returns false.
 bool is_named_pipe(const std::filesystem::path& path);

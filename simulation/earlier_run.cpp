@@ -117,7 +117,7 @@ SimulationRange range_before(const RunSettings& settings, const Scene& before) {
 
 }  // namespace
 
-FolderLock::FolderLock(const std::filesystem::path& folder) {
+FolderLock::FolderLock(const std::filesystem::path& folder) : path_(folder) {
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
     if (failed)
@@ -138,6 +138,14 @@ FolderLock::FolderLock(const std::filesystem::path& folder) {
                         "--out");
     }
     held_ = result == 0;
+}
+
+bool FolderLock::in_place() const { return is_same_file(folder_.get(), path_); }
+
+void FolderLock::require_in_place() const {
+    if (in_place()) return;
+    throw Error(ErrorCode::io,
+                path_.string() + ": the folder was removed or renamed while the run was writing into it");
 }
 
 void remove_earlier_run(const RunFolder& folder) {

@@ -124,7 +124,12 @@ void StatisticsFile::add(std::string_view row) {
 
 void StatisticsFile::save() {
     write_out();
-    if (::fsync(file_.get()) != 0) fail(path_, errno);
+    int failed;
+    do failed = ::fsync(file_.get());
+    while (failed != 0 && errno == EINTR);
+    if (failed != 0) fail(path_, errno);
+    if (!is_same_file(file_.get(), path_))
+        throw Error(ErrorCode::io, path_.string() + ": was removed or replaced while the run was writing it");
 }
 
 void StatisticsFile::write_out() {

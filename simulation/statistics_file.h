@@ -58,8 +58,8 @@ class StatisticsFile {
 
     // Keeps a row for the next save(), or writes out what has gathered. Throws Error(io).
     void add(std::string_view row);
-    // Flushes: when it returns, all rows are in the file and on the device. Throws Error(io); the file then ends with
-    // a whole row.
+    // Flushes: when it returns, all rows are in the file and on the device. Throws Error(io), also when the file was
+    // removed or replaced; the file then ends with a whole row.
     void save();
 
   private:

@@ -95,6 +95,69 @@ class Faults(Case):
             self.no_leftovers("out")
             shutil.rmtree(self.folder / "out")
 
+    def test_an_interrupted_flush_is_repeated(self):
+        self.assertEqual(self.run_into("undisturbed").returncode, 0)
+        for path in ("statistics.csv", ".vdb", "checkpoint", "manifest", "/out"):
+            result = self.run_into("out", "--overwrite", env=self.failing("fsync EINTR 1 3", path))
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            self.same_runs("undisturbed", "out")
+
+    def test_an_encoder_that_cannot_read_is_an_error(self):
+        arguments = ["run", self.scene, "--video", "--splatting", "cpu", "--set", "camera.height=32", "--out", "out"]
+        for call in ("read EIO 1 1000000", "read EIO 2 1000000", "read EIO 2 1"):
+            with self.subTest(call=call):
+                result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=120,
+                                        env=self.failing(call, "socket:", "ffmpeg"))
+                self.assertEqual(result.returncode, 3, result.stderr)
+                self.assertIn("tiny.mp4: ffmpeg", result.stderr)
+                self.assertFalse((self.folder / "out/frames/tiny.mp4").exists())
+                self.no_leftovers("out")
+                self.assertFalse(json.loads((self.folder / "out/manifest.json").read_text())["complete"])
+                self.call(*arguments, "--resume")
+                self.assertTrue((self.folder / "out/frames/tiny.mp4").exists())
+                shutil.rmtree(self.folder / "out")
+
+    def started(self, out):
+        """A long run that has written a few frames."""
+        scene = self.write("long.toml", LONG)
+        process = subprocess.Popen([NEPHOS, "run", scene, "--no-render", "--out", out], cwd=self.folder,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment)
+        self.addCleanup(process.kill)
+        third = self.folder / out / "density/long_0003.vdb"
+        for _ in range(3000):
+            if third.exists() or process.poll() is not None:
+                break
+            time.sleep(0.02)
+        self.assertTrue(third.exists())
+        self.assertIsNone(process.poll())
+        return process
+
+    def ends_with(self, process, says):
+        output, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 3, output + errors)
+        self.assertEqual(output, "")
+        self.assertIn(says, errors)
+        for manifest in self.folder.rglob("manifest.json"):
+            self.assertFalse(json.loads(manifest.read_text())["complete"])
+
+    def test_a_folder_that_is_removed_or_renamed_ends_the_run(self):
+        process = self.started("removed")
+        while (self.folder / "removed").exists():
+            shutil.rmtree(self.folder / "removed", ignore_errors=True)
+        self.ends_with(process, "removed")
+        process = self.started("renamed")
+        (self.folder / "renamed").rename(self.folder / "elsewhere")
+        self.ends_with(process, "renamed: the folder was removed or renamed")
+        self.assertFalse((self.folder / "renamed/manifest.json").exists())
+
+    def test_parts_that_are_removed_are_missed_at_the_end(self):
+        for name in ("density/long_0002.vdb", "statistics.csv"):
+            process = self.started("out")
+            (self.folder / "out" / name).unlink()
+            process.send_signal(signal.SIGINT) if name == "statistics.csv" else None
+            self.ends_with(process, pathlib.Path(name).name)
+            shutil.rmtree(self.folder / "out")
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)
