@@ -77,9 +77,10 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     for (const std::filesystem::path& path :
          {folder.checkpoint(), folder.statistics(), folder.video(), folder.manifest()}) {
         std::error_code error;
-        if (std::filesystem::symlink_status(path, error).type() != std::filesystem::file_type::not_found) {
-            files.push_back(path);
-        }
+        const auto type = std::filesystem::symlink_status(path, error).type();
+        if (type == std::filesystem::file_type::none)
+            throw Error(ErrorCode::io, path.string() + ": cannot examine: " + error.message());
+        if (type != std::filesystem::file_type::not_found) files.push_back(path);
     }
     return files;
 }

@@ -102,6 +102,13 @@ class Faults(Case):
             self.assertEqual((result.returncode, result.stderr), (0, ""))
             self.same_runs("undisturbed", "out")
 
+    def test_a_file_that_cannot_be_examined_is_not_a_foreign_one(self):
+        for name in ("tiny.mp4", "checkpoint.nephos"):
+            result = self.run_into("out", env=self.failing("stat EIO 1 1000", name))
+            self.assertEqual(result.returncode, 3, result.stderr)
+            self.assertRegex(result.stderr, re.escape(name) + ".*Input/output error")
+            self.assertNotIn("--overwrite", result.stderr)
+
     def test_an_encoder_that_cannot_read_is_an_error(self):
         arguments = ["run", self.scene, "--video", "--splatting", "cpu", "--set", "camera.height=32", "--out", "out"]
         for call in ("read EIO 1 1000000", "read EIO 2 1000000", "read EIO 2 1"):
