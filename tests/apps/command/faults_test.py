@@ -109,6 +109,7 @@ class Faults(Case):
             self.assertRegex(result.stderr, re.escape(name) + ".*Input/output error")
             self.assertNotIn("--overwrite", result.stderr)
 
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
     def test_an_encoder_that_cannot_read_is_an_error(self):
         arguments = ["run", self.scene, "--video", "--splatting", "cpu", "--set", "camera.height=32", "--out", "out"]
         for call in ("read EIO 1 1000000", "read EIO 2 1000000", "read EIO 2 1"):
