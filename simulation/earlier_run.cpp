@@ -14,6 +14,7 @@
 
 #include "automaton/checkpoint.h"
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "scenes/format/writer.h"
 #include "simulation/manifest.h"
@@ -181,6 +182,8 @@ void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
     EarlierRun earlier;
     try {
         earlier = read_manifest(folder.manifest());
+    } catch (const ReadFailure&) {
+        throw;
     } catch (const Error& reason) {
         refuse(folder,
                fmt::format("the folder holds a manifest.json that is not of a run ({})", reason.what()));

@@ -40,6 +40,17 @@ std::optional<StateHash> hash_in(std::string_view row) {
     return hash;
 }
 
+// Nothing for what is no file that can be opened. Throws ReadFailure.
+std::optional<std::string> beginning_of(const std::filesystem::path& path, std::size_t size) {
+    try {
+        return read_beginning(path, size);
+    } catch (const ReadFailure&) {
+        throw;
+    } catch (const Error&) {
+        return std::nullopt;
+    }
+}
+
 [[noreturn]] void fail(const std::filesystem::path& path, int error) {
     throw Error(ErrorCode::io, path.string() + ": cannot write: " + std::strerror(error));
 }
@@ -74,6 +85,7 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
         bytes += line.size() + 1;
     }
     if (!good) {
+        check_reading(stream, path);
         throw Error(ErrorCode::io,
                     fmt::format("{}: does not hold the steps 0 to {} that the checkpoint goes on from",
                                 path.string(), steps == 0 ? 0 : steps - 1));
@@ -82,22 +94,13 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
 }
 
 bool is_statistics(const std::filesystem::path& path, std::string_view header) {
-    try {
-        return read_statistics(path, 0, {}, header) > 0;
-    } catch (const Error&) {
-        return false;
-    }
+    const std::optional<std::string> text = beginning_of(path, header.size());
+    return text == header;
 }
 
 bool is_begun_statistics(const std::filesystem::path& path, std::string_view header) {
-    try {
-        const Descriptor file = open_regular_file(path, O_RDONLY);
-        std::string text(header.size() + 1, '\0');
-        const ssize_t size = ::pread(file.get(), text.data(), text.size(), 0);
-        return size >= 0 && header.starts_with(std::string_view(text).substr(0, std::size_t(size)));
-    } catch (const Error&) {
-        return false;
-    }
+    const std::optional<std::string> text = beginning_of(path, header.size() + 1);
+    return text && header.starts_with(*text);
 }
 
 StatisticsFile::StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size)

@@ -38,10 +38,11 @@ using StatisticsVisitor =
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
                               const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
 
-// Returns true when a file begins with the header; false also when it cannot be read.
+// Returns true when a file begins with the header; false also when it cannot be opened. Throws ReadFailure.
 bool is_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
 
 // Returns true for a file that is empty or holds a part of the header and no more: nothing of value is in it.
+// Throws as is_statistics().
 bool is_begun_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
 
 // The file while a run appends to it. It holds whole rows at any moment, except while rows are being written:

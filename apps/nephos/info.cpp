@@ -3,8 +3,6 @@
 // nephos info: what a file says about itself, whatever its name is.
 
 #include <algorithm>
-#include <array>
-#include <fstream>
 #include <memory>
 
 #include <fmt/format.h>
@@ -34,11 +32,7 @@ enum class FileKind { vdb, checkpoint, exr };
 
 // By the first bytes: OpenVDB's magic number is " BDV" and four zeros, OpenEXR's 20000630.
 FileKind kind_of(const std::string& path) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
-    std::array<char, 8> head{};
-    stream.read(head.data(), head.size());
-    const std::string_view bytes(head.data(), std::size_t(stream.gcount()));
+    const std::string bytes = read_beginning(path, 8);
     if (bytes.starts_with(std::string_view(" BDV\0\0\0\0", 8))) return FileKind::vdb;
     if (bytes.starts_with("\x76\x2f\x31\x01")) return FileKind::exr;
     if (is_checkpoint(path)) return FileKind::checkpoint;

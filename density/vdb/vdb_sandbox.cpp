@@ -10,6 +10,7 @@
 
 #include <openvdb/openvdb.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "density/vdb/sandbox.h"
@@ -33,6 +34,7 @@ void check_file(const std::filesystem::path& path) {
     if (!stream) fail(path, std::string("cannot be opened: ") + std::strerror(errno));
     std::array<char, 8> magic{};
     stream.read(magic.data(), magic.size());
+    check_reading(stream, path);
     if (stream.gcount() == 0) fail(path, "the file is empty");
     constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
     if (stream.gcount() != std::streamsize(magic.size()) || magic != kMagic)

@@ -109,6 +109,17 @@ class Faults(Case):
             self.assertRegex(result.stderr, re.escape(name) + ".*Input/output error")
             self.assertNotIn("--overwrite", result.stderr)
 
+    def test_a_file_that_cannot_be_read_is_neither_foreign_nor_damaged(self):
+        self.assertEqual(self.run_into("out").returncode, 0)
+        for name in ("manifest.json", "statistics.csv", "checkpoint.nephos"):
+            for arguments in (["run", self.scene, "--no-render", "--out", "out"],
+                              ["run", self.scene, "--no-render", "--out", "out", "--resume"], ["info", f"out/{name}"]):
+                with self.subTest(name=name, arguments=arguments):
+                    result = self.refused(3, *arguments, says=f"{name}: cannot read: Input/output error",
+                                          env=self.failing("read EIO 1 1000", name))
+                    self.assertNotIn("--overwrite", result.stderr)
+        self.assertEqual(self.run_into("out", "--resume").returncode, 0)
+
     @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
     def test_an_encoder_that_cannot_read_is_an_error(self):
         arguments = ["run", self.scene, "--video", "--splatting", "cpu", "--set", "camera.height=32", "--out", "out"]
