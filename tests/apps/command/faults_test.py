@@ -62,6 +62,31 @@ class Faults(Case):
                 self.same_runs("undisturbed", "out")
                 shutil.rmtree(self.folder / "out")
 
+    def test_whatever_call_fails_the_files_are_whole_and_there_is_a_way_forward(self):
+        """The same bytes as of an undisturbed run, after at most one more call without --overwrite."""
+        self.assertEqual(self.run_into("undisturbed").returncode, 0)
+        kinds = {"write": ("KILL", "EIO", "ENOSPC", "EINTR"), "fsync": ("KILL", "EIO", "EINTR"),
+                 "read": ("KILL", "EIO", "EINTR"), "stat": ("KILL", "EIO")}
+        failed = 0
+        for call, how, number in ((c, h, n) for c, hows in kinds.items() for h in hows for n in range(1, 47, 5)):
+            with self.subTest(call=call, how=how, number=number):
+                shutil.rmtree(self.folder / "out", ignore_errors=True)
+                result = self.run_into("out", env=self.failing(f"{call} {how} {number} 1", str(self.folder)))
+                allowed = {"KILL": (0, -signal.SIGKILL), "EINTR": (0,)}.get(how, (0, 3))
+                self.assertIn(result.returncode, allowed, result.stderr)
+                if result.returncode != 0:
+                    failed += 1
+                    again = self.run_into("out")
+                    if again.returncode == 2 and "--resume" in again.stderr:
+                        again = self.run_into("out", "--resume")
+                    self.assertEqual(again.returncode, 0, again.stderr)
+                for file in (self.folder / "undisturbed").rglob("*.*"):
+                    if file.is_file() and file.name != "manifest.json":
+                        other = self.folder / "out" / file.relative_to(self.folder / "undisturbed")
+                        self.assertEqual(file.read_bytes(), other.read_bytes(), file.name)
+                self.no_leftovers("out")
+        self.assertGreater(failed, 30)
+
     def test_statistics_that_were_only_begun_are_of_no_value(self):
         self.assertEqual(self.run_into("out").returncode, 0)
         (self.folder / "out/checkpoint.nephos").unlink()
