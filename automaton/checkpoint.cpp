@@ -87,12 +87,14 @@ std::vector<std::byte> read_all(const std::filesystem::path& path) {
     try {
         check_sizes(in, size);
     } catch (const Error& error) {
+        check_reading(in, path);
         throw Error(ErrorCode::io, path.string() + ": " + error.what());
     }
     std::vector<std::byte> bytes(size);
     in.seekg(0);
     if (!in.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(size))) {
-        throw Error(ErrorCode::io, path.string() + ": cannot read");
+        check_reading(in, path);
+        throw Error(ErrorCode::io, path.string() + ": became shorter while it was read");
     }
     return bytes;
 }
@@ -178,11 +180,9 @@ StateHash hash_of_bytes(std::span<const std::byte> bytes) {
 }
 
 bool is_checkpoint(const std::filesystem::path& path) {
-    std::array<char, 8> magic{};
     std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) return false;  // a pipe could wait for ever
-    std::ifstream in(path, std::ios::binary);
-    return in.read(magic.data(), magic.size()) && magic == kMagic;
+    if (!std::filesystem::is_regular_file(path, error)) return false;
+    return read_beginning(path, kMagic.size()) == std::string_view(kMagic.data(), kMagic.size());
 }
 
 }  // namespace nephos

@@ -39,7 +39,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path);
 // Returns the XXH3-128 of bytes. Pure.
 StateHash hash_of_bytes(std::span<const std::byte> bytes);
 
-// Returns true for a file that starts with a checkpoint's magic, false also when it cannot be read.
+// Returns true for a regular file that starts with a checkpoint's magic. Throws Error(io) when it cannot be opened or read.
 bool is_checkpoint(const std::filesystem::path& path);
 
 }  // namespace nephos

@@ -33,6 +33,13 @@ void flush_to_device(const std::filesystem::path& subject, const std::filesystem
     if (failed != 0 && errno != EINVAL) fail(reported, "cannot flush to the device", errno);
 }
 
+// Returns false for a link of another user but root: in a folder that others may write to, it waits there to have a file
+// of ours replaced.
+bool is_trusted_link(const std::filesystem::path& link) {
+    struct stat status {};
+    return ::lstat(link.c_str(), &status) == 0 && (status.st_uid == ::geteuid() || status.st_uid == 0);
+}
+
 // Resolves symbolic links, so that the file that one points to is replaced and not the link. Refuses devices
 // and pipes, which a rename would replace by a plain file.
 std::filesystem::path target_of(const std::filesystem::path& path) {
@@ -44,6 +51,8 @@ std::filesystem::path target_of(const std::filesystem::path& path) {
         throw Error(ErrorCode::io, path.string() + ": is not a regular file");
     }
     if (!std::filesystem::is_symlink(path, error)) return path;
+    if (!is_trusted_link(path))
+        throw Error(ErrorCode::io, path.string() + ": is a link of another user, which is not followed");
     const std::filesystem::path target = std::filesystem::weakly_canonical(path, error);
     if (error) fail(path, "cannot follow the link", error.value());
     return target;

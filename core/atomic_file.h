@@ -21,8 +21,8 @@ namespace nephos {
 class AtomicFile {
   public:
     // Creates an empty temporary file whose name nobody can foresee beside `path`, and missing parent folders. A
-    // symbolic link keeps pointing to the new file; a device, a pipe or a folder in the place of the file is
-    // refused. Throws Error(io) naming `path`.
+    // symbolic link of this user or of root keeps pointing to the new file; one of another user, a device, a pipe or a
+    // folder in the place of the file is refused. Throws Error(io) naming `path`.
     explicit AtomicFile(const std::filesystem::path& path);
     // Removes the temporary file unless it was published, unless another was put in its place.
     ~AtomicFile();

@@ -3,6 +3,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <istream>
 #include <system_error>
 
 #include <fcntl.h>
@@ -31,6 +32,32 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags) {
 }
 
 void require_regular_file(const std::filesystem::path& path) { open_regular_file(path, O_RDONLY); }
+
+void check_reading(const std::istream& stream, const std::filesystem::path& path) {
+    if (stream.bad()) throw ReadFailure(path, errno != 0 ? std::strerror(errno) : "unknown error");
+}
+
+std::string read_beginning(const std::filesystem::path& path, std::size_t most) {
+    const Descriptor file = open_regular_file(path, O_RDONLY);
+    std::string text(most, '\0');
+    std::size_t size = 0;
+    while (size < most) {
+        const ssize_t got = ::read(file.get(), text.data() + size, most - size);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) throw ReadFailure(path, std::strerror(errno));
+        if (got == 0) break;
+        size += std::size_t(got);
+    }
+    text.resize(size);
+    return text;
+}
+
+bool is_same_file(int fd, const std::filesystem::path& path) {
+    struct stat opened {
+    }, found{};
+    return ::fstat(fd, &opened) == 0 && ::stat(path.c_str(), &found) == 0 && opened.st_dev == found.st_dev &&
+           opened.st_ino == found.st_ino;
+}
 
 bool is_named_pipe(const std::filesystem::path& path) {
     std::error_code error;

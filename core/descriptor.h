@@ -6,9 +6,13 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <iosfwd>
 #include <span>
+#include <string>
 
 #include <unistd.h>
+
+#include "core/error.h"
 
 namespace nephos {
 
@@ -51,6 +55,22 @@ Descriptor open_regular_file(const std::filesystem::path& path, int flags);
 
 // Throws Error(io) unless open_regular_file() can read it.
 void require_regular_file(const std::filesystem::path& path);
+
+// A file that is there and cannot be read, which says nothing of its content: "PATH: cannot read: Input/output error".
+class ReadFailure : public Error {
+  public:
+    ReadFailure(const std::filesystem::path& path, const std::string& reason)
+        : Error(ErrorCode::io, path.string() + ": cannot read: " + reason) {}
+};
+
+// Throws ReadFailure when reading from the stream of a file has just failed; its end is no failure.
+void check_reading(const std::istream& stream, const std::filesystem::path& path);
+
+// Returns at most `most` bytes from the beginning of a file. Throws as open_regular_file(), and ReadFailure.
+std::string read_beginning(const std::filesystem::path& path, std::size_t most);
+
+// Returns true when `path`, links followed, leads to the file or folder that is open.
+bool is_same_file(int fd, const std::filesystem::path& path);
 
 // Returns true for a FIFO with a name in the file system, which blocks its reader until somebody opens it to
 // write. The anonymous pipe of a running command (/dev/stdin, a shell's `<(command)`) returns false.

@@ -14,6 +14,7 @@
 
 #include "automaton/checkpoint.h"
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "scenes/format/writer.h"
 #include "simulation/manifest.h"
@@ -77,9 +78,10 @@ std::vector<std::filesystem::path> earlier_files(const RunFolder& folder) {
     for (const std::filesystem::path& path :
          {folder.checkpoint(), folder.statistics(), folder.video(), folder.manifest()}) {
         std::error_code error;
-        if (std::filesystem::symlink_status(path, error).type() != std::filesystem::file_type::not_found) {
-            files.push_back(path);
-        }
+        const auto type = std::filesystem::symlink_status(path, error).type();
+        if (type == std::filesystem::file_type::none)
+            throw Error(ErrorCode::io, path.string() + ": cannot examine: " + error.message());
+        if (type != std::filesystem::file_type::not_found) files.push_back(path);
     }
     return files;
 }
@@ -117,7 +119,7 @@ SimulationRange range_before(const RunSettings& settings, const Scene& before) {
 
 }  // namespace
 
-FolderLock::FolderLock(const std::filesystem::path& folder) {
+FolderLock::FolderLock(const std::filesystem::path& folder) : path_(folder) {
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
     if (failed)
@@ -140,6 +142,14 @@ FolderLock::FolderLock(const std::filesystem::path& folder) {
     held_ = result == 0;
 }
 
+bool FolderLock::in_place() const { return is_same_file(folder_.get(), path_); }
+
+void FolderLock::require_in_place() const {
+    if (in_place()) return;
+    throw Error(ErrorCode::io,
+                path_.string() + ": the folder was removed or renamed while the run was writing into it");
+}
+
 void remove_earlier_run(const RunFolder& folder) {
     for (const std::filesystem::path& path : earlier_files(folder)) remove_file(path);
 }
@@ -152,8 +162,10 @@ void remove_leftovers(const RunFolder& folder) {
         }
     };
     remove_if(".", [&](const std::string& name) {
-        return name == folder.manifest().filename() || name == folder.checkpoint().filename();
+        return name == folder.manifest().filename() || name == folder.checkpoint().filename() ||
+               name == folder.statistics().filename();
     });
+    remove_if("statistics", [](const std::string& name) { return name.ends_with(".csv"); });
     const auto is_frame = [&](const std::string& name) {
         return is_frame_of(name, folder.name) || name == folder.video().filename();
     };
@@ -170,6 +182,8 @@ void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
     EarlierRun earlier;
     try {
         earlier = read_manifest(folder.manifest());
+    } catch (const ReadFailure&) {
+        throw;
     } catch (const Error& reason) {
         refuse(folder,
                fmt::format("the folder holds a manifest.json that is not of a run ({})", reason.what()));
@@ -177,7 +191,8 @@ void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
     const auto is_there = [&](const std::filesystem::path& file) {
         return std::ranges::count(files, file) > 0;
     };
-    if (is_there(folder.statistics()) && !is_statistics(folder.statistics())) {
+    if (is_there(folder.statistics()) && !is_statistics(folder.statistics()) &&
+        !is_begun_statistics(folder.statistics())) {
         refuse(folder, "the folder holds a statistics.csv that is not of a run");
     }
     if (earlier.scene_hash != scene_hash) {

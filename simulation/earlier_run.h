@@ -24,7 +24,14 @@ class FolderLock {
     // Returns false on a file system that has no locks (some network ones): two runs are then not kept apart.
     bool held() const { return held_; }
 
+    // Returns true while the folder's path leads to the folder that is held. Who removes or renames it takes the lock
+    // along, and another run may begin in a new one of that name.
+    bool in_place() const;
+    // Throws Error(io) unless in_place().
+    void require_in_place() const;
+
   private:
+    std::filesystem::path path_;
     Descriptor folder_;
     bool held_ = false;
 };

@@ -208,6 +208,8 @@ std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& pa
         return rain;
     } catch (const Error& error) {
         throw Error(ErrorCode::io, path.string() + ": " + error.what());
+    } catch (const std::ios_base::failure& failure) {
+        throw ReadFailure(path, failure.code().message());
     } catch (const nlohmann::json::exception&) {
         throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
     }
@@ -237,6 +239,8 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
         run.range.last_frame = json.at("range").at("last_frame").get<int>();
         run.steps_reported = json.at("steps").at("reported").get<std::uint64_t>();
         return run;
+    } catch (const std::ios_base::failure& failure) {
+        throw ReadFailure(path, failure.code().message());
     } catch (const nlohmann::json::exception&) {
         throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
     }

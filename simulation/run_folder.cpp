@@ -92,13 +92,19 @@ class Recorder : public SimulationSink {
         if (!settings_.scene.layers.empty()) state_.rain = read_rain(folder_.manifest());
         std::erase_if(state_.rain, [&](const auto& rain) { return rain.first >= simulation.next_frame(); });
         state_.steps_reported = simulation.next_step();
+        require_frames("is missing, although the checkpoint is past it");
+    }
+
+    // Throws Error(io) when a file of a frame that is done is not there.
+    void require_frames(const std::string& what) const {
         for (const RunFiles& files : frame_files()) {
             for (const std::filesystem::path& file : files.files) {
-                if (std::filesystem::exists(file)) continue;
-                throw Error(ErrorCode::io,
-                            file.string() +
-                                ": is missing, although the checkpoint is past it: start anew with "
-                                "--overwrite");
+                std::error_code error;
+                const auto type = std::filesystem::status(file, error).type();
+                if (type == std::filesystem::file_type::none)
+                    throw Error(ErrorCode::io, file.string() + ": cannot examine: " + error.message());
+                if (type != std::filesystem::file_type::not_found) continue;
+                throw Error(ErrorCode::io, file.string() + ": " + what + ": start anew with --overwrite");
             }
         }
     }
@@ -229,15 +235,17 @@ void report_progress(const RunObserver& observer, const Simulation& simulation, 
 
 // Up to the end or until it is stopped; leaves a checkpoint in both cases.
 void simulate(Simulation& simulation, Recorder& recorder, const RunSettings& settings,
-              const RunObserver& observer, Clock::time_point begin) {
+              const RunObserver& observer, const FolderLock& lock, Clock::time_point begin) {
     Clock::time_point saved = Clock::now();
     while (!simulation.finished() && !stopped(observer)) {
+        lock.require_in_place();
         simulation.advance(recorder);
         report_progress(observer, simulation, recorder, settings, "simulating");
         if (seconds_since(saved) < settings.checkpoint_every_s) continue;
         recorder.save(simulation, seconds_since(begin));
         saved = Clock::now();
     }
+    lock.require_in_place();
     recorder.save(simulation, seconds_since(begin));
     report_progress(observer, simulation, recorder, settings, "simulating");
 }
@@ -327,13 +335,19 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     recorder.start_video(simulation);
 
     try {
-        simulate(simulation, recorder, settings, observer, begin);
+        simulate(simulation, recorder, settings, observer, lock, begin);
     } catch (...) {
+        // What failed in a folder that is gone failed for that; and in a new one of its name another run may be at work.
+        lock.require_in_place();
         recorder.list_finished_frames(seconds_since(begin));
         throw;
     }
     const bool complete = simulation.finished() && encode(simulation, recorder, settings, observer);
-    if (complete) recorder.write_manifest(true, seconds_since(begin));
+    if (complete) {
+        lock.require_in_place();
+        recorder.require_frames("was removed while the run was writing");
+        recorder.write_manifest(true, seconds_since(begin));
+    }
     RunReport report = report_of(recorder, settings, simulation);
     report.first_step = first_step;
     return report;

@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 
+#include "core/atomic_file.h"
 #include "core/error.h"
 
 namespace nephos {
@@ -37,6 +38,17 @@ std::optional<StateHash> hash_in(std::string_view row) {
     };
     if (!number(digits.substr(0, 16), hash.high) || !number(digits.substr(16), hash.low)) return std::nullopt;
     return hash;
+}
+
+// Nothing for what is no file that can be opened. Throws ReadFailure.
+std::optional<std::string> beginning_of(const std::filesystem::path& path, std::size_t size) {
+    try {
+        return read_beginning(path, size);
+    } catch (const ReadFailure&) {
+        throw;
+    } catch (const Error&) {
+        return std::nullopt;
+    }
 }
 
 [[noreturn]] void fail(const std::filesystem::path& path, int error) {
@@ -73,6 +85,7 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
         bytes += line.size() + 1;
     }
     if (!good) {
+        check_reading(stream, path);
         throw Error(ErrorCode::io,
                     fmt::format("{}: does not hold the steps 0 to {} that the checkpoint goes on from",
                                 path.string(), steps == 0 ? 0 : steps - 1));
@@ -81,21 +94,22 @@ std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t s
 }
 
 bool is_statistics(const std::filesystem::path& path, std::string_view header) {
-    try {
-        return read_statistics(path, 0, {}, header) > 0;
-    } catch (const Error&) {
-        return false;
-    }
+    const std::optional<std::string> text = beginning_of(path, header.size());
+    return text == header;
+}
+
+bool is_begun_statistics(const std::filesystem::path& path, std::string_view header) {
+    const std::optional<std::string> text = beginning_of(path, header.size() + 1);
+    return text && header.starts_with(*text);
 }
 
 StatisticsFile::StatisticsFile(std::filesystem::path path, Descriptor file, std::uint64_t size)
     : path_(std::move(path)), file_(std::move(file)), size_(size) {}
 
 StatisticsFile StatisticsFile::create(const std::filesystem::path& path, std::string_view header) {
-    StatisticsFile file(path, open_regular_file(path, O_WRONLY | O_APPEND | O_CREAT | O_TRUNC), 0);
-    file.gathered_ = header;
-    file.write_out();
-    return file;
+    ::unlink(path.c_str());  // so that no link is followed
+    write_atomically(path, header);
+    return StatisticsFile(path, open_regular_file(path, O_WRONLY | O_APPEND | O_NOFOLLOW), header.size());
 }
 
 StatisticsFile StatisticsFile::resume(const std::filesystem::path& path, std::uint64_t steps,
@@ -113,7 +127,12 @@ void StatisticsFile::add(std::string_view row) {
 
 void StatisticsFile::save() {
     write_out();
-    if (::fsync(file_.get()) != 0) fail(path_, errno);
+    int failed;
+    do failed = ::fsync(file_.get());
+    while (failed != 0 && errno == EINTR);
+    if (failed != 0) fail(path_, errno);
+    if (!is_same_file(file_.get(), path_))
+        throw Error(ErrorCode::io, path_.string() + ": was removed or replaced while the run was writing it");
 }
 
 void StatisticsFile::write_out() {

@@ -38,14 +38,19 @@ using StatisticsVisitor =
 std::uint64_t read_statistics(const std::filesystem::path& path, std::uint64_t steps,
                               const StatisticsVisitor& visit, std::string_view header = kStatisticsHeader);
 
-// Returns true when a file begins with the header; false also when it cannot be read.
+// Returns true when a file begins with the header; false also when it cannot be opened. Throws ReadFailure.
 bool is_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
+
+// Returns true for a file that is empty or holds a part of the header and no more: nothing of value is in it.
+// Throws as is_statistics().
+bool is_begun_statistics(const std::filesystem::path& path, std::string_view header = kStatisticsHeader);
 
 // The file while a run appends to it. It holds whole rows at any moment, except while rows are being written:
 // then a power cut may leave a part of them, which resume() takes away.
 class StatisticsFile {
   public:
-    // Creates a file with the header alone, in the place of any other. Throws Error(io).
+    // Creates a file with the header alone, in the place of any other or of a link, atomically: a kill or a full disk
+    // leaves none without its header. Throws Error(io).
     static StatisticsFile create(const std::filesystem::path& path,
                                  std::string_view header = kStatisticsHeader);
     // Opens the file as read_statistics() has checked it, later rows cut off. Throws Error(io).
@@ -54,8 +59,8 @@ class StatisticsFile {
 
     // Keeps a row for the next save(), or writes out what has gathered. Throws Error(io).
     void add(std::string_view row);
-    // Flushes: when it returns, all rows are in the file and on the device. Throws Error(io); the file then ends with
-    // a whole row.
+    // Flushes: when it returns, all rows are in the file and on the device. Throws Error(io), also when the file was
+    // removed or replaced; the file then ends with a whole row.
     void save();
 
   private:

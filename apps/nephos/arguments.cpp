@@ -185,7 +185,7 @@ Scene load_scene(const SceneArguments& arguments, SceneUse use) {
 void print_scene_errors(const SceneErrors& errors) {
     const std::string plain = "error:";
     const std::string coloured = styled(plain, Style::red, colours_on(stderr));
-    std::string text = errors.what();
+    std::string text = escaped_lines(errors.what());
     // The label stands after the place, once a problem, before any text of the scene itself.
     for (std::size_t line = 0; line < text.size();) {
         const std::size_t end = std::min(text.find('\n', line), text.size());
@@ -194,7 +194,7 @@ void print_scene_errors(const SceneErrors& errors) {
         if (is_message) text.replace(at, plain.size(), coloured);
         line = text.find('\n', line) == text.npos ? text.size() : text.find('\n', line) + 1;
     }
-    print_message(text);
+    print_sequences(text);
     if (!text.ends_with('\n')) print_message("\n");
 }
 

@@ -2,8 +2,7 @@
 
 // nephos info: what a file says about itself, whatever its name is.
 
-#include <array>
-#include <fstream>
+#include <algorithm>
 #include <memory>
 
 #include <fmt/format.h>
@@ -33,11 +32,7 @@ enum class FileKind { vdb, checkpoint, exr };
 
 // By the first bytes: OpenVDB's magic number is " BDV" and four zeros, OpenEXR's 20000630.
 FileKind kind_of(const std::string& path) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
-    std::array<char, 8> head{};
-    stream.read(head.data(), head.size());
-    const std::string_view bytes(head.data(), std::size_t(stream.gcount()));
+    const std::string bytes = read_beginning(path, 8);
     if (bytes.starts_with(std::string_view(" BDV\0\0\0\0", 8))) return FileKind::vdb;
     if (bytes.starts_with("\x76\x2f\x31\x01")) return FileKind::exr;
     if (is_checkpoint(path)) return FileKind::checkpoint;
@@ -53,17 +48,25 @@ Json pairs_json(const std::vector<std::pair<std::string, std::string>>& pairs) {
     return json;
 }
 
+// The number of bytes of a text up to `limit` that does not cut a character of UTF-8.
+std::size_t cut_at(std::string_view text, std::size_t limit) {
+    if (text.size() <= limit) return text.size();
+    std::size_t end = limit;
+    while (end > limit - 4 && (text[end] & 0xC0) == 0x80) --end;
+    return end;
+}
+
 // "  name   value" lines; long values are cut, --json has them whole.
 std::string pairs_text(const std::vector<std::pair<std::string, std::string>>& pairs, int indent) {
     std::size_t width = 0;
-    for (const auto& [name, value] : pairs) width = std::max(width, name.size());
+    for (const auto& [name, value] : pairs) width = std::max(width, escaped(name).size());
     std::string out;
     for (const auto& [name, value] : pairs) {
-        std::string shown;
-        for (const char c : value) shown += static_cast<unsigned char>(c) < 32 || c == 127 ? ' ' : c;
-        constexpr std::size_t kLongest = 200;
-        if (shown.size() > kLongest) shown = shown.substr(0, kLongest) + " ...";
-        out += fmt::format("{:{}}{:{}}  {}\n", "", indent, name, width, shown);
+        std::string shown = value.substr(0, cut_at(value, 200));
+        std::replace_if(
+            shown.begin(), shown.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+        out += fmt::format("{:{}}{:{}}  {}{}\n", "", indent, escaped(name), width, escaped(shown),
+                           shown.size() < value.size() ? " ..." : "");
     }
     return out;
 }
@@ -87,14 +90,14 @@ Json vdb_json(const VdbInfo& info) {
 }
 
 std::string vdb_text(const VdbInfo& info, bool colours) {
-    std::string out = fmt::format("OpenVDB {}, {} grid{}\n", info.file_version, info.grids.size(),
+    std::string out = fmt::format("OpenVDB {}, {} grid{}\n", escaped(info.file_version), info.grids.size(),
                                   info.grids.size() == 1 ? "" : "s");
     out += pairs_text(info.metadata, 2);
     for (const VdbGridInfo& grid : info.grids) {
         const VoxelBox& box = grid.active_box;
         out += fmt::format("\n  {}  {}, {}\n",
                            styled(grid.name.empty() ? "(no name)" : grid.name, Style::bold, colours),
-                           grid.type, grid.grid_class);
+                           escaped(grid.type), escaped(grid.grid_class));
         std::vector<std::pair<std::string, std::string>> rows;
         const Vec3& size = grid.voxel_size;
         rows.emplace_back("voxel size", size.x == size.y && size.y == size.z
@@ -151,9 +154,10 @@ std::string exr_text(const ExrInfo& info, bool colours) {
     std::string out =
         fmt::format("OpenEXR, {} part{}\n", info.parts.size(), info.parts.size() == 1 ? "" : "s");
     for (const ExrPart& part : info.parts) {
-        out += fmt::format("\n  {}  {} x {}, {}{}\n",
-                           styled(part.name.empty() ? "(no name)" : part.name, Style::bold, colours),
-                           part.width, part.height, part.compression, part.complete ? "" : ", INCOMPLETE");
+        out +=
+            fmt::format("\n  {}  {} x {}, {}{}\n",
+                        styled(part.name.empty() ? "(no name)" : part.name, Style::bold, colours), part.width,
+                        part.height, escaped(part.compression), part.complete ? "" : ", INCOMPLETE");
         std::vector<std::pair<std::string, std::string>> rows;
         for (const ExrChannel& channel : part.channels) rows.emplace_back(channel.name, channel.type);
         out += pairs_text(rows, 4);
@@ -197,7 +201,9 @@ int info(const InfoArguments& a) {
         try {
             const Description description = describe(file, colours);
             json.update(description.json);
-            if (!a.work.json) output.write(fmt::format("{}{}: {}", separator, file, description.text));
+            if (!a.work.json) {
+                output.write_styled(fmt::format("{}{}: {}", separator, escaped(file), description.text));
+            }
             separator = "\n";
         } catch (const Error& error) {
             output.flush();  // what was shown before stands before the message

@@ -92,7 +92,7 @@ int run_command(CLI::App& app, int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
-        Output().write(parsed_app(app).help());
+        Output().write_styled(parsed_app(app).help());
         return 0;
     } catch (const CLI::CallForVersion& version) {
         Output().line(version.what());

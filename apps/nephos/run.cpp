@@ -103,14 +103,15 @@ void print_files(Output& output, const RunReport& report) {
     for (const RunFiles& files : report.files) {
         std::string name = files.files.front().string();
         if (files.files.size() > 1) name += " .. " + files.files.back().filename().string();
+        name = escaped(name);
         rows.push_back({name, bytes_text(total_bytes(files)), std::string(opened_by(files.kind))});
         width = std::max(width, name.size());
         size_width = std::max(size_width, rows.back().size.size());
     }
     const bool colours = colours_on(stdout);
     for (const Row& row : rows) {
-        output.line(fmt::format("  {:{}}  {:>{}}  {}", row.files, width, row.size, size_width,
-                                styled(row.opened_by, Style::dim, colours)));
+        output.write_styled(fmt::format("  {:{}}  {:>{}}  {}\n", row.files, width, row.size, size_width,
+                                        styled(row.opened_by, Style::dim, colours)));
     }
 }
 
@@ -123,11 +124,12 @@ std::string drawn_by(const RunReport& report) {
 
 void print_report(const RunReport& report) {
     Output output;
-    output.line(
+    output.write_styled(
         styled(fmt::format("{}: {}, {} in {}{}", report.scene, counted(report.steps_reported - 1, "step"),
                            counted(std::uint64_t(report.frames), "frame"), human_duration(report.wall_s),
                            drawn_by(report)),
-               Style::bold, colours_on(stdout)));
+               Style::bold, colours_on(stdout)) +
+        "\n");
     print_files(output, report);
 }
 

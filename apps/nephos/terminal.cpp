@@ -13,6 +13,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "core/text.h"
+
 namespace nephos {
 namespace {
 
@@ -41,8 +43,8 @@ bool unicode_locale() {
 }
 
 void print_labelled(std::string_view label, Style style, std::string_view message) {
-    print_message(fmt::format("{} {}{}", styled(label, style, colours_on(stderr)), message,
-                              message.ends_with('\n') ? "" : "\n"));
+    print_sequences(fmt::format("{} {}{}", styled(label, style, colours_on(stderr)), escaped_lines(message),
+                                message.ends_with('\n') ? "" : "\n"));
 }
 
 std::string repeat(std::string_view piece, int times) {
@@ -53,7 +55,11 @@ std::string repeat(std::string_view piece, int times) {
 
 }  // namespace
 
-void Output::write(std::string_view text) {
+std::string escaped_lines(std::string_view text) { return escaped(text, "\n\t"); }
+
+void Output::write(std::string_view text) { write_styled(escaped_lines(text)); }
+
+void Output::write_styled(std::string_view text) {
     if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) output_failed(errno);
 }
 
@@ -76,10 +82,13 @@ std::string styled(std::string_view text, Style style, bool colours) {
     static const fmt::text_style kLooks[] = {fmt::emphasis::bold, fmt::emphasis::faint,
                                              fmt::emphasis::bold | fmt::fg(fmt::terminal_color::red),
                                              fmt::fg(fmt::terminal_color::cyan)};
-    return colours ? fmt::format(kLooks[std::size_t(style)], "{}", text) : std::string(text);
+    const std::string shown = escaped_lines(text);
+    return colours ? fmt::format(kLooks[std::size_t(style)], "{}", shown) : shown;
 }
 
-void print_message(std::string_view text) {
+void print_message(std::string_view text) { print_sequences(escaped_lines(text)); }
+
+void print_sequences(std::string_view text) {
     std::fwrite(text.data(), 1, text.size(), stderr);
     std::fflush(stderr);
 }
@@ -104,7 +113,8 @@ int terminal_width(std::FILE* stream, int otherwise) {
 }
 
 std::string json_text(const nlohmann::ordered_json& json) {
-    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    // The dump leaves U+007F and on as they are; outside of its strings there are newlines alone.
+    return escaped(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace), "\n");
 }
 
 std::string human_duration(double seconds) {
@@ -145,13 +155,13 @@ void ProgressBar::update(std::uint64_t done, std::string_view detail) {
     const double elapsed_s = std::chrono::duration<double>(now - begin_).count();
     // One column stays free: some terminals wrap when the last one is written.
     const int width = terminal_width(stderr, 80) - 1;
-    print_message(
+    print_sequences(
         fmt::format("\r{}\033[K", text(unit_, start_, done, total_, elapsed_s, detail, width, unicode_)));
 }
 
 void ProgressBar::clear() {
     if (!drawn_) return;
-    print_message("\r\033[K");
+    print_sequences("\r\033[K");
     drawn_ = false;
 }
 

@@ -3,6 +3,9 @@
 
 // What the command says: results on standard output, messages and the progress bar on standard error. Colours
 // and the bar appear only on a terminal; colours not when NO_COLOR is set or TERM is "dumb" (no-color.org).
+//
+// Names of files, of what is in them, and pieces of scenes come from strangers: everything here but print_sequences()
+// escapes control characters (core/text.h), newlines and tabs excepted, so that no file steers the terminal.
 
 #include <chrono>
 #include <cstdint>
@@ -23,8 +26,10 @@ struct OutputClosed {};
 // Standard output, checked: a full disk or a closed pipe is not silent.
 class Output {
   public:
-    // Writes text as it is. Throws OutputClosed, or Error(io) with the reason.
+    // Writes text, escaped. Throws OutputClosed, or Error(io) with the reason.
     void write(std::string_view text);
+    // Writes text made of styled() and of escaped() pieces, as it is; throws as write().
+    void write_styled(std::string_view text);
     // Writes text and a newline; throws as write().
     void line(std::string_view text);
     // Flushes before the end of the program, so that a late failure is seen; throws as write().
@@ -34,7 +39,7 @@ class Output {
 // Returns true when colours may be used on stdout or stderr.
 bool colours_on(std::FILE* stream);
 
-// Text between escape sequences (ECMA-48) when colours are on.
+// Returns escaped text between escape sequences (ECMA-48) when colours are on.
 enum class Style { bold, dim, red, cyan };
 std::string styled(std::string_view text, Style style, bool colours);
 
@@ -42,13 +47,18 @@ std::string styled(std::string_view text, Style style, bool colours);
 void print_error(std::string_view message);
 void print_error(const Error& error);  // with its place, when it has one
 void print_note(std::string_view message);
-// Prints text as it is on standard error; failures to write are ignored, there is nowhere left to say so.
+// Prints text on standard error; failures to write are ignored, there is nowhere left to say so.
 void print_message(std::string_view text);
+// The same for text made of styled() and of escaped() pieces, or of sequences that move the cursor, as it is.
+void print_sequences(std::string_view text);
+// Returns escaped(text) with its newlines and tabs.
+std::string escaped_lines(std::string_view text);
 
 // Columns of the terminal at `stream`, or `otherwise` when it is none.
 int terminal_width(std::FILE* stream, int otherwise);
 
-// Returns the text of a result for --json: indented; bytes that are no UTF-8 are replaced.
+// Returns the text of a result for --json: indented; bytes that are no UTF-8 are replaced, and
+// all control characters escaped.
 std::string json_text(const nlohmann::ordered_json& json);
 
 // Seconds as "0:07", "12:34" or "1:02:03"; a count as "1,234,567".

@@ -235,6 +235,11 @@ class Child {
         pid_ = -1;
         if (result < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0)) return "";
         if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) return "reading it takes longer than allowed";
+        // The system's answer to memory that is short, in the machine or in a control group.
+        if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
+            return "the system killed the process that read it, as it does where memory is short";
+        if (WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT)
+            return "OpenVDB ended with signal 6 while reading it: it is damaged, or memory is short";
         if (WIFSIGNALED(status)) {
             return "it is damaged: OpenVDB ended with signal " + std::to_string(WTERMSIG(status)) +
                    " while reading it";

@@ -94,8 +94,9 @@ enum class UpAxis {
 
 // Limits on the child process that reads a file; Error(io) beyond them.
 struct VdbReadLimits {
-    std::size_t memory_bytes = 0;  // for the reading process; 0 = half of the memory that is free
-    double seconds = 120;          // wall clock, > 0
+    // For the reading process; 0 = half of the memory that is free, and at most 256 MiB and 2,000 times the file's size.
+    std::size_t memory_bytes = 0;
+    double seconds = 120;  // wall clock, > 0
 };
 
 struct VdbReadOptions {

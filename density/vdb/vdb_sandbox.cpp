@@ -3,12 +3,16 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <limits>
+#include <new>
 #include <stdexcept>
 #include <string>
 
 #include <openvdb/openvdb.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "density/vdb/sandbox.h"
 #include "density/vdb/vdb_archive.h"
 
@@ -30,10 +34,23 @@ void check_file(const std::filesystem::path& path) {
     if (!stream) fail(path, std::string("cannot be opened: ") + std::strerror(errno));
     std::array<char, 8> magic{};
     stream.read(magic.data(), magic.size());
+    check_reading(stream, path);
     if (stream.gcount() == 0) fail(path, "the file is empty");
     constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
     if (stream.gcount() != std::streamsize(magic.size()) || magic != kMagic)
         fail(path, "it is not an OpenVDB file");
+}
+
+// The most memory that reading a file of this size may take. Leaves of 512 voxels take at least 100 bytes in a file and
+// some 3 KiB in memory; Blosc compresses values to 1/255 at best. A length that a damaged header states is not bounded
+// by anything in the file, so that 100 bytes could take what the machine has.
+std::size_t memory_bound(const std::filesystem::path& path) {
+    constexpr std::uintmax_t kLeast = 256u << 20, kPerByte = 2000;
+    constexpr std::uintmax_t kMost = std::numeric_limits<std::size_t>::max();
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(path, error);
+    if (error) fail(path, error.message());
+    return size > (kMost - kLeast) / kPerByte ? kMost : kLeast + kPerByte * size;
 }
 
 }  // namespace
@@ -42,13 +59,21 @@ void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
                 const std::function<void(VdbArchive&, SandboxWriter&)>& child,
                 const std::function<void(SandboxReader&)>& parent) {
     check_file(path);
+    VdbReadLimits bounded = limits;
+    bounded.memory_bytes = memory_limit(limits);
+    const bool by_size = limits.memory_bytes == 0 && memory_bound(path) < bounded.memory_bytes;
+    if (by_size) bounded.memory_bytes = memory_bound(path);
     openvdb::initialize();  // before the fork, so that the child finds it done
     run_sandboxed(
-        path, limits,
+        path, bounded,
         [&](SandboxWriter& writer) {
             try {
                 VdbArchive archive(path);
                 child(archive, writer);
+            } catch (const std::bad_alloc&) {
+                if (!by_size) throw;
+                throw std::runtime_error("reading it takes more than " + bytes_text(bounded.memory_bytes) +
+                                         " of memory, the most for a file of its size");
             } catch (const std::ios_base::failure&) {
                 throw std::runtime_error("it is truncated or damaged");
             } catch (const openvdb::Exception& error) {

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
+#include <ostream>
 #include <string>
 
 #include <openvdb/io/Archive.h>
@@ -14,6 +13,7 @@
 #include "density/openvdb_access.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_metadata.h"
+#include "density/vdb/vdb_output.h"
 
 namespace nephos {
 namespace {
@@ -247,19 +247,22 @@ constexpr std::streamoff kUuidOffset = 8 + 3 * 4 + 1;
 
 void write_file(const std::filesystem::path& temporary, const std::filesystem::path& path,
                 const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) {
-    errno = 0;
+    VdbOutput file(temporary);
+    const auto check = [&](bool good) {
+        if (good) return;
+        throw Error(ErrorCode::io, path.string() + ": cannot write: " +
+                                       (file.error() != 0 ? std::strerror(file.error()) : "unknown error"));
+    };
+    check(file.error() == 0);
     try {
-        std::ofstream stream;
+        std::ostream stream(&file);
         stream.exceptions(std::ios::badbit | std::ios::failbit);
-        stream.open(temporary, std::ios::binary | std::ios::trunc);
         CheckedArchive().save(stream, grids, metadata);
         stream.seekp(kUuidOffset);
         stream << uuid_of(path, grids, metadata);
-        stream.close();
+        check(file.close());
     } catch (const std::ios_base::failure&) {
-        const int error = errno;
-        throw Error(ErrorCode::io,
-                    path.string() + ": cannot write: " + (error ? std::strerror(error) : "unknown error"));
+        check(false);
     } catch (const openvdb::Exception& error) {
         throw Error(ErrorCode::io, path.string() + ": cannot write: " + error.what());
     }

@@ -12,6 +12,7 @@
 #include <png.h>
 
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "render/image/exposure.h"
@@ -160,8 +161,8 @@ double read_png_exposure(const std::filesystem::path& path) {
     const std::string key = std::string("exposure") + std::string(5, '\0');
     unsigned char head[8];
     while (stream.read(reinterpret_cast<char*>(head), sizeof head)) {
-        const std::uint32_t length =
-            std::uint32_t(head[0]) << 24 | std::uint32_t(head[1]) << 16 | std::uint32_t(head[2]) << 8 | head[3];
+        const std::uint32_t length = std::uint32_t(head[0]) << 24 | std::uint32_t(head[1]) << 16 |
+                                     std::uint32_t(head[2]) << 8 | head[3];
         const std::string type(reinterpret_cast<const char*>(head) + 4, 4);
         if (type != "iTXt" || length > 4096) {
             stream.seekg(std::streamoff(length) + 4, std::ios::cur);
@@ -176,6 +177,7 @@ double read_png_exposure(const std::filesystem::path& path) {
         if (const auto [rest, error] = std::from_chars(from, end, value); error == std::errc() && rest == end)
             return value;
     }
+    check_reading(stream, path);
     fail(path, "cannot read the exposure of the PNG", "it has no text chunk \"exposure\" with a number");
 }
 

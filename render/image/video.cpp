@@ -31,19 +31,32 @@ namespace {
 constexpr const char* kNoFfmpeg =
     "the ffmpeg command was not found: install the package ffmpeg to write videos";
 
+// The file itself, which ffmpeg opens under this name: what another may have put in the place of its path stays as it is.
+constexpr int kOutput = 3;
+constexpr const char* kOutputName = "file:/dev/fd/3";
+
+Descriptor opened(const std::filesystem::path& file, const std::filesystem::path& reported) {
+    Descriptor descriptor(::open(file.c_str(), O_RDWR | O_NOFOLLOW | O_CLOEXEC));
+    if (descriptor.get() < 0)
+        throw Error(ErrorCode::io, reported.string() + ": cannot open: " + std::strerror(errno));
+    return descriptor;
+}
+
 // The running command. Its input is a socket rather than a pipe: writing to a dead reader is then an error
 // code (MSG_NOSIGNAL) and not a SIGPIPE, whatever the program around us does with signals.
 class Encoder {
   public:
-    Encoder(const std::vector<std::string>& command, int processors) {
+    // `output` becomes the command's descriptor kOutput.
+    Encoder(const std::vector<std::string>& command, const Descriptor& output, int processors) {
         int ends[2];
         if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
             fail_system("cannot start ffmpeg", errno);
         ours_.reset(ends[0]);
         const Descriptor theirs(ends[1]);
         messages_.reset(::memfd_create("ffmpeg-messages", MFD_CLOEXEC));
-        if (messages_.get() < 0) fail_system("cannot start ffmpeg", errno);
-        spawn(command, theirs.get());
+        progress_.reset(::memfd_create("ffmpeg-progress", MFD_CLOEXEC));
+        if (messages_.get() < 0 || progress_.get() < 0) fail_system("cannot start ffmpeg", errno);
+        spawn(command, theirs.get(), output.get());
         if (processors > 0) keep_to(processors);
     }
     Encoder(const Encoder&) = delete;
@@ -67,11 +80,17 @@ class Encoder {
         return true;
     }
 
-    // Ends the input and waits. Throws Error(io) unless the command succeeded.
-    void finish() {
+    // Ends the input and waits. Throws Error(io) unless the command succeeded and says that it encoded `frames`: some
+    // take an input that cannot be read for one that ends.
+    void finish(std::size_t frames) {
         ours_.close();
         const int status = wait();
-        if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+        if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+            const std::size_t encoded = frames_encoded();
+            if (encoded == frames) return;
+            throw Error(ErrorCode::io, "ffmpeg encoded " + std::to_string(encoded) + " of " +
+                                           std::to_string(frames) + " frames: " + last_message());
+        }
         const std::string how = WIFSIGNALED(status)
                                     ? "was killed by signal " + std::to_string(WTERMSIG(status))
                                     : "failed with status " + std::to_string(WEXITSTATUS(status));
@@ -83,7 +102,7 @@ class Encoder {
         throw Error(ErrorCode::io, what + ": " + std::strerror(error));
     }
 
-    void spawn(const std::vector<std::string>& command, int input) {
+    void spawn(const std::vector<std::string>& command, int input, int output) {
         std::vector<char*> arguments;
         for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
         arguments.push_back(nullptr);
@@ -92,8 +111,9 @@ class Encoder {
         ::posix_spawn_file_actions_init(&actions);
         ::posix_spawnattr_init(&attributes);
         ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
-        ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+        ::posix_spawn_file_actions_adddup2(&actions, progress_.get(), STDOUT_FILENO);
         ::posix_spawn_file_actions_adddup2(&actions, messages_.get(), STDERR_FILENO);
+        ::posix_spawn_file_actions_adddup2(&actions, output, kOutput);
         // A process group of its own: Ctrl-C at the terminal signals the calling program, which then ends
         // ffmpeg.
         ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
@@ -129,18 +149,33 @@ class Encoder {
         return status;
     }
 
-    std::string last_message() {
+    static std::string end_of(const Descriptor& file) {
         char text[600];
-        const off_t end = ::lseek(messages_.get(), 0, SEEK_END);
+        const off_t end = ::lseek(file.get(), 0, SEEK_END);
         const off_t start = end > off_t(sizeof text) ? end - off_t(sizeof text) : 0;
-        const ssize_t count = ::pread(messages_.get(), text, sizeof text, start);
-        std::string message(text, count > 0 ? std::size_t(count) : 0);
+        const ssize_t count = ::pread(file.get(), text, sizeof text, start);
+        return std::string(text, count > 0 ? std::size_t(count) : 0);
+    }
+
+    // The number in the last line "frame=N" of the command's report of progress.
+    std::size_t frames_encoded() {
+        constexpr std::string_view kKey = "frame=";
+        const std::string report = end_of(progress_);
+        const std::size_t at = report.rfind(kKey);
+        std::size_t frames = 0;
+        if (at != report.npos)
+            std::from_chars(report.data() + at + kKey.size(), report.data() + report.size(), frames);
+        return frames;
+    }
+
+    std::string last_message() {
+        std::string message = end_of(messages_);
         while (!message.empty() && (message.back() == '\n' || message.back() == ' ')) message.pop_back();
         return message.empty() ? "no message" : message;
     }
 
     pid_t child_ = -1;
-    Descriptor ours_, messages_;
+    Descriptor ours_, messages_, progress_;
 };
 
 void check(const VideoOptions& options) {
@@ -158,13 +193,12 @@ void check(const VideoOptions& options) {
 // Threads of x264: their number changes the file, so it is the same on every machine and with every --threads.
 constexpr const char* kEncoderThreads = "4";
 
-std::vector<std::string> command_line(const VideoOptions& options, const std::filesystem::path& output) {
+std::vector<std::string> command_line(const VideoOptions& options) {
     char rate[32];
     const auto end =
         std::to_chars(rate, rate + sizeof rate, options.frames_per_second, std::chars_format::fixed, 6);
-    // An absolute path can be mistaken neither for an option nor for a protocol.
-    return {"ffmpeg", "-hide_banner", "-loglevel", "error", "-nostdin", "-y", "-f", "rawvideo",
-            "-pixel_format", "rgb24", "-video_size",
+    return {"ffmpeg", "-hide_banner", "-loglevel", "error", "-nostdin", "-y", "-xerror", "-progress",
+            "pipe:1", "-stats_period", "1000000", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
             std::to_string(options.width) + "x" + std::to_string(options.height), "-framerate",
             std::string(rate, end.ptr), "-filter_threads", kEncoderThreads, "-i", "pipe:0",
             // yuv420p, the one layout every player takes, halves the chroma: sides must be even.
@@ -172,7 +206,7 @@ std::vector<std::string> command_line(const VideoOptions& options, const std::fi
             "-c:v", "libx264", "-threads", kEncoderThreads, "-crf", std::to_string(options.quality),
             "-preset", "medium", "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc",
             "iec61966-2-1", "-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-f",
-            "mp4", "file:" + std::filesystem::absolute(output).string()};
+            "mp4", kOutputName};
 }
 
 }  // namespace
@@ -193,12 +227,15 @@ void require_ffmpeg() {
 
 struct VideoWriter::Impl {
     Impl(const std::filesystem::path& to, const VideoOptions& o)
-        : path(to), options(o), file(to), encoder(command_line(o, file.temporary()), o.processors) {}
+        : path(to),
+          options(o),
+          file(to),
+          encoder(command_line(o), opened(file.temporary(), to), o.processors) {}
 
     // Throws Error(io), with ffmpeg's message where it left one.
     void finish_encoder() {
         try {
-            encoder.finish();
+            encoder.finish(frames);
         } catch (const Error& error) {
             throw Error(ErrorCode::io, path.string() + ": " + error.what());
         }

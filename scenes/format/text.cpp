@@ -10,36 +10,6 @@
 #include "core/error.h"
 
 namespace nephos {
-namespace {
-
-constexpr char32_t kReplacement = 0xFFFD;
-
-bool is_control(char32_t code) {
-    const bool c0_or_c1 = code < 0x20 || (code >= 0x7F && code < 0xA0);
-    const bool reorders_text = (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
-    return c0_or_c1 || reorders_text || code == 0x2028 || code == 0x2029;
-}
-
-}  // namespace
-
-Character character_at(std::string_view text, std::size_t offset) {
-    const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(text[offset + n]); };
-    const Character invalid{kReplacement, text.substr(offset, 1), false};
-    const unsigned first = byte(0);
-    if (first < 0x80) return {first, text.substr(offset, 1), true};
-    const int length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
-    if (first < 0xC2 || first > 0xF4 || text.size() - offset < std::size_t(length)) return invalid;
-    char32_t code = first & (0xFFu >> (length + 1));
-    for (int n = 1; n < length; ++n) {
-        if ((byte(std::size_t(n)) & 0xC0) != 0x80) return invalid;
-        code = (code << 6) | (byte(std::size_t(n)) & 0x3F);
-    }
-    constexpr char32_t kSmallest[] = {0, 0, 0x80, 0x800, 0x10000};
-    const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
-    if (code < kSmallest[length] || code > 0x10FFFF || surrogate) return invalid;
-    return {code, text.substr(offset, std::size_t(length)), true};
-}
-
 std::size_t find_invalid_utf8(std::string_view text) {
     std::size_t offset = 0;
     while (offset < text.size()) {
@@ -62,7 +32,8 @@ std::string printable(std::string_view text) {
     std::string out;
     for (std::size_t offset = 0; offset < text.size();) {
         const Character character = character_at(text, offset);
-        const bool shown = character.valid && (character.code == '\t' || !is_control(character.code));
+        const bool shown =
+            character.valid && (character.code == '\t' || !is_terminal_control(character.code));
         out += shown ? character.bytes : std::string_view("\xEF\xBF\xBD");
         offset += character.bytes.size();
     }

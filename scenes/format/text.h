@@ -13,16 +13,6 @@
 
 namespace nephos {
 
-// One character of a text.
-struct Character {
-    char32_t code = 0;
-    std::string_view bytes;  // its bytes in the text
-    bool valid = true;       // false: a byte that is not UTF-8; code is then U+FFFD
-};
-
-// Decodes the character at byte `offset`, which must be inside the text.
-Character character_at(std::string_view text, std::size_t offset);
-
 // Returns the offset of the first byte that is not valid UTF-8; text.size() if there is none.
 std::size_t find_invalid_utf8(std::string_view text);
 

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "automaton/automaton.h"
 #include "core/atomic_file.h"
@@ -177,6 +178,20 @@ TEST(AtomicFile, FollowsLinksAndRefusesWhatIsNoFile) {
     ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
     EXPECT_THROW(write_atomically(folder / "pipe", "content"), Error);
     EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
+}
+
+// In a folder that others may write to, a link of theirs would have our file replace one of ours elsewhere.
+TEST(AtomicFile, RefusesALinkOfAnotherUser) {
+    const TemporaryFolder folder;
+    write_atomically(folder / "victim", "precious");
+    fs::create_symlink("victim", folder / "link");
+    constexpr uid_t kSomebody = 12345;
+    if (::lchown((folder / "link").c_str(), kSomebody, gid_t(-1)) != 0)
+        GTEST_SKIP() << "only root can make a link of another user";
+    EXPECT_THROW(write_atomically(folder / "link", "new"), Error);
+    std::ifstream in(folder / "victim");
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "precious");
+    EXPECT_TRUE(fs::is_symlink(folder / "link"));
 }
 
 // Others who may write into the folder see the name of the temporary file once it is there: a link that they put in

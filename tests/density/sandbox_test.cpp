@@ -76,6 +76,11 @@ TEST(Sandbox, SurvivesCrashes) {
     EXPECT_NE(crash.find("signal 11"), std::string::npos) << crash;
     const auto abort = error_of([](SandboxWriter&) { std::abort(); });
     EXPECT_NE(abort.find("signal 6"), std::string::npos) << abort;
+    // Neither tells of a damaged file for certain: so does the system end a process when memory is short.
+    const auto killed = error_of([](SandboxWriter&) { std::raise(SIGKILL); });
+    EXPECT_NE(killed.find("memory is short"), std::string::npos) << killed;
+    EXPECT_EQ(killed.find("damaged"), std::string::npos) << killed;
+    EXPECT_NE(abort.find("or memory is short"), std::string::npos) << abort;
     EXPECT_NE(error_of([](SandboxWriter&) { ::_exit(3); }), "");
     EXPECT_NE(error_of([](SandboxWriter&) { ::_exit(0); }), "");
 }

@@ -327,6 +327,32 @@ TEST(VdbRead, HugeBoundsAreRefusedBeforeTheyCostMemory) {
     EXPECT_NE(error_of(folder / "fog.vdb", options).find("longer"), std::string::npos);
 }
 
+// A length of 4 GiB for a text in the header of 100 bytes: OpenVDB makes room for it before it reads.
+TEST(VdbRead, MemoryIsBoundedByTheSizeOfTheFile) {
+    const TemporaryFolder folder;
+    write_own(folder / "whole.vdb");
+    auto bytes = test::bytes_of(folder / "whole.vdb");
+    constexpr std::size_t kTextLength = 61;
+    bytes.resize(100);
+    std::fill_n(bytes.begin() + kTextLength, 4, char(0xFF));
+    test::write_bytes(folder / "greedy.vdb", bytes);
+    std::string message;
+    try {
+        read_vdb_info(folder / "greedy.vdb");
+    } catch (const Error& error) {
+        message = error.what();
+    }
+    EXPECT_NE(message.find("more than 256 MiB of memory, the most for a file of its size"), std::string::npos)
+        << message;
+    EXPECT_EQ(message.find("damaged"), std::string::npos) << message;
+    // A file of a kilobyte may still hold a box of 256^3 voxels.
+    auto full = FloatGrid::create(0.0f);
+    full->setName("density");
+    full->fill(openvdb::CoordBBox(Coord(0), Coord(255)), 1.0f);
+    write_with_openvdb(folder / "full.vdb", {full});
+    EXPECT_EQ(error_of(folder / "full.vdb"), "");
+}
+
 TEST(VdbRead, WhatIsNoFileIsAClearError) {
     const TemporaryFolder folder;
     EXPECT_NE(error_of(folder / "missing.vdb"), "");

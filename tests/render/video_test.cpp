@@ -89,7 +89,8 @@ TEST(Video, RunsOnTheProcessorsThatItIsGiven) {
     const std::string all = encoded("all.mp4", 0);
     EXPECT_GT(all.size(), 1000u);
     EXPECT_EQ(encoded("one.mp4", 1), all);
-    put_command(folder.path(), "#!/bin/sh\nsleep 0.2\nnproc > \"${0%/*}/seen\"\ncat > /dev/null\n");
+    put_command(folder.path(),
+                "#!/bin/sh\nsleep 0.2\nnproc > \"${0%/*}/seen\"\ncat > /dev/null\necho frame=1\n");
     const PathOverride path(folder.path().string() + ":/usr/bin:/bin");
     {
         VideoWriter video(folder.path() / "b.mp4", {.width = 64, .height = 48, .processors = 1});
@@ -157,6 +158,38 @@ TEST(Video, FailingCommandIsAnErrorWithItsMessage) {
     EXPECT_NE(message.find("status 3"), std::string::npos) << message;
     EXPECT_NE(message.find("no such encoder"), std::string::npos) << message;
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+// Success is what the command says that it encoded, not its exit status: one that cannot read its input may take that
+// for the end.
+TEST(Video, CommandThatEncodesFewerFramesIsAnError) {
+    const TemporaryFolder folder, commands;
+    const PathOverride path(commands.path().string() + ":/usr/bin:/bin");
+    put_command(commands.path(), "#!/bin/sh\ncat > /dev/null\necho frame=1\necho frame=3\n");
+    EXPECT_EQ(message_of(folder.path() / "a.mp4", 3), "");
+    for (const char* script : {"#!/bin/sh\ncat > /dev/null\necho frame=3\necho frame=2\n",
+                               "#!/bin/sh\ncat > /dev/null\necho 'Input/output error' >&2\n"}) {
+        put_command(commands.path(), script);
+        const std::string message = message_of(folder.path() / "b.mp4", 3);
+        EXPECT_NE(message.find("of 3 frames"), std::string::npos) << message;
+        EXPECT_FALSE(std::filesystem::exists(folder.path() / "b.mp4"));
+    }
+}
+
+// Others who may write into the folder put a link in the place of the file that is being written.
+TEST(Video, ALinkInThePlaceOfTheFileIsNotFollowed) {
+    if (!has_ffmpeg()) GTEST_SKIP() << "ffmpeg is not here";
+    const TemporaryFolder folder, commands;
+    std::ofstream(folder.path() / "victim") << "precious";
+    put_command(commands.path(), ("#!/bin/sh\nfor f in '" + folder.path().string() +
+                                  "'/.a.part*; do ln -sf victim \"$f\"; done\nexec /usr/bin/ffmpeg \"$@\"\n")
+                                     .c_str());
+    const PathOverride path(commands.path().string() + ":/usr/bin:/bin");
+    const std::string message = message_of(folder.path() / "a.mp4", 3);
+    EXPECT_NE(message.find("another file was put in the place"), std::string::npos) << message;
+    std::ifstream victim(folder.path() / "victim");
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(victim), {}), "precious");
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "a.mp4"));
 }
 
 // A command that goes away while frames are sent would raise SIGPIPE; the process must live and get an error.

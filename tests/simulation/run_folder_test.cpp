@@ -261,9 +261,9 @@ TEST_F(RunFolderTest, TemporaryFilesOfAKilledRunAreRemoved) {
     RunSettings s = settings("out");
     fs::create_directories(s.folder / "density");
     fs::create_directories(s.folder / "frames");
-    const char* ours[] = {".manifest.part12-34.json", ".checkpoint.part12-34.nephos",
-                          "density/.small_0002.part12-34.vdb", "frames/.small_0002.part12-34.png",
-                          "frames/.small.part12-34.mp4"};
+    const char* ours[] = {".manifest.part12-34.json",         ".checkpoint.part12-34.nephos",
+                          ".statistics.part12-34.csv",        "density/.small_0002.part12-34.vdb",
+                          "frames/.small_0002.part12-34.png", "frames/.small.part12-34.mp4"};
     const char* others[] = {".notes.part12-34.txt", "manifest.part12-34.json", ".manifest.part12.json",
                             "density/.other_0002.part12-34.vdb", "density/.small_0002.partial.vdb"};
     for (const char* name : ours) std::ofstream(s.folder / name) << "part";

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What concerns every subcommand: options, help, terminals, completion."""
 
+import json
 import os
 import pty
 import re
@@ -11,7 +12,7 @@ import subprocess
 import termios
 import unittest
 
-from case import BAD, Case, NEPHOS
+from case import BAD, Case, NEPHOS, SCENE
 
 
 class Usage(Case):
@@ -113,6 +114,44 @@ class Terminal(Case):
         _, shown = self.on_terminal("validate", bad)
         self.assertEqual(shown.count("\x1b[1m\x1b[31merror:\x1b[0m"), 3)
         self.assertNotIn("\x1b", self.call("validate", bad, status=2).stderr)
+
+    def plant(self, name, content, planted):
+        """A file where text was replaced by as many bytes of something else."""
+        for old, new in planted.items():
+            self.assertIn(old, content)
+            content = content.replace(old, new.ljust(len(old), b"x"))
+        (self.folder / name).write_bytes(content)
+
+    def test_nothing_in_a_file_or_in_its_name_steers_the_terminal(self):
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        vdb = (self.folder / "out/density/tiny_0001.vdb").read_bytes()
+        hostile = "\x1b]0;t\x07\x9b2J \u202e\r.vdb"
+        (self.folder / hostile).write_bytes(vdb)
+        self.call("render", hostile, "--out", "picture.exr", "--size", "32x24")
+        exr = (self.folder / "picture.exr").read_bytes()
+        self.plant("part.exr", exr, {b"picture": b"\x1b[2J\x07\x9b"})
+        self.plant("channel.exr", exr, {b"transmittance.Y": b"transmit\x1b[2J\x9b2"})
+        self.plant("attribute.exr", exr, {b"stateHash\0": b"\x1b[2J\x07\x9b2J\0", b"sceneHash\0": b"\xc2\x9b2Jxxxxx\0"})
+        self.plant("grid.vdb", vdb, {b"density": b"\x1b[2J\x07"})
+        scene = self.write("\x1b[2J.toml", 'models = ["\\u001b]0;title\\u0007"]\n' + SCENE)
+        calls = [["info", hostile], ["info", hostile, "no\x1b[2J"], ["info", "part.exr"], ["info", "channel.exr"],
+                 ["info", "attribute.exr"], ["info", "grid.vdb"], ["validate", scene], ["run", scene], ["validate", "\x07"],
+                 ["\x1b[2J"], ["validate", self.scene, "--set", "\x1b[2J=1"],
+                 ["hash", self.scene, "--from", "\x9b"], ["run", self.scene, "--no-render", "--out", "\x1b[2J"],
+                 ["info", hostile, "--json"], ["render", hostile, "--size", "8x8", "--out", "\x7f\x9b.png", "--json"]]
+        for arguments in calls:
+            with self.subTest(arguments=arguments):
+                result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True,
+                                        env=self.environment, timeout=120)
+                shown = result.stdout + result.stderr
+                self.assertRegex(shown, r"\\(u00|x)[0-9a-f]{2}|[\uFFFD?]")
+                self.assertNotRegex(shown, "[\0-\x08\x0b-\x1f\x7f-\x9f\u202e]")
+                _, shown = self.on_terminal(*arguments)  # there the command's own colours and progress bar alone
+                shown = re.sub(r"\x1b\[(\d*m|K)|\r", "", shown)
+                self.assertNotRegex(shown, "[\0-\x08\x0b-\x1f\x7f-\x9f\u202e]")
+        # JSON keeps the name, and UTF-8 is shown as it is.
+        self.assertEqual(json.loads(self.call("info", hostile, "--json").stdout)["file"], hostile)
+        self.assertIn(" Wölkchen ☁: ", self.call("info", "Wölkchen ☁", status=3).stderr)
 
     def test_a_reader_that_goes_away_is_no_error(self):
         script = f'set -o pipefail; "{NEPHOS}" hash "{self.scene}" --steps 20000 | head -n 1'

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Calls of the system that fail, kills, and folders that vanish: no torn file, no success that is none, and always a way
+forward. FAILING_CALLS names the library that lets the calls fail (failing_calls.cpp)."""
+
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+from case import Case, LONG, NEPHOS
+
+
+class Faults(Case):
+    def failing(self, call, path=None, program="nephos"):
+        """An environment in which such calls fail."""
+        if "FAILING_CALLS" not in os.environ:
+            self.skipTest("FAILING_CALLS does not say where the library lies that lets calls fail")
+        sanitizer = os.environ.get("LD_PRELOAD", "")
+        env = {**self.environment, "LD_PRELOAD": f"{sanitizer} {os.environ['FAILING_CALLS']}".strip(), "FAIL_CALL": call,
+               "FAIL_PROGRAM": program}
+        return {**env, "FAIL_PATH": path} if path else env
+
+    def run_into(self, out, *arguments, env=None):
+        return subprocess.run([NEPHOS, "run", self.scene, "--no-render", "--out", out, *arguments], cwd=self.folder,
+                              capture_output=True, text=True, env=env or self.environment, timeout=120)
+
+    def no_leftovers(self, out):
+        self.assertEqual([p.name for p in (self.folder / out).rglob(".*")], [])
+
+    def test_a_kill_before_the_first_rows_leaves_a_way_forward(self):
+        self.assertEqual(self.run_into("undisturbed").returncode, 0)
+        for path in ("statistics", "manifest"):
+            for number in range(1, 4):
+                with self.subTest(path=path, number=number):
+                    shutil.rmtree(self.folder / "out", ignore_errors=True)
+                    killed = self.run_into("out", env=self.failing(f"write KILL {number} 1", path))
+                    if killed.returncode == 0:
+                        continue
+                    self.assertEqual(killed.returncode, -signal.SIGKILL)
+                    again = self.run_into("out")
+                    if again.returncode != 0:
+                        self.assertIn("--resume", again.stderr)
+                        again = self.run_into("out", "--resume")
+                    self.assertEqual(again.returncode, 0, again.stderr)
+                    self.same_runs("undisturbed", "out")
+                    self.no_leftovers("out")
+
+    def test_a_disk_that_is_full_at_the_beginning_leaves_a_way_forward(self):
+        self.assertEqual(self.run_into("undisturbed").returncode, 0)
+        for path in ("statistics", "manifest", "checkpoint"):
+            with self.subTest(path=path):
+                full = self.run_into("out", env=self.failing("write ENOSPC 1 1000", path))
+                self.assertEqual(full.returncode, 3, full.stderr)
+                self.assertIn("No space left", full.stderr)
+                self.no_leftovers("out")
+                self.assertEqual(self.run_into("out").returncode, 0)
+                self.same_runs("undisturbed", "out")
+                shutil.rmtree(self.folder / "out")
+
+    def test_whatever_call_fails_the_files_are_whole_and_there_is_a_way_forward(self):
+        """The same bytes as of an undisturbed run, after at most one more call without --overwrite."""
+        self.assertEqual(self.run_into("undisturbed").returncode, 0)
+        kinds = {"write": ("KILL", "EIO", "ENOSPC", "EINTR"), "fsync": ("KILL", "EIO", "EINTR"),
+                 "read": ("KILL", "EIO", "EINTR"), "stat": ("KILL", "EIO")}
+        failed = 0
+        for call, how, number in ((c, h, n) for c, hows in kinds.items() for h in hows for n in range(1, 47, 5)):
+            with self.subTest(call=call, how=how, number=number):
+                shutil.rmtree(self.folder / "out", ignore_errors=True)
+                result = self.run_into("out", env=self.failing(f"{call} {how} {number} 1", str(self.folder)))
+                allowed = {"KILL": (0, -signal.SIGKILL), "EINTR": (0,)}.get(how, (0, 3))
+                self.assertIn(result.returncode, allowed, result.stderr)
+                if result.returncode != 0:
+                    failed += 1
+                    again = self.run_into("out")
+                    if again.returncode == 2 and "--resume" in again.stderr:
+                        again = self.run_into("out", "--resume")
+                    self.assertEqual(again.returncode, 0, again.stderr)
+                for file in (self.folder / "undisturbed").rglob("*.*"):
+                    if file.is_file() and file.name != "manifest.json":
+                        other = self.folder / "out" / file.relative_to(self.folder / "undisturbed")
+                        self.assertEqual(file.read_bytes(), other.read_bytes(), file.name)
+                self.no_leftovers("out")
+        self.assertGreater(failed, 30)
+
+    def test_statistics_that_were_only_begun_are_of_no_value(self):
+        self.assertEqual(self.run_into("out").returncode, 0)
+        (self.folder / "out/checkpoint.nephos").unlink()
+        header = (self.folder / "out/statistics.csv").read_text().splitlines()[0]
+        for text in ("", header[:20], header):
+            (self.folder / "out/statistics.csv").write_text(text)
+            self.assertEqual(self.run_into("out").returncode, 0, text)
+            (self.folder / "out/checkpoint.nephos").unlink()
+        for text in ("mine", header[:20] + "mine"):
+            (self.folder / "out/statistics.csv").write_text(text)
+            self.refused(2, "run", self.scene, "--no-render", "--out", "out", says="statistics.csv")
+
+    def test_a_seek_that_fails_tears_no_file(self):
+        self.assertEqual(self.run_into("undisturbed").returncode, 0)
+        for number in (1, 2, 3, 5, 8, 13, 21):
+            with self.subTest(number=number):
+                result = self.run_into("out", env=self.failing(f"lseek EIO {number} 1", ".vdb"))
+                if result.returncode != 0:
+                    self.assertEqual(result.returncode, 3)
+                    self.assertIn("Input/output error", result.stderr)
+                    self.assertEqual(self.run_into("out").returncode, 0)
+                self.same_runs("undisturbed", "out")
+                self.no_leftovers("out")
+                shutil.rmtree(self.folder / "out")
+
+    def test_writes_of_grids_that_fail_are_told(self):
+        for number in (1, 4, 7):
+            result = self.run_into("out", env=self.failing(f"write EIO {number} 1", ".vdb"))
+            self.assertEqual(result.returncode, 3)
+            self.assertRegex(result.stderr, r"tiny_000\d\.vdb: cannot write: Input/output error")
+            self.no_leftovers("out")
+            shutil.rmtree(self.folder / "out")
+
+    def test_an_interrupted_flush_is_repeated(self):
+        self.assertEqual(self.run_into("undisturbed").returncode, 0)
+        for path in ("statistics.csv", ".vdb", "checkpoint", "manifest", "/out"):
+            result = self.run_into("out", "--overwrite", env=self.failing("fsync EINTR 1 3", path))
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            self.same_runs("undisturbed", "out")
+
+    def test_a_file_that_cannot_be_examined_is_not_a_foreign_one(self):
+        for name in ("tiny.mp4", "checkpoint.nephos"):
+            result = self.run_into("out", env=self.failing("stat EIO 1 1000", name))
+            self.assertEqual(result.returncode, 3, result.stderr)
+            self.assertRegex(result.stderr, re.escape(name) + ".*Input/output error")
+            self.assertNotIn("--overwrite", result.stderr)
+
+    def test_a_file_that_cannot_be_read_is_neither_foreign_nor_damaged(self):
+        self.assertEqual(self.run_into("out").returncode, 0)
+        for name in ("manifest.json", "statistics.csv", "checkpoint.nephos"):
+            for arguments in (["run", self.scene, "--no-render", "--out", "out"],
+                              ["run", self.scene, "--no-render", "--out", "out", "--resume"], ["info", f"out/{name}"]):
+                with self.subTest(name=name, arguments=arguments):
+                    result = self.refused(3, *arguments, says=f"{name}: cannot read: Input/output error",
+                                          env=self.failing("read EIO 1 1000", name))
+                    self.assertNotIn("--overwrite", result.stderr)
+        self.assertEqual(self.run_into("out", "--resume").returncode, 0)
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_an_encoder_that_cannot_read_is_an_error(self):
+        arguments = ["run", self.scene, "--video", "--splatting", "cpu", "--set", "camera.height=32", "--out", "out"]
+        for call in ("read EIO 1 1000000", "read EIO 2 1000000", "read EIO 2 1"):
+            with self.subTest(call=call):
+                result = subprocess.run([NEPHOS, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=120,
+                                        env=self.failing(call, "socket:", "ffmpeg"))
+                self.assertEqual(result.returncode, 3, result.stderr)
+                self.assertIn("tiny.mp4: ffmpeg", result.stderr)
+                self.assertFalse((self.folder / "out/frames/tiny.mp4").exists())
+                self.no_leftovers("out")
+                self.assertFalse(json.loads((self.folder / "out/manifest.json").read_text())["complete"])
+                self.call(*arguments, "--resume")
+                self.assertTrue((self.folder / "out/frames/tiny.mp4").exists())
+                shutil.rmtree(self.folder / "out")
+
+    def started(self, out):
+        """A long run that has written a few frames."""
+        scene = self.write("long.toml", LONG)
+        process = subprocess.Popen([NEPHOS, "run", scene, "--no-render", "--out", out], cwd=self.folder,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment)
+        self.addCleanup(process.kill)
+        third = self.folder / out / "density/long_0003.vdb"
+        for _ in range(3000):
+            if third.exists() or process.poll() is not None:
+                break
+            time.sleep(0.02)
+        self.assertTrue(third.exists())
+        self.assertIsNone(process.poll())
+        return process
+
+    def ends_with(self, process, says):
+        output, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 3, output + errors)
+        self.assertEqual(output, "")
+        self.assertIn(says, errors)
+        for manifest in self.folder.rglob("manifest.json"):
+            self.assertFalse(json.loads(manifest.read_text())["complete"])
+
+    def test_a_folder_that_is_removed_or_renamed_ends_the_run(self):
+        process = self.started("removed")
+        while (self.folder / "removed").exists():
+            shutil.rmtree(self.folder / "removed", ignore_errors=True)
+        self.ends_with(process, "removed")
+        process = self.started("renamed")
+        (self.folder / "renamed").rename(self.folder / "elsewhere")
+        self.ends_with(process, "renamed: the folder was removed or renamed")
+        self.assertFalse((self.folder / "renamed/manifest.json").exists())
+
+    def test_parts_that_are_removed_are_missed_at_the_end(self):
+        for name in ("density/long_0002.vdb", "statistics.csv"):
+            process = self.started("out")
+            (self.folder / "out" / name).unlink()
+            process.send_signal(signal.SIGINT) if name == "statistics.csv" else None
+            self.ends_with(process, pathlib.Path(name).name)
+            shutil.rmtree(self.folder / "out")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
