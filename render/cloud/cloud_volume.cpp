@@ -144,7 +144,12 @@ void light_by_sun(std::span<CloudVolume> volumes, std::span<const DiffusionCells
         volume.to_sun = to_sun;
         volume.front = sweep(volume.field, volume.extinction, to_sun, depths[n], volume.corner_depths);
         volume.shade.clear();
-        if (volume.front.is_periodic()) volume.shade = shade_words(volume.front);
+        if (volume.front.is_periodic()) {
+            volume.shade = shade_words(volume.front);
+            double sum = 0;
+            for (const float depth : volume.front.depths()) sum += double(std::exp(-depth));
+            volume.mean_sunlight = float(sum / double(volume.front.depths().size()));
+        }
         for (std::size_t i = 0; i < volume.own_depths.size(); ++i) volume.own_depths[i] = packed_depth(depths[n][i]);
     });
     for (std::size_t n = 0; n < volumes.size(); ++n) {

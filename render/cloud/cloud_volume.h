@@ -37,6 +37,7 @@ struct CloudVolume {
     // Of a field that repeats: its depths as endless.glsl reads them, a word for each: with those of the next
     // column, the next row, and both.
     std::vector<std::uint32_t> shade;
+    float mean_sunlight = 1;  // that these leave
     DiffuseLight diffuse;  // where diffuses(light)
     double mean_cosine = 0;
     std::vector<float> corner_depths;

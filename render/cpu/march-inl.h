@@ -132,7 +132,8 @@ HWY_INLINE bool march_vector(const ViewScene& scene, const TileRays& rays, std::
         // The step before counts as cloud; where it came from outside, only from the surface on: where the margin
         // of the two samples passes zero, or about one fine step where empty space was skipped.
         const Floats finest =
-            hn::Max(set(march.least_step), hn::Mul(set(shader::kStepPixels * march.per_unit), distance));
+            hn::Min(hn::Max(set(march.least_step), hn::Mul(set(shader::kStepPixels * march.per_unit), distance)),
+                    set(march.most_step));
         const Floats inside = hn::Div(hn::Neg(now.margin), hn::Max(hn::Sub(margin, now.margin), set(shader::kLeastMargin)));
         const Floats behind = hn::IfThenElse(
             hn::Lt(margin, zero), hn::Mul(set(shader::kSkippedSteps), finest),

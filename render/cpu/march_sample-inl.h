@@ -91,7 +91,8 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
     const Floats fade = hn::Div(hn::Sub(distance, set(march.fade_begins)), set(march.fade_ends - march.fade_begins));
     const Floats share = hn::Max(hn::Min(fade, one), zero);
     const Floats kept = hn::NegMulAdd(hn::Mul(share, share), hn::NegMulAdd(set(2.0f), share, set(3.0f)), one);
-    const Floats finest = hn::Max(set(march.least_step), hn::Mul(set(shader::kStepPixels), footprint));
+    const Floats finest = hn::Min(hn::Max(set(march.least_step), hn::Mul(set(shader::kStepPixels), footprint)),
+                                  set(march.most_step));
     const Floats least_step = hn::Mul(finest, hn::MulAdd(hn::Sub(one, transmittance), set(shader::kStepGrowth), one));
     MarchSample sample{zero, one, set(shader::kFarAway_m), zero, hn::Lt(one, zero)};
     for (std::size_t v = 0; v < march.volumes.size(); ++v) {
@@ -148,9 +149,8 @@ HWY_INLINE MarchSample sample_volumes(const MarchedScene& march, const Floats3& 
             out = hn::Min(out, hn::Min(to_face(offset.x, 0, per_way.x), to_face(offset.y, 1, per_way.y)));
             out = hn::Min(out, set(shader::kStraightWay_m));
         }
-        const Floats beyond = hn::Max(set(shader::kBeyondFace_m), hn::Mul(distance, set(shader::kBeyondFacePart)));
-        step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), volume.repeats ? beyond : set(shader::kBeyondFace_m)),
-                              step);
+        const Floats beyond = set(volume.repeats ? shader::kBeyondBentFace_m : shader::kBeyondFace_m);
+        step = hn::IfThenElse(within, hn::Add(hn::Max(out, zero), beyond), step);
         if (!hn::AllFalse(d, sampled)) {
             const auto number = hn::Max(place.number, hn::Zero(di));
             erosion::Node node =

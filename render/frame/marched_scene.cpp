@@ -43,6 +43,7 @@ void MarchedVolume::set_repeats(const CloudVolume& volume, const Vec3& eye_m) {
 
     const LightFront& front = volume.front;
     shade = volume.shade.data();
+    mean_sunlight = volume.mean_sunlight;
     shade_columns = front.columns();
     shade_rows = front.rows();
     const Vec2 at_eye = front.place_of(eye_m);
@@ -70,7 +71,11 @@ MarchedScene::MarchedScene(std::span<const CloudVolume> of, const CameraFrame& c
     if (volumes.size() > shader::kMostVolumes)
         throw Error(ErrorCode::usage, std::to_string(volumes.size()) + " clouds with detail: expected at most " +
                                           std::to_string(shader::kMostVolumes));
-    for (const MarchedVolume& volume : volumes) repeats = repeats || volume.repeats;
+    for (const MarchedVolume& volume : volumes) {
+        if (!volume.repeats) continue;
+        repeats = true;
+        most_step = std::min(most_step, shader::kMostStepNodes * volume.kernel.node_m);
+    }
     per_unit = float(1 / pixels_per_unit);
     // With detail a twentieth of a cell; without, half of one, the distance between two nodes.
     double least_m = double(shader::kLeastStep_m);

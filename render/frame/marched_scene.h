@@ -12,6 +12,7 @@
 #include "render/cloud/cloud_volume.h"
 #include "render/frame/view_sorting.h"
 #include "render/options/camera.h"
+#include "render/shared/march.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
@@ -25,7 +26,7 @@ struct MarchedVolume {
     bool repeats = false;
     float to_patches[4] = {}, patch_ramp = 0;
     shader::vec4 shade_u{}, shade_v{};
-    float shade_mid[2] = {}, shade_top = 0, per_shade_height = 1;
+    float shade_mid[2] = {}, shade_top = 0, per_shade_height = 1, mean_sunlight = 1;
     int shade_columns = 1, shade_rows = 1;
     const std::uint32_t* shade = nullptr;
     const std::uint16_t *sun_depths = nullptr, *surroundings = nullptr, *upwards = nullptr, *sideways = nullptr;
@@ -42,6 +43,7 @@ struct MarchedScene {
     float per_unit = 1;                    // footprint of a pixel at distance 1
     float fade_begins = 1, fade_ends = 1;  // metres from the eye
     float least_step = 1;                  // in cloud, metres
+    float most_step = shader::kFarAway_m;  // likewise
     bool repeats = false;                  // one of them does
     float diffuse = 0, mean_cosine = 0;    // as in shader::March
 

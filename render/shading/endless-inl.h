@@ -123,6 +123,13 @@ HWY_INLINE Floats scaled_share(Floats t, Floats factor) {
     return hn::Div(scaled, hn::Max(hn::Add(hn::Sub(set(1.0f), t), scaled), set(1.0e-6f)));
 }
 
+// The mean fraction of the sunlight that clouds which repeat leave below them.
+inline float mean_sunlight(const MarchedScene& march) {
+    float left = 1;
+    for (const MarchedVolume& volume : march.volumes) left *= volume.repeats ? volume.mean_sunlight : 1;
+    return left;
+}
+
 // Where lines from points towards the sun cross a volume that repeats, in the middle of its height: column and row of its
 // shade, and metres from its corner.
 struct SunCrossing {
@@ -158,6 +165,9 @@ HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& poin
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
     Floats left = set(1.0f);
+    const Floats away = hn::Mul(hn::Sub(hn::Sqrt(dot(point, point)), set(shader::kShadeFades_m)),
+                                set(0.5f / shader::kShadeFades_m));
+    const Floats blurred = hn::Max(hn::Min(away, left), hn::Zero(d));
     for (const MarchedVolume& volume : march.volumes) {
         if (!volume.repeats) continue;
         const SunCrossing at = sun_crossing(volume, point);
@@ -181,7 +191,9 @@ HWY_INLINE Floats sunlight_beyond(const MarchedScene& march, const Floats3& poin
         const Floats below = hn::Mul(hn::Sub(set(volume.shade_top), at.above.z), set(volume.per_shade_height));
         const Floats part = hn::Max(hn::Min(below, set(1.0f)), hn::Zero(d));
         const Floats depth = hn::Mul(hn::Mul(hn::Mul(root, root), set(shader::kMostShadeDepth)), hn::Mul(patches, part));
-        left = hn::Mul(left, fast_exp(hn::Neg(depth)));
+        const Floats mean = hn::NegMulAdd(part, set(1 - volume.mean_sunlight), set(1.0f));
+        const Floats exact = fast_exp(hn::Neg(depth));
+        left = hn::Mul(left, hn::MulAdd(blurred, hn::Sub(mean, exact), exact));
     }
     return left;
 }

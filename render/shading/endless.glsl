@@ -87,6 +87,14 @@ vec2 part_below_endless(vec3 ray) {
     return part;
 }
 
+// Returns the mean fraction of the sunlight that clouds which repeat leave below them.
+float mean_sunlight() {
+    float left = 1.0;
+    for (uint v = 0u; v < march.count; ++v)
+        left *= march.volumes[v].repeats > 0.0 ? march.volumes[v].mean_sunlight : 1.0;
+    return left;
+}
+
 // Returns where the line from a point, over a plane ground, towards the sun crosses a volume that repeats, in the middle
 // of its height: column and row of its shade; metres from its corner.
 vec4 sun_crossing(uint v, vec3 above) {
@@ -108,7 +116,7 @@ bool sees_first_period(vec3 point) {
 
 // Returns the fraction of the sunlight that clouds which repeat leave at a point relative to the eye.
 float sunlight_beyond(vec3 point) {
-    float left = 1.0;
+    float left = 1.0, blurred = clamp((length(point) - kShadeFades_m) * (0.5 / kShadeFades_m), 0.0, 1.0);
     for (uint v = 0u; v < march.count; ++v) {
         if (march.volumes[v].repeats == 0.0) continue;
         vec3 place = above_plane(point, march.volumes[v].bend);
@@ -121,7 +129,8 @@ float sunlight_beyond(vec3 point) {
         uint word = march_light[march.volumes[v].first_shade + texel.y * count.x + texel.x];
         float root = of_word(word, wrapped - vec2(texel)) * (1.0 / 255.0);
         float part = clamp((march.volumes[v].shade_top - place.z) * march.volumes[v].per_shade_height, 0.0, 1.0);
-        left *= exp(-root * root * kMostShadeDepth * patches_at(v, middle) * part);
+        float exact = exp(-root * root * kMostShadeDepth * patches_at(v, middle) * part);
+        left *= mix(exact, 1.0 - part * (1.0 - march.volumes[v].mean_sunlight), blurred);
     }
     return left;
 }

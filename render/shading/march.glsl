@@ -190,7 +190,7 @@ MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
         // repeats they go on to its base.
         float step = distance < part.y ? at.on_m : kFarAway_m;
         if (distance < part.x) step = part.x - distance + kBeyondFace_m;
-        float beyond = max(kBeyondFace_m, march.volumes[v].repeats * kBeyondFacePart * distance);
+        float beyond = march.volumes[v].repeats > 0.0 ? kBeyondBentFace_m : kBeyondFace_m;
         if (at.within) step = max(at.out_m, 0.0) + beyond;
         if (at.near)
             result.near |= 1u << v;
@@ -201,7 +201,7 @@ MarchSample survey(vec3 ray, vec3 per_ray, float distance) {
 }
 
 void sample_near(inout MarchSample result, vec3 ray, float distance, float transmittance) {
-    float footprint = distance * march.per_unit, finest = max(march.least_step, kStepPixels * footprint);
+    float footprint = distance * march.per_unit, finest = min(max(march.least_step, kStepPixels * footprint), march.most_step);
     float least_step = finest * ((1.0 - transmittance) * kStepGrowth + 1.0);
     float share = clamp((distance - march.fade_begins) / (march.fade_ends - march.fade_begins), 0.0, 1.0);
     float kept = 1.0 - share * share * (3.0 - 2.0 * share);
@@ -234,7 +234,7 @@ void advance(MarchSample now, inout MarchState state, inout MarchEvent event, in
     float found = now.extinction;
     // The step before counts as cloud; where it came from outside, only from the surface on: where the margin of the
     // two samples passes zero, or about one fine step where empty space was skipped.
-    float finest = max(march.least_step, kStepPixels * march.per_unit * state.distance);
+    float finest = min(max(march.least_step, kStepPixels * march.per_unit * state.distance), march.most_step);
     float inside = -now.margin / max(state.margin - now.margin, kLeastMargin);
     float behind = state.margin < 0.0 ? kSkippedSteps * finest
                                       : state.way * clamp(inside, 0.0, 1.0) + kSurfaceSteps * finest;

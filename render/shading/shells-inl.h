@@ -155,7 +155,9 @@ HWY_INLINE AirLayer air_layer(const PictureFrame& frame, const RayAir& of, const
     const Floats height = hn::Mul(of.ray.z, places.middle);
     const Floats3 sunlight =
         kHeights == Heights::alike ? sunlight_nearby(frame, height) : sunlight_at(frame, height);
-    const Floats lit = sunlight_left(air, frame.endless, times(places.at, of.ray));
+    Floats lit = sunlight_left(air, frame.endless, times(places.at, of.ray));
+    if (frame.endless != nullptr)  // beyond the last shell but one a place does not stand for tens of kilometres
+        lit = hn::IfThenElse(hn::Ge(begin, set(air.data.shade.w)), set(mean_sunlight(*frame.endless)), lit);
     const auto inside = hn::Lt(begin, set(air.data.shade.w));
     Floats3 light{zero, zero, zero};
     if (shaded) {

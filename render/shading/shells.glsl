@@ -126,6 +126,9 @@ AirLayer air_layer(SunlitAir sunlit, vec3 ray, float begin, float end, float sha
     float height = ray.z * middle, strength = last ? 0.0 : shells.settings.y;
     vec3 sunlight = sunlight_at(height);
     float lit = sunlight_left(at * ray);
+#ifdef NEPHOS_ENDLESS
+    if (last && endless()) lit = mean_sunlight();  // a place does not stand for tens of kilometres
+#endif
     vec3 lost = clear_air(ray, begin) - clear_air(ray, end);
     vec3 light = (strength * (lit - 1.0)) * sunlit_at(sunlit, height, sunlight) * lost;
     if (!kFog) return AirLayer(light, 1.0, middle);

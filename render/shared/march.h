@@ -16,10 +16,11 @@ NEPHOS_CONST float kLeavingOpacity = 0.004f;          // of one where the ray le
 NEPHOS_CONST float kMarchOpaque = 1.0f / 256.0f;      // transmittance at which a ray ends
 NEPHOS_CONST float kLeastStep_m = 2.0f;               // in cloud of cells of 40 m and more,
 NEPHOS_CONST float kStepPixels = 1.2f;                // ... or this many footprints of a pixel
+NEPHOS_CONST float kMostStepNodes = 4.0f;             // ... in a cloud that repeats at most this many half cells
 NEPHOS_CONST float kStepGrowth = 4.0f;                // of steps behind opaque cloud
 NEPHOS_CONST float kLongestStep_m = 30.0f;            // near cloud
 NEPHOS_CONST float kBeyondFace_m = 0.01f;             // where a ray goes on behind the face of a cell or a box
-NEPHOS_CONST float kBeyondFacePart = 1.0e-6f;         // ... of a cloud that repeats at least, in distances: beyond rounding
+NEPHOS_CONST float kBeyondBentFace_m = 1.0f;         // ... of a cloud that repeats: farther than the way there is bent
 NEPHOS_CONST float kLeastHeight_m = 1.0e-3f;          // of such a cloud's top above the eye, if they are at one height
 NEPHOS_CONST float kLeastAdvance = 1.0000005f;         // of a distance in any step: far away floats are coarse
 // Images of a cloud that repeats are drawn aside along a wave, so that gaps do not line up: wave lengths across and along,
@@ -27,11 +28,13 @@ NEPHOS_CONST float kLeastAdvance = 1.0000005f;         // of a distance in any s
 NEPHOS_CONST float kWaveAcross = 45.0f, kWaveAlong = 35.0f, kWaveHeight = 0.03125f;
 NEPHOS_CONST float kPatchLevel = 0.37f;               // of the noise of patches: its third coordinate
 NEPHOS_CONST float kPatchSpread = 1.5f;               // cloud in images is up to 1 + this times as dense
+NEPHOS_CONST float kShadeFades_m = 2.0e4f;            // from here on, over twice as far, shade fades to its mean: so flat is
+                                                      // the view that a pixel covers whole clouds' shadows
 NEPHOS_CONST float kMostShadeDepth = 8.0f;            // that a word of shade stores: four bytes of 255 sqrt(depth / this)
 NEPHOS_CONST float kFarAway_m = 1.0e9f;
 NEPHOS_CONST float kHorizon_m = 2.5e5f;               // where a cloud that repeats ends; it is below the horizon there
 NEPHOS_CONST float kLongestLeap_m = 2.0e3f;           // of a ray below such a cloud: it is straight over that
-NEPHOS_CONST float kStraightWay_m = 1.0e3f;           // ... and in it, where waves bend it: by 8 m in cells of 40 m
+NEPHOS_CONST float kStraightWay_m = 320.0f;          // ... and in it, where waves bend it: by 0.8 m in cells of 40 m
 NEPHOS_CONST float kLeastFootprint_m = 0.05f;
 NEPHOS_CONST float kSkippedSteps = 1.5f;              // of cloud before a sample behind empty space, in finest steps
 NEPHOS_CONST float kSurfaceSteps = 0.3f;              // ... beyond the surface between two samples
@@ -101,6 +104,8 @@ struct MarchVolume {
     float per_shade_height;       // 1 / metres from there down to where it is complete
     uint first_shade;             // word
     uint shade_columns, shade_rows;
+    float mean_sunlight;          // that passes, over a period
+    float unused0, unused1, unused2;
 };
 
 struct March {
@@ -110,12 +115,12 @@ struct March {
     float least_step;              // in cloud, metres
     float diffuse;                 // strength of the light that diffuses; 0: the scattering table has it
     float mean_cosine;             // of the phase function
-    float unused0;
+    float most_step;               // in cloud, metres: far away the footprint of a pixel is larger than clouds
     MarchVolume volumes[kMostVolumes];
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(MarchVolume) == 288 && offsetof(MarchVolume, first_table) == 80 &&
+static_assert(sizeof(MarchVolume) == 304 && offsetof(MarchVolume, to_patches) == 208 && offsetof(MarchVolume, first_table) == 80 &&
               offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 32);
 
 }  // namespace nephos::shader

@@ -107,7 +107,7 @@ shader::March march_constants(std::span<const CloudVolume> volumes, const Camera
                               double pixels_per_unit, const CloudLight& light, float bend) {
     const MarchedScene scene(volumes, camera, pixels_per_unit, light, bend);
     shader::March march{shader::uint(scene.volumes.size()), scene.per_unit, scene.fade_begins, scene.fade_ends,
-                         scene.least_step, scene.diffuse, scene.mean_cosine, 0, {}};
+                         scene.least_step, scene.diffuse, scene.mean_cosine, scene.most_step, {}};
     std::size_t n = 0;
     for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
         const MarchedVolume& from = scene.volumes[n];
@@ -163,6 +163,7 @@ shader::March march_constants(std::span<const CloudVolume> volumes, const Camera
         to.first_shade = shader::uint(at.shade);
         to.shade_columns = shader::uint(from.shade_columns);
         to.shade_rows = shader::uint(from.shade_rows);
+        to.mean_sunlight = from.mean_sunlight;
     });
     return march;
 }
