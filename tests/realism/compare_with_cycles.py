@@ -3,7 +3,7 @@
 """How close pictures of nephos come to a path tracer: the same clouds, cameras, extinctions, phase function, sun and sky
 drawn by nephos, by Blender's Cycles and by OpenVDB's vdb_render, and the mean FLIP of the latter two against Cycles.
 
-    tests/realism/compare_with_cycles.py --out FOLDER [--disney wdas_cloud.vdb] [--only NAME] [--set KEY=VALUE ...]
+    tests/realism/compare_with_cycles.py --out FOLDER [--disney wdas_cloud.vdb] [--only NAME | --genera] [--set KEY=VALUE ...]
 
 The sky has the same radiance in all directions, and there is no ground and no air: what is compared is the light in the
 cloud. Of vdb_render, which knows no sky, the best of several strengths of light and amounts of scatter is taken. Pictures
@@ -18,6 +18,7 @@ import pathlib
 import shutil
 import subprocess
 import sys
+import tomllib
 
 import numpy
 from PIL import Image
@@ -40,6 +41,18 @@ CLOUDS = {
     "congestus": {"scene": "scenes/genera/Cb.toml", "time_s": 1500, "extinction_per_m": 0.02,
                   "eye_m": (-4000, -30000, 1500), "target_m": (0, 0, 6000), "sun": (30, 250), "step_m": 60.0},
 }
+GENERA = ("Ci", "Cc", "Cs", "Ac", "As", "Ns", "Sc", "St", "Cu", "Cb")
+
+
+def genus(name):
+    """The cloud of a scene of a genus, seen by its camera; its voxels are those of the lattice."""
+    path = ROOT / f"scenes/genera/{name}.toml"
+    scene = tomllib.loads(path.read_text(encoding="utf-8"))
+    camera = scene["camera"]
+    return {"scene": path, "eye_m": tuple(camera["position_m"]), "target_m": tuple(camera["target_m"]),
+            "sun": (scene["sun"]["elevation_deg"], scene["sun"]["azimuth_deg"]), "fov_deg": camera["vertical_fov_deg"],
+            "extinction_per_m": scene["density"]["extinction_per_m"],
+            "step_m": min(layer["lattice"]["cell_size_m"] for layer in scene["layer"]) / 2, "refine": 1}
 
 
 def tone_mapped(linear):
@@ -76,11 +89,13 @@ def volume_of(name, cloud, options):
     folder = options.out / name
     files = sorted(folder.glob("density/**/*.vdb"))
     if not files:
-        run("nice", options.nephos, "run", ROOT / cloud["scene"], "--out", folder, "--no-render", "--quiet", "--set",
-            f"frames.start_s={cloud['time_s']}", "--set", "frames.count=1", "--set", f"time.steps={cloud['time_s'] // 10 + 10}",
-            "--set", "density.refine=4")  # with its detail, so that both see the same cloud
+        when = ["--frames", "1"] if "time_s" not in cloud else [
+            "--set", f"frames.start_s={cloud['time_s']}", "--set", "frames.count=1", "--set",
+            f"time.steps={cloud['time_s'] // 10 + 10}"]
+        run("nice", options.nephos, "run", ROOT / cloud["scene"], "--out", folder, "--no-render", "--quiet", *when, "--set",
+            f"density.refine={cloud.get('refine', 4)}")  # with its detail, so that both see the same cloud
         files = sorted(folder.glob("density/**/*.vdb"))
-    return files[0]
+    return min(files, key=lambda file: len(file.name))  # all layers together
 
 
 def by_cycles(name, cloud, volume, options):
@@ -91,7 +106,7 @@ def by_cycles(name, cloud, volume, options):
         job = {"volume": str(volume), "grid": "density", "up": cloud.get("up", "z"), "step_m": cloud["step_m"],
                "extinction_per_m": cloud["extinction_per_m"], "g": options.g, "sun_colour": SUN, "sky": SKY,
                "to_sun": direction_to_sun(*cloud["sun"]), "eye_m": cloud["eye_m"], "target_m": cloud["target_m"],
-               "vertical_fov_deg": 50, "size": SIZE, "threads": options.threads, "samples": options.samples,
+               "vertical_fov_deg": cloud.get("fov_deg", 50), "size": SIZE, "threads": options.threads, "samples": options.samples,
                "bounces": 128, "out": str(base)}
         pathlib.Path(f"{base}.json").write_text(json.dumps(job), encoding="utf-8")
         run("nice", "-n", 19, "blender", "-b", "--factory-startup", "-P", HERE / "cycles_render.py", "--", f"{base}.json")
@@ -101,12 +116,13 @@ def by_cycles(name, cloud, volume, options):
 def by_nephos(name, cloud, volume, options):
     path = options.out / f"{name}-nephos.png"
     keys = {"camera.position_m": listed(cloud["eye_m"]), "camera.target_m": listed(cloud["target_m"]),
-            "camera.vertical_fov_deg": "50", "camera.width": SIZE[0], "camera.height": SIZE[1],
+            "camera.vertical_fov_deg": cloud.get("fov_deg", 50), "camera.width": SIZE[0], "camera.height": SIZE[1],
             "sun.elevation_deg": cloud["sun"][0], "sun.azimuth_deg": cloud["sun"][1], "sun.colour": listed(SUN),
             "atmosphere.model": '"gradient"', "air.extinction_per_m": "[0, 0, 0]", "air.horizon": listed(SKY), "air.zenith": listed(SKY),
             "ground.height_m": "100000", "light.ambient_top": listed(SKY), "light.ambient_base": listed(SKY),
             "light.phase": '"henyey_greenstein"', "light.g": options.g, "camera.exposure": '"manual"', "camera.tone_curve": '"exponential"', "camera.glare": 0,
-            "ground.pattern": '"plain"', "detail.strength": 0, "detail.thermals": 0}  # Cycles draws the voxels as they are
+            "ground.pattern": '"plain"', "detail.strength": 0, "detail.thermals": 0, "detail.apron_cells": 0,
+            "detail.to_horizon": "false", "density.metaball_radius_cells": 1}  # Cycles draws the voxels as they are
     words = [each for key, value in keys.items() for each in ("--set", f"{key}={value}")]
     words += [each for setting in options.set for each in ("--set", setting)]
     run(options.nephos, "render", volume, "--scene", ROOT / "scenes/cumulus.toml", "--up", cloud.get("up", "z"),
@@ -148,7 +164,7 @@ def by_vdb_render(name, cloud, volume, options, truth):
 
 
 def compare(name, options):
-    cloud = CLOUDS[name]
+    cloud = CLOUDS[name] if name in CLOUDS else genus(name)
     volume = volume_of(name, cloud, options)
     pair = by_cycles(name, cloud, volume, options)
     truth = tone_mapped((pair[0] + pair[1]) / 2)
@@ -173,7 +189,8 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for pictures")
     parser.add_argument("--nephos", type=pathlib.Path, default=ROOT / "build/release/bin/nephos", help="the program")
     parser.add_argument("--disney", type=pathlib.Path, help="wdas_cloud_sixteenth.vdb or a larger one of its family")
-    parser.add_argument("--only", choices=CLOUDS, help="one of the clouds")
+    parser.add_argument("--only", choices=(*CLOUDS, *GENERA), help="one of the clouds")
+    parser.add_argument("--genera", action="store_true", help="the ten genera instead, in voxels of their lattices")
     parser.add_argument("--g", type=float, default=0.5, help="asymmetry of the phase function")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a key of our scene")
     parser.add_argument("--samples", type=int, default=192, help="of Cycles, a pixel and run")
@@ -184,7 +201,7 @@ def main():
         if shutil.which(program) is None:
             sys.exit(f"skipped: {program} is not installed (Debian: blender, libopenvdb-tools)")
     options.out.mkdir(parents=True, exist_ok=True)
-    names = [options.only] if options.only else [name for name in CLOUDS if name != "disney" or options.disney]
+    names = [options.only] if options.only else GENERA if options.genera else [name for name in CLOUDS if name != "disney" or options.disney]
     print("| cloud | nephos | of the cloud's pixels | vdb_render | noise of Cycles |\n|---|---|---|---|---|")
     for row in (compare(name, options) for name in names):
         other = f"{row['vdb_render']:.4f} ({row['how']})" if "vdb_render" in row else ""
