@@ -53,7 +53,7 @@ struct DetailSetting {
     bool images = true;  // false: no cloud beyond periodic sides either
 };
 
-// How many times as dense cloud is at most in the images of a grid that repeats.
+// Bounds the density in the images of a grid that repeats: at most so many times that of the grid.
 inline constexpr float kMostInImages = 2.5f;
 
 // Returns whether the cloud goes on to the horizon in pictures.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How far rays through a CoverageField may go without meeting cloud (not installed).
+// Computes how far rays through a CoverageField may go without meeting cloud (not installed).
 
 #include <array>
 #include <cstdint>
@@ -13,8 +13,8 @@
 namespace nephos {
 
 // Returns CoverageField::clearance() for its nodes(), places(), table() and bricks(), and three bytes more: kernels read
-// words. A cell may hold cloud when the coverage of one of its nodes is above `least_coverage` at
-// `most` times the density.
+// words. A cell may hold cloud when the coverage of one of its nodes is above `least_coverage` at `most` times
+// the density.
 std::vector<std::uint8_t> clearance_of_cells(std::span<const std::uint8_t> nodes, std::span<const std::int32_t> places,
                                              std::span<const std::int32_t> table, const std::array<int, 3>& bricks,
                                              float least_coverage, float most);

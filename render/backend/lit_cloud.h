@@ -55,7 +55,7 @@ struct LitCloud {
     CacheKey given_volumes_key{};  // of the cloud that cache_cloud() was given last
     Version volumes_version = 0, volumes_light = 0;
 
-    // What metaballs are drawn with.
+    // Returns the depths that metaballs are drawn with.
     const std::vector<float>& depths_to_draw() const { return drawn_depths.empty() ? sun_depths : drawn_depths; }
 
     // Notes that a pass has changed sun_depths or shadow.

@@ -62,7 +62,7 @@ bool diffuses(const CloudLight& light) {
 
 namespace {
 
-// Whether the line from a point towards the light passes the box of a field's bricks.
+// Returns whether the line from a point towards the light passes the box of a field's bricks.
 bool looks_through(const CoverageField& field, const Vec3& place_m, const Vec3& to_light) {
     if (field.period_m().x > 0)
         return place_m.z < field.corner_m().z + 2 * kCells * field.node_m() * field.bricks()[2];
@@ -117,7 +117,7 @@ std::vector<std::uint32_t> shade_words(const LightFront& front) {
 
 namespace {
 
-// What the other volumes take away at the corners of a brick's cells.
+// Adds the depths of the other volumes at the corners of a brick's cells.
 void add_other_depths(std::span<const CloudVolume> volumes, std::size_t n, std::size_t brick, std::span<float> depths) {
     const CoverageField& field = volumes[n].field;
     const auto& bricks = field.bricks();

@@ -11,23 +11,16 @@ namespace {
 
 constexpr int kCells = CoverageField::kBrickCells;
 
-// Linear between four numbers of a row-major table; 0 beyond it.
-float bilinear(const std::vector<float>& values, int width, int height, double u, double v) {
+// Interpolates between number(x, y) at four whole places around (u, v).
+template <class Number>
+float bilinear(double u, double v, const Number& number) {
     const double u0 = std::floor(u), v0 = std::floor(v);
     const int i = int(u0), j = int(v0);
     const auto fu = float(u - u0), fv = float(v - v0);
-    const auto at = [&](int x, int y) {
-        return x < 0 || y < 0 || x >= width || y >= height ? 0.0f
-                                                           : values[std::size_t(y) * std::size_t(width) + std::size_t(x)];
-    };
-    const float low = at(i, j) + fu * (at(i + 1, j) - at(i, j)),
-                high = at(i, j + 1) + fu * (at(i + 1, j + 1) - at(i, j + 1));
+    const float low = number(i, j) + fu * (number(i + 1, j) - number(i, j)),
+                high = number(i, j + 1) + fu * (number(i + 1, j + 1) - number(i, j + 1));
     return low + fv * (high - low);
 }
-
-}  // namespace
-
-namespace {
 
 int wrapped(int number, int count) {
     const int rest = number % count;
@@ -37,17 +30,12 @@ int wrapped(int number, int count) {
 }  // namespace
 
 float LightFront::at(double u, double v) const {
-    if (periodic_) {
-        const double u0 = std::floor(u), v0 = std::floor(v);
-        const auto fu = float(u - u0), fv = float(v - v0);
-        const int i = wrapped(int(u0), lines_[0]), j = wrapped(int(v0), lines_[1]);
-        const int i1 = i + 1 == lines_[0] ? 0 : i + 1, j1 = j + 1 == lines_[1] ? 0 : j + 1;
-        const auto line = [&](int x, int y) { return depth_[std::size_t(y) * std::size_t(lines_[0]) + std::size_t(x)]; };
-        const float low = line(i, j) + fu * (line(i1, j) - line(i, j)),
-                    high = line(i, j1) + fu * (line(i1, j1) - line(i, j1));
-        return low + fv * (high - low);
-    }
-    return bilinear(depth_, lines_[0], lines_[1], u - first_[0], v - first_[1]);
+    const int width = lines_[0], height = lines_[1];
+    const auto line = [&](int x, int y) { return depth_[std::size_t(y) * std::size_t(width) + std::size_t(x)]; };
+    if (periodic_) return bilinear(u, v, [&](int x, int y) { return line(wrapped(x, width), wrapped(y, height)); });
+    return bilinear(u - first_[0], v - first_[1], [&](int x, int y) {
+        return x < 0 || y < 0 || x >= width || y >= height ? 0.0f : line(x, y);
+    });
 }
 
 void LightFront::resample(double u, double v, int width, int height, std::vector<float>& to) const {

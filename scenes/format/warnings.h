@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a valid scene may not mean: for its author, not for the simulation.
+// Notes for the author of a valid scene about what it may not mean. They change nothing in a simulation.
 
 #include <string>
 #include <vector>
@@ -11,8 +11,8 @@
 namespace nephos {
 
 // Returns a sentence for each finding: base models that nothing uses; parcels that reach above an open top of their
-// lattice, which cuts their clouds flat; and, where clouds do not thin out towards open sides (detail.apron_cells, with detail), those
-// that reach beyond them. Ellipsoids count as far as their radius. Pure.
+// lattice, which cuts their clouds flat; and those that reach beyond open sides where clouds do not thin out towards
+// these (detail.apron_cells, or no detail). Ellipsoids count as far as their radius. Pure.
 std::vector<std::string> warnings(const Scene& scene);
 
 }  // namespace nephos
