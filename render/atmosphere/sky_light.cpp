@@ -111,11 +111,16 @@ void SkyLights::mix_tables(const RenderOptions& options, double elevation_deg) {
             haze[i] = full * (a.haze[i] + fraction * (b.haze[i] - a.haze[i]));
         }
     }
-    light_.horizon = {};
-    for (std::size_t i = 0; i < shader::kSkyColumns; ++i)
+    // The lowest row, whose columns are likewise spaced.
+    const double level = std::cos(radians(elevation_deg));
+    for (std::size_t n = 0; n < light_.horizon.size(); ++n) {
+        const double across = double(n) / double(light_.horizon.size() - 1);
+        const std::size_t i = std::size_t(std::lround(across * double(shader::kSkyColumns - 1)));
+        const double phase = double(shader::particle_phase(float(level * (1 - 2 * across * across)),
+                                                           float(light_.model.mie_g)));
         for (std::size_t c = 0; c < 3; ++c)
-            light_.horizon[c] += (double(scattered[4 * i + c]) + double(haze[4 * i + c]) / (4 * kPi)) /
-                                 double(shader::kSkyColumns);
+            light_.horizon[n][c] = double(scattered[4 * i + c]) + phase * double(haze[4 * i + c]);
+    }
     for (std::size_t i = 0; i < shader::kSkyColumns; ++i) {
         const double altitude_m = double(shader::kSunlightTop) * double(i) / double(shader::kSkyColumns - 1);
         const Rgb light = times(sun_above_air, atmosphere_->sunlight(altitude_m, options.sun.elevation_deg));

@@ -4,12 +4,14 @@
 // The physical sky of a frame: sky tables, cached and interpolated along the sun's path, and the resulting
 // light on clouds and ground. Private to the module.
 
+#include <array>
 #include <cstdint>
 #include <list>
 #include <optional>
 #include <vector>
 
 #include "render/atmosphere/air_colours.h"
+#include "render/image/picture.h"
 
 namespace nephos {
 
@@ -22,7 +24,7 @@ struct SkyLight {
     double eye_altitude_m = 0;          // above the ground, at least 0
     Rgb ground_sun{}, ground_sky{};     // of a white surface on the ground: sunlit; in sky light
     Rgb ambient_top{}, ambient_base{};  // ambient light at a cloud's top and base
-    Rgb horizon{};                      // mean around the horizon
+    std::array<Rgb, PictureAir::kHorizons> horizon{};  // PictureAir::horizon
     Rgb disc{}, disc_fade{};            // shader::FrameUniforms::sun_disc, sun_fade
     bool has_disc = false;
 };

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
 
+#include "render/cloud/light_below.h"
 #include "render/frame/tile_bins.h"
 
 namespace nephos {
@@ -70,7 +71,7 @@ CacheKey light_key(const CacheKey& metaballs, const RenderOptions& options) {
 // Of the parts with detail, whose densities are those of their metaballs.
 CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, const RenderOptions& options) {
     const CloudLight& light = options.light;
-    std::vector<double> rest{mean_cosine(light.phase), double(diffuses(light)), light.albedo};
+    std::vector<double> rest{mean_cosine(light.phase), double(diffuses(light)), light.albedo, options.ground.height_m};
     for (const DetailedVoxels& part : cloud.detailed) {
         const DetailSetting& s = part.setting;
         const DetailOptions& o = s.options;
@@ -102,6 +103,7 @@ void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOpt
     }
     if (cached.light_key == cached.volumes_light_key) return;
     light_volumes(cached.volumes, direction_to_sun(options.sun), options.light, are_new);
+    cached.ground_light = light_below(cached.volumes, direction_to_sun(options.sun), options.ground.height_m);
     cached.volumes_key = key;  // only now: if light fails, all is new again
     cached.volumes_light_key = cached.light_key;
     cached.volumes_light = next_version();

@@ -14,6 +14,7 @@
 #include "render/cloud/cloud_volume.h"
 #include "render/cloud/level_of_detail.h"
 #include "render/frame/versioned.h"
+#include "render/image/ground_light.h"
 #include "render/image/picture.h"
 #include "render/options/options.h"
 
@@ -51,6 +52,7 @@ struct LitCloud {
 
     // The parts with detail, in their order, with their light. See DetailedVoxels.
     std::vector<CloudVolume> volumes;
+    GroundLight ground_light;  // below them
     CacheKey volumes_key{}, volumes_light_key{};
     CacheKey given_volumes_key{};  // of the cloud that cache_cloud() was given last
     Version volumes_version = 0, volumes_light = 0;

@@ -8,6 +8,7 @@
 #include "core/math.h"
 #include "core/vec.h"
 #include "render/cloud/cloud_preparation.h"
+#include "render/image/ground_light.h"
 
 namespace nephos {
 namespace {
@@ -119,6 +120,16 @@ PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera,
     }
     if (sky != nullptr) use_sky(options, *sky, frame);
     return frame;
+}
+
+shader::vec4 ground_light_place(const GroundLight& light, const Vec3& eye_m) {
+    const Vec2 at_eye = (Vec2(eye_m) - light.corner_m) / light.texel_m - 0.5;
+    return {float(1 / light.texel_m.x), float(1 / light.texel_m.y), float(at_eye.x), float(at_eye.y)};
+}
+
+void use_ground_light(const GroundLight& light, const Vec3& eye_m, PictureFrame& frame) {
+    frame.ground_light = light.words.empty() ? nullptr : &light;
+    frame.ground_light_place = ground_light_place(light, eye_m);
 }
 
 void store_part(const float* radiance, const float* depth, const PicturePart& part, Picture& picture) {

@@ -13,6 +13,7 @@
 namespace nephos {
 
 struct AirShells;
+struct GroundLight;
 struct MarchedScene;
 
 // A rectangle of the image that is drawn at once, in pixels; not one of the tiles of tile_bins.h.
@@ -39,12 +40,21 @@ struct PictureFrame : shader::FrameUniforms {
     const float* scattering = nullptr;  // scattering_table.h, for metaballs on the processor
     const AirShells* shells = nullptr;  // likewise; null: none
     const MarchedScene* endless = nullptr;  // clouds that repeat to the horizon; null: none does
+    // Scattered light below clouds; null: that of open ground. Where a point relative to the eye is in it.
+    const GroundLight* ground_light = nullptr;
+    shader::vec4 ground_light_place{};
 };
 
 // Returns the uniforms of a frame. `flash` is null without lightning, `sky` with AirModel::gradient; the
 // latter must outlive the result.
 PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
                         const Flash* flash, const PicturePart& part, const SkyLight* sky = nullptr);
+
+// Returns of a map the x and y scale, and the offset, from a point relative to the eye to a texel, counted from the middle
+// of the first one.
+shader::vec4 ground_light_place(const GroundLight& light, const Vec3& eye_m);
+// Makes the light on the ground that below clouds; `light` must outlive `frame`.
+void use_ground_light(const GroundLight& light, const Vec3& eye_m, PictureFrame& frame);
 
 // Returns 1 / m: by this times the square of its distance a place on the ground's plane lies above the round Earth; 0
 // without a sky, when the ground is a plane.

@@ -338,6 +338,7 @@ void draw_wet_ground(const WetGround& ground, Picture& picture) {
     pass.white = frame_data(white, camera_frame(options.camera), picture.shadow_frame, ground.flash,
                             {0, 0, picture.width, picture.height}, ground.sky);
     pass.white.endless = ground.endless;
+    if (ground.light != nullptr) use_ground_light(*ground.light, eye, pass.white);
     const Rgb& albedo = options.ground.albedo;
     pass.dry = {float(albedo[0]), float(albedo[1]), float(albedo[2]), 0};
     pass.country = country_of(options.ground, eye);

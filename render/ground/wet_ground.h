@@ -53,6 +53,7 @@ bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover
 // Returns true when reflections need a mirrored view.
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover);
 
+struct GroundLight;
 struct MarchedScene;
 
 struct WetGround {
@@ -65,6 +66,7 @@ struct WetGround {
     int shadow_size = 0;
     const SkyLight* sky = nullptr;  // of the picture; null: gradient
     const MarchedScene* endless = nullptr;  // as PictureFrame::endless
+    const GroundLight* light = nullptr;     // below clouds; null: as without
 };
 
 // Replaces the light of the ground, rows in parallel; the result does not depend on the number of threads.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "render/image/ground_light.h"
 
 namespace nephos {
 
@@ -26,9 +27,12 @@ struct ShadowFrame {
 
 // Light in the air of a picture, for overlays such as rain; linear colours.
 struct PictureAir {
+    static constexpr std::size_t kHorizons = 16;
     std::array<double, 3> sun{};               // radiance of a white surface that faces the unshaded sun
     std::array<double, 3> sky{};               // mean radiance of the sky
-    std::array<double, 3> horizon{};           // radiance of the air itself, far away
+    // Radiance of the air itself, far away: from towards the sun to opposite to it, at azimuths from it whose cosine is
+    // 1 - 2 (n / (kHorizons - 1))^2.
+    std::array<std::array<double, 3>, kHorizons> horizon{};
     std::array<double, 3> extinction_per_m{};  // near the ground
 };
 
@@ -46,6 +50,8 @@ struct Picture {
     int shadow_size = 0;        // texels on a side
     std::vector<float> shadow;  // shadow_size^2, transmittance of the whole cloud along the sun's rays
     ShadowFrame shadow_frame;
+
+    GroundLight ground_light;  // with the shadow map
 
     // For each metaball of the cloud, in its order: transmittance of the cloud between its centre and the
     // sun.

@@ -109,7 +109,7 @@ void PrecipitationPainter::draw(Picture& picture, const RenderOptions& options, 
     RenderOptions now = options;
     now.camera = camera_at(options.camera, time_s);
     const CameraFrame camera = camera_frame(now.camera);
-    const PrecipitationLight light = precipitation_light(picture, now, camera, time_s);
+    const PrecipitationLight light = precipitation_light(picture, now, time_s);
     draw_shafts(picture, now, camera, weather.curtains, light, time_s, weather.seed);
     if (p.particles == 0 || p.visibility <= 0) return;
     const auto count = std::size_t(std::ceil(kMadePerDrawn * p.particles));

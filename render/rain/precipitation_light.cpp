@@ -21,49 +21,6 @@ double particle_phase(PrecipitationKind kind, double cosine) {
 
 constexpr double kSkyFraction[2] = {0.68, 0.8};  // of a drop's and a flake's light, the rest is the ground's
 
-// A weighted mean of the picture's pixels and of a value by the options, which replaces missing pixels.
-struct Mean {
-    Rgb sum{};
-    double weights = 0;
-    void add(const float* pixel, double weight) {
-        // Whatever is brighter than white is the sun or its rim, which has a term of its own.
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * std::min(1.0, double(pixel[c]));
-        weights += weight;
-    }
-    Rgb with(const Rgb& otherwise, double more) const {
-        Rgb mean;
-        for (std::size_t c = 0; c < 3; ++c) mean[c] = (sum[c] + more * otherwise[c]) / (weights + more);
-        return mean;
-    }
-};
-
-Rgb surroundings(const Picture& picture, const RenderOptions& options, const CameraFrame& camera) {
-    constexpr double kShareOfOptions = 0.1;  // of the picture
-    const int step = std::max(1, picture.width / 160);
-    Mean above, below;
-    std::size_t looked = 0;
-    for (int y = step / 2; y < picture.height; y += step) {
-        const double upward = (1 - (2 * y + 1.0) / options.camera.height) * camera.half_height;
-        for (int x = step / 2; x < picture.width; x += step, ++looked) {
-            const double across = ((2 * x + 1.0) / options.camera.width - 1) * camera.half_width;
-            const double up = (camera.forward.z + across * camera.right.z + upward * camera.up.z) /
-                              std::sqrt(1 + across * across + upward * upward);
-            const float* pixel =
-                &picture.beauty[3 * (std::size_t(y) * std::size_t(picture.width) + std::size_t(x))];
-            above.add(pixel, smoothstep(-0.05, 0.15, up));
-            below.add(pixel, smoothstep(0.02, -0.2, up));
-        }
-    }
-    const double more = kShareOfOptions * double(std::max<std::size_t>(looked, 1));
-    const Rgb sky = above.with(air_of(picture, options).sky, more);
-    Rgb both{};
-    for (std::size_t c = 0; c < 3; ++c) both[c] = options.ground.albedo[c] * sky[c];
-    const Rgb ground = below.with(both, more);
-    const double fraction = kSkyFraction[int(options.precipitation.kind)];
-    for (std::size_t c = 0; c < 3; ++c) both[c] = fraction * sky[c] + (1 - fraction) * ground[c];
-    return both;
-}
-
 }  // namespace
 
 double forward_g(PrecipitationKind kind) { return kind == PrecipitationKind::rain ? 0.85 : 0.6; }
@@ -76,19 +33,25 @@ PictureAir air_of(const Picture& picture, const RenderOptions& options) {
     for (std::size_t c = 0; c < 3; ++c) {
         air.sun[c] = day.sun * options.sun.colour[c];
         air.sky[c] = 0.5 * (options.air.horizon[c] + options.air.zenith[c]) * day.sky;
-        air.horizon[c] = day.sky * options.air.horizon[c];
+        for (Rgb& horizon : air.horizon) horizon[c] = day.sky * options.air.horizon[c];
     }
     return air;
 }
 
-PrecipitationLight precipitation_light(const Picture& picture, const RenderOptions& options,
-                                       const CameraFrame& camera, double time_s) {
+PrecipitationLight precipitation_light(const Picture& picture, const RenderOptions& options, double time_s) {
     PrecipitationLight light;
     light.kind = options.precipitation.kind;
-    light.surroundings = surroundings(picture, options, camera);
     light.to_sun = direction_to_sun(options.sun);
     const PictureAir air = air_of(picture, options);
     light.sun = air.sun;
+    light.ground = &picture.ground_light;
+    const double sky = kSkyFraction[int(light.kind)], level = std::max(light.to_sun.z, 0.0);
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double of_all = sky + (1 - sky) * options.ground.albedo[c];
+        light.by_sky[c] = of_all * air.sky[c];
+        light.by_scattered_sun[c] = of_all * level * air.sun[c];
+        light.by_sunlit_ground[c] = (1 - sky) * options.ground.albedo[c] * level * air.sun[c];
+    }
     light.air_extinction_per_m = air.extinction_per_m;
     if (const std::optional<Flash> flash = flash_at(options.lightning, time_s)) {
         for (std::size_t c = 0; c < 3; ++c) light.flash[c] = flash->intensity * flash->colour[c];
@@ -119,6 +82,7 @@ float sunlight_at(const Picture& picture, const Vec3& place_m) {
 Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Vec3& place_m,
                       double sunlight) {
     const double sun = sunlight * particle_phase(light.kind, dot(ray, light.to_sun));
+    const GroundLight::Fractions below = light.ground != nullptr ? light.ground->at(Vec2(place_m)) : GroundLight::Fractions{};
     double flash = 0;
     if (light.flash[0] + light.flash[1] + light.flash[2] > 0) {
         const Vec3 way = light.flash_m - place_m;
@@ -127,7 +91,8 @@ Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Ve
     }
     Rgb radiance;
     for (std::size_t c = 0; c < 3; ++c)
-        radiance[c] = light.surroundings[c] + sun * light.sun[c] + flash * light.flash[c];
+        radiance[c] = below.sky * light.by_sky[c] + below.sun * light.by_scattered_sun[c] +
+                      sunlight * light.by_sunlit_ground[c] + sun * light.sun[c] + flash * light.flash[c];
     return radiance;
 }
 

@@ -4,15 +4,18 @@
 // Radiance of rain and snow. Private to the module.
 
 #include "render/image/picture.h"
-#include "render/options/camera.h"
 #include "render/options/options.h"
 
 namespace nephos {
 
 // The light on the particles of one frame.
 struct PrecipitationLight {
-    Rgb surroundings{};  // mean radiance that a particle refracts: of sky and clouds, and ground
-    Rgb sun{};           // radiance of a white surface that faces the sun, without clouds
+    // What a particle refracts of its surroundings, clouds, sky and ground, where there is no cloud: of the sky and of
+    // ground in its light; of ground in the sun. And of clouds and of ground below them, per fraction of the sunlight that
+    // arrives scattered.
+    Rgb by_sky{}, by_sunlit_ground{}, by_scattered_sun{};
+    const GroundLight* ground = nullptr;  // the fractions of these by place; null: no cloud
+    Rgb sun{};                            // radiance of a white surface that faces the sun, without clouds
     Vec3 to_sun{0, 0, 1};
     Rgb flash{};  // of lightning: the same at 1 km from it
     Vec3 flash_m{};
@@ -20,12 +23,11 @@ struct PrecipitationLight {
     PrecipitationKind kind = PrecipitationKind::rain;
 };
 
-// Computes the light from a picture without rain: a drop refracts a wide-angle view of its surroundings
-// upside down (Garg and Nayar 2007). Sky and ground have weights that make drops bright before the ground and
-// a little dark before the sky, as observed; a picture with little of either is complemented by the sky of
-// the options and the ground in its light.
-PrecipitationLight precipitation_light(const Picture& picture, const RenderOptions& options,
-                                       const CameraFrame& camera, double time_s);
+// Returns the light by the picture's air and its map of light below clouds, which it refers to. A drop refracts a
+// wide-angle view of its surroundings upside down (Garg and Nayar 2007): two thirds of it is sky or cloud, the rest
+// ground. So drops are bright before the ground and a little dark before the sky, as observed; and their light depends on
+// where they are, not on where the camera looks.
+PrecipitationLight precipitation_light(const Picture& picture, const RenderOptions& options, double time_s);
 
 // Returns Picture::air, or if there is none the air of the options' gradient.
 PictureAir air_of(const Picture& picture, const RenderOptions& options);

@@ -51,7 +51,9 @@ HWY_INLINE Floats shadow_between(const ShaftPass& p, Floats u, Floats v) {
 }
 
 HWY_INLINE Floats3 radiance(const ShaftPass& p, const Floats3& ray, const Floats3& sun, Floats t) {
-    Floats3 light = set3(p.surroundings);
+    LightBelow below{hn::Zero(Lanes()), set(1)};
+    if (p.ground != nullptr) below = light_below(*p.ground, p.ground_place, times(t, ray));
+    Floats3 light = times_add(below.sun, set3(p.by_scattered_sun), times(below.sky, set3(p.by_sky)));
     if (p.has_sun) {
         Floats weight = set(1);
         if (p.shadow != nullptr) {
@@ -59,7 +61,7 @@ HWY_INLINE Floats3 radiance(const ShaftPass& p, const Floats3& ray, const Floats
                          v = hn::MulAdd(t, dot(set3(p.to_v), ray), set(p.shadow_v));
             weight = shadow_between(p, u, v);
         }
-        light = times_add(weight, sun, light);
+        light = times_add(weight, add(sun, set3(p.by_sunlit_ground)), light);
     }
     if (p.has_flash) {
         const Floats3 way = subtract(set3(p.flash_m), times(t, ray));
@@ -69,6 +71,26 @@ HWY_INLINE Floats3 radiance(const ShaftPass& p, const Floats3& ray, const Floats
             times_add(hn::Mul(flash_falloff(squared), drop_phase(p.forward_g, cosine)), set3(p.flash), light);
     }
     return light;
+}
+
+// PictureAir::horizon along rays.
+HWY_INLINE Floats3 horizon_at(const ShaftPass& p, const Floats3& ray) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    constexpr float kLast = float(PictureAir::kHorizons - 1);
+    const float sun = p.to_sun.x * p.to_sun.x + p.to_sun.y * p.to_sun.y;
+    const Floats level = hn::Mul(hn::MulAdd(ray.x, ray.x, hn::Mul(ray.y, ray.y)), set(sun));
+    const Floats cosine = hn::Div(hn::MulAdd(ray.x, set(p.to_sun.x), hn::Mul(ray.y, set(p.to_sun.y))),
+                                  hn::Sqrt(hn::Max(level, set(1e-12f))));
+    const Floats across = hn::Sqrt(hn::Max(hn::MulAdd(set(-0.5f), cosine, set(0.5f)), hn::Zero(d)));
+    const Floats at = hn::Mul(hn::Min(across, set(1)), set(kLast)), below = hn::Min(hn::Floor(at), set(kLast - 1)),
+                 part = hn::Sub(at, below);
+    const auto first = hn::ConvertTo(di, below);
+    const auto of = [&](const float* from) {
+        const Floats a = hn::GatherIndex(d, from, first), b = hn::GatherIndex(d, from + 1, first);
+        return hn::MulAdd(part, hn::Sub(b, a), a);
+    };
+    return {of(p.horizon[0]), of(p.horizon[1]), of(p.horizon[2])};
 }
 
 // A run of steps in front of the pixels' clouds, or behind them.
@@ -86,7 +108,7 @@ HWY_INLINE void add(Through& run, Floats depth, const Floats3& light) {
 
 // Marches one interval of every ray, or the part of it before or behind the pixels' clouds.
 HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, const Floats3& sun,
-                      Floats begin, Floats end, Floats offset, Through& run) {
+                      const Floats3& horizon, Floats begin, Floats end, Floats offset, Through& run) {
     const Lanes d;
     if (hn::AllFalse(d, hn::Lt(begin, end))) return;
     const Floats zero = hn::Zero(d);
@@ -116,7 +138,7 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
             depth = hn::MulAdd(densest, step, depth);
         }
         if (hn::AllFalse(d, hn::Gt(depth, zero))) continue;
-        const Floats3 seen = mix(set3(p.horizon), radiance(p, ray, sun, middle), kept);
+        const Floats3 seen = mix(horizon, radiance(p, ray, sun, middle), kept);
         add(run, depth, seen);
     }
 }
@@ -157,14 +179,15 @@ void draw_pixels(const ShaftPass& p, MetCurtains& met, std::size_t x, std::size_
     const Floats cloud_m = hn::LoadU(d, pixels.depth_m);
     Floats3 sun = set3(p.sun);
     if (p.has_sun) sun = times(drop_phase(p.forward_g, dot(ray, set3(p.to_sun))), sun);
+    const Floats3 horizon = horizon_at(p, ray);
     const Floats zero = hn::Zero(d), one = set(1), offset = shaft_offsets(x, y);
     Through before{one, {zero, zero, zero}}, behind = before;
     const Floats seen = hn::LoadU(d, pixels.transmittance);
     const bool see_through = !hn::AllFalse(d, hn::Gt(seen, set(kShaftLeastSeen)));
     for (Floats begin = set(-1), end = begin; next_run(met, begin, end);) {
         const Floats parting = hn::Min(hn::Max(cloud_m, begin), end);
-        march(p, met, ray, sun, begin, parting, offset, before);
-        if (see_through) march(p, met, ray, sun, parting, end, offset, behind);
+        march(p, met, ray, sun, horizon, begin, parting, offset, before);
+        if (see_through) march(p, met, ray, sun, horizon, parting, end, offset, behind);
     }
     // The air before a curtain is in both its terms: what the curtain sends has it already, and what it lets
     // through keeps the rest.

@@ -109,7 +109,13 @@ std::vector<std::uint32_t> corners(const std::vector<std::uint8_t>& noise) {
 
 void set_light(ShaftPass& pass, const Picture& picture, const PrecipitationLight& light,
                const PictureAir& air, const Vec3& eye) {
-    pass.surroundings = floats(light.surroundings);
+    pass.by_sky = floats(light.by_sky);
+    pass.by_sunlit_ground = floats(light.by_sunlit_ground);
+    pass.by_scattered_sun = floats(light.by_scattered_sun);
+    if (light.ground != nullptr && !light.ground->words.empty()) {
+        pass.ground = light.ground;
+        pass.ground_place = ground_light_place(*light.ground, eye);
+    }
     pass.sun = floats(light.sun);
     pass.to_sun = floats(light.to_sun);
     pass.flash = floats(light.flash);
@@ -117,7 +123,8 @@ void set_light(ShaftPass& pass, const Picture& picture, const PrecipitationLight
     pass.has_sun = any(light.sun);
     pass.has_flash = any(light.flash);
     pass.forward_g = float(forward_g(light.kind));
-    pass.horizon = floats(air.horizon);
+    for (std::size_t c = 0; c < 3; ++c)
+        for (std::size_t n = 0; n < PictureAir::kHorizons; ++n) pass.horizon[c][n] = float(air.horizon[n][c]);
     pass.air_per_m = floats(air.extinction_per_m);
     if (picture.shadow.empty()) return;
     const ShadowFrame& f = picture.shadow_frame;

@@ -11,6 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "render/rain/rain_shafts.h"
+#include "render/shared/shared.h"
 
 namespace nephos {
 
@@ -36,9 +37,12 @@ struct ShaftPass {
     std::vector<std::uint32_t> noise;  // of each cell its four corners, a byte each
     float softness = 0, fray = 0, contrast = 0, evaporation = 0;
     float clear_m = 0;  // around the eye, where particles are drawn instead
-    glm::vec3 surroundings{}, sun{}, to_sun{}, flash{}, flash_m{}, horizon{}, air_per_m{};
+    glm::vec3 by_sky{}, by_sunlit_ground{}, by_scattered_sun{}, sun{}, to_sun{}, flash{}, flash_m{}, air_per_m{};
+    float horizon[3][PictureAir::kHorizons] = {};  // PictureAir::horizon
     float forward_g = 0;
     bool has_sun = false, has_flash = false;
+    const GroundLight* ground = nullptr;  // null: no cloud
+    shader::vec4 ground_place{};          // of a point relative to the eye (PictureFrame::ground_light_place)
     const float* shadow = nullptr;
     int shadow_size = 0;
     float shadow_u = 0, shadow_v = 0;  // the eye in the map, 0..1

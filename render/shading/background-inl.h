@@ -16,6 +16,7 @@
 #include <hwy/highway.h>
 
 #include "render/frame/frame_data.h"
+#include "render/image/ground_light.h"
 #include "render/shading/air-inl.h"
 #include "render/shading/endless-inl.h"
 #include "render/shading/floats3-inl.h"
@@ -106,6 +107,35 @@ HWY_INLINE Floats3 sky(const PictureFrame& frame, const Floats3& ray) {
     return FrameAir(frame).gradient_sky(hn::Max(ray.z, hn::Zero(Lanes())));
 }
 
+// Fractions of the light of open ground at points relative to the eye: scattered sunlight, and the sky's.
+struct LightBelow {
+    Floats sun, sky;
+};
+
+HWY_INLINE LightBelow light_below(const GroundLight& light, const shader::vec4& place, const Floats3& point) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    constexpr float kLast = float(GroundLight::kTexels - 1);
+    const auto inside = [&](Floats at) { return hn::Min(hn::Max(at, hn::Zero(d)), set(kLast)); };
+    const Floats x = inside(hn::MulAdd(set(place.x), point.x, set(place.z))),
+                 y = inside(hn::MulAdd(set(place.y), point.y, set(place.w)));
+    const Floats i = hn::Min(hn::Floor(x), set(kLast - 1)), j = hn::Min(hn::Floor(y), set(kLast - 1));
+    const auto first = hn::ConvertTo(di, hn::MulAdd(j, set(float(GroundLight::kTexels)), i));
+    const auto texel = [&](int offset) {
+        const auto word = hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(light.words.data()),
+                                          hn::Add(first, hn::Set(di, offset)));
+        return LightBelow{hn::ConvertTo(d, hn::And(word, hn::Set(di, 0xFFFF))),
+                          hn::ConvertTo(d, hn::And(hn::ShiftRight<16>(word), hn::Set(di, 0xFFFF)))};
+    };
+    const auto between = [](const LightBelow& a, const LightBelow& b, Floats part) {
+        return LightBelow{hn::MulAdd(part, hn::Sub(b.sun, a.sun), a.sun), hn::MulAdd(part, hn::Sub(b.sky, a.sky), a.sky)};
+    };
+    const LightBelow of = between(between(texel(0), texel(1), hn::Sub(x, i)),
+                                  between(texel(GroundLight::kTexels), texel(GroundLight::kTexels + 1), hn::Sub(x, i)),
+                                  hn::Sub(y, j));
+    return {hn::Mul(of.sun, set(1.0f / 65535)), hn::Mul(of.sky, set(1.0f / 65535))};
+}
+
 // Returns the radiance of the ground at a point relative to the eye, without the air in front of it.
 HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& map, const Floats3& point) {
     const Floats u = hn::Add(dot(set3(frame.shadow_u), point), set(frame.shadow_u.w)),
@@ -116,7 +146,11 @@ HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& m
         const auto known = hn::And(hn::And(inside(u), inside(v)), sees_first_period(*frame.endless, point));
         if (!hn::AllTrue(Lanes(), known)) shadow = hn::IfThenElse(known, shadow, sunlight_beyond(*frame.endless, point));
     }
-    const Floats3 colour = times_add(shadow, set3(frame.ground_sun), set3(frame.ground));
+    Floats3 colour = times_add(shadow, set3(frame.ground_sun), set3(frame.ground));
+    if (frame.ground_light != nullptr) {
+        const LightBelow below = light_below(*frame.ground_light, frame.ground_light_place, point);
+        colour = times_add(hn::Add(shadow, below.sun), set3(frame.ground_sun), times(below.sky, set3(frame.ground)));
+    }
     if (!(frame.flash.w > 0)) return colour;
     const Floats3 way = subtract(set3(frame.flash), point);
     const Floats squared = dot(way, way);

@@ -29,8 +29,11 @@ vec3 ground(vec3 ray, float distance) {
     vec2 inner = step(vec2(0.01), coordinate) * step(coordinate, vec2(0.99));
     bool known = inner.x * inner.y > 0.0 && sees_first_period(point);
     if (endless() && !known) shadow = sunlight_beyond(point);
-#endif
+    vec2 below = light_below(point);
+    vec3 colour = frame.ground.rgb * below.y + frame.ground_sun.rgb * (shadow + below.x);
+#else
     vec3 colour = frame.ground.rgb + frame.ground_sun.rgb * shadow;
+#endif
     vec3 way = frame.flash.xyz - point;  // lightning; adds nothing in the dark, no branch: see lighting.glsl
     float squared = dot(way, way);
     colour += frame.ground_flash.rgb * flash_falloff(squared) * max(way.z, 0.0) * inversesqrt(max(squared, 1.0e-6));

@@ -134,3 +134,14 @@ float sunlight_beyond(vec3 point) {
     }
     return left;
 }
+
+// Returns fractions of the light of open ground at a point relative to the eye: scattered sunlight, and the sky's.
+vec2 light_below(vec3 point) {
+    vec2 at = clamp(march.ground_light.xy * point.xy + march.ground_light.zw, 0.0, float(kGroundTexels - 1u));
+    vec2 texel = min(floor(at), float(kGroundTexels - 2u)), part = at - texel;
+    uint first = march.first_ground_light + uint(texel.y) * kGroundTexels + uint(texel.x);
+    vec2 low = mix(unpackUnorm2x16(march_light[first]), unpackUnorm2x16(march_light[first + 1u]), part.x);
+    vec2 high = mix(unpackUnorm2x16(march_light[first + kGroundTexels]),
+                    unpackUnorm2x16(march_light[first + kGroundTexels + 1u]), part.x);
+    return mix(low, high, part.y);
+}

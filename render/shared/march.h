@@ -53,6 +53,7 @@ NEPHOS_CONST float kDiffuseBase = 1.2f, kDiffuseFlux = 2.4f;
 NEPHOS_CONST float kDiffuseDecay = 1.5f, kMostRelief = 2.0f;
 NEPHOS_CONST float kMostFluence = 6.0f;               // that a node can store
 NEPHOS_CONST float kMostMarchedDepth = 64.0f;         // towards the sun: of more nothing arrives
+NEPHOS_CONST uint kGroundTexels = 96u;                // on an edge of the map of light on the ground (ground_light.h)
 // Words of a brick: of its nodes, of the corners of its cells, and of its cells' clearance.
 NEPHOS_CONST uint kNodeEdge = 9u, kNodeWords = 729u;
 NEPHOS_CONST uint kMarchLightNodes = 5u, kMarchLightWords = 125u;
@@ -116,12 +117,15 @@ struct March {
     float diffuse;                 // strength of the light that diffuses; 0: the scattering table has it
     float mean_cosine;             // of the phase function
     float most_step;               // in cloud, metres: far away the footprint of a pixel is larger than clouds
+    vec4 ground_light;             // texel of a point p: xy p + zw, counted from texels' middles
+    uint first_ground_light;       // word
+    uint unused0, unused1, unused2;
     MarchVolume volumes[kMostVolumes];
 };
 
 #ifdef __cplusplus
 static_assert(sizeof(MarchVolume) == 304 && offsetof(MarchVolume, to_patches) == 208 && offsetof(MarchVolume, first_table) == 80 &&
-              offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 32);
+              offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 64);
 
 }  // namespace nephos::shader
 #endif

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "density/detail_noise.h"
+#include "render/frame/frame_data.h"
 #include "render/frame/marched_scene.h"
 
 namespace nephos {
@@ -19,6 +20,7 @@ static_assert(shader::kNodeEdge == kEdge && shader::kNodeWords == kNodes);
 static_assert(shader::kMarchLightNodes == kLightNodes && shader::kMarchLightWords == kLightNodesOfBrick);
 static_assert(4 * shader::kClearanceWords ==
               CoverageField::kBrickCells * CoverageField::kBrickCells * CoverageField::kBrickCells);
+static_assert(shader::kGroundTexels == GroundLight::kTexels);
 static_assert(shader::kLargeNoiseWords == kLargeNoiseVoxels * kLargeNoiseVoxels * kLargeNoiseVoxels);
 
 // Where the words of a volume begin.
@@ -84,9 +86,9 @@ std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes) {
     return words;
 }
 
-std::vector<std::uint32_t> march_light(std::span<const CloudVolume> volumes) {
-    std::vector<std::uint32_t> words(for_each_volume(volumes, [](const auto&, const auto&) {}).light_end);
-    for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
+std::vector<std::uint32_t> march_light(const LitCloud& cloud) {
+    std::vector<std::uint32_t> words(for_each_volume(cloud.volumes, [](const auto&, const auto&) {}).light_end);
+    for_each_volume(cloud.volumes, [&](const CloudVolume& volume, const Places& at) {
         const std::size_t count = volume.field.places().size() * kLightNodesOfBrick;
         for (std::size_t i = 0; i < count; ++i) {
             const auto pair = [i](const std::vector<std::uint16_t>& of) {
@@ -100,16 +102,18 @@ std::vector<std::uint32_t> march_light(std::span<const CloudVolume> volumes) {
         }
         std::ranges::copy(volume.shade, words.begin() + std::ptrdiff_t(at.shade));
     });
+    words.insert(words.end(), cloud.ground_light.words.begin(), cloud.ground_light.words.end());
     return words;
 }
 
-shader::March march_constants(std::span<const CloudVolume> volumes, const CameraFrame& camera,
-                              double pixels_per_unit, const CloudLight& light, float bend) {
-    const MarchedScene scene(volumes, camera, pixels_per_unit, light, bend);
+shader::March march_constants(const LitCloud& cloud, const CameraFrame& camera, double pixels_per_unit,
+                              const CloudLight& light, float bend) {
+    const MarchedScene scene(cloud.volumes, camera, pixels_per_unit, light, bend);
     shader::March march{shader::uint(scene.volumes.size()), scene.per_unit, scene.fade_begins, scene.fade_ends,
-                         scene.least_step, scene.diffuse, scene.mean_cosine, scene.most_step, {}};
+                         scene.least_step, scene.diffuse, scene.mean_cosine, scene.most_step,
+                         ground_light_place(cloud.ground_light, camera.position_m), 0, 0, 0, 0, {}};
     std::size_t n = 0;
-    for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
+    const Places end = for_each_volume(cloud.volumes, [&](const CloudVolume& volume, const Places& at) {
         const MarchedVolume& from = scene.volumes[n];
         const ErosionConstants& e = volume.field.erosion();
         shader::MarchVolume& to = march.volumes[n++];
@@ -165,6 +169,7 @@ shader::March march_constants(std::span<const CloudVolume> volumes, const Camera
         to.shade_rows = shader::uint(from.shade_rows);
         to.mean_sunlight = from.mean_sunlight;
     });
+    march.first_ground_light = shader::uint(end.light_end);
     return march;
 }
 
@@ -186,7 +191,7 @@ void MarchVolumes::use(const GpuDevice& gpu, const LitCloud& cloud) {
     }
     if (light_version_ != cloud.volumes_light) {
         light_version_ = 0;
-        replace(gpu, light_, march_light(cloud.volumes));
+        replace(gpu, light_, march_light(cloud));
         light_version_ = cloud.volumes_light;
     }
 }

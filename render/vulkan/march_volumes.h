@@ -18,10 +18,11 @@ namespace nephos {
 // Words of all volumes that hold cloud, one volume after the other: table, clearance and nodes of their fields. A node's
 // word has its t and growth, and those of the next along x: what a look-up interpolates.
 std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes);
-// Words of the corners of cells, with what the next along x has: sun depths, then surroundings, of each volume.
-std::vector<std::uint32_t> march_light(std::span<const CloudVolume> volumes);
+// Words of the corners of cells, with what the next along x has: sun depths, then surroundings, of each volume; then those
+// of the light on the ground.
+std::vector<std::uint32_t> march_light(const LitCloud& cloud);
 // What shaders know of these volumes and words. Throws Error(usage) when there are more than shader::kMostVolumes.
-shader::March march_constants(std::span<const CloudVolume> volumes, const CameraFrame& camera,
+shader::March march_constants(const LitCloud& cloud, const CameraFrame& camera,
                               double pixels_per_unit, const CloudLight& light, float bend);
 
 class MarchVolumes {

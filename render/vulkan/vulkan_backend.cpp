@@ -129,7 +129,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                           shade_step(frame.air.shade, cloud.shadow_size)});
     shader::March march{};
     if (!cloud.volumes.empty()) {
-        march = march_constants(cloud.volumes, frame.camera, pixels_per_unit(frame.options.camera, frame.camera),
+        march = march_constants(cloud, frame.camera, pixels_per_unit(frame.options.camera, frame.camera),
                                 frame.options.light, earth_bend(frame.sky));
         use_volumes(cloud);
     }

@@ -259,7 +259,7 @@ TEST(Particles, AreAFunctionOfIndexAndTime) {
 double energy(const RenderOptions& options, const Weather& weather, double time_s) {
     const CameraFrame camera = camera_frame(options.camera);
     const Picture picture = test::grey(options.camera);
-    const PrecipitationLight light = precipitation_light(picture, options, camera, time_s);
+    const PrecipitationLight light = precipitation_light(picture, options, time_s);
     const StreakView view{options, camera, camera, camera, light, weather.wind_x_m_per_s, 0, time_s};
     static const Particles particles = make_particles(kRain, 3, 50'930);
     double sum = 0;

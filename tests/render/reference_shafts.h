@@ -115,9 +115,16 @@ inline Rgb arriving(const Shafts& s, const Vec3& ray, double t) {
     const Vec3 place = s.camera.position_m + t * ray;
     const Rgb own = particle_radiance(s.light, ray, place, double(sunlight_at(s.picture, place)));
     const PictureAir air = air_of(s.picture, s.options);
+    const Vec3 to_sun = s.light.to_sun;
+    const double level = std::sqrt((ray.x * ray.x + ray.y * ray.y) * (to_sun.x * to_sun.x + to_sun.y * to_sun.y));
+    const double cosine = (ray.x * to_sun.x + ray.y * to_sun.y) / std::max(level, 1e-6);
+    const double at = std::sqrt(std::max(0.5 - 0.5 * cosine, 0.0)) * (air.horizon.size() - 1);
+    const auto below = std::min(std::size_t(at), air.horizon.size() - 2);
     Rgb seen;
-    for (std::size_t c = 0; c < 3; ++c)
-        seen[c] = std::lerp(air.horizon[c], own[c], std::exp(-air.extinction_per_m[c] * t));
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double horizon = std::lerp(air.horizon[below][c], air.horizon[below + 1][c], at - double(below));
+        seen[c] = std::lerp(horizon, own[c], std::exp(-air.extinction_per_m[c] * t));
+    }
     return seen;
 }
 
