@@ -35,7 +35,7 @@
 
 namespace nephos {
 
-inline constexpr int kShaftSteps = 12;
+inline constexpr int kShaftSteps = 24;
 inline constexpr float kShaftLeastSeen = 1.0f / 4096;
 inline constexpr int kShaftStepsPerLight =
     3;  // three steps have light and falls (f) of the one in their middle
