@@ -1,18 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/vdb/vdb_archive.h"
 
+#include <cstring>
+#include <limits>
 #include <stdexcept>
+#include <string>
+
+#include <malloc.h>
+#include <unistd.h>
 
 namespace nephos {
 
 using openvdb::GridBase;
 using openvdb::io::GridDescriptor;
 
-VdbArchive::VdbArchive(const std::filesystem::path& path)
-    : stream_metadata_(new openvdb::io::StreamMetadata) {
-    file_size_ = std::int64_t(std::filesystem::file_size(path));
-    stream_.open(path, std::ios::binary);
-    if (!stream_) throw std::runtime_error("it cannot be opened");
+CheckedBuffer::CheckedBuffer(int fd) : __gnu_cxx::stdio_filebuf<char>(fd, std::ios::in | std::ios::binary) {
+    if (!is_open()) throw std::runtime_error("it cannot be read");
+}
+
+std::streamsize CheckedBuffer::xsgetn(char* to, std::streamsize size) {
+    // Where such a size precedes, OpenVDB passes the beginning of the block that it has allocated for the voxels.
+    if (negated_ > 0 && size == negated_ && ::malloc_usable_size(to) < std::size_t(size))
+        throw std::runtime_error("it is damaged: a chunk of " + std::to_string(size) + " bytes where fewer belong");
+    const std::streamsize got = __gnu_cxx::stdio_filebuf<char>::xsgetn(to, size);
+    negated_ = 0;
+    if (size == sizeof negated_ && got == size) {
+        std::int64_t number = 0;
+        std::memcpy(&number, to, sizeof number);
+        if (number < 0 && number != std::numeric_limits<std::int64_t>::min()) negated_ = -number;
+    }
+    return got;
+}
+
+VdbArchive::VdbArchive(int fd) : buffer_(fd), stream_(&buffer_), stream_metadata_(new openvdb::io::StreamMetadata) {
+    file_size_ = std::int64_t(::lseek(fd, 0, SEEK_END));
+    ::lseek(fd, 0, SEEK_SET);
     stream_.exceptions(std::ios::badbit | std::ios::failbit);
     readHeader(stream_);
     openvdb::io::setStreamMetadataPtr(stream_, stream_metadata_, false);

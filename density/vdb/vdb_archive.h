@@ -6,10 +6,12 @@
 // same format through OpenVDB's own code from a stream with exceptions enabled, without delayed loading, and
 // checks offsets before it follows them.
 
-#include <filesystem>
-#include <fstream>
+#include <cstdint>
+#include <istream>
 #include <string>
 #include <vector>
+
+#include <ext/stdio_filebuf.h>
 
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
@@ -18,10 +20,24 @@
 
 namespace nephos {
 
+// An open file. OpenVDB 10.0.1 (bloscFromStream, unzipFromStream) reads as many bytes as a negative size of a chunk says
+// into a buffer of another size, and compares afterwards: such a read is refused here.
+class CheckedBuffer : public __gnu_cxx::stdio_filebuf<char> {
+  public:
+    explicit CheckedBuffer(int fd);  // which it closes
+
+  protected:
+    // Throws std::runtime_error where `to` is a block of memory that has no room.
+    std::streamsize xsgetn(char* to, std::streamsize size) override;
+
+  private:
+    std::int64_t negated_ = 0;  // the last number that was read, of 8 bytes, if it was negative
+};
+
 class VdbArchive : public openvdb::io::Archive {
   public:
-    // Reads everything but the voxels. Throws a std::exception when the file is damaged.
-    explicit VdbArchive(const std::filesystem::path& path);
+    // Reads everything but the voxels of an open file, which it closes. Throws a std::exception when it is damaged.
+    explicit VdbArchive(int fd);
 
     struct Entry {
         openvdb::io::GridDescriptor descriptor;
@@ -38,7 +54,8 @@ class VdbArchive : public openvdb::io::Archive {
     void read_sequence(std::int32_t count);
     void check_offsets(const openvdb::io::GridDescriptor& descriptor) const;
 
-    std::ifstream stream_;
+    CheckedBuffer buffer_;
+    std::istream stream_{nullptr};
     std::int64_t file_size_ = 0;
     openvdb::io::StreamMetadata::Ptr stream_metadata_;
     openvdb::MetaMap metadata_;

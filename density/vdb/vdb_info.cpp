@@ -8,7 +8,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "density/vdb/sandbox.h"
+#include "density/vdb/vdb_sandbox.h"
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_metadata.h"

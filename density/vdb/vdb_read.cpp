@@ -9,7 +9,7 @@
 #include "core/text.h"
 #include "density/metaballs.h"
 #include "density/openvdb_access.h"
-#include "density/vdb/sandbox.h"
+#include "density/vdb/vdb_sandbox.h"
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_foreign.h"
@@ -150,8 +150,8 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
 }
 
 // The child's part: sends header, geometry, blocks and counts.
-void send_density(VdbArchive& archive, const VdbReadOptions& options, SandboxWriter& writer) {
-    const std::size_t memory_bytes = memory_limit(options.limits);
+void send_density(VdbArchive& archive, const VdbReadOptions& options, std::size_t memory_bytes,
+                  SandboxWriter& writer) {
     const std::size_t n = choose_grid(archive, options.grid);
     const openvdb::GridBase& header = *archive.entries()[n].header;
     check_stated_size(header, memory_bytes);
@@ -391,9 +391,10 @@ LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptio
                     number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
     }
     LoadedDensity loaded;
+    const std::size_t memory_bytes = memory_limit(options.limits);  // here: the child cannot ask the system
     in_sandbox(
         path, options.limits,
-        [&](VdbArchive& archive, SandboxWriter& writer) { send_density(archive, options, writer); },
+        [&](VdbArchive& archive, SandboxWriter& writer) { send_density(archive, options, memory_bytes, writer); },
         [&](SandboxReader& reader) { loaded = receive_density(reader); });
     return loaded;
 }

@@ -8,13 +8,15 @@
 #include <stdexcept>
 #include <string>
 
+#include <fcntl.h>
 #include <openvdb/openvdb.h>
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "core/memory.h"
 #include "core/text.h"
-#include "density/vdb/sandbox.h"
 #include "density/vdb/vdb_archive.h"
+#include "density/vdb/vdb_sandbox.h"
 
 namespace nephos {
 namespace {
@@ -23,8 +25,8 @@ namespace {
     throw Error(ErrorCode::io, path.string() + ": " + what);
 }
 
-// Checks a file without OpenVDB.
-void check_file(const std::filesystem::path& path) {
+// Checks a file without OpenVDB, and opens it.
+Descriptor opened(const std::filesystem::path& path) {
     std::error_code error;
     const auto status = std::filesystem::status(path, error);
     if (!std::filesystem::exists(status)) fail(path, error ? error.message() : "there is no such file");
@@ -39,6 +41,7 @@ void check_file(const std::filesystem::path& path) {
     constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
     if (stream.gcount() != std::streamsize(magic.size()) || magic != kMagic)
         fail(path, "it is not an OpenVDB file");
+    return open_regular_file(path, O_RDONLY);
 }
 
 // The most memory that reading a file of this size may take. Leaves of 512 voxels take at least 100 bytes in a file and
@@ -55,20 +58,24 @@ std::size_t memory_bound(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::size_t memory_limit(const VdbReadLimits& limits) {
+    return limits.memory_bytes > 0 ? limits.memory_bytes : available_memory().bytes / 2;
+}
+
 void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
                 const std::function<void(VdbArchive&, SandboxWriter&)>& child,
                 const std::function<void(SandboxReader&)>& parent) {
-    check_file(path);
-    VdbReadLimits bounded = limits;
-    bounded.memory_bytes = memory_limit(limits);
+    const Descriptor file = opened(path);
+    SandboxLimits bounded{limits.seconds, memory_limit(limits)};
     const bool by_size = limits.memory_bytes == 0 && memory_bound(path) < bounded.memory_bytes;
     if (by_size) bounded.memory_bytes = memory_bound(path);
     openvdb::initialize();  // before the fork, so that the child finds it done
+    const int kept[] = {file.get()};
     run_sandboxed(
-        path, bounded,
+        path, "OpenVDB", bounded, kept,
         [&](SandboxWriter& writer) {
             try {
-                VdbArchive archive(path);
+                VdbArchive archive(file.get());
                 child(archive, writer);
             } catch (const std::bad_alloc&) {
                 if (!by_size) throw;

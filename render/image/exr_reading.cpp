@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cerrno>
+#include <cstring>
 #include <locale>
 #include <sstream>
+#include <new>
+#include <stdexcept>
 #include <string>
 
 #include <OpenEXR/ImfBoxAttribute.h>
@@ -10,22 +14,23 @@
 #include <OpenEXR/ImfDoubleAttribute.h>
 #include <OpenEXR/ImfFloatAttribute.h>
 #include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfRationalAttribute.h>
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfVecAttribute.h>
+#include <fcntl.h>
+#include <unistd.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
+#include "core/sandbox.h"
 #include "render/image/image_file.h"
 
 namespace nephos {
 namespace {
-
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
-    throw Error(ErrorCode::io, path.string() + ": cannot read OpenEXR: " + reason.substr(0, 300));
-}
 
 std::string compression_name(Imf::Compression compression) {
     switch (compression) {
@@ -118,22 +123,97 @@ ExrPart describe(const Imf::Header& header) {
     return part;
 }
 
+// An open file, for a process that may open none.
+class OpenFile : public Imf::IStream {
+  public:
+    explicit OpenFile(int fd) : Imf::IStream("it"), fd_(fd) {}
+    bool read(char to[], int size) override {
+        for (int done = 0; done < size;) {
+            const ssize_t got = ::pread(fd_, to + done, std::size_t(size - done), off_t(at_));
+            if (got < 0 && errno == EINTR) continue;
+            if (got < 0) throw std::runtime_error(std::strerror(errno));
+            if (got == 0) throw std::runtime_error("it ends early");
+            done += int(got);
+            at_ += std::uint64_t(got);
+        }
+        return ::lseek(fd_, 0, SEEK_END) > off_t(at_);
+    }
+    std::uint64_t tellg() override { return at_; }
+    void seekg(std::uint64_t to) override { at_ = to; }
+
+  private:
+    int fd_;
+    std::uint64_t at_ = 0;
+};
+
+void send(SandboxWriter& writer, const ExrPart& part) {
+    writer.text(part.name);
+    writer.value(part.width);
+    writer.value(part.height);
+    writer.value(part.complete);
+    writer.text(part.compression);
+    writer.value(part.channels.size());
+    for (const ExrChannel& channel : part.channels) {
+        writer.text(channel.name);
+        writer.text(channel.type);
+    }
+    writer.value(part.attributes.size());
+    for (const auto& [name, text] : part.attributes) {
+        writer.text(name);
+        writer.text(text);
+    }
+}
+
+ExrPart received(SandboxReader& reader) {
+    ExrPart part;
+    part.name = reader.text();
+    part.width = reader.value<int>();
+    part.height = reader.value<int>();
+    part.complete = reader.value<bool>();
+    part.compression = reader.text();
+    for (auto left = reader.value<std::size_t>(); left > 0; --left) {
+        ExrChannel& channel = part.channels.emplace_back();
+        channel.name = reader.text();
+        channel.type = reader.text();
+    }
+    for (auto left = reader.value<std::size_t>(); left > 0; --left) {
+        auto& [name, text] = part.attributes.emplace_back();
+        name = reader.text();
+        text = reader.text();
+    }
+    return part;
+}
+
 }  // namespace
 
 ExrInfo read_exr_info(const std::filesystem::path& path) {
-    try {
-        const Imf::MultiPartInputFile file(path.c_str());
-        ExrInfo info;
-        for (int i = 0; i < file.parts(); ++i) {
-            info.parts.push_back(describe(file.header(i)));
-            info.parts.back().complete = file.partComplete(i);
-        }
-        return info;
-    } catch (const Error&) {
-        throw;
-    } catch (const std::exception& reason) {
-        fail(path, reason.what());
-    }
+    constexpr SandboxLimits kLimits{.seconds = 60, .memory_bytes = std::size_t{1} << 30};
+    const Descriptor opened = open_regular_file(path, O_RDONLY);
+    const int kept[] = {opened.get()};
+    ExrInfo info;
+    run_sandboxed(
+        path, "OpenEXR", kLimits, kept,
+        [&](SandboxWriter& writer) {
+            try {
+                OpenFile stream(opened.get());
+                const Imf::MultiPartInputFile file(stream, 0);  // no threads
+                writer.value(file.parts());
+                for (int i = 0; i < file.parts(); ++i) {
+                    ExrPart part = describe(file.header(i));
+                    part.complete = file.partComplete(i);
+                    send(writer, part);
+                }
+            } catch (const std::bad_alloc&) {
+                throw;
+            } catch (const std::exception& reason) {
+                throw std::runtime_error(std::string("cannot read OpenEXR: ") + reason.what());
+            }
+        },
+        [&](SandboxReader& reader) {
+            info.parts.clear();
+            for (int left = reader.value<int>(); left > 0; --left) info.parts.push_back(received(reader));
+        });
+    return info;
 }
 
 }  // namespace nephos

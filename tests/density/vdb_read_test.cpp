@@ -418,6 +418,50 @@ TEST(VdbRead, DamagedFilesNeverTakeTheProcessDown) {
     EXPECT_GT(errors, 20);
 }
 
+// OpenVDB reads as many bytes as the negated size of a chunk says into memory that has no room for them.
+TEST(VdbRead, ChunksOfNegativeSizeOverrunNothing) {
+    const TemporaryFolder folder;
+    for (const std::uint32_t compression : {openvdb::io::COMPRESS_BLOSC, openvdb::io::COMPRESS_ZIP}) {
+        auto grid = FloatGrid::create(0.0f);
+        grid->setName("density");
+        for (int n = 0; n < 4000; ++n) grid->tree().setValue(Coord(n % 16, n / 16 % 16, n / 256), float(n % 7) + 1);
+        openvdb::initialize();
+        openvdb::io::File out((folder / "whole.vdb").string());
+        out.setCompression(compression | openvdb::io::COMPRESS_ACTIVE_MASK);
+        out.write({grid});
+        out.close();
+        EXPECT_EQ(load_density(folder / "whole.vdb").density.value(1, 0, 0), 2);
+        const std::vector<char> whole = test::bytes_of(folder / "whole.vdb");
+        int chunks = 0;
+        for (std::size_t at = 100; at + 40 < whole.size(); ++at) {
+            std::int64_t size = 0;
+            std::memcpy(&size, &whole[at], sizeof size);
+            std::uint32_t inner = 0;
+            std::memcpy(&inner, &whole[at + 8 + 12], sizeof inner);
+            const bool blosc = whole[at + 8] == 2 && std::int64_t(inner) == size,
+                       zip = size > 8 && size < 4000 && whole[at + 8] == 0x78 && std::uint8_t(whole[at + 9]) == 0x9C;
+            if (!(compression == openvdb::io::COMPRESS_BLOSC ? blosc : zip)) continue;
+            ++chunks;
+            for (const std::int64_t more : {std::int64_t(4096), std::int64_t(whole.size() - at - 8)}) {
+                std::vector<char> damaged = whole;
+                const std::int64_t negative = -more;
+                std::memcpy(&damaged[at], &negative, sizeof negative);
+                test::write_bytes(folder / "negative.vdb", damaged);
+                try {
+                    load_density(folder / "negative.vdb");
+                    ADD_FAILURE() << "chunk at byte " << at << " read as " << more;
+                } catch (const Error& error) {
+                    // Where the file has no more bytes than there is room for, OpenVDB says so itself.
+                    const bool fits = more <= 512 * std::int64_t(sizeof(float));
+                    EXPECT_NE(std::string(error.what()).find(fits ? "Expected to read" : "where fewer belong"), std::string::npos)
+                        << error.what();
+                }
+            }
+        }
+        EXPECT_GT(chunks, 0);
+    }
+}
+
 TEST(VdbRead, InfoListsEveryGrid) {
     const TemporaryFolder folder;
     const DensityGrid grid = write_own(folder / "own.vdb");

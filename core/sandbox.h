@@ -15,16 +15,19 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
 
-#include "density/vdb/vdb_file.h"
-
 namespace nephos {
 
-class VdbArchive;
+// Limits of the child.
+struct SandboxLimits {
+    double seconds = 60;  // of wall-clock time, above 0
+    std::size_t memory_bytes = std::size_t{256} << 20;  // more than this process has
+};
 
 // The child's end of the pipe: a stream of plain values.
 class SandboxWriter {
@@ -62,28 +65,15 @@ class SandboxReader {
     std::string text();
 };
 
-// Runs `child` in a child process and `parent` in this one, on the values that the child sends. When `child`
-// throws, dies or exceeds a limit, throws Error(io) that names `subject` and the reason, printable and at
-// most 300 characters long. After a restart `parent` is called again and must discard its earlier results.
-void run_sandboxed(const std::filesystem::path& subject, const VdbReadLimits& limits,
-                   const std::function<void(SandboxWriter&)>& child,
+// Runs `child` in a child process and `parent` in this one, on the values that the child sends. The child may do nothing
+// but compute, send, and read `kept`, descriptors that are open already (confinement.h). When `child` throws, dies or
+// exceeds a limit, throws Error(io) that names `subject`, `parser` (the library that reads) and the reason, printable and
+// at most 300 characters long. After a restart `parent` is called again and must discard its earlier results.
+void run_sandboxed(const std::filesystem::path& subject, std::string_view parser, const SandboxLimits& limits,
+                   std::span<const int> kept, const std::function<void(SandboxWriter&)>& child,
                    const std::function<void(SandboxReader&)>& parent);
-
-// Returns limits.memory_bytes, or half of the free memory where that is 0.
-std::size_t memory_limit(const VdbReadLimits& limits);
 
 // Returns `text` without control characters, cut to `length`.
 std::string clamp_message(std::string_view text, std::size_t length = 300);
-
-// Common start of all readers of OpenVDB files: a child process opens the archive and sends the results, so
-// that this process never parses the file.
-
-inline constexpr std::size_t kMaxMetadataText = 1000;  // characters of one text that the child sends
-
-// Runs `child` on the opened archive in the child process and `parent` here on the values that it sends.
-// Throws Error(io) naming the path when it is not a readable OpenVDB file, with the child's message.
-void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
-                const std::function<void(VdbArchive&, SandboxWriter&)>& child,
-                const std::function<void(SandboxReader&)>& parent);
 
 }  // namespace nephos

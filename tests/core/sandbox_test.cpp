@@ -3,17 +3,23 @@
 // The child process that reads untrusted files: whatever it does, this process gets a result or a clear
 // error.
 
-#include "density/vdb/sandbox.h"
+#include "core/sandbox.h"
 
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include "core/error.h"
@@ -22,9 +28,9 @@ namespace nephos {
 namespace {
 
 // The message of the error that such a child leads to; "" when there is none.
-std::string error_of(const std::function<void(SandboxWriter&)>& child, VdbReadLimits limits = {}) {
+std::string error_of(const std::function<void(SandboxWriter&)>& child, SandboxLimits limits = {}) {
     try {
-        run_sandboxed("subject.vdb", limits, child, [](SandboxReader& reader) { reader.value<int>(); });
+        run_sandboxed("subject.vdb", "OpenVDB", limits, {}, child, [](SandboxReader& reader) { reader.value<int>(); });
     } catch (const Error& error) {
         EXPECT_EQ(error.code(), ErrorCode::io);
         return error.what();
@@ -37,7 +43,7 @@ TEST(Sandbox, PassesValuesTextsAndLargeData) {
     std::iota(sent.begin(), sent.end(), 5);
     std::string text;
     run_sandboxed(
-        "subject", {},
+        "subject", "OpenVDB", {}, {},
         [&](SandboxWriter& writer) {
             writer.value(42);
             writer.text("cumulus");
@@ -87,7 +93,7 @@ TEST(Sandbox, SurvivesCrashes) {
 
 TEST(Sandbox, EndsWhatRunsTooLong) {
     const auto start = std::chrono::steady_clock::now();
-    VdbReadLimits limits;
+    SandboxLimits limits;
     limits.seconds = 0.3;
     const auto busy = [](SandboxWriter&) {
         volatile bool forever = true;
@@ -103,7 +109,7 @@ TEST(Sandbox, EndsWhatRunsTooLong) {
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(Sandbox, EndsWhatTakesTooMuchMemory) {
-    VdbReadLimits limits;
+    SandboxLimits limits;
     limits.memory_bytes = std::size_t{256} << 20;
     const auto greedy = [](SandboxWriter& writer) {
         const std::vector<char> memory(std::size_t{2} << 30, 1);
@@ -128,11 +134,51 @@ TEST(Sandbox, NoticesAnIncompleteOrOverlongResult) {
               "");
 }
 
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// What code of a stranger would do first is refused; what reading takes is not.
+TEST(Sandbox, ForbidsEverythingButReading) {
+    const int kept = ::open("/proc/self/exe", O_RDONLY | O_CLOEXEC), other = ::open("/proc/self/exe", O_RDONLY | O_CLOEXEC);
+    ASSERT_GE(kept, 0);
+    std::string refused;
+    char magic[4] = {};
+    const auto child = [&](SandboxWriter& writer) {
+        const auto tell = [&](bool is_refused) { writer.value(is_refused); };
+        tell(::open("/etc/passwd", O_RDONLY) < 0);
+        tell(::open("made-by-a-stranger", O_CREAT | O_WRONLY, 0600) < 0);
+        tell(::unlink("made-by-a-stranger") < 0 && errno == EPERM);
+        tell(::socket(AF_UNIX, SOCK_STREAM, 0) < 0);
+        tell(::fork() < 0);
+        char* const arguments[] = {nullptr};
+        tell(::execv("/bin/true", arguments) < 0);
+        tell(::kill(::getppid(), 0) < 0);
+        tell(::mmap(nullptr, 4096, PROT_READ | PROT_WRITE | PROT_EXEC, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) == MAP_FAILED);
+        tell(::read(other, magic, 4) < 0);
+        tell(::prctl(PR_SET_NAME, "stranger") < 0);
+        if (::pread(kept, magic, 4, 0) != 4) throw std::runtime_error("what is kept cannot be read");
+        int sum = 0;
+        std::thread([&sum] { sum = 42; }).join();
+        if (sum != 42) throw std::runtime_error("no thread");
+        writer.bytes(magic, sizeof magic);
+    };
+    run_sandboxed("s", "a parser", {}, {&kept, 1}, child, [&](SandboxReader& reader) {
+        refused.clear();
+        for (int n = 0; n < 10; ++n) refused += reader.value<bool>() ? 'x' : '-';
+        reader.bytes(magic, sizeof magic);
+    });
+    EXPECT_EQ(refused, "xxxxxxxxxx");
+    EXPECT_EQ(std::string(magic, 4), "\x7f" "ELF");
+    // The parent is not confined.
+    EXPECT_GE(::open("/etc/passwd", O_RDONLY | O_CLOEXEC), 0);
+    ::close(kept);
+    ::close(other);
+}
+#endif
+
 TEST(Sandbox, RejectsMeaninglessLimits) {
-    VdbReadLimits limits;
+    SandboxLimits limits;
     limits.seconds = 0;
     const auto child = [](SandboxWriter& writer) { writer.value(1); };
-    EXPECT_THROW(run_sandboxed("s", limits, child, [](SandboxReader&) {}), Error);
+    EXPECT_THROW(run_sandboxed("s", "OpenVDB", limits, {}, child, [](SandboxReader&) {}), Error);
 }
 
 }  // namespace

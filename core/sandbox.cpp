@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "density/vdb/sandbox.h"
+#include "core/sandbox.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -13,21 +13,13 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/confinement.h"
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/memory.h"
 #include "core/text.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define NEPHOS_SANITIZED 1  // shadow memory needs terabytes of addresses: no limit on them then
-#else
-#define NEPHOS_SANITIZED 0
-#endif
 
 namespace nephos {
 namespace {
@@ -52,50 +44,17 @@ void send_all(int fd, const void* data, std::size_t size) {
         ::_exit(1);  // nobody listens any more
 }
 
-std::size_t sum_or_most(std::size_t a, std::size_t b) {
-    constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
-    return a > kMost - b ? kMost : a + b;
-}
-
-// Addresses that this process uses now.
-std::size_t address_space() {
-    std::ifstream statm("/proc/self/statm");
-    std::size_t pages = 0;
-    statm >> pages;
-    return pages * std::size_t(::sysconf(_SC_PAGESIZE));
-}
-
-void set_limit(int resource, rlim_t value) {
-    rlimit limit{};
-    ::getrlimit(static_cast<__rlimit_resource>(resource), &limit);
-    limit.rlim_cur = std::min(value, limit.rlim_max);
-    ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
-}
-
-// Confines the child: no output to the terminal, no core dump, limits on memory and processor time; it ends
-// with its parent.
-void confine(std::size_t memory_bytes, double seconds) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    for (int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGPIPE}) ::signal(signal, SIG_DFL);
-    const int nowhere = ::open("/dev/null", O_RDWR);
-    if (nowhere >= 0) {
-        ::dup2(nowhere, STDOUT_FILENO);
-        ::dup2(nowhere, STDERR_FILENO);
-    }
-    set_limit(RLIMIT_CORE, 0);
-    set_limit(RLIMIT_CPU, rlim_t(seconds) + 1);
-    if (!NEPHOS_SANITIZED) set_limit(RLIMIT_AS, rlim_t(sum_or_most(address_space(), memory_bytes)));
-}
-
-[[noreturn]] void run_child(int fd, const VdbReadLimits& limits, std::size_t memory_bytes,
+[[noreturn]] void run_child(int fd, const SandboxLimits& limits, std::span<const int> kept,
                             const std::function<void(SandboxWriter&)>& child) {
-    confine(memory_bytes, limits.seconds);
-    SandboxWriter writer(fd);
     try {
+        std::vector<int> open(kept.begin(), kept.end());
+        open.push_back(fd);
+        confine(open, limits.memory_bytes, limits.seconds);
+        SandboxWriter writer(fd);
         child(writer);
         writer.finish();
     } catch (const std::bad_alloc&) {
-        SandboxWriter(fd).fail("reading it takes more than the " + std::to_string(memory_bytes >> 20) +
+        SandboxWriter(fd).fail("reading it takes more than the " + std::to_string(limits.memory_bytes >> 20) +
                                " MiB of memory that are allowed");
     } catch (const std::exception& error) {
         SandboxWriter(fd).fail(error.what());
@@ -219,7 +178,7 @@ class PipeReader final : public SandboxReader {
 // Ends the child whatever happens, so that no process stays behind.
 class Child {
   public:
-    explicit Child(pid_t pid) : pid_(pid) {}
+    Child(pid_t pid, std::string_view parser) : pid_(pid), parser_(parser) {}
     Child(const Child&) = delete;
     Child& operator=(const Child&) = delete;
     ~Child() { end(true); }
@@ -239,19 +198,20 @@ class Child {
         if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
             return "the system killed the process that read it, as it does where memory is short";
         if (WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT)
-            return "OpenVDB ended with signal 6 while reading it: it is damaged, or memory is short";
+            return parser_ + " ended with signal 6 while reading it: it is damaged, or memory is short";
         if (WIFSIGNALED(status)) {
-            return "it is damaged: OpenVDB ended with signal " + std::to_string(WTERMSIG(status)) +
+            return "it is damaged: " + parser_ + " ended with signal " + std::to_string(WTERMSIG(status)) +
                    " while reading it";
         }
-        return "it is damaged: OpenVDB ended while reading it";
+        return "it is damaged: " + parser_ + " ended while reading it";
     }
 
   private:
     pid_t pid_;
+    std::string parser_;
 };
 
-void attempt(const VdbReadLimits& limits, std::size_t memory_bytes, Clock::time_point deadline,
+void attempt(std::string_view parser, const SandboxLimits& limits, std::span<const int> kept, Clock::time_point deadline,
              bool last_attempt, const std::function<void(SandboxWriter&)>& child,
              const std::function<void(SandboxReader&)>& parent) {
     int ends[2];
@@ -261,9 +221,9 @@ void attempt(const VdbReadLimits& limits, std::size_t memory_bytes, Clock::time_
     Descriptor out(ends[0]), in(ends[1]);
     const pid_t pid = ::fork();
     if (pid < 0) throw std::runtime_error(std::string("no process to read it in: ") + std::strerror(errno));
-    if (pid == 0) run_child(ends[1], limits, memory_bytes, child);
+    if (pid == 0) run_child(ends[1], limits, kept, child);
     in.close();
-    Child process(pid);
+    Child process(pid, parser);
     PipeReader reader(out.get(), pid, deadline, last_attempt);
     try {
         parent(reader);
@@ -334,24 +294,18 @@ std::string clamp_message(std::string_view text, std::size_t length) {
     return result;
 }
 
-std::size_t memory_limit(const VdbReadLimits& limits) {
-    if (limits.memory_bytes > 0) return limits.memory_bytes;
-    return available_memory().bytes / 2;
-}
-
-void run_sandboxed(const std::filesystem::path& subject, const VdbReadLimits& limits,
-                   const std::function<void(SandboxWriter&)>& child,
+void run_sandboxed(const std::filesystem::path& subject, std::string_view parser, const SandboxLimits& limits,
+                   std::span<const int> kept, const std::function<void(SandboxWriter&)>& child,
                    const std::function<void(SandboxReader&)>& parent) {
     if (!(limits.seconds > 0 && limits.seconds <= 1e6)) {
         throw Error(ErrorCode::usage,
                     "time limit of " + number_text(limits.seconds, 6) + " s: must be above 0");
     }
-    const std::size_t memory_bytes = memory_limit(limits);
     const auto deadline =
         Clock::now() + std::chrono::milliseconds(static_cast<long long>(limits.seconds * 1000));
     for (int n = 1; n <= kMaxAttempts; ++n) {
         try {
-            attempt(limits, memory_bytes, deadline, n == kMaxAttempts, child, parent);
+            attempt(parser, limits, kept, deadline, n == kMaxAttempts, child, parent);
             return;
         } catch (const Stalled&) {
         } catch (const Error&) {
