@@ -12,7 +12,6 @@
 #include "core/memory.h"
 #include "core/text.h"
 #include "render/blended/blended_backend.h"
-#include "render/cloud/light_below.h"
 #include "render/cpu/cpu_backend.h"
 #include "render/frame/frame_data.h"
 #include "render/frame/marched_scene.h"
@@ -136,6 +135,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
         // The key of the light says nothing of the view, from which other metaballs may be merged.
         cache_cloud(lit, splats.metaballs, options, drawing.detail);
         cache_volumes(lit, splats.metaballs, options);
+        if (!lit.volumes.empty()) cache_ground_light(lit, options);
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
     picture.shadow_frame = lit.frame;
@@ -160,7 +160,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
                 {area, frame_data(options, frame.camera, lit.frame, flash, area, frame.sky)});
             PictureFrame& part = frame.parts.back().frame;
             part.scattering = scattering.get().data();
-            use_ground_light(lit.ground_light, options.camera.position_m, part);
+            if (!lit.volumes.empty()) use_ground_light(lit.ground_light, options.camera.position_m, part);
         }
     }
     if (backend->begin(frame, picture)) drawing.backend = backend.get();
@@ -201,10 +201,10 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
         picture.light[known->cloud.visible[i]] = std::exp(-known->sun_depths[i]);
     picture.shadow = lit.volumes.empty() ? known->shadow : lit.shadow;
     picture.shadow_frame = known->frame;
-    picture.ground_light = !lit.ground_light.words.empty()
-                               ? lit.ground_light
-                               : light_below(picture, lit.cloud.base_m, mean_cosine(options.light.phase),
-                                             options.ground.height_m);
+    if (options.precipitation.enabled) {
+        cache_ground_light(lit, options);
+        picture.ground_light = lit.ground_light;
+    }
 }
 
 Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptions& options) {
@@ -231,7 +231,7 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
     ground.sky = sky_of(splats, options);  // the mirrored view has another
     const MarchedScene marched(lit.volumes, camera, detail.pixels_per_unit, options.light, earth_bend(ground.sky));
     if (marched.repeats) ground.endless = &marched;
-    ground.light = &lit.ground_light;
+    if (!lit.volumes.empty()) ground.light = &lit.ground_light;
     draw_wet_ground(ground, picture);
     return picture;
 }

@@ -119,7 +119,7 @@ struct LoadedDensity {
 // Reads any float, half or double fog volume. Bounds are nephos_bbox where present, else the active bounds,
 // moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and direction, are
 // permuted; rotated, sheared or non-cubic voxels are resampled, with a note. A child process with limits on
-// memory and time parses the file and sends the voxels (core/sandbox.h). Throws Error(io) naming the path and the
+// memory and time parses the file and sends the voxels (density/vdb/sandbox.h). Throws Error(io) naming the path and the
 // defect, Error(usage) on bad options. Thread-safe.
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});

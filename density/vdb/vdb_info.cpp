@@ -8,10 +8,10 @@
 
 #include <openvdb/openvdb.h>
 
-#include "density/vdb/vdb_sandbox.h"
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_metadata.h"
+#include "density/vdb/vdb_sandbox.h"
 
 namespace nephos {
 namespace {

@@ -9,11 +9,11 @@
 #include "core/text.h"
 #include "density/metaballs.h"
 #include "density/openvdb_access.h"
-#include "density/vdb/vdb_sandbox.h"
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_foreign.h"
 #include "density/vdb/vdb_metadata.h"
+#include "density/vdb/vdb_sandbox.h"
 
 namespace nephos {
 namespace {
@@ -142,6 +142,9 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
     metadata.time_step_s = reader.value<double>();
     metadata.frames_per_second = reader.value<double>();
     metadata.time_scale = reader.value<double>();
+    if (!std::isfinite(metadata.extinction_per_m + metadata.time_s + metadata.time_step_s + metadata.frames_per_second +
+                       metadata.time_scale))
+        throw std::runtime_error("the reading process sent an impossible number");
     metadata.seed = reader.value<std::uint64_t>();
     metadata.random_stream_version = reader.value<int>();
     for (std::string* text : {&metadata.scene_hash, &metadata.state_hash, &metadata.nephos_version})
@@ -189,7 +192,8 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, std::size_
                               memory_bytes};
     const ForeignResult result = convert_foreign(foreign, receiver);
     writer.value(Record::end);
-    writer.value(result);
+    writer.value(std::uint8_t(result.resampled));
+    writer.value(result.negative);
 }
 
 Coord receive_origin(SandboxReader& reader, const Extent& extent) {
@@ -209,23 +213,35 @@ LoadedDensity receive_density(SandboxReader& reader) {
     loaded.refine = std::clamp(reader.value<int>(), 1, kMaxRefine);
     const auto extent = reader.value<Extent>();
     const auto placement = reader.value<Placement>();
-    if (extent.x < 1 || extent.y < 1 || extent.z < 1 || !(placement.cell_size_m > 0)) {
+    constexpr int kMost = kMaxExtent * kMaxRefine;
+    const bool possible = std::min({extent.x, extent.y, extent.z}) >= 1 && std::max({extent.x, extent.y, extent.z}) <= kMost;
+    const Vec3 origin_m = placement.origin_m;
+    if (!possible || !(placement.cell_size_m > 0) ||
+        !std::isfinite(origin_m.x + origin_m.y + origin_m.z + placement.cell_size_m))
         throw std::runtime_error("the reading process sent an impossible size");
-    }
+    const auto check = [](std::span<const float> values) {
+        for (const float value : values)
+            if (!(value >= 0 && std::isfinite(value))) throw std::runtime_error("the reading process sent an impossible density");
+    };
     TreeBuilder builder;
     for (;;) {
         const auto record = reader.value<Record>();
         if (record == Record::end) break;
         const Coord origin = receive_origin(reader, extent);
         if (record == Record::tile) {
-            NewBlock{nullptr, reader.value<float>()}.move_to(builder, origin);
+            const auto density = reader.value<float>();
+            check({&density, 1});
+            NewBlock{nullptr, density}.move_to(builder, origin);
             continue;
         }
         auto leaf = uninitialised_leaf(origin);
         reader.bytes(leaf->buffer().data(), kBlockVoxels * sizeof(float));
+        check({leaf->buffer().data(), kBlockVoxels});
         NewBlock::from(std::move(leaf)).move_to(builder, origin);
     }
-    const auto result = reader.value<ForeignResult>();
+    ForeignResult result;
+    result.resampled = reader.value<std::uint8_t>() != 0;
+    result.negative = reader.value<std::uint64_t>();
     loaded.density = builder.finish(extent, placement);
     if (result.resampled) {
         loaded.notes.push_back("its voxels are not cubes along the axes: resampled to voxels of " +

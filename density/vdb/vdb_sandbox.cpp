@@ -66,9 +66,9 @@ void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
                 const std::function<void(VdbArchive&, SandboxWriter&)>& child,
                 const std::function<void(SandboxReader&)>& parent) {
     const Descriptor file = opened(path);
-    SandboxLimits bounded{limits.seconds, memory_limit(limits)};
+    SandboxLimits bounded{limits.seconds, memory_limit(limits), memory_limit(limits)};
     const bool by_size = limits.memory_bytes == 0 && memory_bound(path) < bounded.memory_bytes;
-    if (by_size) bounded.memory_bytes = memory_bound(path);
+    if (by_size) bounded.memory_bytes = bounded.most_bytes = memory_bound(path);
     openvdb::initialize();  // before the fork, so that the child finds it done
     const int kept[] = {file.get()};
     run_sandboxed(

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "core/sandbox.h"
+#include "density/vdb/sandbox.h"
 #include "density/vdb/vdb_file.h"
 
 namespace nephos {

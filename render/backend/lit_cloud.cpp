@@ -71,7 +71,7 @@ CacheKey light_key(const CacheKey& metaballs, const RenderOptions& options) {
 // Of the parts with detail, whose densities are those of their metaballs.
 CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, const RenderOptions& options) {
     const CloudLight& light = options.light;
-    std::vector<double> rest{mean_cosine(light.phase), double(diffuses(light)), light.albedo, options.ground.height_m};
+    std::vector<double> rest{mean_cosine(light.phase), double(diffuses(light)), light.albedo};
     for (const DetailedVoxels& part : cloud.detailed) {
         const DetailSetting& s = part.setting;
         const DetailOptions& o = s.options;
@@ -90,6 +90,25 @@ CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, cons
 
 }  // namespace
 
+void cache_ground_light(LitCloud& cached, const RenderOptions& options) {
+    const Vec3 to_sun = direction_to_sun(options.sun);
+    const double cosine = mean_cosine(options.light.phase);
+    const double rest[] = {to_sun.x, to_sun.y, to_sun.z, cosine, options.ground.height_m};
+    const CacheKey& cloud = cached.volumes.empty() ? cached.metaballs_key : cached.volumes_key;
+    const CacheKey key = key_of({cloud[0], cloud[1]}, rest);
+    if (key == cached.ground_light_key) return;
+    RepeatedArea repeated;
+    for (const CloudVolume& volume : cached.volumes) {
+        const CoverageField& field = volume.field;
+        if (field.period_m().x > 0 && field.period_m().x > repeated.edges_m.x)
+            repeated = {Vec2(field.corner_m()) + field.home_m(), field.period_m()};
+    }
+    cached.ground_light_key = {};
+    cached.ground_light = light_below(cached.given, repeated, to_sun, cosine, options.ground.height_m);
+    cached.ground_light_key = key;
+    cached.volumes_light = next_version();  // a device has it with the light of the volumes
+}
+
 void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options) {
     if (cloud.detailed.empty() && cached.volumes.empty()) return;
     const CacheKey& key = cached.given_volumes_key;
@@ -103,7 +122,6 @@ void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOpt
     }
     if (cached.light_key == cached.volumes_light_key) return;
     light_volumes(cached.volumes, direction_to_sun(options.sun), options.light, are_new);
-    cached.ground_light = light_below(cached.volumes, direction_to_sun(options.sun), options.ground.height_m);
     cached.volumes_key = key;  // only now: if light fails, all is new again
     cached.volumes_light_key = cached.light_key;
     cached.volumes_light = next_version();

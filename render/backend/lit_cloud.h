@@ -52,7 +52,8 @@ struct LitCloud {
 
     // The parts with detail, in their order, with their light. See DetailedVoxels.
     std::vector<CloudVolume> volumes;
-    GroundLight ground_light;  // below them
+    GroundLight ground_light;  // below `given`; made by cache_ground_light()
+    CacheKey ground_light_key{};
     CacheKey volumes_key{}, volumes_light_key{};
     CacheKey given_volumes_key{};  // of the cloud that cache_cloud() was given last
     Version volumes_version = 0, volumes_light = 0;
@@ -75,5 +76,8 @@ void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptio
 
 // Makes cached.volumes those of the same cloud, with their light. After cache_cloud().
 void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOptions& options);
+
+// Makes cached.ground_light that below the same cloud. After cache_volumes().
+void cache_ground_light(LitCloud& cached, const RenderOptions& options);
 
 }  // namespace nephos

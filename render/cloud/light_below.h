@@ -8,23 +8,23 @@
 // above black ground, with delta-Eddington's depth of J. H. Joseph, W. J. Wiscombe and J. A. Weinman 1976), of the sun
 //     ((2 + 3 mu) + (2 - 3 mu) exp(-(1 - g^2) depth / mu)) / (4 + 3 (1 - g) depth) - exp(-depth / mu)
 // where mu is the sine of its elevation, and of the sky 1 / (1 + 3/4 (1 - g) depth); then it spreads as far as the clouds'
-// base is high. Beyond the map the light is the mean of clouds that repeat to the horizon, or that of open ground.
-// Results do not depend on the number of threads. `to_sun`: a unit vector.
-
-#include <span>
+// base is high.
 
 #include "core/vec.h"
-#include "render/cloud/cloud_volume.h"
+#include "render/cloud/cloud_preparation.h"
 #include "render/image/ground_light.h"
-#include "render/image/picture.h"
 
 namespace nephos {
 
-// Returns the light below volumes. None that holds cloud: no words.
-GroundLight light_below(std::span<const CloudVolume> volumes, const Vec3& to_sun, double ground_height_m);
+// Where clouds repeat to the horizon: the corner of their first period, and its edges; edges of 0: they do not.
+struct RepeatedArea {
+    Vec2 corner_m{0, 0}, edges_m{0, 0};
+};
 
-// Returns that below any clouds by their shadow map, whose depths it takes for those of layers: for those of metaballs
-// alone. `base_m`: world z of the lowest; `mean_cosine`: of the phase function. Sun at the horizon or below: no words.
-GroundLight light_below(const Picture& shaded, double base_m, double mean_cosine, double ground_height_m);
+// Returns the light below a cloud of metaballs, which have the depth of columns whether they are drawn as such or not. No
+// visible metaball: no words. Beyond the map the light is that of open ground, or of clouds that repeat its mean. `to_sun`:
+// a unit vector; `mean_cosine`: g of the phase function. Does not depend on the number of threads.
+GroundLight light_below(const PreparedCloud& cloud, const RepeatedArea& repeated, const Vec3& to_sun, double mean_cosine,
+                        double ground_height_m);
 
 }  // namespace nephos

@@ -50,10 +50,10 @@ struct PictureFrame : shader::FrameUniforms {
 PictureFrame frame_data(const RenderOptions& options, const CameraFrame& camera, const ShadowFrame& shadow,
                         const Flash* flash, const PicturePart& part, const SkyLight* sky = nullptr);
 
-// Returns of a map the x and y scale, and the offset, from a point relative to the eye to a texel, counted from the middle
-// of the first one.
+// Returns how a point relative to the eye becomes a texel of the map: its x and y times the first two numbers plus the
+// last two, counted from the middle of the first texel.
 shader::vec4 ground_light_place(const GroundLight& light, const Vec3& eye_m);
-// Makes the light on the ground that below clouds; `light` must outlive `frame`.
+// Sets what the ground of a frame receives below clouds; `light` must outlive `frame`.
 void use_ground_light(const GroundLight& light, const Vec3& eye_m, PictureFrame& frame);
 
 // Returns 1 / m: by this times the square of its distance a place on the ground's plane lies above the round Earth; 0

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 #include <locale>
-#include <sstream>
 #include <new>
+#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <OpenEXR/ImfBoxAttribute.h>
 #include <OpenEXR/ImfChannelList.h>
@@ -26,7 +29,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
-#include "core/sandbox.h"
+#include "density/vdb/sandbox.h"
 #include "render/image/image_file.h"
 
 namespace nephos {
@@ -126,31 +129,44 @@ ExrPart describe(const Imf::Header& header) {
 // An open file, for a process that may open none.
 class OpenFile : public Imf::IStream {
   public:
-    explicit OpenFile(int fd) : Imf::IStream("it"), fd_(fd) {}
+    OpenFile(int fd, const std::filesystem::path& path) : Imf::IStream(path.c_str()), fd_(fd), size_(::lseek(fd, 0, SEEK_END)) {}
     bool read(char to[], int size) override {
         for (int done = 0; done < size;) {
-            const ssize_t got = ::pread(fd_, to + done, std::size_t(size - done), off_t(at_));
-            if (got < 0 && errno == EINTR) continue;
-            if (got < 0) throw std::runtime_error(std::strerror(errno));
-            if (got == 0) throw std::runtime_error("it ends early");
-            done += int(got);
-            at_ += std::uint64_t(got);
+            if (at_ < begin_ || at_ >= begin_ + filled_) fill();
+            const std::uint64_t from = at_ - begin_;
+            const auto some = std::size_t(std::min<std::uint64_t>(filled_ - from, std::uint64_t(size - done)));
+            std::memcpy(to + done, &buffer_[from], some);
+            done += int(some);
+            at_ += some;
         }
-        return ::lseek(fd_, 0, SEEK_END) > off_t(at_);
+        return off_t(at_) < size_;
     }
     std::uint64_t tellg() override { return at_; }
     void seekg(std::uint64_t to) override { at_ = to; }
 
   private:
+    void fill() {
+        ssize_t got = 0;
+        do {
+            got = ::pread(fd_, buffer_.data(), buffer_.size(), off_t(at_));
+        } while (got < 0 && errno == EINTR);
+        if (got < 0) throw std::runtime_error(std::strerror(errno));
+        if (got == 0) throw std::runtime_error("it ends early");
+        begin_ = at_;
+        filled_ = std::uint64_t(got);
+    }
+
     int fd_;
-    std::uint64_t at_ = 0;
+    off_t size_;
+    std::uint64_t at_ = 0, begin_ = 0, filled_ = 0;  // place in the file; part of it in the buffer
+    std::vector<char> buffer_ = std::vector<char>(65536);
 };
 
 void send(SandboxWriter& writer, const ExrPart& part) {
     writer.text(part.name);
     writer.value(part.width);
     writer.value(part.height);
-    writer.value(part.complete);
+    writer.value(std::uint8_t(part.complete));
     writer.text(part.compression);
     writer.value(part.channels.size());
     for (const ExrChannel& channel : part.channels) {
@@ -169,7 +185,7 @@ ExrPart received(SandboxReader& reader) {
     part.name = reader.text();
     part.width = reader.value<int>();
     part.height = reader.value<int>();
-    part.complete = reader.value<bool>();
+    part.complete = reader.value<std::uint8_t>() != 0;
     part.compression = reader.text();
     for (auto left = reader.value<std::size_t>(); left > 0; --left) {
         ExrChannel& channel = part.channels.emplace_back();
@@ -187,15 +203,16 @@ ExrPart received(SandboxReader& reader) {
 }  // namespace
 
 ExrInfo read_exr_info(const std::filesystem::path& path) {
-    constexpr SandboxLimits kLimits{.seconds = 60, .memory_bytes = std::size_t{1} << 30};
+    constexpr SandboxLimits kLimits{.seconds = 60, .memory_bytes = std::size_t{1} << 30, .most_bytes = 16u << 20};
     const Descriptor opened = open_regular_file(path, O_RDONLY);
     const int kept[] = {opened.get()};
     ExrInfo info;
+    Imf::staticInitialize();  // before the fork, so that the child finds it done
     run_sandboxed(
         path, "OpenEXR", kLimits, kept,
         [&](SandboxWriter& writer) {
             try {
-                OpenFile stream(opened.get());
+                OpenFile stream(opened.get(), path);
                 const Imf::MultiPartInputFile file(stream, 0);  // no threads
                 writer.value(file.parts());
                 for (int i = 0; i < file.parts(); ++i) {

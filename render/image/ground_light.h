@@ -11,7 +11,7 @@
 
 namespace nephos {
 
-// A map of the ground; plain data. Its outermost texels have the light beyond it, which makes it continuous.
+// A map of the ground; plain data. Its outermost texels have the light beyond it, which goes on from there.
 struct GroundLight {
     static constexpr int kTexels = 96;  // on an edge
 

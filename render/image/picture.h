@@ -51,7 +51,7 @@ struct Picture {
     std::vector<float> shadow;  // shadow_size^2, transmittance of the whole cloud along the sun's rays
     ShadowFrame shadow_frame;
 
-    GroundLight ground_light;  // with the shadow map
+    GroundLight ground_light;  // where it rains (RenderOptions::precipitation); else all is open
 
     // For each metaball of the cloud, in its order: transmittance of the cloud between its centre and the
     // sun.

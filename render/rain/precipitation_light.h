@@ -10,11 +10,12 @@ namespace nephos {
 
 // The light on the particles of one frame.
 struct PrecipitationLight {
-    // What a particle refracts of its surroundings, clouds, sky and ground, where there is no cloud: of the sky and of
-    // ground in its light; of ground in the sun. And of clouds and of ground below them, per fraction of the sunlight that
-    // arrives scattered.
-    Rgb by_sky{}, by_sunlit_ground{}, by_scattered_sun{};
-    const GroundLight* ground = nullptr;  // the fractions of these by place; null: no cloud
+    // What a particle refracts of its surroundings is
+    //     fractions.sky * by_sky + fractions.sun * by_scattered_sun + sunlight * by_sunlit_ground
+    // with the fractions of GroundLight at its place and the direct sunlight (0..1) there. The terms are the light of the
+    // sky, that of sunlight which clouds scatter down, each with ground in it, and that of ground in the sun.
+    Rgb by_sky{}, by_scattered_sun{}, by_sunlit_ground{};
+    const GroundLight* ground = nullptr;  // null: no cloud
     Rgb sun{};                            // radiance of a white surface that faces the sun, without clouds
     Vec3 to_sun{0, 0, 1};
     Rgb flash{};  // of lightning: the same at 1 km from it

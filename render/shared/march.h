@@ -125,7 +125,7 @@ struct March {
 
 #ifdef __cplusplus
 static_assert(sizeof(MarchVolume) == 304 && offsetof(MarchVolume, to_patches) == 208 && offsetof(MarchVolume, first_table) == 80 &&
-              offsetof(MarchVolume, cap) == 112 && offsetof(March, volumes) == 64);
+              offsetof(MarchVolume, cap) == 112 && offsetof(March, ground_light) == 32 && offsetof(March, volumes) == 64);
 
 }  // namespace nephos::shader
 #endif

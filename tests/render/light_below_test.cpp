@@ -2,6 +2,7 @@
 // Scattered light below clouds with detail (render/cloud/light_below.h).
 
 #include "render/cloud/light_below.h"
+#include "render/options/phase_function.h"
 
 #include <algorithm>
 #include <cmath>
@@ -43,11 +44,11 @@ CloudLight light_with(double g) {
     return light;
 }
 
-GroundLight below(const DetailedVoxels& part, const Vec3& to_sun, const CloudLight& light) {
-    std::vector<CloudVolume> volumes;
-    volumes.emplace_back(part);
-    light_volumes(volumes, to_sun, light, true);
-    return light_below(volumes, to_sun, 0);
+GroundLight below(const DetailedVoxels& part, const Vec3& to_sun, const CloudLight& light, bool repeats = false) {
+    const std::vector<Metaball> balls = metaballs(part.density, part.setting.metaball_radius_cells);
+    const PreparedCloud cloud = prepare({balls, part.setting.extinction_per_m,
+                                         metaball_normalisation(part.setting.metaball_radius_cells), {}});
+    return light_below(cloud, {{0, 0}, repeats ? 2.0 * kMiddle : Vec2(0, 0)}, to_sun, mean_cosine(light.phase), 0);
 }
 
 // What a layer without absorption does not send back, by Eddington's approximation in the form of W. E. Meador and W. R.
@@ -66,7 +67,7 @@ TEST(LightBelow, SheetsTransmitTheTwoStreamSolution) {
                 const GroundLight::Fractions at =
                     below(sheet(depth), {0, std::sqrt(1 - mu * mu), mu}, light_with(g)).at(kMiddle);
                 const double expected = transmitted(depth, g, mu);
-                EXPECT_NEAR(at.sun + std::exp(-depth / mu), expected, 0.02 * expected + 1e-3)
+                EXPECT_NEAR(at.sun + std::exp(-depth / mu), expected, 0.05 * expected + 1e-3)
                     << "g " << g << ", depth " << depth << ", mu " << mu;
                 EXPECT_NEAR(at.sky, 1 / (1 + 0.75 * (1 - g) * depth), 0.02);
             }
@@ -88,15 +89,12 @@ TEST(LightBelow, IsThatOfOpenGroundFarAway) {
         before = sun;
     }
     EXPECT_EQ(GroundLight{}.at(kMiddle).sky, 1);
-    EXPECT_TRUE(light_below({}, {0, 0, 1}, 0).words.empty());
+    EXPECT_TRUE(light_below({}, {}, {0, 0, 1}, 0.85, 0).words.empty());
 }
 
 // Beyond the first period of what repeats there is its mean.
 TEST(LightBelow, GoesOnBelowCloudsThatRepeat) {
-    DetailedVoxels part = sheet(20, true);
-    part.setting.boundaries.x = part.setting.boundaries.y = Boundary::periodic;
-    const Vec3 to_sun{0, 0.6, 0.8};
-    const GroundLight light = below(part, to_sun, light_with(0.85));
+    const GroundLight light = below(sheet(20, true), {0, 0.6, 0.8}, light_with(0.85), true);
     const GroundLight::Fractions beyond = light.at({5e5, 5e5});
     EXPECT_GT(beyond.sun, 0.2 * transmitted(20, 0.85, 0.8));
     EXPECT_LT(beyond.sun, 0.95 * transmitted(20, 0.85, 0.8));
@@ -129,6 +127,7 @@ Picture picture_below(const DetailedVoxels& detailed, bool with_detail, RenderOp
                         metaball_normalisation(detailed.setting.metaball_radius_cells),
                         {}};
     if (with_detail) splats.metaballs.detailed = parts;
+    options.precipitation.enabled = true;
     splats.light = true;
     Renderer renderer{DeviceOptions{.splatting = Splatting::cpu}};
     return renderer.draw_splats(splats, options);
@@ -147,10 +146,10 @@ TEST(LightBelow, LightsTheGround) {
             options.ground.albedo[c] * (at.sky * sky + at.sun * mu * options.sun.colour[c]);
         EXPECT_NEAR(double(picture.beauty[c]), expected, 0.01 * expected);
     }
-    // Metaballs alone leave the ground as it was; their rain has the same light, by the shadow map.
+    // Metaballs alone leave the ground as it was; their rain has the same light.
     const Picture plain = picture_below(sheet(8), false, options);
-    EXPECT_NEAR(plain.ground_light.at(kMiddle).sun, at.sun, 0.1 * at.sun);
-    EXPECT_NEAR(plain.ground_light.at(kMiddle).sky, at.sky, 0.1 * at.sky);
+    EXPECT_NEAR(plain.ground_light.at(kMiddle).sun, at.sun, 0.01 * at.sun);
+    EXPECT_NEAR(plain.ground_light.at(kMiddle).sky, at.sky, 0.01 * at.sky);
     EXPECT_NEAR(double(plain.beauty[0]), 0.3 * 0.5 * (0.5 + 0.1), 1e-3);
 }
 

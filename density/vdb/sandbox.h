@@ -3,7 +3,8 @@
 
 // Parsing of untrusted input in a child process (not installed). A damaged or hostile file may crash the
 // child, hang it or exhaust its memory; the child sends its results through a pipe, and the parent reads
-// nothing but that stream, whose length and order its own code determines.
+// nothing but that stream, whose order its own code determines. Whoever has taken over the child chooses the values:
+// the parent checks them as it would a file's.
 //
 // fork() without exec() in a program with threads: the child has only the calling thread, and a lock that
 // another thread held at that moment stays locked in it. glibc makes its own allocator safe; other locks
@@ -27,6 +28,7 @@ namespace nephos {
 struct SandboxLimits {
     double seconds = 60;  // of wall-clock time, above 0
     std::size_t memory_bytes = std::size_t{256} << 20;  // more than this process has
+    std::size_t most_bytes = std::size_t{64} << 20;     // that it may send
 };
 
 // The child's end of the pipe: a stream of plain values.
@@ -58,6 +60,7 @@ class SandboxReader {
     template <class T>
     T value() {
         static_assert(std::is_trivially_copyable_v<T>);
+        static_assert(!std::is_same_v<T, bool>, "not every byte is a bool: send 0 or 1 as a std::uint8_t");
         T v;
         bytes(&v, sizeof v);
         return v;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/sandbox.h"
+#include "density/vdb/sandbox.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -16,7 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "core/confinement.h"
+#include "density/vdb/confinement.h"
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -44,12 +44,12 @@ void send_all(int fd, const void* data, std::size_t size) {
         ::_exit(1);  // nobody listens any more
 }
 
-[[noreturn]] void run_child(int fd, const SandboxLimits& limits, std::span<const int> kept,
+[[noreturn]] void run_child(pid_t parent, int fd, const SandboxLimits& limits, std::span<const int> kept,
                             const std::function<void(SandboxWriter&)>& child) {
     try {
         std::vector<int> open(kept.begin(), kept.end());
         open.push_back(fd);
-        confine(open, limits.memory_bytes, limits.seconds);
+        confine(parent, open, limits.memory_bytes, limits.seconds);
         SandboxWriter writer(fd);
         child(writer);
         writer.finish();
@@ -82,9 +82,10 @@ std::pair<char, long> process_state(pid_t pid) {
 
 class PipeReader final : public SandboxReader {
   public:
-    PipeReader(int fd, pid_t pid, Clock::time_point deadline, bool last_attempt)
+    PipeReader(int fd, pid_t pid, std::size_t most_bytes, Clock::time_point deadline, bool last_attempt)
         : fd_(fd),
           pid_(pid),
+          most_(most_bytes),
           deadline_(deadline),
           watch_for_stall_(!last_attempt),
           quiet_since_(Clock::now()) {}
@@ -128,6 +129,8 @@ class PipeReader final : public SandboxReader {
     }
 
     void receive(void* data, std::size_t size) {
+        if (size > most_) throw std::runtime_error("the reading process sent more than is allowed");
+        most_ -= size;
         char* out = static_cast<char*>(data);
         while (size > 0) {
             wait_for_data();
@@ -168,6 +171,7 @@ class PipeReader final : public SandboxReader {
 
     int fd_;
     pid_t pid_;
+    std::size_t most_;  // bytes that may still come
     Clock::time_point deadline_;
     bool watch_for_stall_;
     Clock::time_point quiet_since_;
@@ -219,12 +223,12 @@ void attempt(std::string_view parser, const SandboxLimits& limits, std::span<con
         throw std::runtime_error(std::string("no pipe to a reading process: ") + std::strerror(errno));
     }
     Descriptor out(ends[0]), in(ends[1]);
-    const pid_t pid = ::fork();
+    const pid_t self = ::getpid(), pid = ::fork();
     if (pid < 0) throw std::runtime_error(std::string("no process to read it in: ") + std::strerror(errno));
-    if (pid == 0) run_child(ends[1], limits, kept, child);
+    if (pid == 0) run_child(self, ends[1], limits, kept, child);
     in.close();
     Child process(pid, parser);
-    PipeReader reader(out.get(), pid, deadline, last_attempt);
+    PipeReader reader(out.get(), pid, limits.most_bytes, deadline, last_attempt);
     try {
         parent(reader);
         reader.expect_end();

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "density/vdb/confinement.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <sched.h>
+#include <seccomp.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define NEPHOS_SANITIZED 1  // shadow memory needs terabytes of addresses, and reports need files
+#else
+#define NEPHOS_SANITIZED 0
+#endif
+
+namespace nephos {
+namespace {
+
+std::size_t sum_or_most(std::size_t a, std::size_t b) {
+    constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
+    return a > kMost - b ? kMost : a + b;
+}
+
+// Addresses that this process uses now.
+std::size_t address_space() {
+    std::ifstream statm("/proc/self/statm");
+    std::size_t pages = 0;
+    statm >> pages;
+    return pages * std::size_t(::sysconf(_SC_PAGESIZE));
+}
+
+[[noreturn]] void fail(const std::string& step, int number) {
+    throw std::runtime_error("cannot confine the process that reads it: " + step + ": " + std::strerror(number));
+}
+
+void set_limit(__rlimit_resource resource, std::size_t value) {
+    rlimit limit{};
+    if (::getrlimit(resource, &limit) != 0) fail("getrlimit", errno);
+    limit.rlim_cur = limit.rlim_max = std::min(rlim_t(value), limit.rlim_max);
+    if (::setrlimit(resource, &limit) != 0) fail("setrlimit", errno);
+}
+
+// Closes what is not kept, and gives the standard streams that are not an end in nothing.
+void close_others(std::vector<int> kept) {
+    const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+    for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+        if (std::ranges::find(kept, fd) != kept.end()) continue;
+        if (nowhere < 0 || ::dup2(nowhere, fd) < 0) ::close(fd);
+    }
+    std::ranges::sort(kept);
+    unsigned first = STDERR_FILENO + 1;
+    const auto close_until = [&first](unsigned last) {
+        if (first <= last && ::syscall(SYS_close_range, first, last, 0) != 0) fail("close_range", errno);
+    };
+    for (const int fd : kept) {
+        if (unsigned(fd) < first) continue;
+        close_until(unsigned(fd) - 1);
+        first = unsigned(fd) + 1;
+    }
+    close_until(~0u);
+}
+
+// fork() copies private memory only: what is shared, such as a buffer of a device, is still that of the parent.
+void stop_sharing() {
+    struct Mapping {
+        std::uintptr_t begin, end;
+        bool executed;
+    };
+    std::vector<Mapping> writable;
+    std::ifstream maps("/proc/self/maps");
+    if (!maps) fail("/proc/self/maps", errno);
+    for (std::string line; std::getline(maps, line);) {
+        std::istringstream fields(line);
+        std::uintptr_t begin = 0, end = 0;
+        char dash = 0;
+        std::string rights;
+        fields >> std::hex >> begin >> dash >> end >> rights;
+        if (rights.size() != 4 || rights[1] != 'w') continue;
+        if (rights[3] == 's' || rights[2] == 'x') writable.push_back({begin, end, rights[3] != 's'});
+    }
+    for (const Mapping& each : writable)
+        if (::mprotect(reinterpret_cast<void*>(each.begin), each.end - each.begin,
+                       each.executed ? PROT_READ | PROT_WRITE : PROT_READ) != 0)
+            fail("mprotect", errno);
+}
+
+void check(int result) {
+    if (result < 0) fail("seccomp", -result);
+}
+
+// Allows what parsers of an open file need; every other system call fails with EPERM.
+void filter_system_calls() {
+    const std::unique_ptr<void, void (*)(scmp_filter_ctx)> filter(::seccomp_init(SCMP_ACT_ERRNO(EPERM)), ::seccomp_release);
+    if (filter == nullptr) fail("seccomp", ENOMEM);
+    for (const int call :
+         {// files that are open
+          SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(pread64), SCMP_SYS(write), SCMP_SYS(writev), SCMP_SYS(lseek),
+          SCMP_SYS(close), SCMP_SYS(fstat), SCMP_SYS(poll), SCMP_SYS(ppoll),
+          // memory
+          SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(madvise), SCMP_SYS(brk),
+          // threads and locks, of TBB in OpenVDB
+          SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(rseq), SCMP_SYS(set_tid_address), SCMP_SYS(sched_yield),
+          SCMP_SYS(sched_getaffinity), SCMP_SYS(getpid), SCMP_SYS(gettid),
+          // signals of its own, abort()
+          SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
+          // time and the end
+          SCMP_SYS(getrandom), SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep), SCMP_SYS(pause),
+          SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group)})
+        check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, call, 0));
+    // glibc's fstat(); a path would be refused.
+    check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(newfstatat), 1,
+                             SCMP_A3(SCMP_CMP_MASKED_EQ, AT_EMPTY_PATH, AT_EMPTY_PATH)));
+    // No memory that is executed, and none that is shared.
+    check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(mmap), 2,
+                             SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0), SCMP_A3(SCMP_CMP_MASKED_EQ, MAP_SHARED, 0)));
+    // A stack of a thread becomes writable so; what is shared stays as it is, because private memory alone is mapped now.
+    check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(mprotect), 1,
+                             SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0)));
+    // Threads, and neither processes nor namespaces; signals to itself, as abort() sends; the flags of an open file.
+    constexpr scmp_datum_t kNamespaces = CLONE_NEWNS | CLONE_NEWCGROUP | CLONE_NEWUTS | CLONE_NEWIPC | CLONE_NEWUSER |
+                                         CLONE_NEWPID | CLONE_NEWNET;
+    check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(clone), 1,
+                             SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD | kNamespaces, CLONE_THREAD)));
+    check(::seccomp_rule_add(filter.get(), SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0));  // glibc then takes clone()
+    for (const int call : {SCMP_SYS(tgkill), SCMP_SYS(kill)})
+        check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, call, 1, SCMP_A0(SCMP_CMP_EQ, scmp_datum_t(::getpid()))));
+    check(::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(fcntl), 1, SCMP_A1(SCMP_CMP_EQ, F_GETFL)));
+    check(::seccomp_load(filter.get()));
+}
+
+}  // namespace
+
+void confine(pid_t parent, std::span<const int> kept, std::size_t memory_bytes, double seconds) {
+    if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) fail("prctl", errno);
+    if (::getppid() != parent) ::_exit(1);  // it ended before that
+    for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGPIPE}) ::signal(signal, SIG_DFL);
+    set_limit(RLIMIT_CORE, 0);
+    set_limit(RLIMIT_CPU, std::size_t(seconds) + 1);
+    if (NEPHOS_SANITIZED) return;
+    close_others({kept.begin(), kept.end()});
+    set_limit(RLIMIT_AS, sum_or_most(address_space(), memory_bytes));
+    stop_sharing();
+    set_limit(RLIMIT_FSIZE, 0);
+    set_limit(RLIMIT_NOFILE, 0);
+    if (::prctl(PR_SET_DUMPABLE, 0) != 0) fail("prctl", errno);
+    filter_system_calls();  // which sets no_new_privs
+}
+
+}  // namespace nephos
