@@ -24,8 +24,8 @@ struct RunArguments {
     SceneArguments scene;
     std::string out;
     std::optional<FrameRange> frames;
-    bool no_render = false, statistics_only = false, video = false, resume = false, overwrite = false,
-         needs = false;
+    bool no_render = false, statistics_only = false, checkpoint = false, video = false, resume = false,
+         overwrite = false, needs = false;
     double checkpoint_every_s = 60;
     DeviceArguments device;
     WorkArguments work;
@@ -65,6 +65,7 @@ RunSettings settings_of(const RunArguments& a) {
     settings.device = device_options(a.device, settings.scene.frames);
     settings.resume = a.resume;
     settings.overwrite = a.overwrite;
+    settings.checkpoint = !a.statistics_only || a.checkpoint;
     settings.checkpoint_every_s = a.checkpoint_every_s;
     return settings;
 }
@@ -159,6 +160,8 @@ void print_json(const RunReport& report) {
 
 int run(const RunArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
+    if (a.checkpoint && !a.statistics_only)
+        throw Error(ErrorCode::usage, "--checkpoint is for --statistics-only: other runs always leave one");
     if (a.statistics_only && (a.frames || a.video))
         throw Error(ErrorCode::usage, "--statistics-only writes no frames: leave out --frames and --video");
     if (a.needs) {
@@ -181,6 +184,11 @@ int run(const RunArguments& a) {
     defer_signals();
     const RunReport report = run_scene(std::move(settings), observer);
     bar.reset();
+    if (report.restarted && !a.work.quiet)
+        print_note(report.folder.string() +
+                   ": the earlier run left no checkpoint to go on from, so it started anew "
+                   "(--checkpoint leaves one)");
+    if (report.skipped && !a.work.quiet) print_note(report.folder.string() + ": is complete already");
     if (a.work.json) {
         print_json(report);
     } else if (report.complete && !a.work.quiet) {
@@ -204,12 +212,18 @@ void add_run_command(CLI::App& app, Action& action) {
               "Write only these frames, counted from 1; A.., ..B and A alone work too",
               [a](const std::string& text) { a->frames = parse_frames(text); });
     command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics");
-    command->add_flag("--statistics-only", a->statistics_only,
-                      "No frames at all, only statistics of every step, the manifest and the checkpoint; no "
-                      "density is made, so mean_density is empty");
+    command->add_flag(
+        "--statistics-only", a->statistics_only,
+        "No frames at all, only the manifest and statistics of every step (docs/research.md defines the "
+        "columns); no density is made, so mean_density is empty; no checkpoint is left when it is complete");
+    command->add_flag(
+        "--checkpoint", a->checkpoint,
+        "With --statistics-only: leave the checkpoint of the complete run, to lengthen it later");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
-    command->add_flag("--resume", a->resume,
-                      "Go on where an interrupted run stopped, or with more time.steps where a run ended");
+    command->add_flag(
+        "--resume", a->resume,
+        "Go on where an interrupted run stopped, or with more time.steps where a run ended; start "
+        "where nothing is there, and do nothing where the same run is complete");
     command->add_flag(
         "--overwrite", a->overwrite,
         "Start anew although the folder holds an interrupted run, a run of another scene or seed, or files "
