@@ -61,8 +61,8 @@ SizeRange default_size_range(const Extent& extent) {
     return {36, std::uint64_t(side * side)};
 }
 
-void CloudSizes::add(std::span<const Cloud> clouds) {
-    for (const Cloud& cloud : clouds) {
+void CloudSizes::add(std::span<const ConnectedCloud> clouds) {
+    for (const ConnectedCloud& cloud : clouds) {
         ++clouds_;
         area_ += cloud.cells;
         const std::size_t bin = std::size_t(size_bin(cloud.cells));

@@ -45,7 +45,7 @@ struct Estimate {
 class CloudSizes {
   public:
     explicit CloudSizes(SizeRange range) : range_(range) {}
-    void add(std::span<const Cloud> clouds);
+    void add(std::span<const ConnectedCloud> clouds);
     void add(const CloudSizes& other);
 
     std::uint64_t clouds() const { return clouds_; }

@@ -157,8 +157,7 @@ CloudCounts count_cloud(const BitPlaneView& cld, const Boundaries& boundaries) {
     counts.edges = count_edges(seen.data(), cld, boundaries);
     std::ranges::fill(seen, 0);
     for (std::size_t k = 0; k < levels; ++k) {
-        if (counts.level_cells[k] != 0)
-            counts.bases[k] = add_level(cld.words + k * level_words, seen);
+        if (counts.level_cells[k] != 0) counts.bases[k] = add_level(cld.words + k * level_words, seen);
     }
     return counts;
 }

@@ -145,7 +145,7 @@ class Labelling {
         open_edges_.assign(runs_.count(), 0);
     }
 
-    std::vector<Cloud> clouds() {
+    std::vector<ConnectedCloud> clouds() {
         const Extent& e = plane_.extent;
         for (int k = 0; k < e.z; ++k) {
             for (int j = 0; j < e.y; ++j) {
@@ -198,12 +198,12 @@ class Labelling {
         return std::uint64_t(runs_.run(run).end - runs_.run(run).begin);
     }
 
-    std::vector<Cloud> collected() {
+    std::vector<ConnectedCloud> collected() {
         const Extent& e = plane_.extent;
         const Centre x(e.x, periodic_x_), y(e.y, periodic_y_), z(e.z, periodic_z_);
         constexpr std::uint32_t kNone = ~std::uint32_t(0);
         std::vector<std::uint32_t> number(runs_.count(), kNone);
-        std::vector<Cloud> clouds;
+        std::vector<ConnectedCloud> clouds;
         std::vector<Sums> sums;
         for (int row = 0; row < e.y * e.z; ++row) {
             const int j = row % e.y, k = row / e.y;
@@ -215,7 +215,7 @@ class Labelling {
                     clouds.back().lowest = k;
                     sums.emplace_back();
                 }
-                Cloud& cloud = clouds[number[root]];
+                ConnectedCloud& cloud = clouds[number[root]];
                 Sums& sum = sums[number[root]];
                 const Run run = runs_.run(n);
                 const double cells = run.end - run.begin;
@@ -235,7 +235,7 @@ class Labelling {
             }
         }
         for (std::size_t n = 0; n < clouds.size(); ++n) {
-            Cloud& cloud = clouds[n];
+            ConnectedCloud& cloud = clouds[n];
             const Sums& sum = sums[n];
             cloud.x = x.mean(sum.x, double(cloud.cells));
             cloud.y = y.mean(sum.y, double(cloud.cells));
@@ -258,14 +258,15 @@ class Labelling {
 
 }  // namespace
 
-std::vector<Cloud> clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries, Neighbours neighbours) {
+std::vector<ConnectedCloud> clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries,
+                                      Neighbours neighbours) {
     const BitPlane shadow = shadow_of(cld);
     Labelling labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open},
                         neighbours == Neighbours::eight ? 1 : 0);
     return labelling.clouds();
 }
 
-std::vector<Cloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries) {
+std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries) {
     return Labelling(cld, boundaries, 0).clouds();
 }
 

@@ -21,7 +21,7 @@ namespace nephos {
 enum class Neighbours { four, eight };
 
 // One cloud, in units of cells.
-struct Cloud {
+struct ConnectedCloud {
     std::uint64_t cells = 0;  // 2-D: covered columns; 3-D: cloud cells
     // Sides of columns (2-D) or faces of cells (3-D) towards clear air. The side of the box does not count where it is open.
     std::uint64_t edges = 0;
@@ -33,8 +33,8 @@ struct Cloud {
 };
 
 // Return the clouds in the order of their first cell in memory. Thread-safe.
-std::vector<Cloud> clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries,
-                             Neighbours neighbours = Neighbours::four);
-std::vector<Cloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries);
+std::vector<ConnectedCloud> clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries,
+                                      Neighbours neighbours = Neighbours::four);
+std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries);
 
 }  // namespace nephos

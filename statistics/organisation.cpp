@@ -33,7 +33,8 @@ struct Moments {
 
 }  // namespace
 
-Organisation organisation(std::span<const Cloud> clouds, const Extent& extent, const Boundaries& boundaries) {
+Organisation organisation(std::span<const ConnectedCloud> clouds, const Extent& extent,
+                          const Boundaries& boundaries) {
     const std::size_t n = clouds.size();
     if (n < 2) return {kNaN, kNaN, kNaN};
     const bool wrap_x = boundaries.x == Boundary::periodic, wrap_y = boundaries.y == Boundary::periodic;

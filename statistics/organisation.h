@@ -25,7 +25,8 @@ struct Organisation {
 };
 
 // Returns the indices of 2-D clouds of a lattice. SCAI and COP go over all pairs: n^2 operations. Thread-safe.
-Organisation organisation(std::span<const Cloud> clouds, const Extent& extent, const Boundaries& boundaries);
+Organisation organisation(std::span<const ConnectedCloud> clouds, const Extent& extent,
+                          const Boundaries& boundaries);
 
 // Returns a shadow whose columns are covered independently with the probability `cover`, from Philox: the null model.
 // Equal arguments give equal bits.

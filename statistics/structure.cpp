@@ -62,9 +62,7 @@ Pairs pairs_along_y(const BitPlaneView& shadow, int r, bool periodic) {
     return {double(count_cells(both.view())), double(rows) * shadow.extent.x};
 }
 
-}  // namespace
-
-std::vector<LevelOverlap> level_overlaps(const BitPlaneView& cld) {
+std::vector<LevelOverlap> overlaps_up_to(const BitPlaneView& cld, int most) {
     const int nz = cld.extent.z;
     const std::size_t level_words = cld.words_per_row * std::size_t(cld.extent.y);
     const double columns = double(cld.extent.x) * cld.extent.y;
@@ -74,14 +72,15 @@ std::vector<LevelOverlap> level_overlaps(const BitPlaneView& cld) {
     for (int k = 0; k < nz; ++k)
         cover[std::size_t(k)] = double(count_cells({flat, cld.words_per_row, level(k)})) / columns;
     BitPlane both(flat);
+    const std::span<std::uint64_t> words = both.words();
     std::vector<LevelOverlap> overlaps;
-    for (int distance = 1; distance < nz; ++distance) {
+    for (int distance = 1; distance <= most; ++distance) {
         LevelOverlap overlap{distance, 0, 0};
         for (int k = 0; k + distance < nz; ++k) {
             const double f = cover[std::size_t(k)], g = cover[std::size_t(k + distance)];
             if (f <= 0 || g <= 0 || f >= 1 || g >= 1) continue;
             const std::uint64_t *low = level(k), *high = level(k + distance);
-            for (std::size_t n = 0; n < level_words; ++n) both.words()[n] = low[n] | high[n];
+            for (std::size_t n = 0; n < level_words; ++n) words[n] = low[n] | high[n];
             const double together = double(count_cells(both.view())) / columns;
             const double random = f + g - f * g;
             overlap.mean += (together - random) / (std::max(f, g) - random);
@@ -91,6 +90,17 @@ std::vector<LevelOverlap> level_overlaps(const BitPlaneView& cld) {
         overlaps.push_back(overlap);
     }
     return overlaps;
+}
+
+}  // namespace
+
+std::vector<LevelOverlap> level_overlaps(const BitPlaneView& cld) {
+    return overlaps_up_to(cld, cld.extent.z - 1);
+}
+
+double mean_overlap_of_neighbours(const BitPlaneView& cld) {
+    const std::vector<LevelOverlap> overlaps = overlaps_up_to(cld, std::min(1, cld.extent.z - 1));
+    return overlaps.empty() ? kNaN : overlaps.front().mean;
 }
 
 double overlap_length_m(const std::vector<LevelOverlap>& overlaps, double cell_size_m) {

@@ -27,6 +27,9 @@ struct LevelOverlap {
 // Returns the overlap for the distances 1 to nz - 1. Thread-safe.
 std::vector<LevelOverlap> level_overlaps(const BitPlaneView& cld);
 
+// Returns the mean overlap of neighbouring levels, level_overlaps() at distance 1 alone; NaN where no pair has a value.
+double mean_overlap_of_neighbours(const BitPlaneView& cld);
+
 // Returns the decorrelation length z0 of mean(dz) = exp(-dz / z0), least squares through the logarithm of the means above
 // 0.05, weighted by their pairs, in metres; NaN with fewer than two such means or where the overlap does not fall.
 double overlap_length_m(const std::vector<LevelOverlap>& overlaps, double cell_size_m);

@@ -26,15 +26,15 @@ constexpr std::array<Step, 6> kFaces{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 
 constexpr std::array<Step, 4> kCorners{{{1, 1, 0}, {-1, 1, 0}, {1, -1, 0}, {-1, -1, 0}}};
 
 // The components of a plane by flood fill.
-std::vector<Cloud> flood_fill(const BitPlane& plane, const Boundaries& b, bool corners) {
+std::vector<ConnectedCloud> flood_fill(const BitPlane& plane, const Boundaries& b, bool corners) {
     const Extent e = plane.extent();
     std::vector<bool> done(e.cells());
-    std::vector<Cloud> clouds;
+    std::vector<ConnectedCloud> clouds;
     for (std::size_t start = 0; start < e.cells(); ++start) {
         const int i0 = int(start % std::size_t(e.x)), j0 = int(start / std::size_t(e.x) % std::size_t(e.y)),
                   k0 = int(start / std::size_t(e.x) / std::size_t(e.y));
         if (done[start] || !plane.get(i0, j0, k0)) continue;
-        Cloud cloud;
+        ConnectedCloud cloud;
         cloud.lowest = cloud.highest = k0;
         bool low[3] = {}, high[3] = {};
         std::deque<Step> open{{i0, j0, k0}};
@@ -77,7 +77,7 @@ std::vector<Cloud> flood_fill(const BitPlane& plane, const Boundaries& b, bool c
     return clouds;
 }
 
-void expect_same(const std::vector<Cloud>& got, const std::vector<Cloud>& expected) {
+void expect_same(const std::vector<ConnectedCloud>& got, const std::vector<ConnectedCloud>& expected) {
     ASSERT_EQ(got.size(), expected.size());
     for (std::size_t n = 0; n < got.size(); ++n) {
         SCOPED_TRACE(n);
@@ -106,7 +106,7 @@ TEST(Clouds, MatchFloodFill) {
         expect_same(clouds_3d(cld.view(), b), flood_fill(cld, b, false));
         // What the shadow's edges sum up to is the perimeter of the state.
         std::uint64_t edges = 0;
-        for (const Cloud& cloud : clouds_2d(shadow.view(), b)) edges += cloud.edges;
+        for (const ConnectedCloud& cloud : clouds_2d(shadow.view(), b)) edges += cloud.edges;
         EXPECT_EQ(edges, count_cloud(shadow.view(), b).edges);
     }
 }
@@ -114,12 +114,12 @@ TEST(Clouds, MatchFloodFill) {
 TEST(Clouds, CentroidsGoAroundPeriodicSides) {
     BitPlane cld({70, 5, 1});
     for (const int i : {68, 69, 0, 1}) cld.set(i, 2, 0, true);
-    const std::vector<Cloud> around =
+    const std::vector<ConnectedCloud> around =
         clouds_2d(cld.view(), {Boundary::periodic, Boundary::open, Boundary::open});
     ASSERT_EQ(around.size(), 1u);
     EXPECT_NEAR(std::remainder(around[0].x, 70), 0, 1e-9);
     EXPECT_NEAR(around[0].y, 2.5, 1e-12);
-    const std::vector<Cloud> apart = clouds_2d(cld.view(), {});
+    const std::vector<ConnectedCloud> apart = clouds_2d(cld.view(), {});
     ASSERT_EQ(apart.size(), 2u);
     EXPECT_NEAR(apart[0].x, 1, 1e-12);
     EXPECT_NEAR(apart[1].x, 69, 1e-12);
@@ -135,9 +135,9 @@ TEST(CloudSizes, FindAKnownExponent) {
         cumulative.push_back(sum += std::pow(double(a), -kExponent));
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> uniform(0, sum);
-    std::vector<Cloud> clouds;
+    std::vector<ConnectedCloud> clouds;
     for (int n = 0; n < 100'000; ++n) {
-        Cloud cloud;
+        ConnectedCloud cloud;
         cloud.cells = range.first + std::uint64_t(std::ranges::lower_bound(cumulative, uniform(random)) -
                                                   cumulative.begin());
         cloud.edges = std::uint64_t(std::llround(4000 * std::sqrt(double(cloud.cells))));
@@ -177,8 +177,8 @@ TEST(Organisation, OfRandomPointsIsAHalf) {
     std::uniform_real_distribution<double> x(0, extent.x), y(0, extent.y);
     double sum = 0;
     for (int draw = 0; draw < 20; ++draw) {
-        std::vector<Cloud> points(1000);
-        for (Cloud& point : points) {
+        std::vector<ConnectedCloud> points(1000);
+        for (ConnectedCloud& point : points) {
             point.cells = 1;
             point.x = x(random);
             point.y = y(random);
@@ -186,7 +186,7 @@ TEST(Organisation, OfRandomPointsIsAHalf) {
         sum += organisation(points, extent, periodic).iorg;
     }
     EXPECT_NEAR(sum / 20, 0.5, 0.007);
-    std::vector<Cloud> grid(32 * 16);
+    std::vector<ConnectedCloud> grid(32 * 16);
     for (int n = 0; n < 32 * 16; ++n) {
         grid[std::size_t(n)].cells = 1;
         grid[std::size_t(n)].x = n % 32 * 128;
@@ -194,7 +194,7 @@ TEST(Organisation, OfRandomPointsIsAHalf) {
     }
     EXPECT_LT(organisation(grid, extent, periodic).iorg, 0.05);
     // Two clouds of four columns, eight apart: the definitions by hand.
-    std::vector<Cloud> two(2);
+    std::vector<ConnectedCloud> two(2);
     two[0].cells = two[1].cells = 4;
     two[1].x = 8;
     const Organisation pair = organisation(two, {100, 100, 1}, {});

@@ -65,7 +65,7 @@ TEST(NullScene, StatisticsAreThoseInClosedForm) {
         before = copy_of(cld);
         if (step % 100 != 0) continue;  // independent of each other
         ++snapshots;
-        for (const Cloud& cloud : clouds_2d(cld, automaton.options().boundaries))
+        for (const ConnectedCloud& cloud : clouds_2d(cld, automaton.options().boundaries))
             if (cloud.cells <= 4) ++small[cloud.cells];
         overlap += level_overlaps(cld).front().mean;
         correlation +=
