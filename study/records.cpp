@@ -14,6 +14,7 @@
 #include <sys/file.h>
 
 #include "automaton/checkpoint.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/random.h"
 
@@ -217,26 +218,31 @@ std::vector<float> Records::series(const RunRecord& record) const {
     return values;
 }
 
+struct Shard::Files {
+    Descriptor records, series;
+};
+
 Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of)
     : path_(folder / "shards" / fmt::format("{:04}-of-{:04}.jsonl", number, of)),
       series_path_(std::filesystem::path(path_).replace_extension(".series")),
+      files_(std::make_unique<Files>()),
       flushed_(std::chrono::steady_clock::now()) {
     std::error_code error;
     std::filesystem::create_directories(path_.parent_path(), error);
     if (error)
         throw Error(ErrorCode::io,
                     path_.parent_path().string() + ": cannot make the folder: " + error.message());
-    file_ = open_regular_file(path_, O_WRONLY | O_APPEND | O_CREAT);
-    series_file_ = open_regular_file(series_path_, O_WRONLY | O_APPEND | O_CREAT);
-    if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    files_->records = open_regular_file(path_, O_WRONLY | O_APPEND | O_CREAT);
+    files_->series = open_regular_file(series_path_, O_WRONLY | O_APPEND | O_CREAT);
+    if (::flock(files_->records.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
         throw Error(ErrorCode::io, path_.string() +
                                        ": another sweep is writing this shard: wait for its end, or choose "
                                        "another --out or --shard");
     const auto [bytes, values] = Records().read_shard(path_);
     bytes_ = bytes;
     values_ = values * sizeof(float);
-    if (::ftruncate(file_.get(), off_t(bytes_)) != 0) fail(path_, errno);
-    if (::ftruncate(series_file_.get(), off_t(values_)) != 0) fail(series_path_, errno);
+    if (::ftruncate(files_->records.get(), off_t(bytes_)) != 0) fail(path_, errno);
+    if (::ftruncate(files_->series.get(), off_t(values_)) != 0) fail(series_path_, errno);
 }
 
 Shard::~Shard() {
@@ -270,8 +276,8 @@ void Shard::flush() {
     waiting_ = 0;
     flushed_ = std::chrono::steady_clock::now();
     // The series first: a record never refers to what is not there.
-    append(series_path_, series_file_, std::as_bytes(std::span(series)), values_);
-    append(path_, file_, std::as_bytes(std::span(lines)), bytes_);
+    append(series_path_, files_->series, std::as_bytes(std::span(series)), values_);
+    append(path_, files_->records, std::as_bytes(std::span(lines)), bytes_);
 }
 
 }  // namespace nephos

@@ -13,14 +13,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "study/run_statistics.h"
 #include "study/sweep_plan.h"
-
-#include "core/descriptor.h"
 
 namespace nephos {
 
@@ -80,7 +79,8 @@ class Shard {
     void flush_if_due();
 
     std::filesystem::path path_, series_path_;
-    Descriptor file_, series_file_;
+    struct Files;
+    std::unique_ptr<Files> files_;          // open while this object lives
     std::uint64_t bytes_ = 0, values_ = 0;  // that are written
     std::string lines_;
     std::vector<float> series_;

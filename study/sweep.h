@@ -5,8 +5,8 @@
 // computes the other runs. Whatever the number of workers, the shards, their order, kills and resumptions, the tables have
 // the same bytes.
 //
-//     DIR/sweep.toml      the plan, canonical; `nephos sweep DIR/sweep.toml` repeats it
-//     DIR/scene.toml      the scene with every key
+//     DIR/sweep (TOML)    the plan, canonical; `nephos sweep` of it repeats it
+//     DIR/scene (TOML)    the scene with every key
 //     DIR/shards/         records of the runs (records.h)
 //     DIR/runs.csv, points.csv, failures.csv, series.nc, manifest.json     tables.h
 //     DIR/timing.csv      seconds of each call: the only file that differs from machine to machine
@@ -47,13 +47,13 @@ struct SweepReport {
 // Returns what is done of a plan in some folders.
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job);
 
-// Runs what is missing. Writes sweep.toml, scene.toml and the shard; not the tables. Throws Error(io) on a full disk: what is on
+// Runs what is missing. Writes the plan, the scene and the shard; not the tables. Throws Error(io) on a full disk: what is on
 // disk is whole; Error(usage) when the folder's records are of another version. Precondition: the process has one thread.
 SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<void(const SweepProgress&)>& progress,
                       const std::function<bool()>& stop);
 
-// Reads the plan of a folder from its sweep.toml. Throws SceneErrors and Error(io).
+// Reads the plan of a folder from its sweep file. Throws SceneErrors and Error(io).
 SweepPlan plan_of_folder(const std::filesystem::path& folder);
 
 }  // namespace nephos

@@ -91,7 +91,7 @@ class SweepPlan {
     Scene scene_of(const PlannedRun& run) const;
     // Returns the options of scene_of() as a command line that repeats the run: "--set KEY=VALUE ... --seed N".
     std::string command_of(const PlannedRun& run) const;
-    // Returns the canonical sweep file; its scene is "scene.toml", scene_text().
+    // Returns the canonical sweep file; the scene that it names is scene_text().
     std::string to_toml() const;
 
   private:

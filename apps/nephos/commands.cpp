@@ -34,6 +34,7 @@ void add_commands(CLI::App& app, Action& action) {
     add_render_command(app, action);
     add_sweep_command(app, action);
     add_merge_command(app, action);
+    add_fit_command(app, action);
     add_validate_command(app, action);
     add_info_command(app, action);
     add_hash_command(app, action);
