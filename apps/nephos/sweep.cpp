@@ -322,7 +322,7 @@ void add_sweep_command(CLI::App& app, Action& action) {
         "  nephos sweep fair.toml --axis field.background.ext=0.05..0.4:8 --axis "
         "field.background.act=log:1e-6..1e-2:5\n"
         "  nephos sweep fair.toml --axis field.background.ext=0.05..0.4 --points 64 --until cover.se=0.002\n"
-        "  nephos sweep plan.toml --out sweep --shard 2/4");
+        "  nephos sweep PLAN.toml --out sweep --shard 2/4");
     command->callback([a, &action] { action = [a] { return sweep(*a); }; });
 }
 
