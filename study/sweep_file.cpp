@@ -152,6 +152,18 @@ Axis parse_axis(const std::string& text) {
     return axis;
 }
 
+StopAt parse_stop(const std::string& text) {
+    const std::size_t equals = text.find('=');
+    if (equals == text.npos || !text.substr(0, equals).ends_with(".se"))
+        throw Error(ErrorCode::usage, fmt::format("'{}' is not like cover.se=0.002", text));
+    const StopAt stop{text.substr(0, equals - 3),
+                      parse_number(std::string_view(text).substr(equals + 1), text)};
+    statistic_index(stop.statistic);
+    if (!(stop.standard_error > 0))
+        throw Error(ErrorCode::usage, fmt::format("'{}': a standard error is above 0", text));
+    return stop;
+}
+
 SweepOptions read_sweep_file(const std::filesystem::path& path) {
     SweepOptions options;
     read_toml_file(path, [&](TomlTable& table) {

@@ -21,6 +21,9 @@ bool is_sweep_file(const std::filesystem::path& path);
 // "KEY+KEY=..." moves several keys together. Throws Error(usage) that quotes the text and says what was expected.
 Axis parse_axis(const std::string& text);
 
+// Reads "STATISTIC.se=X" of the command line. Throws Error(usage) that says what was expected.
+StopAt parse_stop(const std::string& text);
+
 // Returns `count` values from `from` to `to`, both included, evenly apart or with even ratios, as TOML. Precondition:
 // count >= 2.
 std::vector<std::string> spread_values(double from, double to, std::uint64_t count, Scale scale);

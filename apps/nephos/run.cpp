@@ -6,6 +6,8 @@
 #include <memory>
 #include <utility>
 
+#include "study/run_until.h"
+#include "study/sweep_file.h"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -27,6 +29,8 @@ struct RunArguments {
     bool no_render = false, statistics_only = false, checkpoint = false, video = false, resume = false,
          overwrite = false, needs = false;
     double checkpoint_every_s = 60;
+    std::optional<StopAt> until;
+    std::optional<std::uint64_t> max_steps;
     DeviceArguments device;
     WorkArguments work;
 };
@@ -162,6 +166,8 @@ int run(const RunArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     if (a.checkpoint && !a.statistics_only)
         throw Error(ErrorCode::usage, "--checkpoint is for --statistics-only: other runs always leave one");
+    if (a.until && !a.statistics_only) throw Error(ErrorCode::usage, "--until needs --statistics-only");
+    if (a.max_steps && !a.until) throw Error(ErrorCode::usage, "--max-steps is for --until");
     if (a.statistics_only && (a.frames || a.video))
         throw Error(ErrorCode::usage, "--statistics-only writes no frames: leave out --frames and --video");
     if (a.needs) {
@@ -182,7 +188,15 @@ int run(const RunArguments& a) {
     };
     observer.stop = [] { return pending_signal() != 0; };
     defer_signals();
-    const RunReport report = run_scene(std::move(settings), observer);
+    std::optional<SeriesReport> series;
+    const auto run_all = [&] {
+        if (!a.until) return run_scene(std::move(settings), observer);
+        const std::uint64_t most = a.max_steps.value_or(10 * settings.scene.steps);
+        UntilReport until = run_until(std::move(settings), *a.until, most, observer);
+        if (until.run.complete) series = until.series;
+        return until.run;
+    };
+    const RunReport report = run_all();
     bar.reset();
     if (report.restarted && !a.work.quiet)
         print_note(report.folder.string() +
@@ -194,7 +208,12 @@ int run(const RunArguments& a) {
     } else if (report.complete && !a.work.quiet) {
         print_report(report);
     }
-    if (report.complete) return 0;
+    if (series && !a.work.quiet)
+        print_note(fmt::format("{}: {}; mean {:.6g}, standard error {:.2g} after {} steps{}",
+                               a.until->statistic, series->regime, series->mean, series->error,
+                               report.last_step,
+                               series->reached ? "" : ": not what --until asks for; give more --max-steps"));
+    if (report.complete) return series && !series->reached ? int(ErrorCode::check) : 0;
     print_note(fmt::format("stopped after {} of {} steps and {}; the same command with --resume goes on",
                            report.steps_reported == 0 ? 0 : report.steps_reported - 1, report.last_step,
                            counted(std::uint64_t(report.frames), "frame")));
@@ -228,6 +247,13 @@ void add_run_command(CLI::App& app, Action& action) {
         "--overwrite", a->overwrite,
         "Start anew although the folder holds an interrupted run, a run of another scene or seed, or files "
         "that no run wrote");
+    add_value(*command, "--until", "STAT.se=X",
+              "With --statistics-only: go on, half as many steps again and again, until the standard error "
+              "of a mean "
+              "is X, such as cover.se=0.002; exit status 1 when --max-steps do not do",
+              [a](const std::string& text) { a->until = parse_stop(text); });
+    add_value(*command, "--max-steps", "N", "Most steps of --until (default: ten times time.steps)",
+              [a](const std::string& text) { a->max_steps = parse_unsigned(text, 1, kMaxSteps); });
     add_value(*command, "--checkpoint-every", "S",
               "Seconds between checkpoints (default: 60); Ctrl-C always leaves one",
               [a](const std::string& text) { a->checkpoint_every_s = parse_real(text, 0, 1e9); });

@@ -47,15 +47,6 @@ std::pair<std::uint64_t, std::uint64_t> parse_steps(const std::string& text) {
     return {min, parse_unsigned(text.substr(dots + 2), min, kMaxSteps)};
 }
 
-StopAt parse_until(const std::string& text) {
-    const std::size_t equals = text.find('=');
-    if (equals == text.npos || !text.substr(0, equals).ends_with(".se"))
-        throw Error(ErrorCode::usage, fmt::format("'{}' is not like cover.se=0.002", text));
-    StopAt stop{text.substr(0, equals - 3), parse_real(text.substr(equals + 1), 1e-300, 1e300)};
-    statistic_index(stop.statistic);
-    return stop;
-}
-
 Design parse_design(const std::string& text) {
     for (const Design design :
          {Design::grid, Design::list, Design::random, Design::latin_hypercube, Design::sobol})
@@ -289,7 +280,7 @@ void add_sweep_command(CLI::App& app, Action& action) {
               [a](const std::string& text) { a->steps = parse_steps(text); });
     add_value(*command, "--until", "STAT.se=X",
               "Go on, up to B steps, until the standard error of a statistic is X",
-              [a](const std::string& text) { a->until = parse_until(text); });
+              [a](const std::string& text) { a->until = parse_stop(text); });
     add_value(*command, "--clouds-every", "N",
               "Steps between snapshots whose clouds are measured (default: 10; 0: none)",
               [a](const std::string& text) { a->clouds_every = parse_unsigned(text, 0, 1'000'000); });

@@ -206,6 +206,25 @@ class Sweep(Case):
         self.assertLess(float(run["cover_se"]), 0.001)
         self.assertGreater(int(run["steps"]), 500)
 
+    def test_a_run_until_its_error_is_small(self):
+        until = ("run", self.null, "--statistics-only", "--until", "cover.se=0.002", "--max-steps", "6000", "--out", "run")
+        result = self.call(*until)
+        self.assertRegex(result.stderr, r"cover: steady; mean 0\.\d+, standard error 0\.00\d+ after \d+ steps\n")
+        table = rows(self.folder / "run/statistics.csv")
+        self.assertGreater(len(table), 401)
+        self.assertFalse((self.folder / "run/checkpoint.nephos").exists())
+        mean = float(result.stderr.split("mean ")[1].split(",")[0])
+        self.assertLess(abs(mean - cover(0.002, 0.1)), 0.01)
+        # The same steps as without interruption, and nothing to do when it is called again.
+        self.call("run", self.null, "--statistics-only", "--set", f"time.steps={len(table) - 1}", "--out", "whole")
+        self.assertEqual((self.folder / "run/statistics.csv").read_bytes(), (self.folder / "whole/statistics.csv").read_bytes())
+        again = self.call(*until, "--resume")
+        self.assertIn("complete already", again.stderr)
+        self.assertEqual(len(rows(self.folder / "run/statistics.csv")), len(table))
+        self.assertIn("not what --until asks for", self.call(*until[:4], "cover.se=1e-6", "--max-steps", "450", "--out", "short",
+                                                             status=1).stderr)
+        self.refused(2, *until[:4], "clouds_per_km2.se=1", "--out", "no", says="not measured at every step")
+
     def test_series_are_readable(self):
         from scipy.io import netcdf_file
         self.sweep("a", "-j", "2")
