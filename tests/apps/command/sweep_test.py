@@ -10,8 +10,9 @@ import signal
 import subprocess
 import time
 import unittest
+from xml.etree import ElementTree
 
-from case import Case, NEPHOS
+from case import Case, NEPHOS, SOURCE
 
 # Without vapour cells are independent: the cover is known in closed form.
 NULL = """\
@@ -241,6 +242,20 @@ class Sweep(Case):
                 levels = file.variables["cloud_area_fraction_in_atmosphere_layer"][number]
                 self.assertAlmostEqual(float(levels.mean()), float(run["cloud_fraction"]), places=6)
             self.assertTrue(math.isclose(float(file.variables["time"][1]), 10))
+
+    def test_the_files_of_the_page_work(self):
+        page = SOURCE / "docs/research"
+        result = self.call("sweep", page / "fair.toml", "--axis", "field.background.ext=0.05..0.4:8", "--replicates", "3",
+                           "--steps", "300..3000", "--dry-run")
+        self.assertIn("8 points (grid; field.background.ext: 8 values) x 3 replicates = 24 runs of 300 to 3000 steps",
+                      result.stdout)
+        self.sweep("a", "-j", "2")
+        self.call("fit", page / "cover.toml", "--runs", "8", "--out", "fit", "-j", "2")
+        for arguments in (["points", "a/points.csv", "field.background.ext", "cover", "0.1", "0.01"],):
+            picture = subprocess.run(["/usr/bin/python3", page / "plot.py", *arguments], cwd=self.folder, text=True,
+                                     capture_output=True, check=True).stdout
+            root = ElementTree.fromstring(picture)
+            self.assertEqual(len(root.findall("{http://www.w3.org/2000/svg}circle")), 3)
 
     def test_a_full_disk_stops_cleanly(self):
         limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
