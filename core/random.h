@@ -30,6 +30,8 @@ enum class Domain : std::uint32_t {
     skies = 4,          // which clouds enter, and where
     layers = 5,         // seeds of the layers of a scene
     particles = 6,      // rain and snow
+    sweep = 7,          // seeds and points of studies of many runs
+    null_model = 8,     // random shadows that statistics are compared with
 };
 
 // The draws of a block of 8x8x8 cells: number of sparse events, sparse events, dense draws of hum, act, ext.

@@ -23,6 +23,8 @@
 namespace nephos {
 namespace {
 
+using Parameters = std::vector<std::pair<std::string, std::string>>;
+
 bool is_frame_of(const std::string& file, const std::string& name) {
     if (!file.starts_with(name + "_")) return false;
     const std::size_t dot = file.rfind('.');
@@ -98,6 +100,28 @@ std::string range_text(const EarlierRun& run) {
                        run.render ? "" : ", without pictures");
 }
 
+// Names the keys in which two scenes differ, at most three of them.
+std::string changed_keys(const EarlierRun& earlier, const RunSettings& settings) {
+    std::vector<std::string> keys;
+    const auto value_in = [](const Parameters& parameters, const std::string& key) -> std::string {
+        const auto found = std::ranges::find(parameters, key, &Parameters::value_type::first);
+        return found == parameters.end() ? "its default" : found->second;
+    };
+    const Parameters now = parameters(settings.scene);
+    for (const Parameters* list : {&earlier.parameters, &now}) {
+        for (const auto& [key, value] : *list) {
+            const std::string was = value_in(earlier.parameters, key), is = value_in(now, key);
+            if (was == is) continue;
+            std::string text = fmt::format("`{}` was {}, now {}", key, was, is);
+            if (std::ranges::count(keys, text) == 0) keys.push_back(std::move(text));
+        }
+    }
+    if (keys.empty()) return "the initial state differs";
+    const std::size_t more = keys.size() > 3 ? keys.size() - 3 : 0;
+    keys.resize(keys.size() - more);
+    return fmt::format("{}{}", fmt::join(keys, "; "), more > 0 ? fmt::format("; and {} more", more) : "");
+}
+
 // Describes what makes the scene another one than that of the earlier run.
 std::string difference(const EarlierRun& earlier, const RunSettings& settings) {
     Scene other_video = settings.scene;
@@ -106,9 +130,22 @@ std::string difference(const EarlierRun& earlier, const RunSettings& settings) {
         return settings.scene.frames.video ? "only the video differs: the first call was without --video"
                                            : "only the video differs: the first call was with --video";
     }
-    return earlier.simulation_hash == settings.simulation_hash
-               ? "the simulation is the same, density, frames or pictures differ"
-               : "the simulation itself differs";
+    return changed_keys(earlier, settings);
+}
+
+// Returns the scene of an earlier run, which may have fewer steps. Throws Error(usage) when it is another one.
+Scene scene_before(const EarlierRun& earlier, const RunSettings& settings, const RunFolder& folder) {
+    Scene before = settings.scene;
+    before.steps = std::min(earlier.scene_steps, settings.scene.steps);
+    if (earlier.simulation_hash == settings.simulation_hash && earlier.scene_hash == scene_hash(before))
+        return before;
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("{}: was started with another scene (hash {}, now {}; {}). Resume with the scene, "
+                    "--seed, --set and --video of the first call (manifest.json has the scene under "
+                    "\"scene_text\"; only time.steps may be larger), or start anew with --overwrite",
+                    folder.folder.string(), earlier.scene_hash, settings.scene_hash,
+                    difference(earlier, settings)));
 }
 
 // The range that the same command line gives for the scene as it was.
@@ -172,7 +209,7 @@ void remove_leftovers(const RunFolder& folder) {
     for (const std::string& part : frame_parts(folder)) remove_if(part, is_frame);
 }
 
-void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
+void refuse_to_lose(const RunFolder& folder, const RunSettings& settings) {
     const std::vector<std::filesystem::path> files = earlier_files(folder);
     if (files.empty()) return;
     if (files.back() != folder.manifest()) {
@@ -195,8 +232,9 @@ void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
         !is_begun_statistics(folder.statistics())) {
         refuse(folder, "the folder holds a statistics.csv that is not of a run");
     }
-    if (earlier.scene_hash != scene_hash) {
-        refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed", earlier.name));
+    if (earlier.scene_hash != settings.scene_hash) {
+        refuse(folder, fmt::format("it holds a run of '{}' with another scene or seed ({})", earlier.name,
+                                   changed_keys(earlier, settings)));
     }
     if (!is_there(folder.checkpoint())) return;
     if (!is_checkpoint(folder.checkpoint())) {
@@ -211,27 +249,23 @@ void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash) {
                     earlier.steps_reported == 0 ? 0 : earlier.steps_reported - 1, earlier.range.last_step));
 }
 
-void require_checkpoint(const RunFolder& folder) {
-    if (std::filesystem::exists(folder.checkpoint())) return;
-    throw Error(ErrorCode::io, folder.checkpoint().string() +
-                                   ": is not there, so there is nothing to resume: run without --resume");
+Resumption find_resumption(const RunSettings& settings, const RunFolder& folder) {
+    if (std::filesystem::exists(folder.checkpoint())) return Resumption::go_on;
+    if (!std::filesystem::exists(folder.manifest())) return Resumption::nothing_there;
+    const EarlierRun earlier = read_manifest(folder.manifest());
+    const Scene before = scene_before(earlier, settings, folder);
+    const bool same = earlier.range == settings.range && earlier.render == settings.render;
+    if (same && earlier.complete && settings.statistics_only) return Resumption::complete;
+    if (!same && earlier.range != range_before(settings, before))
+        refuse(folder, "it holds a run of the same scene for " + range_text(earlier));
+    return Resumption::start_anew;
 }
+
+void remove_checkpoint(const RunFolder& folder) { remove_file(folder.checkpoint()); }
 
 Simulation resumed_simulation(const RunSettings& settings, const RunFolder& folder) {
     const EarlierRun earlier = read_manifest(folder.manifest());
-    Scene before = settings.scene;
-    // A run of the very same scene may have been written before manifests named the scene's steps.
-    if (earlier.scene_hash != settings.scene_hash)
-        before.steps = std::min(earlier.scene_steps, settings.scene.steps);
-    if (earlier.simulation_hash != settings.simulation_hash || earlier.scene_hash != scene_hash(before)) {
-        throw Error(
-            ErrorCode::usage,
-            fmt::format("{}: was started with another scene (hash {}, now {}; {}). Resume with the scene, "
-                        "--seed, --set and --video of the first call (manifest.json has the scene under "
-                        "\"scene_text\"; only time.steps may be larger), or start anew with --overwrite",
-                        folder.folder.string(), earlier.scene_hash, settings.scene_hash,
-                        difference(earlier, settings)));
-    }
+    const Scene before = scene_before(earlier, settings, folder);
     const SimulationRange range = range_before(settings, before);
     const EarlierRun now{.render = settings.render, .range = range};
     if (earlier.range != range || earlier.render != settings.render) {

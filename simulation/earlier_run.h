@@ -46,10 +46,20 @@ void remove_leftovers(const RunFolder& folder);
 
 // Throws Error(usage) when a new run would overwrite something that it cannot make again: an interrupted run,
 // which may hold hours of work, a run of another scene, or a file that no run wrote.
-void refuse_to_lose(const RunFolder& folder, const std::string& scene_hash);
+void refuse_to_lose(const RunFolder& folder, const RunSettings& settings);
 
-// Throws Error(io) when there is no checkpoint to go on from.
-void require_checkpoint(const RunFolder& folder);
+// What `--resume` finds in a folder.
+enum class Resumption {
+    nothing_there,  // no run: it starts
+    start_anew,  // the same scene, perhaps with fewer steps, but no checkpoint: it starts, and nothing else is lost
+    go_on,     // a checkpoint
+    complete,  // the same run, complete and without a checkpoint: there is nothing to do
+};
+// Throws Error(usage) when the folder holds a run of another scene, Error(io) when its manifest cannot be read.
+Resumption find_resumption(const RunSettings& settings, const RunFolder& folder);
+
+// Removes the checkpoint of a complete run. Throws Error(io).
+void remove_checkpoint(const RunFolder& folder);
 
 // Returns the simulation of the folder's checkpoint. The scene may be that of the first call with a larger
 // `time.steps`; frames that were written before then name the hash of that scene. Throws Error(usage) when it is

@@ -15,6 +15,7 @@
 #include "core/math.h"
 #include "core/random.h"
 #include "density/combine.h"
+#include "scenes/format/writer.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -147,8 +148,12 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
                      {"state_hash", state.state_hash}};
     json["bounds"] = bounds_json(scene, whole_box(scene));
     if (!scene.layers.empty()) json["layers"] = layers_json(settings, folder);
-    json["files"] = {{"statistics", relative(settings, folder.statistics())},
-                     {"checkpoint", relative(settings, folder.checkpoint())}};
+    Json keys = Json::object();
+    for (const auto& [key, value] : parameters(scene)) keys[key] = value;
+    json["parameters"] = std::move(keys);
+    json["files"] = {{"statistics", relative(settings, folder.statistics())}};
+    if (settings.checkpoint || !state.complete)
+        json["files"]["checkpoint"] = relative(settings, folder.checkpoint());
     if (state.complete && settings.render && scene.frames.video) {
         json["files"]["video"] = relative(settings, folder.video());
     }
@@ -238,6 +243,10 @@ EarlierRun read_manifest(const std::filesystem::path& path) {
         run.range.first_frame = json.at("range").at("first_frame").get<int>();
         run.range.last_frame = json.at("range").at("last_frame").get<int>();
         run.steps_reported = json.at("steps").at("reported").get<std::uint64_t>();
+        if (json.contains("parameters")) {
+            for (const auto& [key, value] : json.at("parameters").items())
+                run.parameters.emplace_back(key, value.get<std::string>());
+        }
         return run;
     } catch (const std::ios_base::failure& failure) {
         throw ReadFailure(path, failure.code().message());

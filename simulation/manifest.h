@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "automaton/automaton.h"
@@ -63,6 +64,8 @@ struct EarlierRun {
     bool render = true;
     SimulationRange range;
     std::uint64_t steps_reported = 0;
+    // Of scenes/format/writer.h: keys of its scene that are not at their defaults.
+    std::vector<std::pair<std::string, std::string>> parameters;
 };
 
 // Throws Error(io) when the file cannot be read or is no manifest.

@@ -111,12 +111,12 @@ class Recorder : public SimulationSink {
 
     // Frames and statistics first: what the checkpoint goes on from is then always there. So is the
     // manifest's rain, which no other file has.
-    void save(Simulation& simulation, double wall_s) {
+    void save(Simulation& simulation, double wall_s, bool with_checkpoint = true) {
         output_.finish();
         statistics_->save();
         for (StatisticsFile& file : layer_statistics_) file.save();
         if (!state_.rain.empty()) write_manifest(false, wall_s);
-        write_checkpoint(folder_.checkpoint(), simulation.save());
+        if (with_checkpoint) write_checkpoint(folder_.checkpoint(), simulation.save());
         write_manifest(false, wall_s);
     }
 
@@ -220,7 +220,7 @@ RunReport report_of(const Recorder& recorder, const RunSettings& settings, const
     }
     report.files.push_back(std::move(statistics));
     report.files.push_back({"manifest", {folder.manifest()}});
-    report.files.push_back({"checkpoint", {folder.checkpoint()}});
+    if (settings.checkpoint || !state.complete) report.files.push_back({"checkpoint", {folder.checkpoint()}});
     return report;
 }
 
@@ -233,7 +233,7 @@ void report_progress(const RunObserver& observer, const Simulation& simulation, 
                        settings.range.last_frame - settings.range.first_frame + 1, phase});
 }
 
-// Up to the end or until it is stopped; leaves a checkpoint in both cases.
+// Up to the end or until it is stopped; leaves a checkpoint, at the end only where one is wanted.
 void simulate(Simulation& simulation, Recorder& recorder, const RunSettings& settings,
               const RunObserver& observer, const FolderLock& lock, Clock::time_point begin) {
     Clock::time_point saved = Clock::now();
@@ -246,8 +246,29 @@ void simulate(Simulation& simulation, Recorder& recorder, const RunSettings& set
         saved = Clock::now();
     }
     lock.require_in_place();
-    recorder.save(simulation, seconds_since(begin));
+    recorder.save(simulation, seconds_since(begin), settings.checkpoint || !simulation.finished());
     report_progress(observer, simulation, recorder, settings, "simulating");
+}
+
+// The report of a run that was complete before and has no checkpoint that could be read: of statistics alone.
+RunReport report_of_complete(const RunSettings& settings, const RunFolder& folder) {
+    RunReport report;
+    report.scene = settings.scene.name;
+    report.scene_hash = settings.scene_hash;
+    report.simulation_hash = settings.simulation_hash;
+    report.folder = settings.folder;
+    report.last_step = settings.range.last_step;
+    report.complete = report.skipped = true;
+    report.first_step = report.steps_taken = settings.range.last_step;
+    report.steps_reported = settings.range.last_step + 1;
+    read_statistics(
+        folder.statistics(), report.steps_reported,
+        [&](std::uint64_t, std::string_view, const StateHash& hash) { report.state_hash = hash.hex(); });
+    RunFiles statistics{"statistics", {folder.statistics()}};
+    for (const LayerOptions& layer : settings.scene.layers)
+        statistics.files.push_back(folder.statistics(layer.name));
+    report.files = {std::move(statistics), {"manifest", {folder.manifest()}}};
+    return report;
 }
 
 // Completes the video, when there is to be one and it is not there yet; false when it was stopped.
@@ -314,11 +335,14 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
                       settings.range.last_frame >= settings.range.first_frame;
     const RunFolder folder{settings.folder, settings.scene.name};
     if (settings.render && wants_video(settings.scene)) require_ffmpeg();
-    if (settings.resume) require_checkpoint(folder);
+    const Resumption resumption =
+        settings.resume ? find_resumption(settings, folder) : Resumption::nothing_there;
+    if (resumption == Resumption::complete) return report_of_complete(settings, folder);
+    settings.resume = resumption == Resumption::go_on;
     Recorder recorder(settings);  // opens the device
 
     const FolderLock lock(folder.folder);
-    if (!settings.resume && !settings.overwrite) refuse_to_lose(folder, settings.scene_hash);
+    if (resumption == Resumption::nothing_there && !settings.overwrite) refuse_to_lose(folder, settings);
     if (lock.held()) remove_leftovers(folder);
     Simulation simulation = settings.resume
                                 ? resumed_simulation(settings, folder)
@@ -347,9 +371,11 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
         lock.require_in_place();
         recorder.require_frames("was removed while the run was writing");
         recorder.write_manifest(true, seconds_since(begin));
+        if (!settings.checkpoint) remove_checkpoint(folder);
     }
     RunReport report = report_of(recorder, settings, simulation);
     report.first_step = first_step;
+    report.restarted = resumption == Resumption::start_anew;
     return report;
 }
 

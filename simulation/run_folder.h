@@ -9,7 +9,7 @@
 //     DIR/statistics.csv               a row a step
 //     DIR/statistics/LAYER.csv         a row a step of each layer
 //     DIR/manifest.json                what was run, and every file with its moment
-//     DIR/checkpoint.nephos            where to go on
+//     DIR/checkpoint.nephos            where to go on; a complete run of statistics alone leaves none
 //
 // Every file appears complete or not at all, but for statistics.csv, to which each checkpoint appends whole
 // rows. A run that was interrupted and resumed at any moment leaves the same content as one that was not;
@@ -57,7 +57,10 @@ struct RunSettings {
     bool render = true;            // pictures too
     DeviceOptions device{};        // what draws them, whatever scene.frames says
     std::filesystem::path folder;
-    bool resume = false;             // go on from the folder's checkpoint
+    // Go on from the folder's checkpoint; start where there is none, of nothing or of the same scene; do nothing where the
+    // same run is complete.
+    bool resume = false;
+    bool checkpoint = true;          // leave the checkpoint of a complete run, to lengthen it later
     bool overwrite = false;          // start anew although the folder holds what would be lost
     double checkpoint_every_s = 60;  // wall time between checkpoints; 0 = after every piece of work
 
@@ -91,6 +94,8 @@ struct RunReport {
     std::filesystem::path folder;
     std::uint64_t last_step = 0;  // that the run has or will have
     bool complete = false;
+    bool skipped = false;              // it was complete before, without a checkpoint: nothing was done
+    bool restarted = false;            // there was an earlier run, but no checkpoint to go on from
     std::uint64_t first_step = 0;      // 0, or where it was resumed
     std::uint64_t steps_taken = 0;     // by the automaton, those ahead of the results included
     std::uint64_t steps_reported = 0;  // rows in statistics.csv

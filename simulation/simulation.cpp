@@ -57,6 +57,7 @@ class TotalStatistics {
         total.cover = 1 - clear_;
         total.base_m = base_;
         total.top_m = top_;
+        total.base_mean_m = total.top_mean_m = total.perimeter_m = std::numeric_limits<double>::quiet_NaN();
         total.mean_density = volume_ > 0 ? density_ / volume_ : 0;
         return total;
     }
@@ -78,7 +79,7 @@ LayerParts parts_for(SimulationResults results) {
 
 CloudStatistics no_automaton() {
     CloudStatistics none;
-    none.base_m = none.top_m = std::numeric_limits<double>::quiet_NaN();
+    none.base_m = none.top_m = none.base_mean_m = none.top_mean_m = std::numeric_limits<double>::quiet_NaN();
     return none;
 }
 
@@ -266,7 +267,8 @@ DensityGrid Simulation::moisture_of(std::size_t layer, std::uint64_t step) {
 }
 
 std::optional<DensityGrid> Simulation::moisture_at(std::size_t layer, const Moment& moment) {
-    const bool detailed = scene_.layers.empty() ? scene_.density.detail.enabled : layer_detail(scene_, layer).enabled;
+    const bool detailed =
+        scene_.layers.empty() ? scene_.density.detail.enabled : layer_detail(scene_, layer).enabled;
     if (!detailed || !remembers_planes(layer)) return std::nullopt;
     DensityGrid before = moisture_of(layer, moment.step);
     if (moment.fraction == 0) return before;
@@ -346,7 +348,7 @@ Simulation::PastLayer Simulation::past_of(std::size_t number) const {
     Lattice planes;
     if (const Automaton* automaton = layer.automaton()) {
         state.statistics = cloud_statistics(automaton->hum(), automaton->act(), automaton->cld(),
-                                            automaton->options().placement);
+                                            automaton->options().placement, automaton->options().boundaries);
     }
     if (remembers_planes(number)) {
         planes.cld = copy_of(layer.automaton()->cld());

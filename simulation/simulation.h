@@ -49,7 +49,7 @@ struct LayerStep {
     std::size_t clouds = 0;  // in the sky, those that form or dissolve included
     std::size_t rain_areas = 0;
     double rain_mm_per_h = 0;  // the strongest of them
-    // Of a veil, of its voxels; of clouds drawn directly all 0, with base_m and top_m NaN.
+    // Of a veil, of its voxels; of clouds drawn directly all 0, with the heights NaN.
     CloudStatistics statistics;
     StateHash hash;
 };
@@ -60,7 +60,7 @@ struct StepResult {
     double time_s = 0;
     // mean_density is that of q at this step, NaN where no density is made (SimulationResults). Of several layers:
     // sums of cells; 1 - prod(1 - cover), which assumes random overlap; lowest base; highest top; mean density of
-    // all boxes.
+    // all boxes; NaN for the means over columns and the perimeter, which belong to one lattice.
     CloudStatistics statistics;
     StateHash hash;
     std::vector<LayerStep> layers;  // none in a scene without layers

@@ -16,7 +16,7 @@
 namespace nephos {
 namespace {
 
-constexpr std::uint32_t kHistoryVersion = 3;
+constexpr std::uint32_t kHistoryVersion = 4;
 
 // The range of a simulation, in the order of a checkpoint.
 void put_range(ByteWriter& writer, const SimulationRange& range) {
@@ -211,10 +211,11 @@ void Simulation::restore_history(const Checkpoint& checkpoint) {
     const std::uint8_t content = reader.get<std::uint8_t>(), expected = content_bits(scene_, results_);
     if ((content & 1) != (expected & 1)) {
         throw Error(ErrorCode::usage,
-                    (content & 1) != 0 ? "the checkpoint belongs to a run that drew detail or wrote the state: expected "
-                                         "`detail.enabled` or `density.write_state` as then"
-                                       : "the checkpoint belongs to a run without detail and without the state: expected "
-                                         "`detail.enabled = false` and no `density.write_state`, as then");
+                    (content & 1) != 0
+                        ? "the checkpoint belongs to a run that drew detail or wrote the state: expected "
+                          "`detail.enabled` or `density.write_state` as then"
+                        : "the checkpoint belongs to a run without detail and without the state: expected "
+                          "`detail.enabled = false` and no `density.write_state`, as then");
     }
     if (!continues(before, range_) || !same_window || content != expected) {
         throw Error(ErrorCode::usage,

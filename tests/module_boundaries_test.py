@@ -15,12 +15,15 @@ MAY_USE = {
     "core": set(),
     "automaton": {"core"},
     "seeds": {"core", "automaton"},
-    "density": {"core", "automaton"},
+    "statistics": {"core", "automaton"},
+    "density": {"core", "automaton", "statistics"},
     "render/options": {"core"},
     "render": {"core", "automaton", "density", "render/options"},
     "scenes/format": {"core", "automaton", "seeds", "density", "render/options"},
-    "simulation": {"core", "automaton", "seeds", "density", "render", "render/options", "scenes/format"},
-    "apps/nephos": {"core", "automaton", "seeds", "density", "render", "render/options", "scenes/format", "simulation"},
+    "simulation": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format"},
+    "study": {"core", "automaton", "statistics", "seeds", "density", "render/options", "scenes/format", "simulation"},
+    "apps/nephos": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format",
+                    "simulation", "study"},
 }
 # Folders of render/ from the lowest to the highest: each may include those of the rows above its own. The renderer's
 # own files, at the root of render/, may include all of them, and none of them may include these.

@@ -24,6 +24,7 @@ void add_commands(CLI::App& app, Action& action) {
         "  nephos run scenes/cumulus.toml --out out/cumulus     density grids, pictures, statistics\n"
         "  nephos run scenes/cumulus.toml --no-render --seed 7  the same without pictures, another seed\n"
         "  nephos render cloud.vdb --out cloud.png              a picture of any fog volume\n"
+        "  nephos sweep fair.toml --axis field.background.ext=0.05,0.1,0.2   tables of many runs\n"
         "  nephos validate my-scene.toml                        every problem of a scene at once\n"
         "\n"
         "Exit status: 0 done, 1 a check failed, 2 usage or scene, 3 input or output, 4 GPU,\n"
@@ -31,6 +32,9 @@ void add_commands(CLI::App& app, Action& action) {
     app.require_subcommand(1);
     add_run_command(app, action);
     add_render_command(app, action);
+    add_sweep_command(app, action);
+    add_merge_command(app, action);
+    add_fit_command(app, action);
     add_validate_command(app, action);
     add_info_command(app, action);
     add_hash_command(app, action);

@@ -14,6 +14,9 @@ namespace nephos {
 using Action = std::function<int()>;
 
 void add_run_command(CLI::App& app, Action& action);
+void add_sweep_command(CLI::App& app, Action& action);
+void add_fit_command(CLI::App& app, Action& action);
+void add_merge_command(CLI::App& app, Action& action);
 void add_render_command(CLI::App& app, Action& action);
 void add_validate_command(CLI::App& app, Action& action);
 void add_info_command(CLI::App& app, Action& action);

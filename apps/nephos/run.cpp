@@ -6,6 +6,8 @@
 #include <memory>
 #include <utility>
 
+#include "study/run_until.h"
+#include "study/sweep_file.h"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -24,9 +26,11 @@ struct RunArguments {
     SceneArguments scene;
     std::string out;
     std::optional<FrameRange> frames;
-    bool no_render = false, statistics_only = false, video = false, resume = false, overwrite = false,
-         needs = false;
+    bool no_render = false, statistics_only = false, checkpoint = false, video = false, resume = false,
+         overwrite = false, needs = false;
     double checkpoint_every_s = 60;
+    std::optional<StopAt> until;
+    std::optional<std::uint64_t> max_steps;
     DeviceArguments device;
     WorkArguments work;
 };
@@ -65,6 +69,7 @@ RunSettings settings_of(const RunArguments& a) {
     settings.device = device_options(a.device, settings.scene.frames);
     settings.resume = a.resume;
     settings.overwrite = a.overwrite;
+    settings.checkpoint = !a.statistics_only || a.checkpoint;
     settings.checkpoint_every_s = a.checkpoint_every_s;
     return settings;
 }
@@ -159,6 +164,10 @@ void print_json(const RunReport& report) {
 
 int run(const RunArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
+    if (a.checkpoint && !a.statistics_only)
+        throw Error(ErrorCode::usage, "--checkpoint is for --statistics-only: other runs always leave one");
+    if (a.until && !a.statistics_only) throw Error(ErrorCode::usage, "--until needs --statistics-only");
+    if (a.max_steps && !a.until) throw Error(ErrorCode::usage, "--max-steps is for --until");
     if (a.statistics_only && (a.frames || a.video))
         throw Error(ErrorCode::usage, "--statistics-only writes no frames: leave out --frames and --video");
     if (a.needs) {
@@ -179,14 +188,32 @@ int run(const RunArguments& a) {
     };
     observer.stop = [] { return pending_signal() != 0; };
     defer_signals();
-    const RunReport report = run_scene(std::move(settings), observer);
+    std::optional<SeriesReport> series;
+    const auto run_all = [&] {
+        if (!a.until) return run_scene(std::move(settings), observer);
+        const std::uint64_t most = a.max_steps.value_or(10 * settings.scene.steps);
+        UntilReport until = run_until(std::move(settings), *a.until, most, observer);
+        if (until.run.complete) series = until.series;
+        return until.run;
+    };
+    const RunReport report = run_all();
     bar.reset();
+    if (report.restarted && !a.work.quiet)
+        print_note(report.folder.string() +
+                   ": the earlier run left no checkpoint to go on from, so it started anew "
+                   "(--checkpoint leaves one)");
+    if (report.skipped && !a.work.quiet) print_note(report.folder.string() + ": is complete already");
     if (a.work.json) {
         print_json(report);
     } else if (report.complete && !a.work.quiet) {
         print_report(report);
     }
-    if (report.complete) return 0;
+    if (series && !a.work.quiet)
+        print_note(fmt::format("{}: {}; mean {:.6g}, standard error {:.2g} after {} steps{}",
+                               a.until->statistic, series->regime, series->mean, series->error,
+                               report.last_step,
+                               series->reached ? "" : ": not what --until asks for; give more --max-steps"));
+    if (report.complete) return series && !series->reached ? int(ErrorCode::check) : 0;
     print_note(fmt::format("stopped after {} of {} steps and {}; the same command with --resume goes on",
                            report.steps_reported == 0 ? 0 : report.steps_reported - 1, report.last_step,
                            counted(std::uint64_t(report.frames), "frame")));
@@ -204,16 +231,29 @@ void add_run_command(CLI::App& app, Action& action) {
               "Write only these frames, counted from 1; A.., ..B and A alone work too",
               [a](const std::string& text) { a->frames = parse_frames(text); });
     command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics");
-    command->add_flag("--statistics-only", a->statistics_only,
-                      "No frames at all, only statistics of every step, the manifest and the checkpoint; no "
-                      "density is made, so mean_density is empty");
+    command->add_flag(
+        "--statistics-only", a->statistics_only,
+        "No frames at all, only the manifest and statistics of every step (docs/research.md defines the "
+        "columns); no density is made, so mean_density is empty; no checkpoint is left when it is complete");
+    command->add_flag(
+        "--checkpoint", a->checkpoint,
+        "With --statistics-only: leave the checkpoint of the complete run, to lengthen it later");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
-    command->add_flag("--resume", a->resume,
-                      "Go on where an interrupted run stopped, or with more time.steps where a run ended");
+    command->add_flag(
+        "--resume", a->resume,
+        "Go on where an interrupted run stopped, or with more time.steps where a run ended; start "
+        "where nothing is there, and do nothing where the same run is complete");
     command->add_flag(
         "--overwrite", a->overwrite,
         "Start anew although the folder holds an interrupted run, a run of another scene or seed, or files "
         "that no run wrote");
+    add_value(*command, "--until", "STAT.se=X",
+              "With --statistics-only: go on, half as many steps again and again, until the standard error "
+              "of a mean "
+              "is X, such as cover.se=0.002; exit status 1 when --max-steps do not do",
+              [a](const std::string& text) { a->until = parse_stop(text); });
+    add_value(*command, "--max-steps", "N", "Most steps of --until (default: ten times time.steps)",
+              [a](const std::string& text) { a->max_steps = parse_unsigned(text, 1, kMaxSteps); });
     add_value(*command, "--checkpoint-every", "S",
               "Seconds between checkpoints (default: 60); Ctrl-C always leaves one",
               [a](const std::string& text) { a->checkpoint_every_s = parse_real(text, 0, 1e9); });

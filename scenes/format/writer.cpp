@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scenes/format/writer.h"
 
+#include <algorithm>
+#include <map>
+
 #include <xxhash.h>
 
 #include "scenes/format/schema.h"
@@ -103,6 +106,28 @@ void write_section(std::string& out, const Section& section, const void* owner, 
     }
 }
 
+using Parameters = std::vector<std::pair<std::string, std::string>>;
+
+// The keys of a canonical text with their paths; items of arrays of tables by their number.
+Parameters flattened(std::string_view text) {
+    Parameters all;
+    std::map<std::string, int> items;
+    std::string path;
+    while (!text.empty()) {
+        const std::string_view line = text.substr(0, text.find('\n'));
+        text.remove_prefix(std::min(text.size(), line.size() + 1));
+        if (line.starts_with("[[")) {
+            const std::string name(line.substr(2, line.size() - 4));
+            path = indexed(name, std::size_t(items[name]++)) + ".";
+        } else if (line.starts_with("[")) {
+            path = std::string(line.substr(1, line.size() - 2)) + ".";
+        } else if (const std::size_t equals = line.find(" = "); equals != line.npos) {
+            all.emplace_back(path + std::string(line.substr(0, equals)), line.substr(equals + 3));
+        }
+    }
+    return all;
+}
+
 std::string hash_of(std::string_view text) {
     const XXH128_hash_t hash = XXH3_128bits(text.data(), text.size());
     XXH128_canonical_t canonical;
@@ -187,6 +212,13 @@ std::string to_toml(const Scene& scene) {
     std::string out;
     write_section(out, scene_section(), &scene, {});
     return out;
+}
+
+std::vector<std::pair<std::string, std::string>> parameters(const Scene& scene) {
+    const Parameters defaults = flattened(to_toml(Scene{}));
+    Parameters changed = flattened(to_toml(scene));
+    std::erase_if(changed, [&](const auto& key) { return std::ranges::count(defaults, key) > 0; });
+    return changed;
 }
 
 std::string scene_hash(const Scene& scene) {

@@ -5,6 +5,8 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "scenes/format/scene.h"
 
@@ -25,6 +27,11 @@ std::string scene_hash(const Scene& scene);
 // the same hash. Of initial_state_file only its presence counts, because the folder may move; pass the hash
 // of the state in it as `initial_state_hash`.
 std::string simulation_hash(const Scene& scene, std::string_view initial_state_hash = {});
+
+// Returns the keys in which the scene differs from one with defaults alone, as pairs of path and TOML text in the order of
+// the reference: ("field.background.ext", "0.12"), ("field.scatters[0].count", "40"). With them and the defaults a scene is
+// complete. Thread-safe.
+std::vector<std::pair<std::string, std::string>> parameters(const Scene& scene);
 
 // Returns the value of a key as TOML on one line. A path without a value is empty.
 std::string value_text(const Key& key, const void* value);

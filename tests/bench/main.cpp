@@ -25,6 +25,7 @@
 #include "tests/bench/rain_bench.h"
 #include "tests/bench/render_bench.h"
 #include "tests/bench/seeds_bench.h"
+#include "tests/bench/study_bench.h"
 #include "tests/bench/veil_bench.h"
 
 namespace {
@@ -67,6 +68,7 @@ int main(int argc, char** argv) {
         {"memory", [&] { return memory_rows(source, programs / "../../bin/nephos"); }},
         {"veil", [] { return veil_bench_rows(); }},
         {"seeds", [] { return seeds_rows(); }},
+        {"study", [] { return study_rows(); }},
         {"ground", [] { return ground_rows(); }},
         {"rain", [] { return rain_rows(); }},
         {"atmosphere", [] { return atmosphere_rows(); }},

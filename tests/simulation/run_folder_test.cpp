@@ -164,9 +164,6 @@ std::string error_of(const RunSettings& s, ErrorCode code) {
 
 TEST_F(RunFolderTest, RefusesToResumeWhatDoesNotFit) {
     RunSettings s = settings("out");
-    s.resume = true;
-    EXPECT_NE(error_of(s, ErrorCode::io).find("checkpoint.nephos"), std::string::npos);
-    s.resume = false;
     ASSERT_FALSE(run_scene(s, stop_after(9)).complete);
     EXPECT_NE(error_of(s, ErrorCode::usage).find("--resume"), std::string::npos)
         << "it would throw work away";
@@ -184,6 +181,51 @@ TEST_F(RunFolderTest, RefusesToResumeWhatDoesNotFit) {
     RunSettings damaged = s;
     fs::resize_file(s.folder / "checkpoint.nephos", fs::file_size(s.folder / "checkpoint.nephos") / 2);
     EXPECT_NE(error_of(damaged, ErrorCode::io).find("checkpoint.nephos"), std::string::npos);
+}
+
+// One command for a driver: it starts, goes on, lengthens and skips, and never throws another run away.
+TEST_F(RunFolderTest, ResumingStatisticsStartsGoesOnAndSkips) {
+    const auto statistics = [&](const std::string& name, std::uint64_t steps) {
+        Scene scene = settings(name).scene;
+        scene.steps = steps;
+        RunSettings s = run_settings(scene, "small.toml");
+        s.folder = settings(name).folder;
+        s.statistics_only = s.resume = true;
+        s.render = s.checkpoint = false;
+        s.range = {steps, 1, 0};
+        return s;
+    };
+    const RunSettings s = statistics("out", 7);
+    ASSERT_FALSE(run_scene(s, stop_after(3)).complete);
+    EXPECT_TRUE(fs::exists(s.folder / "checkpoint.nephos")) << "an interrupted run leaves one";
+    RunReport report = run_scene(s, {});
+    EXPECT_TRUE(report.complete && !report.skipped && !report.restarted);
+    EXPECT_GT(report.first_step, 0u);
+    EXPECT_FALSE(fs::exists(s.folder / "checkpoint.nephos")) << "a complete one does not";
+    const std::string seven = content(s.folder / "statistics.csv"), hash = report.state_hash;
+    report = run_scene(s, {});
+    EXPECT_TRUE(report.complete && report.skipped);
+    EXPECT_EQ(report.state_hash, hash);
+    EXPECT_EQ(content(s.folder / "statistics.csv"), seven);
+
+    RunSettings longer = statistics("out", 9);
+    longer.checkpoint = true;
+    report = run_scene(longer, {});
+    EXPECT_TRUE(report.complete && report.restarted);
+    EXPECT_TRUE(content(s.folder / "statistics.csv").starts_with(seven));
+    longer = statistics("out", 11);
+    report = run_scene(longer, {});
+    EXPECT_TRUE(report.complete && !report.restarted);
+    EXPECT_EQ(report.first_step, 9u) << "the checkpoint that was asked for";
+
+    Scene scene = longer.scene;
+    scene.automaton.seed = 99;
+    RunSettings other = run_settings(scene, "small.toml");
+    other.folder = s.folder;
+    other.statistics_only = other.resume = true;
+    other.range = longer.range;
+    EXPECT_NE(error_of(other, ErrorCode::usage).find("`seed` was"), std::string::npos)
+        << "the key that differs";
 }
 
 TEST_F(RunFolderTest, RefusesToResumeWhenResultsAreGone) {

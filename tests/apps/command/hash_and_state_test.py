@@ -70,7 +70,7 @@ class State(Case):
         # Another state is another simulation.
         manifest = json.loads((self.folder / "out/manifest.json").read_text())
         self.call("state", self.scene, "--steps", "5", "--out", "state.vdb")
-        self.refused(2, "run", scene, "--no-render", "--out", "out", "--resume", says="the simulation itself differs")
+        self.refused(2, "run", scene, "--no-render", "--out", "out", "--resume", says="the initial state differs")
         self.call("run", scene, "--no-render", "--out", "out")
         again = json.loads((self.folder / "out/manifest.json").read_text())
         self.assertNotEqual(manifest["scene"]["simulation_hash"], again["scene"]["simulation_hash"])

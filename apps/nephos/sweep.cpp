@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// nephos sweep and nephos merge: many runs of a scene, and their tables.
+
+#include "study/sweep.h"
+
+#include <algorithm>
+#include <memory>
+#include <thread>
+
+#include "study/sweep_file.h"
+#include "study/tables.h"
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "apps/nephos/arguments.h"
+#include "apps/nephos/commands.h"
+#include "apps/nephos/terminal.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "simulation/layer_simulation.h"
+#include "simulation/memory.h"
+
+namespace nephos {
+namespace {
+
+struct SweepArguments {
+    SceneArguments scene;
+    std::string out, layer;
+    std::vector<std::string> axes;
+    std::optional<Design> design;
+    std::optional<std::uint64_t> points, replicates, seed;
+    bool common_seeds = false, dry_run = false, status = false, retry_failed = false, fail_fast = false,
+         overwrite = false;
+    std::optional<std::pair<std::uint64_t, std::uint64_t>> steps;
+    std::optional<StopAt> until;
+    std::optional<std::uint64_t> clouds_every;
+    std::uint32_t shard = 0, shards = 1;
+    int workers = 0;
+    WorkArguments work;
+};
+
+std::pair<std::uint64_t, std::uint64_t> parse_steps(const std::string& text) {
+    const std::size_t dots = text.find("..");
+    const std::uint64_t min = parse_unsigned(text.substr(0, dots), 20, kMaxSteps);
+    if (dots == text.npos) return {min, min};
+    return {min, parse_unsigned(text.substr(dots + 2), min, kMaxSteps)};
+}
+
+Design parse_design(const std::string& text) {
+    for (const Design design :
+         {Design::grid, Design::list, Design::random, Design::latin_hypercube, Design::sobol})
+        if (text == design_name(design)) return design;
+    throw Error(ErrorCode::usage,
+                fmt::format("'{}' is not one of grid, list, random, latin_hypercube and sobol", text));
+}
+
+void parse_shard(const std::string& text, SweepArguments& a) {
+    const std::size_t slash = text.find('/');
+    if (slash == text.npos) throw Error(ErrorCode::usage, fmt::format("'{}' is not like 0/4", text));
+    a.shards = std::uint32_t(parse_unsigned(text.substr(slash + 1), 1, 100'000));
+    a.shard = std::uint32_t(parse_unsigned(text.substr(0, slash), 0, a.shards - 1));
+}
+
+// A sweep file, or a scene with axes; what the command line names comes on top of both.
+SweepOptions options_of(const SweepArguments& a) {
+    SweepOptions options;
+    if (is_sweep_file(a.scene.file)) {
+        options = read_sweep_file(a.scene.file);
+    } else {
+        options.scene_file = a.scene.file;
+        if (!a.steps) {
+            const std::uint64_t steps =
+                std::max<std::uint64_t>(20, load_scene(a.scene, SceneUse::without_frames).steps);
+            options.steps = {steps, 10 * steps, {}};
+        }
+    }
+    options.overrides.insert(options.overrides.end(), a.scene.overrides.begin(), a.scene.overrides.end());
+    for (const std::string& axis : a.axes) options.axes.push_back(parse_axis(axis));
+    if (a.design) options.design = *a.design;
+    if (a.points) options.points = *a.points;
+    if (a.points && !a.design && options.design == Design::grid) options.design = Design::sobol;
+    if (a.replicates) options.replicates = std::uint32_t(*a.replicates);
+    if (a.scene.seed) options.seed = *a.scene.seed;
+    if (a.common_seeds) options.common_seeds = true;
+    if (a.steps) options.steps = {a.steps->first, a.steps->second, options.steps.until};
+    if (a.until) options.steps.until = a.until;
+    if (a.clouds_every) options.clouds_every = int(*a.clouds_every);
+    if (!a.layer.empty()) options.layer = a.layer;
+    return options;
+}
+
+std::string describe(const SweepPlan& plan) {
+    std::vector<std::string> axes;
+    for (const Axis& axis : plan.options().axes)
+        axes.push_back(axis.values.empty()
+                           ? fmt::format("{} from {} to {}", fmt::join(axis.keys, "+"),
+                                         number_text(axis.from), number_text(axis.to))
+                           : fmt::format("{}: {} values", fmt::join(axis.keys, "+"), axis.values.size()));
+    const StepRules& steps = plan.options().steps;
+    return fmt::format("{} points ({}{}{}) x {} replicates = {} runs of {}{} steps",
+                       human_count(plan.points()), design_name(plan.options().design),
+                       axes.empty() ? "" : "; ", fmt::join(axes, ", "), plan.options().replicates,
+                       human_count(plan.runs()), steps.min,
+                       steps.max > steps.min ? fmt::format(" to {}", steps.max) : "");
+}
+
+nlohmann::ordered_json report_json(const SweepPlan& plan, const SweepReport& report,
+                                   const std::string& folder) {
+    return {{"folder", folder},
+            {"points", plan.points()},
+            {"runs", report.progress.in_all},
+            {"done", report.progress.done - report.progress.failed},
+            {"failed", report.progress.failed},
+            {"before", report.progress.before},
+            {"unused", report.unused},
+            {"complete", report.complete},
+            {"wall_s", report.wall_s}};
+}
+
+void print_failures(const SweepReport& report, const std::string& folder) {
+    for (const std::string& failure : report.failures) print_message("  " + failure + "\n");
+    if (report.progress.failed > 0)
+        print_note(
+            fmt::format("{} of {} runs failed; {}/failures.csv has them with the command that repeats each, "
+                        "--retry-failed runs them again",
+                        report.progress.failed, report.progress.in_all, folder));
+}
+
+// Points that have no mean, and those whose errors disagree, are said and not left to the table.
+void print_warnings_of_points(const SweepPlan& plan, const Records& records) {
+    std::uint64_t unsteady = 0, differ = 0;
+    for (std::uint64_t point = 0; point < plan.points(); ++point) {
+        const PointSummary summary = summarise(plan, records, point);
+        unsteady += summary.regimes[std::size_t(Regime::not_steady)] > 0;
+        differ += summary.statistics[0].errors_differ;
+    }
+    if (unsteady > 0)
+        print_note(
+            fmt::format("{} of {} points have runs that are not steady, and no means: give more --steps",
+                        unsteady, plan.points()));
+    if (differ > 0)
+        print_note(fmt::format(
+            "at {} of {} points the errors of cover between seeds and within the runs differ 3-fold "
+            "(column cover_errors_differ)",
+            differ, plan.points()));
+}
+
+void write_and_print_tables(const SweepPlan& plan, const Records& records, const std::string& folder,
+                            bool quiet) {
+    const std::uint64_t missing = write_tables(plan, records, folder);
+    if (quiet) return;
+    print_warnings_of_points(plan, records);
+    if (missing > 0) print_note(fmt::format("{} of {} runs are missing yet", missing, plan.runs()));
+    Output output;
+    output.line(
+        fmt::format("{0}/points.csv  a row a point: means, 95 % intervals, regimes\n"
+                    "{0}/runs.csv    a row a run\n"
+                    "{0}/series.nc   every step of every run (NetCDF)",
+                    folder));
+}
+
+void check_memory_of(const SweepPlan& plan, int workers) {
+    std::size_t bytes = 0;
+    for (std::size_t n = 0; n < lattice_count(plan.scene()); ++n)
+        if (plan.scene().layers.empty() || !plan.scene().layers[n].is_veil)
+            bytes += Automaton::memory_bytes(automaton_options(plan.scene(), n));
+    require_memory(bytes * std::size_t(workers), fmt::format("{} workers with a run each", workers));
+}
+
+int sweep(const SweepArguments& a) {
+    const ThreadLimit limit(1);  // parallelism is between runs; and workers are forked from one thread
+    const SweepPlan plan(options_of(a));
+    SweepJob job;
+    job.folder = a.out.empty() ? "out/sweep-" + std::filesystem::path(a.scene.file).stem().string() : a.out;
+    job.workers = a.workers > 0 ? a.workers : int(std::max(1u, std::thread::hardware_concurrency()));
+    job.shard = a.shard;
+    job.shards = a.shards;
+    job.retry_failed = a.retry_failed;
+    job.fail_fast = a.fail_fast;
+    job.overwrite = a.overwrite;
+    const std::string folder = job.folder.string();
+    Output output;
+    if (a.dry_run || a.status) {
+        const SweepReport report = sweep_status(plan, job);
+        if (a.work.json) {
+            output.line(json_text(report_json(plan, report, folder)));
+            return 0;
+        }
+        output.line(describe(plan));
+        output.line(fmt::format("{}: {} of {} runs done, {} failed", folder,
+                                human_count(report.progress.done - report.progress.failed),
+                                human_count(report.progress.in_all), report.progress.failed));
+        for (std::uint64_t n = 0; a.dry_run && n < std::min<std::uint64_t>(plan.runs(), 10); ++n)
+            output.line(fmt::format("  point {} replicate {}: {}", plan.run(n).point, plan.run(n).replicate,
+                                    plan.command_of(plan.run(n))));
+        if (a.dry_run && plan.runs() > 10)
+            output.line(fmt::format("  ... and {} more", human_count(plan.runs() - 10)));
+        return 0;
+    }
+    check_memory_of(plan, job.workers);
+    if (!a.work.quiet && !a.work.json) print_note(describe(plan));
+    std::unique_ptr<ProgressBar> bar;
+    defer_signals();
+    const SweepReport report = run_sweep(
+        plan, job,
+        [&](const SweepProgress& progress) {
+            if (!bar)
+                bar = std::make_unique<ProgressBar>("run", progress.before, progress.in_all, !a.work.quiet);
+            bar->update(progress.done, progress.failed > 0 ? fmt::format("{} failed", progress.failed) : "");
+        },
+        [] { return pending_signal() != 0; });
+    bar.reset();
+    if (report.unused > 0 && !a.work.quiet)
+        print_note(fmt::format("{}: {} records are of other points or rules; they stay, and are in no table",
+                               folder, report.unused));
+    if (a.work.json) output.line(json_text(report_json(plan, report, folder)));
+    const bool quiet = a.work.quiet || a.work.json;
+    if (pending_signal() != 0) {
+        print_note(fmt::format("stopped after {} of {} runs; the same command goes on", report.progress.done,
+                               report.progress.in_all));
+        return 128 + pending_signal();
+    }
+    if (job.shards == 1) {
+        write_and_print_tables(plan, Records::read({job.folder}), folder, quiet);
+    } else if (!quiet) {
+        output.line(fmt::format("shard {} of {} is done; when all are, `nephos merge {}` makes the tables",
+                                job.shard, job.shards, folder));
+    }
+    print_failures(report, folder);
+    return report.progress.failed > 0 ? int(ErrorCode::check) : 0;
+}
+
+struct MergeArguments {
+    std::vector<std::string> folders;
+    std::string out;
+    WorkArguments work;
+};
+
+int merge(const MergeArguments& a) {
+    const ThreadLimit limit(1);
+    const SweepPlan plan = plan_of_folder(a.folders.front());
+    std::vector<std::filesystem::path> folders(a.folders.begin(), a.folders.end());
+    const Records records = Records::read(folders);
+    const std::string out = a.out.empty() ? a.folders.front() : a.out;
+    write_and_print_tables(plan, records, out, a.work.quiet);
+    return 0;
+}
+
+}  // namespace
+
+void add_sweep_command(CLI::App& app, Action& action) {
+    CLI::App* command =
+        app.add_subcommand("sweep", "Many runs of a scene over values of its keys: tables with error bars");
+    const auto a = std::make_shared<SweepArguments>();
+    command->add_option("SCENE", a->scene.file, "Scene, or sweep file (TOML with a key `scene`)")
+        ->required()
+        ->type_name("SCENE");
+    add_scene_changes(*command, a->scene);
+    command->add_option("-o,--out", a->out, "Folder to write to (default: out/sweep-NAME)")->type_name("DIR");
+    command
+        ->add_option("--axis", a->axes,
+                     "A key and its values: KEY=V,V,.. or KEY=FROM..TO:COUNT or KEY=log:FROM..TO:COUNT; "
+                     "without COUNT a "
+                     "range for a sampled design; KEY+KEY=.. moves keys together; may be repeated")
+        ->type_name("AXIS")
+        ->expected(1)
+        ->allow_extra_args(false)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    add_value(*command, "--design", "NAME", "grid (default), list, random, latin_hypercube or sobol",
+              [a](const std::string& text) { a->design = parse_design(text); });
+    add_value(*command, "--points", "N", "Number of points of a sampled design (alone: sobol)",
+              [a](const std::string& text) { a->points = parse_unsigned(text, 1, 10'000'000); });
+    add_value(*command, "-r,--replicates", "N", "Runs of a point, with a seed each (default: 5)",
+              [a](const std::string& text) { a->replicates = parse_unsigned(text, 1, 100'000); });
+    command->add_flag("--common-seeds", a->common_seeds, "Replicate r has the same seed at all points");
+    add_value(*command, "--steps", "A[..B]",
+              "At least A steps, and up to B while a run is not steady (default: the scene's, up to ten "
+              "times as many)",
+              [a](const std::string& text) { a->steps = parse_steps(text); });
+    add_value(*command, "--until", "STAT.se=X",
+              "Go on, up to B steps, until the standard error of a statistic is X",
+              [a](const std::string& text) { a->until = parse_stop(text); });
+    add_value(*command, "--clouds-every", "N",
+              "Steps between snapshots whose clouds are measured (default: 10; 0: none)",
+              [a](const std::string& text) { a->clouds_every = parse_unsigned(text, 0, 1'000'000); });
+    command->add_option("--layer", a->layer, "Layer whose lattice is measured, in a scene with several")
+        ->type_name("NAME");
+    add_value(*command, "-j,--workers", "N",
+              "Runs at a time, each in a process with one thread (default: all cores)",
+              [a](const std::string& text) { a->workers = int(parse_unsigned(text, 1, 1024)); });
+    add_value(*command, "--shard", "I/N",
+              "Only the I-th of N parts of the runs, I from 0; `nephos merge` makes the tables",
+              [a](const std::string& text) { parse_shard(text, *a); });
+    command->add_flag("--dry-run", a->dry_run, "Only check all values, and print what would be run");
+    command->add_flag("--status", a->status, "Only print how many runs are done");
+    command->add_flag("--retry-failed", a->retry_failed, "Run again what failed");
+    command->add_flag("--fail-fast", a->fail_fast, "End at the first run that fails");
+    command->add_flag("--overwrite", a->overwrite, "Throw the records in the folder away first");
+    add_json(*command, a->work);
+    add_quiet(*command, a->work);
+    command->footer(
+        "Writes DIR/points.csv (a row a point), runs.csv (a row a run), series.nc (every step), failures.csv "
+        "and\n"
+        "manifest.json; docs/research.md defines every column. The same command goes on where it was "
+        "stopped, and\n"
+        "computes only what is missing when an axis has grown. Means are given of steady and of pulsing runs "
+        "only.\n"
+        "Exit status 1: some runs failed; the others are in the tables.\n"
+        "\n"
+        "Examples:\n"
+        "  nephos sweep fair.toml --axis field.background.ext=0.05,0.1,0.2 --replicates 5 --out sweep\n"
+        "  nephos sweep fair.toml --axis field.background.ext=0.05..0.4:8 --axis "
+        "field.background.act=log:1e-6..1e-2:5\n"
+        "  nephos sweep fair.toml --axis field.background.ext=0.05..0.4 --points 64 --until cover.se=0.002\n"
+        "  nephos sweep PLAN.toml --out sweep --shard 2/4");
+    command->callback([a, &action] { action = [a] { return sweep(*a); }; });
+}
+
+void add_merge_command(CLI::App& app, Action& action) {
+    CLI::App* command = app.add_subcommand("merge", "Make the tables of a sweep from its shards");
+    const auto a = std::make_shared<MergeArguments>();
+    command->add_option("DIR", a->folders, "Folders of the sweep; the plan is that of the first")
+        ->required()
+        ->type_name("DIR");
+    command->add_option("-o,--out", a->out, "Folder for the tables (default: the first)")->type_name("DIR");
+    add_quiet(*command, a->work);
+    command->footer(
+        "The tables have the same bytes for any number of shards, in any order.\n"
+        "\n"
+        "Examples:\n"
+        "  nephos merge sweep\n"
+        "  nephos merge host-a/sweep host-b/sweep --out tables");
+    command->callback([a, &action] { action = [a] { return merge(*a); }; });
+}
+
+}  // namespace nephos

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "statistics/cloud_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+
+#ifndef HWY_DISABLED_TARGETS
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
+#endif
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "statistics/cloud_statistics.cpp"
+#include <hwy/foreach_target.h>
+// foreach_target.h must come first
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace nephos {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Returns the number of 1 bits in `count` words: std::popcount is a table look-up where the compiler may not assume
+// the instruction.
+std::uint64_t count_bits_of(const std::uint64_t* words, std::size_t count) {
+    const hn::ScalableTag<std::uint64_t> d;
+    const std::size_t lanes = hn::Lanes(d);
+    auto sums = hn::Zero(d);
+    std::size_t n = 0;
+    for (; n + lanes <= count; n += lanes) sums = hn::Add(sums, hn::PopulationCount(hn::LoadU(d, words + n)));
+    std::uint64_t total = hn::GetLane(hn::SumOfLanes(d, sums));
+    for (; n < count; ++n) total += hwy::PopCount(words[n]);
+    return total;
+}
+
+// Returns the number of bits that are 1 in a and 0 in b.
+std::uint64_t count_and_not_of(const std::uint64_t* a, const std::uint64_t* b, std::size_t count) {
+    const hn::ScalableTag<std::uint64_t> d;
+    const std::size_t lanes = hn::Lanes(d);
+    auto sums = hn::Zero(d);
+    std::size_t n = 0;
+    for (; n + lanes <= count; n += lanes)
+        sums = hn::Add(sums, hn::PopulationCount(hn::AndNot(hn::LoadU(d, b + n), hn::LoadU(d, a + n))));
+    std::uint64_t total = hn::GetLane(hn::SumOfLanes(d, sums));
+    for (; n < count; ++n) total += hwy::PopCount(a[n] & ~b[n]);
+    return total;
+}
+
+// Adds a level to the columns seen so far, and returns the number of columns that it adds.
+std::uint64_t add_level_to(std::uint64_t* seen, const std::uint64_t* level, std::size_t count) {
+    const hn::ScalableTag<std::uint64_t> d;
+    const std::size_t lanes = hn::Lanes(d);
+    auto sums = hn::Zero(d);
+    std::size_t n = 0;
+    for (; n + lanes <= count; n += lanes) {
+        const auto before = hn::LoadU(d, seen + n), bits = hn::LoadU(d, level + n);
+        sums = hn::Add(sums, hn::PopulationCount(hn::AndNot(before, bits)));
+        hn::StoreU(hn::Or(before, bits), d, seen + n);
+    }
+    std::uint64_t total = hn::GetLane(hn::SumOfLanes(d, sums));
+    for (; n < count; ++n) {
+        total += hwy::PopCount(level[n] & ~seen[n]);
+        seen[n] |= level[n];
+    }
+    return total;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace nephos
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephos {
+
+namespace {
+
+HWY_EXPORT(count_bits_of);
+HWY_EXPORT(count_and_not_of);
+HWY_EXPORT(add_level_to);
+
+std::uint64_t count_bits(const std::uint64_t* words, std::size_t count) {
+    return HWY_DYNAMIC_DISPATCH(count_bits_of)(words, count);
+}
+
+void require_one_extent(const BitPlaneView& a, const BitPlaneView& b) {
+    if (!(a.extent == b.extent)) throw Error(ErrorCode::usage, "the planes of a state differ in extent");
+}
+
+// Sets `edges` to 1 where a column and its eastern neighbour differ.
+void eastern_edges(const std::uint64_t* row, std::size_t words, int nx, bool periodic, std::uint64_t* edges) {
+    for (std::size_t n = 0; n < words; ++n) {
+        const std::uint64_t next = n + 1 < words ? row[n + 1] : 0;
+        edges[n] = row[n] ^ (row[n] >> 1 | next << 63);
+    }
+    const std::uint64_t last = std::uint64_t(1) << ((nx - 1) % 64), bit = row[words - 1] & last;
+    const bool wraps = periodic && (bit != 0) != ((row[0] & 1) != 0);
+    edges[words - 1] = (edges[words - 1] & ~last) | (wraps ? last : 0);
+}
+
+std::uint64_t count_edges(const std::uint64_t* shadow, const BitPlaneView& plane,
+                          const Boundaries& boundaries) {
+    const std::size_t words = plane.words_per_row;
+    const int ny = plane.extent.y;
+    std::vector<std::uint64_t> edges(words * std::size_t(ny));
+    for (int j = 0; j < ny; ++j) {
+        const std::size_t at = std::size_t(j) * words;
+        eastern_edges(shadow + at, words, plane.extent.x, boundaries.x == Boundary::periodic, &edges[at]);
+    }
+    std::uint64_t total = count_bits(edges.data(), edges.size());
+    for (int j = 0; j < ny; ++j) {
+        const bool last = j + 1 == ny;
+        const std::uint64_t* row = shadow + std::size_t(j) * words;
+        const std::uint64_t* north = last ? shadow : row + words;
+        std::uint64_t* to = &edges[std::size_t(j) * words];
+        const bool counted = !last || boundaries.y == Boundary::periodic;
+        for (std::size_t n = 0; n < words; ++n) to[n] = counted ? row[n] ^ north[n] : 0;
+    }
+    return total + count_bits(edges.data(), edges.size());
+}
+
+double face_m(CloudLimit limit, std::size_t level, const Placement& placement) {
+    return placement.origin_m.z + double(level + (limit == CloudLimit::top ? 1 : 0)) * placement.cell_size_m;
+}
+
+}  // namespace
+
+std::uint64_t count_cells(const BitPlaneView& plane) { return count_bits(plane.words, plane.word_count()); }
+
+std::uint64_t count_deaths(const BitPlaneView& before, const BitPlaneView& after) {
+    require_one_extent(before, after);
+    return HWY_DYNAMIC_DISPATCH(count_and_not_of)(before.words, after.words, before.word_count());
+}
+
+CloudCounts count_cloud(const BitPlaneView& cld, const Boundaries& boundaries) {
+    CloudCounts counts;
+    const std::size_t levels = std::size_t(cld.extent.z);
+    const std::size_t level_words = cld.words_per_row * std::size_t(cld.extent.y);
+    counts.extent = cld.extent;
+    counts.level_cells.resize(levels);
+    counts.bases.resize(levels);
+    counts.tops.resize(levels);
+    const auto add_level = [&](const std::uint64_t* level, std::vector<std::uint64_t>& seen) {
+        return HWY_DYNAMIC_DISPATCH(add_level_to)(seen.data(), level, level_words);
+    };
+    std::vector<std::uint64_t> seen(level_words);
+    for (std::size_t k = levels; k-- > 0;) {
+        const std::uint64_t* level = cld.words + k * level_words;
+        counts.level_cells[k] = count_bits(level, level_words);
+        counts.cells += counts.level_cells[k];
+        if (counts.level_cells[k] != 0) counts.tops[k] = add_level(level, seen);
+        counts.columns += counts.tops[k];
+    }
+    if (counts.columns == 0) return counts;
+    counts.edges = count_edges(seen.data(), cld, boundaries);
+    std::ranges::fill(seen, 0);
+    for (std::size_t k = 0; k < levels; ++k) {
+        if (counts.level_cells[k] != 0) counts.bases[k] = add_level(cld.words + k * level_words, seen);
+    }
+    return counts;
+}
+
+BitPlane shadow_of(const BitPlaneView& cld) {
+    BitPlane shadow({cld.extent.x, cld.extent.y, 1});
+    const std::size_t level_words = cld.words_per_row * std::size_t(cld.extent.y);
+    const std::span<std::uint64_t> to = shadow.words();
+    for (std::size_t k = 0; k < std::size_t(cld.extent.z); ++k) {
+        const std::uint64_t* level = cld.words + k * level_words;
+        for (std::size_t n = 0; n < level_words; ++n) to[n] |= level[n];
+    }
+    return shadow;
+}
+
+double mean_height_m(const CloudCounts& counts, CloudLimit limit, const Placement& placement) {
+    const std::vector<std::uint64_t>& levels = limit == CloudLimit::base ? counts.bases : counts.tops;
+    std::uint64_t columns = 0, sum = 0;
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        columns += levels[k];
+        sum += levels[k] * std::uint64_t(k);
+    }
+    if (columns == 0) return std::numeric_limits<double>::quiet_NaN();
+    return face_m(limit, 0, placement) + double(sum) / double(columns) * placement.cell_size_m;
+}
+
+double height_quantile_m(const CloudCounts& counts, CloudLimit limit, double q, const Placement& placement) {
+    const std::vector<std::uint64_t>& levels = limit == CloudLimit::base ? counts.bases : counts.tops;
+    std::uint64_t columns = 0, below = 0;
+    for (const std::uint64_t count : levels) columns += count;
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        below += levels[k];
+        if (below > 0 && double(below) >= q * double(columns)) return face_m(limit, k, placement);
+    }
+    return std::numeric_limits<double>::quiet_NaN();
+}
+
+CloudStatistics cloud_statistics(const CloudCounts& counts, const Placement& placement) {
+    CloudStatistics result;
+    result.cld = counts.cells;
+    result.cover = double(counts.columns) / (double(counts.extent.x) * double(counts.extent.y));
+    result.base_m = height_quantile_m(counts, CloudLimit::base, 0, placement);
+    result.top_m = height_quantile_m(counts, CloudLimit::top, 1, placement);
+    result.base_mean_m = mean_height_m(counts, CloudLimit::base, placement);
+    result.top_mean_m = mean_height_m(counts, CloudLimit::top, placement);
+    result.perimeter_m = double(counts.edges) * placement.cell_size_m;
+    result.mean_density = double(counts.cells) / double(counts.extent.cells());
+    return result;
+}
+
+CloudStatistics cloud_statistics(const BitPlaneView& hum, const BitPlaneView& act, const BitPlaneView& cld,
+                                 const Placement& placement, const Boundaries& boundaries) {
+    require_one_extent(hum, cld);
+    require_one_extent(act, cld);
+    CloudStatistics result = cloud_statistics(count_cloud(cld, boundaries), placement);
+    result.hum = count_cells(hum);
+    result.act = count_cells(act);
+    return result;
+}
+
+}  // namespace nephos
+#endif

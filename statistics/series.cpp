@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "statistics/series.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace nephos {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kBatch = 5;    // MSER-5
+constexpr double kLeastPulse = 0.3;  // of the second maximum
+constexpr double kLeastRise = 0.2;   // of it above the minimum before
+constexpr std::size_t kLeastPeriods = 6;
+constexpr double kLeastTimes = 20;  // tau in a steady series
+constexpr double kHalves = 3;       // standard errors between two halves
+constexpr double kSparse = 0.01, kOvercast = 0.95;
+
+double mean_of(std::span<const double> values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+}
+
+double variance_of(std::span<const double> values) {
+    const double mean = mean_of(values);
+    double sum = 0;
+    for (const double value : values) sum += (value - mean) * (value - mean);
+    return values.size() > 1 ? sum / double(values.size() - 1) : 0;
+}
+
+std::vector<double> batch_means(std::span<const double> values, std::size_t batch) {
+    std::vector<double> means;
+    for (std::size_t n = 0; n + batch <= values.size(); n += batch)
+        means.push_back(mean_of(values.subspan(n, batch)));
+    return means;
+}
+
+// The first maximum of rho that rises far enough above the lowest value before it: lag and height; lag 0 if none.
+struct Pulse {
+    std::size_t lag = 0;
+    double height = 0;
+};
+
+Pulse second_maximum(std::span<const double> rho) {
+    // The highest value that follows the first descent to a minimum: neighbouring bumps of noise do not end the search
+    // before rho falls again by the least rise.
+    double lowest = 1;
+    Pulse best;
+    for (std::size_t lag = 1; lag < rho.size(); ++lag) {
+        if (best.lag == 0 || rho[lag] > best.height) {
+            if (rho[lag] > kLeastPulse && rho[lag] > lowest + kLeastRise) best = {lag, rho[lag]};
+        }
+        if (best.lag != 0 && rho[lag] < best.height - kLeastRise) return best;
+        if (best.lag == 0) lowest = std::min(lowest, rho[lag]);
+    }
+    // A rise that goes on to the last lag has no maximum yet.
+    return {};
+}
+
+// tau of a whole series, of at most as many lags as half of it.
+double tau_of(std::span<const double> values) {
+    return integrated_time(autocorrelation(values, values.size() / 2));
+}
+
+bool halves_agree(std::span<const double> values, double error_of_mean) {
+    const std::size_t half = values.size() / 2;
+    const double difference = mean_of(values.first(half)) - mean_of(values.last(half));
+    // Each half has an error sqrt(2) larger than the whole, their difference one twice as large.
+    return std::abs(difference) <= kHalves * 2 * error_of_mean + 1e-12;
+}
+
+bool is_dead(std::span<const double> cover, bool can_revive) {
+    if (cover.empty() || cover.back() != 0) return false;
+    if (!can_revive) return true;
+    const std::size_t half = cover.size() / 2;
+    return cover.size() >= 100 && std::ranges::all_of(cover.last(half), [](double c) { return c == 0; });
+}
+
+Regime regime_of_level(double mean, Regime otherwise) {
+    if (mean < kSparse) return Regime::sparse;
+    return mean > kOvercast ? Regime::overcast : otherwise;
+}
+
+}  // namespace
+
+std::string_view regime_name(Regime regime) {
+    constexpr std::array<std::string_view, 6> kNames{"dead",    "sparse",   "steady",
+                                                     "pulsing", "overcast", "not_steady"};
+    return kNames.at(std::size_t(regime));
+}
+
+std::vector<double> autocorrelation(std::span<const double> series, std::size_t lags) {
+    std::vector<double> rho(lags + 1, 0.0);
+    rho[0] = 1;
+    if (series.empty()) return rho;
+    const double mean = mean_of(series);
+    std::vector<double> deviations;
+    deviations.reserve(series.size());
+    double variance = 0;
+    for (const double value : series) {
+        deviations.push_back(value - mean);
+        variance += deviations.back() * deviations.back();
+    }
+    // A constant has deviations of rounding alone.
+    if (variance <= 1e-24 * std::max(1.0, mean * mean) * double(series.size())) return rho;
+    for (std::size_t lag = 1; lag <= lags && lag < series.size(); ++lag) {
+        double sum = 0;
+        for (std::size_t n = 0; n + lag < deviations.size(); ++n) sum += deviations[n] * deviations[n + lag];
+        rho[lag] = sum / variance;
+    }
+    return rho;
+}
+
+double integrated_time(std::span<const double> rho) {
+    double sum = 0;
+    for (std::size_t lag = 1; lag + 1 < rho.size(); lag += 2) {
+        const double pair = rho[lag] + rho[lag + 1];
+        if (pair <= 0) {
+            sum += std::max(0.0, rho[lag]);
+            break;
+        }
+        sum += pair;
+    }
+    return 1 + 2 * sum;
+}
+
+std::size_t mser_5(std::span<const double> series) {
+    const std::vector<double> batches = batch_means(series, kBatch);
+    const std::size_t most = batches.size() / 2;
+    // Sums from the end: of what is left after a cut.
+    double sum = 0, squares = 0, best = std::numeric_limits<double>::infinity();
+    std::size_t cut = 0;
+    const double centre = batches.empty() ? 0 : batches.back();
+    for (std::size_t n = batches.size(); n-- > 0;) {
+        const double value = batches[n] - centre, count = double(batches.size() - n);
+        sum += value;
+        squares += value * value;
+        if (n > most) continue;
+        const double error = std::max(0.0, squares - sum * sum / count) / (count * count);
+        if (error <= best) {
+            best = error;
+            cut = n;
+        }
+    }
+    return cut * kBatch;
+}
+
+Judgement judge(std::span<const double> cover, bool can_revive) {
+    Judgement result;
+    if (is_dead(cover, can_revive)) {
+        result.regime = Regime::dead;
+        // From the first step on after which there is no cloud any more.
+        result.warm_up = cover.size();
+        while (result.warm_up > 0 && cover[result.warm_up - 1] == 0) --result.warm_up;
+        result.used = cover.size() - result.warm_up;
+        return result;
+    }
+    if (cover.size() < 4 * kBatch) return result;
+    result.warm_up = mser_5(cover);
+    // A cut at its limit says that the series still drifts where it ends.
+    const bool at_limit = result.warm_up / kBatch == cover.size() / kBatch / 2;
+    std::span<const double> left = cover.subspan(result.warm_up);
+    const std::vector<double> rho = autocorrelation(left, left.size() / 2);
+    const Pulse pulse = second_maximum(rho);
+    if (pulse.lag > 0) {
+        result.period = pulse.lag;
+        result.pulse = pulse.height;
+        // The first pulses after a start are not like the others: a common start fires all cells at once.
+        const std::size_t settled = std::max(result.warm_up, 2 * pulse.lag);
+        if (settled < cover.size()) {
+            const std::size_t periods = (cover.size() - settled) / pulse.lag;
+            result.warm_up = settled;
+            result.used = periods * pulse.lag;
+            if (periods >= kLeastPeriods) {
+                const std::span<const double> whole = cover.subspan(settled, result.used);
+                const std::vector<double> means = batch_means(whole, pulse.lag);
+                const double error = std::sqrt(variance_of(means) * tau_of(means) / double(means.size()));
+                if (halves_agree(batch_means(whole, pulse.lag), error)) result.regime = Regime::pulsing;
+            }
+        }
+        return result;
+    }
+    result.used = left.size();
+    const double tau = integrated_time(rho);
+    const double error = std::sqrt(variance_of(left) * tau / double(left.size()));
+    if (at_limit || double(left.size()) < kLeastTimes * tau || !halves_agree(left, error)) return result;
+    result.regime = regime_of_level(mean_of(left), Regime::steady);
+    return result;
+}
+
+SeriesMean mean_over(std::span<const double> series, const Judgement& judgement, std::size_t stride) {
+    const SeriesMean none{kNaN, kNaN, kNaN, kNaN, kNaN};
+    if (judgement.regime == Regime::not_steady || judgement.used == 0) return none;
+    // Values at the steps from warm_up on, before warm_up + used.
+    const std::size_t first = (judgement.warm_up + stride - 1) / stride;
+    const std::size_t last =
+        std::min(series.size(), (judgement.warm_up + judgement.used + stride - 1) / stride);
+    if (first >= last) return none;
+    const std::span<const double> values = series.subspan(first, last - first);
+    if (std::ranges::any_of(values, [](double value) { return std::isnan(value); })) return none;
+    SeriesMean result{mean_of(values), 0, std::sqrt(variance_of(values)), 1, double(values.size())};
+    const std::size_t batch = judgement.period / stride;
+    if (judgement.regime == Regime::pulsing && batch > 1 && values.size() >= 2 * batch) {
+        const std::vector<double> means = batch_means(values, batch);
+        result.error = std::sqrt(variance_of(means) * tau_of(means) / double(means.size()));
+        if (result.error > 0) {
+            result.effective = result.deviation * result.deviation / (result.error * result.error);
+            result.tau = double(values.size()) / result.effective * double(stride);
+        }
+        return result;
+    }
+    const double tau = tau_of(values);
+    result.tau = tau * double(stride);
+    result.effective = double(values.size()) / tau;
+    result.error = result.deviation * std::sqrt(tau / double(values.size()));
+    return result;
+}
+
+}  // namespace nephos

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// NetCDF classic files with 64-bit offsets (CDF-2, "NetCDF Classic and 64-bit Offset File Formats", OGC 10-092r3), which
+// ncdump, xarray, scipy, MATLAB, IDL and R read. Written here and not by libnetcdf, whose some thirty shared libraries would
+// add more to the start of every command than a short run takes (docs/adr/0012-study-files.md).
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace nephos {
+
+enum class NetcdfType { text = 2, int32 = 4, float32 = 5, float64 = 6 };
+
+struct NetcdfDimension {
+    std::string name;
+    std::uint64_t size = 0;
+};
+
+using NetcdfAttributes = std::vector<std::pair<std::string, std::string>>;
+
+struct NetcdfVariable {
+    std::string name;
+    NetcdfType type = NetcdfType::float32;
+    std::vector<std::size_t> dimensions;  // places in the file's list; the last runs fastest
+    NetcdfAttributes attributes;
+    // Hands over the values in order with any number of calls of `put`; missing ones are NaN (or INT32_MIN + 1 in
+    // attributes' _FillValue). Text: characters one after the other, as numbers.
+    std::function<void(const std::function<void(double)>& put)> values;
+};
+
+// Writes a file atomically; its bytes are a function of the arguments alone. Throws Error(io), Error(usage) when a
+// variable takes 4 GiB or more, which the format does not hold, or hands over another number of values than its
+// dimensions have.
+void write_netcdf(const std::filesystem::path& path, const std::vector<NetcdfDimension>& dimensions,
+                  const NetcdfAttributes& attributes, const std::vector<NetcdfVariable>& variables);
+
+// A variable of a file that was read, its values as doubles; a CDF-1, CDF-2 or CDF-5 file.
+struct NetcdfData {
+    std::vector<std::string> dimensions;
+    std::vector<std::uint64_t> sizes;
+    std::vector<double> values;
+};
+
+// Reads one variable: `name`, or the only one with two or more dimensions where it is empty. Throws Error(io) that says what
+// the file is instead (a NetCDF-4 file: `nccopy -k classic` converts it), or which variables it has.
+NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& name);
+
+}  // namespace nephos

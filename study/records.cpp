@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/records.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <span>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/file.h>
+
+#include "automaton/checkpoint.h"
+#include "core/descriptor.h"
+#include "core/error.h"
+#include "core/random.h"
+
+namespace nephos {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view kHashField = ",\"xxh3\":\"";
+constexpr double kFlushAfter_s = 1;
+constexpr int kFlushAfter = 64;
+
+std::string hash_text(std::string_view text) { return hash_of_bytes(std::as_bytes(std::span(text))).hex(); }
+
+// Closes an object with the hash of all before.
+std::string sealed(const Json& json) {
+    std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    text.pop_back();
+    const std::string hash = hash_text(text);
+    return text + std::string(kHashField) + hash + "\"}\n";
+}
+
+bool is_whole(std::string_view line) {
+    const std::size_t at = line.rfind(kHashField);
+    if (at == line.npos || !line.ends_with("\"}")) return false;
+    const std::size_t begin = at + kHashField.size();
+    return line.substr(begin, line.size() - 2 - begin) == hash_text(line.substr(0, at));
+}
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+double number_of(const Json& json) { return json.is_number() ? json.get<double>() : std::nan(""); }
+
+Json head(const PlannedRun& run, std::string_view status) {
+    return {{"run", run.id},
+            {"status", status},
+            {"statistics_version", NEPHOS_STATISTICS_VERSION},
+            {"random_stream_version", kRandomStreamVersion},
+            {"replicate", run.replicate},
+            {"seed", std::to_string(run.seed)},
+            {"values", run.values}};
+}
+
+Regime regime_of(const std::string& name) {
+    for (int n = 0; n <= int(Regime::not_steady); ++n)
+        if (regime_name(Regime(n)) == name) return Regime(n);
+    throw Error(ErrorCode::io, "'" + name + "' is not a regime");
+}
+
+RunRecord record_of(const Json& json) {
+    RunRecord record;
+    record.id = json.at("run").get<std::string>();
+    record.failed = json.at("status") != "done";
+    if (record.failed) {
+        record.message = json.at("message").get<std::string>();
+        return record;
+    }
+    RunResult& result = record.result;
+    result.regime = regime_of(json.at("regime").get<std::string>());
+    result.steps = json.at("steps").get<std::uint64_t>();
+    result.warm_up = json.at("warm_up_steps").get<std::uint64_t>();
+    result.used = json.at("used_steps").get<std::uint64_t>();
+    result.period = json.at("period_steps").get<std::uint64_t>();
+    for (std::size_t n = 0; n < kStatistics.size(); ++n) {
+        const Json& s = json.at("statistics").at(std::string(kStatistics[n].name));
+        result.statistics[n] = {number_of(s.at(0)), number_of(s.at(1)), number_of(s.at(2)),
+                                number_of(s.at(3)), number_of(s.at(4))};
+    }
+    result.profile = json.at("profile").get<std::vector<double>>();
+    result.sizes = json.at("sizes").get<std::vector<std::uint64_t>>();
+    result.snapshots = json.at("snapshots").get<std::uint64_t>();
+    result.state_hash = json.at("state_hash").get<std::string>();
+    record.series_offset = json.at("series_offset").get<std::uint64_t>();
+    return record;
+}
+
+[[noreturn]] void fail(const std::filesystem::path& path, int error) {
+    throw Error(ErrorCode::io, path.string() + ": cannot write: " + std::strerror(error));
+}
+
+// Appends, or leaves the file as it was.
+void append(const std::filesystem::path& path, const Descriptor& file, std::span<const std::byte> content,
+            std::uint64_t& size) {
+    int error = write_all(file.get(), content);
+    if (error == 0 && ::fdatasync(file.get()) != 0) error = errno;
+    if (error != 0) {
+        [[maybe_unused]] const int ignored = ::ftruncate(file.get(), off_t(size));
+        fail(path, error);
+    }
+    size += content.size();
+}
+
+}  // namespace
+
+std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset) {
+    Json json = head(run, "done");
+    json["regime"] = regime_name(result.regime);
+    json["steps"] = result.steps;
+    json["warm_up_steps"] = result.warm_up;
+    json["used_steps"] = result.used;
+    json["period_steps"] = result.period;
+    Json statistics = Json::object();
+    for (std::size_t n = 0; n < kStatistics.size(); ++n) {
+        const SeriesMean& s = result.statistics[n];
+        statistics[std::string(kStatistics[n].name)] = {number(s.mean), number(s.error), number(s.deviation),
+                                                        number(s.tau), number(s.effective)};
+    }
+    json["statistics"] = std::move(statistics);
+    json["profile"] = result.profile;
+    json["sizes"] = result.sizes;
+    json["snapshots"] = result.snapshots;
+    json["state_hash"] = result.state_hash;
+    json["series_offset"] = series_offset;
+    return sealed(json);
+}
+
+std::string failure_line(const PlannedRun& run, std::string_view message) {
+    Json json = head(run, "failed");
+    json["message"] = message;
+    return sealed(json);
+}
+
+std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesystem::path& path) {
+    require_regular_file(path);
+    std::ifstream stream(path, std::ios::binary);
+    const auto shard = std::uint32_t(files_.size());
+    files_.push_back(std::filesystem::path(path).replace_extension(".series"));
+    std::uint64_t bytes = 0, values = 0;
+    bool torn = false;
+    for (std::string line; std::getline(stream, line);) {
+        if (torn)
+            throw Error(ErrorCode::io,
+                        fmt::format("{}: the record at byte {} is damaged, but others follow it",
+                                    path.string(), bytes));
+        if (stream.eof() || !is_whole(line)) {
+            torn = true;
+            continue;
+        }
+        try {
+            const Json json = Json::parse(line);
+            if (json.at("statistics_version") != NEPHOS_STATISTICS_VERSION ||
+                json.at("random_stream_version") != kRandomStreamVersion)
+                throw Error(ErrorCode::usage,
+                            path.string() +
+                                ": has records of another version of the statistics or of the random stream: "
+                                "choose another --out, or give --overwrite");
+            RunRecord record = record_of(json);
+            record.shard = shard;
+            if (!record.failed)
+                values = std::max(values, record.series_offset + kSeries.size() * (record.result.steps + 1));
+            const auto known = runs_.find(record.id);
+            if (known == runs_.end()) {
+                runs_.emplace(record.id, std::move(record));
+            } else if (!record.failed || known->second.failed) {
+                known->second = std::move(record);
+            }
+        } catch (const nlohmann::json::exception&) {
+            throw Error(ErrorCode::io,
+                        fmt::format("{}: the record at byte {} is not of a run", path.string(), bytes));
+        }
+        bytes += line.size() + 1;
+    }
+    check_reading(stream, path);
+    return {bytes, values};
+}
+
+Records Records::read(const std::vector<std::filesystem::path>& folders) {
+    Records records;
+    for (const std::filesystem::path& folder : folders) {
+        std::vector<std::filesystem::path> files;
+        std::error_code error;
+        for (std::filesystem::directory_iterator at(folder / "shards", error), end; !error && at != end;
+             at.increment(error))
+            if (at->path().extension() == ".jsonl") files.push_back(at->path());
+        std::ranges::sort(files);
+        for (const std::filesystem::path& file : files) records.read_shard(file);
+    }
+    return records;
+}
+
+const RunRecord* Records::find(const std::string& id) const {
+    const auto found = runs_.find(id);
+    return found == runs_.end() ? nullptr : &found->second;
+}
+
+std::vector<float> Records::series(const RunRecord& record) const {
+    std::vector<float> values(kSeries.size() * (record.result.steps + 1));
+    const std::filesystem::path& path = files_[record.shard];
+    const Descriptor file = open_regular_file(path, O_RDONLY);
+    char* to = static_cast<char*>(static_cast<void*>(values.data()));
+    std::size_t left = values.size() * sizeof(float);
+    off_t at = off_t(record.series_offset * sizeof(float));
+    while (left > 0) {
+        const ssize_t got = ::pread(file.get(), to, left, at);
+        if (got < 0 && errno == EINTR) continue;
+        if (got <= 0)
+            throw Error(ErrorCode::io, path.string() + ": does not hold the series that the records name");
+        to += got;
+        at += got;
+        left -= std::size_t(got);
+    }
+    return values;
+}
+
+struct Shard::Files {
+    Descriptor records, series;
+};
+
+Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of)
+    : path_(folder / "shards" / fmt::format("{:04}-of-{:04}.jsonl", number, of)),
+      series_path_(std::filesystem::path(path_).replace_extension(".series")),
+      files_(std::make_unique<Files>()),
+      flushed_(std::chrono::steady_clock::now()) {
+    std::error_code error;
+    std::filesystem::create_directories(path_.parent_path(), error);
+    if (error)
+        throw Error(ErrorCode::io,
+                    path_.parent_path().string() + ": cannot make the folder: " + error.message());
+    files_->records = open_regular_file(path_, O_WRONLY | O_APPEND | O_CREAT);
+    files_->series = open_regular_file(series_path_, O_WRONLY | O_APPEND | O_CREAT);
+    if (::flock(files_->records.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        throw Error(ErrorCode::io, path_.string() +
+                                       ": another sweep is writing this shard: wait for its end, or choose "
+                                       "another --out or --shard");
+    const auto [bytes, values] = Records().read_shard(path_);
+    bytes_ = bytes;
+    values_ = values * sizeof(float);
+    if (::ftruncate(files_->records.get(), off_t(bytes_)) != 0) fail(path_, errno);
+    if (::ftruncate(files_->series.get(), off_t(values_)) != 0) fail(series_path_, errno);
+}
+
+Shard::~Shard() {
+    try {
+        flush();
+    } catch (const Error&) {
+        // Whoever wants to know has called flush().
+    }
+}
+
+void Shard::add(const PlannedRun& run, const RunResult& result) {
+    lines_ += record_line(run, result, values_ / sizeof(float) + series_.size());
+    series_.insert(series_.end(), result.series.begin(), result.series.end());
+    flush_if_due();
+}
+
+void Shard::add_failure(const PlannedRun& run, std::string_view message) {
+    lines_ += failure_line(run, message);
+    flush_if_due();
+}
+
+void Shard::flush_if_due() {
+    const double waited = std::chrono::duration<double>(std::chrono::steady_clock::now() - flushed_).count();
+    if (++waiting_ >= kFlushAfter || waited > kFlushAfter_s) flush();
+}
+
+void Shard::flush() {
+    if (lines_.empty()) return;
+    const std::string lines = std::exchange(lines_, {});
+    const std::vector<float> series = std::exchange(series_, {});
+    waiting_ = 0;
+    flushed_ = std::chrono::steady_clock::now();
+    // The series first: a record never refers to what is not there.
+    append(series_path_, files_->series, std::as_bytes(std::span(series)), values_);
+    append(path_, files_->records, std::as_bytes(std::span(lines)), bytes_);
+}
+
+}  // namespace nephos

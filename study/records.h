@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The results of a sweep on disk while it goes on, in files to which whole records are appended:
+//
+//     DIR/shards/0000-of-0001.jsonl   a line of JSON a run, at whose end its XXH3-128 stands
+//     DIR/shards/0000-of-0001.series  the series of the runs one after the other, 32-bit floats, little-endian
+//
+// A shard belongs to one process; several processes share no file. What a kill or a full disk leaves of a last record is
+// recognised by its hash and dropped. The order of records means nothing.
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "study/run_statistics.h"
+#include "study/sweep_plan.h"
+
+namespace nephos {
+
+// A run as a shard has it.
+struct RunRecord {
+    std::string id;
+    bool failed = false;
+    std::string message;              // of a failed run
+    RunResult result;                 // without its series
+    std::uint32_t shard = 0;          // place in the list of files that were read
+    std::uint64_t series_offset = 0;  // in values
+};
+
+// Returns a record as its line, with the newline; `series_offset` in values.
+std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset);
+std::string failure_line(const PlannedRun& run, std::string_view message);
+
+// All records of some shards, the last of each run; failed ones where there is no other.
+class Records {
+  public:
+    // Reads every shard of the folders. Throws Error(io) when a file cannot be read, or a record before the last one
+    // is damaged; Error(usage) when records are of another version of the statistics or of the random stream.
+    static Records read(const std::vector<std::filesystem::path>& folders);
+
+    const RunRecord* find(const std::string& id) const;
+    std::size_t size() const { return runs_.size(); }
+    // Returns the series of a run: kSeries one after the other, steps + 1 values each. Throws Error(io).
+    std::vector<float> series(const RunRecord& record) const;
+
+  private:
+    friend class Shard;
+    // Reads a shard, and gives back the bytes of its whole records and the values of series that they refer to.
+    std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path);
+
+    std::map<std::string, RunRecord, std::less<>> runs_;
+    std::vector<std::filesystem::path> files_;  // of series, by RunRecord::shard
+};
+
+// A shard while its process appends to it.
+class Shard {
+  public:
+    // Opens or creates the shard and takes away what is left of a torn record. Throws Error(io), also when another
+    // process holds it.
+    Shard(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of);
+    ~Shard();
+    Shard(const Shard&) = delete;
+    Shard& operator=(const Shard&) = delete;
+
+    // Keep a record for the next flush(), which follows by itself after 64 records or a second. Throw Error(io).
+    void add(const PlannedRun& run, const RunResult& result);
+    void add_failure(const PlannedRun& run, std::string_view message);
+    // Writes what was kept; when it returns, it is on the device. On a full disk throws Error(io), and what is on disk is
+    // whole.
+    void flush();
+
+  private:
+    void flush_if_due();
+
+    std::filesystem::path path_, series_path_;
+    struct Files;
+    std::unique_ptr<Files> files_;          // open while this object lives
+    std::uint64_t bytes_ = 0, values_ = 0;  // that are written
+    std::string lines_;
+    std::vector<float> series_;
+    int waiting_ = 0;
+    std::chrono::steady_clock::time_point flushed_;
+};
+
+}  // namespace nephos

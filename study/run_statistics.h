@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// One run of a study: its steps, its series, and of each statistic the mean with its standard error.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "statistics/cloud_sizes.h"
+#include "statistics/series.h"
+#include "study/sweep_plan.h"
+
+#include "scenes/format/scene.h"
+
+namespace nephos {
+
+// A statistic of a run; units stand in the names.
+struct StatisticInfo {
+    std::string_view name, unit, definition;
+};
+
+// In the order of the tables. Those of clouds, correlation and overlap are taken of a snapshot every `clouds_every` steps.
+inline constexpr std::array<StatisticInfo, 16> kStatistics{{
+    {"cover", "1", "fraction of the columns with a cloud cell, seen from above"},
+    {"cloud_fraction", "1", "fraction of the cells that are cloud"},
+    {"act_fraction", "1", "fraction of the cells that are active"},
+    {"hum_fraction", "1", "fraction of the cells that are humid"},
+    {"base_mean_m", "m", "mean cloud base of the columns with cloud"},
+    {"top_mean_m", "m", "mean cloud top of the columns with cloud"},
+    {"edge_per_km", "km-1", "length of the cloud edge seen from above, per area: km per km2"},
+    {"clouds_per_km2", "km-2", "clouds seen from above (4 neighbours), per area"},
+    {"cloud_area_m2", "m2", "mean area of a cloud seen from above"},
+    {"correlation_length_m", "m", "distance at which the correlation of the shadow falls to 1/e"},
+    {"overlap", "1", "overlap of neighbouring levels: 1 maximum, 0 random"},
+    {"lifetime_s", "s", "mean lifetime of a cloud cell, cells over deaths; without wind only"},
+    {"size_exponent", "1", "t of n(a) ~ a^-t by maximum likelihood"},
+    {"size_exponent_line", "1", "t of n(a) ~ a^-t by a line through half-octave bins"},
+    {"fractal_dimension", "1", "D of edge ~ area^(D/2)"},
+    {"pulse_period_s", "s", "period of a pulsing run"},
+}};
+
+// Returns the place of a statistic in kStatistics. Throws Error(usage) that lists the names and says which was meant.
+std::size_t statistic_index(std::string_view name);
+
+// Values of every step that a run keeps, as 32-bit floats; NaN without value.
+struct SeriesInfo {
+    std::string_view name, standard_name, unit, definition;
+};
+inline constexpr std::array<SeriesInfo, 7> kSeries{{
+    {"cloud_area_fraction", "cloud_area_fraction", "1", "cover"},
+    {"cloud_fraction", "", "1", "fraction of the cells that are cloud"},
+    {"act_fraction", "", "1", "fraction of the cells that are active"},
+    {"hum_fraction", "", "1", "fraction of the cells that are humid"},
+    {"cloud_base_altitude", "cloud_base_altitude", "m", "mean over the columns with cloud"},
+    {"cloud_top_altitude", "cloud_top_altitude", "m", "mean over the columns with cloud"},
+    {"edge_per_km", "", "km-1", "length of the cloud edge per area"},
+}};
+
+// What a finished run leaves.
+struct RunResult {
+    Regime regime = Regime::not_steady;
+    std::uint64_t steps = 0, warm_up = 0, used = 0, period = 0;
+    std::array<SeriesMean, kStatistics.size()> statistics;
+    std::vector<double> profile;       // mean cloud fraction of each level; empty where not steady
+    std::vector<std::uint64_t> sizes;  // clouds of each size bin over the snapshots that were used
+    std::uint64_t snapshots = 0;
+    std::string state_hash;     // after the last step
+    std::vector<float> series;  // kSeries one after the other, steps + 1 values each
+};
+
+// Runs the scene from its start by the rules of `options`, which has its `layer` set where the scene has layers. Throws as
+// LayerSimulation. The result does not depend on the number of threads.
+RunResult run_for_statistics(const Scene& scene, const SweepOptions& options);
+
+}  // namespace nephos

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/sweep.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <set>
+
+#include "study/sweep_file.h"
+#include "study/workers.h"
+#include <fmt/format.h>
+
+#include "core/atomic_file.h"
+#include "core/bytes.h"
+#include "core/error.h"
+
+namespace nephos {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kNamedFailures = 5;
+
+// By the value of the id: neither the order of runs nor a grown axis moves a run to another shard.
+bool is_of_shard(const PlannedRun& run, const SweepJob& job) {
+    return job.shards == 1 || std::stoull(run.id.substr(0, 8), nullptr, 16) % job.shards == job.shard;
+}
+
+std::string packed(const RunResult& result) {
+    ByteWriter writer;
+    writer.put(result.regime);
+    writer.put(std::array{result.steps, result.warm_up, result.used, result.period, result.snapshots});
+    writer.put(result.statistics);
+    writer.put(std::array{std::uint64_t(result.profile.size()), std::uint64_t(result.sizes.size()),
+                          std::uint64_t(result.series.size()), std::uint64_t(result.state_hash.size())});
+    writer.put_bytes(std::as_bytes(std::span(result.profile)));
+    writer.put_bytes(std::as_bytes(std::span(result.sizes)));
+    writer.put_bytes(std::as_bytes(std::span(result.series)));
+    writer.put_bytes(std::as_bytes(std::span(result.state_hash)));
+    const std::vector<std::byte> bytes = writer.take();
+    std::string text(bytes.size(), '\0');
+    std::memcpy(text.data(), bytes.data(), bytes.size());
+    return text;
+}
+
+RunResult unpacked(const std::string& text) {
+    ByteReader reader(std::as_bytes(std::span(text)));
+    RunResult result;
+    result.regime = reader.get<Regime>();
+    const auto counts = reader.get<std::array<std::uint64_t, 5>>();
+    result.steps = counts[0];
+    result.warm_up = counts[1];
+    result.used = counts[2];
+    result.period = counts[3];
+    result.snapshots = counts[4];
+    result.statistics = reader.get<decltype(result.statistics)>();
+    const auto sizes = reader.get<std::array<std::uint64_t, 4>>();
+    result.profile.resize(sizes[0]);
+    result.sizes.resize(sizes[1]);
+    result.series.resize(sizes[2]);
+    result.state_hash.resize(sizes[3]);
+    reader.get_bytes(std::as_writable_bytes(std::span(result.profile)));
+    reader.get_bytes(std::as_writable_bytes(std::span(result.sizes)));
+    reader.get_bytes(std::as_writable_bytes(std::span(result.series)));
+    reader.get_bytes(std::as_writable_bytes(std::span(result.state_hash)));
+    return result;
+}
+
+void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
+    write_atomically(folder / "scene.toml", plan.scene_text());
+    write_atomically(folder / "sweep.toml", plan.to_toml());
+}
+
+// Counts what is there. Goes over all runs, but keeps none.
+SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records& records) {
+    SweepReport report;
+    std::uint64_t known = 0;
+    for (std::uint64_t n = 0; n < plan.runs(); ++n) {
+        const PlannedRun run = plan.run(n);
+        const RunRecord* record = records.find(run.id);
+        known += record != nullptr;
+        if (!is_of_shard(run, job)) continue;
+        ++report.progress.in_all;
+        if (record == nullptr) continue;
+        ++report.progress.done;
+        if (!record->failed) continue;
+        ++report.progress.failed;
+        if (report.failures.size() < kNamedFailures)
+            report.failures.push_back(
+                fmt::format("point {}, replicate {}: {}", run.point, run.replicate, record->message));
+    }
+    report.progress.before = report.progress.done;
+    report.complete = report.progress.done == report.progress.in_all;
+    report.unused = records.size() - known;
+    return report;
+}
+
+}  // namespace
+
+SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
+    return status_of(plan, job, Records::read({job.folder}));
+}
+
+SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
+                      const std::function<void(const SweepProgress&)>& progress,
+                      const std::function<bool()>& stop) {
+    const Clock::time_point begin = Clock::now();
+    if (job.overwrite) {
+        std::error_code error;
+        std::filesystem::remove_all(job.folder / "shards", error);
+        if (error)
+            throw Error(ErrorCode::io,
+                        (job.folder / "shards").string() + ": cannot remove: " + error.message());
+    }
+    const Records records = Records::read({job.folder});
+    SweepReport report = status_of(plan, job, records);
+    SweepProgress& count = report.progress;
+    const auto is_wanted = [&](const PlannedRun& run) {
+        if (!is_of_shard(run, job)) return false;
+        const RunRecord* record = records.find(run.id);
+        return record == nullptr || (record->failed && job.retry_failed);
+    };
+    if (job.retry_failed) {
+        count.done -= count.failed;
+        count.before = count.done;
+        count.failed = 0;
+        report.failures.clear();
+    }
+    write_plan(plan, job.folder);
+    if (count.done == count.in_all) return report;
+
+    Shard shard(job.folder, job.shard, job.shards);
+    std::uint64_t at = 0;
+    bool give_up = false;
+    const auto next = [&]() -> std::optional<std::uint64_t> {
+        while (at < plan.runs() && !is_wanted(plan.run(at))) ++at;
+        if (give_up || at == plan.runs()) return std::nullopt;
+        return at++;
+    };
+    const Task task = [&](std::uint64_t number) {
+        const PlannedRun run = plan.run(number);
+        return packed(run_for_statistics(plan.scene_of(run), plan.options()));
+    };
+    const TaskEnd end = [&](std::uint64_t number, const std::string& result,
+                            const std::optional<std::string>& failure) {
+        const PlannedRun run = plan.run(number);
+        if (failure) {
+            shard.add_failure(run, *failure);
+            ++count.failed;
+            give_up = give_up || job.fail_fast;
+            if (report.failures.size() < kNamedFailures)
+                report.failures.push_back(
+                    fmt::format("point {}, replicate {}: {}", run.point, run.replicate, *failure));
+        } else {
+            shard.add(run, unpacked(result));
+        }
+        ++count.done;
+    };
+    WorkerOptions workers;
+    workers.count = int(std::min<std::uint64_t>(std::uint64_t(job.workers), count.in_all - count.done));
+    workers.stop = stop;
+    workers.idle = [&] {
+        if (progress) progress(count);
+    };
+    work(workers, next, task, end);
+    shard.flush();
+    report.complete = count.done == count.in_all;
+    report.wall_s = std::chrono::duration<double>(Clock::now() - begin).count();
+    std::ofstream timing(job.folder / "timing.csv", std::ios::app);
+    if (timing.tellp() == 0) timing << "shard,shards,workers,runs,wall_s\n";
+    timing << fmt::format("{},{},{},{},{:.3f}\n", job.shard, job.shards, workers.count,
+                          count.done - count.before, report.wall_s);
+    return report;
+}
+
+SweepPlan plan_of_folder(const std::filesystem::path& folder) {
+    return SweepPlan(read_sweep_file(folder / "sweep.toml"));
+}
+
+}  // namespace nephos

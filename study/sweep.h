@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A sweep on disk. Every function does only what is missing: the same call again, after a kill or after an axis grew,
+// computes the other runs. Whatever the number of workers, the shards, their order, kills and resumptions, the tables have
+// the same bytes.
+//
+//     DIR/sweep (TOML)    the plan, canonical; `nephos sweep` of it repeats it
+//     DIR/scene (TOML)    the scene with every key
+//     DIR/shards/         records of the runs (records.h)
+//     DIR/runs.csv, points.csv, failures.csv, series.nc, manifest.json     tables.h
+//     DIR/timing.csv      seconds of each call: the only file that differs from machine to machine
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "study/records.h"
+#include "study/sweep_plan.h"
+
+namespace nephos {
+
+struct SweepJob {
+    std::filesystem::path folder;
+    int workers = 1;
+    std::uint32_t shard = 0, shards = 1;  // this process takes the runs whose id modulo `shards` is `shard`
+    bool retry_failed = false;
+    bool fail_fast = false;  // end at the first failure
+    bool overwrite = false;  // throw the records of other plans away
+};
+
+struct SweepProgress {
+    std::uint64_t done = 0, in_all = 0, failed = 0;  // of this shard
+    std::uint64_t before = 0;                        // done by earlier calls
+};
+
+struct SweepReport {
+    SweepProgress progress;
+    bool complete = false;     // every run of the shard is done or failed
+    std::uint64_t unused = 0;  // records in the folder that are of no run of this plan
+    double wall_s = 0;
+    std::vector<std::string> failures;  // "point 3, replicate 1: message", at most five
+};
+
+// Returns what is done of a plan in some folders.
+SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job);
+
+// Runs what is missing. Writes the plan, the scene and the shard; not the tables. Throws Error(io) on a full disk: what is on
+// disk is whole; Error(usage) when the folder's records are of another version. Precondition: the process has one thread.
+SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
+                      const std::function<void(const SweepProgress&)>& progress,
+                      const std::function<bool()>& stop);
+
+// Reads the plan of a folder from its sweep file. Throws SceneErrors and Error(io).
+SweepPlan plan_of_folder(const std::filesystem::path& folder);
+
+}  // namespace nephos

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/sweep_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "study/run_statistics.h"
+#include "study/toml_table.h"
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "simulation/layer_simulation.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kLargest = std::numeric_limits<double>::max();
+constexpr std::uint64_t kMostValues = 100'000;
+const std::vector<std::string_view> kScaleNames{"linear", "log", "integer"};
+
+void read_axis(TomlTable& table, SweepOptions& options) {
+    Axis& axis = options.axes.emplace_back();
+    if (const auto key = table.text("key")) axis.keys = {*key};
+    for (std::string& key : table.texts("keys")) axis.keys.push_back(std::move(key));
+    if (axis.keys.empty())
+        table.report("key", "an axis has no key", "expected key = \"field.background.ext\", or keys = [...]");
+    axis.values = table.values("values");
+    bool has_range = false;
+    table.table("range", [&](TomlTable& range) {
+        has_range = true;
+        axis.from = range.number("from", -kLargest, kLargest).value_or(0);
+        axis.to = range.number("to", -kLargest, kLargest).value_or(1);
+        axis.scale = Scale(range.word("scale", kScaleNames).value_or(0));
+        if (!(axis.to > axis.from))
+            range.report("to", "the range of an axis is empty", "expected `to` above `from`");
+        if (axis.scale == Scale::log && !(axis.from > 0))
+            range.report("from", "a range on a log scale starts at or below 0", "expected `from` above 0");
+        if (const auto count = range.integer("count", 2, kMostValues); count && axis.to > axis.from)
+            axis.values = spread_values(axis.from, axis.to, *count, axis.scale);
+    });
+    if (axis.values.empty() && !has_range)
+        table.report("values", "an axis has no values",
+                     "expected values = [...], or range = { from = .., to = .., count = .. }");
+}
+
+void read_steps(TomlTable& table, StepRules& rules) {
+    rules.min = table.integer("min", 20, kMaxSteps).value_or(rules.min);
+    rules.max = table.integer("max", rules.min, kMaxSteps).value_or(std::max(rules.min, rules.max));
+    table.table("until", [&](TomlTable& until) {
+        StopAt stop;
+        std::vector<std::string_view> names;
+        for (const StatisticInfo& info : kStatistics) names.push_back(info.name);
+        stop.statistic = names[until.word("statistic", names).value_or(0)];
+        stop.standard_error =
+            until.number("standard_error", std::numeric_limits<double>::min(), kLargest).value_or(1);
+        if (!until.has("statistic") || !until.has("standard_error"))
+            until.report("statistic", "`until` needs a statistic and a standard error",
+                         "expected { statistic = \"cover\", standard_error = 0.002 }");
+        rules.until = stop;
+    });
+}
+
+double parse_number(std::string_view text, const std::string& whole) {
+    double number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error == std::errc() && end == text.data() + text.size() && std::isfinite(number)) return number;
+    throw Error(ErrorCode::usage, fmt::format("'{}': '{}' is not a number", whole, text));
+}
+
+// Cuts at separators that are not inside quotes or brackets.
+std::vector<std::string> pieces(std::string_view text, char separator) {
+    std::vector<std::string> parts{""};
+    int depth = 0;
+    char quote = 0;
+    for (const char c : text) {
+        if (quote != 0) {
+            if (c == quote) quote = 0;
+        } else if (c == '"' || c == '\'') {
+            quote = c;
+        } else if (c == '[' || c == '{') {
+            ++depth;
+        } else if (c == ']' || c == '}') {
+            --depth;
+        }
+        if (c == separator && depth == 0 && quote == 0) {
+            parts.emplace_back();
+        } else {
+            parts.back() += c;
+        }
+    }
+    return parts;
+}
+
+}  // namespace
+
+std::vector<std::string> spread_values(double from, double to, std::uint64_t count, Scale scale) {
+    std::vector<std::string> values;
+    for (std::uint64_t n = 0; n < count; ++n) {
+        const double unit = double(n) / double(count - 1);
+        double value = scale == Scale::log ? from * std::pow(to / from, unit) : from + unit * (to - from);
+        if (n == 0) value = from;
+        if (n + 1 == count) value = to;
+        if (scale == Scale::integer) value = std::floor(value + 0.5);
+        // 12 digits: 0.1..0.3:3 has the value 0.2, and not the double beside it.
+        std::string text = number_text(value, 12);
+        if (std::ranges::count(values, text) == 0) values.push_back(std::move(text));
+    }
+    return values;
+}
+
+Axis parse_axis(const std::string& text) {
+    const std::size_t equals = text.find('=');
+    const auto fail = [&](const std::string& message) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("'{}' {}: expected KEY=V,V,.. or KEY=FROM..TO:COUNT, KEY=log:FROM..TO:COUNT",
+                                text, message));
+    };
+    if (equals == text.npos || equals == 0) fail("is not an axis");
+    Axis axis;
+    axis.keys = pieces(std::string_view(text).substr(0, equals), '+');
+    std::string_view rest = std::string_view(text).substr(equals + 1);
+    for (std::size_t n = 0; n < kScaleNames.size(); ++n) {
+        const std::string prefix = std::string(kScaleNames[n]) + ":";
+        if (!rest.starts_with(prefix)) continue;
+        axis.scale = Scale(n);
+        rest.remove_prefix(prefix.size());
+    }
+    const std::size_t dots = rest.find("..");
+    const bool is_range =
+        dots != rest.npos && std::string_view("\"'[").find(rest[0]) == std::string_view::npos;
+    if (!is_range) {
+        if (axis.scale != Scale::linear) fail("names a scale but no range");
+        axis.values = pieces(rest, ',');
+        if (std::ranges::count(axis.values, "") > 0) fail("has an empty value");
+        return axis;
+    }
+    const std::size_t colon = rest.find(':', dots);
+    axis.from = parse_number(rest.substr(0, dots), text);
+    axis.to = parse_number(rest.substr(dots + 2, colon == rest.npos ? colon : colon - dots - 2), text);
+    if (!(axis.to > axis.from)) fail("has an empty range");
+    if (axis.scale == Scale::log && !(axis.from > 0))
+        fail("has a range on a log scale that does not start above 0");
+    if (colon != rest.npos) {
+        const double count = parse_number(rest.substr(colon + 1), text);
+        if (!(count >= 2 && count <= double(kMostValues) && count == std::floor(count)))
+            fail("has a count that is not a whole number from 2 to 100,000");
+        axis.values = spread_values(axis.from, axis.to, std::uint64_t(count), axis.scale);
+    }
+    return axis;
+}
+
+StopAt parse_stop(const std::string& text) {
+    const std::size_t equals = text.find('=');
+    if (equals == text.npos || !text.substr(0, equals).ends_with(".se"))
+        throw Error(ErrorCode::usage, fmt::format("'{}' is not like cover.se=0.002", text));
+    const StopAt stop{text.substr(0, equals - 3),
+                      parse_number(std::string_view(text).substr(equals + 1), text)};
+    statistic_index(stop.statistic);
+    if (!(stop.standard_error > 0))
+        throw Error(ErrorCode::usage, fmt::format("'{}': a standard error is above 0", text));
+    return stop;
+}
+
+SweepOptions read_sweep_file(const std::filesystem::path& path) {
+    SweepOptions options;
+    read_toml_file(path, [&](TomlTable& table) {
+        const std::optional<std::string> scene = table.text("scene");
+        if (!scene && !table.has("scene"))
+            table.report("scene", "the sweep has no scene", "expected scene = \"FILE.toml\"");
+        options.scene_file = path.parent_path() / scene.value_or("");
+        options.overrides = table.texts("set");
+        options.design = Design(table.word("design", {"grid", "list", "random", "latin_hypercube", "sobol"})
+                                    .value_or(std::size_t(Design::grid)));
+        options.points = table.integer("points", 1, 10'000'000).value_or(0);
+        options.replicates =
+            std::uint32_t(table.integer("replicates", 1, 100'000).value_or(options.replicates));
+        options.seed =
+            table.integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(options.seed);
+        options.common_seeds = table.word("seeds", {"per_point", "common"}).value_or(0) == 1;
+        options.clouds_every =
+            int(table.integer("clouds_every", 0, 1'000'000).value_or(std::uint64_t(options.clouds_every)));
+        options.layer = table.text("layer").value_or("");
+        table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
+        table.tables("axis", [&](TomlTable& axis) { read_axis(axis, options); });
+    });
+    return options;
+}
+
+bool is_sweep_file(const std::filesystem::path& path) {
+    bool has_scene = false;
+    try {
+        // What else is in the file is unknown here, and reported by whoever reads it for good.
+        read_toml_file(path, [&](TomlTable& table) { has_scene = table.has("scene"); });
+    } catch (const SceneErrors&) {
+    }
+    return has_scene;
+}
+
+}  // namespace nephos

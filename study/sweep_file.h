@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Sweep files: the plan of a sweep as TOML. docs/research.md lists the keys.
+
+#include <filesystem>
+#include <string>
+
+#include "study/sweep_plan.h"
+
+namespace nephos {
+
+// Reads a sweep file; the scene in it is relative to the file's folder. Throws SceneErrors with every problem, Error(io).
+SweepOptions read_sweep_file(const std::filesystem::path& path);
+
+// Returns true for a TOML file with a key `scene`: a sweep file, and no scene. Throws Error(io).
+bool is_sweep_file(const std::filesystem::path& path);
+
+// Reads an axis of the command line: "KEY=0.1,0.2,0.3" values, "KEY=0.1..0.4:7" seven values evenly apart,
+// "KEY=log:1e-6..1e-2:5" with even ratios, "KEY=0.1..0.4" and "KEY=log:..", "KEY=integer:3..9" a range for a sampled design;
+// "KEY+KEY=..." moves several keys together. Throws Error(usage) that quotes the text and says what was expected.
+Axis parse_axis(const std::string& text);
+
+// Reads "STATISTIC.se=X" of the command line. Throws Error(usage) that says what was expected.
+StopAt parse_stop(const std::string& text);
+
+// Returns `count` values from `from` to `to`, both included, evenly apart or with even ratios, as TOML. Precondition:
+// count >= 2.
+std::vector<std::string> spread_values(double from, double to, std::uint64_t count, Scale scale);
+
+}  // namespace nephos

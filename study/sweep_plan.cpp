@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/sweep_plan.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "automaton/checkpoint.h"
+#include "core/error.h"
+#include "core/random.h"
+#include "core/text.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/writer.h"
+#include "simulation/layer_simulation.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::uint64_t kMaxPoints = 10'000'000;
+
+StateHash hash_of_text(std::string_view text) { return hash_of_bytes(std::as_bytes(std::span(text))); }
+
+std::string joined_keys(const Axis& axis) { return fmt::format("{}", fmt::join(axis.keys, "+")); }
+
+bool is_sampled(Design design) { return design != Design::grid && design != Design::list; }
+
+std::string value_at(const Axis& axis, double unit) {
+    switch (axis.scale) {
+        case Scale::log:
+            return number_text(axis.from * std::pow(axis.to / axis.from, unit));
+        case Scale::integer:
+            return fmt::format("{}",
+                               std::min(std::floor(axis.from + unit * (axis.to - axis.from + 1)), axis.to));
+        case Scale::linear:
+            break;
+    }
+    return number_text(axis.from + unit * (axis.to - axis.from));
+}
+
+// One text for one value: "0.10" is 0.1, a word without quotes gets them.
+std::string canonical_value(const std::string& value) {
+    if (value.empty() || value == "true" || value == "false" ||
+        std::string_view("\"'[{").find(value[0]) != std::string_view::npos)
+        return value;
+    double number = 0;
+    const char* end = value.data() + value.size();
+    const auto [last, error] = std::from_chars(value.data() + (value[0] == '+'), end, number);
+    if (error == std::errc() && last == end) return number_text(number);
+    return '"' + value + '"';
+}
+
+std::uint64_t point_count(const SweepOptions& options) {
+    if (is_sampled(options.design)) return options.points;
+    if (options.axes.empty()) return 1;
+    std::uint64_t count = 1;
+    for (const Axis& axis : options.axes) {
+        if (options.design == Design::list) return axis.values.size();
+        count *= axis.values.size();
+        if (count > kMaxPoints) return count;
+    }
+    return count;
+}
+
+void check_options(const SweepOptions& options) {
+    const auto fail = [](const std::string& message) { throw Error(ErrorCode::usage, message); };
+    if (options.replicates < 1 || options.replicates > 100'000)
+        fail(fmt::format("replicates: {} is not from 1 to 100,000", options.replicates));
+    if (options.steps.min < 20 || options.steps.max < options.steps.min || options.steps.max > kMaxSteps)
+        fail(fmt::format("steps: {}..{} is not a range from 20 steps upwards", options.steps.min,
+                         options.steps.max));
+    for (const Axis& axis : options.axes) {
+        const std::string name = "axis " + joined_keys(axis);
+        for (const std::string& key : axis.keys) {
+            if (key == "seed") fail(name + ": the seed is not an axis: give the number of replicates");
+            if (key == "time.steps") fail(name + ": the steps are not an axis: give the range of steps");
+            if (key == "name") fail(name + ": the name of the scene changes nothing");
+        }
+        if (is_sampled(options.design)) {
+            if (!axis.values.empty())
+                fail(fmt::format("{}: a design '{}' takes a range, not values: expected {}=FROM..TO", name,
+                                 design_name(options.design), joined_keys(axis)));
+            if (!(axis.to > axis.from)) fail(name + ": the range is empty");
+            if (axis.scale == Scale::log && !(axis.from > 0))
+                fail(name + ": a range on a log scale starts above 0");
+        } else if (axis.values.empty()) {
+            fail(name + ": has no values");
+        }
+        if (options.design == Design::list && axis.values.size() != options.axes.front().values.size())
+            fail(fmt::format("{}: has {} values, the first axis {}: a list takes one of each for a point",
+                             name, axis.values.size(), options.axes.front().values.size()));
+        for (const Axis& other : options.axes) {
+            for (const std::string& key : axis.keys) {
+                if (&other != &axis && std::ranges::count(other.keys, key) > 0)
+                    fail("key `" + key + "` is in two axes");
+            }
+        }
+    }
+    if (is_sampled(options.design) && (options.points < 1 || options.points > kMaxPoints))
+        fail(fmt::format("design '{}': expected points from 1 to {}", design_name(options.design),
+                         kMaxPoints));
+    if (point_count(options) > kMaxPoints) fail(fmt::format("the grid has more than {} points", kMaxPoints));
+}
+
+}  // namespace
+
+double largest_activation(const Scene& scene) {
+    if (!scene.layers.empty()) return 1;
+    const FieldOptions& field = scene.automaton.field;
+    double act = field.background.act;
+    for (const Ellipsoid& ellipsoid : field.ellipsoids)
+        act = std::max({act, ellipsoid.centre.act, ellipsoid.rim.act});
+    for (const EllipsoidScatter& scatter : field.scatters)
+        act = std::max({act, scatter.centre.act, scatter.rim.act});
+    return act;
+}
+
+SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
+    for (Axis& axis : options_.axes)
+        for (std::string& value : axis.values) value = canonical_value(value);
+    check_options(options_);
+    scene_ = read_scene(options_.scene_file, options_.overrides, SceneUse::without_frames);
+    std::vector<std::string> lattices;
+    for (const LayerOptions& layer : scene_.layers)
+        if (layer.automaton && !layer.is_veil) lattices.push_back(layer.name);
+    if (scene_.layers.empty() ? !options_.layer.empty()
+                              : lattices.size() != 1 && std::ranges::count(lattices, options_.layer) == 0) {
+        throw Error(
+            ErrorCode::usage,
+            fmt::format(
+                "{}: {}", options_.scene_file.string(),
+                scene_.layers.empty()
+                    ? "has no layers: leave out --layer"
+                    : fmt::format("has the layers with an automaton {}: name one of them with --layer",
+                                  fmt::join(lattices, ", "))));
+    }
+    if (!scene_.layers.empty() && options_.layer.empty()) options_.layer = lattices.front();
+    points_ = point_count(options_);
+    if (is_sampled(options_.design))
+        unit_points_ = unit_points(options_.design, points_, options_.axes.size(), options_.seed);
+    check_axes();
+    scene_.frames = {};  // of a study nothing is drawn
+    scene_.frames.enabled = false;
+    scene_text_ = nephos::to_toml(scene_);
+    simulation_hash_ = simulation_start(scene_).simulation_hash;
+}
+
+void SweepPlan::check_axes() const {
+    for (const Axis& axis : options_.axes) {
+        std::vector<std::string> values = axis.values;
+        if (values.empty()) values = {value_at(axis, 0), value_at(axis, 1)};
+        for (const std::string& value : values) {
+            std::vector<std::string> overrides = options_.overrides;
+            for (const std::string& key : axis.keys) overrides.push_back(key + "=" + value);
+            read_scene(options_.scene_file, overrides, SceneUse::without_frames);
+        }
+    }
+    // Values that are good alone may contradict each other.
+    if (points_ > 0) scene_of(run(0));
+    if (points_ > 1) scene_of(run(runs() - 1));
+}
+
+std::vector<std::string> SweepPlan::values_of_point(std::uint64_t point) const {
+    std::vector<std::string> values(options_.axes.size());
+    for (std::size_t n = options_.axes.size(); n-- > 0;) {
+        const Axis& axis = options_.axes[n];
+        if (options_.design == Design::grid) {
+            values[n] = axis.values[point % axis.values.size()];
+            point /= axis.values.size();
+        } else if (options_.design == Design::list) {
+            values[n] = axis.values[point];
+        } else {
+            values[n] = value_at(axis, unit_points_[point * options_.axes.size() + n]);
+        }
+    }
+    return values;
+}
+
+// The keys and values of a point in the order of the keys, whatever the order of the axes.
+std::string SweepPlan::identity(const std::vector<std::string>& values) const {
+    std::vector<std::string> lines;
+    for (std::size_t n = 0; n < values.size(); ++n)
+        for (const std::string& key : options_.axes[n].keys) lines.push_back(key + "=" + values[n] + "\n");
+    std::ranges::sort(lines);
+    return fmt::format("{}", fmt::join(lines, ""));
+}
+
+PlannedRun SweepPlan::run(std::uint64_t number) const {
+    PlannedRun run;
+    run.number = number;
+    run.point = number / options_.replicates;
+    run.replicate = std::uint32_t(number % options_.replicates);
+    run.values = values_of_point(run.point);
+    const std::string point = identity(run.values);
+    const StateHash hash = options_.common_seeds ? StateHash{} : hash_of_text(point);
+    PhiloxWords counter = item_counter(Domain::sweep, 0, run.replicate, std::uint32_t(hash.low), 0);
+    const std::uint64_t key = options_.seed ^ hash.high;
+    const PhiloxWords words = philox(key, counter);
+    // 63 bits: every seed is an integer of TOML.
+    run.seed = (std::uint64_t(words[0]) << 32 | words[1]) >> 1;
+    const StepRules& steps = options_.steps;
+    run.id = hash_of_text(fmt::format("{}\n{}{}\n{}..{} {} {}\n{} {} {}\n", simulation_hash_, point, run.seed,
+                                      steps.min, steps.max, steps.until ? steps.until->statistic : "",
+                                      steps.until ? number_text(steps.until->standard_error) : "",
+                                      options_.clouds_every, options_.layer, NEPHOS_STATISTICS_VERSION))
+                 .hex();
+    return run;
+}
+
+Scene SweepPlan::scene_of(const PlannedRun& run) const {
+    std::vector<std::string> overrides = options_.overrides;
+    for (std::size_t n = 0; n < run.values.size(); ++n)
+        for (const std::string& key : options_.axes[n].keys) overrides.push_back(key + "=" + run.values[n]);
+    Scene scene = read_scene(options_.scene_file, overrides, SceneUse::without_frames);
+    scene.automaton.seed = run.seed;
+    return scene;
+}
+
+std::string SweepPlan::command_of(const PlannedRun& run) const {
+    std::string command;
+    for (std::size_t n = 0; n < run.values.size(); ++n)
+        for (const std::string& key : options_.axes[n].keys)
+            command += fmt::format("--set {}={} ", key, run.values[n]);
+    return command + fmt::format("--seed {}", run.seed);
+}
+
+std::string SweepPlan::to_toml() const {
+    const SweepOptions& o = options_;
+    std::string text = fmt::format("scene = \"scene.toml\"\ndesign = \"{}\"\n", design_name(o.design));
+    if (is_sampled(o.design)) text += fmt::format("points = {}\n", o.points);
+    text += fmt::format("replicates = {}\nseed = {}\nseeds = \"{}\"\n", o.replicates, o.seed,
+                        o.common_seeds ? "common" : "per_point");
+    if (!o.layer.empty()) text += fmt::format("layer = \"{}\"\n", o.layer);
+    text += fmt::format("clouds_every = {}\n\n[steps]\nmin = {}\nmax = {}\n", o.clouds_every, o.steps.min,
+                        o.steps.max);
+    if (o.steps.until)
+        text += fmt::format("until = {{ statistic = \"{}\", standard_error = {} }}\n",
+                            o.steps.until->statistic, number_text(o.steps.until->standard_error));
+    constexpr std::string_view kScales[] = {"linear", "log", "integer"};
+    for (const Axis& axis : o.axes) {
+        text += "\n[[axis]]\n";
+        std::vector<std::string> keys;
+        for (const std::string& key : axis.keys) keys.push_back('"' + key + '"');
+        text += fmt::format("keys = [{}]\n", fmt::join(keys, ", "));
+        if (axis.values.empty()) {
+            text += fmt::format("range = {{ from = {}, to = {}, scale = \"{}\" }}\n", number_text(axis.from),
+                                number_text(axis.to), kScales[std::size_t(axis.scale)]);
+        } else {
+            text += fmt::format("values = [{}]\n", fmt::join(axis.values, ", "));
+        }
+    }
+    return text;
+}
+
+}  // namespace nephos

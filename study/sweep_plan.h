@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What a sweep is to run: a scene, axes of its keys, replicates. The runs are never listed: run number n is computed from
+// n, so that a million of them take no memory.
+//
+//     run n = replicate n % replicates of point n / replicates
+//     id    = XXH3-128 of the scene, the point's keys and values, the seed, the rules of steps and the version of the
+//             statistics: never of n, of the order, of a shard or of a worker
+//     seed  = Philox(seed of the sweep; domain sweep, replicate, hash of the point's keys and values), so a replicate of a
+//             point has the same seed when an axis grows; with common seeds without the hash: replicate r has one seed
+//             at all points
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "study/design.h"
+
+#include "scenes/format/scene.h"
+
+namespace nephos {
+
+enum class Scale { linear, log, integer };
+
+// Keys of the scene that take a value together.
+struct Axis {
+    std::vector<std::string> keys;    // "field.background.ext"; at least one
+    std::vector<std::string> values;  // as TOML; of a grid and a list
+    // Of the other designs.
+    double from = 0, to = 1;
+    Scale scale = Scale::linear;
+    bool operator==(const Axis&) const = default;
+};
+
+// A statistic whose standard error decides when a run is long enough.
+struct StopAt {
+    std::string statistic;  // of run_statistics.h
+    double standard_error = 0;
+    bool operator==(const StopAt&) const = default;
+};
+
+// How long a run is: `min` steps, then half as many again and again until it is steady and as exact as asked for, at
+// most `max`. Dead and overcast runs stop.
+struct StepRules {
+    std::uint64_t min = 300, max = 3000;
+    std::optional<StopAt> until;
+    bool operator==(const StepRules&) const = default;
+};
+
+struct SweepOptions {
+    std::filesystem::path scene_file;
+    std::vector<std::string> overrides;  // of all runs, as of --set
+    Design design = Design::grid;
+    std::uint64_t points = 0;  // of designs other than grid and list
+    std::vector<Axis> axes;
+    std::uint32_t replicates = 5;
+    std::uint64_t seed = 1;
+    bool common_seeds = false;
+    StepRules steps;
+    int clouds_every = 10;  // steps between the snapshots whose clouds are labelled; 0: none
+    std::string layer;      // whose statistics are taken; empty: the only lattice of the scene
+};
+
+// One run, as its worker needs it.
+struct PlannedRun {
+    std::string id;  // 32 hexadecimal digits
+    std::uint64_t number = 0, point = 0;
+    std::uint32_t replicate = 0;
+    std::uint64_t seed = 0;
+    std::vector<std::string> values;  // of each axis
+};
+
+class SweepPlan {
+  public:
+    // Reads the scene and checks every value of every axis (of a range its ends) against it, before anything is run.
+    // Throws SceneErrors that point at the value, Error(usage) on axes that contradict each other, Error(io).
+    explicit SweepPlan(SweepOptions options);
+
+    const SweepOptions& options() const { return options_; }
+    const Scene& scene() const { return scene_; }                  // with the overrides of all runs
+    const std::string& scene_text() const { return scene_text_; }  // canonical
+    std::uint64_t points() const { return points_; }
+    std::uint64_t runs() const { return points_ * options_.replicates; }
+    std::vector<std::string> values_of_point(std::uint64_t point) const;
+    PlannedRun run(std::uint64_t number) const;
+    // Returns the scene of a run. Throws as read_scene().
+    Scene scene_of(const PlannedRun& run) const;
+    // Returns the options of scene_of() as a command line that repeats the run: "--set KEY=VALUE ... --seed N".
+    std::string command_of(const PlannedRun& run) const;
+    // Returns the canonical sweep file; the scene that it names is scene_text().
+    std::string to_toml() const;
+
+  private:
+    void check_axes() const;
+    std::string identity(const std::vector<std::string>& values) const;
+
+    SweepOptions options_;
+    Scene scene_;
+    std::string scene_text_, simulation_hash_;
+    std::uint64_t points_ = 0;
+    std::vector<double> unit_points_;  // of sampled designs
+};
+
+// Returns the largest probability of activation anywhere and ever, 0 where no act can come; 1 where clouds of layers make
+// the field.
+double largest_activation(const Scene& scene);
+
+}  // namespace nephos

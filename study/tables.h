@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The tables of a sweep: functions of its plan and its records alone, whatever made the records and in which order.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "study/records.h"
+#include "study/sweep_plan.h"
+
+namespace nephos {
+
+// A statistic of a point over its replicates.
+struct PointMean {
+    double mean, deviation;      // over the replicates; NaN unless every one of them has a value
+    double error;                // between replicates: deviation / sqrt(n); NaN of one
+    double low, high;            // 95 % interval by Student's t
+    double error_within;         // what the errors within the runs make of the mean: sqrt(sum of squares) / n
+    bool errors_differ = false;  // 3-fold: replicates in phase, or runs too short
+};
+
+struct PointSummary {
+    std::uint64_t point = 0;
+    std::vector<std::string> values;
+    std::uint32_t runs = 0, missing = 0, failed = 0;
+    std::array<std::uint32_t, 6> regimes{};  // runs of each Regime
+    std::array<PointMean, kStatistics.size()> statistics;
+};
+
+// Returns the summary of a point. Of a point with a run that is missing, failed or not steady nothing is averaged.
+PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint64_t point);
+
+// Writes DIR/runs.csv, points.csv, failures.csv, series.nc and manifest.json, each atomically. Returns how many runs of
+// the plan have no record. Throws Error(io).
+std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
+                           const std::filesystem::path& folder);
+
+}  // namespace nephos

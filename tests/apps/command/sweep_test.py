@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`nephos sweep` and `nephos merge`: the same tables whatever happened on the way, and statistics with a known answer."""
+
+import csv
+import math
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import time
+import unittest
+from xml.etree import ElementTree
+
+from case import Case, NEPHOS, SOURCE
+
+# Without vapour cells are independent: the cover is known in closed form.
+NULL = """\
+seed = 3
+[lattice]
+cells = [64, 64, 10]
+boundaries = ["periodic", "periodic", "open"]
+initial = "empty"
+[time]
+steps = 400
+[field.background]
+hum = 0.0
+act = 0.002
+ext = 0.1
+"""
+TABLES = ("runs.csv", "points.csv", "failures.csv", "series.nc", "manifest.json")
+
+
+def cover(act, ext, levels=10):
+    fraction = act * (1 - ext) / (1 - (1 - act) * (1 - ext))
+    return 1 - (1 - fraction) ** levels
+
+
+def rows(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+class Sweep(Case):
+    def setUp(self):
+        super().setUp()
+        self.null = self.write("null.toml", NULL)
+
+    def sweep(self, out, *arguments, axis="field.background.ext=0.05,0.1,0.2", steps="400..1600", status=0):
+        return self.call("sweep", self.null, "--axis", axis, "--replicates", "3", "--steps", steps, "--out", out,
+                         *arguments, status=status)
+
+    def start(self, *arguments):
+        return subprocess.Popen([NEPHOS, *map(str, arguments)], cwd=self.folder, env=self.environment,
+                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def tables(self, folder):
+        return {name: (self.folder / folder / name).read_bytes() for name in TABLES}
+
+    def test_means_are_those_in_closed_form(self):
+        self.sweep("a", "-j", "2")
+        points = rows(self.folder / "a/points.csv")
+        self.assertEqual([point["field.background.ext"] for point in points], ["0.05", "0.1", "0.2"])
+        for point in points:
+            ext = float(point["field.background.ext"])
+            error = max(float(point["cover_se"]), float(point["cover_se_within"]))
+            self.assertLess(abs(float(point["cover"]) - cover(0.002, ext)), 5 * error)
+            self.assertLess(error, 0.01)
+            self.assertEqual(point["steady"], "3")
+            self.assertAlmostEqual(float(point["lifetime_s"]), 10 / ext, delta=0.05 * 10 / ext)
+        for run in rows(self.folder / "a/runs.csv"):
+            self.assertEqual((run["status"], run["regime"]), ("done", "steady"))
+            self.assertGreater(int(run["used_steps"]), 100)
+
+    def test_a_run_of_the_table_can_be_repeated(self):
+        self.sweep("a", "-j", "2")
+        run = rows(self.folder / "a/runs.csv")[4]
+        last = self.hashes("a/scene.toml", "--steps", run["steps"], "--seed", run["seed"], "--set",
+                           f"field.background.ext={run['field.background.ext']}").splitlines()[-1]
+        self.assertEqual(last, f"{run['steps']} {run['state_hash']}")
+
+    def test_tables_are_the_same_for_any_workers_shards_and_order(self):
+        self.sweep("one", "-j", "1")
+        expected = self.tables("one")
+        self.sweep("two", "-j", "2")
+        self.assertEqual(self.tables("two"), expected)
+        for shards in (3, 7):
+            folder = f"shards{shards}"
+            for shard in reversed(range(shards)):
+                self.sweep(folder, "-j", "2", "--shard", f"{shard}/{shards}")
+            self.call("merge", folder)
+            self.assertEqual(self.tables(folder), expected)
+        # Shards of two machines, merged in either order.
+        self.sweep("here", "--shard", "0/2")
+        self.sweep("there", "--shard", "1/2")
+        for first, second in (("here", "there"), ("there", "here")):
+            self.call("merge", first, second, "--out", "merged")
+            self.assertEqual(self.tables("merged"), expected)
+
+    def test_a_grown_axis_computes_only_what_is_new(self):
+        self.sweep("grown", "-j", "2", axis="field.background.ext=0.2,0.05")
+        result = self.sweep("grown", "-j", "2", "--json")
+        self.assertIn('"before": 6', result.stdout)
+        self.sweep("whole", "-j", "2")
+        self.assertEqual(self.tables("grown"), self.tables("whole"))
+        # A smaller one leaves the others out, and says so.
+        result = self.sweep("grown", axis="field.background.ext=0.1")
+        self.assertIn("6 records are of other points", result.stderr)
+        self.assertEqual(len(rows(self.folder / "grown/points.csv")), 1)
+
+    def test_killed_at_any_time_it_goes_on(self):
+        self.sweep("whole", "-j", "2")
+        arguments = ("sweep", self.null, "--axis", "field.background.ext=0.05,0.1,0.2", "--replicates", "3", "--steps",
+                     "400..1600", "--out", "killed", "-j", "2")
+        for wait, kill in ((0.1, signal.SIGKILL), (0.25, signal.SIGTERM), (0.4, signal.SIGKILL), (0.3, signal.SIGINT)):
+            process = self.start(*arguments)
+            time.sleep(wait)
+            process.send_signal(kill)
+            process.wait(timeout=60)
+        shard = self.folder / "killed/shards/0000-of-0001.jsonl"
+        if shard.exists():
+            with open(shard, "ab") as file:
+                file.write(b'{"run":"0123","status":"do')  # a torn record
+        self.sweep("killed", "-j", "2")
+        self.assertEqual(self.tables("killed"), self.tables("whole"))
+
+    def test_a_crash_costs_one_run(self):
+        arguments = ["sweep", self.null, "--axis", "field.background.ext=0.05,0.1", "--replicates", "1", "--clouds-every", "0",
+                     "--out", "crash", "-j", "1", "--steps", "30000"]
+        process = self.start(*arguments)
+        deadline = time.time() + 30
+        children = []
+        while time.time() < deadline and not children:
+            children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        time.sleep(0.2)
+        os.kill(int(children[0]), signal.SIGKILL)
+        self.assertEqual(process.wait(timeout=100), 1)
+        self.assertEqual([run["status"] for run in rows(self.folder / "crash/runs.csv")], ["failed", "done"])
+        failure = rows(self.folder / "crash/failures.csv")[0]
+        self.assertIn("signal 9", failure["message"])
+        self.assertIn("--set field.background.ext=0.05 --seed", failure["command"])
+        self.assertIn("1 failed", self.call(*arguments, "--status").stdout)
+        self.call(*arguments, status=1)  # it is not tried again unasked
+        self.call(*arguments, "--retry-failed")
+        self.assertEqual([run["status"] for run in rows(self.folder / "crash/runs.csv")], ["done", "done"])
+
+    def test_bad_input_is_refused_before_the_first_run(self):
+        for arguments, says in ((["--axis", "field.background.ext=0.1,1.5"], "field.background.ext"),
+                                (["--axis", "field.background.exd=0.1"], "did you mean `ext`"),
+                                (["--axis", "seed=1,2"], "replicates"),
+                                (["--axis", "time.steps=10,20"], "range of steps"),
+                                (["--axis", "field.background.ext"], "KEY=V,V"),
+                                (["--axis", "field.background.ext=0.3..0.1:4"], "empty range"),
+                                (["--axis", "field.background.act=log:0..1:4"], "log scale"),
+                                (["--axis", "field.background.ext=0.1..0.2"], "has no values"),
+                                (["--until", "cover.se=nought"], "nought"),
+                                (["--until", "cower.se=0.1"], "did you mean `cover`"),
+                                (["--shard", "3/3"], "'3'"),
+                                (["--steps", "5"], "'5'"),
+                                (["--design", "hypercube"], "latin_hypercube"),
+                                (["--layer", "low"], "no layers")):
+            with self.subTest(arguments=arguments):
+                self.assertIn(says, self.call("sweep", self.null, *arguments, "--out", "bad", status=2).stderr)
+        self.assertFalse((self.folder / "bad").exists())
+        plan = self.write("plan.toml", 'scene = "null.toml"\nreplicats = 2\n[[axis]]\nkey = "field.background.ext"\n'
+                                       'values = [0.1, [1]]\n[steps]\nmin = 3\n')
+        message = self.call("sweep", plan, status=2).stderr
+        self.assertIn("did you mean `replicates`?", message)
+        self.assertIn("plan.toml:2:1", message)
+        self.assertIn("plan.toml:7:7", message)
+
+    def test_designs(self):
+        result = self.call("sweep", self.null, "--axis", "field.background.ext=log:0.01..0.4", "--axis",
+                           "field.background.act+field.background.hum=0.001..0.1", "--points", "4", "--dry-run", "--out", "x")
+        self.assertIn("4 points (sobol;", result.stdout)
+        self.assertIn("--set field.background.ext=0.063245553", result.stdout)
+        self.assertIn("--set field.background.act=0.0505 --set field.background.hum=0.0505", result.stdout)
+        self.assertFalse((self.folder / "x").exists())
+        for design in ("random", "latin_hypercube"):
+            self.call("sweep", self.null, "--axis", "field.background.ext=0.05..0.4", "--points", "4", "--design", design,
+                      "--replicates", "1", "--out", design, "--steps", "100")
+            values = sorted(float(point["field.background.ext"]) for point in rows(self.folder / design / "points.csv"))
+            if design == "latin_hypercube":  # one in each quarter
+                self.assertEqual([int((value - 0.05) / 0.35 * 4) for value in values], [0, 1, 2, 3])
+            # The plan that is in the folder repeats it.
+            before = self.tables(design)
+            self.call("sweep", f"{design}/sweep.toml", "--out", f"{design}2")
+            self.assertEqual(self.tables(f"{design}2"), before)
+        pairs = self.call("sweep", self.null, "--axis", "field.background.ext=0.1,0.2", "--axis",
+                          "field.background.act=0.01,0.02", "--design", "list", "--dry-run", "-r", "1")
+        self.assertIn("2 points", pairs.stdout)
+
+    def test_common_seeds(self):
+        self.sweep("a", "--common-seeds", steps="50")
+        seeds = {(run["replicate"], run["seed"]) for run in rows(self.folder / "a/runs.csv")}
+        self.assertEqual(len(seeds), 3)
+
+    def test_what_is_not_steady_has_no_mean(self):
+        result = self.sweep("short", steps="30")
+        self.assertIn("are not steady", result.stderr)
+        for point in rows(self.folder / "short/points.csv"):
+            self.assertEqual((point["not_steady"], point["cover"]), ("3", ""))
+
+    def test_until(self):
+        self.call("sweep", self.null, "--replicates", "1", "--steps", "100..20000", "--until", "cover.se=0.001", "--out", "u")
+        run = rows(self.folder / "u/runs.csv")[0]
+        self.assertLess(float(run["cover_se"]), 0.001)
+        self.assertGreater(int(run["steps"]), 500)
+
+    def test_a_run_until_its_error_is_small(self):
+        until = ("run", self.null, "--statistics-only", "--until", "cover.se=0.002", "--max-steps", "6000", "--out", "run")
+        result = self.call(*until)
+        self.assertRegex(result.stderr, r"cover: steady; mean 0\.\d+, standard error 0\.00\d+ after \d+ steps\n")
+        table = rows(self.folder / "run/statistics.csv")
+        self.assertGreater(len(table), 401)
+        self.assertFalse((self.folder / "run/checkpoint.nephos").exists())
+        mean = float(result.stderr.split("mean ")[1].split(",")[0])
+        self.assertLess(abs(mean - cover(0.002, 0.1)), 0.01)
+        # The same steps as without interruption, and nothing to do when it is called again.
+        self.call("run", self.null, "--statistics-only", "--set", f"time.steps={len(table) - 1}", "--out", "whole")
+        self.assertEqual((self.folder / "run/statistics.csv").read_bytes(), (self.folder / "whole/statistics.csv").read_bytes())
+        again = self.call(*until, "--resume")
+        self.assertIn("complete already", again.stderr)
+        self.assertEqual(len(rows(self.folder / "run/statistics.csv")), len(table))
+        self.assertIn("not what --until asks for", self.call(*until[:4], "cover.se=1e-6", "--max-steps", "450", "--out", "short",
+                                                             status=1).stderr)
+        self.refused(2, *until[:4], "clouds_per_km2.se=1", "--out", "no", says="not measured at every step")
+
+    def test_series_are_readable(self):
+        from scipy.io import netcdf_file
+        self.sweep("a", "-j", "2")
+        with netcdf_file(self.folder / "a/series.nc", mmap=False) as file:
+            series = file.variables["cloud_area_fraction"]
+            self.assertEqual(series.dimensions, ("run", "step"))
+            self.assertEqual(series.standard_name, b"cloud_area_fraction")
+            for number, run in enumerate(rows(self.folder / "a/runs.csv")):
+                begin, used = int(run["warm_up_steps"]), int(run["used_steps"])
+                values = [float(value) for value in series[number, begin:begin + used]]
+                self.assertAlmostEqual(sum(values) / used, float(run["cover"]), places=6)
+                self.assertEqual(float(series[number, 0]), 0)
+                self.assertEqual(file.variables["run_id"][number].tobytes().decode(), run["run"])
+                levels = file.variables["cloud_area_fraction_in_atmosphere_layer"][number]
+                self.assertAlmostEqual(float(levels.mean()), float(run["cloud_fraction"]), places=6)
+            self.assertTrue(math.isclose(float(file.variables["time"][1]), 10))
+
+    def test_the_files_of_the_page_work(self):
+        page = SOURCE / "docs/research"
+        result = self.call("sweep", page / "fair.toml", "--axis", "field.background.ext=0.05..0.4:8", "--replicates", "3",
+                           "--steps", "300..3000", "--dry-run")
+        self.assertIn("8 points (grid; field.background.ext: 8 values) x 3 replicates = 24 runs of 300 to 3000 steps",
+                      result.stdout)
+        self.sweep("a", "-j", "2")
+        self.call("fit", page / "cover.toml", "--runs", "8", "--out", "fit", "-j", "2")
+        for arguments in (["points", "a/points.csv", "field.background.ext", "cover", "0.1", "0.01"],):
+            picture = subprocess.run(["/usr/bin/python3", page / "plot.py", *arguments], cwd=self.folder, text=True,
+                                     capture_output=True, check=True).stdout
+            root = ElementTree.fromstring(picture)
+            self.assertEqual(len(root.findall("{http://www.w3.org/2000/svg}circle")), 3)
+
+    def test_a_full_disk_stops_cleanly(self):
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+        result = self.call("sweep", self.null, "--axis", "field.background.ext=0.05,0.1,0.2", "--replicates", "3", "--steps",
+                           "400..1600", "--out", "full", "-j", "1", preexec_fn=limit, status=3)
+        self.assertIn("cannot write", result.stderr)
+        # What is there is whole, and the sweep goes on from it.
+        self.sweep("full", "-j", "2")
+        self.sweep("whole", "-j", "2")
+        self.assertEqual(self.tables("full"), self.tables("whole"))
+
+
+if __name__ == "__main__":
+    unittest.main()

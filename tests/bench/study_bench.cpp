@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/bench/study_bench.h"
+
+#include "statistics/cloud_statistics.h"
+#include "statistics/clouds.h"
+#include "statistics/structure.h"
+#include "study/run_statistics.h"
+#include <tbb/global_control.h>
+
+#include "automaton/automaton.h"
+
+namespace nephos::bench {
+namespace {
+
+constexpr int kSteps = 300, kRounds = 5;
+
+// The field of docs/research.md.
+Scene fair_scene() {
+    Scene scene;
+    scene.name = "fair";
+    scene.automaton.extent = {256, 128, 20};
+    scene.automaton.boundaries = {Boundary::periodic, Boundary::periodic, Boundary::open};
+    scene.automaton.initial = InitialState::empty;
+    scene.automaton.field.background = {0.003, 1e-4, 0.12};
+    scene.frames.enabled = false;
+    return scene;
+}
+
+void step_alone(const Scene& scene) {
+    Automaton automaton(scene.automaton);
+    for (int n = 0; n < kSteps; ++n) automaton.step();
+}
+
+BenchRow sweep_row(int clouds_every, const std::string& what, const std::string& target) {
+    const Scene scene = fair_scene();
+    SweepOptions options;
+    options.steps = {kSteps, kSteps, {}};
+    options.clouds_every = clouds_every;
+    const auto [ours, other] = interleave(
+        kRounds, [&] { run_for_statistics(scene, options); }, [&] { step_alone(scene); });
+    return {"a run of a sweep, 256x128x20 x 300 steps, " + what + ", against its steps alone", ours, other,
+            target, ""};
+}
+
+// One statistic, on the last of the states, against a step.
+template <typename Measure>
+BenchRow state_row(const std::string& what, const std::string& target, Measure&& measure) {
+    const Scene scene = fair_scene();
+    Automaton automaton(scene.automaton), other(scene.automaton);
+    for (int n = 0; n < kSteps; ++n) automaton.step();
+    for (int n = 0; n < kSteps; ++n) other.step();
+    constexpr int kRepeat = 50;
+    const auto [ours, theirs] = interleave(
+        kRounds,
+        [&] {
+            for (int n = 0; n < kRepeat; ++n) measure(automaton);
+        },
+        [&] {
+            for (int n = 0; n < kRepeat; ++n) other.step();
+        });
+    return {what + " of a state of 256x128x20, against a step", ours / kRepeat, theirs / kRepeat, target, ""};
+}
+
+}  // namespace
+
+std::vector<BenchRow> study_rows() {
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    const Boundaries boundaries = fair_scene().automaton.boundaries;
+    std::uint64_t kept = 0;  // so that no work is left out
+    std::vector<BenchRow> rows;
+    rows.push_back(sweep_row(0, "statistics of every step", "<= 1.05x"));
+    rows.push_back(sweep_row(10, "and clouds, correlation and overlap of every tenth", "<= 1.10x"));
+    rows.push_back(state_row("cover, profile, base, top and edge", "<= 0.1x",
+                             [&](const Automaton& a) { kept += count_cloud(a.cld(), boundaries).edges; }));
+    rows.push_back(state_row("2-D clouds", "<= 1x",
+                             [&](const Automaton& a) { kept += clouds_2d(a.cld(), boundaries).size(); }));
+    rows.push_back(state_row("3-D clouds", "<= 1x",
+                             [&](const Automaton& a) { kept += clouds_3d(a.cld(), boundaries).size(); }));
+    rows.back().note = kept == 0 ? "nothing was measured" : "";
+    return rows;
+}
+
+}  // namespace nephos::bench

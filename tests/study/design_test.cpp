@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Designs, axes of the command line, and the quantiles of Student's t against tables.
+
+#include "study/design.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "study/student.h"
+#include "study/sweep_file.h"
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+
+namespace nephos {
+namespace {
+
+TEST(Design, LatinHypercubeHasOnePointInEachStratum) {
+    for (const std::uint64_t count : {1u, 7u, 64u}) {
+        const std::vector<double> points = unit_points(Design::latin_hypercube, count, 3, 11);
+        for (std::size_t d = 0; d < 3; ++d) {
+            std::set<int> strata;
+            for (std::uint64_t n = 0; n < count; ++n) strata.insert(int(points[n * 3 + d] * double(count)));
+            EXPECT_EQ(strata.size(), count);
+        }
+    }
+    EXPECT_NE(unit_points(Design::latin_hypercube, 8, 2, 1), unit_points(Design::latin_hypercube, 8, 2, 2));
+}
+
+TEST(Design, MorePointsKeepTheFirstOnes) {
+    for (const Design design : {Design::random, Design::sobol}) {
+        const std::vector<double> few = unit_points(design, 10, 4, 3), many = unit_points(design, 100, 4, 3);
+        EXPECT_TRUE(std::equal(few.begin(), few.end(), many.begin()));
+        EXPECT_TRUE(std::ranges::all_of(many, [](double x) { return x >= 0 && x < 1; }));
+    }
+}
+
+// The first seven points of two dimensions (Joe and Kuo's direction numbers), and how even they are: the mean of x y over 256
+// points is 1/4 far closer than random ones come.
+TEST(Design, SobolPointsAreEven) {
+    const std::vector<double> points = unit_points(Design::sobol, 255, 2, 0);
+    EXPECT_EQ(points[0], 0.5);
+    EXPECT_EQ(points[1], 0.5);
+    std::set<double> first;
+    for (std::size_t n = 0; n < 7; ++n) first.insert(points[2 * n]);
+    EXPECT_EQ(first, (std::set<double>{0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875}));
+    double sum = 0;
+    for (std::size_t n = 0; n < 255; ++n) sum += points[2 * n] * points[2 * n + 1];
+    EXPECT_NEAR(sum / 256, 0.25, 0.004);
+    EXPECT_THROW(unit_points(Design::sobol, 1, 4000, 0), Error);
+}
+
+TEST(Student, QuantilesAreThoseOfTheTables) {
+    EXPECT_NEAR(student_quantile(1, 0.95), 12.706, 1e-3);
+    EXPECT_NEAR(student_quantile(4, 0.95), 2.776, 1e-3);
+    EXPECT_NEAR(student_quantile(10, 0.90), 1.812, 1e-3);
+    EXPECT_NEAR(student_quantile(1000, 0.95), 1.962, 1e-3);
+}
+
+TEST(Axis, IsReadFromTheCommandLine) {
+    EXPECT_EQ(parse_axis("a.b=0.1,0.2").values, (std::vector<std::string>{"0.1", "0.2"}));
+    EXPECT_EQ(parse_axis("a.b=0.1..0.3:3").values, (std::vector<std::string>{"0.1", "0.2", "0.3"}));
+    EXPECT_EQ(parse_axis("a=log:1e-6..1e-2:5").values,
+              (std::vector<std::string>{"1e-06", "1e-05", "0.0001", "0.001", "0.01"}));
+    EXPECT_EQ(parse_axis("a=integer:1..4:4").values, (std::vector<std::string>{"1", "2", "3", "4"}));
+    EXPECT_EQ(parse_axis("a=[1, 2],[3, 4]").values, (std::vector<std::string>{"[1, 2]", "[3, 4]"}));
+    EXPECT_EQ(parse_axis("w=\"a,b\",c").values, (std::vector<std::string>{"\"a,b\"", "c"}));
+    const Axis range = parse_axis("a+b[0].c=log:0.001..1");
+    EXPECT_EQ(range.keys, (std::vector<std::string>{"a", "b[0].c"}));
+    EXPECT_TRUE(range.values.empty() && range.scale == Scale::log && range.from == 0.001 && range.to == 1);
+    for (const char* bad :
+         {"a", "=1", "a=1..", "a=..", "a=1..x", "a=2..1", "a=1,,2", "a=1..2:1", "a=1..2:2.5", "a=log:3"})
+        EXPECT_THROW(parse_axis(bad), Error) << bad;
+}
+
+}  // namespace
+}  // namespace nephos
