@@ -409,8 +409,11 @@ void Controls::note(const std::string& name) {
 }
 
 void tooltip_of_last(const char* text) {
-    if (text == nullptr || *text == '\0' || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled))
-        return;
+    if (ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) tooltip(text);
+}
+
+void tooltip(const char* text) {
+    if (text == nullptr || *text == '\0') return;
     ImGui::BeginTooltip();
     ImGui::PushTextWrapPos(28 * ImGui::GetFontSize());
     ImGui::TextUnformatted(text);
@@ -418,17 +421,17 @@ void tooltip_of_last(const char* text) {
     ImGui::EndTooltip();
 }
 
-bool button(Editor& editor, const std::string& name, const char* tooltip) {
+bool button(Editor& editor, const std::string& name, const char* hint) {
     const bool pressed = ImGui::Button(name.c_str());
     editor.controls.note(name);
-    tooltip_of_last(tooltip);
+    tooltip_of_last(hint);
     return pressed;
 }
 
-bool toggle(Editor& editor, const std::string& name, bool& on, const char* tooltip) {
+bool toggle(Editor& editor, const std::string& name, bool& on, const char* hint) {
     const bool changed = ImGui::Checkbox(name.c_str(), &on);
     editor.controls.note(name);
-    tooltip_of_last(tooltip);
+    tooltip_of_last(hint);
     return changed;
 }
 

@@ -13,6 +13,8 @@
 namespace nephos {
 namespace {
 
+// How long nothing moves before a picture is drawn with its detail.
+constexpr std::chrono::milliseconds kRest{180};
 constexpr std::size_t kMostCheckpointBytes = 512u << 20;
 // Checkpoints are compared by this name alone: which scene they belong to is known here.
 const std::string kLive = "live";
@@ -341,15 +343,15 @@ void LiveScene::draw() {
             return ended_ ||
                    (frame_ && (frame_ != maker.frame() || !(view_ == maker.view()) || scene_to_draw_));
         };
-        const bool refines = maker.is_draft() && !running_;
-        if (refines) {
-            drawing_due_.wait_for(lock, std::chrono::milliseconds(180), is_new);
-        } else {
-            drawing_due_.wait(lock, is_new);
+        const auto rests = [&] { return maker.is_draft() && !running_ && goal_ == status_.step; };
+        drawing_due_.wait(lock, [&] { return is_new() || rests(); });
+        bool refine = false;
+        if (!is_new()) {  // nothing moves: after a moment the picture gets its detail
+            drawing_due_.wait_for(lock, kRest, [&] { return is_new() || !rests(); });
+            refine = !is_new() && rests();
+            if (!is_new() && !refine) continue;
         }
         if (ended_) return;
-        const bool refine = !is_new();
-        if (refine && (running_ || !maker.is_draft() || goal_ != status_.step)) continue;
         const std::shared_ptr<const LiveFrame> frame = frame_;
         const LiveView view = view_;
         const Scene scene = drawn_scene_;

@@ -2,6 +2,7 @@
 // Menus, the status bar, and the tabs View and Text.
 
 #include <algorithm>
+#include <cmath>
 
 #include <imgui.h>
 #include <imgui_stdlib.h>
@@ -248,6 +249,21 @@ void view_options_panel(Editor& editor) {
         "Changes of wind and climate then act from the present step on, and are written into the scene as "
         "key "
         "frames: the saved scene repeats what was seen, bit for bit. Otherwise the scene is simulated anew.");
+    if (editor.shown_scene && !editor.shown_scene->layers.empty()) {
+        ImGui::SetNextItemWidth(-1);
+        ImGui::SliderFloat("##final state", &editor.final_state, 0, 1, "atmosphere to %.2f");
+        editor.controls.note("final state");
+        tooltip_of_last("State of the atmosphere that the climate goes to: 0 clear, 1 storm (T, 3.4)");
+        ImGui::SetNextItemWidth(-1);
+        ImGui::SliderFloat("##duration", &editor.climate_minutes, 1, 120,
+                           "within %.0f min of simulated time");
+        editor.controls.note("climate duration");
+        if (button(editor, "Start the change now",
+                   "Writes the change into [climate] as key frames from the present step on")) {
+            record_climate(editor, std::round(100.0 * double(editor.final_state)) / 100,
+                           60 * std::round(double(editor.climate_minutes)));
+        }
+    }
     if (button(editor, "Lightning in the middle", "A flash where the camera looks, now")) add_flash(editor);
 }
 

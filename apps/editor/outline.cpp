@@ -43,6 +43,12 @@ Vec3 middle_of(const Editor& editor) {
             place.origin_m.z};
 }
 
+// What was selected since the last frame is seen: everything above it opens, and itself.
+bool leads_to_new_selection(const Editor& editor, const TextPath& path) {
+    return editor.selected != editor.revealed && editor.selected.size() >= path.size() &&
+           std::equal(path.begin(), path.end(), editor.selected.begin());
+}
+
 std::string label_of(const Node& element, const Key& list, std::size_t index) {
     const Entry* name = element.find("name");
     if (name != nullptr && name->value.kind == Node::Kind::text && !name->value.text.empty())
@@ -103,6 +109,7 @@ void element_row(Editor& editor, const Key& list, const TextPath& array, const N
         ImGuiTreeNodeFlags_SpanAvailWidth |
         (editor.selected == at ? ImGuiTreeNodeFlags_Selected : ImGuiTreeNodeFlags_None);
     const std::string label = label_of(elements.items[index], list, index);
+    if (has_lists && leads_to_new_selection(editor, at)) ImGui::SetNextItemOpen(true);
     const bool open = ImGui::TreeNodeEx("element", flags, "%s", label.c_str());
     editor.controls.note(path_text(at));
     if (ImGui::IsItemClicked() || ImGui::IsItemClicked(ImGuiMouseButton_Right)) editor.selected = at;
@@ -129,18 +136,20 @@ void list_row(Editor& editor, const Key& key, const TextPath& at) {
         (count == 0 ? ImGuiTreeNodeFlags_Leaf : ImGuiTreeNodeFlags_None) |
         (editor.selected == at ? ImGuiTreeNodeFlags_Selected : ImGuiTreeNodeFlags_None);
     if (count == 0) ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
-    // A new element is seen: its list opens with it.
-    if (editor.selected.size() > at.size() && std::equal(at.begin(), at.end(), editor.selected.begin()))
-        ImGui::SetNextItemOpen(true, ImGuiCond_Appearing);
+    if (leads_to_new_selection(editor, at)) ImGui::SetNextItemOpen(true);
     const bool open = ImGui::TreeNodeEx("list", flags, "%s (%zu)", list_name(key).c_str(), count);
     if (count == 0) ImGui::PopStyleColor();
     editor.controls.note(name);
-    tooltip_of_last(key.effect.c_str());
+    const bool hovered = ImGui::IsItemHovered();
     if (ImGui::IsItemClicked() && !ImGui::IsItemToggledOpen()) editor.selected = at;
     ImGui::SameLine(ImGui::GetContentRegionMax().x - 1.3f * ImGui::GetFontSize());
     if (ImGui::SmallButton("+")) add_element(editor, key, at);
     editor.controls.note("new " + name);
-    tooltip_of_last(("New " + element_name(key.name)).c_str());
+    if (ImGui::IsItemHovered()) {
+        ImGui::SetTooltip("New %s", element_name(key.name).c_str());
+    } else if (hovered) {
+        tooltip(key.effect.c_str());
+    }
     if (open) {
         const Node* now = value_node(editor.document->values(), at);  // a click may have changed it
         for (std::size_t n = 0; now != nullptr && n < now->items.size(); ++n) {
@@ -176,6 +185,7 @@ void outline_keys(Editor& editor, const Section& section, const TextPath& path, 
             (has_lists && present ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None) |
             (editor.selected == at ? ImGuiTreeNodeFlags_Selected : ImGuiTreeNodeFlags_None);
         if (!present) ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+        if (has_lists && leads_to_new_selection(editor, at)) ImGui::SetNextItemOpen(true);
         const bool open = ImGui::TreeNodeEx(key.name.c_str(), flags, "%s", readable_name(key).c_str());
         if (!present) ImGui::PopStyleColor();
         editor.controls.note(path_text(at));
@@ -197,7 +207,9 @@ void outline_panel(Editor& editor) {
     if (ImGui::TreeNodeEx("scene", flags, "%s", editor.document->title().c_str())) ImGui::TreePop();
     editor.controls.note("scene");
     if (ImGui::IsItemClicked()) editor.selected.clear();
+    const TextPath selected = editor.selected;
     outline_keys(editor, scene_section(), {}, true);
+    editor.revealed = selected;
 
     const bool is_element = !editor.selected.empty() && editor.selected.back().name.empty();
     const bool typing = ImGui::GetIO().WantTextInput;

@@ -97,6 +97,13 @@ void within_limits(const Key& key, std::vector<double>& numbers) {
     }
 }
 
+// To a power of ten that is at most `step`.
+double rounded(double number, double step) {
+    if (!std::isfinite(number) || !(step > 0)) return number;
+    const double unit = std::pow(10.0, std::floor(std::log10(step)));
+    return std::round(number / unit) * unit;
+}
+
 // Numbers side by side. Returns the new value as TOML.
 std::optional<std::string> edit_numbers(const Row& row, std::size_t count, bool integers) {
     std::vector<double> numbers = numbers_of(row.node, count);
@@ -127,6 +134,9 @@ std::optional<std::string> edit_numbers(const Row& row, std::size_t count, bool 
                                nullptr, count > 2 ? (integers ? "%.0f" : "%.5g") : format.c_str());
     }
     if (!changed) return std::nullopt;
+    if (!ImGui::GetIO().WantTextInput && !integers) {  // by the mouse: no more digits than a pixel means
+        for (double& number : numbers) number = rounded(number, drag_speed(row.key, number, false));
+    }
     within_limits(row.key, numbers);
     const bool one_for_both =
         count == 2 && row.node != nullptr && row.node->kind != Node::Kind::array && row.present;

@@ -66,7 +66,7 @@ std::string readable_name(std::string_view name) {
 
 std::string readable_name(const Key& key) {
     // In the file they are short; beside a slider they need not be.
-    static constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kLong{{
+    static constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kLong{{
         {"hum", "Humidity (hum)"},
         {"act", "Activation (act)"},
         {"ext", "Extinction (ext)"},
@@ -75,6 +75,8 @@ std::string readable_name(const Key& key) {
         {"k0", "Half width z (k0)"},
         {"t0", "Half width in steps (t0)"},
         {"model", "Model"},
+        {"exposure_ev", "Exposure offset"},
+        {"vertical_fov_deg", "Field of view"},
     }};
     for (const auto& [name, text] : kLong) {
         if (key.name == name) return std::string(text);
@@ -233,10 +235,16 @@ std::vector<TextEntry> new_element(const Key& tables, const Node& values, const 
             }
             const double step = key.name == "state" ? 0.25 : 600;
             value = number_text(array->items.empty() ? 0 : std::min(last + step, key.limits.max), 6);
+        } else if (key.name == "position_m" && tables.section->find("target_m") != nullptr) {
+            value = default_of_kind(key, {centre_m.x, centre_m.y - 4000, std::max(2.0, centre_m.z - 500)});
         } else {
             value = default_of_kind(key, centre_m);
         }
         if (!value.empty()) entries.emplace_back(key.name, value);
+    }
+    if (tables.name == "levels") {  // a level has a wind, in one of its two forms
+        entries.emplace_back("from_deg", "270");
+        entries.emplace_back("speed_m_per_s", "5");
     }
     return entries;
 }

@@ -84,11 +84,13 @@ struct Editor {
     ImVec2 view_min{}, view_max{};  // of the picture in the window
     std::shared_ptr<const LivePicture> picture;
     std::vector<LiveStep> steps;
-    bool record = false;         // edits of wind, climate and lights become key frames at the present step
-    std::uint64_t pictures = 0;  // that were shown
+    bool record = false;  // edits of wind, climate and lights become key frames at the present step
+    float final_state = 1, climate_minutes = 30;  // of a change of climate
+    std::uint64_t pictures = 0;                   // that were shown
 
     // Of the panels.
     TextPath selected;                     // in the outline: a section or an element
+    TextPath revealed;               // what the outline has opened for
     std::map<std::string, Node> defaults;  // values of keys that the text does not have
     std::uint64_t defaults_version = 0;
     std::string filter;            // of the properties
@@ -140,9 +142,10 @@ void dialogs(Editor& editor);
 void open_dialog(Editor& editor, FileDialog dialog);
 
 // Controls with names; each returns as its ImGui namesake.
-bool button(Editor& editor, const std::string& name, const char* tooltip = nullptr);
-bool toggle(Editor& editor, const std::string& name, bool& on, const char* tooltip = nullptr);
+bool button(Editor& editor, const std::string& name, const char* hint = nullptr);
+bool toggle(Editor& editor, const std::string& name, bool& on, const char* hint = nullptr);
 void tooltip_of_last(const char* text);
+void tooltip(const char* text);
 
 // view.cpp
 void frame_scene(Editor& editor);        // a camera that shows all of the clouds

@@ -60,7 +60,11 @@ vk::raii::DeviceMemory allocate(const Gpu& gpu, const vk::MemoryRequirements& ne
 Gpu::Gpu(GLFWwindow* window, const std::string& wanted_device, bool validation) {
     std::uint32_t count = 0;
     const char** needed = glfwGetRequiredInstanceExtensions(&count);
-    if (needed == nullptr) throw Error(ErrorCode::gpu, "this Vulkan loader cannot draw into windows");
+    if (needed == nullptr)
+        throw Error(ErrorCode::gpu,
+                    "no Vulkan driver that draws into windows: install mesa-vulkan-drivers, which also draws "
+                    "without a "
+                    "graphics card, or repair your card's");
     std::vector<const char*> extensions(needed, needed + count), layers;
     if (validation) {
         extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
@@ -153,11 +157,10 @@ SwapChain::SwapChain(const Gpu& from) : gpu(from) {
             if (candidate.format == wanted) format = candidate;
         }
     }
-    const vk::AttachmentDescription colour({}, format.format, vk::SampleCountFlagBits::e1,
-                                           vk::AttachmentLoadOp::eLoad, vk::AttachmentStoreOp::eStore,
-                                           vk::AttachmentLoadOp::eDontCare, vk::AttachmentStoreOp::eDontCare,
-                                           vk::ImageLayout::eColorAttachmentOptimal,
-                                           vk::ImageLayout::ePresentSrcKHR);
+    const vk::AttachmentDescription colour(
+        {}, format.format, vk::SampleCountFlagBits::e1, vk::AttachmentLoadOp::eLoad,
+        vk::AttachmentStoreOp::eStore, vk::AttachmentLoadOp::eDontCare, vk::AttachmentStoreOp::eDontCare,
+        vk::ImageLayout::eColorAttachmentOptimal, vk::ImageLayout::ePresentSrcKHR);
     const vk::AttachmentReference reference(0, vk::ImageLayout::eColorAttachmentOptimal);
     const vk::SubpassDescription subpass({}, vk::PipelineBindPoint::eGraphics, {}, reference);
     const auto output = vk::PipelineStageFlagBits::eColorAttachmentOutput;
