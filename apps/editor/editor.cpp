@@ -316,11 +316,11 @@ int loop(Editor& editor, Report& report) {
         const double pause = (busy ? kFrameSeconds : kIdleSeconds) - seconds_since(last_frame);
         if (script.is_active() && pause > 0)
             std::this_thread::sleep_for(std::chrono::duration<double>(pause / 2));
+        if (std::exchange(editor.theme_changed, false)) apply_theme(editor);
         if (!editor.window->begin_frame(script.is_active() ? 0 : std::max(pause, 0.001))) {
             editor.window->ask_to_close(false);
             ask_before(editor, Pending::close);
         }
-        if (std::exchange(editor.theme_changed, false)) apply_theme(editor);
         const double interval = seconds_since(last_frame);
         last_frame = Clock::now();
         if (scripted && script.is_active()) script.apply(editor);
@@ -336,6 +336,7 @@ int loop(Editor& editor, Report& report) {
             ask_before(editor, Pending::open, path);
         draw_interface(editor);
         update_title(editor, title);
+        if (script.is_random()) editor.quit = false;
         const bool whole =
             editor.picture && (editor.running || editor.picture->refined || !editor.view.detail);
         if (screenshot_due && seconds_since(report.begin) > editor.options.after_s && whole &&

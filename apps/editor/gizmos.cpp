@@ -102,8 +102,8 @@ constexpr ImU32 kAxisColours[3] = {IM_COL32(235, 80, 80, 255), IM_COL32(90, 200,
                                    IM_COL32(90, 140, 250, 255)};
 
 // Handles of a thing with a place and a size along its axes. Returns true while one moves.
-bool shape_handles(Editor& editor, const TextPath& place_path, const TextPath& size_path, const Vec3& origin,
-                   const Vec3& place, const Vec3& half_size, double yaw_deg) {
+bool shape_handles(Editor& editor, const TextPath& place_path, const TextPath& size_path, Vec3 origin,
+                   Vec3 place, Vec3 half_size, double yaw_deg) {
     bool drags = false;
     const Vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     const double sizes[3] = {half_size.x, half_size.y, half_size.z};
@@ -154,11 +154,13 @@ TextPath with(const TextPath& path, const char* name) {
 // Where a model's own space stands while its seeds are edited: at the camera's target.
 bool model_gizmo(Editor& editor) {
     const TextPath model(editor.selected.begin(), editor.selected.begin() + 2);
-    const Node* seeds = value_node(editor.document->values(), with(model, "seeds"));
-    if (seeds == nullptr) return false;
+    const auto count = [&] {  // asked again after each seed: a handle replaces the values
+        const Node* seeds = value_node(editor.document->values(), with(model, "seeds"));
+        return seeds != nullptr ? seeds->items.size() : 0;
+    };
     const Vec3 origin = editor.camera.camera.target_m;
     bool drags = false;
-    for (std::size_t n = 0; n < seeds->items.size(); ++n) {
+    for (std::size_t n = 0; n < count(); ++n) {
         TextPath path = with(model, "seeds");
         path.push_back({{}, n});
         const Vec3 place = vector_of(value_node(editor.document->values(), with(path, "position_m")), {});
@@ -203,7 +205,7 @@ bool gizmos(Editor& editor) {
     if (section != "field") return false;
     bool drags = false;
     for (std::size_t n = 0; n < scene->automaton.field.ellipsoids.size(); ++n) {
-        const Ellipsoid& parcel = scene->automaton.field.ellipsoids[n];
+        const Ellipsoid parcel = scene->automaton.field.ellipsoids[n];  // a handle replaces the scene
         const TextPath path{{"field", 0}, {"ellipsoids", 0}, {{}, n}};
         const bool chosen = editor.selected == path;
         ellipsoid_lines(editor, parcel.centre_m, parcel.semi_axes_m, parcel.yaw_deg,

@@ -470,8 +470,9 @@ void found_rows(Editor& editor, const Section& section, const TextPath& path) {
         if (key.kind == KeyKind::table) found_rows(editor, *key.section, joined_path(path, key.name));
         if (key.kind != KeyKind::tables) continue;
         const TextPath at = joined_path(path, key.name);
-        const Node* array = value_node(editor.document->values(), at);
-        for (std::size_t n = 0; array != nullptr && n < array->items.size() && n < 50; ++n) {
+        for (std::size_t n = 0; n < 50; ++n) {
+            const Node* array = value_node(editor.document->values(), at);  // an edit replaces the values
+            if (array == nullptr || n >= array->items.size()) break;
             TextPath element = at;
             element.push_back({{}, n});
             found_rows(editor, *key.section, element);

@@ -149,8 +149,7 @@ const void* owner_at(const Scene& scene, const TextPath& path, std::size_t model
         } else {
             if (list == nullptr) return nullptr;
             const std::size_t index = step.index + (list->name == "model" ? models_from_files : 0);
-            if (index >= list->size(owner)) return list->element_defaults;
-            owner = list->element(owner, index);
+            owner = index < list->size(owner) ? list->element(owner, index) : list->element_defaults;
             list = nullptr;
         }
     }

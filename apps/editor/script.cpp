@@ -105,7 +105,10 @@ bool Script::find(Editor& editor, const std::string& name, ImVec2& at) {
     if (found != editor.controls.last.end() && !found->second.clipped) {
         at = ImVec2(0.5f * (found->second.min.x + found->second.max.x),
                     0.5f * (found->second.min.y + found->second.max.y));
-        return true;
+        // Where the last command moved it to: only what stands still is clicked.
+        found_frames_ = at.x == found_at_.x && at.y == found_at_.y ? found_frames_ + 1 : 0;
+        found_at_ = at;
+        return found_frames_ >= 3;
     }
     editor.controls.wanted = name;
     if (Clock::now() - line_begin_ < kPatience) return false;
@@ -161,7 +164,13 @@ void Script::random_input(Editor& editor) {
             at = ImVec2(0.5f * (chosen->second.min.x + chosen->second.max.x),
                         0.5f * (chosen->second.min.y + chosen->second.max.y));
         }
-        click(at, kind == 0);
+        Input input;  // quicker than click(): there are many
+        input.mouse = at;
+        input.ctrl = kind == 0;
+        input.left = true;
+        inputs_.push_back(input);
+        input.left = false;
+        inputs_.push_back(input);
     } else if (kind < 16) {
         Input input;
         input.mouse = ImVec2(below(size.x), below(size.y));
@@ -186,6 +195,7 @@ void Script::begin_line(Editor& editor) {
     const std::vector<std::string> words = lines_.front().words;
     const std::string& command = words.front();
     if (!line_begun_) line_begin_ = Clock::now();
+    if (!line_begun_) found_at_ = ImVec2(-1, -1);
     line_begun_ = true;
     const auto done = [this] {
         lines_.pop_front();

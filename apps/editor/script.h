@@ -39,7 +39,9 @@ class Script {
     explicit Script(const std::filesystem::path& path);
     Script() = default;
 
-    bool is_active() const { return !lines_.empty() || !inputs_.empty(); }
+    bool is_active() const { return !lines_.empty() || !inputs_.empty() || random_left_ > 0; }
+    // Returns true during `random`, which must not end the program.
+    bool is_random() const { return random_left_ > 0; }
     // Gives ImGui the input of this frame; between its NewFrame() of the back end and its own. Throws Error(check).
     void apply(Editor& editor);
 
@@ -71,6 +73,8 @@ class Script {
     ImVec2 mouse_{-1, -1};
     Clock::time_point line_begin_ = Clock::now();
     bool line_begun_ = false;
+    ImVec2 found_at_{-1, -1};  // where a control was in the frame before
+    int found_frames_ = 0;     // for how many frames
     std::uint64_t random_left_ = 0;
     std::mt19937 random_;
     int last_key_ = -1;

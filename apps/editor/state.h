@@ -90,7 +90,7 @@ struct Editor {
 
     // Of the panels.
     TextPath selected;                     // in the outline: a section or an element
-    TextPath revealed;               // what the outline has opened for
+    TextPath revealed;                     // what the outline has opened for
     std::map<std::string, Node> defaults;  // values of keys that the text does not have
     std::uint64_t defaults_version = 0;
     std::string filter;            // of the properties

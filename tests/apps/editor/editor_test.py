@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 import unittest
 
 from PIL import Image, ImageStat
@@ -41,7 +42,12 @@ class Case(unittest.TestCase):
         self.assertEqual(done.returncode, status, output)
         return output
 
-    def scene(self, name, **replace):
+    def image(self, name, box=None):
+        """A picture of the test's folder in grey, or a part of it."""
+        with Image.open(self.folder / name) as image:
+            return image.convert("L").crop(box or (0, 0, *image.size))
+
+    def scene(self, name):
         """A copy of a shipped scene in the test's folder."""
         text = (SOURCE / "scenes" / name).read_text(encoding="utf-8")
         path = self.folder / pathlib.Path(name).name
@@ -56,7 +62,8 @@ class Window(Case):
         output = self.edit(self.scene("cumulus.toml"), "--screenshot", picture, "--after", "4", "--report", "--validation",
                            "--theme", "dark")
         self.assertIn("frames/s", output)
-        image = Image.open(picture).convert("RGB")
+        with Image.open(picture) as file:
+            image = file.convert("RGB")
         self.assertEqual(image.size, (1280, 800))
         view = image.crop((270, 40, 860, 560))
         sky, ground = view.crop((0, 0, 590, 100)), view.crop((0, 450, 590, 520))
@@ -67,13 +74,12 @@ class Window(Case):
         for panel in ((5, 30, 240, 780), (900, 30, 1270, 780), (300, 640, 860, 780)):
             grey = image.crop(panel).convert("L")
             self.assertLess(ImageStat.Stat(grey).mean[0], 90)
-            self.assertGreater(grey.getextrema()[1], 180)  # letters
+            self.assertGreater(grey.getextrema()[1], 120)  # letters
 
     def test_light_theme_and_large_text(self):
         picture = self.folder / "window.png"
         self.edit("--screenshot", picture, "--after", "3", "--theme", "light", "--scale", "1.5", "--validation")
-        image = Image.open(picture).convert("L")
-        self.assertGreater(ImageStat.Stat(image.crop((5, 40, 300, 780))).mean[0], 200)
+        self.assertGreater(ImageStat.Stat(self.image(picture, (5, 40, 300, 780))).mean[0], 200)
 
     def test_sizes(self):
         """Very small, minimised, large: nothing is lost, and the validation layer is silent."""
@@ -89,8 +95,8 @@ class Window(Case):
             wait 0.7
             screenshot large.png
             """)
-        self.assertEqual(Image.open(self.folder / "small.png").size, (200, 150))
-        self.assertEqual(Image.open(self.folder / "large.png").size, (1500, 900))
+        self.assertEqual(self.image("small.png").size, (200, 150))
+        self.assertEqual(self.image("large.png").size, (1500, 900))
 
     def test_every_panel(self):
         """Opens every section of the outline, every tab, menu and mode once."""
@@ -103,11 +109,11 @@ class Window(Case):
         lines += [f"click mode {mode}" for mode in ("density", "transmittance", "light only", "beauty")]
         lines += ["click Seed boxes", "click Centre axes", "click Roots", "click Light rays", "wait-picture"]
         lines += ["screenshot view.png", "key F1", "wait 0.2", "key F1", "key CTRL+R", "wait 0.2",
-                  "expect-control Start the run", "click menu File", "wait 0.2", "key ESCAPE", "click menu View",
+                  "expect-control Start the run", "click menu File", "wait 0.2", "click scene", "wait 0.2", "click menu View",
                   "wait 0.2", "click menu Light", "wait 0.3", "screenshot light.png"]
         self.edit(self.scene("torchelsen/cloud-1.toml"), "--validation", script="\n".join(lines))
-        dark = ImageStat.Stat(Image.open(self.folder / "view.png").convert("L").crop((5, 40, 200, 780))).mean[0]
-        light = ImageStat.Stat(Image.open(self.folder / "light.png").convert("L").crop((5, 200, 200, 780))).mean[0]
+        dark = ImageStat.Stat(self.image("view.png", (5, 40, 200, 780))).mean[0]
+        light = ImageStat.Stat(self.image("light.png", (5, 200, 200, 780))).mean[0]
         self.assertLess(dark, light - 80)
 
     def test_slider_shows_in_the_picture(self):
@@ -129,7 +135,7 @@ class Window(Case):
             """)
 
         def brightness(name):
-            return ImageStat.Stat(Image.open(self.folder / name).convert("L").crop((300, 60, 850, 550))).mean[0]
+            return ImageStat.Stat(self.image(name, (300, 60, 850, 550))).mean[0]
 
         self.assertLess(brightness("night.png"), brightness("day.png") - 40)
         self.assertAlmostEqual(brightness("again.png"), brightness("day.png"), delta=2)
@@ -139,7 +145,7 @@ class Story(Case):
     def test_a_sky_from_nothing(self):
         """T's chapter 3: a cloud of 15 seeds, a sky of it, a simulation in a layer, a wind that is changed while it
         runs; saved, and simulated again from the file with the same state hashes as the window showed."""
-        new_seeds = "\n".join(["click new model[0].seeds"] * 14)
+        new_seeds = "\n".join(["click new model[0].seeds\nwait 0.15"] * 14)
         script = f"""
             wait-step 1
             key SPACE
@@ -184,8 +190,8 @@ class Story(Case):
         self.assertEqual(text.count("[[model]]"), 1, text)
         self.assertIn('name = "bank"', text)
         self.assertIn('models = ["bank"]', text)
-        self.assertEqual(text.count("position_m") + text.count("[[model.seeds]]") + text.count("{"), text.count("{") +
-                         text.count("position_m") + text.count("[[model.seeds]]"))
+        model = tomllib.loads(text)["model"][0]
+        self.assertEqual(len(model["seeds"]), 15, text)
         self.assertGreaterEqual(text.count("[[wind]]"), 3, text)  # before, until then, from then on
         seen = (self.folder / "seen.txt").read_text(encoding="utf-8").splitlines()
         self.assertGreater(len(seen), 40)
@@ -230,7 +236,7 @@ class Wild(Case):
     def test_two_thousand_random_inputs(self):
         """Clicks, drags and keys at random: no crash, no message of the validation layer, no frame of two seconds. Files
         are not written: dialogs have no folder to save into but the test's own."""
-        output = self.edit(self.scene("cumulus-by-hand.toml"), "--validation", "--report",
+        output = self.edit(self.scene("torchelsen/cloud-1.toml"), "--validation", "--report", size="1000x640",
                            script="wait-step 1\nrandom 2000 20261122\n")
         longest = int(re.search(r"longest frame (\d+) ms", output).group(1))
         self.assertLess(longest, 2000, output)

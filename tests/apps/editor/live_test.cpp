@@ -35,7 +35,8 @@ Scene small_scene(const std::string& more = {}) {
     return read_scene_text(
         "name = \"small\"\nseed = 3\n[lattice]\ncells = [48, 40, 16]\ncell_size_m = 60\norigin_m = [-1440, "
         "-1200, 900]\n"
-        "[[field.scatters]]\ncount = 8\nreplace = true\nz_m = [1000, 1400]\ncentre = { hum = 0.3, act = 0.05, ext = 0.1 "
+        "[[field.scatters]]\ncount = 8\nreplace = true\nz_m = [1000, 1400]\ncentre = { hum = 0.3, act = "
+        "0.05, ext = 0.1 "
         "}\n[camera]\nposition_m = [0, -3000, "
         "400]\n" +
             more,
