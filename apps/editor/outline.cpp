@@ -141,10 +141,11 @@ void list_row(Editor& editor, const Key& key, const TextPath& at) {
     if (count == 0) ImGui::PopStyleColor();
     editor.controls.note(name);
     const bool hovered = ImGui::IsItemHovered();
-    if (ImGui::IsItemClicked() && !ImGui::IsItemToggledOpen()) editor.selected = at;
+    const bool clicked = ImGui::IsItemClicked() && !ImGui::IsItemToggledOpen();
     ImGui::SameLine(ImGui::GetContentRegionMax().x - 1.3f * ImGui::GetFontSize());
     if (ImGui::SmallButton("+")) add_element(editor, key, at);
     editor.controls.note("new " + name);
+    if (clicked && !ImGui::IsItemHovered()) editor.selected = at;
     if (ImGui::IsItemHovered()) {
         ImGui::SetTooltip("New %s", element_name(key.name).c_str());
     } else if (hovered) {
