@@ -179,7 +179,55 @@ bool model_gizmo(Editor& editor) {
     return drags;
 }
 
+// The lattice that is shown: of a scene with layers the first with an automaton.
+struct ShownBits {
+    BitPlaneView hum, act, cld;
+    Placement placement;
+};
+std::optional<ShownBits> shown_bits(const Editor& editor, const FrameResult& frame) {
+    if (!editor.shown_scene) return std::nullopt;
+    const Scene& scene = *editor.shown_scene;
+    if (frame.layers.empty() && frame.hum) {
+        return ShownBits{*frame.hum, *frame.act, *frame.cld, scene.automaton.placement};
+    }
+    for (std::size_t n = 0; n < frame.layers.size() && n < scene.layers.size(); ++n) {
+        const LayerFrame& layer = frame.layers[n];
+        if (layer.hum) return ShownBits{*layer.hum, *layer.act, *layer.cld, scene.layers[n].placement};
+    }
+    return std::nullopt;
+}
+
 }  // namespace
+
+void slice_of_bits(Editor& editor) {
+    if (!editor.show_slice) return;
+    const std::shared_ptr<const LiveFrame> frame = editor.live.frame();
+    const auto bits = frame ? shown_bits(editor, frame->frame) : std::nullopt;
+    if (!bits) return;
+    constexpr int kMostCells = 5000;  // that are looked at: a large slice is drawn coarser
+    const Extent& cells = bits->cld.extent;
+    const int k = std::clamp(editor.slice, 0, cells.z - 1);
+    int stride = 1;
+    while ((cells.x / stride) * (cells.y / stride) > kMostCells) ++stride;
+    const Vec3& origin = bits->placement.origin_m;
+    const double edge = bits->placement.cell_size_m;
+    const auto at = [&](int i, int j) {
+        return on_screen(editor, {origin.x + edge * i, origin.y + edge * j, origin.z + edge * (k + 0.5)});
+    };
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    for (int j = 0; j < cells.y; j += stride) {
+        for (int i = 0; i < cells.x; i += stride) {
+            const ImU32 colour = bits->cld.get(i, j, k)   ? IM_COL32(225, 90, 90, 170)
+                                 : bits->act.get(i, j, k) ? IM_COL32(240, 150, 60, 170)
+                                 : bits->hum.get(i, j, k) ? IM_COL32(90, 190, 110, 120)
+                                                          : 0;
+            if (colour == 0) continue;
+            const auto a = at(i, j), b = at(i + stride, j), c = at(i + stride, j + stride),
+                       d = at(i, j + stride);
+            if (a && b && c && d) list.AddQuadFilled(*a, *b, *c, *d, colour);
+        }
+    }
+}
 
 bool gizmos(Editor& editor) {
     const std::optional<Scene>& scene = editor.document->scene();

@@ -227,6 +227,16 @@ void view_options_panel(Editor& editor) {
     ImGui::TextDisabled("OVER THE PICTURE");
     toggle(editor, "Shapes of the selection", editor.show_gizmos,
            "Lattice, parcels, seeds; handles of the selected one (G)");
+    toggle(editor, "Slice of the bits", editor.show_slice,
+           "Cells of the automaton at one height: hum green, act orange, cld red, as in the plots");
+    if (editor.show_slice && editor.shown_scene) {
+        const Scene& scene = *editor.shown_scene;
+        const int height = scene.layers.empty() ? scene.automaton.extent.z : scene.layers.front().extent.z;
+        ImGui::SetNextItemWidth(-1);
+        ImGui::SliderInt("##slice", &editor.slice, 0, std::max(0, height - 1), "cell %d from below",
+                         ImGuiSliderFlags_AlwaysClamp);
+        editor.controls.note("slice");
+    }
     toggle(editor, "Plots below the time line", editor.show_plots);
     ImGui::Spacing();
     ImGui::TextDisabled("CAMERA");

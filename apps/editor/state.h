@@ -97,7 +97,8 @@ struct Editor {
     int tab = 0, wanted_tab = -1;  // properties, text
     std::string text_buffer;
     std::uint64_t text_version = 0;
-    int slice = -1;  // height of the slice of the field that is drawn; -1: none
+    bool show_slice = false;  // of the bits hum, act and cld, over the picture
+    int slice = 0;            // its height, in cells
     bool show_gizmos = true, show_plots = true;
 
     // Of dialogs.
@@ -154,6 +155,8 @@ std::optional<ImVec2> on_screen(const Editor& editor, const Vec3& world_m);
 
 // gizmos.cpp: shapes of the scene over the picture. Returns true while the mouse moves one.
 bool gizmos(Editor& editor);
+// Cells with hum, act or cld in a slice of the lattice, over the picture.
+void slice_of_bits(Editor& editor);
 
 // live_changes.cpp: writes a change that was made while the scene runs as key frames at the present step.
 bool record_live(Editor& editor, const TextPath& path, const std::string& value);

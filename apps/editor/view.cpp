@@ -204,6 +204,7 @@ void view_panel(Editor& editor) {
     editor.controls.note("view");
     const bool hovered = ImGui::IsItemHovered(), active = ImGui::IsItemActive();
     ImGui::GetWindowDrawList()->PushClipRect(editor.view_min, editor.view_max, true);
+    slice_of_bits(editor);
     const bool drags = gizmos(editor);
     if (active && !drags) mouse(editor);
     if (hovered) wheel(editor);

@@ -116,6 +116,24 @@ class Window(Case):
         light = ImageStat.Stat(self.image("light.png", (5, 200, 200, 780))).mean[0]
         self.assertLess(dark, light - 80)
 
+    def test_slice_of_the_bits(self):
+        """Red, orange and green cells over the picture, and none of them without the slice."""
+        self.edit(self.scene("cumulus-by-hand.toml"), "--validation", script="""
+            wait-step 60
+            key SPACE
+            click tab View
+            wait-picture
+            screenshot without.png
+            click Slice of the bits
+            wait 0.5
+            screenshot slice.png
+            """)
+        with Image.open(self.folder / "without.png") as a, Image.open(self.folder / "slice.png") as b:
+            box = (300, 60, 850, 550)
+            reds = [sum(1 for red, green, blue in image.convert("RGB").crop(box).getdata() if red > blue + 60)
+                    for image in (a, b)]
+        self.assertGreater(reds[1], reds[0] + 200)
+
     def test_slider_shows_in_the_picture(self):
         """A sun below the horizon darkens the picture, and undo brings the day back."""
         self.edit(self.scene("cumulus-by-hand.toml"), "--validation", script="""
