@@ -12,7 +12,7 @@
 namespace nephos {
 namespace {
 
-constexpr Rgb kBoxes{0.05, 0.15, 0.9}, kRoots{1, 0.75, 0}, kOutside{0.9, 0.9, 0.9}, kInside{0.9, 0.02, 0.02};
+constexpr Rgb kBoxes{0.05, 0.15, 0.9}, kRoots{0.1, 0.35, 1}, kOutside{1, 0.85, 0.05}, kInside{0.9, 0.02, 0.02};
 constexpr Rgb kAxes[3] = {{0.8, 0.1, 0.1}, {0.1, 0.6, 0.1}, {0.1, 0.3, 0.9}};
 
 // The lines of one cloud; everything below is in its model space.

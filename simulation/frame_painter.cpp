@@ -44,6 +44,11 @@ void lean(RainCurtain& curtain, const Wind& wind, const PrecipitationOptions& p,
 FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
     : scene_(scene), renderer_(device) {}
 
+void FramePainter::set_scene(const Scene& scene, bool same_layers) {
+    scene_ = scene;
+    if (!same_layers) painter_ = SkyPainter();
+}
+
 void FramePainter::add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
                               std::optional<std::size_t> layer, double time_s, std::size_t first, std::size_t count,
                               std::vector<DetailedVoxels>& to) const {

@@ -52,6 +52,11 @@ class FramePainter {
     PendingFrame begin(FrameResult frame);
     Picture finish(PendingFrame&& pending);
 
+    // Draws later frames as another scene asks for, with the same back-end and what it has cached. `same_layers`: frames
+    // are still those of the simulation that drawn ones came from; false: of another one. Precondition: no frame is
+    // begun and not finished.
+    void set_scene(const Scene& scene, bool same_layers);
+
     const Renderer& renderer() const { return renderer_; }
     // Return what Renderer's do. They never change: any thread may call these three while another draws.
     std::string backend_name() const { return renderer_.backend_name(); }

@@ -10,7 +10,7 @@
 
 namespace nephos {
 
-void add_commands(CLI::App& app, Action& action) {
+void add_commands(CLI::App& app, Action& action, const EditFunction& edit) {
     app.name("nephos");
     app.description("Grows clouds in a cellular automaton, and turns them into density grids and pictures.");
     app.formatter(std::make_shared<HelpPage>());
@@ -26,6 +26,8 @@ void add_commands(CLI::App& app, Action& action) {
         "  nephos render cloud.vdb --out cloud.png              a picture of any fog volume\n"
         "  nephos sweep fair.toml --axis field.background.ext=0.05,0.1,0.2   tables of many runs\n"
         "  nephos validate my-scene.toml                        every problem of a scene at once\n"
+        "  nephos edit scenes/cumulus.toml                      a window: change the scene and watch it "
+        "live\n"
         "\n"
         "Exit status: 0 done, 1 a check failed, 2 usage or scene, 3 input or output, 4 GPU,\n"
         "             130 stopped by Ctrl-C, 143 by SIGTERM. Results go to stdout, messages to stderr.");
@@ -39,6 +41,7 @@ void add_commands(CLI::App& app, Action& action) {
     add_info_command(app, action);
     add_hash_command(app, action);
     add_state_command(app, action);
+    add_edit_command(app, action, edit);
     add_completion_command(app, action);
     for (CLI::App* sub : app.get_subcommands({})) {
         sub->formatter(std::make_shared<HelpPage>());

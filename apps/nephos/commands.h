@@ -13,6 +13,23 @@ namespace nephos {
 
 using Action = std::function<int()>;
 
+// What `nephos edit` was called with (apps/editor/editor.h explains it).
+struct EditArguments {
+    std::string scene, screenshot, script, theme, device;
+    double after_s = 3, scale = 0;
+    int width = 0, height = 0;
+    bool report = false, validation = false;
+};
+// Opens the editor's window; returns the exit status.
+using EditFunction = std::function<int(const EditArguments&)>;
+
+// Becomes the program nephos-editor, which stands beside this one or in the path: the command itself needs no window and
+// no Vulkan. Throws Error(usage) naming the packages to install where it was not built.
+int start_editor_program(const EditArguments& arguments);
+
+// Parses a command line and does what it says; the only place where exceptions end. Returns the exit status.
+int run_program(int argc, const char* const* argv, const EditFunction& edit);
+
 void add_run_command(CLI::App& app, Action& action);
 void add_sweep_command(CLI::App& app, Action& action);
 void add_fit_command(CLI::App& app, Action& action);
@@ -23,9 +40,10 @@ void add_info_command(CLI::App& app, Action& action);
 void add_hash_command(CLI::App& app, Action& action);
 void add_state_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
+void add_edit_command(CLI::App& app, Action& action, const EditFunction& edit);
 
 // Adds all of them, with --help and --version.
-void add_commands(CLI::App& app, Action& action);
+void add_commands(CLI::App& app, Action& action, const EditFunction& edit = &start_editor_program);
 
 // The text of --help: one page a command, wrapped to the terminal.
 class HelpPage : public CLI::FormatterBase {

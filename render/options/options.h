@@ -211,8 +211,8 @@ std::optional<Flash> flash_at(std::span<const LightningFlash> lightning, double 
 struct DebugView {
     bool boxes = false;  // edges of the seed boxes, blue
     bool axes = false;   // axes through the clouds' centres: x red, y green, z blue
-    bool roots = false;  // an arrow for each root of each seed of the base model, yellow
-    bool rays = false;   // from the boxes' centres to the light, red inside boxes
+    bool roots = false;  // an arrow for each root of each seed of the base model, blue
+    bool rays = false;   // from the boxes' centres to the light, yellow, red inside boxes
     bool any() const { return boxes || axes || roots || rays; }
     bool operator==(const DebugView&) const = default;
 };

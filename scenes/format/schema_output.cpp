@@ -252,7 +252,7 @@ const Section& debug_view_section() {
              "axes", "", kAny, "Axes through the centres of clouds: east red, north green, up blue.",
              "T, figure 28"),
          render_key<&RenderOptions::debug_view, &DebugView::roots>(
-             "roots", "", kAny, "An arrow for each root of the base model, yellow.", "T, figure 28"),
+             "roots", "", kAny, "An arrow for each root of the base model, blue.", "T, figure 28"),
          render_key<&RenderOptions::debug_view, &DebugView::rays>(
              "rays", "", kAny,
              "Rays from the boxes to the sun, white, and red inside of boxes, where light is absorbed.",

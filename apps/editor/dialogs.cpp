@@ -1,0 +1,409 @@
+// SPDX-License-Identifier: Apache-2.0
+// Dialogs over the window: files, unsaved edits, recovery, a run, shortcuts.
+
+#include <algorithm>
+#include <array>
+
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include "apps/editor/state.h"
+#include "core/error.h"
+#include "density/vdb/vdb_file.h"
+#include "render/image/image_file.h"
+#include "scenes/format/writer.h"
+#include "simulation/frame_writer.h"
+#include "simulation/run_folder.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char* title_of(FileDialog dialog) {
+    switch (dialog) {
+        case FileDialog::open:
+            return "Open a scene";
+        case FileDialog::save_as:
+            return "Save the scene as";
+        case FileDialog::export_grid:
+            return "Export the present grid";
+        case FileDialog::screenshot:
+            return "Save a picture of the window";
+        case FileDialog::none:
+            break;
+    }
+    return "";
+}
+
+const char* extension_of(FileDialog dialog) {
+    if (dialog == FileDialog::export_grid) return ".vdb";
+    return dialog == FileDialog::screenshot ? ".png" : ".toml";
+}
+
+// The density that is shown now, of all layers together.
+void export_grid(Editor& editor, const fs::path& path) {
+    const std::shared_ptr<const LiveFrame> frame = editor.live.frame();
+    if (!frame || !editor.shown_scene) throw Error(ErrorCode::usage, "there is no grid yet");
+    if (!has_density(*editor.shown_scene)) {
+        throw Error(ErrorCode::usage, "the clouds of this scene are drawn directly: there is no grid");
+    }
+    const FrameResult& result = frame->frame;
+    const VdbMetadata metadata =
+        density_metadata(*editor.shown_scene, scene_hash(*editor.shown_scene), result.time_s, result.hash);
+    VdbContent content;
+    content.density = &result.density;
+    write_vdb(path, content, metadata);
+}
+
+// What the dialog was for.
+bool accept(Editor& editor, const fs::path& path) {
+    try {
+        switch (editor.dialog) {
+            case FileDialog::open:
+                if (!fs::is_regular_file(path)) throw Error(ErrorCode::io, path.string() + ": no such file");
+                ask_before(editor, Pending::open, path);
+                return true;
+            case FileDialog::save_as:
+                editor.document->save_as(path);
+                note_recent(editor.settings, path);
+                say(editor, "Saved " + path.string());
+                return true;
+            case FileDialog::export_grid:
+                export_grid(editor, path);
+                say(editor, "Grid of step " + std::to_string(editor.picture ? editor.picture->step : 0) +
+                                ": " + path.string());
+                return true;
+            case FileDialog::screenshot:
+                editor.capture_to = path;
+                return true;
+            case FileDialog::none:
+                return true;
+        }
+    } catch (const std::exception& error) {
+        editor.dialog_problem = error.what();
+    }
+    return false;
+}
+
+struct Listed {
+    std::string name;
+    bool is_folder = false;
+};
+
+std::vector<Listed> content_of(const fs::path& folder, const std::string& extension) {
+    std::vector<Listed> out;
+    std::error_code error;
+    for (auto at = fs::directory_iterator(folder, error); !error && at != fs::directory_iterator();
+         at.increment(error)) {
+        const std::string name = at->path().filename().string();
+        std::error_code ignored;  // a link to nowhere is no folder
+        const bool is_folder = at->is_directory(ignored);
+        if (name.starts_with('.') || (!is_folder && at->path().extension() != extension)) continue;
+        out.push_back({name, is_folder});
+        if (out.size() >= 5000) break;
+    }
+    std::ranges::sort(out, [](const Listed& a, const Listed& b) {
+        return a.is_folder != b.is_folder ? a.is_folder : a.name < b.name;
+    });
+    return out;
+}
+
+void file_dialog(Editor& editor) {
+    if (editor.dialog == FileDialog::none) return;
+    const char* title = title_of(editor.dialog);
+    if (!ImGui::IsPopupOpen(title)) ImGui::OpenPopup(title);
+    const float em = ImGui::GetFontSize();
+    ImGui::SetNextWindowSize(ImVec2(34 * em, 27 * em), ImGuiCond_Appearing);
+    bool open = true;
+    if (!ImGui::BeginPopupModal(title, &open, ImGuiWindowFlags_NoSavedSettings)) {
+        editor.dialog = FileDialog::none;
+        return;
+    }
+    bool accepted = false;
+    ImGui::TextWrapped("%s", editor.dialog_folder.string().c_str());
+    ImGui::BeginChild("files", ImVec2(0, -3.6f * ImGui::GetFrameHeightWithSpacing()), true);
+    if (ImGui::Selectable("..")) editor.dialog_folder = editor.dialog_folder.parent_path();
+    for (const Listed& entry : content_of(editor.dialog_folder, extension_of(editor.dialog))) {
+        const std::string label = entry.is_folder ? entry.name + "/" : entry.name;
+        if (ImGui::Selectable(label.c_str(), entry.name == editor.dialog_name,
+                              ImGuiSelectableFlags_AllowDoubleClick)) {
+            if (entry.is_folder) {
+                editor.dialog_folder /= entry.name;
+            } else {
+                editor.dialog_name = entry.name;
+                accepted = ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
+            }
+        }
+        editor.controls.note("file " + entry.name);
+    }
+    ImGui::EndChild();
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::InputTextWithHint("##name", "name of the file", &editor.dialog_name,
+                                 ImGuiInputTextFlags_EnterReturnsTrue)) {
+        accepted = true;
+    }
+    editor.controls.note("file name");
+    ImGui::TextWrapped("%s", editor.dialog_problem.c_str());
+    const bool named = !editor.dialog_name.empty();
+    if (!named) ImGui::BeginDisabled();
+    accepted |= button(editor, editor.dialog == FileDialog::open ? "Open" : "Save");
+    if (!named) ImGui::EndDisabled();
+    ImGui::SameLine();
+    if (button(editor, "Cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) open = false;
+    if (accepted && named) {
+        fs::path path = editor.dialog_folder / editor.dialog_name;
+        if (fs::path(editor.dialog_name).is_absolute()) path = editor.dialog_name;
+        if (path.extension() != extension_of(editor.dialog)) path += extension_of(editor.dialog);
+        if (accept(editor, path)) open = false;
+    }
+    if (!open) {
+        const bool before_pending = editor.dialog == FileDialog::save_as && !editor.document->is_modified();
+        editor.dialog = FileDialog::none;
+        editor.dialog_problem.clear();
+        ImGui::CloseCurrentPopup();
+        if (before_pending && editor.pending != Pending::none) do_pending(editor);
+    }
+    ImGui::EndPopup();
+}
+
+void unsaved_dialog(Editor& editor) {
+    if (editor.pending == Pending::none || editor.dialog != FileDialog::none) return;
+    constexpr const char* kTitle = "Unsaved edits";
+    if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
+    if (!ImGui::BeginPopupModal(kTitle, nullptr,
+                                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
+        return;
+    ImGui::Text("%s has edits that are not saved.", editor.document->title().c_str());
+    ImGui::Spacing();
+    if (button(editor, "Save them")) {
+        if (!editor.document->has_file()) {
+            open_dialog(editor, FileDialog::save_as);
+            ImGui::CloseCurrentPopup();
+        } else if (save_document(editor)) {
+            do_pending(editor);
+            ImGui::CloseCurrentPopup();
+        }
+    }
+    ImGui::SameLine();
+    if (button(editor, "Discard them")) {
+        do_pending(editor);
+        ImGui::CloseCurrentPopup();
+    }
+    ImGui::SameLine();
+    if (button(editor, "Go on editing") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) {
+        editor.pending = Pending::none;
+        ImGui::CloseCurrentPopup();
+    }
+    ImGui::EndPopup();
+}
+
+void recovery_dialog(Editor& editor) {
+    if (!editor.show_recovery) return;
+    constexpr const char* kTitle = "Edits of an earlier session";
+    if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
+    if (!ImGui::BeginPopupModal(kTitle, nullptr,
+                                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
+        return;
+    ImGui::Text("An earlier session with %s ended before its edits were saved.",
+                editor.document->title().c_str());
+    ImGui::Spacing();
+    const auto path = editor.document->found_autosave(editor.folder);
+    const auto close = [&] {
+        editor.show_recovery = false;
+        ImGui::CloseCurrentPopup();
+    };
+    if (!path) close();
+    if (path && button(editor, "Take them")) {
+        try {
+            const SceneDocument saved(*path);
+            editor.document->edit(saved.text(), "Recover");
+            say(editor, "Edits recovered; save to keep them, undo to go back");
+        } catch (const Error& error) {
+            say(editor, error.what(), true);
+        }
+        close();
+    }
+    ImGui::SameLine();
+    if (path && button(editor, "Delete them")) {
+        std::error_code ignored;
+        fs::remove(*path, ignored);
+        close();
+    }
+    ImGui::SameLine();
+    if (button(editor, "Later")) close();
+    ImGui::EndPopup();
+}
+
+void start_run(Editor& editor) {
+    auto run = std::make_unique<BackgroundRun>();
+    BackgroundRun& state = *run;
+    state.folder = fs::path("out") / editor.shown_scene->name;
+    state.thread = std::thread([&state, scene = *editor.shown_scene,
+                                file = editor.document->path().string()] {
+        std::string result, failure;
+        try {
+            RunSettings settings = run_settings(scene, file);
+            settings.folder = state.folder;
+            settings.device.splatting = scene.frames.splatting;
+            settings.device.device = scene.frames.device;
+            RunObserver observer;
+            observer.stop = [&state] { return state.stop.load(); };
+            observer.progress = [&state](const RunProgress& progress) {
+                const std::scoped_lock lock(state.mutex);
+                state.fraction =
+                    progress.steps_in_all > 0 ? double(progress.steps) / double(progress.steps_in_all) : 0;
+                state.phase = std::string(progress.phase) + ": step " + std::to_string(progress.steps) + "/" +
+                              std::to_string(progress.steps_in_all) + ", frame " +
+                              std::to_string(progress.frames) + "/" + std::to_string(progress.frames_in_all);
+            };
+            const RunReport report = run_scene(std::move(settings), observer);
+            result = report.complete ? "complete: " + std::to_string(report.frames) + " frames in " +
+                                           report.folder.string()
+                                     : "stopped; `nephos run --resume` goes on";
+        } catch (const std::exception& error) {
+            failure = error.what();
+        }
+        const std::scoped_lock lock(state.mutex);
+        state.result = result;
+        state.failure = failure;
+        state.done = true;
+    });
+    editor.run = std::move(run);
+}
+
+void run_window(Editor& editor) {
+    if (!editor.show_run) return;
+    const float em = ImGui::GetFontSize();
+    ImGui::SetNextWindowSize(ImVec2(32 * em, 0), ImGuiCond_Appearing);
+    if (ImGui::Begin("Run the scene", &editor.show_run,
+                     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoCollapse)) {
+        ImGui::TextWrapped(
+            "Simulates the whole scene as it stands and writes density grids, pictures and statistics, "
+            "as `nephos run` does.");
+        ImGui::Spacing();
+        if (!editor.shown_scene) {
+            ImGui::TextWrapped("The scene has problems: they come first.");
+        } else if (!editor.run) {
+            ImGui::Text("into out/%s", editor.shown_scene->name.c_str());
+            if (button(editor, "Start the run")) start_run(editor);
+        } else {
+            const std::scoped_lock lock(editor.run->mutex);
+            ImGui::ProgressBar(
+                float(editor.run->done && editor.run->failure.empty() ? 1 : editor.run->fraction));
+            editor.controls.note("run progress");
+            const std::string text = !editor.run->failure.empty()  ? editor.run->failure
+                                     : !editor.run->result.empty() ? editor.run->result
+                                                                   : editor.run->phase;
+            ImGui::TextWrapped("%s", text.c_str());
+        }
+        if (editor.run && editor.run->done) {
+            if (button(editor, "Close the run")) {
+                editor.run.reset();
+                editor.show_run = false;
+            }
+        } else if (editor.run && button(editor, "Stop the run")) {
+            editor.run->stop = true;
+        }
+    }
+    ImGui::End();
+}
+
+void shortcuts_window(Editor& editor) {
+    if (!editor.show_shortcuts) return;
+    static constexpr std::array<std::array<const char*, 2>, 25> kKeys{{
+        {"Space", "run or pause"},
+        {",   .", "a step back, a step on"},
+        {"Home", "back to the start"},
+        {"Left mouse button", "turn round what is looked at"},
+        {"Right mouse button", "look around"},
+        {"Middle mouse button", "shift the view"},
+        {"Wheel", "nearer, farther"},
+        {"W A S D   Q E", "fly; Shift: four times as fast"},
+        {"F", "look at all clouds"},
+        {"C", "camera of the scene"},
+        {"G", "shapes of the scene over the picture"},
+        {"1 2 3 4", "beauty, density, transmittance, light only"},
+        {"Ctrl+N", "new scene"},
+        {"Ctrl+O", "open"},
+        {"Ctrl+S", "save"},
+        {"Ctrl+Shift+S", "save as"},
+        {"Ctrl+Z", "undo"},
+        {"Ctrl+Y", "redo"},
+        {"Ctrl+D", "copy the selected element"},
+        {"Delete", "delete the selected element"},
+        {"Ctrl+click on a number", "type it"},
+        {"Ctrl+R", "run the scene into files"},
+        {"F12", "picture of the window"},
+        {"F1", "this list"},
+        {"Ctrl+Q", "quit"},
+    }};
+    if (ImGui::Begin("Keys", &editor.show_shortcuts,
+                     ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings |
+                         ImGuiWindowFlags_NoCollapse)) {
+        if (ImGui::BeginTable("keys", 2)) {
+            for (const auto& [key, what] : kKeys) {
+                ImGui::TableNextRow();
+                ImGui::TableNextColumn();
+                ImGui::TextUnformatted(key);
+                ImGui::TableNextColumn();
+                ImGui::TextDisabled("%s", what);
+            }
+            ImGui::EndTable();
+        }
+    }
+    ImGui::End();
+}
+
+}  // namespace
+
+void open_dialog(Editor& editor, FileDialog dialog) {
+    editor.dialog = dialog;
+    editor.dialog_problem.clear();
+    std::error_code error;
+    if (editor.dialog_folder.empty()) {
+        const fs::path start = editor.document->has_file()
+                                   ? fs::absolute(editor.document->path(), error).parent_path()
+                                   : fs::current_path(error);
+        editor.dialog_folder = start;
+    }
+    const fs::path stem = editor.document->path().stem();
+    editor.dialog_name = dialog == FileDialog::open ? "" : stem.string() + extension_of(dialog);
+}
+
+void ask_before(Editor& editor, Pending what, fs::path path) {
+    editor.pending = what;
+    editor.pending_path = std::move(path);
+    if (!editor.document->is_modified()) do_pending(editor);
+}
+
+void do_pending(Editor& editor) {
+    const Pending what = std::exchange(editor.pending, Pending::none);
+    try {
+        if (what == Pending::close) {
+            editor.document->remove_autosave();
+            editor.quit = true;
+        } else if (what == Pending::new_scene) {
+            open_document(editor, std::make_unique<SceneDocument>(first_scene_text()));
+        } else if (what == Pending::open && editor.pending_path.extension() == ".vdb") {
+            say(editor,
+                "A grid is no scene: name it as `initial_state` in [lattice], or draw it with `nephos "
+                "render`",
+                true);
+        } else if (what == Pending::open) {
+            open_document(editor, std::make_unique<SceneDocument>(editor.pending_path));
+        }
+    } catch (const Error& error) {
+        say(editor, error.what(), true);
+    }
+}
+
+void dialogs(Editor& editor) {
+    file_dialog(editor);
+    unsaved_dialog(editor);
+    recovery_dialog(editor);
+    run_window(editor);
+    shortcuts_window(editor);
+}
+
+}  // namespace nephos

@@ -1,0 +1,507 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/editor/editor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "apps/editor/script.h"
+#include "apps/editor/state.h"
+#include "core/error.h"
+#include "render/image/image_file.h"
+
+namespace nephos {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kFrameSeconds = 1.0 / 60, kIdleSeconds = 0.1;
+
+double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+ImGuiWindowFlags panel_flags() {
+    return ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+           ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
+           ImGuiWindowFlags_NoBringToFrontOnFocus;
+}
+
+// A bar between two panels that the mouse moves; `size` is in points at scale 1.
+void splitter(Editor& editor, const char* name, const ImVec2& min, const ImVec2& max, bool vertical,
+              float sign, float& size, float scale) {
+    ImGui::SetNextWindowPos(min);
+    ImGui::SetNextWindowSize(ImVec2(std::max(1.0f, max.x - min.x), std::max(1.0f, max.y - min.y)));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
+    ImGui::Begin(name, nullptr, panel_flags() | ImGuiWindowFlags_NoScrollbar);
+    ImGui::InvisibleButton("bar", ImVec2(std::max(1.0f, max.x - min.x), std::max(1.0f, max.y - min.y)));
+    editor.controls.note(name);
+    const bool hot = ImGui::IsItemHovered() || ImGui::IsItemActive();
+    if (hot) ImGui::SetMouseCursor(vertical ? ImGuiMouseCursor_ResizeEW : ImGuiMouseCursor_ResizeNS);
+    if (hot)
+        ImGui::GetWindowDrawList()->AddRectFilled(min, max, ImGui::GetColorU32(ImGuiCol_SeparatorHovered));
+    if (ImGui::IsItemActive()) {
+        const float by = vertical ? ImGui::GetIO().MouseDelta.x : ImGui::GetIO().MouseDelta.y;
+        size = std::clamp(size + sign * by / scale, 60.0f, 1600.0f);
+    }
+    ImGui::End();
+    ImGui::PopStyleVar();
+}
+
+void panel(const char* name, const ImVec2& min, const ImVec2& max, ImGuiWindowFlags more,
+           const std::function<void()>& fill) {
+    if (max.x - min.x < 2 || max.y - min.y < 2) return;
+    ImGui::SetNextWindowPos(min);
+    ImGui::SetNextWindowSize(ImVec2(max.x - min.x, max.y - min.y));
+    if (ImGui::Begin(name, nullptr, panel_flags() | more)) fill();
+    ImGui::End();
+}
+
+// Panels around the picture; those that find no room are left out.
+void layout(Editor& editor, float scale) {
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    const float bar = 5 * scale, top = ImGui::GetFrameHeight(), status = ImGui::GetFrameHeight() + 2 * scale;
+    const float room = std::max(1.0f, size.x - 60 * scale);
+    float left = std::floor(editor.settings.left * scale), right = std::floor(editor.settings.right * scale);
+    if (left + right > room) {  // a narrow window: the picture keeps a third
+        const float fit = std::max(0.0f, 0.66f * size.x) / (left + right);
+        left = std::floor(left * fit);
+        right = std::floor(right * fit);
+    }
+    if (size.x < 420 * scale) left = right = 0;
+    float bottom = std::floor(editor.settings.bottom * scale);
+    bottom = std::min(bottom, std::floor(0.45f * size.y));
+    if (size.y < 260 * scale) bottom = 0;
+    const float low = size.y - status, middle = std::max(top + 1, low - bottom);
+    panel("Outline", {0, top}, {left, low}, 0, [&] { outline_panel(editor); });
+    panel("Properties", {size.x - right, top}, {size.x, low}, 0, [&] {
+        if (ImGui::BeginTabBar("tabs")) {
+            const auto tab = [&](const char* name, int number) {
+                const bool wanted = editor.wanted_tab == number;
+                const bool open = ImGui::BeginTabItem(
+                    name, nullptr, wanted ? ImGuiTabItemFlags_SetSelected : ImGuiTabItemFlags_None);
+                editor.controls.note(std::string("tab ") + name);
+                if (open) editor.tab = number;
+                return open;
+            };
+            const int wanted = editor.wanted_tab;
+            if (tab("Properties", 0)) {
+                properties_panel(editor);
+                ImGui::EndTabItem();
+            }
+            if (tab("View", 1)) {
+                view_options_panel(editor);
+                ImGui::EndTabItem();
+            }
+            if (tab("Text", 2)) {
+                text_panel(editor);
+                ImGui::EndTabItem();
+            }
+            if (wanted == editor.wanted_tab) editor.wanted_tab = -1;
+            ImGui::EndTabBar();
+        }
+    });
+    if (bottom > 0) {
+        panel("Time", {left + (left > 0 ? bar : 0), middle + bar},
+              {size.x - right - (right > 0 ? bar : 0), low}, ImGuiWindowFlags_NoScrollbar,
+              [&] { timeline_panel(editor); });
+    }
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
+    panel("Picture", {left + (left > 0 ? bar : 0), top},
+          {size.x - right - (right > 0 ? bar : 0), bottom > 0 ? middle : low},
+          ImGuiWindowFlags_NoBackground | ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse,
+          [&] { view_panel(editor); });
+    ImGui::PopStyleVar();
+    if (left > 0)
+        splitter(editor, "left bar", {left, top}, {left + bar, low}, true, 1, editor.settings.left, scale);
+    if (right > 0) {
+        splitter(editor, "right bar", {size.x - right - bar, top}, {size.x - right, low}, true, -1,
+                 editor.settings.right, scale);
+    }
+    if (bottom > 0) {
+        splitter(editor, "bottom bar", {left + bar, middle}, {size.x - right - bar, middle + bar}, false, -1,
+                 editor.settings.bottom, scale);
+    }
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(9 * scale, 3 * scale));
+    panel("Status", {0, low}, {size.x, size.y}, ImGuiWindowFlags_NoScrollbar, [&] { status_bar(editor); });
+    ImGui::PopStyleVar();
+}
+
+// Sends what the document became to the live scene.
+void follow_document(Editor& editor) {
+    if (editor.shown_version == editor.document->version()) return;
+    editor.shown_version = editor.document->version();
+    const std::optional<Scene>& scene = editor.document->scene();
+    if (!scene || !editor.document->problems().empty()) return;
+    if (!editor.shown_scene) {
+        const double start = scene->frames.enabled ? scene->frames.start_s : 0;
+        const Moment moment = moment_of(std::max(0.0, start), scene->automaton.time_step_s);
+        editor.shown_scene = *scene;
+        editor.live.start(*scene, std::min<std::uint64_t>(moment.step, scene->steps));
+        take_scene_camera(editor);
+        return;
+    }
+    const SceneChange change = change_between(*editor.shown_scene, *scene);
+    const bool camera_changed = !(editor.shown_scene->render.camera == scene->render.camera);
+    editor.shown_scene = *scene;
+    if (change == SceneChange::simulation) {
+        const LiveStatus status = editor.live.status();
+        editor.live.start(*scene, std::max(status.goal, status.step));
+    } else if (change == SceneChange::picture) {
+        editor.live.redraw(*scene);
+    }
+    if (camera_changed) take_scene_camera(editor);
+}
+
+void take_new_results(Editor& editor) {
+    const std::uint64_t known = editor.picture ? editor.picture->number : 0;
+    if (std::shared_ptr<const LivePicture> next = editor.live.picture(known)) {
+        editor.window->set_picture(next->width, next->height, next->rgba.data());
+        editor.picture = std::move(next);
+        ++editor.pictures;
+    }
+    const LiveStatus status = editor.live.status();
+    if (status.rows < editor.steps.size()) editor.steps.clear();
+    if (status.rows != editor.steps.size()) {
+        const std::vector<LiveStep> more = editor.live.steps(editor.steps.size());
+        editor.steps.insert(editor.steps.end(), more.begin(), more.end());
+    }
+}
+
+void look_after_files(Editor& editor) {
+    const Clock::time_point now = Clock::now();
+    if (now - editor.last_disk_look > std::chrono::milliseconds(700)) {
+        editor.last_disk_look = now;
+        switch (editor.document->look_at_disk()) {
+            case SceneDocument::Disk::same:
+                break;
+            case SceneDocument::Disk::reloaded:
+                say(editor, "Another program changed the file: it was read again");
+                break;
+            case SceneDocument::Disk::differs:
+                say(editor,
+                    "Another program changed the file; saving overwrites that, File > Reload takes it", true);
+                break;
+            case SceneDocument::Disk::gone:
+                say(editor, "The file is gone from the disk; saving makes it anew", true);
+                break;
+        }
+    }
+    if (now - editor.last_autosave > std::chrono::seconds(5)) {
+        editor.last_autosave = now;
+        try {
+            editor.document->autosave(editor.folder);
+        } catch (const Error& error) {
+            say(editor, std::string("Not autosaved: ") + error.what(), true);
+        }
+    }
+}
+
+void shortcuts(Editor& editor) {
+    const ImGuiIO& io = ImGui::GetIO();
+    const auto pressed = [](int key) { return ImGui::IsKeyPressed(key, false); };
+    if (io.KeyCtrl) {
+        if (pressed('S')) {
+            if (io.KeyShift || !editor.document->has_file()) {
+                open_dialog(editor, FileDialog::save_as);
+            } else {
+                save_document(editor);
+            }
+        }
+        if (pressed('O')) open_dialog(editor, FileDialog::open);
+        if (pressed('N')) ask_before(editor, Pending::new_scene);
+        if (pressed('Q')) ask_before(editor, Pending::close);
+        if (pressed('R')) editor.show_run = true;
+        if (io.WantTextInput) return;
+        if (pressed('Z')) {
+            editor.document->undo();
+            say(editor, "Undone");
+        }
+        if (pressed('Y')) {
+            editor.document->redo();
+            say(editor, "Done again");
+        }
+        return;
+    }
+    if (pressed(key_code("F1"))) editor.show_shortcuts = !editor.show_shortcuts;
+    if (pressed(key_code("F12"))) open_dialog(editor, FileDialog::screenshot);
+    if (io.WantTextInput) return;
+    const LiveStatus status = editor.live.status();
+    if (pressed(key_code("SPACE"))) editor.live.run(editor.running = !editor.running);
+    const bool goes = pressed(key_code("HOME")) || pressed(key_code(",")) || pressed(key_code("."));
+    if (goes) editor.live.run(editor.running = false);
+    if (pressed(key_code("HOME"))) editor.live.seek(0);
+    if (pressed(key_code(","))) editor.live.seek(status.step > 0 ? status.step - 1 : 0);
+    if (pressed(key_code("."))) editor.live.seek(status.step + 1);
+    if (pressed('F')) frame_scene(editor);
+    if (pressed('C')) take_scene_camera(editor);
+    if (pressed('G')) editor.show_gizmos = !editor.show_gizmos;
+    for (int mode = 0; mode < int(std::size(kViewModes)); ++mode) {
+        if (pressed('1' + mode)) editor.view.mode = mode;
+    }
+}
+
+void save_capture(Editor& editor) {
+    if (editor.capture_to.empty()) return;
+    const WindowImage& image = editor.window->captured();
+    const std::filesystem::path path = std::exchange(editor.capture_to, {});
+    Rgb8Image out;
+    out.width = image.width;
+    out.height = image.height;
+    out.rgb.reserve(std::size_t(3) * std::size_t(image.width) * std::size_t(image.height));
+    for (std::size_t at = 0; at + 3 < image.rgba.size(); at += 4) {
+        out.rgb.insert(out.rgb.end(), {image.rgba[at], image.rgba[at + 1], image.rgba[at + 2]});
+    }
+    write_png(path, out, RenderOptions{}, PictureMetadata{});
+    say(editor, "Picture of the window: " + path.string());
+}
+
+// Times and rates of a session, for --report.
+struct Report {
+    Clock::time_point begin = Clock::now();
+    double first_frame_s = 0, first_picture_s = 0, longest_frame_s = 0;
+    std::uint64_t frames = 0;
+    std::vector<double> intervals;  // between frames that were drawn without waiting for input
+
+    void print(const Editor& editor) const {
+        const double seconds = seconds_since(begin);
+        std::vector<double> sorted = intervals;
+        std::ranges::sort(sorted);
+        const double slowest = sorted.empty() ? 0 : sorted[std::size_t(0.99 * double(sorted.size() - 1))];
+        fmt::print("first frame {:.2f} s, first picture {:.2f} s after the start\n", first_frame_s,
+                   first_picture_s);
+        fmt::print("interface {:.1f} frames/s, longest frame {:.0f} ms, 99 % within {:.0f} ms\n",
+                   double(frames) / seconds, 1e3 * longest_frame_s, 1e3 * slowest);
+        const double shown = std::max(0.1, seconds - first_picture_s);
+        fmt::print("pictures {:.1f} a second, the last of {}x{} in {:.0f} ms by {}\n",
+                   double(editor.pictures) / shown, editor.picture ? editor.picture->width : 0,
+                   editor.picture ? editor.picture->height : 0, editor.picture ? editor.picture->draw_ms : 0,
+                   editor.live.status().device);
+        const LiveStatus status = editor.live.status();
+        fmt::print("step {} of {}, {:.2f} ms a step, {} checkpoints of {} MiB\n", status.step, status.rows,
+                   status.step_ms, status.checkpoints, status.checkpoint_bytes >> 20);
+    }
+};
+
+void draw_interface(Editor& editor) {
+    const float scale = ImGui::GetFontSize() / 15;
+    editor.controls.last = std::move(editor.controls.now);
+    editor.controls.now.clear();
+    shortcuts(editor);
+    menu_bar(editor);
+    layout(editor, scale);
+    dialogs(editor);
+    if (!ImGui::IsAnyMouseDown()) editor.document->end_merging();
+}
+
+void update_title(Editor& editor, std::string& shown) {
+    const std::string title =
+        (editor.document->is_modified() ? "\u2022 " : "") + editor.document->title() + " - nephos";
+    if (title != shown) editor.window->set_title(shown = title);
+}
+
+int loop(Editor& editor, Report& report) {
+    Script script = editor.options.script.empty() ? Script() : Script(editor.options.script);
+    const bool scripted = script.is_active();
+    std::string title;
+    Clock::time_point last_frame = Clock::now(), last_input = Clock::now();
+    bool screenshot_due = !editor.options.screenshot.empty();
+    while (!editor.quit) {
+        const bool busy = editor.running || script.is_active() || seconds_since(last_input) < 1 ||
+                          editor.live.status().goal != editor.live.status().step ||
+                          editor.window->is_minimised();
+        const double pause = (busy ? kFrameSeconds : kIdleSeconds) - seconds_since(last_frame);
+        if (script.is_active() && pause > 0)
+            std::this_thread::sleep_for(std::chrono::duration<double>(pause / 2));
+        if (std::exchange(editor.theme_changed, false)) apply_theme(editor);
+        if (!editor.window->begin_frame(script.is_active() ? 0 : std::max(pause, 0.001))) {
+            editor.window->ask_to_close(false);
+            ask_before(editor, Pending::close);
+        }
+        const double interval = seconds_since(last_frame);
+        last_frame = Clock::now();
+        if (scripted && script.is_active()) script.apply(editor);
+        ImGui::NewFrame();
+        const ImGuiIO& io = ImGui::GetIO();
+        if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0 || io.MouseWheel != 0 || ImGui::IsAnyItemActive()) {
+            last_input = Clock::now();
+        }
+        follow_document(editor);
+        take_new_results(editor);
+        look_after_files(editor);
+        for (const std::filesystem::path& path : editor.window->take_dropped())
+            ask_before(editor, Pending::open, path);
+        draw_interface(editor);
+        update_title(editor, title);
+        if (script.is_random()) editor.quit = false;
+        const bool whole =
+            editor.picture && (editor.running || editor.picture->refined || !editor.view.detail);
+        if (screenshot_due && seconds_since(report.begin) > editor.options.after_s && whole &&
+            !script.is_active()) {
+            editor.capture_to = editor.options.screenshot;
+            editor.quit = true;
+            screenshot_due = false;
+        }
+        if (!editor.capture_to.empty()) editor.window->capture_next();
+        editor.window->end_frame();
+        if (!editor.capture_to.empty() && !editor.window->is_minimised()) save_capture(editor);
+        if (report.frames++ == 0) report.first_frame_s = seconds_since(report.begin);
+        if (report.first_picture_s == 0 && editor.picture)
+            report.first_picture_s = seconds_since(report.begin);
+        const double spent = seconds_since(last_frame);
+        if (report.frames > 3) report.longest_frame_s = std::max(report.longest_frame_s, spent);
+        if (report.frames > 3 && busy) report.intervals.push_back(interval);
+        if (scripted && !script.is_active() && editor.options.screenshot.empty()) editor.quit = true;
+    }
+    return 0;
+}
+
+std::unique_ptr<SceneDocument> first_document(Editor& editor) {
+    namespace fs = std::filesystem;
+    if (editor.options.scene.empty()) return std::make_unique<SceneDocument>(first_scene_text());
+    if (!fs::is_directory(editor.options.scene)) return std::make_unique<SceneDocument>(editor.options.scene);
+    for (const auto& entry : fs::directory_iterator(editor.options.scene)) {
+        if (entry.path().extension() == ".toml") editor.folder_scenes.push_back(entry.path());
+    }
+    std::ranges::sort(editor.folder_scenes);
+    if (editor.folder_scenes.empty()) {
+        throw Error(ErrorCode::usage, editor.options.scene.string() + ": no scene (*.toml) in this folder");
+    }
+    return std::make_unique<SceneDocument>(editor.folder_scenes.front());
+}
+
+}  // namespace
+
+Editor::Editor(const EditorOptions& from)
+    : options(from),
+      folder(settings_folder()),
+      settings(read_settings(folder)),
+      live({.splatting = Splatting::cpu}) {
+    if (!options.theme.empty()) settings.dark = options.theme != "light";
+    document = first_document(*this);
+    WindowOptions of_window;
+    of_window.width = options.width > 0 ? options.width : settings.width;
+    of_window.height = options.height > 0 ? options.height : settings.height;
+    of_window.device = options.device;
+    of_window.validation = options.validation;
+    // What is to be seen is simulated while the window opens.
+    follow_document(*this);
+    live.run(running);
+    window = std::make_unique<Window>(of_window);
+    apply_theme(*this);
+    last_autosave = Clock::now();
+}
+
+Editor::~Editor() = default;
+
+void say(Editor& editor, std::string message, bool is_bad) {
+    editor.message = std::move(message);
+    editor.message_is_bad = is_bad;
+    editor.message_time = Clock::now();
+}
+
+void Controls::note(const std::string& name) {
+    const bool visible = ImGui::IsItemVisible();
+    if (name == wanted && !visible) ImGui::SetScrollHereY(0.5f);
+    now[name] = {ImGui::GetItemRectMin(), ImGui::GetItemRectMax(), !visible};
+}
+
+void tooltip_of_last(const char* text) {
+    if (ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) tooltip(text);
+}
+
+void tooltip(const char* text) {
+    if (text == nullptr || *text == '\0') return;
+    ImGui::BeginTooltip();
+    ImGui::PushTextWrapPos(28 * ImGui::GetFontSize());
+    ImGui::TextUnformatted(text);
+    ImGui::PopTextWrapPos();
+    ImGui::EndTooltip();
+}
+
+bool button(Editor& editor, const std::string& name, const char* hint) {
+    const bool pressed = ImGui::Button(name.c_str());
+    editor.controls.note(name);
+    tooltip_of_last(hint);
+    return pressed;
+}
+
+bool toggle(Editor& editor, const std::string& name, bool& on, const char* hint) {
+    const bool changed = ImGui::Checkbox(name.c_str(), &on);
+    editor.controls.note(name);
+    tooltip_of_last(hint);
+    return changed;
+}
+
+void change_text(Editor& editor, std::string text, const std::string& what, const std::string& merge) {
+    editor.document->edit(std::move(text), what, merge);
+}
+
+void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging) {
+    const std::string name = path_text(path);
+    try {
+        if (editor.record && record_live(editor, path, value)) return;
+        change_text(editor, with_value(editor.document->text(), path, value), "Change " + name,
+                    dragging ? name : "");
+    } catch (const Error& error) {
+        say(editor, error.what(), true);
+    }
+}
+
+void open_document(Editor& editor, std::unique_ptr<SceneDocument> document) {
+    editor.document->remove_autosave();
+    editor.document = std::move(document);
+    editor.shown_version = 0;
+    editor.shown_scene.reset();
+    editor.selected.clear();
+    editor.steps.clear();
+    editor.text_version = 0;
+    editor.defaults.clear();
+    editor.defaults_version = 0;
+    editor.live.run(editor.running = true);
+    if (editor.document->has_file()) note_recent(editor.settings, editor.document->path());
+    if (editor.document->found_autosave(editor.folder)) editor.show_recovery = true;
+}
+
+bool save_document(Editor& editor) {
+    try {
+        editor.document->save();
+        note_recent(editor.settings, editor.document->path());
+        say(editor, "Saved " + editor.document->path().string());
+        return true;
+    } catch (const Error& error) {
+        say(editor, std::string("Not saved: ") + error.what(), true);
+        return false;
+    }
+}
+
+int run_editor(const EditorOptions& options) {
+    Report report;
+    Editor editor(options);
+    if (editor.document->has_file()) note_recent(editor.settings, editor.document->path());
+    if (editor.document->found_autosave(editor.folder) && options.script.empty() &&
+        options.screenshot.empty()) {
+        editor.show_recovery = true;
+    }
+    int status = 0;
+    try {
+        status = loop(editor, report);
+    } catch (const Error& error) {
+        if (error.code() != ErrorCode::gpu || !editor.document->is_modified()) throw;
+        editor.document->autosave(editor.folder);
+        throw Error(ErrorCode::gpu,
+                    std::string(error.what()) +
+                        "; unsaved edits are kept, and are offered at the next start with this scene");
+    }
+    if (options.report) report.print(editor);
+    editor.document->remove_autosave();
+    if (options.script.empty() && options.screenshot.empty()) write_settings(editor.folder, editor.settings);
+    const std::vector<std::string> messages = editor.window->validation_messages();
+    for (const std::string& message : messages) fmt::print(stderr, "validation: {}\n", message);
+    return messages.empty() ? status : int(ErrorCode::gpu);
+}
+
+}  // namespace nephos

@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/editor/live.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <utility>
+
+#include "apps/editor/live_picture.h"
+#include "core/error.h"
+#include "simulation/memory.h"
+
+namespace nephos {
+namespace {
+
+// How long nothing moves before a picture is drawn with its detail.
+constexpr std::chrono::milliseconds kRest{180};
+constexpr std::size_t kMostCheckpointBytes = 512u << 20;
+// Checkpoints are compared by this name alone: which scene they belong to is known here.
+const std::string kLive = "live";
+
+// The scene as it is simulated here: a frame a step, for as long as anybody looks.
+Scene live_scene(Scene scene) {
+    scene.frames = FrameOptions{};
+    scene.frames.start_s = 0;
+    scene.frames.per_second = 1;
+    scene.frames.time_scale = scene.automaton.time_step_s;
+    scene.frames.count = 0;
+    scene.steps = kMaxFrames - 1;
+    scene.density.write_state = true;  // planes for the views of hum, act and cld
+    return scene;
+}
+
+// Keeps the last frame and all steps that a simulation hands out.
+struct Collector : SimulationSink {
+    void step(const StepResult& result) override {
+        steps.push_back({result.step, {result.time_s, result.statistics, result.hash}});
+    }
+    void frame(const FrameResult& result) override { last = result; }
+    std::vector<std::pair<std::uint64_t, LiveStep>> steps;
+    std::optional<FrameResult> last;
+};
+
+}  // namespace
+
+SceneChange change_between(const Scene& before, const Scene& after) {
+    if (before == after) return SceneChange::none;
+    Scene same = before;
+    same.render = after.render;
+    same.frames = after.frames;
+    same.name = after.name;
+    same.steps = after.steps;
+    same.density.extinction_per_m = after.density.extinction_per_m;
+    same.density.metaball_radius_cells = after.density.metaball_radius_cells;
+    // Rain and snow lie on the ground.
+    if (after.ground_cover.enabled && !(before.render.precipitation == after.render.precipitation)) {
+        return SceneChange::simulation;
+    }
+    return same == after ? SceneChange::picture : SceneChange::simulation;
+}
+
+LiveScene::LiveScene(DeviceOptions device) : device_(std::move(device)) {
+    simulation_thread_ = std::thread([this] { simulate(); });
+    drawing_thread_ = std::thread([this] { draw(); });
+}
+
+LiveScene::~LiveScene() {
+    {
+        const std::scoped_lock lock(mutex_);
+        ended_ = true;
+        hold_ = false;
+    }
+    simulation_due_.notify_all();
+    drawing_due_.notify_all();
+    simulation_thread_.join();
+    drawing_thread_.join();
+}
+
+void LiveScene::start(const Scene& scene, std::uint64_t goal) {
+    const std::scoped_lock lock(mutex_);
+    new_scene_ = live_scene(scene);
+    keeps_state_ = false;
+    drawn_scene_ = scene;
+    goal_ = goal;
+    status_.failure.clear();
+    simulation_due_.notify_all();
+}
+
+void LiveScene::change(const Scene& scene) {
+    const std::scoped_lock lock(mutex_);
+    const bool keeps = !new_scene_ || keeps_state_;
+    new_scene_ = live_scene(scene);
+    keeps_state_ = keeps;
+    drawn_scene_ = scene;
+    simulation_due_.notify_all();
+}
+
+void LiveScene::redraw(const Scene& scene) {
+    const std::scoped_lock lock(mutex_);
+    drawn_scene_ = scene;
+    scene_to_draw_ = true;
+    drawing_due_.notify_all();
+}
+
+std::uint64_t LiveScene::hold() {
+    std::unique_lock lock(mutex_);
+    hold_ = true;
+    simulation_due_.notify_all();
+    held_.wait(lock, [this] { return is_held_ || ended_; });
+    return status_.steps_taken;
+}
+
+void LiveScene::release() {
+    const std::scoped_lock lock(mutex_);
+    hold_ = false;
+    simulation_due_.notify_all();
+}
+
+void LiveScene::run(bool running) {
+    const std::scoped_lock lock(mutex_);
+    running_ = status_.running = running;
+    if (!running) goal_ = std::min(goal_, status_.step);
+    simulation_due_.notify_all();
+    drawing_due_.notify_all();
+}
+
+void LiveScene::set_speed(double steps_per_second) {
+    const std::scoped_lock lock(mutex_);
+    steps_per_second_ = steps_per_second;
+    simulation_due_.notify_all();
+}
+
+void LiveScene::seek(std::uint64_t step) {
+    const std::scoped_lock lock(mutex_);
+    goal_ = std::min<std::uint64_t>(step, kMaxFrames - 2);
+    simulation_due_.notify_all();
+}
+
+void LiveScene::set_view(const LiveView& view) {
+    const std::scoped_lock lock(mutex_);
+    if (view == view_) return;
+    view_ = view;
+    drawing_due_.notify_all();
+}
+
+std::shared_ptr<const LivePicture> LiveScene::picture(std::uint64_t than) const {
+    const std::scoped_lock lock(mutex_);
+    return picture_ && picture_->number > than ? picture_ : nullptr;
+}
+
+std::shared_ptr<const LiveFrame> LiveScene::frame() const {
+    const std::scoped_lock lock(mutex_);
+    return frame_;
+}
+
+LiveStatus LiveScene::status() const {
+    const std::scoped_lock lock(mutex_);
+    LiveStatus status = status_;
+    status.goal = goal_;
+    status.rows = rows_.size();
+    return status;
+}
+
+std::vector<LiveStep> LiveScene::steps(std::uint64_t from) const {
+    const std::scoped_lock lock(mutex_);
+    if (from >= rows_.size()) return {};
+    return {rows_.begin() + std::ptrdiff_t(from), rows_.end()};
+}
+
+// With the mutex held: forgets a simulation that failed, so that only another scene starts one.
+void LiveScene::fail(const std::string& what) {
+    status_.failure = what;
+    running_ = status_.running = false;
+    goal_ = status_.step;
+    simulation_.reset();
+    checkpoints_.clear();
+    checkpoint_bytes_ = 0;
+}
+
+void LiveScene::simulate() {
+    std::unique_lock lock(mutex_);
+    Clock::time_point next_step = Clock::now();
+    while (true) {
+        const auto has_work = [this] {
+            return ended_ || hold_ || new_scene_ ||
+                   (simulation_ && (running_ || !frame_ || goal_ != status_.step));
+        };
+        simulation_due_.wait(lock, has_work);
+        if (ended_) return;
+        if (hold_) {
+            is_held_ = true;
+            held_.notify_all();
+            simulation_due_.wait(lock, [this] { return !hold_ || ended_; });
+            is_held_ = false;
+            continue;
+        }
+        try {
+            if (new_scene_) {
+                take_scene(lock);
+            } else if (goal_ != status_.step || !frame_) {
+                advance(lock, goal_);
+                next_step = Clock::now();
+            } else if (Clock::now() < next_step) {
+                simulation_due_.wait_until(lock, next_step);
+            } else {
+                const auto pause = std::chrono::duration<double>(1 / std::max(steps_per_second_, 0.01));
+                next_step += std::chrono::duration_cast<Clock::duration>(pause);
+                next_step = std::max(next_step, Clock::now() - std::chrono::milliseconds(100));
+                goal_ = status_.step + 1;
+                advance(lock, goal_);
+            }
+        } catch (const std::bad_alloc&) {
+            if (!lock.owns_lock()) lock.lock();
+            fail("out of memory: the simulation was stopped");
+        } catch (const std::exception& error) {
+            if (!lock.owns_lock()) lock.lock();
+            fail(error.what());
+        }
+    }
+}
+
+void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
+    const Scene scene = std::move(*new_scene_);
+    const bool keeps_state = keeps_state_ && simulation_ != nullptr;
+    new_scene_.reset();
+    const Scene drawn = drawn_scene_;
+    lock.unlock();
+    std::shared_ptr<Simulation> simulation;
+    if (keeps_state) {
+        // States before this moment stay valid, those after it do not.
+        const Checkpoint now = simulation_->save();
+        simulation = std::make_shared<Simulation>(scene, full_range(scene), kLive, now);
+    } else {
+        check_memory(scene, RunParts::statistics);
+        SimulationStart start = simulation_start(scene);
+        simulation = std::make_shared<Simulation>(scene, full_range(scene), kLive, std::move(start.initial));
+    }
+    lock.lock();
+    scene_ = scene;
+    simulation_ = std::move(simulation);
+    ++simulation_number_;
+    if (keeps_state) {
+        const auto later = checkpoints_.upper_bound(simulation_->next_step());
+        checkpoints_.erase(later, checkpoints_.end());
+        rows_.resize(std::min<std::size_t>(rows_.size(), simulation_->next_step()));
+    } else {
+        checkpoints_.clear();
+        checkpoint_bytes_ = 0;
+        checkpoint_every_ = 8;
+        rows_.clear();
+        status_.step = 0;
+        frame_.reset();
+        const auto most = std::uint64_t(kMaxFrames - 2);
+        goal_ = std::min(goal_, most);
+        keep_checkpoint();
+    }
+    status_.steps_taken = simulation_->steps_taken();
+    if (!new_scene_) {
+        drawn_scene_ = drawn;
+        scene_to_draw_ = true;
+    }
+}
+
+void LiveScene::keep_checkpoint() {
+    const std::uint64_t step = simulation_->next_step();
+    if (checkpoints_.contains(step) || step % checkpoint_every_ != 0) return;
+    Checkpoint checkpoint = simulation_->save();
+    checkpoint_bytes_ += checkpoint.automaton.size() + checkpoint.history.size();
+    checkpoints_.emplace(step, std::move(checkpoint));
+    while (checkpoint_bytes_ > kMostCheckpointBytes && checkpoints_.size() > 2) {
+        checkpoint_every_ *= 2;
+        std::erase_if(checkpoints_, [this](const auto& entry) {
+            const bool goes = entry.first % checkpoint_every_ != 0;
+            if (goes) checkpoint_bytes_ -= entry.second.automaton.size() + entry.second.history.size();
+            return goes;
+        });
+    }
+    status_.checkpoints = checkpoints_.size();
+    status_.checkpoint_bytes = checkpoint_bytes_;
+}
+
+// Without the mutex. The frame of step s comes after the report of step s.
+void LiveScene::go_back(std::uint64_t step) {
+    auto nearest = checkpoints_.upper_bound(step);
+    nearest = std::prev(nearest);  // the first is that of step 0
+    simulation_ = std::make_shared<Simulation>(scene_, full_range(scene_), kLive, nearest->second);
+}
+
+// Simulates up to the frame of step `goal`, or of an earlier one after a while, so that a picture is seen meanwhile.
+void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) {
+    const bool is_first = !frame_;
+    const auto begin = Clock::now();
+    lock.unlock();
+    const std::uint64_t next_frame = std::uint64_t(simulation_->next_frame() - 1);  // of step 0 is number 1
+    std::uint64_t from = next_frame;
+    if (goal < next_frame) {
+        go_back(goal);
+        from = std::uint64_t(simulation_->next_frame() - 1);
+    } else if (const auto nearest = std::prev(checkpoints_.upper_bound(goal));
+               nearest->first > next_frame + 1) {
+        go_back(goal);  // forwards over steps that are known
+        from = std::uint64_t(simulation_->next_frame() - 1);
+    }
+    Collector collector;
+    std::uint64_t done = from;
+    while (!collector.last || done <= goal) {
+        simulation_->advance(collector);
+        const std::uint64_t reached = std::uint64_t(simulation_->next_frame() - 1);
+        if (reached > done) {
+            done = reached;
+            lock.lock();
+            keep_checkpoint();
+            const bool interrupted = ended_ || hold_ || new_scene_ || goal_ != goal;
+            lock.unlock();
+            if (interrupted || Clock::now() - begin > std::chrono::milliseconds(is_first ? 0 : 150)) break;
+        }
+    }
+    const double spent_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+    lock.lock();
+    for (const auto& [step, row] : collector.steps) {
+        if (step == rows_.size()) rows_.push_back(row);
+    }
+    auto frame = std::make_shared<LiveFrame>();
+    frame->simulation = simulation_;
+    frame->frame = std::move(*collector.last);
+    frame->frame.number = 0;
+    frame->simulation_number = simulation_number_;
+    status_.step = frame->frame.step;
+    status_.steps_taken = simulation_->steps_taken();
+    const double steps = double(std::max<std::uint64_t>(done - from, 1));
+    status_.step_ms += 0.2 * (spent_ms / steps - status_.step_ms);
+    frame_ = std::move(frame);
+    drawing_due_.notify_all();
+}
+
+void LiveScene::draw() {
+    std::unique_lock lock(mutex_);
+    std::unique_ptr<FramePainter> painter;
+    std::uint64_t painted_simulation = 0;
+    LivePictureMaker maker;
+    while (true) {
+        const auto is_new = [&] {
+            return ended_ ||
+                   (frame_ && (frame_ != maker.frame() || !(view_ == maker.view()) || scene_to_draw_));
+        };
+        const auto rests = [&] { return maker.is_draft() && !running_ && goal_ == status_.step; };
+        drawing_due_.wait(lock, [&] { return is_new() || rests(); });
+        bool refine = false;
+        if (!is_new()) {  // nothing moves: after a moment the picture gets its detail
+            drawing_due_.wait_for(lock, kRest, [&] { return is_new() || !rests(); });
+            refine = !is_new() && rests();
+            if (!is_new() && !refine) continue;
+        }
+        if (ended_) return;
+        const std::shared_ptr<const LiveFrame> frame = frame_;
+        const LiveView view = view_;
+        const Scene scene = drawn_scene_;
+        scene_to_draw_ = false;
+        lock.unlock();
+        std::shared_ptr<LivePicture> made;
+        std::string failure, device;
+        try {
+            if (!painter) painter = std::make_unique<FramePainter>(scene, device_);
+            const bool same = painted_simulation == frame->simulation_number;
+            painted_simulation = frame->simulation_number;
+            made = maker.draw(*painter, scene, frame, view, refine, same);
+            device = painter->device_name();
+        } catch (const std::exception& error) {
+            failure = error.what();
+            maker.skip(frame, view);
+            painter.reset();  // a device that failed is opened anew
+        }
+        lock.lock();
+        if (made) {
+            made->number = ++pictures_;
+            picture_ = std::move(made);
+            status_.device = device;
+        }
+        if (!failure.empty()) status_.failure = failure;
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A scene that runs and is drawn beside the window, which never waits for either:
+//
+//     window --(scene, speed, goal)--> simulation thread --(newest frame)--> drawing thread --(picture)--> window
+//            --(camera, size)--------------------------------------------->
+//
+// One frame a step. Frames and pictures that nobody has taken are replaced by newer ones. Steps that are asked for
+// again are simulated from the nearest of the checkpoints that are kept in memory.
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "density/statistics.h"
+#include "scenes/format/scene.h"
+#include "simulation/frame_painter.h"
+#include "simulation/simulation.h"
+
+namespace nephos {
+
+// Whether a new text of a scene needs another simulation, or its pictures alone change. Pure.
+enum class SceneChange { none, picture, simulation };
+SceneChange change_between(const Scene& before, const Scene& after);
+
+// What the plots show of a step.
+struct LiveStep {
+    double time_s = 0;
+    CloudStatistics statistics;
+    StateHash hash;
+};
+
+// A step's density and clouds, and the simulation that the clouds' shapes belong to.
+struct LiveFrame {
+    std::shared_ptr<const Simulation> simulation;
+    FrameResult frame;
+    std::uint64_t simulation_number = 0;  // rises with every scene that is simulated anew
+};
+
+// How a picture is drawn.
+struct LiveView {
+    Camera camera;                  // of the window: without path
+    int width = 640, height = 360;  // of the picture when nothing moves, pixels
+    bool detail = true;             // procedural detail when nothing moves
+    int mode = 0;                   // kViewModes: index
+    DebugView debug;
+    bool operator==(const LiveView&) const = default;
+};
+inline constexpr const char* kViewModes[] = {"beauty", "density", "transmittance", "light only"};
+
+struct LivePicture {
+    int width = 0, height = 0;
+    std::vector<std::uint8_t> rgba;  // row 0 at the top
+    std::uint64_t step = 0;
+    double time_s = 0;
+    Camera camera;         // that it was drawn with
+    bool refined = false;  // at the full size, with detail
+    double draw_ms = 0;
+    std::uint64_t number = 0;  // rises
+};
+
+struct LiveStatus {
+    bool running = false;
+    std::uint64_t step = 0;         // of the newest frame
+    std::uint64_t goal = 0;         // step that is being simulated to
+    std::uint64_t steps_taken = 0;  // by the automata: a change of the scene acts from this step on
+    std::uint64_t rows = 0;         // steps whose statistics are known, from 0 on
+    double step_ms = 0;             // mean wall time of a step
+    std::size_t checkpoints = 0, checkpoint_bytes = 0;
+    std::string failure;  // what ended the simulation or the drawing; empty: nothing
+    std::string device;   // that draws
+};
+
+class LiveScene {
+  public:
+    explicit LiveScene(DeviceOptions device = {});
+    ~LiveScene();
+    LiveScene(const LiveScene&) = delete;
+    LiveScene& operator=(const LiveScene&) = delete;
+
+    // Simulates a scene from its start and shows step `goal` of it, passing through those before it.
+    void start(const Scene& scene, std::uint64_t goal);
+    // Goes on from the present state with another scene of the same layers and lattices: what a user changed while it
+    // runs. Call it between hold() and release().
+    void change(const Scene& scene);
+    // Draws with the options of another scene; its simulation is the same.
+    void redraw(const Scene& scene);
+
+    // Waits until no step is under way (some milliseconds, a large scene's step at most), keeps it so, and returns the
+    // number of steps that were taken: a change of the scene would act from that step on.
+    std::uint64_t hold();
+    void release();
+
+    void run(bool running);
+    void set_speed(double steps_per_second);
+    // Shows a step: simulates to it, or goes back to it.
+    void seek(std::uint64_t step);
+    void set_view(const LiveView& view);
+
+    // Return the newest; null while there is none, or nothing newer than `than`.
+    std::shared_ptr<const LivePicture> picture(std::uint64_t than) const;
+    std::shared_ptr<const LiveFrame> frame() const;
+    LiveStatus status() const;
+    // Copies the rows of steps from `from` on.
+    std::vector<LiveStep> steps(std::uint64_t from = 0) const;
+
+  private:
+    using Clock = std::chrono::steady_clock;
+
+    void simulate();
+    void draw();
+    void take_scene(std::unique_lock<std::mutex>& lock);
+    void advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal);
+    void go_back(std::uint64_t step);
+    void keep_checkpoint();
+    void fail(const std::string& what);
+
+    const DeviceOptions device_;
+    mutable std::mutex mutex_;
+    std::condition_variable simulation_due_, drawing_due_, held_;
+
+    // Shared, under the mutex.
+    bool ended_ = false, running_ = false, hold_ = false, is_held_ = false;
+    std::optional<Scene> new_scene_;  // to simulate
+    bool keeps_state_ = false;        // new_scene_ goes on from the present state
+    Scene drawn_scene_;
+    bool scene_to_draw_ = false, layers_changed_ = false;
+    double steps_per_second_ = 6;
+    std::uint64_t goal_ = 0;
+    LiveView view_;
+    std::shared_ptr<const LiveFrame> frame_;
+    std::shared_ptr<const LivePicture> picture_;
+    std::vector<LiveStep> rows_;
+    LiveStatus status_;
+    std::uint64_t pictures_ = 0;
+
+    // Of the simulation thread alone.
+    Scene scene_;
+    std::shared_ptr<Simulation> simulation_;
+    std::map<std::uint64_t, Checkpoint> checkpoints_;  // by the next step that they report
+    std::uint64_t checkpoint_every_ = 8, simulation_number_ = 0;
+    std::size_t checkpoint_bytes_ = 0;
+
+    std::thread simulation_thread_, drawing_thread_;
+};
+
+}  // namespace nephos

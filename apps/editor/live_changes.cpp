@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+// Changes that are made while a scene runs. A key frame holds from its time on; the one before it keeps what was true
+// until then. What was simulated up to the present step therefore stays true of the changed scene, and the run goes on
+// from its present state.
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/editor/schema_values.h"
+#include "apps/editor/state.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/text.h"
+
+namespace nephos {
+namespace {
+
+std::string levels_toml(const std::vector<WindLevel>& levels) {
+    std::string out = "[";
+    for (const WindLevel& level : levels) {
+        if (out.size() > 1) out += ", ";
+        out += "{ height_m = " + number_text(level.height_m) +
+               ", east_m_per_s = " + number_text(level.velocity.east_m_per_s) +
+               ", north_m_per_s = " + number_text(level.velocity.north_m_per_s) + " }";
+    }
+    return out + "]";
+}
+
+// The profile at a time, at the heights of all key frames around it.
+std::vector<WindLevel> profile_at(const Wind& wind, double time_s) {
+    std::vector<double> heights;
+    for (const WindKeyframe& key : wind.keyframes) {
+        for (const WindLevel& level : key.levels) heights.push_back(level.height_m);
+    }
+    if (heights.empty()) heights = {0};
+    std::ranges::sort(heights);
+    heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
+    std::vector<WindLevel> out;
+    for (const double height : heights) out.push_back({height, wind_at(wind, height, time_s)});
+    return out;
+}
+
+// The text with key frames of a wind at a path ("wind", "layer[0].wind") replaced.
+std::string with_keyframes(std::string text, const TextPath& path, const std::vector<WindKeyframe>& keys) {
+    text = without(text, path);
+    for (const WindKeyframe& key : keys) {
+        text = with_new_element(
+            text, path,
+            std::vector<TextEntry>{{"time_s", number_text(key.time_s)}, {"levels", levels_toml(key.levels)}});
+    }
+    return text;
+}
+
+// Key frames of a wind that is `before` up to the step before `step` and `after` from it on. Between two key frames of
+// `before` every step gets one of its own, so that its steps keep their bits.
+std::vector<WindKeyframe> changed_keys(const Wind& before, const std::vector<WindLevel>& after,
+                                       std::uint64_t step, double step_s) {
+    const double now = double(step) * step_s, last = now - step_s;
+    std::vector<WindKeyframe> keys;
+    for (const WindKeyframe& key : before.keyframes) {
+        if (key.time_s <= last) keys.push_back(key);
+    }
+    const bool between = keys.size() < before.keyframes.size() && !keys.empty();
+    if (between) {
+        const double from = keys.back().time_s;
+        for (std::uint64_t at = std::uint64_t(std::max(0.0, std::ceil(from / step_s))); at < step; ++at) {
+            const double time = double(at) * step_s;
+            if (time > from) keys.push_back({time, profile_at(before, time)});
+        }
+    } else if (step > 0 && (keys.empty() || keys.back().time_s < last)) {
+        keys.push_back({last, profile_at(before, last)});
+    }
+    keys.push_back({now, after});
+    return keys;
+}
+
+// Applies a text that goes on from the present state.
+bool apply(Editor& editor, const std::string& text, const std::string& what, const std::string& merge) {
+    editor.document->edit(text, what, merge);
+    editor.shown_version = editor.document->version();
+    if (!editor.document->problems().empty() || !editor.document->scene()) return true;
+    editor.shown_scene = *editor.document->scene();
+    editor.live.change(*editor.shown_scene);
+    return true;
+}
+
+struct Held {
+    explicit Held(LiveScene& live) : scene(live), step(live.hold()) {}
+    ~Held() { scene.release(); }
+    Held(const Held&) = delete;
+    Held& operator=(const Held&) = delete;
+    LiveScene& scene;
+    std::uint64_t step;
+};
+
+// Length of the path of a wind's array at the start of a path; 0 when it is none.
+std::size_t wind_length(const TextPath& path) {
+    if (!path.empty() && path[0].name == "wind") return 1;
+    return path.size() > 2 && path[0].name == "layer" && path[2].name == "wind" ? 3 : 0;
+}
+
+// The wind of a scene at such a path.
+const Wind& wind_at_path(const Scene& scene, const TextPath& path) {
+    return path.size() == 1 ? scene.automaton.wind : scene.layers.at(path[1].index).wind;
+}
+
+bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, const std::string& value) {
+    const Held held(editor.live);
+    const Scene before = *editor.shown_scene;
+    const std::string& text = editor.document->text();
+    // The edit as it would be without recording says which profile is wanted.
+    const std::string edited = with_value(text, path, value);
+    const std::filesystem::path folder =
+        editor.document->has_file() ? std::filesystem::absolute(editor.document->path()).parent_path() : "";
+    Scene wanted;
+    try {
+        wanted = read_scene_text(edited, editor.document->title(), folder);
+    } catch (const SceneErrors&) {
+        return false;  // shown as any other problem
+    }
+    const std::size_t index = path[array.size()].index;
+    const Wind& changed = wind_at_path(wanted, array);
+    if (index >= changed.keyframes.size()) return false;
+    const std::vector<WindKeyframe> keys =
+        changed_keys(wind_at_path(before, array), changed.keyframes[index].levels, held.step,
+                     before.automaton.time_step_s);
+    say(editor, "Wind recorded from step " + std::to_string(held.step) + " on");
+    const bool done =
+        apply(editor, with_keyframes(text, array, keys), "Wind from step " + std::to_string(held.step),
+              "live " + std::to_string(held.step));
+    // What is shown of the list is now its newest key frame.
+    if (editor.selected.size() > array.size() &&
+        std::equal(array.begin(), array.end(), editor.selected.begin())) {
+        editor.selected[array.size()].index = keys.size() - 1;
+    }
+    return done;
+}
+
+}  // namespace
+
+bool record_live(Editor& editor, const TextPath& path, const std::string& value) {
+    if (!editor.shown_scene || !editor.document->problems().empty()) return false;
+    const std::size_t length = wind_length(path);
+    if (length > 0 && path.size() > length + 1 && path.back().name != "time_s") {
+        return record_wind(editor, TextPath(path.begin(), path.begin() + std::ptrdiff_t(length)), path,
+                           value);
+    }
+    return false;
+}
+
+void record_climate(Editor& editor, double final_state, double duration_s) {
+    if (!editor.shown_scene || !editor.document->problems().empty()) return;
+    const Held held(editor.live);
+    const Scene& scene = *editor.shown_scene;
+    const double step_s = scene.automaton.time_step_s, now = double(held.step) * step_s;
+    const auto state_at = [&](double time_s) {
+        const std::vector<StatePoint>& points = scene.climate.schedule;
+        if (points.empty()) return 0.0;
+        if (time_s <= points.front().time_s) return points.front().state;
+        for (std::size_t n = 1; n < points.size(); ++n) {
+            if (time_s > points[n].time_s) continue;
+            const double part = (time_s - points[n - 1].time_s) / (points[n].time_s - points[n - 1].time_s);
+            return points[n - 1].state + part * (points[n].state - points[n - 1].state);
+        }
+        return points.back().state;
+    };
+    std::vector<StatePoint> points;
+    for (const StatePoint& point : scene.climate.schedule) {
+        if (point.time_s < now - step_s) points.push_back(point);
+    }
+    // Every step between two points gets one, so that the past keeps its bits.
+    const double from = points.empty() ? -step_s : points.back().time_s;
+    const bool moving = points.size() < scene.climate.schedule.size() && !points.empty();
+    for (std::uint64_t step = moving ? 0 : (held.step > 0 ? held.step - 1 : 0); step <= held.step; ++step) {
+        const double time = double(step) * step_s;
+        if (time > from) points.push_back({time, state_at(time)});
+    }
+    points.push_back({now + std::max(duration_s, step_s), final_state});
+    std::string schedule = "[";
+    for (const StatePoint& point : points) {
+        if (schedule.size() > 1) schedule += ", ";
+        schedule +=
+            "{ time_s = " + number_text(point.time_s) + ", state = " + number_text(point.state) + " }";
+    }
+    std::string text = editor.document->text();
+    for (const char* key :
+         {"climate.initial_state", "climate.final_state", "climate.duration_s", "climate.schedule"}) {
+        text = without(text, text_path(key));
+    }
+    text = with_value(text, text_path("climate.schedule"), schedule + "]");
+    apply(editor, text, "Climate from step " + std::to_string(held.step), "");
+    say(editor, "The climate changes from step " + std::to_string(held.step) + " on");
+}
+
+void add_flash(Editor& editor) {
+    if (!editor.shown_scene) return;
+    const Vec3 at = editor.camera.camera.target_m;
+    const double time_s = editor.picture ? editor.picture->time_s : 0;
+    const auto rounded = [](double number) { return number_text(std::round(number), 7); };
+    const std::vector<TextEntry> entries{
+        {"position_m", "[" + rounded(at.x) + ", " + rounded(at.y) + ", " + rounded(at.z) + "]"},
+        {"time_s", number_text(time_s)},
+        {"duration_s", number_text(4 * editor.shown_scene->automaton.time_step_s)},
+        {"intensity", "4"}};
+    change_text(editor, with_new_element(editor.document->text(), text_path("lightning"), entries),
+                "Lightning");
+}
+
+void keep_camera(Editor& editor) {
+    const auto place = [](const Vec3& v) {
+        return "[" + number_text(std::round(v.x), 7) + ", " + number_text(std::round(v.y), 7) + ", " +
+               number_text(std::round(v.z), 7) + "]";
+    };
+    const Camera& camera = editor.camera.camera;
+    std::string text =
+        with_value(editor.document->text(), text_path("camera.position_m"), place(camera.position_m));
+    text = with_value(text, text_path("camera.target_m"), place(camera.target_m));
+    text = with_value(text, text_path("camera.vertical_fov_deg"), number_text(camera.vertical_fov_deg, 4));
+    change_text(editor, text, "Camera");
+    say(editor, "The scene has this camera now");
+}
+
+}  // namespace nephos

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The scene that is edited: its text, what the text means, its history, and its file.
+//
+// The text is the truth. Every edit makes a new text (scenes/format/toml_edit.h), which is read at once: a scene
+// without problems becomes scene(), otherwise problems() says what is wrong and scene() stays the last good one. Undo
+// and redo go through the history of texts, so that a walk back ends in the same bytes. Not thread-safe.
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scenes/format/document.h"
+#include "scenes/format/errors.h"
+#include "scenes/format/scene.h"
+#include "scenes/format/toml_edit.h"
+
+namespace nephos {
+
+class SceneDocument {
+  public:
+    // A new scene that has never been saved; `text` is its start.
+    explicit SceneDocument(std::string text, std::string name = "untitled.toml");
+    // Throws Error(io) when the file cannot be read; a file with problems is opened all the same.
+    explicit SceneDocument(const std::filesystem::path& path);
+
+    const std::string& text() const { return history_[at_].text; }
+    const TomlNode& tree() const { return tree_; }
+    // The values of the text, of its last version without syntax errors.
+    const Node& values() const { return values_; }
+    // The last text without problems as a scene; none when there was none.
+    const std::optional<Scene>& scene() const { return scene_; }
+    const std::vector<Problem>& problems() const { return problems_; }
+
+    // Replaces the text as one step of the history. Edits in a row with the same `merge`, if it is not empty, are one
+    // step: those of one drag of a slider. Returns false when nothing changes.
+    bool edit(std::string text, const std::string& what, const std::string& merge = {});
+    // Ends such a row.
+    void end_merging() { merge_.clear(); }
+
+    bool can_undo() const { return at_ > 0; }
+    bool can_redo() const { return at_ + 1 < history_.size(); }
+    void undo();
+    void redo();
+    std::string undo_text() const { return can_undo() ? history_[at_].what : ""; }
+    std::string redo_text() const { return can_redo() ? history_[at_ + 1].what : ""; }
+    // Rises with every change of the text, also by undo.
+    std::uint64_t version() const { return version_; }
+
+    bool is_modified() const { return text() != saved_text_; }
+    bool has_file() const { return has_file_; }
+    const std::filesystem::path& path() const { return path_; }
+    std::string title() const { return path_.filename().string(); }
+    // Throw Error(io) naming the file; the file then is as it was.
+    void save();
+    void save_as(const std::filesystem::path& path);
+
+    // What another program did to the file since it was read or saved.
+    enum class Disk { same, reloaded, differs, gone };
+    // Reads a file that changed, unless there are unsaved edits (`differs`). The old text can be had again by undo.
+    Disk look_at_disk();
+    void reload();
+
+    // Writes unsaved edits into a file beside the scene's, in `folder` for one that has none; removes that file when
+    // there are none. Throws Error(io).
+    void autosave(const std::filesystem::path& folder);
+    void remove_autosave();
+    // The file of that kind that a crashed editor left for this scene; none when there is none newer.
+    std::optional<std::filesystem::path> found_autosave(const std::filesystem::path& folder) const;
+
+  private:
+    struct Version {
+        std::string text, what;
+    };
+    void read();
+    void note_file();
+    std::filesystem::path autosave_path(const std::filesystem::path& folder) const;
+
+    std::vector<Version> history_;
+    std::size_t at_ = 0, history_bytes_ = 0;
+    std::string merge_, saved_text_;
+    std::filesystem::path path_;
+    bool has_file_ = false;
+    std::optional<std::filesystem::file_time_type> file_time_;
+    std::filesystem::path autosaved_;
+    std::uint64_t version_ = 0, autosaved_version_ = 0;
+
+    TomlNode tree_;
+    Node values_;
+    std::optional<Scene> scene_;
+    std::vector<Problem> problems_;
+};
+
+}  // namespace nephos

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/editor/schema_values.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <utility>
+
+#include "scenes/format/text.h"
+#include "scenes/format/writer.h"
+
+namespace nephos {
+namespace {
+
+// Ends of names that repeat the unit, the longest first.
+constexpr std::array<std::string_view, 15> kUnitEnds{"_mm_per_h_per_m",
+                                                     "_mm_per_h",
+                                                     "_m_per_s",
+                                                     "_per_m",
+                                                     "_cells",
+                                                     "_pixels",
+                                                     "_mm",
+                                                     "_deg",
+                                                     "_m2",
+                                                     "_um",
+                                                     "_km",
+                                                     "_ev",
+                                                     "_hpa",
+                                                     "_m",
+                                                     "_s"};
+
+std::string default_of_kind(const Key& key, const Vec3& centre_m) {
+    switch (key.kind) {
+        case KeyKind::vector: {
+            std::string out = "[";
+            for (const double part : {centre_m.x, centre_m.y, centre_m.z}) {
+                if (out.size() > 1) out += ", ";
+                out += number_text(part, 6);
+            }
+            return out + "]";
+        }
+        case KeyKind::integer:
+        case KeyKind::count:
+            return std::to_string(std::max(1LL, static_cast<long long>(std::max(key.limits.min, 0.0))));
+        case KeyKind::number:
+            return key.limits.min > 0 || key.limits.above_min ? number_text(key.limits.min + 1, 6) : "0";
+        default:
+            return {};
+    }
+}
+
+}  // namespace
+
+std::string readable_name(std::string_view name) {
+    for (const std::string_view end : kUnitEnds) {
+        if (name.size() > end.size() && name.ends_with(end)) {
+            name.remove_suffix(end.size());
+            break;
+        }
+    }
+    std::string out(name);
+    std::ranges::replace(out, '_', ' ');
+    if (!out.empty()) out[0] = char(std::toupper(static_cast<unsigned char>(out[0])));
+    return out;
+}
+
+std::string readable_name(const Key& key) {
+    // In the file they are short; beside a slider they need not be.
+    static constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kLong{{
+        {"hum", "Humidity (hum)"},
+        {"act", "Activation (act)"},
+        {"ext", "Extinction (ext)"},
+        {"i0", "Half width x (i0)"},
+        {"j0", "Half width y (j0)"},
+        {"k0", "Half width z (k0)"},
+        {"t0", "Half width in steps (t0)"},
+        {"model", "Model"},
+        {"exposure_ev", "Exposure offset"},
+        {"vertical_fov_deg", "Field of view"},
+    }};
+    for (const auto& [name, text] : kLong) {
+        if (key.name == name) return std::string(text);
+    }
+    return readable_name(std::string_view(key.name));
+}
+
+std::string unit_sign(std::string_view unit) {
+    if (unit == "deg") return "°";
+    return std::string(unit);
+}
+
+std::string list_name(const Key& key) {
+    if (key.name == "model") return "Base models";
+    if (key.name == "sky") return "Skies";
+    if (key.name == "layer") return "Layers";
+    if (key.name == "wind") return "Wind over time";
+    if (key.name == "levels") return "Levels";
+    if (key.name == "path") return "Path";
+    return readable_name(key);
+}
+
+std::string element_name(std::string_view key) {
+    std::string name = readable_name(key);
+    if (name == "Skies") return "Sky";
+    if (name.size() > 3 && name.ends_with('s') && !name.ends_with("ss")) name.pop_back();
+    return name;
+}
+
+const Node* value_node(const Node& values, const TextPath& path) {
+    const Node* node = &values;
+    for (const TextStep& step : path) {
+        if (step.name.empty()) {
+            if (step.index >= node->items.size()) return nullptr;
+            node = &node->items[step.index];
+        } else {
+            const Entry* entry = node->find(step.name);
+            if (entry == nullptr) return nullptr;
+            node = &entry->value;
+        }
+    }
+    return node;
+}
+
+const Key* key_at(const TextPath& path) {
+    std::vector<std::string> names;
+    for (const TextStep& step : path) {
+        if (!step.name.empty()) names.push_back(step.name);
+    }
+    return names.empty() ? nullptr : find_key(names);
+}
+
+const Section* section_at(const TextPath& path) {
+    if (path.empty()) return &scene_section();
+    const Key* key = key_at(path);
+    return key != nullptr ? key->section : nullptr;
+}
+
+const void* owner_at(const Scene& scene, const TextPath& path, std::size_t models_from_files) {
+    const Section* section = &scene_section();
+    const void* owner = &scene;
+    const Key* list = nullptr;
+    for (const TextStep& step : path) {
+        if (!step.name.empty()) {
+            const Key* key = section != nullptr ? section->find(step.name) : nullptr;
+            if (key == nullptr || key->section == nullptr || key->value == nullptr) return nullptr;
+            owner = key->value(const_cast<void*>(owner));
+            section = key->section;
+            list = key->kind == KeyKind::tables ? key : nullptr;
+        } else {
+            if (list == nullptr) return nullptr;
+            const std::size_t index = step.index + (list->name == "model" ? models_from_files : 0);
+            owner = index < list->size(owner) ? list->element(owner, index) : list->element_defaults;
+            list = nullptr;
+        }
+    }
+    return list == nullptr ? owner : nullptr;
+}
+
+std::string default_value(const Key& key, const void* owner) {
+    if (owner == nullptr || key.value == nullptr) return {};
+    if (key.kind == KeyKind::table || key.kind == KeyKind::tables) return {};
+    return value_text(key, key.value(const_cast<void*>(owner)));
+}
+
+Node parsed_value(const std::string& toml) {
+    Document document;
+    const int origin = document.add_origin("value", "v = " + toml, true);
+    std::optional<Node> parsed = document.parse(origin);
+    if (!parsed || parsed->entries.empty()) return {};
+    return std::move(parsed->entries.front().value);
+}
+
+std::vector<std::string> names_of(const Node* array) {
+    std::vector<std::string> names;
+    if (array == nullptr) return names;
+    for (const Node& item : array->items) {
+        const Entry* name = item.find("name");
+        if (name != nullptr && name->value.kind == Node::Kind::text) names.push_back(name->value.text);
+    }
+    return names;
+}
+
+std::string unused_name(std::string_view start, const std::vector<std::string>& taken) {
+    for (std::size_t number = taken.size() + 1;; ++number) {
+        std::string name = std::string(start) + "-" + std::to_string(number);
+        if (std::ranges::find(taken, name) == taken.end()) return name;
+    }
+}
+
+std::vector<TextEntry> new_element(const Key& tables, const Node& values, const TextPath& path,
+                                   const Scene* scene, const Vec3& centre_m) {
+    std::vector<TextEntry> entries;
+    const Node* array = value_node(values, path);
+    for (const Key& key : tables.section->keys) {
+        const bool layer_skies = tables.name == "layer" && key.name == "skies";
+        const bool sky_models = tables.name == "sky" && (key.name == "models" || key.name == "clouds");
+        const bool base = tables.name == "layer" && key.name == "base_height_m";
+        if (!key.required && !layer_skies && !sky_models && !base) continue;
+        std::string value;
+        if (key.name == "name") {
+            std::string start = element_name(tables.name);
+            start[0] = char(std::tolower(static_cast<unsigned char>(start[0])));
+            value = toml_string(unused_name(start, names_of(array)));
+        } else if (layer_skies && scene != nullptr && !scene->skies.empty()) {
+            value = "[" + toml_string(scene->skies.front().name) + "]";
+        } else if (sky_models && key.name == "models" && scene != nullptr && !scene->models.empty()) {
+            value = "[" + toml_string(scene->models.front().name) + "]";
+        } else if (sky_models && key.name == "models") {
+            const std::vector<std::string> names = names_of(value_node(values, text_path("model")));
+            if (!names.empty()) value = "[" + toml_string(names.front()) + "]";
+        } else if (sky_models && key.name == "clouds") {
+            value = "20";
+        } else if (layer_skies) {
+            const std::vector<std::string> names = names_of(value_node(values, text_path("sky")));
+            if (!names.empty()) value = "[" + toml_string(names.front()) + "]";
+        } else if (base) {
+            value = number_text(centre_m.z, 6);
+        } else if (key.kind == KeyKind::tables) {
+            value = "[{ ";
+            for (const auto& [name, inner] : new_element(key, values, path, scene, centre_m)) {
+                if (value.size() > 3) value += ", ";
+                value += name + " = " + inner;
+            }
+            value += value.size() > 3 ? " }]" : "}]";
+        } else if (key.kind == KeyKind::number && (key.name == "time_s" || key.name == "state") &&
+                   array != nullptr) {
+            double last = 0;  // times and states rise
+            for (const Node& item : array->items) {
+                const Entry* entry = item.find(key.name);
+                if (entry == nullptr) continue;
+                const Node& number = entry->value;
+                last = std::max(last,
+                                number.kind == Node::Kind::integer ? double(number.integer) : number.number);
+            }
+            const double step = key.name == "state" ? 0.25 : 600;
+            value = number_text(array->items.empty() ? 0 : std::min(last + step, key.limits.max), 6);
+        } else if (key.name == "position_m" && tables.section->find("target_m") != nullptr) {
+            value = default_of_kind(key, {centre_m.x, centre_m.y - 4000, std::max(2.0, centre_m.z - 500)});
+        } else {
+            value = default_of_kind(key, centre_m);
+        }
+        if (!value.empty()) entries.emplace_back(key.name, value);
+    }
+    if (tables.name == "levels") {  // a level has a wind, in one of its two forms
+        entries.emplace_back("from_deg", "270");
+        entries.emplace_back("speed_m_per_s", "5");
+    }
+    return entries;
+}
+
+std::string with_new_name(std::string text, const Node& values, const TextPath& path,
+                          const std::string& name) {
+    const Node* old = value_node(values, path);
+    const std::string was = old != nullptr ? old->text : "";
+    text = with_value(text, path, toml_string(name));
+    const bool of_model = path.size() == 3 && path[0].name == "model";
+    const bool of_sky = path.size() == 3 && path[0].name == "sky";
+    if (was.empty() || (!of_model && !of_sky)) return text;
+    const std::string array = of_model ? "sky" : "layer", key = of_model ? "models" : "skies";
+    const Node* users = value_node(values, {{array, 0}});
+    if (users == nullptr) return text;
+    for (std::size_t n = 0; n < users->items.size(); ++n) {
+        const Entry* list = users->items[n].find(key);
+        if (list == nullptr) continue;
+        const TextPath at{{array, 0}, {{}, n}, {key, 0}};
+        if (list->value.kind == Node::Kind::text && list->value.text == was) {
+            text = with_value(text, at, toml_string(name));
+        }
+        for (std::size_t item = 0; item < list->value.items.size(); ++item) {
+            if (list->value.items[item].text != was) continue;
+            TextPath to = at;
+            to.push_back({{}, item});
+            text = with_value(text, to, toml_string(name));
+        }
+    }
+    return text;
+}
+
+}  // namespace nephos

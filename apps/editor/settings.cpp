@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/editor/settings.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "core/atomic_file.h"
+
+namespace nephos {
+namespace {
+
+template <typename Number>
+void take(const std::string& text, Number min, Number max, Number& value) {
+    std::istringstream in(text);
+    in.imbue(std::locale::classic());
+    Number read{};
+    if (in >> read && read >= min && read <= max) value = read;
+}
+
+}  // namespace
+
+std::filesystem::path settings_folder() {
+    if (const char* folder = std::getenv("XDG_CONFIG_HOME"); folder != nullptr && *folder == '/') {
+        return std::filesystem::path(folder) / "nephos";
+    }
+    const char* home = std::getenv("HOME");
+    return std::filesystem::path(home != nullptr ? home : "/tmp") / ".config" / "nephos";
+}
+
+Settings read_settings(const std::filesystem::path& folder) {
+    Settings settings;
+    std::ifstream file(folder / "editor.conf");
+    for (std::string line; std::getline(file, line);) {
+        const std::size_t equals = line.find(" = ");
+        if (equals == std::string::npos) continue;
+        const std::string key = line.substr(0, equals), value = line.substr(equals + 3);
+        if (key == "width") take(value, 200, 16384, settings.width);
+        if (key == "height") take(value, 150, 16384, settings.height);
+        if (key == "left") take(value, 0.0f, 4000.0f, settings.left);
+        if (key == "right") take(value, 0.0f, 4000.0f, settings.right);
+        if (key == "bottom") take(value, 0.0f, 4000.0f, settings.bottom);
+        if (key == "theme") settings.dark = value != "light";
+        if (key == "scale") take(value, 0.0f, 4.0f, settings.scale);
+        if (key == "recent" && settings.recent.size() < kMostRecent) settings.recent.push_back(value);
+    }
+    return settings;
+}
+
+void write_settings(const std::filesystem::path& folder, const Settings& settings) {
+    std::string text =
+        fmt::format("width = {}\nheight = {}\nleft = {}\nright = {}\nbottom = {}\ntheme = {}\nscale = {}\n",
+                    settings.width, settings.height, settings.left, settings.right, settings.bottom,
+                    settings.dark ? "dark" : "light", settings.scale);
+    for (const std::string& recent : settings.recent) {
+        if (recent.find('\n') == std::string::npos) text += "recent = " + recent + "\n";
+    }
+    write_atomically(folder / "editor.conf", text);
+}
+
+void note_recent(Settings& settings, const std::filesystem::path& path) {
+    const std::string name = std::filesystem::absolute(path).lexically_normal().string();
+    std::erase(settings.recent, name);
+    settings.recent.insert(settings.recent.begin(), name);
+    if (settings.recent.size() > kMostRecent) settings.recent.resize(kMostRecent);
+}
+
+}  // namespace nephos

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the editor remembers from one start to the next: the size of its window and panels, theme, recent files. A text
+// file of `key = value` lines in the user's configuration folder.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace nephos {
+
+struct Settings {
+    int width = 1360, height = 860;               // of the window
+    float left = 250, right = 390, bottom = 190;  // of the panels, at scale 1
+    bool dark = true;
+    float scale = 0;                  // 0: that of the display
+    std::vector<std::string> recent;  // newest first
+};
+
+inline constexpr std::size_t kMostRecent = 12;
+
+// Returns $XDG_CONFIG_HOME/nephos, or ~/.config/nephos.
+std::filesystem::path settings_folder();
+
+// Returns the defaults where there is no file, or a line cannot be read. Lines of later versions are ignored.
+Settings read_settings(const std::filesystem::path& folder);
+// Throws Error(io).
+void write_settings(const std::filesystem::path& folder, const Settings& settings);
+
+// Puts a file at the top of the recent ones.
+void note_recent(Settings& settings, const std::filesystem::path& path);
+
+}  // namespace nephos

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The state of the editor, and the panels that show and change it: plain data and one function a panel.
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "apps/editor/editor.h"
+#include "apps/editor/live.h"
+#include "apps/editor/scene_document.h"
+#include "apps/editor/settings.h"
+#include "apps/editor/window.h"
+#include "scenes/format/schema.h"
+
+namespace nephos {
+
+// Where each control is that was drawn in this frame, by its name, for scripts and tests.
+struct Controls {
+    struct Place {
+        ImVec2 min, max;
+        bool clipped = false;  // scrolled out of sight
+    };
+    std::map<std::string, Place> now, last;  // of this frame, of the one before
+    std::string wanted;                      // is scrolled into sight
+    // Notes the control that was drawn last.
+    void note(const std::string& name);
+};
+
+// A camera that the user flies; world z is up.
+struct ViewCamera {
+    Camera camera;
+    bool moved = false;      // not that of the scene any more
+    double fly_m_per_s = 0;  // 0: by the size of the scene
+};
+
+// `nephos run` beside the window.
+struct BackgroundRun {
+    std::thread thread;
+    std::atomic<bool> stop = false, done = false;
+    std::mutex mutex;
+    double fraction = 0;
+    std::string phase, result, failure;
+    std::filesystem::path folder;
+    ~BackgroundRun() {
+        stop = true;
+        if (thread.joinable()) thread.join();
+    }
+};
+
+enum class FileDialog { none, open, save_as, export_grid, screenshot };
+// What waits for an answer about unsaved edits.
+enum class Pending { none, close, open, new_scene, folder_scene };
+
+struct Editor {
+    explicit Editor(const EditorOptions& options);
+    ~Editor();
+
+    EditorOptions options;
+    std::filesystem::path folder;  // of settings and of what was never saved
+    Settings settings;
+    std::unique_ptr<Window> window;
+    std::unique_ptr<SceneDocument> document;
+    LiveScene live;
+    Controls controls;
+
+    // Of the scene as the live part has it.
+    std::optional<Scene> shown_scene;
+    std::uint64_t shown_version = 0;
+    bool running = true;
+    double speed = 60;  // simulated seconds a second
+    LiveView view;
+    ViewCamera camera;
+    ImVec2 view_min{}, view_max{};  // of the picture in the window
+    std::shared_ptr<const LivePicture> picture;
+    std::vector<LiveStep> steps;
+    bool record = false;  // edits of wind, climate and lights become key frames at the present step
+    float final_state = 1, climate_minutes = 30;  // of a change of climate
+    std::uint64_t pictures = 0;                   // that were shown
+
+    // Of the panels.
+    TextPath selected;                     // in the outline: a section or an element
+    TextPath revealed;                     // what the outline has opened for
+    std::map<std::string, Node> defaults;  // values of keys that the text does not have
+    std::uint64_t defaults_version = 0;
+    std::string filter;            // of the properties
+    int tab = 0, wanted_tab = -1;  // properties, text
+    std::string text_buffer;
+    std::uint64_t text_version = 0;
+    bool show_slice = false;  // of the bits hum, act and cld, over the picture
+    int slice = 0;            // its height, in cells
+    bool show_gizmos = true, show_plots = true;
+
+    // Of dialogs.
+    FileDialog dialog = FileDialog::none;
+    std::filesystem::path dialog_folder, pending_path;
+    std::string dialog_name, dialog_problem;
+    Pending pending = Pending::none;
+    bool show_shortcuts = false, show_about = false, show_run = false, show_recovery = false;
+    std::vector<std::filesystem::path> folder_scenes;
+    std::string message;  // in the status bar
+    bool message_is_bad = false;
+    std::chrono::steady_clock::time_point message_time, last_disk_look, last_autosave;
+    std::unique_ptr<BackgroundRun> run;
+    bool quit = false, theme_changed = false;
+    std::filesystem::path capture_to;  // a picture of the window that is due
+};
+
+// Says something in the status bar.
+void say(Editor& editor, std::string message, bool is_bad = false);
+
+// editor.cpp: changes of the document reach the live scene; `what` names the step for undo.
+void change_text(Editor& editor, std::string text, const std::string& what, const std::string& merge = {});
+void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false);
+void open_document(Editor& editor, std::unique_ptr<SceneDocument> document);
+// Ends what waited for an answer about unsaved edits.
+void do_pending(Editor& editor);
+void ask_before(Editor& editor, Pending what, std::filesystem::path path = {});
+bool save_document(Editor& editor);
+
+// Panels; each fills the ImGui window that its caller opened.
+void menu_bar(Editor& editor);
+void outline_panel(Editor& editor);
+void properties_panel(Editor& editor);
+void view_panel(Editor& editor);
+void timeline_panel(Editor& editor);
+void status_bar(Editor& editor);
+void view_options_panel(Editor& editor);
+void text_panel(Editor& editor);
+void dialogs(Editor& editor);
+
+// dialogs.cpp
+void open_dialog(Editor& editor, FileDialog dialog);
+
+// Controls with names; each returns as its ImGui namesake.
+bool button(Editor& editor, const std::string& name, const char* hint = nullptr);
+bool toggle(Editor& editor, const std::string& name, bool& on, const char* hint = nullptr);
+void tooltip_of_last(const char* text);
+void tooltip(const char* text);
+
+// view.cpp
+void frame_scene(Editor& editor);        // a camera that shows all of the clouds
+void take_scene_camera(Editor& editor);  // that of the scene
+std::optional<ImVec2> on_screen(const Editor& editor, const Vec3& world_m);
+
+// gizmos.cpp: shapes of the scene over the picture. Returns true while the mouse moves one.
+bool gizmos(Editor& editor);
+// Cells with hum, act or cld in a slice of the lattice, over the picture.
+void slice_of_bits(Editor& editor);
+
+// live_changes.cpp: writes a change that was made while the scene runs as key frames at the present step.
+bool record_live(Editor& editor, const TextPath& path, const std::string& value);
+// From the present step on the climate goes to a state, 0..1, within a time.
+void record_climate(Editor& editor, double final_state, double duration_s);
+void add_flash(Editor& editor);    // lightning where the camera looks, now
+void keep_camera(Editor& editor);  // writes it into the scene
+
+// theme.cpp
+void apply_theme(Editor& editor);
+
+// first_scene.cpp
+std::string first_scene_text();
+
+}  // namespace nephos

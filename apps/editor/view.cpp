@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+// The picture and its camera: fly, orbit, and what lies over it.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "apps/editor/state.h"
+#include "density/metaballs.h"
+#include "render/options/camera.h"
+#include "simulation/framing.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// The direction of view as angles: yaw clockwise from north, pitch up.
+struct Look {
+    double yaw = 0, pitch = 0, distance = 1;
+};
+
+Look look_of(const Camera& camera) {
+    const Vec3 way = camera.target_m - camera.position_m;
+    const double distance = std::max(length(way), 1e-3);
+    return {std::atan2(way.x, way.y), std::asin(std::clamp(way.z / distance, -1.0, 1.0)), distance};
+}
+
+Vec3 way_of(const Look& look) {
+    return {look.distance * std::sin(look.yaw) * std::cos(look.pitch),
+            look.distance * std::cos(look.yaw) * std::cos(look.pitch), look.distance * std::sin(look.pitch)};
+}
+
+Look turned(Look look, double right, double up) {
+    look.yaw = std::remainder(look.yaw + right, 2 * kPi);
+    look.pitch = std::clamp(look.pitch + up, -0.495 * kPi, 0.495 * kPi);
+    return look;
+}
+
+// Metres that one pixel of the picture is at the camera's target.
+double metres_a_pixel(const Editor& editor) {
+    const Camera& camera = editor.camera.camera;
+    const double height = std::max(1.0f, editor.view_max.y - editor.view_min.y);
+    return 2 * look_of(camera).distance * std::tan(camera.vertical_fov_deg * kPi / 360) / height;
+}
+
+// The right button looks around from where one is, the left goes round the target, the middle shifts both, the wheel
+// goes nearer.
+void mouse(Editor& editor) {
+    const ImGuiIO& io = ImGui::GetIO();
+    Camera& camera = editor.camera.camera;
+    const double radians = 0.004;
+    const ImVec2 by = io.MouseDelta;
+    const bool moved = by.x != 0 || by.y != 0;
+    if (moved && ImGui::IsMouseDown(ImGuiMouseButton_Right)) {
+        const Look look = turned(look_of(camera), radians * by.x, -radians * by.y);
+        camera.target_m = camera.position_m + way_of(look);
+        editor.camera.moved = true;
+    } else if (moved && ImGui::IsMouseDown(ImGuiMouseButton_Middle)) {
+        const CameraFrame frame = camera_frame(camera);
+        const double scale = metres_a_pixel(editor);
+        const Vec3 shift = (-by.x * scale) * frame.right + (by.y * scale) * frame.up;
+        camera.position_m = camera.position_m + shift;
+        camera.target_m = camera.target_m + shift;
+        editor.camera.moved = true;
+    } else if (moved && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
+        const Look look = turned(look_of(camera), radians * by.x, -radians * by.y);
+        camera.position_m = camera.target_m - way_of(look);
+        editor.camera.moved = true;
+    }
+}
+
+void wheel(Editor& editor) {
+    const float turns = ImGui::GetIO().MouseWheel;
+    if (turns == 0) return;
+    Camera& camera = editor.camera.camera;
+    Look look = look_of(camera);
+    look.distance = std::clamp(look.distance * std::pow(0.88, double(turns)), 5.0, 5e5);
+    camera.position_m = camera.target_m - way_of(look);
+    editor.camera.moved = true;
+}
+
+bool is_down(char key) { return ImGui::IsKeyDown(int(key)); }
+
+void keys(Editor& editor) {
+    const ImGuiIO& io = ImGui::GetIO();
+    if (io.WantTextInput || io.KeyCtrl || io.KeyAlt) return;
+    const double ahead = (is_down('W') ? 1 : 0) - (is_down('S') ? 1 : 0);
+    const double aside = (is_down('D') ? 1 : 0) - (is_down('A') ? 1 : 0);
+    const double rise = (is_down('E') ? 1 : 0) - (is_down('Q') ? 1 : 0);
+    if (ahead == 0 && aside == 0 && rise == 0) return;
+    Camera& camera = editor.camera.camera;
+    const CameraFrame frame = camera_frame(camera);
+    // As fast as things are large: a second crosses a third of the way to the target.
+    const double speed = std::clamp(look_of(camera).distance / 3, 20.0, 3000.0) * (io.KeyShift ? 4 : 1);
+    const double way = speed * std::min(io.DeltaTime, 0.1f);
+    const Vec3 shift = (way * ahead) * frame.forward + ((way * aside) * frame.right + Vec3{0, 0, way * rise});
+    camera.position_m = camera.position_m + shift;
+    camera.target_m = camera.target_m + shift;
+    editor.camera.moved = true;
+}
+
+// A few words over the picture.
+void captions(Editor& editor, const LiveStatus& status) {
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    const auto write = [&](ImVec2 at, const std::string& text, ImU32 colour) {
+        list.AddText(ImVec2(at.x + 1, at.y + 1), IM_COL32(0, 0, 0, 170), text.c_str());
+        list.AddText(at, colour, text.c_str());
+    };
+    const float line = ImGui::GetTextLineHeightWithSpacing();
+    const ImVec2 corner(editor.view_min.x + 0.6f * line, editor.view_min.y + 0.5f * line);
+    const ImU32 white = IM_COL32(255, 255, 255, 230);
+    if (!status.failure.empty()) {
+        list.AddRectFilled(ImVec2(editor.view_min.x, editor.view_max.y - 3 * line), editor.view_max,
+                           IM_COL32(90, 20, 20, 220));
+        const std::string text = status.failure.substr(0, 400);
+        list.AddText(nullptr, 0, ImVec2(corner.x, editor.view_max.y - 2.6f * line), white, text.c_str(),
+                     nullptr, editor.view_max.x - corner.x - line);
+    }
+    if (!editor.picture) {
+        write(corner, "Preparing the first picture\u2026", white);
+        return;
+    }
+    const int seconds = int(std::lround(editor.picture->time_s));
+    char text[128];
+    std::snprintf(text, sizeof text, "step %llu   %d:%02d:%02d",
+                  static_cast<unsigned long long>(editor.picture->step), seconds / 3600, seconds / 60 % 60,
+                  seconds % 60);
+    write(corner, text, white);
+    if (status.goal > status.step + 1) {
+        write(ImVec2(corner.x, corner.y + line),
+              "simulating to step " + std::to_string(status.goal) + "\u2026", white);
+    }
+}
+
+}  // namespace
+
+std::optional<ImVec2> on_screen(const Editor& editor, const Vec3& world_m) {
+    Camera camera = editor.camera.camera;
+    camera.width = std::max(1, int(editor.view_max.x - editor.view_min.x));
+    camera.height = std::max(1, int(editor.view_max.y - editor.view_min.y));
+    const PixelPosition at = project(camera_frame(camera), camera, world_m);
+    if (!at.in_front || std::abs(at.x) > 1e5 || std::abs(at.y) > 1e5) return std::nullopt;
+    return ImVec2(editor.view_min.x + float(at.x), editor.view_min.y + float(at.y));
+}
+
+void take_scene_camera(Editor& editor) {
+    if (!editor.shown_scene) return;
+    const double time_s = editor.picture ? editor.picture->time_s : 0;
+    editor.camera.camera = camera_at(editor.shown_scene->render.camera, time_s);
+    editor.camera.camera.path.clear();
+    editor.camera.moved = false;
+}
+
+void frame_scene(Editor& editor) {
+    const std::shared_ptr<const LiveFrame> frame = editor.live.frame();
+    if (!frame || !editor.shown_scene) return;
+    WorldBox box{{1e30, 1e30, 1e30}, {-1e30, -1e30, -1e30}};
+    const auto add = [&](const DensityGrid& grid) {
+        if (grid.active_voxels() == 0) return;
+        const WorldBox of_grid = cloud_box(grid);
+        box.min_m = {std::min(box.min_m.x, of_grid.min_m.x), std::min(box.min_m.y, of_grid.min_m.y),
+                     std::min(box.min_m.z, of_grid.min_m.z)};
+        box.max_m = {std::max(box.max_m.x, of_grid.max_m.x), std::max(box.max_m.y, of_grid.max_m.y),
+                     std::max(box.max_m.z, of_grid.max_m.z)};
+    };
+    add(frame->frame.density);
+    for (const LayerFrame& layer : frame->frame.layers) {
+        add(layer.density);
+        for (const SkyCloud& cloud : layer.clouds) {
+            const Sphere sphere = layer.sky->sphere(cloud);
+            const Vec3 reach{sphere.radius_m, sphere.radius_m, sphere.radius_m};
+            if (!layer.direct) continue;
+            box.min_m = {std::min(box.min_m.x, (sphere.centre_m - reach).x),
+                         std::min(box.min_m.y, (sphere.centre_m - reach).y),
+                         std::min(box.min_m.z, (sphere.centre_m - reach).z)};
+            box.max_m = {std::max(box.max_m.x, (sphere.centre_m + reach).x),
+                         std::max(box.max_m.y, (sphere.centre_m + reach).y),
+                         std::max(box.max_m.z, (sphere.centre_m + reach).z)};
+        }
+    }
+    if (box.min_m.x > box.max_m.x) {
+        say(editor, "There is no cloud yet to look at", true);
+        return;
+    }
+    Camera& camera = editor.camera.camera;
+    camera.width = std::max(1, int(editor.view_max.x - editor.view_min.x));
+    camera.height = std::max(1, int(editor.view_max.y - editor.view_min.y));
+    nephos::frame(camera, box, View::side, editor.shown_scene->render.ground.height_m);
+    editor.camera.moved = true;
+}
+
+void view_panel(Editor& editor) {
+    const ImVec2 size = ImGui::GetContentRegionAvail();
+    editor.view_min = ImGui::GetCursorScreenPos();
+    editor.view_max =
+        ImVec2(editor.view_min.x + std::max(size.x, 1.0f), editor.view_min.y + std::max(size.y, 1.0f));
+    editor.window->place_picture(editor.view_min, editor.view_max);
+    // A child, so that controls over the picture take the mouse before it does.
+    ImGui::SetNextItemWidth(-1);
+    ImGui::InvisibleButton("view", ImVec2(std::max(size.x, 1.0f), std::max(size.y, 1.0f)),
+                           ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight |
+                               ImGuiButtonFlags_MouseButtonMiddle);
+    editor.controls.note("view");
+    const bool hovered = ImGui::IsItemHovered(), active = ImGui::IsItemActive();
+    ImGui::GetWindowDrawList()->PushClipRect(editor.view_min, editor.view_max, true);
+    slice_of_bits(editor);
+    const bool drags = gizmos(editor);
+    if (active && !drags) mouse(editor);
+    if (hovered) wheel(editor);
+    if (ImGui::IsWindowFocused() || hovered) keys(editor);
+    captions(editor, editor.live.status());
+    ImGui::GetWindowDrawList()->PopClipRect();
+
+    const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
+    editor.view.width = std::clamp(int(std::lround(size.x * scale.x)), 16, 4096);
+    editor.view.height = std::clamp(int(std::lround(size.y * scale.y)), 16, 4096);
+    editor.view.camera = editor.camera.camera;
+    editor.live.set_view(editor.view);
+}
+
+}  // namespace nephos

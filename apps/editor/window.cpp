@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/editor/window.h"
+
+#define GLFW_INCLUDE_NONE
+#define GLFW_INCLUDE_VULKAN
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_vulkan.h>
+
+#include "apps/editor/vulkan_parts.h"
+#include "core/error.h"
+
+namespace nephos {
+namespace {
+
+// GLFW says what went wrong by a callback.
+std::string glfw_problem;
+void on_glfw_error(int, const char* description) { glfw_problem = description; }
+
+struct Glfw {
+    Glfw() {
+        glfwSetErrorCallback(&on_glfw_error);
+        if (glfwInit() != GLFW_TRUE) {
+            throw Error(ErrorCode::gpu, "no window can be opened: " + glfw_problem +
+                                            " (is DISPLAY set? without a screen: xvfb-run nephos edit ...)");
+        }
+        if (glfwVulkanSupported() != GLFW_TRUE) {
+            glfwTerminate();
+            throw Error(
+                ErrorCode::gpu,
+                "no Vulkan loader, or no driver that draws into windows: install mesa-vulkan-drivers, which "
+                "also draws without a graphics card");
+        }
+    }
+    ~Glfw() { glfwTerminate(); }
+    Glfw(const Glfw&) = delete;
+    Glfw& operator=(const Glfw&) = delete;
+};
+
+struct WindowHandle {
+    explicit WindowHandle(const WindowOptions& options) {
+        glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+        glfwWindowHint(GLFW_VISIBLE, options.visible ? GLFW_TRUE : GLFW_FALSE);
+        glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+        window = glfwCreateWindow(options.width, options.height, options.title.c_str(), nullptr, nullptr);
+        if (window == nullptr) throw Error(ErrorCode::gpu, "no window can be opened: " + glfw_problem);
+        glfwSetWindowSizeLimits(window, 200, 150, GLFW_DONT_CARE, GLFW_DONT_CARE);
+    }
+    ~WindowHandle() { glfwDestroyWindow(window); }
+    WindowHandle(const WindowHandle&) = delete;
+    WindowHandle& operator=(const WindowHandle&) = delete;
+    GLFWwindow* window = nullptr;
+};
+
+struct Interface {
+    Interface() {
+        IMGUI_CHECKVERSION();
+        ImGui::CreateContext();
+        ImGui::GetIO().IniFilename = nullptr;  // settings.h keeps the layout
+    }
+    ~Interface() { ImGui::DestroyContext(); }
+    Interface(const Interface&) = delete;
+    Interface& operator=(const Interface&) = delete;
+};
+
+// Exceptions of the Vulkan binding as those of nephos.
+template <typename Function>
+auto checked(const Function& function) {
+    try {
+        return function();
+    } catch (const vk::DeviceLostError&) {
+        throw Error(ErrorCode::gpu, "the graphics device was lost (reset, removed, or out of memory)");
+    } catch (const vk::SystemError& error) {
+        throw Error(ErrorCode::gpu, std::string("the graphics device failed: ") + error.what());
+    }
+}
+
+}  // namespace
+
+struct Window::Impl {
+    explicit Impl(const WindowOptions& options)
+        : handle(options),
+          gpu(handle.window, options.device, options.validation),
+          chain(gpu),
+          frame(gpu),
+          picture(gpu) {
+        glfwSetWindowUserPointer(handle.window, this);
+        glfwSetDropCallback(handle.window, [](GLFWwindow* window, int count, const char** paths) {
+            auto& self = *static_cast<Impl*>(glfwGetWindowUserPointer(window));
+            for (int n = 0; n < count; ++n) self.dropped.emplace_back(paths[n]);
+        });
+        ImGui_ImplGlfw_InitForVulkan(handle.window, true);
+        chain.create(framebuffer_size());
+        ImGui_ImplVulkan_InitInfo info{};
+        info.Instance = *gpu.instance;
+        info.PhysicalDevice = *gpu.physical;
+        info.Device = *gpu.device;
+        info.QueueFamily = gpu.family;
+        info.Queue = *gpu.queue;
+        info.DescriptorPool = *gpu.descriptors;
+        info.MinImageCount = 2;
+        info.ImageCount = std::max(2u, std::uint32_t(chain.views.size()));
+        info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
+        info.CheckVkResultFn = [](VkResult result) {
+            if (result < 0) vk::throwResultException(vk::Result(result), "ImGui");
+        };
+        ImGui_ImplVulkan_Init(&info, *chain.pass);
+    }
+    ~Impl() {
+        try {
+            gpu.device.waitIdle();
+        } catch (const std::exception&) {  // a lost device: nothing is drawn any more
+        }
+        ImGui_ImplVulkan_Shutdown();
+        ImGui_ImplGlfw_Shutdown();
+    }
+
+    vk::Extent2D framebuffer_size() const {
+        int width = 0, height = 0;
+        glfwGetFramebufferSize(handle.window, &width, &height);
+        return {std::uint32_t(width), std::uint32_t(height)};
+    }
+
+    void load_fonts() {
+        gpu.device.waitIdle();
+        frame.run_once([](vk::CommandBuffer commands) { ImGui_ImplVulkan_CreateFontsTexture(commands); });
+        ImGui_ImplVulkan_DestroyFontUploadObjects();
+        fonts_loaded = true;
+    }
+
+    void show(ImDrawData* data) {
+        const vk::Extent2D size = framebuffer_size();
+        if (size.width == 0 || size.height == 0) return;
+        if (size != chain.extent || chain.is_old) {
+            gpu.device.waitIdle();
+            chain.create(size);
+        }
+        frame.wait();
+        const std::optional<std::uint32_t> index = chain.acquire(*frame.acquired);
+        if (!index) return;
+        const vk::CommandBuffer commands = frame.begin();
+        picture.upload(commands);
+        picture.draw(commands, chain.images[*index], chain.extent, place);
+        commands.beginRenderPass({*chain.pass, *chain.framebuffers[*index], {{0, 0}, chain.extent}, {}},
+                                 vk::SubpassContents::eInline);
+        ImGui_ImplVulkan_RenderDrawData(data, commands);
+        commands.endRenderPass();
+        if (captures) frame.copy_image(commands, chain.images[*index], chain.extent);
+        frame.submit(chain.drawn(*index));
+        if (captures) {
+            frame.wait();
+            image = frame.copied(chain.extent, chain.is_bgr());
+            captures = false;
+        }
+        chain.present(*index);
+    }
+
+    Glfw glfw;
+    WindowHandle handle;
+    Interface interface;
+    Gpu gpu;
+    SwapChain chain;
+    FrameCommands frame;
+    PictureImage picture;
+    vk::Rect2D place;
+    bool fonts_loaded = false, captures = false;
+    WindowImage image;
+    std::vector<std::filesystem::path> dropped;
+};
+
+Window::Window(const WindowOptions& options)
+    : impl_(checked([&] { return std::make_unique<Impl>(options); })) {}
+Window::~Window() = default;
+
+bool Window::begin_frame(double wait_s) {
+    if (wait_s > 0) {
+        glfwWaitEventsTimeout(wait_s);
+    } else {
+        glfwPollEvents();
+    }
+    if (glfwWindowShouldClose(impl_->handle.window) != 0) return false;
+    checked([&] {
+        if (!impl_->fonts_loaded) impl_->load_fonts();
+    });
+    ImGui_ImplVulkan_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    return true;
+}
+
+void Window::end_frame() {
+    ImGui::Render();
+    checked([&] { impl_->show(ImGui::GetDrawData()); });
+}
+
+void Window::ask_to_close(bool asked) {
+    glfwSetWindowShouldClose(impl_->handle.window, asked ? GLFW_TRUE : GLFW_FALSE);
+}
+
+void Window::set_picture(int width, int height, const unsigned char* rgba) {
+    checked([&] {
+        impl_->frame.wait();
+        impl_->picture.set(width, height, rgba);
+    });
+}
+
+void Window::place_picture(const ImVec2& min, const ImVec2& max) {
+    const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
+    const auto pixel = [](float at) { return std::int32_t(std::lround(std::max(at, 0.0f))); };
+    const std::int32_t left = pixel(min.x * scale.x), top = pixel(min.y * scale.y);
+    impl_->place = vk::Rect2D({left, top}, {std::uint32_t(std::max(0, pixel(max.x * scale.x) - left)),
+                                            std::uint32_t(std::max(0, pixel(max.y * scale.y) - top))});
+}
+
+void Window::capture_next() { impl_->captures = true; }
+const WindowImage& Window::captured() const { return impl_->image; }
+
+void Window::rebuild_fonts() { impl_->fonts_loaded = false; }
+
+void Window::set_title(const std::string& title) { glfwSetWindowTitle(impl_->handle.window, title.c_str()); }
+void Window::set_size(int width, int height) { glfwSetWindowSize(impl_->handle.window, width, height); }
+void Window::minimise(bool minimised) {
+    if (minimised) {
+        glfwIconifyWindow(impl_->handle.window);
+    } else {
+        glfwRestoreWindow(impl_->handle.window);
+    }
+}
+bool Window::is_minimised() const {
+    const vk::Extent2D size = impl_->framebuffer_size();
+    return size.width == 0 || size.height == 0 ||
+           glfwGetWindowAttrib(impl_->handle.window, GLFW_ICONIFIED) == GLFW_TRUE;
+}
+float Window::content_scale() const {
+    float x = 1, y = 1;
+    glfwGetWindowContentScale(impl_->handle.window, &x, &y);
+    return std::clamp(x, 0.5f, 4.0f);
+}
+std::string Window::device_name() const { return impl_->gpu.name; }
+std::vector<std::filesystem::path> Window::take_dropped() { return std::exchange(impl_->dropped, {}); }
+std::vector<std::string> Window::validation_messages() const { return impl_->gpu.messages(); }
+void Window::wake() { glfwPostEmptyEvent(); }
+
+}  // namespace nephos

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The command line: parses, calls one subcommand, and turns what went wrong into a message and an exit
+// status.
+//
+//     0 done    1 a check failed    2 usage or scene    3 input or output    4 GPU    130 Ctrl-C    143
+//     SIGTERM
+
+#include <filesystem>
+#include <new>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "apps/nephos/arguments.h"
+#include "apps/nephos/commands.h"
+#include "apps/nephos/terminal.h"
+#include "core/error.h"
+#include "core/memory.h"
+#include "scenes/format/errors.h"
+
+namespace nephos {
+namespace {
+
+constexpr int kUsage = int(ErrorCode::usage);
+constexpr int kIo = int(ErrorCode::io);
+
+// The subcommand that was being parsed, or the whole.
+const CLI::App& parsed_app(const CLI::App& app) {
+    const std::vector<CLI::App*> chosen = app.get_subcommands();
+    return chosen.empty() ? app : *chosen.front();
+}
+
+// The command or option that an unknown argument was probably meant to be.
+std::string suggestion(const CLI::App& app, const std::string& word) {
+    std::vector<std::string> names;
+    if (word.starts_with("-")) {
+        for (const CLI::Option* option : app.get_options()) {
+            for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+        }
+    } else if (app.get_parent() == nullptr) {
+        for (const CLI::App* sub : app.get_subcommands({})) names.push_back(sub->get_name());
+    }
+    const std::vector<std::string_view> candidates(names.begin(), names.end());
+    const std::string_view closest = closest_word(word.substr(0, word.find('=')), candidates);
+    return closest.empty() ? "" : ": did you mean `" + std::string(closest) + "`?";
+}
+
+std::string explain(const CLI::App& app, const CLI::ParseError& error) {
+    const std::vector<std::string> words = app.remaining(true);
+    // A command that is misspelt is to the parser one that is missing.
+    const bool no_command = app.get_parent() == nullptr && !words.empty();
+    if (no_command || dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
+        const std::string word = words.empty() ? "" : words.front();
+        const char* kind = word.starts_with("-") ? "unknown option" : "unexpected argument";
+        if (app.get_parent() == nullptr && !word.starts_with("-")) kind = "unknown command";
+        return std::string(kind) + " `" + word + "`" + suggestion(app, word);
+    }
+    if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
+        if (app.get_parent() == nullptr) return "a command is missing";
+        for (const CLI::Option* option : app.get_options()) {
+            if (option->get_required() && option->count() == 0) return option_label(*option) + " is missing";
+        }
+    }
+    if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+        for (const CLI::Option* option : app.get_options()) {
+            const std::string name = option->get_name();
+            if (!name.empty() && std::string(error.what()).find(name) != std::string::npos) {
+                return option_label(*option) + ": the value is missing, or given more than once";
+            }
+        }
+    }
+    return error.what();
+}
+
+int report_usage(const CLI::App& app, const std::string& message) {
+    const std::string command = app.get_parent() == nullptr ? "nephos" : "nephos " + app.get_name();
+    print_error(message);
+    print_message("usage: " + usage_line(app) + "\n       `" + command + " --help` explains them\n");
+    return kUsage;
+}
+
+int report(const Error& error) {
+    print_error(error);
+    return int(error.code());
+}
+
+int run_command(CLI::App& app, int argc, const char* const* argv, const EditFunction& edit) {
+    Action action;
+    add_commands(app, action, edit);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+        Output().write_styled(parsed_app(app).help());
+        return 0;
+    } catch (const CLI::CallForVersion& version) {
+        Output().line(version.what());
+        return 0;
+    } catch (const CLI::ParseError& error) {
+        const CLI::App& command = parsed_app(app);
+        return report_usage(command, explain(command, error));
+    } catch (const Error& error) {  // from the checked conversion of a value (arguments.h)
+        return report_usage(parsed_app(app), error.what());
+    }
+    return action();
+}
+
+// The only place where exceptions end.
+int guarded(int argc, const char* const* argv, const EditFunction& edit) {
+    CLI::App app;
+    try {
+        const int status = run_command(app, argc, argv, edit);
+        Output().flush();
+        return status;
+    } catch (const OutputClosed&) {
+        return 0;
+    } catch (const SceneErrors& error) {
+        print_scene_errors(error);
+        return int(error.code());
+    } catch (const Error& error) {
+        return report(error);
+    } catch (const std::bad_alloc&) {
+        print_error("out of memory");
+        return kIo;
+    } catch (const std::filesystem::filesystem_error& error) {
+        print_error(error.path1().string() + ": " + error.code().message());
+        return kIo;
+    } catch (const std::exception& error) {
+        print_error(std::string("unexpected: ") + error.what());
+        return kIo;
+    }
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv, const EditFunction& edit) {
+    keep_freed_memory();
+    install_signal_handlers();
+    return guarded(argc, argv, edit);
+}
+
+}  // namespace nephos

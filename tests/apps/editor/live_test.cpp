@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scenes that run beside the window: the steps are those of the simulation, going back shows the same state, changes
+// while it runs act from their step on, and failures are said.
+
+#include "apps/editor/live.h"
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "apps/editor/scene_document.h"
+#include "scenes/format/reader.h"
+#include "simulation/layer_simulation.h"
+
+namespace nephos {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Waits for something that other threads do; a minute is far more than it takes.
+testing::AssertionResult comes(const std::function<bool()>& condition) {
+    const Clock::time_point begin = Clock::now();
+    while (!condition()) {
+        if (Clock::now() - begin > std::chrono::minutes(1))
+            return testing::AssertionFailure() << "after a minute";
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return testing::AssertionSuccess();
+}
+
+Scene small_scene(const std::string& more = {}) {
+    return read_scene_text(
+        "name = \"small\"\nseed = 3\n[lattice]\ncells = [48, 40, 16]\ncell_size_m = 60\norigin_m = [-1440, "
+        "-1200, 900]\n"
+        "[[field.scatters]]\ncount = 8\nreplace = true\nz_m = [1000, 1400]\ncentre = { hum = 0.3, act = "
+        "0.05, ext = 0.1 "
+        "}\n[camera]\nposition_m = [0, -3000, "
+        "400]\n" +
+            more,
+        "small.toml");
+}
+
+std::vector<std::string> true_hashes(const Scene& scene, std::uint64_t steps) {
+    std::vector<LayerSimulation> layers = make_layers(scene);
+    std::vector<std::string> hashes{combined_hash(layers).hex()};
+    for (std::uint64_t n = 0; n < steps; ++n) {
+        for (LayerSimulation& layer : layers) layer.step();
+        hashes.push_back(combined_hash(layers).hex());
+    }
+    return hashes;
+}
+
+LiveView small_view() {
+    LiveView view;
+    view.width = 96;
+    view.height = 64;
+    view.camera.position_m = {0, -3000, 400};
+    return view;
+}
+
+TEST(LiveScene, StepsAreThoseOfTheSimulation) {
+    const Scene scene = small_scene();
+    LiveScene live({.splatting = Splatting::cpu});
+    live.set_view(small_view());
+    live.start(scene, 40);
+    ASSERT_TRUE(comes([&] { return live.status().step == 40; })) << live.status().failure;
+    const std::vector<LiveStep> steps = live.steps();
+    const std::vector<std::string> hashes = true_hashes(scene, 40);
+    ASSERT_GE(steps.size(), 41u);
+    for (std::size_t n = 0; n <= 40; ++n) ASSERT_EQ(steps[n].hash.hex(), hashes[n]) << "step " << n;
+    ASSERT_TRUE(comes([&] { return live.picture(0) && live.picture(0)->step == 40; }));
+    EXPECT_EQ(live.frame()->frame.hash.hex(), hashes[40]);
+}
+
+TEST(LiveScene, GoesBackToTheSameState) {
+    LiveScene live({.splatting = Splatting::cpu});
+    live.set_view(small_view());
+    live.start(small_scene(), 60);
+    ASSERT_TRUE(comes([&] { return live.status().step == 60; }));
+    const std::vector<LiveStep> steps = live.steps();
+    for (const std::uint64_t step : {3u, 59u, 0u, 16u, 17u, 60u, 75u}) {
+        live.seek(step);
+        ASSERT_TRUE(comes([&] { return live.status().step == step; })) << step;
+        if (step < steps.size()) {
+            EXPECT_EQ(live.frame()->frame.hash, steps[step].hash) << step;
+        }
+        EXPECT_EQ(live.frame()->frame.step, step);
+    }
+}
+
+// A wind that is changed while it runs, written down as key frames: the scene that says so, simulated from its start,
+// has the bits that were seen.
+TEST(LiveScene, ChangeOnTheWayEqualsItsKeyFramesFromTheStart) {
+    const std::string wind = "[[wind]]\nlevels = [{ height_m = 1000, east_m_per_s = 3 }]\n";
+    LiveScene live({.splatting = Splatting::cpu});
+    live.set_view(small_view());
+    live.start(small_scene(wind), 10);
+    ASSERT_TRUE(comes([&] { return live.status().step == 10; }));
+    const std::uint64_t step = live.hold();
+    EXPECT_GE(step, 10u);
+    const std::string before = std::to_string(10 * (step - 1)), now = std::to_string(10 * step);
+    const Scene changed =
+        small_scene("[[wind]]\ntime_s = " + before +
+                    "\nlevels = [{ height_m = 1000, east_m_per_s = 3 }]\n[[wind]]\ntime_s = " + now +
+                    "\nlevels = [{ height_m = 1000, east_m_per_s = -5, north_m_per_s = 2 }]\n");
+    live.change(changed);
+    live.release();
+    live.seek(50);
+    ASSERT_TRUE(comes([&] { return live.status().step == 50; })) << live.status().failure;
+    const std::vector<LiveStep> seen = live.steps();
+    const std::vector<std::string> hashes = true_hashes(changed, 50);
+    ASSERT_GE(seen.size(), 51u);
+    for (std::size_t n = 0; n <= 50; ++n) ASSERT_EQ(seen[n].hash.hex(), hashes[n]) << "step " << n;
+    EXPECT_NE(hashes[50], true_hashes(small_scene(wind), 50)[50]);
+}
+
+TEST(LiveScene, RunsAtItsSpeedAndStops) {
+    LiveScene live({.splatting = Splatting::cpu});
+    live.set_view(small_view());
+    live.set_speed(200);
+    live.start(small_scene(), 0);
+    live.run(true);
+    ASSERT_TRUE(comes([&] { return live.status().step > 20; }));
+    live.run(false);
+    live.hold();
+    const std::uint64_t step = live.status().step;
+    live.release();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    EXPECT_EQ(live.status().step, step);
+    ASSERT_TRUE(comes([&] { return live.picture(0)->refined && live.picture(0)->step == step; }));
+    EXPECT_EQ(live.picture(0)->width, 96);
+}
+
+TEST(LiveScene, FailuresAreSaidAndAnotherSceneGoesOn) {
+    LiveScene live({.splatting = Splatting::cpu});
+    live.set_view(small_view());
+    Scene huge = small_scene();
+    huge.automaton.extent = {65536, 65536, 512};
+    live.start(huge, 5);
+    ASSERT_TRUE(comes([&] { return !live.status().failure.empty(); }));
+    EXPECT_NE(live.status().failure.find("memory"), std::string::npos) << live.status().failure;
+    live.start(small_scene(), 5);
+    ASSERT_TRUE(comes([&] { return live.status().step == 5; }));
+    EXPECT_EQ(live.status().failure, "");
+}
+
+TEST(LiveScene, OnlySomeChangesNeedAnotherSimulation) {
+    const Scene scene = small_scene();
+    Scene other = scene;
+    EXPECT_EQ(change_between(scene, other), SceneChange::none);
+    other.render.sun.elevation_deg = 3;
+    other.density.extinction_per_m = 0.3;
+    EXPECT_EQ(change_between(scene, other), SceneChange::picture);
+    other.automaton.seed = 4;
+    EXPECT_EQ(change_between(scene, other), SceneChange::simulation);
+}
+
+}  // namespace
+}  // namespace nephos

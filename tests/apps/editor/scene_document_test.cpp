@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+// The document of the editor: saving keeps bytes, undo goes back to them, problems leave the last good scene, changes
+// on disk and crashes lose nothing.
+
+#include "apps/editor/scene_document.h"
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include "apps/editor/schema_values.h"
+#include "core/error.h"
+#include "scenes/format/reader.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string content(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream out;
+    out << file.rdbuf();
+    return out.str();
+}
+
+// A folder of its own for each test.
+struct Folder {
+    Folder()
+        : path(fs::path(testing::TempDir()) /
+               ("editor_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
+        fs::remove_all(path);
+        fs::create_directories(path);
+    }
+    ~Folder() { fs::remove_all(path); }
+    Folder(const Folder&) = delete;
+    Folder& operator=(const Folder&) = delete;
+    fs::path path;
+};
+
+void write(const fs::path& path, const std::string& text) {
+    std::ofstream(path, std::ios::binary) << text;
+    // The clock of a file system may be coarse.
+    fs::last_write_time(path, fs::last_write_time(path) + std::chrono::seconds(2));
+}
+
+TEST(SceneDocument, OpenAndSaveOfShippedScenesChangesNoByte) {
+    const Folder folder;
+    int count = 0;
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(NEPHOS_SOURCE_DIR) / "scenes")) {
+        if (entry.path().extension() != ".toml") continue;
+        SceneDocument document(entry.path());
+        EXPECT_TRUE(document.problems().empty()) << entry.path();
+        ASSERT_TRUE(document.scene()) << entry.path();
+        EXPECT_EQ(*document.scene(), read_scene(entry.path())) << entry.path();
+        const fs::path copy = folder.path / entry.path().filename();
+        document.save_as(copy);
+        EXPECT_EQ(content(copy), content(entry.path())) << entry.path();
+        EXPECT_FALSE(document.is_modified());
+        ++count;
+    }
+    EXPECT_GE(count, 20);
+}
+
+// Any walk of edits, undos and redos, followed by undos to its start, ends in the bytes of the file; redos then in those
+// of the last text.
+TEST(SceneDocument, RandomWalkOfEditsAndUndosEndsInTheSameBytes) {
+    const unsigned seed = 15;
+    std::mt19937 random(seed);
+    const fs::path path = fs::path(NEPHOS_SOURCE_DIR) / "scenes/climate.toml";
+    for (int walk = 0; walk < 2; ++walk) {
+        SCOPED_TRACE("seed " + std::to_string(seed) + ", walk " + std::to_string(walk));
+        SceneDocument document(path);
+        const std::string first = document.text();
+        for (int n = 0; n < 60; ++n) {
+            switch (random() % 7) {
+                case 0:
+                case 1:
+                    document.edit(with_value(document.text(), text_path("sun.elevation_deg"),
+                                             std::to_string(random() % 90)),
+                                  "sun", random() % 2 == 0 ? "sun" : "");
+                    break;
+                case 2:
+                    document.edit(with_value(document.text(), text_path("air.horizon"),
+                                             "[0.1, 0.2, 0." + std::to_string(random() % 9 + 1) + "]"),
+                                  "air");
+                    break;
+                case 3: {
+                    const Node* skies = value_node(document.values(), text_path("sky"));
+                    if (skies == nullptr || skies->items.empty()) break;
+                    document.edit(with_copied_element(document.text(), text_path("sky"),
+                                                      random() % skies->items.size()),
+                                  "copy");
+                    break;
+                }
+                case 4: {
+                    const Node* skies = value_node(document.values(), text_path("sky"));
+                    if (skies == nullptr || skies->items.empty()) break;
+                    const TextPath at{{"sky", 0}, {{}, random() % skies->items.size()}};
+                    document.edit(without(document.text(), at), "delete");
+                    break;
+                }
+                case 5:
+                    document.undo();
+                    break;
+                default:
+                    document.redo();
+                    break;
+            }
+        }
+        const std::string last = document.text();
+        int undone = 0;
+        while (document.can_undo()) {
+            document.undo();
+            ++undone;
+        }
+        EXPECT_EQ(document.text(), first);
+        for (int n = 0; n < undone; ++n) document.redo();
+        EXPECT_EQ(document.text(), last);
+    }
+}
+
+TEST(SceneDocument, OneDragIsOneUndo) {
+    SceneDocument document(std::string("[sun]\nelevation_deg = 1\n"));
+    const TextPath path = text_path("sun.elevation_deg");
+    for (const char* value : {"2", "3", "4"})
+        document.edit(with_value(document.text(), path, value), "drag", "sun");
+    document.end_merging();
+    document.edit(with_value(document.text(), path, "5"), "drag", "sun");
+    document.undo();
+    EXPECT_EQ(document.text(), "[sun]\nelevation_deg = 4\n");
+    document.undo();
+    EXPECT_EQ(document.text(), "[sun]\nelevation_deg = 1\n");
+    EXPECT_FALSE(document.can_undo());
+    EXPECT_EQ(document.redo_text(), "drag");
+}
+
+TEST(SceneDocument, ProblemsLeaveTheLastGoodScene) {
+    SceneDocument document(std::string("[sun]\nelevation_deg = 12\n"));
+    ASSERT_TRUE(document.scene());
+    document.edit("[sun]\nelevation_deg = 95\n", "type");
+    ASSERT_EQ(document.problems().size(), 1u);
+    EXPECT_EQ(document.problems()[0].where.line, 2);
+    EXPECT_EQ(document.problems()[0].caret, 17);
+    EXPECT_EQ(document.scene()->render.sun.elevation_deg, 12);
+    document.edit("[sun\n", "type");
+    EXPECT_EQ(document.problems().size(), 1u);
+    EXPECT_NE(value_node(document.values(), text_path("sun.elevation_deg")),
+              nullptr);  // the last that could be read
+    document.edit("[sun]\nelevation_deg = 13\n", "type");
+    EXPECT_TRUE(document.problems().empty());
+    EXPECT_EQ(document.scene()->render.sun.elevation_deg, 13);
+}
+
+TEST(SceneDocument, SeesWhatOtherProgramsDoToItsFile) {
+    const Folder folder;
+    const fs::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    SceneDocument document(path);
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::same);
+    write(path, "seed = 2\n");
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::reloaded);
+    EXPECT_EQ(document.scene()->automaton.seed, 2u);
+    EXPECT_FALSE(document.is_modified());
+    document.undo();
+    EXPECT_EQ(document.text(), "seed = 1\n");
+    document.redo();
+    write(path, "seed = two\n");  // with a problem: shown, the last good scene stays
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::reloaded);
+    EXPECT_EQ(document.problems().size(), 1u);
+    EXPECT_EQ(document.scene()->automaton.seed, 2u);
+    document.edit("seed = 3\n", "mine");
+    write(path, "seed = 44\n");
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::differs);
+    EXPECT_EQ(document.text(), "seed = 3\n");
+    fs::remove(path);
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::gone);
+    document.save();
+    EXPECT_EQ(content(path), "seed = 3\n");
+}
+
+TEST(SceneDocument, UnsavedEditsSurviveACrash) {
+    const Folder folder;
+    const fs::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    {
+        SceneDocument document(path);
+        document.edit("seed = 9\n", "edit");
+        document.autosave(folder.path);
+    }  // no orderly end
+    SceneDocument next(path);
+    const auto found = next.found_autosave(folder.path);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(content(*found), "seed = 9\n");
+    next.edit(content(*found), "Recover");
+    next.autosave(folder.path);
+    next.save();
+    EXPECT_FALSE(next.found_autosave(folder.path));  // saved: there is nothing to recover
+    EXPECT_EQ(content(path), "seed = 9\n");
+}
+
+TEST(SceneDocument, SavingWhereItCannotKeepsTheEdits) {
+    SceneDocument document(std::string("seed = 1\n"));
+    document.edit("seed = 2\n", "edit");
+    EXPECT_THROW(document.save_as("/proc/nowhere/a.toml"), Error);
+    EXPECT_TRUE(document.is_modified());
+    EXPECT_FALSE(document.has_file());
+}
+
+// New elements of every list are valid by themselves, whatever their required keys are.
+TEST(SchemaValues, NewElementsHaveTheirRequiredKeys) {
+    const auto made = [](const std::string& text, const std::string& path) {
+        SceneDocument document(text);
+        const TextPath at = text_path(path);
+        const Key* key = key_at(at);
+        EXPECT_NE(key, nullptr) << path;
+        const std::optional<Scene>& scene = document.scene();
+        return with_new_element(
+            text, at, new_element(*key, document.values(), at, scene ? &*scene : nullptr, {0, 0, 1000}));
+    };
+    std::string text = "name = \"a\"\n";
+    for (const char* path : {"field.ellipsoids", "field.scatters", "wind", "lightning", "camera.path"}) {
+        text = made(text, path);
+        SceneDocument document(text);
+        EXPECT_TRUE(document.problems().empty()) << path << "\n" << format(document.problems()) << text;
+    }
+    std::string sky = "name = \"a\"\n";
+    for (const char* path : {"model", "sky", "layer"}) sky = made(sky, path);
+    EXPECT_TRUE(SceneDocument(sky).problems().empty()) << format(SceneDocument(sky).problems()) << sky;
+    for (const char* path : {"model[0].seeds", "model[0].seeds[0].roots", "sky", "layer[0].rain.placed",
+                             "climate.schedule", "model"}) {
+        sky = made(sky, path);
+        EXPECT_TRUE(SceneDocument(sky).problems().empty()) << path << "\n"
+                                                           << format(SceneDocument(sky).problems()) << sky;
+    }
+}
+
+TEST(SchemaValues, RenamingFollowsReferences) {
+    const std::string text =
+        "[[model]]\nname = \"a\"\nseeds = [{}]\n[[sky]]\nname = \"s\"\nstate = 0\nmodels = [\"a\", \"b\"] # "
+        "two\n"
+        "[[layer]]\nname = \"l\"\nskies = \"s\"\n";
+    const SceneDocument document(text);
+    const std::string renamed =
+        with_new_name(text, document.values(), text_path("model[0].name"), "new \"a\"");
+    EXPECT_NE(renamed.find("models = [\"new \\\"a\\\"\", \"b\"] # two"), std::string::npos) << renamed;
+    EXPECT_NE(with_new_name(text, document.values(), text_path("sky[0].name"), "t").find("skies = \"t\""),
+              std::string::npos);
+}
+
+TEST(SchemaValues, OwnersAndDefaults) {
+    const SceneDocument document(fs::path(NEPHOS_SOURCE_DIR) / "scenes/climate.toml");
+    const Scene& scene = *document.scene();
+    const TextPath layer = text_path("layer[1]");
+    EXPECT_EQ(owner_at(scene, layer, 0), &scene.layers[1]);
+    EXPECT_EQ(owner_at(scene, text_path("layer[0].rain.finder"), 0) == nullptr, false);
+    EXPECT_EQ(owner_at(scene, text_path("model[0]"), 2), &scene.models[2]);
+    EXPECT_EQ(owner_at(scene, text_path("nothing"), 0), nullptr);
+    EXPECT_EQ(default_value(*key_at(text_path("layer[1].opacity")), owner_at(scene, layer, 0)), "0.35");
+    EXPECT_EQ(readable_name("elevation_deg"), "Elevation");
+    EXPECT_EQ(element_name("scatters"), "Scatter");
+}
+
+// Every key of every section has a default that reads as TOML, also of elements that are not there.
+void visit(const Scene& scene, const Section& section, const TextPath& path, int depth, int& count) {
+    const void* owner = owner_at(scene, path, 0);
+    for (const Key& key : section.keys) {
+        TextPath at = path;
+        at.push_back({key.name, 0});
+        SCOPED_TRACE(path_text(at));
+        if (key.section == nullptr) {
+            const std::string value = default_value(key, owner);
+            if (!value.empty()) {
+                EXPECT_NE(parsed_value(value).kind, Node::Kind::table) << value;
+                ++count;
+            }
+            EXPECT_FALSE(readable_name(key).empty());
+        } else if (depth < 5) {
+            if (key.kind == KeyKind::tables) at.push_back({{}, 3});
+            visit(scene, *key.section, at, depth + 1, count);
+        }
+    }
+}
+
+TEST(SchemaValues, EveryKeyHasAReadableDefault) {
+    int count = 0;
+    visit(Scene{}, scene_section(), {}, 0, count);
+    visit(read_scene(fs::path(NEPHOS_SOURCE_DIR) / "scenes/storm.toml"), scene_section(), {}, 0, count);
+    EXPECT_GT(count, 400);
+}
+
+}  // namespace
+}  // namespace nephos
