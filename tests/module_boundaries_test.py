@@ -49,7 +49,7 @@ LIBRARIES = {
     "CLI/": {"apps/nephos"},
     "toml++/": {"scenes/format"},
     "Random123/": {"core", "automaton", "seeds"},
-    "xxhash.h": {"automaton", "render", "scenes/format"},
+    "xxhash.h": {"core", "automaton", "render", "scenes/format"},
 }
 # Seconds and hundreds of megabytes each: never in a public header.
 HEAVY = ("openvdb/", "vulkan/")

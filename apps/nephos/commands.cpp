@@ -35,6 +35,7 @@ void add_commands(CLI::App& app, Action& action) {
     add_info_command(app, action);
     add_hash_command(app, action);
     add_state_command(app, action);
+    add_verify_command(app, action);
     add_completion_command(app, action);
     for (CLI::App* sub : app.get_subcommands({})) {
         sub->formatter(std::make_shared<HelpPage>());

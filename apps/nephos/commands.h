@@ -19,6 +19,7 @@ void add_validate_command(CLI::App& app, Action& action);
 void add_info_command(CLI::App& app, Action& action);
 void add_hash_command(CLI::App& app, Action& action);
 void add_state_command(CLI::App& app, Action& action);
+void add_verify_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
 
 // Adds all of them, with --help and --version.
