@@ -19,8 +19,10 @@ MAY_USE = {
     "render/options": {"core"},
     "render": {"core", "automaton", "density", "render/options"},
     "scenes/format": {"core", "automaton", "seeds", "density", "render/options"},
-    "simulation": {"core", "automaton", "seeds", "density", "render", "render/options", "scenes/format"},
-    "apps/nephos": {"core", "automaton", "seeds", "density", "render", "render/options", "scenes/format", "simulation"},
+    "scenes/metar": {"core"},
+    "simulation": {"core", "automaton", "seeds", "density", "render", "render/options", "scenes/format", "scenes/metar"},
+    "apps/nephos": {"core", "automaton", "seeds", "density", "render", "render/options", "scenes/format",
+                    "scenes/metar", "simulation"},
 }
 # Folders of render/ from the lowest to the highest: each may include those of the rows above its own. The renderer's
 # own files, at the root of render/, may include all of them, and none of them may include these.
@@ -42,17 +44,19 @@ LEAF = "render/shared/"
 # Start of a system header's name: the modules that may include it.
 LIBRARIES = {
     "openvdb/": {"density"},
+    "nanovdb/": {"density"},
+    "zlib.h": {"density"},
     "vulkan/": {"render"},
     "OpenEXR/": {"render"},
     "Imf": {"render"},
-    "png.h": {"render"},
+    "png.h": {"density", "render"},
     "CLI/": {"apps/nephos"},
     "toml++/": {"scenes/format"},
     "Random123/": {"core", "automaton", "seeds"},
     "xxhash.h": {"core", "automaton", "render", "scenes/format"},
 }
 # Seconds and hundreds of megabytes each: never in a public header.
-HEAVY = ("openvdb/", "vulkan/")
+HEAVY = ("openvdb/", "nanovdb/", "vulkan/")
 SOURCES = {".h", ".cpp", ".vert", ".frag", ".comp", ".glsl", ".py", ".sh"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 

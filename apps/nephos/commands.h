@@ -20,6 +20,8 @@ void add_info_command(CLI::App& app, Action& action);
 void add_hash_command(CLI::App& app, Action& action);
 void add_state_command(CLI::App& app, Action& action);
 void add_verify_command(CLI::App& app, Action& action);
+void add_export_command(CLI::App& app, Action& action);
+void add_metar_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
 
 // Adds all of them, with --help and --version.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// nephos verify: whether the folder of a run is whole and says the truth.
+// nephos verify: whether the folder of a run or of an export is whole and says the truth.
 
 #include <memory>
 
@@ -11,6 +11,7 @@
 #include "apps/nephos/commands.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
+#include "simulation/export/export.h"
 #include "simulation/run_listing.h"
 #include "simulation/verify.h"
 
@@ -25,7 +26,8 @@ struct VerifyArguments {
 
 Verification verify_folder(const VerifyArguments& a) {
     if (is_run_folder(a.folder)) return verify_run(a.folder, a.options);
-    throw Error(ErrorCode::io, a.folder + ": holds no run (manifest.json)");
+    if (is_export_folder(a.folder)) return verify_export(a.folder, a.options);
+    throw Error(ErrorCode::io, a.folder + ": holds neither a run (manifest.json) nor an export (export.json)");
 }
 
 int verify(const VerifyArguments& a) {
@@ -55,9 +57,9 @@ int verify(const VerifyArguments& a) {
 }  // namespace
 
 void add_verify_command(CLI::App& app, Action& action) {
-    CLI::App* command = app.add_subcommand("verify", "Check the files of a run against their checksums");
+    CLI::App* command = app.add_subcommand("verify", "Check the files of a run or an export against their checksums");
     const auto a = std::make_shared<VerifyArguments>();
-    command->add_option("DIR", a->folder, "Folder of a run, with its manifest.json")
+    command->add_option("DIR", a->folder, "Folder of a run (manifest.json) or of an export (export.json)")
         ->required()
         ->type_name("DIR");
     command->add_flag("--hashes", a->options.hashes_only, "Compare the files' checksums alone; decode nothing");
@@ -79,7 +81,8 @@ void add_verify_command(CLI::App& app, Action& action) {
         "Of a run: no frame or file is missing or extra; bytes and XXH3-128 of each file and of its decoded voxels are\n"
         "those of the manifest; transform, bounds and class are the same in all files; values are finite, 0 to 1;\n"
         "metadata agree with the manifest; layers add up to the common grid. Reported: roughness at the seam of\n"
-        "periodic axes, largest change of a voxel and of sharpness.\n"
+        "periodic axes, largest change of a voxel and of sharpness. Of an export: checksums, and the voxels read\n"
+        "back from each file against those of the source, within the error of their type.\n"
         "\n"
         "Exit status 0: everything holds; 1: a check failed; 3: the folder cannot be read.\n"
         "\n"
