@@ -33,8 +33,7 @@ Matrix4 ecef_from_world(const Georeference& place) {
                  cos_lon = std::cos(place.longitude_deg * kRadians);
     const double e2 = kFlattening * (2 - kFlattening);
     const double n = kSemiMajor_m / std::sqrt(1 - e2 * sin_lat * sin_lat);  // radius in the prime vertical
-    const double h =
-        place.height_m + (place.height_datum == HeightDatum::msl ? place.geoid_height_m : 0.0);
+    const double h = place.height_m + (place.height_datum == HeightDatum::msl ? place.geoid_height_m : 0.0);
     const double east[3] = {-sin_lon, cos_lon, 0};
     const double north[3] = {-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat};
     const double up[3] = {cos_lat * cos_lon, cos_lat * sin_lon, sin_lat};
@@ -74,9 +73,9 @@ std::string utc_text(double seconds_since_1970) {
     const year_month_day date(day);
     const auto in_day = (sys_time<milliseconds>(all) - day).count();
     char text[64];
-    std::snprintf(text, sizeof text, "%04d-%02u-%02uT%02d:%02d:%02d", int(date.year()), unsigned(date.month()),
-                  unsigned(date.day()), int(in_day / 3600000), int(in_day / 60000 % 60),
-                  int(in_day / 1000 % 60));
+    std::snprintf(text, sizeof text, "%04d-%02u-%02uT%02d:%02d:%02d", int(date.year()),
+                  unsigned(date.month()), unsigned(date.day()), int(in_day / 3600000),
+                  int(in_day / 60000 % 60), int(in_day / 1000 % 60));
     std::string out = text;
     if (in_day % 1000 != 0) {
         std::snprintf(text, sizeof text, ".%03d", int(in_day % 1000));
@@ -88,7 +87,8 @@ std::string utc_text(double seconds_since_1970) {
 std::string utc_at(const Georeference& place, double time_s) {
     if (!place.given || place.start_utc.empty()) return {};
     const std::optional<double> start = utc_seconds(place.start_utc);
-    if (!start) throw Error(ErrorCode::usage, "'" + place.start_utc + "' is no moment such as 2024-06-21T13:50:00Z");
+    if (!start)
+        throw Error(ErrorCode::usage, "'" + place.start_utc + "' is no moment such as 2024-06-21T13:50:00Z");
     return utc_text(*start + time_s);
 }
 

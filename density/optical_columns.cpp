@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "density/export/volume.h"
+#include "density/openvdb_access.h"
 
 namespace nephos {
 namespace {
@@ -31,6 +32,24 @@ double height_of_mass(const std::vector<double>& levels, double fraction, const 
 }
 
 }  // namespace
+
+double optical_cover(const DensityGrid& density, double extinction_per_m) {
+    const Extent extent = density.extent();
+    if (extent.cells() == 0) return 0;
+    std::vector<double> depth(std::size_t(extent.x) * std::size_t(extent.y), 0.0);
+    for (const Block& block : blocks_of(density)) {
+        const int x = block.origin.x(), y = block.origin.y(),
+                  levels = std::min(kBlock, extent.z - block.origin.z());
+        for (int i = 0; i < std::min(kBlock, extent.x - x); ++i) {
+            for (int j = 0; j < std::min(kBlock, extent.y - y); ++j) {
+                double& column = depth[std::size_t(y + j) * std::size_t(extent.x) + std::size_t(x + i)];
+                for (int k = 0; k < levels; ++k) column += double(block.value(leaf_offset(i, j, k)));
+            }
+        }
+    }
+    const double least = 1 / (extinction_per_m * density.placement().cell_size_m);
+    return double(std::ranges::count_if(depth, [&](double d) { return d > least; })) / double(depth.size());
+}
 
 OpticalColumns optical_columns(const DensityGrid& density, double extinction_per_m) {
     const double nan = std::numeric_limits<double>::quiet_NaN();

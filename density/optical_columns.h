@@ -19,7 +19,10 @@ struct OpticalColumns {
     double mean_transmittance = 1;
 };
 
-// Extinction in 1/m where density is 1. Thread-safe; pure.
+// Returns the cover alone, without a dense copy of the grid. Extinction in 1/m where density is 1. Thread-safe; pure.
+double optical_cover(const DensityGrid& density, double extinction_per_m);
+
+// The same of all. Memory: a dense copy of the grid. Thread-safe; pure.
 OpticalColumns optical_columns(const DensityGrid& density, double extinction_per_m);
 
 }  // namespace nephos

@@ -17,6 +17,8 @@ struct CloudStatistics {
     double base_m = 0;        // world z of the lower face of the lowest cloud cell; NaN without cloud
     double top_m = 0;         // world z of the upper face of the highest cloud cell; NaN without cloud
     double mean_density = 0;  // mean of cld over all cells of the box
+    // Fraction of the columns whose optical depth is above 1, what an observer calls cover; 0 where it is not computed.
+    double optical_cover = 0;
 };
 
 // Returns the statistics of one state. Throws Error(usage) when the planes differ in extent. Thread-safe; the

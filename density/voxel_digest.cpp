@@ -21,8 +21,8 @@ std::string voxel_digest(const DensityGrid& density, bool half) {
         const openvdb::Coord& o = block.origin;
         bool any = false;
         for (int n = 0; n < kBlockVoxels; ++n) {
-            const bool inside = o.x() + (n >> 6) < extent.x && o.y() + (n >> 3 & 7) < extent.y &&
-                                o.z() + (n & 7) < extent.z;
+            const bool inside =
+                o.x() + (n >> 6) < extent.x && o.y() + (n >> 3 & 7) < extent.y && o.z() + (n & 7) < extent.z;
             float value = inside ? std::max(block.value(n), 0.0f) : 0.0f;
             if (half) value = float(openvdb::math::half(value));
             values[std::size_t(n)] = value;

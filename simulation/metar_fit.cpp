@@ -18,8 +18,11 @@ constexpr double kTolerance = 0.1 / 8;  // of cover
 // The optical cover of a layer of the scene in its first frame.
 double cover_of_layer(const Scene& scene, std::size_t layer) {
     const LayerOptions& options = scene.layers[layer];
-    const DensityGrid density = veil_density(veil_options(scene, layer), layer_wind(scene, layer), options.extent, options.placement, scene.frames.start_s);
-    return optical_columns(options.opacity < 1 ? scaled(density, options.opacity) : density, scene.density.extinction_per_m).cover;
+    const DensityGrid density = veil_density(veil_options(scene, layer), layer_wind(scene, layer),
+                                             options.extent, options.placement, scene.frames.start_s);
+    return optical_columns(options.opacity < 1 ? scaled(density, options.opacity) : density,
+                           scene.density.extinction_per_m)
+        .cover;
 }
 
 }  // namespace
@@ -49,7 +52,9 @@ FittedScene fit_metar(const Metar& metar, const MetarSceneOptions& options) {
         }
         fit.coverage = coverage[n];
         if (std::abs(fit.cover - layers[n].cover) > 0.5 / 8)
-            fitted.notes.push_back(fmt::format("{}: the cover of {:.2f} is not met within half an okta: it is {:.2f}", layers[n].group, layers[n].cover, fit.cover));
+            fitted.notes.push_back(
+                fmt::format("{}: the cover of {:.2f} is not met within half an okta: it is {:.2f}",
+                            layers[n].group, layers[n].cover, fit.cover));
         fitted.layers.push_back(fit);
     }
     fitted.text = metar_scene_text(metar, options, coverage);

@@ -73,18 +73,21 @@ std::size_t layer_index(const Scene& scene, const std::string& name) {
         if (scene.layers[n].name == name) return n;
         if (has_density(scene.layers[n])) names += (names.empty() ? "" : ", ") + scene.layers[n].name;
     }
-    throw Error(ErrorCode::usage, "there is no layer '" + name + "'; " +
-                                      (names.empty() ? "the scene has no layers" : "the layers are " + names));
+    throw Error(ErrorCode::usage,
+                "there is no layer '" + name + "'; " +
+                    (names.empty() ? "the scene has no layers" : "the layers are " + names));
 }
 
 std::filesystem::path density_file(const RunListing& run, const ListedFrame& frame,
                                    const std::optional<std::string>& layer) {
     const RunFolder folder{run.folder, run.scene.name};
-    if (!has_density(run.scene)) throw Error(ErrorCode::usage, run.folder.string() + ": the run has no density files");
+    if (!has_density(run.scene))
+        throw Error(ErrorCode::usage, run.folder.string() + ": the run has no density files");
     if (!layer) {
         if (run.scene.layers.empty() || run.scene.density_files.combined) return folder.density(frame.number);
-        throw Error(ErrorCode::usage, run.folder.string() + ": the run has no file of all layers together "
-                                                            "(`density.combined` is false): name a layer");
+        throw Error(ErrorCode::usage, run.folder.string() +
+                                          ": the run has no file of all layers together "
+                                          "(`density.combined` is false): name a layer");
     }
     const std::size_t n = layer_index(run.scene, *layer);
     if (!has_density(run.scene.layers[n]) || !run.scene.density_files.per_layer)

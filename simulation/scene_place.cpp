@@ -22,9 +22,7 @@ const Wind& wind_of_height(const Scene& scene, double height_m) {
     return common_wind(scene);
 }
 
-double height_of_level(const Placement& box, int k) {
-    return box.origin_m.z + (k + 0.5) * box.cell_size_m;
-}
+double height_of_level(const Placement& box, int k) { return box.origin_m.z + (k + 0.5) * box.cell_size_m; }
 
 // A profile between two key frames has the levels of both.
 std::vector<WindLevel> table_of(const Wind& wind, double time_s) {
@@ -58,8 +56,8 @@ std::optional<Stretch> period_of(const Placement& at, Extent extent, Boundaries 
 
 }  // namespace
 
-std::vector<Velocity> wind_of_levels(const Scene& scene, std::optional<std::size_t> layer, const Placement& box,
-                                     Extent size, double time_s) {
+std::vector<Velocity> wind_of_levels(const Scene& scene, std::optional<std::size_t> layer,
+                                     const Placement& box, Extent size, double time_s) {
     std::vector<Velocity> velocities;
     for (int k = 0; k < size.z; ++k) {
         const double height = height_of_level(box, k);
@@ -89,7 +87,8 @@ Vec3 period_m(const Scene& scene, std::optional<std::size_t> layer) {
         if (layer) {
             common = of_layer(scene.layers[*layer]);
         } else if (scene.layers.empty()) {
-            common = period_of(scene.automaton.placement, scene.automaton.extent, scene.automaton.boundaries, axis);
+            common = period_of(scene.automaton.placement, scene.automaton.extent, scene.automaton.boundaries,
+                               axis);
         } else {
             bool first = true;
             for (const LayerOptions& l : scene.layers) {

@@ -20,8 +20,8 @@ std::vector<WindLevel> wind_levels(const Scene& scene, std::optional<std::size_t
                                    Extent size, double time_s);
 
 // Returns the velocity at the centre of each level of voxels, size.z of them.
-std::vector<Velocity> wind_of_levels(const Scene& scene, std::optional<std::size_t> layer, const Placement& box,
-                                     Extent size, double time_s);
+std::vector<Velocity> wind_of_levels(const Scene& scene, std::optional<std::size_t> layer,
+                                     const Placement& box, Extent size, double time_s);
 
 // Returns the lengths in metres after which the density of a layer, or of all together, repeats; 0 on an axis where it
 // does not. Of several layers an axis repeats if it does so in all of them, over the same stretch of the world.

@@ -22,7 +22,7 @@
 namespace nephos {
 namespace {
 
-constexpr std::size_t kNamed = 3;       // problems of one kind that are named
+constexpr std::size_t kNamed = 3;  // problems of one kind that are named
 constexpr double kLayersTolerance = 1e-3;
 
 // Counts problems of one kind, and names the first of them.
@@ -48,8 +48,8 @@ std::vector<std::filesystem::path> extra_files(const RunListing& run, const std:
     std::vector<std::filesystem::path> extra;
     for (const char* part : {"density", "frames", "statistics"}) {
         std::error_code error;
-        for (std::filesystem::recursive_directory_iterator at(run.folder / part, error), end; !error && at != end;
-             at.increment(error)) {
+        for (std::filesystem::recursive_directory_iterator at(run.folder / part, error), end;
+             !error && at != end; at.increment(error)) {
             if (at->is_directory()) continue;
             const std::filesystem::path path = at->path().lexically_relative(run.folder);
             if (!listed.contains(path.generic_string())) extra.push_back(path);
@@ -67,9 +67,10 @@ Check check_numbers(const RunListing& run) {
     const int last = run.complete ? run.range.last_frame : (numbers.empty() ? 0 : *numbers.rbegin());
     for (; next <= last; ++next)
         if (!numbers.contains(next)) problems.add(fmt::format("frame {} is missing", next));
-    if (!run.complete) problems.add(fmt::format("the run is not complete: {} frames are done", numbers.size()));
-    return problems.check("frames", fmt::format("{} frames, {} to {}, no gap", numbers.size(),
-                                                run.range.first_frame, last));
+    if (!run.complete)
+        problems.add(fmt::format("the run is not complete: {} frames are done", numbers.size()));
+    return problems.check(
+        "frames", fmt::format("{} frames, {} to {}, no gap", numbers.size(), run.range.first_frame, last));
 }
 
 // The density of one file as a reader sees it; what is wrong with it goes into `problems`.
@@ -101,7 +102,8 @@ class Decoder {
     }
 
     std::vector<Check> checks() const {
-        return {voxels_.check("voxels", fmt::format("{} density files decode to the voxels of the manifest", count_)),
+        return {voxels_.check("voxels",
+                              fmt::format("{} density files decode to the voxels of the manifest", count_)),
                 values_.check("values", fmt::format("finite, 0 to {:.4g}", largest_)),
                 geometry_.check("geometry", "same transform, bounds and class in every file of a kind"),
                 metadata_.check("metadata", "time, extinction, scene and state as in the manifest")};
@@ -112,13 +114,15 @@ class Decoder {
         if (!loaded.metadata) return metadata_.add(file.path + ": has no metadata of nephos");
         const VdbMetadata& m = *loaded.metadata;
         if (m.time_s != frame.time_s)
-            metadata_.add(fmt::format("{}: time {} s, {} in the manifest", file.path, m.time_s, frame.time_s));
+            metadata_.add(
+                fmt::format("{}: time {} s, {} in the manifest", file.path, m.time_s, frame.time_s));
         if (m.extinction_per_m != run_.scene.density.extinction_per_m)
             metadata_.add(fmt::format("{}: extinction {} per m", file.path, m.extinction_per_m));
         if (m.scene_hash != run_.scene_hash) metadata_.add(file.path + ": is of another scene");
         if (run_.scene.layers.empty() && m.state_hash != frame.state_hash)
             metadata_.add(file.path + ": is of another state");
-        if (!(m.georeference == run_.scene.georeference)) metadata_.add(file.path + ": lies at another place");
+        if (!(m.georeference == run_.scene.georeference))
+            metadata_.add(file.path + ": lies at another place");
     }
 
     // Grids that hold only a part of the box (hum, act, cld, the wind) have its transform, not its bounds.
@@ -131,7 +135,8 @@ class Decoder {
                 geometry_.add(file.path + ": `density` is of class " + grid.grid_class);
             if (added) continue;
             const VdbGridInfo& other = first->second;
-            if (other.world_from_index != grid.world_from_index) geometry_.add(file.path + ": `" + grid.name + "` has another transform");
+            if (other.world_from_index != grid.world_from_index)
+                geometry_.add(file.path + ": `" + grid.name + "` has another transform");
             if (grid.name == "density" && !(other.active_box == grid.active_box))
                 geometry_.add(file.path + ": has other bounds");
             if (other.grid_class != grid.grid_class || other.type != grid.type)
@@ -147,8 +152,9 @@ class Decoder {
 };
 
 // The density of layers must be that of the file of all together.
-void compare_layers(const ListedFrame& frame, const DensityGrid& whole, const std::vector<DensityGrid>& layers,
-                    const std::vector<Boundaries>& boundaries, double& largest, Problems& problems) {
+void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
+                    const std::vector<DensityGrid>& layers, const std::vector<Boundaries>& boundaries,
+                    double& largest, Problems& problems) {
     const DensityGrid sum = combine(layers, boundaries);
     if (!(sum.extent() == whole.extent())) {
         problems.add(fmt::format("frame {}: the layers' box is another", frame.number));
@@ -156,10 +162,12 @@ void compare_layers(const ListedFrame& frame, const DensityGrid& whole, const st
     }
     const std::vector<float> a = sum.to_dense(), b = whole.to_dense();
     double difference = 0;
-    for (std::size_t n = 0; n < a.size(); ++n) difference = std::max(difference, double(std::abs(a[n] - b[n])));
+    for (std::size_t n = 0; n < a.size(); ++n)
+        difference = std::max(difference, double(std::abs(a[n] - b[n])));
     largest = std::max(largest, difference);
     if (difference > kLayersTolerance)
-        problems.add(fmt::format("frame {}: the layers differ from the common grid by {:.3g}", frame.number, difference));
+        problems.add(fmt::format("frame {}: the layers differ from the common grid by {:.3g}", frame.number,
+                                 difference));
 }
 
 // How much a sequence moves from frame to frame.
@@ -174,15 +182,17 @@ class Motion {
         if (before_.size() == now.size()) {
             for (std::size_t n = 0; n < now.size(); ++n)
                 change_ = std::max(change_, double(std::abs(now[n] - before_[n])));
-            if (sharpness_ > 0) sharpness_change_ = std::max(sharpness_change_, std::abs(gradients / sharpness_ - 1));
+            if (sharpness_ > 0)
+                sharpness_change_ = std::max(sharpness_change_, std::abs(gradients / sharpness_ - 1));
         }
         sharpness_ = gradients;
         before_ = std::move(now);
     }
     Check check(const std::optional<double>& most) const {
         const bool good = !most || change_ <= *most;
-        std::string text = fmt::format("largest change of a voxel {:.3g}, of the sum of gradients {:.2g} %, from frame to frame",
-                                       change_, 100 * sharpness_change_);
+        std::string text = fmt::format(
+            "largest change of a voxel {:.3g}, of the sum of gradients {:.2g} %, from frame to frame",
+            change_, 100 * sharpness_change_);
         if (!good) text += fmt::format("; at most {:g} is allowed", *most);
         return {"motion", good, text, {{"largest_change", change_}, {"sharpness_change", sharpness_change_}}};
     }
@@ -203,8 +213,9 @@ Check check_seams(const RunListing& run, const DensityGrid& grid, bool all) {
         const Seam seam = seam_of(density, e.x, e.y, e.z, axis);
         const bool good = seam.at_seam <= seam.inside;
         check.passed = check.passed && good;
-        check.detail += fmt::format("{}{}: {:.4f} at the seam, at most {:.4f} inside{}", check.detail.empty() ? "" : "; ",
-                                    names[axis], seam.at_seam, seam.inside, good ? "" : " (the seam shows)");
+        check.detail +=
+            fmt::format("{}{}: {:.4f} at the seam, at most {:.4f} inside{}", check.detail.empty() ? "" : "; ",
+                        names[axis], seam.at_seam, seam.inside, good ? "" : " (the seam shows)");
         check.figures.emplace_back(fmt::format("{}_seam", names[axis]), seam.at_seam);
         check.figures.emplace_back(fmt::format("{}_inside", names[axis]), seam.inside);
     }
@@ -225,7 +236,8 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
         std::map<std::string, DensityGrid> grids;
         for (const FileRecord& file : frame.files) {
             if (!file.path.ends_with(".vdb")) continue;
-            if (std::optional<DensityGrid> grid = decoder.read(frame, file)) grids.emplace(file.path, std::move(*grid));
+            if (std::optional<DensityGrid> grid = decoder.read(frame, file))
+                grids.emplace(file.path, std::move(*grid));
         }
         if (grids.empty()) continue;
         const auto path_of = [&](const std::filesystem::path& path) {
@@ -241,7 +253,8 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
             boundaries.push_back(layer.boundaries);
         }
         if (whole != grids.end() && !layers.empty() &&
-            layers.size() == std::size_t(std::ranges::count_if(run.scene.layers, [](const auto& l) { return has_density(l); }))) {
+            layers.size() == std::size_t(std::ranges::count_if(
+                                 run.scene.layers, [](const auto& l) { return has_density(l); }))) {
             compare_layers(frame, whole->second, layers, boundaries, largest, sums);
             ++compared;
         }
@@ -251,7 +264,9 @@ void check_content(const RunListing& run, const VerifyOptions& options, std::vec
     }
     for (Check& check : decoder.checks()) checks.push_back(std::move(check));
     if (compared > 0)
-        checks.push_back(sums.check("layers", fmt::format("add up to the common grid within {:.2g} in {} frames", largest, compared)));
+        checks.push_back(sums.check(
+            "layers",
+            fmt::format("add up to the common grid within {:.2g} in {} frames", largest, compared)));
     if (last) {
         checks.push_back(check_seams(run, *last, options.seam));
         checks.push_back(motion.check(options.max_change));
@@ -273,9 +288,11 @@ Check compare_runs(const RunListing& run, const std::filesystem::path& other_fol
         std::map<std::string, std::string> voxels;
         for (const FileRecord& file : found->second->files) voxels[file.path] = file.voxels;
         for (const FileRecord& file : frame.files)
-            if (!file.voxels.empty() && voxels[file.path] != file.voxels) problems.add(file.path + ": other voxels");
+            if (!file.voxels.empty() && voxels[file.path] != file.voxels)
+                problems.add(file.path + ": other voxels");
     }
-    return problems.check("against", fmt::format("{}: the same states and voxels in {} frames", other_folder.string(), run.frames.size()));
+    return problems.check("against", fmt::format("{}: the same states and voxels in {} frames",
+                                                 other_folder.string(), run.frames.size()));
 }
 
 // Compares frames that are simulated anew with those of the manifest.
@@ -293,9 +310,10 @@ class Replay : public SimulationSink {
         if (found == frames_.end()) return;
         ++count;
         if (found->second->state_hash != frame.hash.hex())
-            return problems.add(fmt::format("frame {}: state {}, {} in the manifest", frame.number, frame.hash.hex(),
-                                            found->second->state_hash));
-        const std::string name = folder_.density(frame.number).lexically_relative(folder_.folder).generic_string();
+            return problems.add(fmt::format("frame {}: state {}, {} in the manifest", frame.number,
+                                            frame.hash.hex(), found->second->state_hash));
+        const std::string name =
+            folder_.density(frame.number).lexically_relative(folder_.folder).generic_string();
         for (const FileRecord& file : found->second->files) {
             if (plain_ && file.path == name && file.voxels != voxel_digest(frame.density, half_))
                 problems.add(fmt::format("frame {}: other voxels", frame.number));
@@ -321,7 +339,8 @@ Check replay_frames(const RunListing& run, int count) {
     } catch (const Error& error) {
         return {"replay", false, error.what()};
     }
-    return sink.problems.check("replay", fmt::format("{} frames simulated anew have the same states and voxels", sink.count));
+    return sink.problems.check(
+        "replay", fmt::format("{} frames simulated anew have the same states and voxels", sink.count));
 }
 
 }  // namespace
@@ -332,7 +351,9 @@ bool Verification::passed() const {
 
 Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
     const int n = axis == 0 ? nx : axis == 1 ? ny : nz;
-    const std::size_t stride = axis == 0 ? 1 : axis == 1 ? std::size_t(nx) : std::size_t(nx) * std::size_t(ny);
+    const std::size_t stride = axis == 0   ? 1
+                               : axis == 1 ? std::size_t(nx)
+                                           : std::size_t(nx) * std::size_t(ny);
     std::vector<double> planes(std::size_t(n), 0.0);
     for (std::size_t at = 0; at < density.size(); ++at) {
         const int i = int(at / stride % std::size_t(n));
@@ -362,9 +383,11 @@ std::vector<Check> check_files(const std::filesystem::path& folder, const std::v
             }
             const FileDigest found = file_digest(path);
             if (found.bytes != files[n].bytes)
-                wrong[n] = fmt::format("{}: {} bytes, not {}", files[n].path.generic_string(), found.bytes, files[n].bytes);
+                wrong[n] = fmt::format("{}: {} bytes, not {}", files[n].path.generic_string(), found.bytes,
+                                       files[n].bytes);
             else if (found.xxh3 != files[n].xxh3)
-                wrong[n] = fmt::format("{}: its bytes are not those that were written", files[n].path.generic_string());
+                wrong[n] = fmt::format("{}: its bytes are not those that were written",
+                                       files[n].path.generic_string());
         } catch (const Error& error) {
             wrong[n] = error.what();
         }
@@ -372,7 +395,8 @@ std::vector<Check> check_files(const std::filesystem::path& folder, const std::v
     Problems presence, content;
     for (const std::string& text : missing)
         if (!text.empty()) presence.add(text);
-    for (const std::filesystem::path& path : extra) presence.add(path.generic_string() + " is listed nowhere");
+    for (const std::filesystem::path& path : extra)
+        presence.add(path.generic_string() + " is listed nowhere");
     std::uint64_t bytes = 0;
     for (const ListedFile& file : files) bytes += file.bytes;
     for (const std::string& text : wrong)
@@ -401,8 +425,10 @@ Verification verify_run(const std::filesystem::path& folder, const VerifyOptions
         for (const LayerOptions& layer : run.scene.layers) names.insert("statistics/" + layer.name + ".csv");
     }
     if (!recorded && has_density(run.scene))
-        result.checks.push_back({"digests", false, "the manifest, of an earlier version, has no checksums: run the scene anew"});
-    for (Check& check : check_files(folder, files, extra_files(run, names))) result.checks.push_back(std::move(check));
+        result.checks.push_back(
+            {"digests", false, "the manifest, of an earlier version, has no checksums: run the scene anew"});
+    for (Check& check : check_files(folder, files, extra_files(run, names)))
+        result.checks.push_back(std::move(check));
     if (options.against) result.checks.push_back(compare_runs(run, *options.against));
     if (!options.hashes_only) check_content(run, options, result.checks);
     if (options.replay > 0) result.checks.push_back(replay_frames(run, options.replay));

@@ -114,8 +114,8 @@ std::vector<std::pair<std::string, std::string>> place_rows(const VdbGridInfo& g
     std::vector<std::pair<std::string, std::string>> rows;
     rows.emplace_back("voxel (0, 0, 0)", fmt::format("centre at ({:g}, {:g}, {:g})", m[3], m[7], m[11]));
     rows.emplace_back("index to world",
-                      fmt::format("[{:g} {:g} {:g} {:g}; {:g} {:g} {:g} {:g}; {:g} {:g} {:g} {:g}]", m[0], m[1], m[2],
-                                  m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]));
+                      fmt::format("[{:g} {:g} {:g} {:g}; {:g} {:g} {:g} {:g}; {:g} {:g} {:g} {:g}]", m[0],
+                                  m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]));
     return rows;
 }
 

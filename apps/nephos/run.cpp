@@ -206,7 +206,7 @@ void add_run_command(CLI::App& app, Action& action) {
     command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics");
     command->add_flag("--statistics-only", a->statistics_only,
                       "No frames at all, only statistics of every step, the manifest and the checkpoint; no "
-                      "density is made, so mean_density is empty");
+                      "density is made, so mean_density and optical_cover are empty");
     command->add_flag("--video", a->video, "Also an MP4 of all pictures (needs the ffmpeg command)");
     command->add_flag("--resume", a->resume,
                       "Go on where an interrupted run stopped, or with more time.steps where a run ended");

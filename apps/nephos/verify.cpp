@@ -2,6 +2,8 @@
 
 // nephos verify: whether the folder of a run or of an export is whole and says the truth.
 
+#include "simulation/verify.h"
+
 #include <memory>
 
 #include <fmt/format.h>
@@ -13,7 +15,6 @@
 #include "core/error.h"
 #include "simulation/export/export.h"
 #include "simulation/run_listing.h"
-#include "simulation/verify.h"
 
 namespace nephos {
 namespace {
@@ -27,7 +28,8 @@ struct VerifyArguments {
 Verification verify_folder(const VerifyArguments& a) {
     if (is_run_folder(a.folder)) return verify_run(a.folder, a.options);
     if (is_export_folder(a.folder)) return verify_export(a.folder, a.options);
-    throw Error(ErrorCode::io, a.folder + ": holds neither a run (manifest.json) nor an export (export.json)");
+    throw Error(ErrorCode::io,
+                a.folder + ": holds neither a run (manifest.json) nor an export (export.json)");
 }
 
 int verify(const VerifyArguments& a) {
@@ -37,15 +39,18 @@ int verify(const VerifyArguments& a) {
     if (a.work.json) {
         nlohmann::ordered_json checks = nlohmann::ordered_json::array();
         for (const Check& check : result.checks) {
-            nlohmann::ordered_json json = {{"name", check.name}, {"passed", check.passed}, {"detail", check.detail}};
+            nlohmann::ordered_json json = {
+                {"name", check.name}, {"passed", check.passed}, {"detail", check.detail}};
             for (const auto& [name, value] : check.figures) json["figures"][name] = value;
             checks.push_back(std::move(json));
         }
-        output.line(json_text({{"folder", a.folder}, {"kind", result.kind}, {"passed", result.passed()}, {"checks", checks}}));
+        output.line(json_text(
+            {{"folder", a.folder}, {"kind", result.kind}, {"passed", result.passed()}, {"checks", checks}}));
     } else if (!a.work.quiet || !result.passed()) {
         const bool colours = colours_on(stdout);
         for (const Check& check : result.checks) {
-            output.write_styled(fmt::format("  {}  {:9} {}\n", check.passed ? "ok  " : styled("FAIL", Style::red, colours),
+            output.write_styled(fmt::format("  {}  {:9} {}\n",
+                                            check.passed ? "ok  " : styled("FAIL", Style::red, colours),
                                             check.name, escaped_lines(check.detail)));
         }
     }
@@ -57,12 +62,14 @@ int verify(const VerifyArguments& a) {
 }  // namespace
 
 void add_verify_command(CLI::App& app, Action& action) {
-    CLI::App* command = app.add_subcommand("verify", "Check the files of a run or an export against their checksums");
+    CLI::App* command =
+        app.add_subcommand("verify", "Check the files of a run or an export against their checksums");
     const auto a = std::make_shared<VerifyArguments>();
     command->add_option("DIR", a->folder, "Folder of a run (manifest.json) or of an export (export.json)")
         ->required()
         ->type_name("DIR");
-    command->add_flag("--hashes", a->options.hashes_only, "Compare the files' checksums alone; decode nothing");
+    command->add_flag("--hashes", a->options.hashes_only,
+                      "Compare the files' checksums alone; decode nothing");
     command
         ->add_option_function<std::string>(
             "--against", [a](const std::string& text) { a->options.against = text; },
@@ -78,10 +85,14 @@ void add_verify_command(CLI::App& app, Action& action) {
     add_json(*command, a->work);
     add_quiet(*command, a->work);
     command->footer(
-        "Of a run: no frame or file is missing or extra; bytes and XXH3-128 of each file and of its decoded voxels are\n"
-        "those of the manifest; transform, bounds and class are the same in all files; values are finite, 0 to 1;\n"
-        "metadata agree with the manifest; layers add up to the common grid. Reported: roughness at the seam of\n"
-        "periodic axes, largest change of a voxel and of sharpness. Of an export: checksums, and the voxels read\n"
+        "Of a run: no frame or file is missing or extra; bytes and XXH3-128 of each file and of its decoded "
+        "voxels are\n"
+        "those of the manifest; transform, bounds and class are the same in all files; values are finite, 0 "
+        "to 1;\n"
+        "metadata agree with the manifest; layers add up to the common grid. Reported: roughness at the seam "
+        "of\n"
+        "periodic axes, largest change of a voxel and of sharpness. Of an export: checksums, and the voxels "
+        "read\n"
         "back from each file against those of the source, within the error of their type.\n"
         "\n"
         "Exit status 0: everything holds; 1: a check failed; 3: the folder cannot be read.\n"

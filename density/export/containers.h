@@ -38,7 +38,8 @@ EncodedVolume read_dds(const std::filesystem::path& path);
 
 // A 3-D texture with `description` as the value of its key "nephos". Source: Khronos, "KTX File Format Specification
 // 2.0", and "Data Format Specification 1.3".
-void write_ktx2(const std::filesystem::path& path, const EncodedVolume& volume, const std::string& description);
+void write_ktx2(const std::filesystem::path& path, const EncodedVolume& volume,
+                const std::string& description);
 EncodedVolume read_ktx2(const std::filesystem::path& path);
 
 // Level 0 as point data `density` at the voxels' centres, appended raw or compressed by zlib, with the time as field
@@ -48,7 +49,8 @@ struct VtiPlace {
     std::array<double, 3> voxel_m{};
     double time_s = 0;
 };
-void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place, bool zip);
+void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place,
+               bool zip);
 EncodedVolume read_vti(const std::filesystem::path& path);
 
 // A collection of files with their times for ParaView (.pvd); names are relative to it.

@@ -54,9 +54,11 @@ nanovdb::GridHandle<> converted(const openvdb::FloatGrid& grid, NanoQuantise qua
 
 }  // namespace
 
-void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec, NanoQuantise quantise) {
+void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
+                   NanoQuantise quantise) {
     openvdb::initialize();
-    constexpr nanovdb::io::Codec kCodecs[] = {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP, nanovdb::io::Codec::BLOSC};
+    constexpr nanovdb::io::Codec kCodecs[] = {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP,
+                                              nanovdb::io::Codec::BLOSC};
     // The library seeks over the header before there are bytes, which a string stream refuses. No file is smaller.
     std::ostringstream stream(std::string(1024, '\0'), std::ios::binary);
     try {
@@ -91,8 +93,10 @@ DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const
                     auto leaf = uninitialised_leaf({x, y, z});
                     const FloatLeaf* from = grid->tree().probeConstLeaf({x, y, z});
                     for (int n = 0; n < kBlockVoxels; ++n) {
-                        leaf->buffer().data()[n] = from != nullptr ? from->buffer().data()[n]
-                                                                   : grid->tree().getValue({x + (n >> 6), y + (n >> 3 & 7), z + (n & 7)});
+                        leaf->buffer().data()[n] =
+                            from != nullptr
+                                ? from->buffer().data()[n]
+                                : grid->tree().getValue({x + (n >> 6), y + (n >> 3 & 7), z + (n & 7)});
                     }
                     NewBlock::from(std::move(leaf)).move_to(builder, {x, y, z});
                 }

@@ -10,11 +10,12 @@
 
 namespace nephos {
 
-enum class NanoCodec { none, zip, blosc };     // compression of the file
+enum class NanoCodec { none, zip, blosc };    // compression of the file
 enum class NanoQuantise { none, fp8, fp16 };  // bits of a value, by the range of its leaf
 
 // Writes atomically. Throws Error(io) naming the file. Thread-safe for different files.
-void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec, NanoQuantise quantise);
+void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
+                   NanoQuantise quantise);
 
 // Reads the float grid of a file that was not quantised, as a grid of this extent and placement. Throws Error(io)
 // naming the file, also when it is quantised or has voxels outside of the extent.

@@ -21,7 +21,9 @@ namespace {
 
 constexpr std::size_t kZipBlock = std::size_t(1) << 18;  // bytes before compression
 
-std::string triple(double a, double b, double c) { return number_text(a) + " " + number_text(b) + " " + number_text(c); }
+std::string triple(double a, double b, double c) {
+    return number_text(a) + " " + number_text(b) + " " + number_text(c);
+}
 
 std::string_view vtk_type(VoxelType type) {
     switch (type) {
@@ -32,7 +34,8 @@ std::string_view vtk_type(VoxelType type) {
         case VoxelType::r32f:
             return "Float32";
         default:
-            throw Error(ErrorCode::usage, "a VTI file holds r8, r16 or r32f, not " + std::string(type_name(type)));
+            throw Error(ErrorCode::usage,
+                        "a VTI file holds r8, r16 or r32f, not " + std::string(type_name(type)));
     }
 }
 
@@ -58,8 +61,10 @@ std::vector<std::byte> zipped(const std::vector<std::byte>& bytes) {
 }
 
 std::vector<std::byte> unzipped(ByteReader& reader) {
-    const auto count = reader.get<std::uint64_t>(), block = reader.get<std::uint64_t>(), last = reader.get<std::uint64_t>();
-    if (count > reader.rest().size() / 8 || block > (std::uint64_t(1) << 30) || last > block) throw Error(ErrorCode::io, "its table of blocks is damaged");
+    const auto count = reader.get<std::uint64_t>(), block = reader.get<std::uint64_t>(),
+               last = reader.get<std::uint64_t>();
+    if (count > reader.rest().size() / 8 || block > (std::uint64_t(1) << 30) || last > block)
+        throw Error(ErrorCode::io, "its table of blocks is damaged");
     std::vector<std::uint64_t> sizes(count);
     for (std::uint64_t& size : sizes) size = reader.get<std::uint64_t>();
     std::vector<std::byte> out;
@@ -70,7 +75,8 @@ std::vector<std::byte> unzipped(ByteReader& reader) {
         out.resize(at + std::size_t(size));
         uLongf length = uLongf(size);
         if (uncompress(reinterpret_cast<Bytef*>(out.data() + at), &length,
-                       reinterpret_cast<const Bytef*>(reader.rest().data()), uLong(sizes[n])) != Z_OK || length != size)
+                       reinterpret_cast<const Bytef*>(reader.rest().data()), uLong(sizes[n])) != Z_OK ||
+            length != size)
             throw Error(ErrorCode::io, "a block is damaged");
         reader.skip(std::size_t(sizes[n]));
     }
@@ -96,17 +102,26 @@ void append_png(png_structp png, png_bytep data, png_size_t size) {
 
 }  // namespace
 
-void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place, bool zip) {
+void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place,
+               bool zip) {
     const VolumeLevel& top = volume.levels.front();
-    const std::string extent = "0 " + std::to_string(top.nx - 1) + " 0 " + std::to_string(top.ny - 1) + " 0 " + std::to_string(top.nz - 1);
-    std::string xml = "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"";
+    const std::string extent = "0 " + std::to_string(top.nx - 1) + " 0 " + std::to_string(top.ny - 1) +
+                               " 0 " + std::to_string(top.nz - 1);
+    std::string xml =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+        "header_type=\"UInt64\"";
     if (zip) xml += " compressor=\"vtkZLibDataCompressor\"";
     xml += ">\n<ImageData WholeExtent=\"" + extent + "\" Origin=\"" +
            triple(place.first_m[0], place.first_m[1], place.first_m[2]) + "\" Spacing=\"" +
-           triple(place.voxel_m[0], place.voxel_m[1], place.voxel_m[2]) + "\" Direction=\"1 0 0 0 1 0 0 0 1\">\n";
-    xml += "<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">" + number_text(place.time_s) + "</DataArray></FieldData>\n";
-    xml += "<Piece Extent=\"" + extent + "\">\n<PointData Scalars=\"density\"><DataArray type=\"" + std::string(vtk_type(volume.type)) +
-           "\" Name=\"density\" format=\"appended\" offset=\"0\"/></PointData>\n</Piece>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_";
+           triple(place.voxel_m[0], place.voxel_m[1], place.voxel_m[2]) +
+           "\" Direction=\"1 0 0 0 1 0 0 0 1\">\n";
+    xml +=
+        "<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">" +
+        number_text(place.time_s) + "</DataArray></FieldData>\n";
+    xml += "<Piece Extent=\"" + extent + "\">\n<PointData Scalars=\"density\"><DataArray type=\"" +
+           std::string(vtk_type(volume.type)) +
+           "\" Name=\"density\" format=\"appended\" "
+           "offset=\"0\"/></PointData>\n</Piece>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_";
     write_pieces_atomically(path, [&](const AppendPiece& append) {
         append(xml);
         std::vector<std::byte> packed;
@@ -146,7 +161,8 @@ EncodedVolume read_vti(const std::filesystem::path& path) {
             if (size > reader.rest().size()) throw Error(ErrorCode::io, "it ends inside of its voxels");
             level.bytes.assign(reader.rest().begin(), reader.rest().begin() + std::ptrdiff_t(size));
         }
-        if (level.nx < 1 || level.ny < 1 || level.nz < 1 || level.bytes.size() != encoded_bytes(level.nx, level.ny, level.nz, volume.type))
+        if (level.nx < 1 || level.ny < 1 || level.nz < 1 ||
+            level.bytes.size() != encoded_bytes(level.nx, level.ny, level.nz, volume.type))
             throw Error(ErrorCode::io, "its voxels are not of the size that it states");
         volume.levels.push_back(std::move(level));
         return volume;
@@ -154,9 +170,12 @@ EncodedVolume read_vti(const std::filesystem::path& path) {
 }
 
 std::string pvd_text(const std::vector<PvdEntry>& entries) {
-    std::string text = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>\n";
+    std::string text =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" "
+        "byte_order=\"LittleEndian\">\n<Collection>\n";
     for (const PvdEntry& entry : entries)
-        text += "<DataSet timestep=\"" + number_text(entry.time_s) + "\" group=\"\" part=\"0\" file=\"" + entry.file + "\"/>\n";
+        text += "<DataSet timestep=\"" + number_text(entry.time_s) + "\" group=\"\" part=\"0\" file=\"" +
+                entry.file + "\"/>\n";
     return text + "</Collection>\n</VTKFile>\n";
 }
 
@@ -180,8 +199,9 @@ void write_slices(const std::filesystem::path& path, const EncodedVolume& volume
         throw Error(ErrorCode::io, path.string() + ": libpng cannot encode the slices");
     }
     png_set_write_fn(png, &writing, append_png, nullptr);
-    png_set_IHDR(png, info, png_uint_32(top.nx * columns), png_uint_32(top.ny * rows), int(8 * bytes), PNG_COLOR_TYPE_GRAY,
-                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_IHDR(png, info, png_uint_32(top.nx * columns), png_uint_32(top.ny * rows), int(8 * bytes),
+                 PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
     png_set_compression_level(png, 1);
     png_write_info(png, info);
     if (bytes == 2) png_set_swap(png);  // PNG is big-endian
@@ -193,7 +213,10 @@ void write_slices(const std::filesystem::path& path, const EncodedVolume& volume
                 if (k >= top.nz)
                     std::fill_n(to, row_bytes, std::byte{0});
                 else
-                    std::memcpy(to, top.bytes.data() + (std::size_t(k) * std::size_t(top.ny) + std::size_t(y)) * row_bytes, row_bytes);
+                    std::memcpy(to,
+                                top.bytes.data() +
+                                    (std::size_t(k) * std::size_t(top.ny) + std::size_t(y)) * row_bytes,
+                                row_bytes);
             }
             png_write_row(png, reinterpret_cast<png_const_bytep>(row.data()));
         }
@@ -211,18 +234,25 @@ EncodedVolume read_slices(const std::filesystem::path& path, int nx, int ny, int
         png_image_free(&image);
         return Error(ErrorCode::io, path.string() + ": " + what);
     };
-    if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0) throw fail("it is no PNG file");
+    if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
+        throw fail("it is no PNG file");
     const bool wide = (image.format & PNG_FORMAT_FLAG_LINEAR) != 0;
     const int rows = (nz + columns - 1) / columns;
-    if (int(image.width) != nx * columns || int(image.height) != ny * rows || wide) throw fail("it is no picture of 8-bit slices of this size");
+    if (int(image.width) != nx * columns || int(image.height) != ny * rows || wide)
+        throw fail("it is no picture of 8-bit slices of this size");
     image.format = PNG_FORMAT_GRAY;
     std::vector<std::byte> pixels(PNG_IMAGE_SIZE(image));
     if (png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) == 0) throw fail("it is damaged");
-    VolumeLevel level{nx, ny, nz, std::vector<std::byte>(std::size_t(nx) * std::size_t(ny) * std::size_t(nz))};
+    VolumeLevel level{nx, ny, nz,
+                      std::vector<std::byte>(std::size_t(nx) * std::size_t(ny) * std::size_t(nz))};
     for (int k = 0; k < nz; ++k) {
         for (int y = 0; y < ny; ++y) {
-            const std::size_t from = (std::size_t(k / columns) * std::size_t(ny) + std::size_t(y)) * image.width + std::size_t(k % columns) * std::size_t(nx);
-            std::memcpy(level.bytes.data() + (std::size_t(k) * std::size_t(ny) + std::size_t(y)) * std::size_t(nx), pixels.data() + from, std::size_t(nx));
+            const std::size_t from =
+                (std::size_t(k / columns) * std::size_t(ny) + std::size_t(y)) * image.width +
+                std::size_t(k % columns) * std::size_t(nx);
+            std::memcpy(
+                level.bytes.data() + (std::size_t(k) * std::size_t(ny) + std::size_t(y)) * std::size_t(nx),
+                pixels.data() + from, std::size_t(nx));
         }
     }
     EncodedVolume volume{VoxelType::r8, {}};

@@ -43,7 +43,8 @@ void take_levels(EncodedVolume& volume, ByteReader& reader, int nx, int ny, int 
     for (std::uint32_t n = 0; n < levels; ++n) {
         VolumeLevel level{level_size(nx, n), level_size(ny, n), level_size(nz, n), {}};
         const std::size_t bytes = encoded_bytes(level.nx, level.ny, level.nz, volume.type);
-        if (bytes > reader.rest().size()) throw Error(ErrorCode::io, "it ends inside of level " + std::to_string(n));
+        if (bytes > reader.rest().size())
+            throw Error(ErrorCode::io, "it ends inside of level " + std::to_string(n));
         level.bytes.resize(bytes);
         reader.get_bytes(level.bytes);
         volume.levels.push_back(std::move(level));
@@ -64,11 +65,12 @@ std::vector<std::byte> data_format(VoxelType type) {
     constexpr std::uint32_t kSamples = 1, kBlockBytes = 24 + 16 * kSamples;
     ByteWriter w;
     w.put(kBlockBytes + 4);
-    w.put(std::uint32_t{0});                                // Khronos, basic format
-    w.put(std::uint32_t{2} | kBlockBytes << 16);            // version 1.3
-    w.put(std::uint32_t(block ? 131 : 1) | 1 << 8 | 1 << 16);  // BC4 or RGBSDA; BT.709, linear, straight alpha
-    w.put(std::uint32_t(block ? 3 | 3 << 8 : 0));           // texels of a block, less 1
-    w.put(bytes);                                           // of plane 0
+    w.put(std::uint32_t{0});                      // Khronos, basic format
+    w.put(std::uint32_t{2} | kBlockBytes << 16);  // version 1.3
+    w.put(std::uint32_t(block ? 131 : 1) | 1 << 8 |
+          1 << 16);                                // BC4 or RGBSDA; BT.709, linear, straight alpha
+    w.put(std::uint32_t(block ? 3 | 3 << 8 : 0));  // texels of a block, less 1
+    w.put(bytes);                                  // of plane 0
     w.put(std::uint32_t{0});
     w.put((bytes * 8 - 1) << 16 | std::uint32_t(real ? 0xC0 : 0) << 24);  // bits, red, signed float
     w.put(std::uint32_t{0});
@@ -103,7 +105,8 @@ void write_raw(const std::filesystem::path& path, const EncodedVolume& volume) {
     write_pieces_atomically(path, [&](const AppendPiece& append) { append_levels(volume, append); });
 }
 
-EncodedVolume read_raw(const std::filesystem::path& path, VoxelType type, int nx, int ny, int nz, int levels) {
+EncodedVolume read_raw(const std::filesystem::path& path, VoxelType type, int nx, int ny, int nz,
+                       int levels) {
     return with_whole_file(path, [&](ByteReader& reader) {
         EncodedVolume volume{type, {}};
         take_levels(volume, reader, nx, ny, nz, std::uint32_t(levels));
@@ -115,7 +118,8 @@ void write_dds(const std::filesystem::path& path, const EncodedVolume& volume, b
     const VolumeLevel& top = volume.levels.front();
     const bool block = volume.type == VoxelType::bc4;
     if (legacy && !block && volume.type != VoxelType::r8)
-        throw Error(ErrorCode::usage, "a DDS file with the old header holds r8 or bc4, not " + std::string(type_name(volume.type)));
+        throw Error(ErrorCode::usage, "a DDS file with the old header holds r8 or bc4, not " +
+                                          std::string(type_name(volume.type)));
     const auto levels = std::uint32_t(volume.levels.size());
     ByteWriter w;
     w.put(kDdsMagic);
@@ -124,7 +128,8 @@ void write_dds(const std::filesystem::path& path, const EncodedVolume& volume, b
     w.put(std::uint32_t{0x801007} | (block ? 0x80000u : 0x8u) | (levels > 1 ? 0x20000u : 0u));
     w.put(std::uint32_t(top.ny));
     w.put(std::uint32_t(top.nx));
-    w.put(std::uint32_t(block ? encoded_bytes(top.nx, top.ny, 1, volume.type) : encoded_bytes(top.nx, 1, 1, volume.type)));
+    w.put(std::uint32_t(block ? encoded_bytes(top.nx, top.ny, 1, volume.type)
+                              : encoded_bytes(top.nx, 1, 1, volume.type)));
     w.put(std::uint32_t(top.nz));
     w.put(levels);
     for (int n = 0; n < 11; ++n) w.put(std::uint32_t{0});
@@ -136,7 +141,7 @@ void write_dds(const std::filesystem::path& path, const EncodedVolume& volume, b
     w.put(std::uint32_t(luminance ? 0xFF : 0));
     for (int n = 0; n < 3; ++n) w.put(std::uint32_t{0});
     w.put(std::uint32_t{0x1000 | 0x400008} & ~(levels > 1 ? 0u : 0x400000u));  // texture, complex; mip maps
-    w.put(std::uint32_t{0x200000});                                           // volume
+    w.put(std::uint32_t{0x200000});                                            // volume
     for (int n = 0; n < 3; ++n) w.put(std::uint32_t{0});
     if (!legacy) {
         w.put(kDxgi[std::size_t(volume.type)]);
@@ -159,7 +164,8 @@ EncodedVolume read_dds(const std::filesystem::path& path) {
             const auto dxgi = reader.get<std::uint32_t>();
             reader.skip(kDx10Bytes - 4);
             const auto* found = std::find(std::begin(kDxgi), std::end(kDxgi), dxgi);
-            if (found == std::end(kDxgi)) throw Error(ErrorCode::io, "its format " + std::to_string(dxgi) + " is not supported");
+            if (found == std::end(kDxgi))
+                throw Error(ErrorCode::io, "its format " + std::to_string(dxgi) + " is not supported");
             volume.type = VoxelType(found - std::begin(kDxgi));
         } else if (head[21] == kAti1) {
             volume.type = VoxelType::bc4;
@@ -173,10 +179,14 @@ EncodedVolume read_dds(const std::filesystem::path& path) {
     });
 }
 
-void write_ktx2(const std::filesystem::path& path, const EncodedVolume& volume, const std::string& description) {
+void write_ktx2(const std::filesystem::path& path, const EncodedVolume& volume,
+                const std::string& description) {
     const VolumeLevel& top = volume.levels.front();
     const bool block = volume.type == VoxelType::bc4;
-    const std::uint32_t unit = block ? 8 : volume.type == VoxelType::r8 ? 1 : volume.type == VoxelType::r32f ? 4 : 2;
+    const std::uint32_t unit = block                            ? 8
+                               : volume.type == VoxelType::r8   ? 1
+                               : volume.type == VoxelType::r32f ? 4
+                                                                : 2;
     const std::vector<std::byte> format = data_format(volume.type);
     ByteWriter pairs;
     put_pair(pairs, "KTXorientation", "ruo");  // x right, y up, z out
@@ -195,8 +205,9 @@ void write_ktx2(const std::filesystem::path& path, const EncodedVolume& volume, 
     }
     ByteWriter w;
     w.put_bytes(std::as_bytes(std::span(kKtxMagic)));
-    for (const std::uint32_t value : {kVulkan[std::size_t(volume.type)], block ? 1u : unit, std::uint32_t(top.nx),
-                                      std::uint32_t(top.ny), std::uint32_t(top.nz), 0u, 1u, levels, 0u})
+    for (const std::uint32_t value :
+         {kVulkan[std::size_t(volume.type)], block ? 1u : unit, std::uint32_t(top.nx), std::uint32_t(top.ny),
+          std::uint32_t(top.nz), 0u, 1u, levels, 0u})
         w.put(value);
     w.put(std::uint32_t(begin));
     w.put(std::uint32_t(format.size()));
@@ -230,17 +241,21 @@ EncodedVolume read_ktx2(const std::filesystem::path& path) {
         if (all.size() < 80) throw Error(ErrorCode::io, "it is no KTX 2 file");
         reader.get_bytes(std::as_writable_bytes(std::span(magic)));
         reader.get_bytes(std::as_writable_bytes(std::span(head)));
-        if (!std::equal(std::begin(magic), std::end(magic), std::begin(kKtxMagic))) throw Error(ErrorCode::io, "it is no KTX 2 file");
+        if (!std::equal(std::begin(magic), std::end(magic), std::begin(kKtxMagic)))
+            throw Error(ErrorCode::io, "it is no KTX 2 file");
         reader.skip(32);
         const auto* found = std::find(std::begin(kVulkan), std::end(kVulkan), head[0]);
-        if (found == std::end(kVulkan) || head[8] != 0) throw Error(ErrorCode::io, "its format is not supported");
+        if (found == std::end(kVulkan) || head[8] != 0)
+            throw Error(ErrorCode::io, "its format is not supported");
         EncodedVolume volume{VoxelType(found - std::begin(kVulkan)), {}};
         check_size(head[2], head[3], head[4], head[7]);
         for (std::uint32_t n = 0; n < head[7]; ++n) {
             const auto offset = reader.get<std::uint64_t>(), bytes = reader.get<std::uint64_t>();
             reader.skip(std::min<std::size_t>(8, reader.rest().size()));
-            VolumeLevel level{level_size(int(head[2]), n), level_size(int(head[3]), n), level_size(int(head[4]), n), {}};
-            if (bytes != encoded_bytes(level.nx, level.ny, level.nz, volume.type) || offset > all.size() || bytes > all.size() - offset)
+            VolumeLevel level{
+                level_size(int(head[2]), n), level_size(int(head[3]), n), level_size(int(head[4]), n), {}};
+            if (bytes != encoded_bytes(level.nx, level.ny, level.nz, volume.type) || offset > all.size() ||
+                bytes > all.size() - offset)
                 throw Error(ErrorCode::io, "it ends inside of level " + std::to_string(n));
             const auto part = all.subspan(std::size_t(offset), std::size_t(bytes));
             level.bytes.assign(part.begin(), part.end());

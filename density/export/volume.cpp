@@ -107,17 +107,20 @@ Volume halved(const Volume& volume) {
     next.values.resize(next.voxels());
     const std::size_t row = std::size_t(volume.nx), slice = row * std::size_t(volume.ny);
     // Along an axis of one voxel both neighbours are that voxel.
-    const std::size_t dx = volume.nx > 1 ? 1 : 0, dy = volume.ny > 1 ? row : 0, dz = volume.nz > 1 ? slice : 0;
+    const std::size_t dx = volume.nx > 1 ? 1 : 0, dy = volume.ny > 1 ? row : 0,
+                      dz = volume.nz > 1 ? slice : 0;
     const std::size_t step = volume.nx > 1 ? 2 : 1;
     tbb::parallel_for(0, next.nz, [&](int k) {
         for (int j = 0; j < next.ny; ++j) {
             const float* a = volume.values.data() + std::size_t(volume.nz > 1 ? 2 * k : k) * slice +
                              std::size_t(volume.ny > 1 ? 2 * j : j) * row;
             const float *b = a + dy, *c = a + dz, *d = c + dy;
-            float* to = next.values.data() + (std::size_t(k) * std::size_t(next.ny) + std::size_t(j)) * std::size_t(next.nx);
+            float* to = next.values.data() +
+                        (std::size_t(k) * std::size_t(next.ny) + std::size_t(j)) * std::size_t(next.nx);
             for (std::size_t i = 0; i < std::size_t(next.nx); ++i) {
                 const std::size_t n = i * step;
-                to[i] = 0.125f * (((a[n] + a[n + dx]) + (b[n] + b[n + dx])) + ((c[n] + c[n + dx]) + (d[n] + d[n + dx])));
+                to[i] = 0.125f * (((a[n] + a[n + dx]) + (b[n] + b[n + dx])) +
+                                  ((c[n] + c[n + dx]) + (d[n] + d[n + dx])));
             }
         }
     });
@@ -126,7 +129,8 @@ Volume halved(const Volume& volume) {
 
 int level_count(const std::array<int, 3>& size, int smallest) {
     int levels = 1;
-    for (int longest = std::max({size[0], size[1], size[2]}); longest > smallest; longest = (longest + 1) / 2) ++levels;
+    for (int longest = std::max({size[0], size[1], size[2]}); longest > smallest; longest = (longest + 1) / 2)
+        ++levels;
     return levels;
 }
 

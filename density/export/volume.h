@@ -55,8 +55,9 @@ struct VolumeBox {
     std::array<int, 3> padding{};  // voxels of 0 at the upper ends
     int border = 0;                // voxels on each side
     std::array<double, 3> voxel_m{};
-    std::array<double, 3> min_m{}, max_m{};  // corners of the box, border and padding included; world coordinates
-    std::array<int, 3> axis{0, 1, 2};        // the world's axis (0 east) behind each of the file's
+    std::array<double, 3> min_m{},
+        max_m{};                       // corners of the box, border and padding included; world coordinates
+    std::array<int, 3> axis{0, 1, 2};  // the world's axis (0 east) behind each of the file's
 };
 
 VolumeBox box_of(Extent extent, const Placement& placement, const VolumeLayout& layout);

@@ -107,8 +107,8 @@ void decode_bc4(const std::byte* bytes, Volume& v, float scale) {
                 for (int n = 0; n < 16; ++n) {
                     const int x = 4 * i + (n & 3), y = 4 * j + (n >> 2);
                     if (x >= v.nx || y >= v.ny) continue;
-                    v.values[(std::size_t(k) * std::size_t(v.ny) + std::size_t(y)) * std::size_t(v.nx) + std::size_t(x)] =
-                        palette[bits >> (16 + 3 * n) & 7] / 255 * scale;
+                    v.values[(std::size_t(k) * std::size_t(v.ny) + std::size_t(y)) * std::size_t(v.nx) +
+                             std::size_t(x)] = palette[bits >> (16 + 3 * n) & 7] / 255 * scale;
                 }
             }
         }
@@ -144,7 +144,8 @@ std::vector<std::byte> encode(const Volume& volume, VoxelType type, float scale)
             });
             break;
         case VoxelType::r16f:
-            convert_all<std::uint16_t>(volume.values, out, [inverse](float value) { return half_bits(value * inverse); });
+            convert_all<std::uint16_t>(volume.values, out,
+                                       [inverse](float value) { return half_bits(value * inverse); });
             break;
         case VoxelType::r32f:
             convert_all<float>(volume.values, out, [inverse](float value) { return value * inverse; });
@@ -156,8 +157,10 @@ std::vector<std::byte> encode(const Volume& volume, VoxelType type, float scale)
     return out;
 }
 
-Volume decode(const std::byte* bytes, std::size_t count, int nx, int ny, int nz, VoxelType type, float scale) {
-    if (count != encoded_bytes(nx, ny, nz, type)) throw Error(ErrorCode::io, "its voxels are not of the size that it states");
+Volume decode(const std::byte* bytes, std::size_t count, int nx, int ny, int nz, VoxelType type,
+              float scale) {
+    if (count != encoded_bytes(nx, ny, nz, type))
+        throw Error(ErrorCode::io, "its voxels are not of the size that it states");
     Volume volume{nx, ny, nz, std::vector<float>(std::size_t(nx) * std::size_t(ny) * std::size_t(nz))};
     std::vector<float>& values = volume.values;
     if (type == VoxelType::bc4) {
@@ -166,7 +169,8 @@ Volume decode(const std::byte* bytes, std::size_t count, int nx, int ny, int nz,
         std::memcpy(values.data(), bytes, count);
         for (float& value : values) value *= scale;
     } else if (type == VoxelType::r8) {
-        for (std::size_t n = 0; n < values.size(); ++n) values[n] = float(std::to_integer<int>(bytes[n])) / 255 * scale;
+        for (std::size_t n = 0; n < values.size(); ++n)
+            values[n] = float(std::to_integer<int>(bytes[n])) / 255 * scale;
     } else {
         for (std::size_t n = 0; n < values.size(); ++n) {
             std::uint16_t code;

@@ -20,15 +20,15 @@ struct MetarCloud {
 };
 
 struct MetarWeather {
-    char intensity = 0;          // '-', '+' or 0: moderate
-    bool vicinity = false;       // VC: not at the aerodrome
-    std::string descriptor;      // "SH", "TS", "FZ", "BL", "DR", "MI", "BC", "PR" or ""
+    char intensity = 0;                  // '-', '+' or 0: moderate
+    bool vicinity = false;               // VC: not at the aerodrome
+    std::string descriptor;              // "SH", "TS", "FZ", "BL", "DR", "MI", "BC", "PR" or ""
     std::vector<std::string> phenomena;  // "RA", "SN", "FG" ...; may be empty beside TS and VCSH
 };
 
 struct MetarWind {
     bool known = false;
-    bool variable = false;     // VRB, or no direction
+    bool variable = false;  // VRB, or no direction
     int from_deg = 0;
     double speed_m_per_s = 0;
     std::optional<double> gust_m_per_s;

@@ -14,7 +14,8 @@ constexpr double kKnot = 1852.0 / 3600;
 constexpr double kStatuteMile_m = 1609.344;
 
 bool all_digits(std::string_view text) {
-    return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+    return !text.empty() &&
+           std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 bool all_slashes(std::string_view text) { return !text.empty() && text.find_first_not_of('/') == text.npos; }
 int number(std::string_view text) {
@@ -43,9 +44,14 @@ class Reader {
     }
 
     Metar read() {
-        if (words_.empty()) throw Error(ErrorCode::usage, "the report is empty: expected one such as EGLL 211350Z 24012KT 9999 FEW020 14/08 Q1017");
+        if (words_.empty())
+            throw Error(
+                ErrorCode::usage,
+                "the report is empty: expected one such as EGLL 211350Z 24012KT 9999 FEW020 14/08 Q1017");
         while (is("METAR") || is("SPECI") || is("COR")) take("kind of report", false);
-        if (done() || words_[at_].text.size() != 4 || !std::all_of(word().begin(), word().end(), [](char c) { return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }))
+        if (done() || words_[at_].text.size() != 4 || !std::all_of(word().begin(), word().end(), [](char c) {
+                return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+            }))
             fail("expected the four letters of an aerodrome, such as EGLL");
         metar_.station = word();
         take("aerodrome");
@@ -80,7 +86,8 @@ class Reader {
     [[noreturn]] void fail(const std::string& expected) const {
         const std::size_t column = done() ? metar_.text.size() : words_[at_].column;
         const std::size_t length = done() ? 1 : word().size();
-        throw Error(ErrorCode::usage, (done() ? std::string("the report ends early") : "`" + word() + "`") + ": " + expected + "\n  " + metar_.text + "\n  " +
+        throw Error(ErrorCode::usage, (done() ? std::string("the report ends early") : "`" + word() + "`") +
+                                          ": " + expected + "\n  " + metar_.text + "\n  " +
                                           std::string(column, ' ') + std::string(length, '^'));
     }
 
@@ -91,7 +98,8 @@ class Reader {
 
     Metar finished() {
         if (metar_.cavok && (!metar_.clouds.empty() || !metar_.weather.empty()))
-            throw Error(ErrorCode::usage, "CAVOK excludes clouds and weather, but the report has them:\n  " + metar_.text);
+            throw Error(ErrorCode::usage,
+                        "CAVOK excludes clouds and weather, but the report has them:\n  " + metar_.text);
         return std::move(metar_);
     }
 
@@ -99,8 +107,10 @@ class Reader {
         if (done()) fail("expected day and time, such as 211350Z");
         const std::string& w = word();
         const bool good = w.size() == 7 && all_digits(std::string_view(w).substr(0, 6)) && w[6] == 'Z';
-        const int day = good ? number(w.substr(0, 2)) : 0, hour = good ? number(w.substr(2, 2)) : 0, minute = good ? number(w.substr(4, 2)) : 0;
-        if (!good || day < 1 || day > 31 || hour > 23 || minute > 59) fail("expected day and time (UTC), such as 211350Z");
+        const int day = good ? number(w.substr(0, 2)) : 0, hour = good ? number(w.substr(2, 2)) : 0,
+                  minute = good ? number(w.substr(4, 2)) : 0;
+        if (!good || day < 1 || day > 31 || hour > 23 || minute > 59)
+            fail("expected day and time (UTC), such as 211350Z");
         metar_.day = day;
         metar_.hour = hour;
         metar_.minute = minute;
@@ -112,7 +122,9 @@ class Reader {
             metar_.automatic = metar_.automatic || is("AUTO");
             return take(is("AUTO") ? "automatic station" : "corrected", false);
         }
-        if (read_wind() || read_visibility() || read_sky() || read_temperature() || read_pressure() || read_other() || read_weather()) return;
+        if (read_wind() || read_visibility() || read_sky() || read_temperature() || read_pressure() ||
+            read_other() || read_weather())
+            return;
         if (!lenient_) fail("expected wind, visibility, weather, clouds, temperature or pressure");
         metar_.warnings.push_back("`" + word() + "` is no group that is known, and was left out");
         take("not understood", false);
@@ -122,9 +134,12 @@ class Reader {
     bool read_wind() {
         std::string w = word();
         std::size_t words = 1;
-        const auto gap = [&](std::size_t n) { return at_ + n < words_.size() ? words_[at_ + n].text : std::string(); };
+        const auto gap = [&](std::size_t n) {
+            return at_ + n < words_.size() ? words_[at_ + n].text : std::string();
+        };
         const bool head = w.size() == 5 && (all_digits(w) || w.starts_with("VRB"));
-        if (head && gap(1).size() >= 5 && gap(1).front() == 'G' && (gap(1).ends_with("KT") || gap(1).ends_with("MPS"))) {
+        if (head && gap(1).size() >= 5 && gap(1).front() == 'G' &&
+            (gap(1).ends_with("KT") || gap(1).ends_with("MPS"))) {
             w += gap(1);
             words = 2;
         } else if (w.size() == 7 && all_digits(w.substr(0, 3)) && w[3] == 'V' && all_digits(w.substr(4))) {
@@ -136,10 +151,14 @@ class Reader {
         double unit = kKnot;
         bool with_unit = true;
         std::string value = w;
-        if (w.ends_with("KT")) value.resize(w.size() - 2);
-        else if (w.ends_with("MPS")) unit = 1, value.resize(w.size() - 3);
-        else if (w.ends_with("KMH")) unit = 1 / 3.6, value.resize(w.size() - 3);
-        else with_unit = false;
+        if (w.ends_with("KT"))
+            value.resize(w.size() - 2);
+        else if (w.ends_with("MPS"))
+            unit = 1, value.resize(w.size() - 3);
+        else if (w.ends_with("KMH"))
+            unit = 1 / 3.6, value.resize(w.size() - 3);
+        else
+            with_unit = false;
         if (value.size() < 5) return false;
         const std::string direction = value.substr(0, 3);
         std::string speed = value.substr(3), gust;
@@ -162,7 +181,11 @@ class Reader {
         wind.from_deg = known_direction ? number(direction) % 360 : 0;
         wind.speed_m_per_s = wind.known ? number(speed) * unit : 0;
         if (all_digits(gust)) wind.gust_m_per_s = number(gust) * unit;
-        take(!wind.known ? "wind unknown" : wind.speed_m_per_s == 0 ? "calm" : "wind at 10 m" + std::string(wind.gust_m_per_s ? ", gusts are not simulated" : ""), wind.known, words);
+        take(!wind.known ? "wind unknown"
+             : wind.speed_m_per_s == 0
+                 ? "calm"
+                 : "wind at 10 m" + std::string(wind.gust_m_per_s ? ", gusts are not simulated" : ""),
+             wind.known, words);
         return true;
     }
 
@@ -180,7 +203,10 @@ class Reader {
         }
         if (w.size() >= 4 && all_digits(w.substr(0, 4))) {
             const std::string rest = w.substr(4);
-            if (rest.empty() || rest == "NDV") return set_visibility(number(w.substr(0, 4)), number(w.substr(0, 4)) == 9999 ? "visibility 10 km or more" : "visibility");
+            if (rest.empty() || rest == "NDV")
+                return set_visibility(number(w.substr(0, 4)), number(w.substr(0, 4)) == 9999
+                                                                  ? "visibility 10 km or more"
+                                                                  : "visibility");
             for (const char* direction : {"N", "NE", "E", "SE", "S", "SW", "W", "NW"}) {
                 if (rest != direction) continue;
                 take("least visibility in one direction", false);
@@ -199,7 +225,8 @@ class Reader {
         std::string miles = w;
         double whole = 0;
         std::size_t words = 1;
-        if (all_digits(w) && w.size() <= 2 && at_ + 1 < words_.size() && words_[at_ + 1].text.ends_with("SM")) {
+        if (all_digits(w) && w.size() <= 2 && at_ + 1 < words_.size() &&
+            words_[at_ + 1].text.ends_with("SM")) {
             whole = number(w);
             miles = words_[at_ + 1].text;
             words = 2;
@@ -217,23 +244,32 @@ class Reader {
             if (!all_digits(over) || !all_digits(under) || number(under) == 0) return false;
             value = double(number(over)) / number(under);
         }
-        return set_visibility(std::min(9999, int(std::lround((whole + value) * kStatuteMile_m))), "visibility", words);
+        return set_visibility(std::min(9999, int(std::lround((whole + value) * kStatuteMile_m))),
+                              "visibility", words);
     }
 
     bool read_sky() {
         const std::string& w = word();
-        for (const auto& [text, meaning] : {std::pair{"NSC", "no significant cloud"}, {"NCD", "no cloud detected"}, {"CLR", "no cloud seen by the instrument"}, {"SKC", "sky clear"}}) {
+        for (const auto& [text, meaning] : {std::pair{"NSC", "no significant cloud"},
+                                            {"NCD", "no cloud detected"},
+                                            {"CLR", "no cloud seen by the instrument"},
+                                            {"SKC", "sky clear"}}) {
             if (w != text) continue;
             take(meaning);
             return true;
         }
-        constexpr std::pair<std::string_view, CloudAmount> kAmounts[] = {{"FEW", CloudAmount::few}, {"SCT", CloudAmount::scattered}, {"BKN", CloudAmount::broken},
-                                                                         {"OVC", CloudAmount::overcast}, {"///", CloudAmount::unknown}};
+        constexpr std::pair<std::string_view, CloudAmount> kAmounts[] = {{"FEW", CloudAmount::few},
+                                                                         {"SCT", CloudAmount::scattered},
+                                                                         {"BKN", CloudAmount::broken},
+                                                                         {"OVC", CloudAmount::overcast},
+                                                                         {"///", CloudAmount::unknown}};
         if (w.size() == 5 && w.starts_with("VV") && (all_digits(w.substr(2)) || all_slashes(w.substr(2)))) {
             MetarCloud cloud{CloudAmount::obscured, {}, {}};
             if (all_digits(w.substr(2))) cloud.height_ft = 100 * number(w.substr(2));
             metar_.clouds.push_back(cloud);
-            take(cloud.height_ft ? "sky obscured, vertical visibility " + std::to_string(*cloud.height_ft) + " ft" : "sky obscured");
+            take(cloud.height_ft
+                     ? "sky obscured, vertical visibility " + std::to_string(*cloud.height_ft) + " ft"
+                     : "sky obscured");
             return true;
         }
         for (const auto& [text, amount] : kAmounts) {
@@ -243,13 +279,16 @@ class Reader {
             // "FEW025CB///": slashes behind a type say nothing; "FEW025 CB" has a gap.
             while (!type.empty() && type.back() == '/') type.pop_back();
             std::size_t words = 1;
-            if (type.empty() && w.size() == 6 && at_ + 1 < words_.size() && (words_[at_ + 1].text == "CB" || words_[at_ + 1].text == "TCU")) {
+            if (type.empty() && w.size() == 6 && at_ + 1 < words_.size() &&
+                (words_[at_ + 1].text == "CB" || words_[at_ + 1].text == "TCU")) {
                 type = words_[at_ + 1].text;
                 words = 2;
             }
-            const bool readable = (all_digits(height) || all_slashes(height)) && (type.empty() || type == "CB" || type == "TCU");
+            const bool readable = (all_digits(height) || all_slashes(height)) &&
+                                  (type.empty() || type == "CB" || type == "TCU");
             if (!readable && lenient_) return false;
-            if (!readable) fail("expected an amount, hundreds of feet and perhaps CB or TCU, such as BKN025CB");
+            if (!readable)
+                fail("expected an amount, hundreds of feet and perhaps CB or TCU, such as BKN025CB");
             MetarCloud cloud{amount, {}, type};
             if (all_digits(height)) cloud.height_ft = 100 * number(height);
             const bool known = amount != CloudAmount::unknown && cloud.height_ft;
@@ -258,7 +297,10 @@ class Reader {
                 return true;
             }
             metar_.clouds.push_back(cloud);
-            take(known ? "cloud base at " + std::to_string(*cloud.height_ft) + " ft" + (type.empty() ? "" : ", " + type) : "cloud of unknown amount or height", cloud.height_ft.has_value(), words);
+            take(known ? "cloud base at " + std::to_string(*cloud.height_ft) + " ft" +
+                             (type.empty() ? "" : ", " + type)
+                       : "cloud of unknown amount or height",
+                 cloud.height_ft.has_value(), words);
             return true;
         }
         return false;
@@ -279,7 +321,9 @@ class Reader {
             return true;
         };
         std::optional<int> temperature, dew;
-        if (!part(std::string_view(w).substr(0, slash), temperature) || !part(std::string_view(w).substr(slash + 1), dew)) return false;
+        if (!part(std::string_view(w).substr(0, slash), temperature) ||
+            !part(std::string_view(w).substr(slash + 1), dew))
+            return false;
         if (!temperature && !dew && w != "/////" && w != "//" && w != "///") return false;
         if (w == "//" || w == "///") {
             take("not observed", false);
@@ -310,7 +354,10 @@ class Reader {
         const std::string& w = word();
         if (w == "WS") {
             std::size_t words = 1;
-            while (at_ + words < words_.size() && words < 4 && (words_[at_ + words].text == "ALL" || words_[at_ + words].text == "RWY" || words_[at_ + words].text.starts_with("R"))) ++words;
+            while (at_ + words < words_.size() && words < 4 &&
+                   (words_[at_ + words].text == "ALL" || words_[at_ + words].text == "RWY" ||
+                    words_[at_ + words].text.starts_with("R")))
+                ++words;
             take("wind shear", false, words);
             return true;
         }
@@ -345,10 +392,14 @@ class Reader {
             weather.vicinity = true;
             w.remove_prefix(2);
         }
-        const auto among = [](std::string_view two, const auto& list) { return std::find(list.begin(), list.end(), two) != list.end(); };
-        static constexpr std::array<std::string_view, 8> kDescriptors{"SH", "TS", "FZ", "BL", "DR", "MI", "BC", "PR"};
-        static constexpr std::array<std::string_view, 22> kPhenomena{"RA", "DZ", "SN", "SG", "PL", "GR", "GS", "UP", "IC", "FG", "BR",
-                                                                     "HZ", "FU", "VA", "DU", "SA", "PO", "SQ", "FC", "SS", "DS", "PY"};
+        const auto among = [](std::string_view two, const auto& list) {
+            return std::find(list.begin(), list.end(), two) != list.end();
+        };
+        static constexpr std::array<std::string_view, 8> kDescriptors{"SH", "TS", "FZ", "BL",
+                                                                      "DR", "MI", "BC", "PR"};
+        static constexpr std::array<std::string_view, 22> kPhenomena{
+            "RA", "DZ", "SN", "SG", "PL", "GR", "GS", "UP", "IC", "FG", "BR",
+            "HZ", "FU", "VA", "DU", "SA", "PO", "SQ", "FC", "SS", "DS", "PY"};
         if (w.size() >= 2 && among(w.substr(0, 2), kDescriptors)) {
             weather.descriptor = w.substr(0, 2);
             w.remove_prefix(2);
@@ -395,7 +446,9 @@ std::string metar_text(const Metar& m) {
     if (m.wind.known) {
         const int knots = int(std::lround(m.wind.speed_m_per_s / kKnot));
         const int from = (m.wind.from_deg + 5) / 10 * 10;
-        const std::string direction = knots == 0 ? "000" : m.wind.variable ? "VRB" : digits(from == 0 ? 360 : from, 3);
+        const std::string direction = knots == 0        ? "000"
+                                      : m.wind.variable ? "VRB"
+                                                        : digits(from == 0 ? 360 : from, 3);
         text += " " + direction + digits(knots, 2);
         if (m.wind.gust_m_per_s) text += "G" + digits(int(std::lround(*m.wind.gust_m_per_s / kKnot)), 2);
         text += "KT";
@@ -412,7 +465,8 @@ std::string metar_text(const Metar& m) {
         for (const std::string& phenomenon : w.phenomena) text += phenomenon;
     }
     for (const MetarCloud& c : m.clouds) {
-        text += " " + std::string(amount_text(c.amount)) + (c.height_ft ? digits(*c.height_ft / 100, 3) : "///") + c.type;
+        text += " " + std::string(amount_text(c.amount)) +
+                (c.height_ft ? digits(*c.height_ft / 100, 3) : "///") + c.type;
     }
     if (m.clouds.empty()) text += " NSC";
     if (m.temperature_c && m.dew_point_c) {

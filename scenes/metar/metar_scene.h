@@ -26,12 +26,12 @@ struct MetarSceneOptions {
 
 // A layer of clouds that a group becomes.
 struct MetarLayer {
-    std::string name;   // "Sc1": genus and number, from below
-    std::string genus;  // WMO abbreviation
+    std::string name;              // "Sc1": genus and number, from below
+    std::string genus;             // WMO abbreviation
     double base_m = 0, top_m = 0;  // above the aerodrome, which is z = 0
-    double cover = 0;     // of optical depth above 1, to be met; 1: no gap
-    bool sheet = false;   // without gaps: nothing to fit
-    std::string group;    // of the report
+    double cover = 0;              // of optical depth above 1, to be met; 1: no gap
+    bool sheet = false;            // without gaps: nothing to fit
+    std::string group;             // of the report
 };
 
 // Returns the layers of a report from below. Groups of unknown amount or height are left out.
@@ -42,7 +42,8 @@ double cover_of(CloudAmount amount);
 
 // Returns the scene as TOML with comments; `coverage` has the key of that name for each of layers_of(). Throws
 // Error(usage) when the date is none, or has no such day.
-std::string metar_scene_text(const Metar& metar, const MetarSceneOptions& options, const std::vector<double>& coverage);
+std::string metar_scene_text(const Metar& metar, const MetarSceneOptions& options,
+                             const std::vector<double>& coverage);
 
 // Returns what the report says that the scene leaves out, a sentence each.
 std::vector<std::string> metar_notes(const Metar& metar, const MetarSceneOptions& options);

@@ -32,20 +32,26 @@ std::string_view name_of(ExportFormat format) {
 }
 
 void check_options(const ExportOptions& o) {
-    if (o.formats.empty() && o.weather.empty()) throw Error(ErrorCode::usage, "neither --to nor --for says which files to write");
-    if (o.voxel_m && (o.largest_side || o.budget_bytes)) throw Error(ErrorCode::usage, "--voxel excludes --size and --budget");
-    if (o.largest_side && o.budget_bytes) throw Error(ErrorCode::usage, "--size and --budget exclude each other");
+    if (o.formats.empty() && o.weather.empty())
+        throw Error(ErrorCode::usage, "neither --to nor --for says which files to write");
+    if (o.voxel_m && (o.largest_side || o.budget_bytes))
+        throw Error(ErrorCode::usage, "--voxel excludes --size and --budget");
+    if (o.largest_side && o.budget_bytes)
+        throw Error(ErrorCode::usage, "--size and --budget exclude each other");
     for (const ExportFormat format : all_formats(o)) {
         const VoxelType type = type_of(o, format);
         const bool whole = type == VoxelType::r8 || type == VoxelType::r16;
         if (format == ExportFormat::vti && (type == VoxelType::bc4 || type == VoxelType::r16f))
-            throw Error(ErrorCode::usage, "--type " + std::string(type_name(type)) + ": VTK has r8, r16 and r32f");
+            throw Error(ErrorCode::usage,
+                        "--type " + std::string(type_name(type)) + ": VTK has r8, r16 and r32f");
         if (format == ExportFormat::slices && !whole)
-            throw Error(ErrorCode::usage, "--type " + std::string(type_name(type)) + ": slices are r8 or r16");
+            throw Error(ErrorCode::usage,
+                        "--type " + std::string(type_name(type)) + ": slices are r8 or r16");
         if (format == ExportFormat::dds && o.legacy_dds && type != VoxelType::r8 && type != VoxelType::bc4)
             throw Error(ErrorCode::usage, "--legacy-dds: the old header has r8 and bc4");
         if (format == ExportFormat::vti && o.layout.axes != AxisOrder::enu)
-            throw Error(ErrorCode::usage, "--axes: VTK's space is right-handed and named x y z: leave it at enu for vti");
+            throw Error(ErrorCode::usage,
+                        "--axes: VTK's space is right-handed and named x y z: leave it at enu for vti");
     }
 }
 
@@ -68,8 +74,9 @@ PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
         }
         const bool one = format == ExportFormat::vti || format == ExportFormat::slices;
         for (int n = 0; n < (one ? 1 : s.levels); ++n)
-            plan.bytes_a_frame += encoded_bytes(std::max(1, plan.box.size[0] >> n), std::max(1, plan.box.size[1] >> n),
-                                                std::max(1, plan.box.size[2] >> n), type_of(options, format));
+            plan.bytes_a_frame +=
+                encoded_bytes(std::max(1, plan.box.size[0] >> n), std::max(1, plan.box.size[1] >> n),
+                              std::max(1, plan.box.size[2] >> n), type_of(options, format));
     }
     return plan;
 }
@@ -87,12 +94,14 @@ ExportReport report_of(const ExportOptions& options, const std::vector<ExportSeq
 // The disk that holds the folder, or will.
 void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
     std::filesystem::path at = std::filesystem::absolute(folder);
-    while (!std::filesystem::exists(at) && at.has_parent_path() && at != at.parent_path()) at = at.parent_path();
+    while (!std::filesystem::exists(at) && at.has_parent_path() && at != at.parent_path())
+        at = at.parent_path();
     std::error_code error;
     const auto space = std::filesystem::space(at, error);
     if (error || space.available >= bytes) return;
-    throw Error(ErrorCode::io, fmt::format("{}: the export takes {}, but only {} are free", folder.string(), bytes_text(std::size_t(bytes)),
-                                           bytes_text(std::size_t(space.available))));
+    throw Error(ErrorCode::io,
+                fmt::format("{}: the export takes {}, but only {} are free", folder.string(),
+                            bytes_text(std::size_t(bytes)), bytes_text(std::size_t(space.available))));
 }
 
 // Keeps grids that were read once, as long as they are small.
@@ -129,7 +138,8 @@ DensityGrid grid_of(const DensityGrid& density, int factor) {
     return DensityGrid::from_dense(volume.values, {volume.nx, volume.ny, volume.nz}, placement);
 }
 
-void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s, const LoadedDensity& loaded) {
+void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
+                    const LoadedDensity& loaded) {
     DensityGrid density = grid_of(loaded.density, s.layout.factor);
     VdbContent content;
     VdbMetadata metadata = loaded.metadata.value_or(VdbMetadata{});
@@ -141,7 +151,8 @@ void write_vdb_file(const std::filesystem::path& path, const ExportOptions& opti
         const Wind wind{{{0, metadata.wind}}};
         const Placement& at = loaded.density.placement();
         for (int k = 0; k < density.extent().z; ++k)
-            content.wind.push_back(wind_at(wind, at.origin_m.z + (k + 0.5) * density.placement().cell_size_m, 0));
+            content.wind.push_back(
+                wind_at(wind, at.origin_m.z + (k + 0.5) * density.placement().cell_size_m, 0));
         content.wind_name = options.velocity_name;
     }
     write_vdb(path, content, metadata);
@@ -154,7 +165,8 @@ class FrameExporter {
 
     FrameFigures write(const ExportSequence& s, const SourceFrame& frame, const LoadedDensity& loaded) {
         if (!(loaded.density.extent() == s.extent) || !(loaded.density.placement() == s.placement))
-            throw Error(ErrorCode::io, frame.file.string() + ": has another box than the first file of its sequence");
+            throw Error(ErrorCode::io,
+                        frame.file.string() + ": has another box than the first file of its sequence");
         std::map<VoxelType, EncodedVolume> encoded;
         std::optional<Volume> volume;
         for (const ExportFormat format : all_formats(options_)) {
@@ -165,7 +177,8 @@ class FrameExporter {
             if (format == ExportFormat::vdb) {
                 write_vdb_file(path, options_, s, loaded);
             } else if (format == ExportFormat::nvdb) {
-                write_nanovdb(path, grid_of(loaded.density, s.layout.factor), options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
+                write_nanovdb(path, grid_of(loaded.density, s.layout.factor),
+                              options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
             } else {
                 const VoxelType type = type_of(options_, format);
                 auto found = encoded.find(type);
@@ -192,7 +205,8 @@ class FrameExporter {
         return encoded;
     }
 
-    void write_dense(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s, const SourceFrame& frame, const EncodedVolume& encoded) const {
+    void write_dense(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
+                     const SourceFrame& frame, const EncodedVolume& encoded) const {
         const VolumeBox box = box_of(s.extent, s.placement, s.layout);
         switch (format) {
             case ExportFormat::raw:
@@ -222,7 +236,8 @@ void write_weather(const ExportOptions& options, ExportList& list) {
     const RunListing run = read_run(options.source);
     std::vector<WeatherSummary> frames;
     for (const ListedFrame& frame : run.frames) {
-        const bool wanted = frame.number >= options.first_frame && frame.number <= options.last_frame && (frame.number - options.first_frame) % options.frame_step == 0;
+        const bool wanted = frame.number >= options.first_frame && frame.number <= options.last_frame &&
+                            (frame.number - options.first_frame) % options.frame_step == 0;
         if (wanted) frames.push_back(summarise(run, frame));
     }
     const auto write = [&](WeatherFormat format, std::span<const std::byte> content) {
@@ -233,7 +248,9 @@ void write_weather(const ExportOptions& options, ExportList& list) {
             list.add(name, {}, {});
         }
     };
-    const auto write_text = [&](WeatherFormat format, const std::string& text) { write(format, std::as_bytes(std::span(text.data(), text.size()))); };
+    const auto write_text = [&](WeatherFormat format, const std::string& text) {
+        write(format, std::as_bytes(std::span(text.data(), text.size())));
+    };
     for (const WeatherFormat format : options.weather) {
         switch (format) {
             case WeatherFormat::layers:
@@ -272,13 +289,15 @@ void write_texts(const ExportOptions& options, const std::vector<ExportSequence>
         write(s.name + ".volume.json", sidecar_text(options, s, figures[n]));
         if (std::ranges::count(formats, ExportFormat::vti) == 0) continue;
         std::vector<PvdEntry> entries;
-        for (const SourceFrame& frame : s.frames) entries.push_back({frame.time_s, frame_name(s, frame.number, ExportFormat::vti)});
+        for (const SourceFrame& frame : s.frames)
+            entries.push_back({frame.time_s, frame_name(s, frame.number, ExportFormat::vti)});
         write(s.name + ".pvd", pvd_text(entries));
     }
     if (std::ranges::count(formats, ExportFormat::usd) > 0) {
         const std::string& name = sequences.front().name;
         const std::string& layer = sequences.front().layer;
-        write((layer.empty() ? name : name.substr(0, name.size() - layer.size() - 1)) + ".usda", usd_text(options, sequences));
+        write((layer.empty() ? name : name.substr(0, name.size() - layer.size() - 1)) + ".usda",
+              usd_text(options, sequences));
     }
     write("README.txt", readme_text(options, sequences));
 }
@@ -311,7 +330,8 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
         frames += s.frames.size();
         if (!options.range_auto) continue;
         float most = 0;
-        for (const SourceFrame& frame : s.frames) most = std::max(most, reader.read(frame.file, true).density.max_value());
+        for (const SourceFrame& frame : s.frames)
+            most = std::max(most, reader.read(frame.file, true).density.max_value());
         if (most > 0) s.scale = most;
     }
     ExportList list(options, sequences);
@@ -327,11 +347,14 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                     frame.time_s = loaded.metadata->time_s;
                     frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
                 }
-                for (const std::string& note : loaded.notes) notes.push_back(frame.file.string() + ": " + note);
+                for (const std::string& note : loaded.notes)
+                    notes.push_back(frame.file.string() + ": " + note);
                 figures[n].push_back(exporter.write(s, frame, loaded));
                 if (figures[n].back().max > s.scale && options.type != VoxelType::r32f)
-                    notes.push_back(fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 (--range auto keeps them)",
-                                                frame.file.string(), figures[n].back().max, s.scale));
+                    notes.push_back(
+                        fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
+                                    "(--range auto keeps them)",
+                                    frame.file.string(), figures[n].back().max, s.scale));
                 if (++done % kListEvery == 0) list.write(false);
                 if (progress && !progress(done, frames)) {
                     list.write(false);

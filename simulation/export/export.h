@@ -39,7 +39,7 @@ struct ExportOptions {
     std::string target;  // name of the preset, for the README; may be empty
     std::vector<ExportFormat> formats;
     std::vector<WeatherFormat> weather;  // of a run
-    std::optional<VoxelType> type;  // none: that of the format (format_type())
+    std::optional<VoxelType> type;       // none: that of the format (format_type())
     bool range_auto = false;  // divide by the largest value of the sequence, so that all codes are used
     std::optional<std::string> layer;  // a name, or "each"; none: all layers together
     int first_frame = 1, last_frame = 1 << 30, frame_step = 1;
@@ -47,7 +47,7 @@ struct ExportOptions {
     std::optional<double> voxel_m;  // edge of a voxel; a multiple of the grid's
     std::optional<int> largest_side;
     bool mips = false;
-    std::string velocity_name;  // of the wind in VDB files; empty: none
+    std::string velocity_name;      // of the wind in VDB files; empty: none
     bool half_voxel_shift = false;  // VDB and USD: moved by half a voxel along -x -y -z, for Blender
     bool zip = false;               // compress VTI and NanoVDB
     bool legacy_dds = false;
@@ -66,12 +66,12 @@ struct ExportedFile {
 
 // One sequence of an export: a layer, or all together.
 struct PlannedSequence {
-    std::string name;  // of its files
+    std::string name;   // of its files
     std::string layer;  // empty: all together
     VolumeBox box;
     int factor = 1, levels = 1;
     std::size_t frames = 0;
-    std::uint64_t bytes_a_frame = 0;  // of all formats whose size is known beforehand
+    std::uint64_t bytes_a_frame = 0;    // of all formats whose size is known beforehand
     std::uint64_t estimated_bytes = 0;  // of one frame of the others
 };
 
@@ -112,7 +112,8 @@ const std::vector<NamedWeather>& weather_formats();
 struct ExportPreset {
     std::string name, description;
     void (*apply)(ExportOptions& options);
-    std::string readme;  // the steps, with {NAME}, {FIRST}, {COUNT}, {VOXEL}, {EXTINCTION} and {SHIFT} to fill in
+    std::string
+        readme;  // the steps, with {NAME}, {FIRST}, {COUNT}, {VOXEL}, {EXTINCTION} and {SHIFT} to fill in
 };
 const std::vector<ExportPreset>& export_presets();
 

@@ -19,12 +19,9 @@ using Json = nlohmann::ordered_json;
 constexpr int kFormatVersion = 1;
 
 Json layout_json(const VolumeLayout& layout) {
-    return {{"factor", layout.factor},
-            {"axes", int(layout.axes)},
-            {"border", int(layout.border)},
-            {"periodic", layout.periodic},
-            {"multiple", layout.multiple},
-            {"power_of_two", layout.power_of_two}};
+    return {{"factor", layout.factor},      {"axes", int(layout.axes)},
+            {"border", int(layout.border)}, {"periodic", layout.periodic},
+            {"multiple", layout.multiple},  {"power_of_two", layout.power_of_two}};
 }
 
 VolumeLayout layout_of(const Json& json) {
@@ -43,8 +40,12 @@ VolumeLayout layout_of(const Json& json) {
 Json head_json(const ExportOptions& o, const std::vector<ExportSequence>& sequences) {
     Json list = Json::array();
     for (const ExportSequence& s : sequences) {
-        list.push_back({{"name", s.name}, {"layer", s.layer}, {"levels", s.levels}, {"scale", s.scale},
-                        {"layout", layout_json(s.layout)}, {"scene_hash", s.metadata.scene_hash}});
+        list.push_back({{"name", s.name},
+                        {"layer", s.layer},
+                        {"levels", s.levels},
+                        {"scale", s.scale},
+                        {"layout", layout_json(s.layout)},
+                        {"scene_hash", s.metadata.scene_hash}});
     }
     Json types = Json::object();
     for (const ExportFormat format : all_formats(o)) {
@@ -55,8 +56,14 @@ Json head_json(const ExportOptions& o, const std::vector<ExportSequence>& sequen
             {"format_version", kFormatVersion},
             {"nephos_version", version()},
             {"target", o.target},
-            {"options", {{"types", types}, {"zip", o.zip}, {"legacy_dds", o.legacy_dds}, {"quantise", int(o.quantise)},
-                         {"half_voxel_shift", o.half_voxel_shift}, {"velocity", o.velocity_name}, {"grid", o.grid}}},
+            {"options",
+             {{"types", types},
+              {"zip", o.zip},
+              {"legacy_dds", o.legacy_dds},
+              {"quantise", int(o.quantise)},
+              {"half_voxel_shift", o.half_voxel_shift},
+              {"velocity", o.velocity_name},
+              {"grid", o.grid}}},
             {"sequences", list}};
 }
 
@@ -66,7 +73,8 @@ ExportedFile file_of(const Json& json) {
     file.digest = {json.at("bytes").get<std::uint64_t>(), json.at("xxh3").get<std::string>()};
     file.source = json.value("source", std::string());
     file.format = json.value("format", std::string());
-    const bool inside = file.path.is_relative() && file.path.lexically_normal() == file.path && *file.path.begin() != "..";
+    const bool inside =
+        file.path.is_relative() && file.path.lexically_normal() == file.path && *file.path.begin() != "..";
     if (!inside) throw Error(ErrorCode::io, "it lists a file outside of its folder");
     return file;
 }
@@ -88,14 +96,16 @@ bool is_export_folder(const std::filesystem::path& folder) {
     return std::filesystem::is_regular_file(folder / "export.json", error);
 }
 
-ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences) : folder_(options.folder) {
+ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences)
+    : folder_(options.folder) {
     head_ = head_json(options, sequences).dump(2, ' ', false, Json::error_handler_t::replace);
     std::error_code error;
     std::filesystem::create_directories(folder_, error);
     if (error) throw Error(ErrorCode::io, folder_.string() + ": cannot make the folder: " + error.message());
     if (!is_export_folder(folder_)) {
         if (!std::filesystem::is_empty(folder_, error) || error)
-            throw Error(ErrorCode::usage, folder_.string() + ": is not empty and holds no export: choose another folder");
+            throw Error(ErrorCode::usage,
+                        folder_.string() + ": is not empty and holds no export: choose another folder");
         return;
     }
     Json json = parsed_list(folder_ / "export.json");
@@ -103,7 +113,9 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     json.erase("files");
     json.erase("complete");
     if (json.dump(2, ' ', false, Json::error_handler_t::replace) != head_)
-        throw Error(ErrorCode::usage, folder_.string() + ": holds an export with other options or of another scene: choose another folder");
+        throw Error(ErrorCode::usage,
+                    folder_.string() +
+                        ": holds an export with other options or of another scene: choose another folder");
     try {
         for (const Json& one : files) {
             ExportedFile file = file_of(one);
@@ -137,12 +149,14 @@ void ExportList::write(bool complete) const {
     json["complete"] = complete;
     Json files = Json::array();
     for (const ExportedFile& file : files_) {
-        Json entry = {{"path", file.path.generic_string()}, {"bytes", file.digest.bytes}, {"xxh3", file.digest.xxh3}};
+        Json entry = {
+            {"path", file.path.generic_string()}, {"bytes", file.digest.bytes}, {"xxh3", file.digest.xxh3}};
         if (!file.source.empty()) entry.update(Json{{"format", file.format}, {"source", file.source}});
         files.push_back(std::move(entry));
     }
     json["files"] = std::move(files);
-    write_atomically(folder_ / "export.json", std::string_view(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"));
+    write_atomically(folder_ / "export.json",
+                     std::string_view(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"));
 }
 
 // After a failure, whose message is the one to show.
@@ -161,9 +175,11 @@ ListedExport read_export(const std::filesystem::path& folder) {
         list.complete = json.at("complete").get<bool>();
         for (const Json& file : json.at("files")) list.files.push_back(file_of(file));
         for (const Json& s : json.at("sequences"))
-            list.sequences.push_back({s.at("name").get<std::string>(), layout_of(s.at("layout")), s.at("levels").get<int>(), s.at("scale").get<float>()});
+            list.sequences.push_back({s.at("name").get<std::string>(), layout_of(s.at("layout")),
+                                      s.at("levels").get<int>(), s.at("scale").get<float>()});
         const Json& options = json.at("options");
-        for (const auto& [name, type] : options.at("types").items()) list.types[name] = VoxelType(type.get<int>());
+        for (const auto& [name, type] : options.at("types").items())
+            list.types[name] = VoxelType(type.get<int>());
         list.half_voxel_shift = options.at("half_voxel_shift").get<bool>();
         list.quantise = NanoQuantise(options.at("quantise").get<int>());
         list.grid = options.at("grid").get<std::string>();

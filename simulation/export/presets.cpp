@@ -59,7 +59,8 @@ void flightgear(ExportOptions& o) { o.weather.push_back(WeatherFormat::metar); }
 
 constexpr const char* kXplane =
     "X-Plane 12 (not tried in X-Plane; report what differs)\n\n"
-    "Read {NAME}.xplane.json in a plug-in: each frame has the fields of XPLMWeatherInfo_t (up to three cloud layers, heights\n"
+    "Read {NAME}.xplane.json in a plug-in: each frame has the fields of XPLMWeatherInfo_t (up to three cloud "
+    "layers, heights\n"
     "in metres MSL, winds with true bearings). Give them to XPLMSetWeatherAtLocation.\n";
 
 constexpr const char* kMsfs =
@@ -69,7 +70,8 @@ constexpr const char* kMsfs =
 
 constexpr const char* kCigi =
     "CIGI 3.3 (packets decoded by Wireshark's dissector)\n\n"
-    "{NAME}.pcap has a datagram a frame: IG Control, then a Weather Control for each of up to three layers, global scope,\n"
+    "{NAME}.pcap has a datagram a frame: IG Control, then a Weather Control for each of up to three layers, "
+    "global scope,\n"
     "big-endian. Play it with tcpreplay, or take the payloads as they are.\n";
 
 constexpr const char* kFlightgear =
@@ -78,32 +80,45 @@ constexpr const char* kFlightgear =
 
 constexpr const char* kBlender =
     "Blender (tried in 3.4)\n\n"
-    "1. Add > Volume > Import OpenVDB, and choose {FIRST} alone: Blender finds the {COUNT} frames of the sequence itself\n"
-    "   (Properties > Object Data > File: Sequence, Frames {COUNT}, Start {START}). Or drag the first file into the view.\n"
-    "2. Leave location, rotation and scale as they are: the file is in metres, z up, at its place in the world.\n"
-    "3. The view ends at 1,000 m: set View > Sidebar > View > End to 100000 m, and the camera's Clip End too.\n"
-    "4. Shading: a new material with Principled Volume; Density Attribute `density`, Density {EXTINCTION}, Colour white,\n"
+    "1. Add > Volume > Import OpenVDB, and choose all VDB files of this folder (key A): they become one "
+    "sequence of {COUNT}\n"
+    "   frames that starts at {START} (Properties > Object Data > File). {FIRST} alone is a still.\n"
+    "2. Leave location, rotation and scale as they are: the file is in metres, z up, at its place in the "
+    "world.\n"
+    "3. The view ends at 1,000 m: set View > Sidebar > View > End to 100000 m, and the camera's Clip End "
+    "too.\n"
+    "4. Shading: a new material with Principled Volume; Density Attribute `density`, Density {EXTINCTION}, "
+    "Colour white,\n"
     "   Anisotropy 0.6. Density is the extinction coefficient per metre where the voxels are 1.\n"
-    "5. Render properties > Volumes > Step Rate 1 (Cycles). Motion blur: Object Data > Velocity Grid `velocity`, Velocity\n"
+    "5. Render properties > Volumes > Step Rate 1 (Cycles). Motion blur: Object Data > Velocity Grid "
+    "`velocity`, Velocity\n"
     "   Scale {VELOCITY_SCALE}.\n\n"
-    "Half a voxel. Cycles of Blender 3.4 draws every VDB file half a voxel too far along +x, +y and +z. These files are\n"
-    "moved by {SHIFT} m on each axis to compensate. If your version draws them half a voxel too low and left, export\n"
+    "Half a voxel. Cycles of Blender 3.4 draws every VDB file half a voxel too far along +x, +y and +z. "
+    "These files are\n"
+    "moved by {SHIFT} m on each axis to compensate. If your version draws them half a voxel too low and "
+    "left, export\n"
     "with --to vdb instead of --for blender.\n";
 
 constexpr const char* kUnreal =
     "Unreal Engine 5.3 or newer, Sparse Volume Textures (not tried in Unreal; report what differs)\n\n"
-    "1. Content Browser > Import: choose {FIRST} alone; files of one folder with rising numbers are taken as one animated\n"
+    "1. Content Browser > Import: choose {FIRST} alone; files of one folder with rising numbers are taken as "
+    "one animated\n"
     "   texture. Attributes A: `density`, format Unorm8 or Float16.\n"
-    "2. Add a Heterogeneous Volume with a Volume-domain material that samples the texture; Extinction = density times\n"
-    "   {EXTINCTION} per metre. One unit of Unreal is a centimetre: multiply by 0.01 where the material counts in them.\n"
-    "3. The importer applies the file's transform; it is right-handed and Unreal left-handed, so check that east stays east\n"
+    "2. Add a Heterogeneous Volume with a Volume-domain material that samples the texture; Extinction = "
+    "density times\n"
+    "   {EXTINCTION} per metre. One unit of Unreal is a centimetre: multiply by 0.01 where the material "
+    "counts in them.\n"
+    "3. The importer applies the file's transform; it is right-handed and Unreal left-handed, so check that "
+    "east stays east\n"
     "   with the sidecar's min_m and max_m. Scale the actor by 100 (metres to centimetres).\n";
 
 constexpr const char* kUnity =
     "Unity, 3-D textures (not tried in Unity; report what differs)\n\n"
-    "1. Import {FIRST} as a Texture 2D with Texture Shape 3D, Columns {COLUMNS}, Rows {ROWS}; no mip maps, no sRGB, Wrap\n"
+    "1. Import {FIRST} as a Texture 2D with Texture Shape 3D, Columns {COLUMNS}, Rows {ROWS}; no mip maps, "
+    "no sRGB, Wrap\n"
     "   Mode Clamp, Format R 8. Slices are already in Unity's order: x east, y up, z north, left-handed.\n"
-    "2. Place a Local Volumetric Fog or your own ray marcher at min_m .. max_m of the sidecar; metres are units.\n"
+    "2. Place a Local Volumetric Fog or your own ray marcher at min_m .. max_m of the sidecar; metres are "
+    "units.\n"
     "3. Extinction per metre = texture * {SCALE} * {EXTINCTION}.\n"
     "The border of zeros lets clamped addresses read nothing.\n";
 
@@ -120,8 +135,10 @@ constexpr const char* kParaview =
 
 constexpr const char* kVulkan =
     "Vulkan, Direct3D and other engines that load KTX 2\n\n"
-    "Upload {FIRST} as a 3-D image with all levels (libktx, or the 100 lines of the specification). The key `nephos` of each\n"
-    "file is the sidecar's text. Address mode clamp to edge: the border is 0. Value = texel * {SCALE}; extinction per metre\n"
+    "Upload {FIRST} as a 3-D image with all levels (libktx, or the 100 lines of the specification). The key "
+    "`nephos` of each\n"
+    "file is the sidecar's text. Address mode clamp to edge: the border is 0. Value = texel * {SCALE}; "
+    "extinction per metre\n"
     "= value * {EXTINCTION}. World place: min_m .. max_m of the sidecar.\n";
 
 }  // namespace

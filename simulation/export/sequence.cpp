@@ -33,7 +33,8 @@ bool is_wanted(const ExportOptions& o, int number) {
     return number >= o.first_frame && number <= o.last_frame && (number - o.first_frame) % o.frame_step == 0;
 }
 
-std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> layer, const ExportSequence& s) {
+std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> layer,
+                               const ExportSequence& s) {
     std::vector<double> times;
     const Wind& wind = layer ? layer_wind(scene, *layer) : scene.automaton.wind;
     for (const WindKeyframe& keyframe : wind.keyframes) times.push_back(keyframe.time_s);
@@ -58,13 +59,15 @@ void read_first(const ExportOptions& options, ExportSequence& s) {
     if (s.of_nephos && s.metadata.frames_per_second > 0) s.frames_per_second = s.metadata.frames_per_second;
 }
 
-ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& run, const std::optional<std::string>& layer) {
+ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& run,
+                               const std::optional<std::string>& layer) {
     ExportSequence s;
     s.name = run.scene.name + (layer ? "_" + *layer : "");
     s.layer = layer.value_or("");
     for (const ListedFrame& frame : run.frames) {
         if (!is_wanted(options, frame.number)) continue;
-        s.frames.push_back({density_file(run, frame, layer), frame.number, frame.time_s, utc_at(run.scene.georeference, frame.time_s)});
+        s.frames.push_back({density_file(run, frame, layer), frame.number, frame.time_s,
+                            utc_at(run.scene.georeference, frame.time_s)});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, run.folder.string() + ": has no frame of this range");
     read_first(options, s);
@@ -79,8 +82,11 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
     s.name = split_name(files.front()).first;
     int next = 1;
     for (const std::filesystem::path& file : files) {
-        const int number = files.size() == 1 ? split_name(file).second.value_or(1) : split_name(file).second.value_or(next);
-        if (number < next && !s.frames.empty()) throw Error(ErrorCode::usage, file.string() + ": its number does not follow that of the file before");
+        const int number =
+            files.size() == 1 ? split_name(file).second.value_or(1) : split_name(file).second.value_or(next);
+        if (number < next && !s.frames.empty())
+            throw Error(ErrorCode::usage,
+                        file.string() + ": its number does not follow that of the file before");
         next = number + 1;
         if (is_wanted(options, number)) s.frames.push_back({file, number, 0, {}});
     }
@@ -101,8 +107,10 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
         const double ratio = *options.voxel_m / edge;
         if (ratio < 0.999 || std::abs(ratio - std::round(ratio)) > 1e-6 * ratio) {
             const double near = std::max(1.0, std::round(ratio)) * edge;
-            throw Error(ErrorCode::usage, fmt::format("--voxel {:g}: the grid's voxels are {:g} m, and only means of whole numbers of them keep the mass: "
-                                                      "expected a multiple such as {:g}", *options.voxel_m, edge, near));
+            throw Error(ErrorCode::usage, fmt::format("--voxel {:g}: the grid's voxels are {:g} m, and only "
+                                                      "means of whole numbers of them keep the mass: "
+                                                      "expected a multiple such as {:g}",
+                                                      *options.voxel_m, edge, near));
         }
         s.layout.factor = int(std::lround(ratio));
     } else if (options.largest_side) {
@@ -110,9 +118,12 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
     }
     const std::vector<ExportFormat> formats = all_formats(options);
     if (!options.weather.empty() && options.files.empty() && !is_run_folder(options.source))
-        throw Error(ErrorCode::usage, options.source.string() + ": layers, metar, xplane, wpr and cigi summarise a run, not a file");
+        throw Error(
+            ErrorCode::usage,
+            options.source.string() + ": layers, metar, xplane, wpr and cigi summarise a run, not a file");
     const bool dense = std::ranges::any_of(formats, is_dense);
-    const bool blocks = std::ranges::any_of(formats, [&](ExportFormat f) { return is_dense(f) && type_of(options, f) == VoxelType::bc4; });
+    const bool blocks = std::ranges::any_of(
+        formats, [&](ExportFormat f) { return is_dense(f) && type_of(options, f) == VoxelType::bc4; });
     const auto fit = [&] {
         s.layout.multiple = options.layout.multiple;
         if (blocks) s.layout.multiple = std::lcm(s.layout.multiple, 4);
@@ -128,31 +139,43 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
         std::uint64_t bytes = 0;
         const VolumeBox box = box_of(s.extent, s.placement, s.layout);
         for (const ExportFormat format : formats) {
-            for (int n = 0; is_dense(format) && n < (format == ExportFormat::vti || format == ExportFormat::slices ? 1 : s.levels); ++n)
-                bytes += encoded_bytes(std::max(1, box.size[0] >> n), std::max(1, box.size[1] >> n), std::max(1, box.size[2] >> n), type_of(options, format));
+            for (int n = 0;
+                 is_dense(format) &&
+                 n < (format == ExportFormat::vti || format == ExportFormat::slices ? 1 : s.levels);
+                 ++n)
+                bytes += encoded_bytes(std::max(1, box.size[0] >> n), std::max(1, box.size[1] >> n),
+                                       std::max(1, box.size[2] >> n), type_of(options, format));
         }
         return bytes;
     };
     if (options.budget_bytes) {
-        if (!dense) throw Error(ErrorCode::usage, "--budget counts dense formats: raw, vti, dds, ktx2 or slices");
+        if (!dense)
+            throw Error(ErrorCode::usage, "--budget counts dense formats: raw, vti, dds, ktx2 or slices");
         while (frame_bytes() > *options.budget_bytes && s.layout.factor < longest) {
             ++s.layout.factor;
             fit();
         }
         if (frame_bytes() > *options.budget_bytes)
-            throw Error(ErrorCode::usage, "--budget " + bytes_text(std::size_t(*options.budget_bytes)) + " is less than the smallest frame takes");
-        if (s.layout.factor > 1) notes.push_back(fmt::format("{}: voxels of {:g} m instead of {:g} m, so that a frame fits into {}", s.name, edge * s.layout.factor, edge, bytes_text(std::size_t(*options.budget_bytes))));
+            throw Error(ErrorCode::usage, "--budget " + bytes_text(std::size_t(*options.budget_bytes)) +
+                                              " is less than the smallest frame takes");
+        if (s.layout.factor > 1)
+            notes.push_back(
+                fmt::format("{}: voxels of {:g} m instead of {:g} m, so that a frame fits into {}", s.name,
+                            edge * s.layout.factor, edge, bytes_text(std::size_t(*options.budget_bytes))));
     }
     const VolumeBox box = box_of(s.extent, s.placement, s.layout);
     const int side = std::max({box.size[0], box.size[1], box.size[2]});
     if (options.limit_side > 0 && dense && side > options.limit_side) {
         const int factor = s.layout.factor * ((side + options.limit_side - 1) / options.limit_side);
-        throw Error(ErrorCode::usage, fmt::format("{}: {} voxels on a side, but {} takes at most {}: give --voxel {:g} or a --size", s.name, side,
-                                                  options.target, options.limit_side, factor * edge));
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: {} voxels on a side, but {} takes at most {}: give --voxel {:g} or a --size",
+                        s.name, side, options.target, options.limit_side, factor * edge));
     }
     if (dense && box.padding != std::array<int, 3>{}) {
-        notes.push_back(fmt::format("{}: padded with 0 by {} x {} x {} voxels to {} x {} x {}", s.name, box.padding[0], box.padding[1], box.padding[2],
-                                    box.size[0], box.size[1], box.size[2]));
+        notes.push_back(fmt::format("{}: padded with 0 by {} x {} x {} voxels to {} x {} x {}", s.name,
+                                    box.padding[0], box.padding[1], box.padding[2], box.size[0], box.size[1],
+                                    box.size[2]));
     }
 }
 
@@ -175,7 +198,9 @@ VoxelType format_type(ExportFormat format) {
 }
 
 VoxelType type_of(const ExportOptions& options, ExportFormat format) {
-    if (!is_dense(format)) return options.type == VoxelType::r16f && format == ExportFormat::vdb ? VoxelType::r16f : VoxelType::r32f;
+    if (!is_dense(format))
+        return options.type == VoxelType::r16f && format == ExportFormat::vdb ? VoxelType::r16f
+                                                                              : VoxelType::r32f;
     return options.type.value_or(format_type(format));
 }
 
@@ -197,9 +222,13 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
     std::vector<ExportSequence> sequences;
     std::error_code error;
     if (options.files.empty() && std::filesystem::is_directory(options.source, error)) {
-        if (!is_run_folder(options.source)) throw Error(ErrorCode::io, options.source.string() + ": is no folder of a run (it has no manifest.json)");
+        if (!is_run_folder(options.source))
+            throw Error(ErrorCode::io,
+                        options.source.string() + ": is no folder of a run (it has no manifest.json)");
         const RunListing run = read_run(options.source);
-        if (!run.complete) notes.push_back(run.folder.string() + ": the run is not complete; its frames so far are exported");
+        if (!run.complete)
+            notes.push_back(run.folder.string() +
+                            ": the run is not complete; its frames so far are exported");
         std::vector<std::optional<std::string>> layers{options.layer};
         if (options.layer == "each") {
             layers.clear();
@@ -211,7 +240,8 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
         }
         for (const auto& layer : layers) sequences.push_back(sequence_of_run(options, run, layer));
     } else {
-        if (options.layer && options.layer != "all") throw Error(ErrorCode::usage, "--layer: layers are those of a run, not of a file");
+        if (options.layer && options.layer != "all")
+            throw Error(ErrorCode::usage, "--layer: layers are those of a run, not of a file");
         sequences.push_back(sequence_of_files(options));
     }
     for (ExportSequence& s : sequences) choose_layout(options, s, notes);

@@ -64,39 +64,61 @@ std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>
     for (const WeatherSummary& w : frames) {
         Json clouds = Json::array(), winds = Json::array();
         for (const LayerSummary& s : three_layers(w.layers)) {
-            clouds.push_back({{"cloud_type", xplane_type(s.genus)}, {"coverage", s.columns.cover}, {"alt_top", s.columns.top_m + w.elevation_m},
+            clouds.push_back({{"cloud_type", xplane_type(s.genus)},
+                              {"coverage", s.columns.cover},
+                              {"alt_top", s.columns.top_m + w.elevation_m},
                               {"alt_base", s.columns.cloud_base_m + w.elevation_m}});
         }
         for (const auto& [height, v] : w.wind) {
             if (winds.size() == 13) break;
-            winds.push_back({{"alt_msl", height + w.elevation_m}, {"speed", std::hypot(v.east_m_per_s, v.north_m_per_s)},
-                             {"direction", from_of(v)}, {"gust_speed", 0}, {"shear", 0}, {"turbulence", 0}});
+            winds.push_back({{"alt_msl", height + w.elevation_m},
+                             {"speed", std::hypot(v.east_m_per_s, v.north_m_per_s)},
+                             {"direction", from_of(v)},
+                             {"gust_speed", 0},
+                             {"shear", 0},
+                             {"turbulence", 0}});
         }
-        Json entry = {{"number", w.number}, {"time_s", w.time_s}, {"visibility", w.visibility_m},
-                      {"precip_rate", std::min(1.0, w.rain_mm_per_h / 20)}, {"cloud_layers", clouds}, {"wind_layers", winds}};
+        Json entry = {{"number", w.number},           {"time_s", w.time_s},
+                      {"visibility", w.visibility_m}, {"precip_rate", std::min(1.0, w.rain_mm_per_h / 20)},
+                      {"cloud_layers", clouds},       {"wind_layers", winds}};
         const Georeference& place = run.scene.georeference;
-        if (place.given) entry.update(Json{{"latitude", place.latitude_deg}, {"longitude", place.longitude_deg}, {"ground_altitude_msl", place.height_m}});
+        if (place.given)
+            entry.update(Json{{"latitude", place.latitude_deg},
+                              {"longitude", place.longitude_deg},
+                              {"ground_altitude_msl", place.height_m}});
         list.push_back(std::move(entry));
     }
-    return Json{{"structure", "XPLMWeatherInfo_t"}, {"frames", list}}.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    return Json{{"structure", "XPLMWeatherInfo_t"}, {"frames", list}}.dump(2, ' ', false,
+                                                                           Json::error_handler_t::replace) +
+           "\n";
 }
 
 std::string wpr_text(const RunListing& run, const WeatherSummary& w) {
     std::string text = fmt::format(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<SimBase.Document Type=\"WeatherPreset\" version=\"1,3\">\n  <Descr>AceXML Document</Descr>\n"
-        "  <WeatherPreset.Preset>\n    <Name>{}</Name>\n    <IsAltitudeAMGL>False</IsAltitudeAMGL>\n", run.scene.name);
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<SimBase.Document Type=\"WeatherPreset\" "
+        "version=\"1,3\">\n  <Descr>AceXML Document</Descr>\n"
+        "  <WeatherPreset.Preset>\n    <Name>{}</Name>\n    <IsAltitudeAMGL>False</IsAltitudeAMGL>\n",
+        run.scene.name);
     for (const LayerSummary& s : three_layers(w.layers)) {
-        text += fmt::format("    <CloudLayer>\n      <CloudLayerAltitudeBot Value=\"{:.1f}\" Unit=\"m\"/>\n      <CloudLayerAltitudeTop Value=\"{:.1f}\" Unit=\"m\"/>\n"
-                            "      <CloudLayerDensity Value=\"{:.3f}\" Unit=\"(0 - 1)\"/>\n      <CloudLayerScattering Value=\"{:.3f}\" Unit=\"(0 - 1)\"/>\n    </CloudLayer>\n",
-                            s.columns.cloud_base_m + w.elevation_m, s.columns.top_m + w.elevation_m, std::min(1.0, s.columns.median_depth / 20), s.columns.cover);
+        text += fmt::format(
+            "    <CloudLayer>\n      <CloudLayerAltitudeBot Value=\"{:.1f}\" Unit=\"m\"/>\n      "
+            "<CloudLayerAltitudeTop Value=\"{:.1f}\" Unit=\"m\"/>\n"
+            "      <CloudLayerDensity Value=\"{:.3f}\" Unit=\"(0 - 1)\"/>\n      <CloudLayerScattering "
+            "Value=\"{:.3f}\" Unit=\"(0 - 1)\"/>\n    </CloudLayer>\n",
+            s.columns.cloud_base_m + w.elevation_m, s.columns.top_m + w.elevation_m,
+            std::min(1.0, s.columns.median_depth / 20), s.columns.cover);
     }
     for (const auto& [height, v] : w.wind) {
-        text += fmt::format("    <WindLayer>\n      <WindLayerAltitude Value=\"{:.1f}\" Unit=\"m\"/>\n      <WindLayerAngle Value=\"{:.1f}\" Unit=\"degrees\"/>\n"
-                            "      <WindLayerSpeed Value=\"{:.1f}\" Unit=\"knts\"/>\n    </WindLayer>\n",
-                            height + w.elevation_m, from_of(v), std::hypot(v.east_m_per_s, v.north_m_per_s) / kKnot);
+        text += fmt::format(
+            "    <WindLayer>\n      <WindLayerAltitude Value=\"{:.1f}\" Unit=\"m\"/>\n      <WindLayerAngle "
+            "Value=\"{:.1f}\" Unit=\"degrees\"/>\n"
+            "      <WindLayerSpeed Value=\"{:.1f}\" Unit=\"knts\"/>\n    </WindLayer>\n",
+            height + w.elevation_m, from_of(v), std::hypot(v.east_m_per_s, v.north_m_per_s) / kKnot);
     }
-    text += fmt::format("    <Precipitations Value=\"{:.2f}\" Unit=\"mm/h\"/>\n    <ThunderstormIntensity Value=\"{:.1f}\" Unit=\"(0 - 1)\"/>\n  </WeatherPreset.Preset>\n</SimBase.Document>\n",
-                        w.rain_mm_per_h, w.thunder ? 1.0 : 0.0);
+    text += fmt::format(
+        "    <Precipitations Value=\"{:.2f}\" Unit=\"mm/h\"/>\n    <ThunderstormIntensity Value=\"{:.1f}\" "
+        "Unit=\"(0 - 1)\"/>\n  </WeatherPreset.Preset>\n</SimBase.Document>\n",
+        w.rain_mm_per_h, w.thunder ? 1.0 : 0.0);
     return text;
 }
 
@@ -112,15 +134,17 @@ std::vector<std::byte> cigi_packets(const WeatherSummary& weather) {
         ++id;
         w.put(std::uint8_t{12});
         w.put(std::uint8_t{56});
-        put_big(w, std::uint16_t{0});      // of no region: global
-        w.put(std::uint8_t(id));           // cloud layer 1 to 3
-        w.put(std::uint8_t{95});           // humidity in it, per cent
+        put_big(w, std::uint16_t{0});  // of no region: global
+        w.put(std::uint8_t(id));       // cloud layer 1 to 3
+        w.put(std::uint8_t{95});       // humidity in it, per cent
         w.put(std::uint8_t(1 | (weather.thunder && id == 1 ? 8 : 0) | cigi_type(s.genus) << 4));
-        w.put(std::uint8_t{0});            // global scope, no severity
+        w.put(std::uint8_t{0});  // global scope, no severity
         const double direction = s.wind_from_deg > 180 ? s.wind_from_deg - 360 : s.wind_from_deg;
         const double base = s.columns.cloud_base_m + weather.elevation_m;
-        for (const double value : {15.0 - 0.0065 * base, 100.0, 0.0, 100 * s.columns.cover, base, std::max(0.0, s.columns.top_m + weather.elevation_m - base),
-                                   s.transition_m, s.wind_m_per_s, 0.0, direction, 1013.25 * std::pow(1 - 2.25577e-5 * base, 5.25588), 0.0})
+        for (const double value :
+             {15.0 - 0.0065 * base, 100.0, 0.0, 100 * s.columns.cover, base,
+              std::max(0.0, s.columns.top_m + weather.elevation_m - base), s.transition_m, s.wind_m_per_s,
+              0.0, direction, 1013.25 * std::pow(1 - 2.25577e-5 * base, 5.25588), 0.0})
             put_big(w, float(value));
     }
     return w.take();

@@ -27,7 +27,8 @@ void compare(const std::vector<float>& expected, const std::vector<float>& found
     d.voxels += expected.size();
 }
 
-EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type, const VolumeBox& box, int levels) {
+EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
+                         const VolumeBox& box, int levels) {
     const auto& [nx, ny, nz] = box.size;
     if (format == "raw") return read_raw(path, type, nx, ny, nz, levels);
     if (format == "dds") return read_dds(path);
@@ -37,8 +38,8 @@ EncodedVolume read_dense(const std::filesystem::path& path, const std::string& f
 }
 
 // Adds the differences of one file to its source. Returns false for what cannot be compared.
-bool compare_file(const std::filesystem::path& folder, const ListedExport& list, const ListedExport::Sequence& s,
-                  const ExportedFile& file, Difference& d) {
+bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
+                  const ListedExport::Sequence& s, const ExportedFile& file, Difference& d) {
     VdbReadOptions reading;
     reading.grid = list.grid;
     const DensityGrid source = load_density(folder / file.source, reading).density;
@@ -58,7 +59,8 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         const DensityGrid found = load_density(path).density;
         if (list.half_voxel_shift)
             for (int a = 0; a < 3; ++a) at.origin_m[a] -= at.cell_size_m / 2;
-        if (!(found.placement() == at)) throw Error(ErrorCode::io, path.string() + ": lies at another place than its source");
+        if (!(found.placement() == at))
+            throw Error(ErrorCode::io, path.string() + ": lies at another place than its source");
         compare(expected.values, found.to_dense(), d);
         return true;
     }
@@ -70,14 +72,16 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     if (encoded.type != type->second || std::array{top.nx, top.ny, top.nz} != box.size)
         throw Error(ErrorCode::io, path.string() + ": has another type or size than the list says");
     compare(lay_out(source, s.layout).values,
-            decode(top.bytes.data(), top.bytes.size(), top.nx, top.ny, top.nz, encoded.type, s.scale).values, d);
+            decode(top.bytes.data(), top.bytes.size(), top.nx, top.ny, top.nz, encoded.type, s.scale).values,
+            d);
     return true;
 }
 
 const ListedExport::Sequence* sequence_of(const ListedExport& list, const std::string& name) {
     const ListedExport::Sequence* best = nullptr;
     for (const ListedExport::Sequence& s : list.sequences) {
-        if (name.starts_with(s.name + "_") && (best == nullptr || s.name.size() > best->name.size())) best = &s;
+        if (name.starts_with(s.name + "_") && (best == nullptr || s.name.size() > best->name.size()))
+            best = &s;
     }
     return best;
 }
@@ -111,12 +115,20 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
         // A half is exact to its eleven bits; density is at most scale.
         const double most = largest_error(t) * scale * 1.0001 + 1e-7;
         const double rms = std::sqrt(d.squares / double(std::max<std::size_t>(1, d.voxels)));
-        checks.push_back({format, d.largest <= most,
-                          fmt::format("{} files read back: largest difference {:.3g} (at most {:.3g}), rms {:.3g}", counts[format], d.largest, most, rms),
-                          {{"largest", d.largest}, {"rms", rms}}});
+        checks.push_back(
+            {format,
+             d.largest <= most,
+             fmt::format("{} files read back: largest difference {:.3g} (at most {:.3g}), rms {:.3g}",
+                         counts[format], d.largest, most, rms),
+             {{"largest", d.largest}, {"rms", rms}}});
     }
-    if (bad > 0) checks.push_back({"voxels", false, bad > 1 ? fmt::format("{}; and {} more", problem, bad - 1) : problem});
-    if (lost > 0) checks.push_back({"sources", true, fmt::format("{} files were not compared: their sources are not there any more", lost)});
+    if (bad > 0)
+        checks.push_back(
+            {"voxels", false, bad > 1 ? fmt::format("{}; and {} more", problem, bad - 1) : problem});
+    if (lost > 0)
+        checks.push_back(
+            {"sources", true,
+             fmt::format("{} files were not compared: their sources are not there any more", lost)});
     return checks;
 }
 
@@ -125,9 +137,11 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
 Verification verify_export(const std::filesystem::path& folder, const VerifyOptions& options) {
     const ListedExport list = read_export(folder);
     if (options.against || options.replay > 0)
-        throw Error(ErrorCode::usage, folder.string() + ": is an export; --against and --replay are for runs");
+        throw Error(ErrorCode::usage,
+                    folder.string() + ": is an export; --against and --replay are for runs");
     Verification result{"export", {}};
-    if (!list.complete) result.checks.push_back({"complete", false, "the export was interrupted: the same command goes on"});
+    if (!list.complete)
+        result.checks.push_back({"complete", false, "the export was interrupted: the same command goes on"});
     std::vector<ListedFile> files;
     std::set<std::filesystem::path> names{"export.json"};
     for (const ExportedFile& file : list.files) {

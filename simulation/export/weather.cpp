@@ -22,7 +22,8 @@ constexpr double kFoot_m = 0.3048, kKoschmieder = 3.912, kSurface_m = 10;
 
 // The true bearing that a velocity comes from, 0..360.
 double bearing_from(const Velocity& v, double heading_deg) {
-    const double degrees = std::atan2(-v.east_m_per_s, -v.north_m_per_s) * 180 / std::numbers::pi + heading_deg;
+    const double degrees =
+        std::atan2(-v.east_m_per_s, -v.north_m_per_s) * 180 / std::numbers::pi + heading_deg;
     return degrees - 360 * std::floor(degrees / 360);
 }
 
@@ -45,7 +46,8 @@ std::string genus_of(const Scene& scene, const LayerOptions& layer) {
     return {};
 }
 
-LayerSummary summary_of(const RunListing& run, const std::string& name, const DensityGrid& density, const Wind& wind, double time_s) {
+LayerSummary summary_of(const RunListing& run, const std::string& name, const DensityGrid& density,
+                        const Wind& wind, double time_s) {
     LayerSummary s;
     s.name = name;
     s.columns = optical_columns(density, run.scene.density.extinction_per_m);
@@ -72,11 +74,14 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
     w.elevation_m = scene.georeference.given ? scene.georeference.height_m : 0;
     const double heading = scene.georeference.given ? scene.georeference.heading_deg : 0;
     if (scene.layers.empty()) {
-        w.layers.push_back(summary_of(run, scene.name, read_density(density_file(run, frame, {})), scene.automaton.wind, frame.time_s));
+        w.layers.push_back(summary_of(run, scene.name, read_density(density_file(run, frame, {})),
+                                      scene.automaton.wind, frame.time_s));
     }
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         if (!has_density(scene.layers[n])) continue;
-        LayerSummary s = summary_of(run, scene.layers[n].name, read_density(density_file(run, frame, scene.layers[n].name)), layer_wind(scene, n), frame.time_s);
+        LayerSummary s = summary_of(run, scene.layers[n].name,
+                                    read_density(density_file(run, frame, scene.layers[n].name)),
+                                    layer_wind(scene, n), frame.time_s);
         s.genus = genus_of(scene, scene.layers[n]);
         for (const RainRecord& area : frame.rain)
             if (area.layer == s.name) s.rain_mm_per_h = std::max(s.rain_mm_per_h, area.intensity_mm_per_h);
@@ -84,15 +89,19 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
     }
     std::erase_if(w.layers, [](const LayerSummary& s) { return !(s.columns.cover > 0); });
     std::ranges::stable_sort(w.layers, {}, [](const LayerSummary& s) { return s.columns.cloud_base_m; });
-    for (const WindLevel& level : wind_levels(scene, scene.layers.empty() ? std::nullopt : std::optional<std::size_t>(0), {}, {}, frame.time_s))
+    for (const WindLevel& level :
+         wind_levels(scene, scene.layers.empty() ? std::nullopt : std::optional<std::size_t>(0), {}, {},
+                     frame.time_s))
         w.wind.emplace_back(level.height_m, level.velocity);
-    const Wind& wind = scene.layers.empty() || !scene.automaton.wind.keyframes.empty() ? scene.automaton.wind : layer_wind(scene, 0);
+    const Wind& wind = scene.layers.empty() || !scene.automaton.wind.keyframes.empty() ? scene.automaton.wind
+                                                                                       : layer_wind(scene, 0);
     const Velocity surface = wind_at(wind, kSurface_m, frame.time_s);
     w.surface_m_per_s = speed_of(surface);
     w.surface_from_deg = bearing_from(surface, heading);
     const Fog& fog = scene.render.fog;
     if (fog.extinction_per_m > 0) w.visibility_m = std::min(9999.0, kKoschmieder / fog.extinction_per_m);
-    for (const RainRecord& area : frame.rain) w.rain_mm_per_h = std::max(w.rain_mm_per_h, area.intensity_mm_per_h);
+    for (const RainRecord& area : frame.rain)
+        w.rain_mm_per_h = std::max(w.rain_mm_per_h, area.intensity_mm_per_h);
     w.showers = frame.rain.size() > 1;
     w.snow = scene.render.precipitation.kind == PrecipitationKind::snow;
     w.thunder = !scene.render.lightning.empty();
@@ -102,7 +111,8 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
 std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
     Metar m;
     const std::string& name = run.scene.name;
-    const bool station = name.size() == 4 && std::ranges::all_of(name, [](char c) { return c >= 'A' && c <= 'Z'; });
+    const bool station =
+        name.size() == 4 && std::ranges::all_of(name, [](char c) { return c >= 'A' && c <= 'Z'; });
     m.station = station ? name : "ZZZZ";
     m.day = 1;
     if (!weather.utc.empty()) {
@@ -148,19 +158,37 @@ std::string layers_json_text(const RunListing& run, const std::vector<WeatherSum
     for (const WeatherSummary& w : frames) {
         Json layers = Json::array();
         for (const LayerSummary& s : w.layers) {
-            layers.push_back({{"name", s.name}, {"genus", s.genus}, {"base_m", number_or_null(s.columns.base_m + w.elevation_m)},
-                              {"top_m", number_or_null(s.columns.top_m + w.elevation_m)}, {"cloud_base_m", number_or_null(s.columns.cloud_base_m + w.elevation_m)},
-                              {"coverage", s.columns.cover}, {"oktas", s.oktas}, {"optical_depth_median", s.columns.median_depth}, {"transition_m", s.transition_m},
-                              {"rain_mm_per_h", s.rain_mm_per_h}, {"wind_from_deg", s.wind_from_deg}, {"wind_m_per_s", s.wind_m_per_s}});
+            layers.push_back({{"name", s.name},
+                              {"genus", s.genus},
+                              {"base_m", number_or_null(s.columns.base_m + w.elevation_m)},
+                              {"top_m", number_or_null(s.columns.top_m + w.elevation_m)},
+                              {"cloud_base_m", number_or_null(s.columns.cloud_base_m + w.elevation_m)},
+                              {"coverage", s.columns.cover},
+                              {"oktas", s.oktas},
+                              {"optical_depth_median", s.columns.median_depth},
+                              {"transition_m", s.transition_m},
+                              {"rain_mm_per_h", s.rain_mm_per_h},
+                              {"wind_from_deg", s.wind_from_deg},
+                              {"wind_m_per_s", s.wind_m_per_s}});
         }
         Json entry = {{"number", w.number}, {"time_s", w.time_s}};
         if (!w.utc.empty()) entry["utc"] = w.utc;
-        entry.update(Json{{"layers", layers}, {"visibility_m", w.visibility_m}, {"rain_mm_per_h", w.rain_mm_per_h},
-                          {"kind", w.rain_mm_per_h == 0 ? "none" : w.snow ? "snow" : "rain"},
-                          {"surface_wind_from_deg", w.surface_from_deg}, {"surface_wind_m_per_s", w.surface_m_per_s}, {"metar", metar_of(run, w)}});
+        entry.update(Json{{"layers", layers},
+                          {"visibility_m", w.visibility_m},
+                          {"rain_mm_per_h", w.rain_mm_per_h},
+                          {"kind", w.rain_mm_per_h == 0 ? "none"
+                                   : w.snow             ? "snow"
+                                                        : "rain"},
+                          {"surface_wind_from_deg", w.surface_from_deg},
+                          {"surface_wind_m_per_s", w.surface_m_per_s},
+                          {"metar", metar_of(run, w)}});
         list.push_back(std::move(entry));
     }
-    const Json json = {{"format", "nephos layers"}, {"format_version", 1}, {"scene_hash", run.scene_hash}, {"heights", "metres above mean sea level"}, {"frames", list}};
+    const Json json = {{"format", "nephos layers"},
+                       {"format_version", 1},
+                       {"scene_hash", run.scene_hash},
+                       {"heights", "metres above mean sea level"},
+                       {"frames", list}};
     return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -15,20 +15,20 @@ namespace nephos {
 struct LayerSummary {
     std::string name, genus;  // genus: WMO abbreviation, "" where the scene names none
     OpticalColumns columns;
-    double oktas = 0;  // 8 times the cover
+    double oktas = 0;         // 8 times the cover
     double transition_m = 0;  // from the base to where the layer has half of its mean density
     double wind_from_deg = 0, wind_m_per_s = 0;  // at the base; the bearing is true
-    double rain_mm_per_h = 0;  // the strongest of its areas
+    double rain_mm_per_h = 0;                    // the strongest of its areas
 };
 
 struct WeatherSummary {
     int number = 1;
     double time_s = 0;
-    std::string utc;  // empty without a start
-    std::vector<LayerSummary> layers;  // with any column of optical depth above 1; from below
-    std::vector<std::pair<double, Velocity>> wind;  // by height
+    std::string utc;                                   // empty without a start
+    std::vector<LayerSummary> layers;                  // with any column of optical depth above 1; from below
+    std::vector<std::pair<double, Velocity>> wind;     // by height
     double surface_from_deg = 0, surface_m_per_s = 0;  // at 10 m; true
-    double visibility_m = 9999;  // of the fog; 9999: none
+    double visibility_m = 9999;                        // of the fog; 9999: none
     double rain_mm_per_h = 0;
     bool snow = false, showers = false, thunder = false;
     double elevation_m = 0;  // of z = 0 above mean sea level

@@ -61,8 +61,10 @@ TEST(Volume, LayoutPermutesPadsAndWraps) {
                             inside = inside && i >= 0 && i < n;
                             world[axis] = i;
                         }
-                        const float expected = inside ? dense[linear_index(extent, world[0], world[1], world[2])] : 0.0f;
-                        ASSERT_EQ(v.values[std::size_t((z * v.ny + y) * v.nx + x)], expected) << x << " " << y << " " << z;
+                        const float expected =
+                            inside ? dense[linear_index(extent, world[0], world[1], world[2])] : 0.0f;
+                        ASSERT_EQ(v.values[std::size_t((z * v.ny + y) * v.nx + x)], expected)
+                            << x << " " << y << " " << z;
                     }
             EXPECT_EQ(box.size[0] % 4, 0);
             EXPECT_DOUBLE_EQ(box.min_m[2], (axes == AxisOrder::unity ? -200 : 300) - box.border * 25);
@@ -93,12 +95,14 @@ TEST(Volume, TypesAreWithinTheirError) {
     const DensityGrid grid = random_grid({37, 22, 9}, 3);
     const Volume v = lay_out(grid, {});
     for (const float scale : {1.0f, 0.8f}) {
-        for (const VoxelType type : {VoxelType::r8, VoxelType::r16, VoxelType::r16f, VoxelType::r32f, VoxelType::bc4}) {
+        for (const VoxelType type :
+             {VoxelType::r8, VoxelType::r16, VoxelType::r16f, VoxelType::r32f, VoxelType::bc4}) {
             const auto bytes = encode(v, type, scale);
             ASSERT_EQ(bytes.size(), encoded_bytes(v.nx, v.ny, v.nz, type));
             const Volume back = decode(bytes.data(), bytes.size(), v.nx, v.ny, v.nz, type, scale);
             for (std::size_t n = 0; n < v.values.size(); ++n)
-                ASSERT_NEAR(back.values[n], v.values[n], largest_error(type) * scale * 1.001 + 1e-7) << type_name(type);
+                ASSERT_NEAR(back.values[n], v.values[n], largest_error(type) * scale * 1.001 + 1e-7)
+                    << type_name(type);
             EXPECT_THROW(decode(bytes.data(), bytes.size() - 1, v.nx, v.ny, v.nz, type, scale), Error);
         }
     }
@@ -113,7 +117,8 @@ TEST(Volume, HalvesAreRoundedToNearestEven) {
         return std::uint16_t(std::to_integer<unsigned>(bytes[0]) | std::to_integer<unsigned>(bytes[1]) << 8);
     };
     const auto value_of = [](std::uint32_t half) {
-        return half < 0x400 ? std::ldexp(float(half), -24) : std::ldexp(float(0x400 + (half & 0x3FF)), int(half >> 10) - 25);
+        return half < 0x400 ? std::ldexp(float(half), -24)
+                            : std::ldexp(float(0x400 + (half & 0x3FF)), int(half >> 10) - 25);
     };
     for (std::uint32_t half = 0; half < 0x7C00; ++half) ASSERT_EQ(bits_of(value_of(half)), half);
     for (std::uint32_t half = 0; half < 0x7BFF; half += 7) {
@@ -134,14 +139,16 @@ TEST(Volume, Bc4IsOfLittleError) {
     const auto bytes = encode(v, VoxelType::bc4, 1);
     const Volume back = decode(bytes.data(), bytes.size(), v.nx, v.ny, v.nz, VoxelType::bc4, 1);
     double squares = 0;
-    for (std::size_t n = 0; n < v.values.size(); ++n) squares += std::pow(double(back.values[n] - v.values[n]), 2);
+    for (std::size_t n = 0; n < v.values.size(); ++n)
+        squares += std::pow(double(back.values[n] - v.values[n]), 2);
     EXPECT_LT(std::sqrt(squares / double(v.values.size())), 1.0 / 255);
 }
 
 TEST(Containers, AreReadBackAndRefuseWhatIsCut) {
     const TemporaryFolder folder;
     const DensityGrid grid = random_grid({32, 24, 16}, 4);
-    for (const VoxelType type : {VoxelType::r8, VoxelType::r16, VoxelType::r16f, VoxelType::r32f, VoxelType::bc4}) {
+    for (const VoxelType type :
+         {VoxelType::r8, VoxelType::r16, VoxelType::r16f, VoxelType::r32f, VoxelType::bc4}) {
         EncodedVolume volume{type, {}};
         Volume level = lay_out(grid, {});
         for (int n = 0; n < 3; ++n) {
@@ -200,13 +207,15 @@ TEST(Containers, NanoVdbHoldsTheSameVoxels) {
     const DensityGrid grid = random_grid({37, 22, 19}, 5);
     for (const NanoCodec codec : {NanoCodec::none, NanoCodec::zip, NanoCodec::blosc}) {
         write_nanovdb(folder / "v.nvdb", grid, codec, NanoQuantise::none);
-        EXPECT_TRUE(read_nanovdb(folder / "v.nvdb", grid.extent(), grid.placement()).to_dense() == grid.to_dense());
+        EXPECT_TRUE(read_nanovdb(folder / "v.nvdb", grid.extent(), grid.placement()).to_dense() ==
+                    grid.to_dense());
     }
     EXPECT_THROW(read_nanovdb(folder / "v.nvdb", {8, 8, 8}, grid.placement()), Error);
     write_nanovdb(folder / "q.nvdb", grid, NanoCodec::none, NanoQuantise::fp8);
     EXPECT_THROW(read_nanovdb(folder / "q.nvdb", grid.extent(), grid.placement()), Error);
     write_nanovdb(folder / "v.nvdb", grid, NanoCodec::none, NanoQuantise::none);
-    EXPECT_LT(std::filesystem::file_size(folder / "q.nvdb"), 0.9 * double(std::filesystem::file_size(folder / "v.nvdb")));
+    EXPECT_LT(std::filesystem::file_size(folder / "q.nvdb"),
+              0.9 * double(std::filesystem::file_size(folder / "v.nvdb")));
 }
 
 }  // namespace

@@ -57,6 +57,10 @@ class Metar(Case):
             with self.subTest(report=report):
                 groups = self.explained(report)["groups"]
                 self.assertEqual(" ".join(g["group"] for g in groups), report.rstrip("="))
+                fitted = json.loads(self.call("metar", report, "-o", "sky.toml", "--json").stdout)
+                for layer in fitted["layers"]:
+                    self.assertLessEqual(abs(layer["cover"] - layer["wanted"]), 0.5 / 8, layer)
+                self.call("validate", "sky.toml")
 
     def test_layers(self):
         layers = {layer["group"]: layer for layer in self.explained(REAL[0])["layers"]}
