@@ -147,7 +147,9 @@ void add_metar_command(CLI::App& app, Action& action) {
                   const std::vector<double> numbers = parse_reals(text, 3, -180, 9000);
                   if (std::abs(numbers[0]) > 90)
                       throw Error(ErrorCode::usage, "'" + text + "' has a latitude beyond 90 degrees");
-                  a->options.place = MetarPlace{numbers[0], std::min(numbers[1], 180.0), numbers[2]};
+                  if (numbers[1] > 180)
+                      throw Error(ErrorCode::usage, "'" + text + "' has a longitude beyond 180 degrees");
+                  a->options.place = MetarPlace{numbers[0], numbers[1], numbers[2]};
               });
     command->add_option("--name", a->options.name, "Name of the scene (default: the aerodrome's)")
         ->type_name("NAME");
