@@ -14,7 +14,7 @@ bool several_threads() {
 
 }  // namespace
 
-FrameOutput::FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&)> done)
+FrameOutput::FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&, std::vector<WrittenFile>)> done)
     : settings_(settings),
       done_(std::move(done)),
       writer_(settings.scene, {settings.folder, settings.scene.name}, settings.range.first_frame),
@@ -64,10 +64,15 @@ void FrameOutput::finish_video() {
 
 // The frame itself first, then the video of it.
 void FrameOutput::write(const Drawn& drawn) {
-    writer_.write_density(drawn.frame);
+    std::vector<WrittenFile> files = writer_.write_density(drawn.frame);
     Rgb8Image image;
-    if (painter_) image = writer_.write_picture(drawn.frame, drawn.picture, *painter_);
-    done_(drawn.frame);
+    if (painter_) {
+        image = writer_.write_picture(drawn.frame, drawn.picture, *painter_);
+        const RunFolder folder{settings_.folder, settings_.scene.name};
+        for (const std::filesystem::path& picture : picture_files(folder, settings_.scene, drawn.frame.number))
+            files.push_back({picture, file_digest(picture), {}});
+    }
+    done_(drawn.frame, std::move(files));
     if (video_) video_->add(drawn.frame.number, image);
 }
 

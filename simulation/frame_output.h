@@ -17,6 +17,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "render/image/picture.h"
 #include "simulation/frame_painter.h"
@@ -34,10 +35,11 @@ inline constexpr std::size_t kFramesWritten = 2, kFramesDrawn = 1, kFramesPrepar
 
 class FrameOutput {
   public:
-    // `done` is called for each frame all of whose files are there, in order, by the thread that writes.
+    // `done` is called for each frame all of whose files are there, with these files, in order, by the thread that
+    // writes.
     // `settings` must outlive this object, and the simulation the next finish() or finish_quietly(). Throws
     // Error(gpu) when pictures are wanted and the device that is asked for is not there.
-    FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&)> done);
+    FrameOutput(const RunSettings& settings, std::function<void(const FrameResult&, std::vector<WrittenFile>)> done);
 
     // Return what Renderer's do; empty without pictures.
     std::string backend_name() const;
@@ -70,7 +72,7 @@ class FrameOutput {
     void write(const Drawn& drawn);
 
     const RunSettings& settings_;
-    std::function<void(const FrameResult&)> done_;
+    std::function<void(const FrameResult&, std::vector<WrittenFile>)> done_;
     FrameWriter writer_;
     std::optional<RunVideo> video_;  // of the thread that writes
     std::unique_ptr<FramePainter> painter_;

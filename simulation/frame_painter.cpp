@@ -95,10 +95,14 @@ PendingFrame FramePainter::begin(FrameResult frame) {
     }
     std::optional<GroundCoverView> ground;
     if (frame.ground) ground = view_of(*frame.ground);
+    const Georeference& place = scene_.georeference;
+    RenderOptions options = scene_.render;
+    options.sun = scene_sun_at(scene_, frame.time_s);
     std::optional<FilmFrame> film;
-    if (frame.number > 0) film = FilmFrame{frame.number - 1, &scene_.frames, &scene_.render.sun};
+    if (frame.number > 0) film = FilmFrame{frame.number - 1, &scene_.frames, &scene_.render.sun,
+                                                    place.given ? place.heading_deg : 0};
     PendingSkyPicture picture =
-        painter_.begin(renderer_, cloud, layers, scene_.render, frame.time_s, scene_.frames.exr, ground,
+        painter_.begin(renderer_, cloud, layers, options, frame.time_s, scene_.frames.exr, ground,
                        weather_of(scene_, frame.layers, frame.time_s), film);
     return {std::move(frame), std::move(balls), std::move(detailed), std::move(picture)};
 }

@@ -7,10 +7,12 @@
 #include "core/random.h"
 #include "density/combine.h"
 #include "density/metaballs.h"
+#include "density/voxel_digest.h"
 #include "render/image/exposure.h"
 #include "scenes/format/layers.h"
 #include "scenes/format/writer.h"
 #include "simulation/frame_detail.h"
+#include "simulation/scene_place.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -50,6 +52,7 @@ VdbMetadata density_metadata(const Scene& scene, std::string scene_hash, double 
     metadata.state_hash = hash.hex();
     metadata.nephos_version = version();
     metadata.random_stream_version = int(kRandomStreamVersion);
+    metadata.georeference = scene.georeference;
     return metadata;
 }
 
@@ -68,30 +71,45 @@ DensityGrid FrameWriter::refined(const DensityGrid& density, const std::optional
     return resample(density, options.refine, options.metaball_radius_cells, boundaries);
 }
 
-VdbMetadata FrameWriter::metadata_of(const FrameResult& frame, const StateHash& hash) const {
-    return density_metadata(scene_, scene_hash_, frame.time_s, hash);
+VdbMetadata FrameWriter::metadata_of(const FrameResult& frame, const StateHash& hash,
+                                     std::optional<std::size_t> layer, const DensityGrid& density) const {
+    VdbMetadata metadata = density_metadata(scene_, scene_hash_, frame.time_s, hash);
+    metadata.period_m = period_m(scene_, layer);
+    metadata.wind = wind_levels(scene_, layer, density.placement(), density.extent(), frame.time_s);
+    return metadata;
 }
 
-void FrameWriter::write_density(const FrameResult& frame) const {
-    if (!scene_.layers.empty()) {
-        write_layers(frame);
-        return;
+// The digest of the file is that of its bytes as they are read back.
+WrittenFile FrameWriter::write(const FrameResult& frame, VdbContent content, std::optional<std::size_t> layer) const {
+    const DensityGrid& density = *content.density;
+    content.half = scene_.density.half;
+    if (scene_.density.write_velocity) {
+        content.wind = wind_of_levels(scene_, layer, density.placement(), density.extent(), frame.time_s);
+        content.wind_name = scene_.density_files.velocity_name;
     }
-    const DensityGrid written = 
+    const StateHash& hash = layer ? frame.layers[*layer].hash : frame.hash;
+    const std::filesystem::path path =
+        layer ? folder_.density(frame.number, frame.layers[*layer].name) : folder_.density(frame.number);
+    write_vdb(path, content, metadata_of(frame, hash, layer, density));
+    return {path, file_digest(path), voxel_digest(density, content.half)};
+}
+
+std::vector<WrittenFile> FrameWriter::write_density(const FrameResult& frame) const {
+    if (!scene_.layers.empty()) return write_layers(frame);
+    const DensityGrid written =
         refined(frame.density, frame.moisture, std::nullopt, scene_.automaton.boundaries, frame.time_s);
     VdbContent content;
     content.density = &written;
-    content.half = scene_.density.half;
     content.hum = frame.hum;
     content.act = frame.act;
     content.cld = frame.cld;
     content.cells = scene_.automaton.placement;
-    if (scene_.density.write_velocity) content.wind = &scene_.automaton.wind;
-    write_vdb(folder_.density(frame.number), content, metadata_of(frame, frame.hash));
+    return {write(frame, std::move(content), std::nullopt)};
 }
 
 // A file for each layer, with its own voxels, bits and wind, and one of their densities together.
-void FrameWriter::write_layers(const FrameResult& frame) const {
+std::vector<WrittenFile> FrameWriter::write_layers(const FrameResult& frame) const {
+    std::vector<WrittenFile> files;
     std::vector<DensityGrid> grids;
     std::vector<Boundaries> boundaries;
     for (std::size_t n = 0; n < frame.layers.size(); ++n) {
@@ -99,23 +117,22 @@ void FrameWriter::write_layers(const FrameResult& frame) const {
         if (layer.direct) continue;
         grids.push_back(refined(layer.density, layer.moisture, n, layer.boundaries, frame.time_s));
         boundaries.push_back(layer.boundaries);
+        if (!scene_.density_files.per_layer) continue;
         VdbContent content;
         content.density = &grids.back();
-        content.half = scene_.density.half;
         content.hum = layer.hum;
         content.act = layer.act;
         content.cld = layer.cld;
         content.cells = scene_.layers[n].placement;
-        if (scene_.density.write_velocity) content.wind = &layer_wind(scene_, n);
-        write_vdb(folder_.density(frame.number, layer.name), content, metadata_of(frame, layer.hash));
+        files.push_back(write(frame, std::move(content), n));
     }
-    if (grids.empty()) return;
+    if (grids.empty() || !scene_.density_files.combined) return files;
     const DensityGrid whole = scene_.density.refine > 1 ? combine(grids, boundaries) : frame.density;
     VdbContent content;
     content.density = &whole;
-    content.half = scene_.density.half;
     content.cells = whole.placement();
-    write_vdb(folder_.density(frame.number), content, metadata_of(frame, frame.hash));
+    files.insert(files.begin(), write(frame, std::move(content), std::nullopt));
+    return files;
 }
 
 Rgb8Image FrameWriter::write_picture(const FrameResult& frame, const Picture& picture,

@@ -5,7 +5,9 @@
 // either complete or not there.
 
 #include <string>
+#include <vector>
 
+#include "core/digest.h"
 #include "density/vdb/vdb_file.h"
 #include "render/image/image_file.h"
 #include "scenes/format/scene.h"
@@ -15,14 +17,22 @@
 
 namespace nephos {
 
+// A file of a frame that was written.
+struct WrittenFile {
+    std::filesystem::path path;
+    FileDigest digest;
+    std::string voxels;  // voxel_digest() of a density file as it is read back; empty for others
+};
+
 class FrameWriter {
   public:
     // Frame `first_frame` has no frame before it whose exposure it follows.
     FrameWriter(const Scene& scene, RunFolder folder, int first_frame = 1);
 
     // Writes a density file, refined as the scene asks for; of a scene with layers one for each layer, with its
-    // own voxels, bits and wind, and one of their densities together. Throws Error(io) naming the file.
-    void write_density(const FrameResult& frame) const;
+    // own voxels, bits and wind, and one of their densities together. Returns the files in this order. Throws Error(io)
+    // naming the file.
+    std::vector<WrittenFile> write_density(const FrameResult& frame) const;
 
     // Writes the EXR and PNG files that the scene asks for of a picture of `painter`, whose back-end they name.
     // Returns what the PNG shows; empty without one. Throws Error(io) naming the file.
@@ -32,10 +42,12 @@ class FrameWriter {
     Rgb8Image write_picture(const FrameResult& frame, const Picture& picture, const FramePainter& painter);
 
   private:
-    void write_layers(const FrameResult& frame) const;
+    std::vector<WrittenFile> write_layers(const FrameResult& frame) const;
+    WrittenFile write(const FrameResult& frame, VdbContent content, std::optional<std::size_t> layer) const;
     DensityGrid refined(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
                         std::optional<std::size_t> layer, const Boundaries& boundaries, double time_s) const;
-    VdbMetadata metadata_of(const FrameResult& frame, const StateHash& hash) const;
+    VdbMetadata metadata_of(const FrameResult& frame, const StateHash& hash, std::optional<std::size_t> layer,
+                            const DensityGrid& density) const;
 
     Scene scene_;
     RunFolder folder_;

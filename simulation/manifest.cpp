@@ -16,6 +16,7 @@
 #include "core/random.h"
 #include "density/combine.h"
 #include "scenes/format/writer.h"
+#include "simulation/scene_place.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -59,14 +60,29 @@ RainRecord rain_record(const Json& json) {
     return area;
 }
 
+Json file_json(const FileRecord& file) {
+    Json json = {{"path", file.path}, {"bytes", file.digest.bytes}, {"xxh3", file.digest.xxh3}};
+    if (!file.voxels.empty()) json["voxels_xxh3"] = file.voxels;
+    return json;
+}
+
+Json files_json(const std::vector<FileRecord>& files) {
+    Json list = Json::array();
+    for (const FileRecord& file : files) list.push_back(file_json(file));
+    return list;
+}
+
 Json frame_json(const RunSettings& settings, const FrameRecord& frame, const ManifestState& state,
                 const RunFolder& folder) {
     const FrameOptions& frames = settings.scene.frames;
     Json entry = {{"number", frame.number},
-                  {"time_s", frame.time_s},
-                  {"step", frame.step},
-                  {"state_hash", frame.state_hash.hex()}};
-    if (has_density(settings.scene)) entry["density"] = relative(settings, folder.density(frame.number));
+                  {"time_s", frame.time_s}};
+    if (const std::string utc = utc_at(settings.scene.georeference, frame.time_s); !utc.empty())
+        entry["utc"] = utc;
+    entry.update(Json{{"step", frame.step},
+                      {"state_hash", frame.state_hash.hex()}});
+    if (has_density(settings.scene) && (settings.scene.layers.empty() || settings.scene.density_files.combined))
+        entry["density"] = relative(settings, folder.density(frame.number));
     if (settings.render && (frames.png || frames.video)) {
         entry["png"] = relative(settings, folder.picture(frame.number, ".png"));
     }
@@ -74,10 +90,11 @@ Json frame_json(const RunSettings& settings, const FrameRecord& frame, const Man
         entry["exr"] = relative(settings, folder.picture(frame.number, ".exr"));
     Json layers = Json::object();
     for (const LayerOptions& layer : settings.scene.layers) {
-        if (has_density(layer))
+        if (settings.scene.density_files.per_layer && has_density(layer))
             layers[layer.name] = relative(settings, folder.density(frame.number, layer.name));
     }
     if (!layers.empty()) entry["layers"] = std::move(layers);
+    if (!frame.files.empty()) entry["files"] = files_json(frame.files);
     const auto rain = state.rain.find(frame.number);
     if (rain == state.rain.end()) return entry;
     Json areas = Json::array();
@@ -86,7 +103,15 @@ Json frame_json(const RunSettings& settings, const FrameRecord& frame, const Man
     return entry;
 }
 
-Json bounds_json(const Scene& scene, const GridBox& box) {
+// null on an axis that does not repeat.
+Json period_json(const Vec3& period) {
+    Json json = Json::array();
+    for (int axis = 0; axis < 3; ++axis) json.push_back(period[axis] > 0 ? Json(period[axis]) : Json());
+    return json;
+}
+
+// Of a layer, or of all together.
+Json bounds_json(const Scene& scene, const GridBox& box, std::optional<std::size_t> layer) {
     const int refine = scene.density.refine;
     const Placement& at = box.placement;
     const Extent& cells = box.extent;
@@ -96,8 +121,37 @@ Json bounds_json(const Scene& scene, const GridBox& box) {
             {"max_m",
              {at.origin_m.x + cells.x * at.cell_size_m, at.origin_m.y + cells.y * at.cell_size_m,
               at.origin_m.z + cells.z * at.cell_size_m}},
+            {"period_m", period_json(period_m(scene, layer))},
             {"up_axis", "z"},
             {"extinction_per_m", scene.density.extinction_per_m}};
+}
+
+Json place_json(const Georeference& place) {
+    Json json = {{"latitude_deg", place.latitude_deg},
+                 {"longitude_deg", place.longitude_deg},
+                 {"height_m", place.height_m},
+                 {"height_datum", place.height_datum == HeightDatum::msl ? "msl" : "ellipsoid"},
+                 {"geoid_height_m", place.geoid_height_m},
+                 {"heading_deg", place.heading_deg}};
+    if (!place.start_utc.empty()) json["start_utc"] = place.start_utc;
+    json["projection"] = "tangent";
+    json["ecef_from_world"] = ecef_from_world(place);
+    return json;
+}
+
+// The table of one wind at its key frames.
+Json wind_json(const Wind& wind) {
+    Json keyframes = Json::array();
+    for (const WindKeyframe& keyframe : wind.keyframes) {
+        Json levels = Json::array();
+        for (const WindLevel& level : keyframe.levels) {
+            levels.push_back({{"height_m", level.height_m},
+                              {"east_m_per_s", level.velocity.east_m_per_s},
+                              {"north_m_per_s", level.velocity.north_m_per_s}});
+        }
+        keyframes.push_back({{"time_s", keyframe.time_s}, {"levels", std::move(levels)}});
+    }
+    return keyframes;
 }
 
 // The box of all layers together.
@@ -112,12 +166,14 @@ GridBox whole_box(const Scene& scene) {
 
 Json layers_json(const RunSettings& settings, const RunFolder& folder) {
     Json layers = Json::array();
-    for (const LayerOptions& layer : settings.scene.layers) {
+    for (std::size_t n = 0; n < settings.scene.layers.size(); ++n) {
+        const LayerOptions& layer = settings.scene.layers[n];
         layers.push_back({{"name", layer.name},
                           {"automaton", layer.automaton},
                           {"veil", layer.is_veil},
                           {"opacity", layer.opacity},
-                          {"bounds", bounds_json(settings.scene, {layer.extent, layer.placement})},
+                          {"bounds", bounds_json(settings.scene, {layer.extent, layer.placement}, n)},
+                          {"wind", wind_json(layer_wind(settings.scene, n))},
                           {"statistics", relative(settings, folder.statistics(layer.name))}});
     }
     return layers;
@@ -146,7 +202,9 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
     json["steps"] = {{"reported", state.steps_reported},
                      {"time_step_s", scene.automaton.time_step_s},
                      {"state_hash", state.state_hash}};
-    json["bounds"] = bounds_json(scene, whole_box(scene));
+    json["bounds"] = bounds_json(scene, whole_box(scene), std::nullopt);
+    if (scene.georeference.given) json["georeference"] = place_json(scene.georeference);
+    json["wind"] = wind_json(scene.automaton.wind);
     if (!scene.layers.empty()) json["layers"] = layers_json(settings, folder);
     Json keys = Json::object();
     for (const auto& [key, value] : parameters(scene)) keys[key] = value;
@@ -170,6 +228,12 @@ std::string members(const Json& object) {
 
 }  // namespace
 
+FileRecord file_record(const Json& json) {
+    return {json.at("path").get<std::string>(),
+            {json.at("bytes").get<std::uint64_t>(), json.at("xxh3").get<std::string>()},
+            json.value("voxels_xxh3", std::string())};
+}
+
 void write_manifest(const RunSettings& settings, const ManifestState& state) {
     const RunFolder folder{settings.folder, settings.scene.name};
     write_pieces_atomically(folder.manifest(), [&](const AppendPiece& append) {
@@ -181,9 +245,11 @@ void write_manifest(const RunSettings& settings, const ManifestState& state) {
                                 .dump(-1, ' ', false, Json::error_handler_t::replace));
             separator = ",\n";
         }
-        const Json tail = {
+        Json tail = Json::object();
+        if (!state.run_files.empty()) tail["run_files"] = files_json(state.run_files);
+        tail.update(Json{
             {"scene_text", settings.scene_text},
-            {"timing", {{"wall_s", state.wall_s}, {"backend", state.backend}, {"device", state.device}}}};
+            {"timing", {{"wall_s", state.wall_s}, {"backend", state.backend}, {"device", state.device}}}});
         append("\n  ],\n" + members(tail) + "\n}\n");
     });
 }
@@ -199,18 +265,15 @@ std::vector<RainRecord> rain_of(const FrameResult& frame) {
     return areas;
 }
 
-std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& path) {
+namespace {
+
+// Calls `read` with the manifest as a whole. Throws Error(io) naming it.
+template <class Read>
+auto with_manifest(const std::filesystem::path& path, const Read& read) {
     require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
     try {
-        std::map<int, std::vector<RainRecord>> rain;
-        const Json json = Json::parse(stream);
-        for (const Json& frame : json.at("frames")) {
-            if (!frame.contains("rain")) continue;
-            std::vector<RainRecord>& areas = rain[frame.at("number").get<int>()];
-            for (const Json& area : frame.at("rain")) areas.push_back(rain_record(area));
-        }
-        return rain;
+        return read(Json::parse(stream));
     } catch (const Error& error) {
         throw Error(ErrorCode::io, path.string() + ": " + error.what());
     } catch (const std::ios_base::failure& failure) {
@@ -218,6 +281,32 @@ std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& pa
     } catch (const nlohmann::json::exception&) {
         throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
     }
+}
+
+}  // namespace
+
+std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& path) {
+    return with_manifest(path, [](const Json& json) {
+        std::map<int, std::vector<RainRecord>> rain;
+        for (const Json& frame : json.at("frames")) {
+            if (!frame.contains("rain")) continue;
+            std::vector<RainRecord>& areas = rain[frame.at("number").get<int>()];
+            for (const Json& area : frame.at("rain")) areas.push_back(rain_record(area));
+        }
+        return rain;
+    });
+}
+
+std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::path& path) {
+    return with_manifest(path, [](const Json& json) {
+        std::map<int, std::vector<FileRecord>> files;
+        for (const Json& frame : json.at("frames")) {
+            if (!frame.contains("files")) continue;
+            std::vector<FileRecord>& records = files[frame.at("number").get<int>()];
+            for (const Json& file : frame.at("files")) records.push_back(file_record(file));
+        }
+        return files;
+    });
 }
 
 EarlierRun read_manifest(const std::filesystem::path& path) {

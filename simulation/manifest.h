@@ -10,18 +10,29 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "automaton/automaton.h"
+#include "core/digest.h"
 #include "simulation/run_folder.h"
 
 namespace nephos {
 
-// A frame that is in the folder. Small: a run keeps one for each frame, 40 bytes beside a grid of kilobytes
-// on disk.
+// A file of the run and the checksums by which it is known.
+struct FileRecord {
+    std::string path;  // below the run's folder, with forward slashes
+    FileDigest digest;
+    std::string voxels;  // voxel_digest() of a density file; empty for others
+};
+
+// A frame that is in the folder. Small: a run keeps one for each frame, some hundred bytes beside a grid of
+// kilobytes on disk.
 struct FrameRecord {
     int number = 1;
     double time_s = 0;
     std::uint64_t step = 0;
     StateHash state_hash;
+    std::vector<FileRecord> files;
 };
 
 // A rain area of a frame, as the manifest lists it.
@@ -40,13 +51,14 @@ struct ManifestState {
     std::uint64_t steps_reported = 0;
     std::string state_hash;  // at the last reported step
     std::vector<FrameRecord> frames;
+    std::vector<FileRecord> run_files;  // of a complete run: those of no frame, but for the manifest
     std::map<int, std::vector<RainRecord>> rain;  // by number of the frame; frames without rain left out
     double wall_s = 0;
     std::string backend, device;  // that drew; empty without pictures
 };
 
 // Writes atomically, frame by frame. As JSON cannot be appended to, every call writes the whole list anew:
-// some 200 bytes a frame, against seconds between two checkpoints. Throws Error(io).
+// some 400 bytes a frame, against seconds between two checkpoints. Throws Error(io).
 void write_manifest(const RunSettings& settings, const ManifestState& state);
 
 // Returns the rain areas of all layers of a frame.
@@ -55,6 +67,13 @@ std::vector<RainRecord> rain_of(const FrameResult& frame);
 // Reads those that the manifest of an earlier run lists, exactly as they were. Throws Error(io) as
 // read_manifest().
 std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& path);
+
+// Returns the record of a file as a manifest has it. Throws a JSON exception when it is none.
+FileRecord file_record(const nlohmann::ordered_json& json);
+
+// Reads the files of the frames that the manifest of an earlier run lists; none for frames of a manifest that has no
+// digests, as those of earlier versions. Throws Error(io) as read_manifest().
+std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::path& path);
 
 // What a later run must know about an earlier one.
 struct EarlierRun {

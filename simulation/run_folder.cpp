@@ -11,6 +11,7 @@
 #include "automaton/checkpoint.h"
 #include "core/error.h"
 #include "density/vdb/vdb_file.h"
+#include "density/voxel_digest.h"
 #include "render/image/video.h"
 #include "scenes/format/writer.h"
 #include "simulation/earlier_run.h"
@@ -39,7 +40,9 @@ class Recorder : public SimulationSink {
     explicit Recorder(const RunSettings& settings)
         : settings_(settings),
           folder_{settings.folder, settings.scene.name},
-          output_(settings, [this](const FrameResult& frame) { note(frame); }) {
+          output_(settings, [this](const FrameResult& frame, std::vector<WrittenFile> files) {
+              note(frame, std::move(files));
+          }) {
         state_.backend = output_.backend_name();
         state_.device = output_.device_name();
     }
@@ -79,7 +82,7 @@ class Recorder : public SimulationSink {
             for (; number < simulation.next_frame(); ++number) {
                 if (moment_of_frame(settings_.scene, number - 1).step != step) return;
                 const double time_s = frame_time_s(settings_.scene.frames, number - 1);
-                state_.frames.push_back({number, time_s, step, hash});
+                state_.frames.push_back({number, time_s, step, hash, {}});
             }
         };
         // Frames before the first row of their step cannot be: a range of frames reports every step from 0.
@@ -93,6 +96,11 @@ class Recorder : public SimulationSink {
         std::erase_if(state_.rain, [&](const auto& rain) { return rain.first >= simulation.next_frame(); });
         state_.steps_reported = simulation.next_step();
         require_frames("is missing, although the checkpoint is past it");
+        std::map<int, std::vector<FileRecord>> files = read_frame_files(folder_.manifest());
+        for (FrameRecord& frame : state_.frames) {
+            frame.files = std::move(files[frame.number]);
+            if (frame.files.empty()) frame.files = digests_of_frame(frame.number);
+        }
     }
 
     // Throws Error(io) when a file of a frame that is done is not there.
@@ -109,13 +117,13 @@ class Recorder : public SimulationSink {
         }
     }
 
-    // Frames and statistics first: what the checkpoint goes on from is then always there. So is the
-    // manifest's rain, which no other file has.
+    // Frames and statistics first: what the checkpoint goes on from is then always there. So are the manifest's rain
+    // and digests, which no other file has.
     void save(Simulation& simulation, double wall_s, bool with_checkpoint = true) {
         output_.finish();
         statistics_->save();
         for (StatisticsFile& file : layer_statistics_) file.save();
-        if (!state_.rain.empty()) write_manifest(false, wall_s);
+        write_manifest(false, wall_s);
         if (with_checkpoint) write_checkpoint(folder_.checkpoint(), simulation.save());
         write_manifest(false, wall_s);
     }
@@ -136,6 +144,11 @@ class Recorder : public SimulationSink {
 
     void write_manifest(bool complete, double wall_s) {
         state_.complete = complete;
+        state_.run_files.clear();
+        if (complete) {
+            for (const std::filesystem::path& path : run_files())
+                state_.run_files.push_back({relative(path), file_digest(path), {}});
+        }
         state_.wall_s = wall_s;
         nephos::write_manifest(settings_, state_);
         steps_saved_ = state_.steps_reported;
@@ -157,13 +170,11 @@ class Recorder : public SimulationSink {
     std::vector<RunFiles> frame_files() const {
         RunFiles density{"density", {}}, png{"png", {}}, exr{"exr", {}};
         for (const FrameRecord& frame : state_.frames) {
-            if (has_density(settings_.scene)) density.files.push_back(folder_.density(frame.number));
-            for (const LayerOptions& layer : settings_.scene.layers) {
-                if (has_density(layer)) density.files.push_back(folder_.density(frame.number, layer.name));
-            }
+            for (std::filesystem::path& file : density_files(folder_, settings_.scene, frame.number))
+                density.files.push_back(std::move(file));
             if (!settings_.render) continue;
-            if (wants_png(settings_.scene)) png.files.push_back(folder_.picture(frame.number, ".png"));
-            if (settings_.scene.frames.exr) exr.files.push_back(folder_.picture(frame.number, ".exr"));
+            for (std::filesystem::path& file : picture_files(folder_, settings_.scene, frame.number))
+                (file.extension() == ".png" ? png : exr).files.push_back(std::move(file));
         }
         std::vector<RunFiles> all{std::move(density), std::move(png), std::move(exr)};
         std::erase_if(all, [](const RunFiles& files) { return files.files.empty(); });
@@ -174,9 +185,37 @@ class Recorder : public SimulationSink {
     const RunFolder& folder() const { return folder_; }
 
   private:
+    std::string relative(const std::filesystem::path& path) const {
+        return path.lexically_relative(settings_.folder).generic_string();
+    }
+
+    // Of the files that belong to no frame, all but the manifest.
+    std::vector<std::filesystem::path> run_files() const {
+        std::vector<std::filesystem::path> files{folder_.statistics()};
+        for (const LayerOptions& layer : settings_.scene.layers)
+            files.push_back(folder_.statistics(layer.name));
+        files.push_back(folder_.checkpoint());
+        if (settings_.render && wants_video(settings_.scene)) files.push_back(folder_.video());
+        return files;
+    }
+
+    // For frames of a run whose manifest, of an earlier version, names no digests.
+    std::vector<FileRecord> digests_of_frame(int number) const {
+        std::vector<FileRecord> files;
+        for (const std::filesystem::path& path : density_files(folder_, settings_.scene, number))
+            files.push_back({relative(path), file_digest(path), voxel_digest(read_density(path))});
+        if (!settings_.render) return files;
+        for (const std::filesystem::path& path : picture_files(folder_, settings_.scene, number))
+            files.push_back({relative(path), file_digest(path), {}});
+        return files;
+    }
+
     // By the thread that writes.
-    void note(const FrameResult& frame) {
-        state_.frames.push_back({frame.number, frame.time_s, frame.step, frame.hash});
+    void note(const FrameResult& frame, std::vector<WrittenFile> written) {
+        std::vector<FileRecord> files;
+        for (WrittenFile& file : written)
+            files.push_back({relative(file.path), std::move(file.digest), std::move(file.voxels)});
+        state_.frames.push_back({frame.number, frame.time_s, frame.step, frame.hash, std::move(files)});
         if (std::vector<RainRecord> rain = rain_of(frame); !rain.empty())
             state_.rain[frame.number] = std::move(rain);
         frames_done_ = int(state_.frames.size());
@@ -298,6 +337,23 @@ std::filesystem::path RunFolder::density(int frame, const std::string& layer) co
 
 std::filesystem::path RunFolder::picture(int frame, std::string_view extension) const {
     return frame_path(folder / "frames", name, frame).replace_extension(extension);
+}
+
+std::vector<std::filesystem::path> density_files(const RunFolder& folder, const Scene& scene, int frame) {
+    std::vector<std::filesystem::path> files;
+    if (has_density(scene) && (scene.layers.empty() || scene.density_files.combined))
+        files.push_back(folder.density(frame));
+    for (const LayerOptions& layer : scene.layers) {
+        if (scene.density_files.per_layer && has_density(layer)) files.push_back(folder.density(frame, layer.name));
+    }
+    return files;
+}
+
+std::vector<std::filesystem::path> picture_files(const RunFolder& folder, const Scene& scene, int frame) {
+    std::vector<std::filesystem::path> files;
+    if (wants_png(scene)) files.push_back(folder.picture(frame, ".png"));
+    if (scene.frames.enabled && scene.frames.exr) files.push_back(folder.picture(frame, ".exr"));
+    return files;
 }
 
 std::filesystem::path RunFolder::video() const { return folder / "frames" / (name + ".mp4"); }

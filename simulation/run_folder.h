@@ -45,6 +45,10 @@ struct RunFolder {
     std::filesystem::path checkpoint() const { return folder / "checkpoint.nephos"; }
 };
 
+// Return the files of a frame: its density files, those of all layers together first; its pictures.
+std::vector<std::filesystem::path> density_files(const RunFolder& folder, const Scene& scene, int frame);
+std::vector<std::filesystem::path> picture_files(const RunFolder& folder, const Scene& scene, int frame);
+
 struct RunSettings {
     Scene scene;
     std::optional<Lattice> initial;  // the state at step 0, when it is not the scene's own; taken by the run

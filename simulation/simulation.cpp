@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "density/optical_columns.h"
 #include "density/combine.h"
 #include "density/smoothing.h"
 
@@ -47,6 +48,7 @@ class TotalStatistics {
         total_.act += layer.act;
         total_.cld += layer.cld;
         clear_ *= 1 - layer.cover;
+        optically_clear_ *= 1 - layer.optical_cover;
         base_ = std::fmin(base_, layer.base_m);
         top_ = std::fmax(top_, layer.top_m);
         density_ += layer.mean_density * volume_m3;
@@ -58,13 +60,14 @@ class TotalStatistics {
         total.base_m = base_;
         total.top_m = top_;
         total.base_mean_m = total.top_mean_m = total.perimeter_m = std::numeric_limits<double>::quiet_NaN();
+        total.optical_cover = 1 - optically_clear_;
         total.mean_density = volume_ > 0 ? density_ / volume_ : 0;
         return total;
     }
 
   private:
     CloudStatistics total_;
-    double clear_ = 1, density_ = 0, volume_ = 0;
+    double clear_ = 1, optically_clear_ = 1, density_ = 0, volume_ = 0;
     double base_ = std::numeric_limits<double>::quiet_NaN(), top_ = base_;
 };
 
@@ -217,6 +220,8 @@ void Simulation::report_step(SimulationSink& sink) {
             if (layers_[n].is_veil() && makes_density(n)) layer.statistics = cloud_statistics(densities[n]);
             layer.statistics.mean_density = makes_density(n) ? densities[n].sum() / double(box.extent.cells())
                                                              : std::numeric_limits<double>::quiet_NaN();
+            layer.statistics.optical_cover = makes_density(n) ? optical_cover(densities[n], scene_.density.extinction_per_m)
+                                                              : std::numeric_limits<double>::quiet_NaN();
             total.add(layer.statistics, volume_m3(box));
         }
         result.layers.push_back(std::move(layer));

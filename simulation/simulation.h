@@ -58,7 +58,7 @@ struct LayerStep {
 struct StepResult {
     std::uint64_t step = 0;
     double time_s = 0;
-    // mean_density is that of q at this step, NaN where no density is made (SimulationResults). Of several layers:
+    // mean_density and optical_cover are those of q at this step, NaN where no density is made (SimulationResults). Of several layers:
     // sums of cells; 1 - prod(1 - cover), which assumes random overlap; lowest base; highest top; mean density of
     // all boxes; NaN for the means over columns and the perimeter, which belong to one lattice.
     CloudStatistics statistics;

@@ -56,7 +56,8 @@ std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<cons
         if (schedule.period() == 1) return present;
         const int frame = schedule.frame_of_light(cloud.slot, film->index);
         const auto [found, added] = earlier.try_emplace(frame);
-        if (added) found->second = light_of(sun_at(*film->sun, frame_time_s(*film->frames, frame)));
+        if (added) found->second = light_of(
+                turned_sun_at(*film->sun, film->heading_deg, frame_time_s(*film->frames, frame)));
         return found->second;
     };
     std::vector<CloudToLight> lit;

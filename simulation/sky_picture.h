@@ -37,7 +37,8 @@ struct DrawnClouds {
 struct FilmFrame {
     int index = 0;                         // from 0
     const FrameOptions* frames = nullptr;  // not null
-    const Sun* sun = nullptr;              // not null; before sun_at()
+    const Sun* sun = nullptr;              // not null; before turned_sun_at()
+    double heading_deg = 0;                // true bearing of the world's y axis
 };
 
 class SkyBillboards {

@@ -23,9 +23,9 @@ std::string field(double value) { return std::isnan(value) ? std::string() : fmt
 
 // What the two kinds of rows end with.
 std::string fields(const CloudStatistics& s, const StateHash& hash) {
-    return fmt::format("{},{},{},{},{},{},{},{},{},{},{}", s.hum, s.act, s.cld, field(s.cover),
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", s.hum, s.act, s.cld, field(s.cover),
                        field(s.base_m), field(s.top_m), field(s.base_mean_m), field(s.top_mean_m),
-                       field(s.perimeter_m), field(s.mean_density), hash.hex());
+                       field(s.perimeter_m), field(s.mean_density), field(s.optical_cover), hash.hex());
 }
 
 // The hash at the end of a row.

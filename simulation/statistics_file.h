@@ -19,12 +19,11 @@ namespace nephos {
 
 inline constexpr std::string_view kStatisticsHeader =
     "step,time_s,hum,act,cld,cloud_cover,base_m,top_m,base_mean_m,top_mean_m,perimeter_m,"
-    "mean_density,hash\n";
+    "mean_density,optical_cover,hash\n";
 // Of the file that each layer has in a scene with layers.
 inline constexpr std::string_view kLayerStatisticsHeader =
-    "step,time_s,state,clouds,rain_areas,rain_mm_per_h,hum,act,cld,cloud_cover,base_m,top_m,base_mean_m,top_"
-    "mean_m,"
-    "perimeter_m,mean_density,hash\n";
+    "step,time_s,state,clouds,rain_areas,rain_mm_per_h,hum,act,cld,cloud_cover,base_m,top_m,base_mean_m,top_mean_m,"
+    "perimeter_m,mean_density,optical_cover,hash\n";
 
 // Returns a row with its newline.
 std::string statistics_row(const StepResult& result);

@@ -118,7 +118,7 @@ VolumePicture draw_volume(const std::string& file, const LoadedDensity& loaded,
     PendingFrame pending = painter.begin(std::move(frame));
     result.metaballs = pending.balls.size();
     result.picture = painter.finish(std::move(pending));
-    result.options.sun = sun_at(result.options.sun, time_s);
+    result.options.sun = scene_sun_at(drawn, time_s);
     return result;
 }
 

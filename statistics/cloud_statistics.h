@@ -64,6 +64,8 @@ struct CloudStatistics {
     double top_mean_m = 0;    // mean of the cloud top over the columns with cloud; NaN without cloud
     double perimeter_m = 0;   // length of the edge of the shadow
     double mean_density = 0;  // mean of cld over all cells of the box
+    // Fraction of the columns whose optical depth is above 1, what an observer calls cover; 0 where it is not computed.
+    double optical_cover = 0;
 };
 
 // Returns the statistics of counted cloud; hum and act are 0.

@@ -20,10 +20,12 @@ MAY_USE = {
     "render/options": {"core"},
     "render": {"core", "automaton", "density", "render/options"},
     "scenes/format": {"core", "automaton", "seeds", "density", "render/options"},
-    "simulation": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format"},
+    "scenes/metar": {"core"},
+    "simulation": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format",
+                   "scenes/metar"},
     "study": {"core", "automaton", "statistics", "seeds", "density", "render/options", "scenes/format", "simulation"},
     "apps/nephos": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format",
-                    "simulation", "study"},
+                    "scenes/metar", "simulation", "study"},
     "apps/editor": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format",
                     "simulation", "apps/nephos"},
 }
@@ -47,21 +49,23 @@ LEAF = "render/shared/"
 # Start of a system header's name: the modules that may include it.
 LIBRARIES = {
     "openvdb/": {"density"},
+    "nanovdb/": {"density"},
+    "zlib.h": {"density"},
     "vulkan/": {"render", "apps/editor"},
     "GLFW/": {"apps/editor"},
     "imgui": {"apps/editor"},
     "backends/imgui": {"apps/editor"},
     "OpenEXR/": {"render"},
     "Imf": {"render"},
-    "png.h": {"render"},
+    "png.h": {"density", "render"},
     "CLI/": {"apps/nephos"},
     "toml++/": {"scenes/format"},
     "Random123/": {"core", "automaton", "seeds"},
     "seccomp.h": {"density"},
-    "xxhash.h": {"automaton", "render", "scenes/format"},
+    "xxhash.h": {"core", "automaton", "render", "scenes/format"},
 }
 # Seconds and hundreds of megabytes each: never in a public header.
-HEAVY = ("openvdb/", "vulkan/")
+HEAVY = ("openvdb/", "nanovdb/", "vulkan/")
 SOURCES = {".h", ".cpp", ".vert", ".frag", ".comp", ".glsl", ".py", ".sh"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 

@@ -41,6 +41,9 @@ void add_commands(CLI::App& app, Action& action, const EditFunction& edit) {
     add_info_command(app, action);
     add_hash_command(app, action);
     add_state_command(app, action);
+    add_export_command(app, action);
+    add_metar_command(app, action);
+    add_verify_command(app, action);
     add_edit_command(app, action, edit);
     add_completion_command(app, action);
     for (CLI::App* sub : app.get_subcommands({})) {

@@ -39,6 +39,9 @@ void add_validate_command(CLI::App& app, Action& action);
 void add_info_command(CLI::App& app, Action& action);
 void add_hash_command(CLI::App& app, Action& action);
 void add_state_command(CLI::App& app, Action& action);
+void add_verify_command(CLI::App& app, Action& action);
+void add_export_command(CLI::App& app, Action& action);
+void add_metar_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
 void add_edit_command(CLI::App& app, Action& action, const EditFunction& edit);
 

@@ -48,6 +48,16 @@ Json pairs_json(const std::vector<std::pair<std::string, std::string>>& pairs) {
     return json;
 }
 
+// Numbers as numbers, and texts as texts.
+Json entries_json(const std::vector<VdbMetadataEntry>& entries) {
+    Json json = Json::object();
+    for (const VdbMetadataEntry& entry : entries) {
+        Json value = entry.is_json ? Json::parse(entry.value, nullptr, false) : Json(entry.value);
+        json[entry.name] = value.is_discarded() ? Json(entry.value) : std::move(value);
+    }
+    return json;
+}
+
 // The number of bytes of a text up to `limit` that does not cut a character of UTF-8.
 std::size_t cut_at(std::string_view text, std::size_t limit) {
     if (text.size() <= limit) return text.size();
@@ -74,6 +84,7 @@ std::string pairs_text(const std::vector<std::pair<std::string, std::string>>& p
 Json vdb_json(const VdbInfo& info) {
     Json grids = Json::array();
     for (const VdbGridInfo& grid : info.grids) {
+        const Matrix4& m = grid.world_from_index;
         grids.push_back({{"name", grid.name},
                          {"type", grid.type},
                          {"class", grid.grid_class},
@@ -81,18 +92,37 @@ Json vdb_json(const VdbInfo& info) {
                          {"active_voxels", grid.active_voxels},
                          {"active_min", grid.active_box.min},
                          {"active_max", grid.active_box.max},
-                         {"metadata", pairs_json(grid.metadata)}});
+                         {"origin", {m[3], m[7], m[11]}},
+                         {"world_from_index", m},
+                         {"metadata", entries_json(grid.metadata)}});
     }
     return {{"kind", "vdb"},
             {"file_version", info.file_version},
             {"grids", grids},
-            {"metadata", pairs_json(info.metadata)}};
+            {"metadata", entries_json(info.metadata)}};
+}
+
+std::string entries_text(const std::vector<VdbMetadataEntry>& entries, int indent) {
+    std::vector<std::pair<std::string, std::string>> pairs;
+    for (const VdbMetadataEntry& entry : entries) pairs.emplace_back(entry.name, entry.value);
+    return pairs_text(pairs, indent);
+}
+
+// The place of the first voxel's centre, and the matrix that turns an index into a place, by rows.
+std::vector<std::pair<std::string, std::string>> place_rows(const VdbGridInfo& grid) {
+    const Matrix4& m = grid.world_from_index;
+    std::vector<std::pair<std::string, std::string>> rows;
+    rows.emplace_back("voxel (0, 0, 0)", fmt::format("centre at ({:g}, {:g}, {:g})", m[3], m[7], m[11]));
+    rows.emplace_back("index to world",
+                      fmt::format("[{:g} {:g} {:g} {:g}; {:g} {:g} {:g} {:g}; {:g} {:g} {:g} {:g}]", m[0],
+                                  m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]));
+    return rows;
 }
 
 std::string vdb_text(const VdbInfo& info, bool colours) {
     std::string out = fmt::format("OpenVDB {}, {} grid{}\n", escaped(info.file_version), info.grids.size(),
                                   info.grids.size() == 1 ? "" : "s");
-    out += pairs_text(info.metadata, 2);
+    out += entries_text(info.metadata, 2);
     for (const VdbGridInfo& grid : info.grids) {
         const VoxelBox& box = grid.active_box;
         out += fmt::format("\n  {}  {}, {}\n",
@@ -109,8 +139,9 @@ std::string vdb_text(const VdbInfo& info, bool colours) {
                               fmt::format("({}, {}, {}) to ({}, {}, {})", box.min[0], box.min[1], box.min[2],
                                           box.max[0], box.max[1], box.max[2]));
         }
+        for (auto& row : place_rows(grid)) rows.push_back(std::move(row));
         out += pairs_text(rows, 4);
-        if (grid.metadata != info.metadata) out += pairs_text(grid.metadata, 4);
+        if (grid.metadata != info.metadata) out += entries_text(grid.metadata, 4);
     }
     return out;
 }

@@ -234,7 +234,8 @@ void add_run_command(CLI::App& app, Action& action) {
     command->add_flag(
         "--statistics-only", a->statistics_only,
         "No frames at all, only the manifest and statistics of every step (docs/research.md defines the "
-        "columns); no density is made, so mean_density is empty; no checkpoint is left when it is complete");
+        "columns); no density is made, so mean_density and optical_cover are empty; no checkpoint is left when it "
+        "is complete");
     command->add_flag(
         "--checkpoint", a->checkpoint,
         "With --statistics-only: leave the checkpoint of the complete run, to lengthen it later");

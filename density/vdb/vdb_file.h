@@ -36,6 +36,15 @@
 //     nephos_random_stream_version      int32    version of the random stream
 //     nephos_refine                     int32    voxels per cell and axis
 //     nephos_bbox_min, nephos_bbox_max  vec3i    bounds of the voxels, both included; constant over a sequence
+//     nephos_wind                       string   "[[height m, east m/s, north m/s], ...]"; missing in calm air
+//     nephos_period_m                   vec3d    where it repeats, metres; 0 on an axis that does not
+//
+// and where the scene has a place on Earth (core/place.h):
+//
+//     nephos_latitude_deg, nephos_longitude_deg, nephos_height_m, nephos_geoid_height_m, nephos_heading_deg  double
+//     nephos_height_datum               string   "msl" or "ellipsoid"
+//     nephos_start_utc, nephos_utc      string   the moments of simulated time 0 and of this frame; missing without
+//     nephos_ecef_from_world            mat4d    world to ECEF (WGS 84), by rows, for column vectors
 //
 // clang-format on
 
@@ -48,6 +57,7 @@
 #include <vector>
 
 #include "automaton/lattice.h"
+#include "core/place.h"
 #include "core/wind.h"
 #include "density/density_grid.h"
 
@@ -65,6 +75,9 @@ struct VdbMetadata {
     std::string state_hash;
     std::string nephos_version;
     int random_stream_version = 0;
+    Georeference georeference;
+    Vec3 period_m{};  // 0 on an axis that does not repeat
+    std::vector<WindLevel> wind;  // at the moment of the file; linear between levels, constant beyond
     bool operator==(const VdbMetadata&) const = default;
 };
 
@@ -74,7 +87,9 @@ struct VdbContent {
     bool half = false;  // density as 16-bit floats
     std::optional<BitPlaneView> hum, act, cld;
     Placement cells;             // of the bit planes; must agree with density's placement and extent / refine
-    const Wind* wind = nullptr;  // writes `vel` at metadata.time_s; needs density
+    // Writes the wind by height, one velocity a level of voxels, as a grid of this name; needs density.
+    std::vector<Velocity> wind;
+    std::string wind_name = "vel";
 };
 
 // Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content
@@ -132,6 +147,14 @@ DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions
 Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
                    const VdbReadLimits& limits = {});
 
+// One value of the metadata of a file.
+struct VdbMetadataEntry {
+    std::string name;
+    std::string value;     // as text; numbers with all their digits
+    bool is_json = false;  // a number, a truth value, or a list of numbers, in the form of JSON
+    bool operator==(const VdbMetadataEntry&) const = default;
+};
+
 // One grid as `nephos info` lists it.
 struct VdbGridInfo {
     std::string name;
@@ -140,13 +163,14 @@ struct VdbGridInfo {
     Vec3 voxel_size{};       // world units
     VoxelBox active_box;
     std::uint64_t active_voxels = 0;
-    std::vector<std::pair<std::string, std::string>> metadata;  // name, value as text; by name
+    Matrix4 world_from_index{};              // by rows; an index is the centre of a voxel
+    std::vector<VdbMetadataEntry> metadata;  // by name
 };
 
 struct VdbInfo {
     std::string file_version;        // "10.0/224": library and format
     std::vector<VdbGridInfo> grids;  // in the file's order
-    std::vector<std::pair<std::string, std::string>> metadata;
+    std::vector<VdbMetadataEntry> metadata;
 };
 
 // Lists the grids and metadata of a file. Throws Error(io) as load_density().

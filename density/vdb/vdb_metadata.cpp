@@ -2,8 +2,48 @@
 #include "density/vdb/vdb_metadata.h"
 
 #include <charconv>
+#include <cmath>
+#include <cstring>
+
+#include "core/text.h"
 
 namespace nephos {
+
+namespace {
+
+std::string wind_text(const std::vector<WindLevel>& levels) {
+    std::string text = "[";
+    for (const WindLevel& level : levels) {
+        text += (text.size() > 1 ? ", [" : "[") + number_text(level.height_m) + ", " +
+                number_text(level.velocity.east_m_per_s) + ", " + number_text(level.velocity.north_m_per_s) + "]";
+    }
+    return text + "]";
+}
+
+// The inverse; no levels for any other text.
+std::vector<WindLevel> wind_levels(const std::string& text) {
+    std::vector<double> numbers;
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    while (at < end) {
+        if (std::strchr("[], ", *at) != nullptr) {
+            ++at;
+            continue;
+        }
+        double number = 0;
+        const auto [next, error] = std::from_chars(at, end, number);
+        if (error != std::errc() || !std::isfinite(number)) return {};
+        numbers.push_back(number);
+        at = next;
+    }
+    std::vector<WindLevel> levels;
+    if (numbers.size() % 3 != 0) return levels;
+    for (std::size_t n = 0; n < numbers.size(); n += 3)
+        levels.push_back({numbers[n], {numbers[n + 1], numbers[n + 2]}});
+    return levels;
+}
+
+}  // namespace
 
 openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int refine) {
     openvdb::MetaMap map;
@@ -23,6 +63,23 @@ openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int ref
     map.insertMeta(kMetaRefine, openvdb::Int32Metadata(refine));
     map.insertMeta(kMetaBoxMin, openvdb::Vec3IMetadata({0, 0, 0}));
     map.insertMeta(kMetaBoxMax, openvdb::Vec3IMetadata({voxels.x - 1, voxels.y - 1, voxels.z - 1}));
+    const Vec3& period = metadata.period_m;
+    map.insertMeta(kMetaPeriod, openvdb::Vec3DMetadata({period.x, period.y, period.z}));
+    if (!metadata.wind.empty()) map.insertMeta(kMetaWind, openvdb::StringMetadata(wind_text(metadata.wind)));
+    if (!metadata.georeference.given) return map;
+    const Georeference& place = metadata.georeference;
+    map.insertMeta(kMetaLatitude, openvdb::DoubleMetadata(place.latitude_deg));
+    map.insertMeta(kMetaLongitude, openvdb::DoubleMetadata(place.longitude_deg));
+    map.insertMeta(kMetaHeight, openvdb::DoubleMetadata(place.height_m));
+    map.insertMeta(kMetaGeoidHeight, openvdb::DoubleMetadata(place.geoid_height_m));
+    map.insertMeta(kMetaHeading, openvdb::DoubleMetadata(place.heading_deg));
+    map.insertMeta(kMetaHeightDatum,
+                   openvdb::StringMetadata(place.height_datum == HeightDatum::msl ? "msl" : "ellipsoid"));
+    if (!place.start_utc.empty()) {
+        map.insertMeta(kMetaStart, openvdb::StringMetadata(place.start_utc));
+        map.insertMeta(kMetaUtc, openvdb::StringMetadata(utc_at(place, metadata.time_s)));
+    }
+    map.insertMeta(kMetaEcef, openvdb::Mat4DMetadata(openvdb::Mat4d(ecef_from_world(place).data())));
     return map;
 }
 
@@ -41,6 +98,22 @@ std::optional<VdbMetadata> from_meta_map(const openvdb::MetaMap& map) {
     metadata.random_stream_version = meta_value<int>(map, kMetaStreamVersion).value_or(0);
     const std::string seed = meta_value<std::string>(map, kMetaSeed).value_or("");
     std::from_chars(seed.data(), seed.data() + seed.size(), metadata.seed);
+    metadata.wind = wind_levels(meta_value<std::string>(map, kMetaWind).value_or(""));
+    const openvdb::Vec3d period = meta_value<openvdb::Vec3d>(map, kMetaPeriod).value_or(openvdb::Vec3d(0.0));
+    metadata.period_m = {period.x(), period.y(), period.z()};
+    const auto latitude = meta_value<double>(map, kMetaLatitude);
+    if (!latitude) return metadata;
+    Georeference& place = metadata.georeference;
+    place.given = true;
+    place.latitude_deg = *latitude;
+    place.longitude_deg = meta_value<double>(map, kMetaLongitude).value_or(0);
+    place.height_m = meta_value<double>(map, kMetaHeight).value_or(0);
+    place.geoid_height_m = meta_value<double>(map, kMetaGeoidHeight).value_or(0);
+    place.heading_deg = meta_value<double>(map, kMetaHeading).value_or(0);
+    const std::string datum = meta_value<std::string>(map, kMetaHeightDatum).value_or("msl");
+    place.height_datum = datum == "ellipsoid" ? HeightDatum::ellipsoid : HeightDatum::msl;
+    place.start_utc = meta_value<std::string>(map, kMetaStart).value_or("");
+    if (!place.start_utc.empty() && !utc_seconds(place.start_utc)) place.start_utc.clear();
     return metadata;
 }
 

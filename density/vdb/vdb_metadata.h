@@ -28,6 +28,17 @@ inline constexpr const char* kMetaStreamVersion = "nephos_random_stream_version"
 inline constexpr const char* kMetaRefine = "nephos_refine";
 inline constexpr const char* kMetaBoxMin = "nephos_bbox_min";
 inline constexpr const char* kMetaBoxMax = "nephos_bbox_max";
+inline constexpr const char* kMetaWind = "nephos_wind";
+inline constexpr const char* kMetaPeriod = "nephos_period_m";
+inline constexpr const char* kMetaLatitude = "nephos_latitude_deg";
+inline constexpr const char* kMetaLongitude = "nephos_longitude_deg";
+inline constexpr const char* kMetaHeight = "nephos_height_m";
+inline constexpr const char* kMetaGeoidHeight = "nephos_geoid_height_m";
+inline constexpr const char* kMetaHeading = "nephos_heading_deg";
+inline constexpr const char* kMetaHeightDatum = "nephos_height_datum";
+inline constexpr const char* kMetaStart = "nephos_start_utc";
+inline constexpr const char* kMetaUtc = "nephos_utc";
+inline constexpr const char* kMetaEcef = "nephos_ecef_from_world";
 
 openvdb::MetaMap to_meta_map(const VdbMetadata& metadata, Extent voxels, int refine);
 

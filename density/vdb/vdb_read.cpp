@@ -132,6 +132,16 @@ void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& meta
          {&metadata->scene_hash, &metadata->state_hash, &metadata->nephos_version}) {
         writer.text(clamp_message(*text, kMaxMetadataText));
     }
+    const Georeference& place = metadata->georeference;
+    writer.value(std::uint8_t(place.given));
+    for (const double number : {place.latitude_deg, place.longitude_deg, place.height_m, place.geoid_height_m,
+                                place.heading_deg})
+        writer.value(number);
+    writer.value(std::uint8_t(place.height_datum == HeightDatum::ellipsoid));
+    writer.text(place.start_utc);
+    writer.value(metadata->period_m);
+    writer.value(std::uint32_t(metadata->wind.size()));
+    for (const WindLevel& level : metadata->wind) writer.value(level);
 }
 
 std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
@@ -149,6 +159,16 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
     metadata.random_stream_version = reader.value<int>();
     for (std::string* text : {&metadata.scene_hash, &metadata.state_hash, &metadata.nephos_version})
         *text = reader.text();
+    Georeference& place = metadata.georeference;
+    place.given = reader.value<std::uint8_t>() != 0;
+    for (double* number : {&place.latitude_deg, &place.longitude_deg, &place.height_m, &place.geoid_height_m,
+                           &place.heading_deg})
+        *number = reader.value<double>();
+    place.height_datum = reader.value<std::uint8_t>() != 0 ? HeightDatum::ellipsoid : HeightDatum::msl;
+    place.start_utc = reader.text();
+    metadata.period_m = reader.value<Vec3>();
+    for (auto left = reader.value<std::uint32_t>(); left > 0; --left)
+        metadata.wind.push_back(reader.value<WindLevel>());
     return metadata;
 }
 

@@ -62,8 +62,8 @@ GridGeometry geometry_of(const VdbContent& content) {
     check_plane(content.act, cells);
     check_plane(content.cld, cells);
     if (!content.density && !cells) throw Error(ErrorCode::usage, "nothing to write into a VDB file");
-    if (content.wind && !content.density)
-        throw Error(ErrorCode::usage, "`vel` in a VDB file needs a density grid");
+    if (!content.wind.empty() && !content.density)
+        throw Error(ErrorCode::usage, "the wind in a VDB file needs a density grid");
     GridGeometry geometry;
     geometry.voxels = content.density ? content.density->extent() : *cells;
     if (geometry.voxels.cells() == 0) throw Error(ErrorCode::usage, "a VDB file needs at least one voxel");
@@ -165,14 +165,12 @@ openvdb::BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const GridGeometry& 
 }
 
 // The wind at the height of each voxel, in every block of the density grid.
-openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geometry,
-                                      double time_s) {
+openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geometry) {
+    if (content.wind.size() != std::size_t(geometry.voxels.z))
+        throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
     std::vector<openvdb::Vec3s> profile;
-    for (int k = 0; k < geometry.voxels.z; ++k) {
-        const double height = geometry.placement.origin_m.z + (k + 0.5) * geometry.placement.cell_size_m;
-        const Velocity v = wind_at(*content.wind, height, time_s);
+    for (const Velocity& v : content.wind)
         profile.emplace_back(float(v.east_m_per_s), float(v.north_m_per_s), 0.0f);
-    }
     auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3s(0.0f));
     grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
     openvdb::tree::ValueAccessor<openvdb::Vec3STree> accessor(grid->tree());
@@ -191,7 +189,7 @@ openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const GridGeome
 }
 
 openvdb::GridCPtrVec make_grids(const VdbContent& content, const GridGeometry& geometry,
-                                const openvdb::MetaMap& metadata, double time_s) {
+                                const openvdb::MetaMap& metadata) {
     openvdb::GridCPtrVec grids;
     if (content.density) {
         // A new grid around the same tree: its own metadata, no copy of the voxels.
@@ -210,9 +208,9 @@ openvdb::GridCPtrVec make_grids(const VdbContent& content, const GridGeometry& g
         describe(*grid, name, geometry, metadata);
         grids.push_back(grid);
     }
-    if (content.wind) {
-        const auto grid = velocity_grid(content, geometry, time_s);
-        describe(*grid, "vel", geometry, metadata);
+    if (!content.wind.empty()) {
+        const auto grid = velocity_grid(content, geometry);
+        describe(*grid, content.wind_name.c_str(), geometry, metadata);
         grids.push_back(grid);
     }
     return grids;
@@ -274,7 +272,7 @@ void write_vdb(const std::filesystem::path& path, const VdbContent& content, con
     openvdb::initialize();
     const GridGeometry geometry = geometry_of(content);
     const openvdb::MetaMap meta = to_meta_map(metadata, geometry.voxels, geometry.refine);
-    const auto grids = make_grids(content, geometry, meta, metadata.time_s);
+    const auto grids = make_grids(content, geometry, meta);
     write_atomically(
         path, [&](const std::filesystem::path& temporary) { write_file(temporary, path, grids, meta); });
 }

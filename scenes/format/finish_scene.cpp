@@ -154,6 +154,46 @@ void check_wind_times(const SectionReader& owner, const Wind& wind) {
     }
 }
 
+// The sun of the scene's place and start, unless the scene says where it stands. The moment of a sun with a date of its
+// own stays; a place of its own, too.
+void place_sun(const SectionReader& reader, Scene& scene) {
+    const Georeference& place = scene.georeference;
+    if (!place.given || !reader.sound({"sun", "georeference"})) return;
+    const Entry* given = reader.find("sun");
+    const auto has = [&](const char* name) { return given != nullptr && given->value.find(name) != nullptr; };
+    Sun& sun = scene.render.sun;
+    const bool own_height = sun.date.empty() && (has("elevation_deg") || has("azimuth_deg"));
+    if (own_height) return;
+    if (sun.date.empty()) {
+        if (place.start_utc.empty()) return;
+        sun.date = place.start_utc.substr(0, 10);
+        sun.time = place.start_utc.substr(11, 8);
+        if (!has("moves")) sun.moves = true;
+    }
+    if (has("latitude_deg") || has("longitude_deg")) return;
+    sun.latitude_deg = place.latitude_deg;
+    sun.longitude_deg = place.longitude_deg;
+}
+
+// Names of grids are taken for paths by some programs.
+void check_velocity_name(const SectionReader& reader, const Scene& scene) {
+    const std::string& name = scene.density_files.velocity_name;
+    const auto allowed = [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+    };
+    if (!reader.sound({"density"})) return;
+    const SectionReader density = below(reader, "density");
+    const bool good = !name.empty() && name.size() <= 60 && std::all_of(name.begin(), name.end(), allowed);
+    if (!good || name == "density" || name == "hum" || name == "act" || name == "cld") {
+        density.report("velocity_name", "`density.velocity_name` is \"" + shortened(name) + "\"",
+                       "expected up to 60 letters, digits or `_` that name no other grid, such as \"velocity\"");
+    }
+    if (!scene.density_files.per_layer && !scene.density_files.combined && !scene.layers.empty()) {
+        density.report("combined", "neither `density.per_layer` nor `density.combined` is true",
+                       "expected one of them, or `frames.enabled` = false for no density files");
+    }
+}
+
 void finish_scene(const SectionReader& reader, void* owner) {
     auto& scene = *static_cast<Scene*>(owner);
     check_name(reader, scene);
@@ -161,6 +201,8 @@ void finish_scene(const SectionReader& reader, void* owner) {
     check_wind_speed(reader, scene);
     check_periodic_sizes(reader, scene);
     check_frames(reader, scene);
+    place_sun(reader, scene);
+    check_velocity_name(reader, scene);
     finish_layers(reader, scene);
     const AutomatonOptions& automaton = scene.automaton;
     fill_in_centres(scene.automaton.field.scatters, automaton.extent, automaton.placement);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "automaton/options.h"
+#include "core/place.h"
 #include "density/options.h"
 #include "render/options/device_options.h"
 #include "render/options/options.h"
@@ -38,6 +39,14 @@ struct FrameOptions {
     bool operator==(const FrameOptions&) const = default;
 };
 
+// Which density files a run writes, and what they have beside density.
+struct DensityFileOptions {
+    bool per_layer = true;  // of a scene with layers: a file for each, with its own voxels
+    bool combined = true;   // of a scene with layers: one of all together; of others always
+    std::string velocity_name = "vel";  // of the grid of the wind: letters, digits and '_'
+    bool operator==(const DensityFileOptions&) const = default;
+};
+
 struct Scene {
     std::string name;  // base name of output files; letters, digits, '-', '_' and '.'
     AutomatonOptions automaton;
@@ -52,6 +61,8 @@ struct Scene {
     std::vector<LayerOptions> layers;
     GroundCoverOptions ground_cover;  // water and snow on the ground over time
     DensityOptions density;
+    DensityFileOptions density_files;
+    Georeference georeference;
     RenderOptions render;
     FrameOptions frames;
     bool operator==(const Scene&) const = default;
@@ -92,6 +103,13 @@ std::uint64_t steps_up_to(const Moment& moment);
 // Returns the number of frames: 0 without frames.enabled, frames.count, or if that is 0 all frames up to and including the last step,
 // at most kMaxFrames.
 int frame_count(const Scene& scene);
+
+// Returns the sun of the scene at a simulated time, its azimuth relative to the world's y axis: that of its date and
+// place, turned by the georeference's heading, or as the scene says. Throws as sun_at(). Pure.
+Sun scene_sun_at(const Scene& scene, double time_s);
+
+// The same for a sun of its own: `heading_deg` is the true bearing of the y axis.
+Sun turned_sun_at(const Sun& sun, double heading_deg, double time_s);
 
 inline constexpr int kMaxFrames = 1'000'000;
 

@@ -175,6 +175,10 @@ const Section& scene_section() {
         detail.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->density.detail == DetailOptions{});
         };
+        Key georeference = group("georeference", georeference_section());
+        georeference.written = [](const void* scene) {
+            return static_cast<const Scene*>(scene)->georeference.given;
+        };
         Key level_of_detail = group("level_of_detail", level_of_detail_section());
         level_of_detail.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->render.level_of_detail == LevelOfDetailOptions{});
@@ -187,6 +191,7 @@ const Section& scene_section() {
              model_files_key(),
              group("lattice", lattice_section()),
              group("time", time_section()),
+             std::move(georeference),
              group("field", field_section()),
              tables<&Scene::automaton, &AutomatonOptions::wind, &Wind::keyframes>("wind", wind_section(), 0,
                                                                                   10'000),

@@ -101,7 +101,21 @@ const Section& density_section() {
          density_key<&DensityOptions::write_state>("write_state", "", kAny,
                                                    "Write also the bool grids `hum`, `act` and `cld`."),
          density_key<&DensityOptions::write_velocity>("write_velocity", "", kAny,
-                                                      "Write also the wind as the grid `vel`, in m/s.")},
+                                                      "Write also the wind as the grid `vel`, in m/s."),
+         written_if(
+             key<&Scene::density_files, &DensityFileOptions::velocity_name>(
+                 "velocity_name", "", kAny,
+                 "Name of that grid: Houdini looks for `vel`, Blender for `velocity`, others for `v`."),
+             [](const void* owner) {
+                 return static_cast<const Scene*>(owner)->density_files.velocity_name != "vel";
+             }),
+         written_if(key<&Scene::density_files, &DensityFileOptions::per_layer>(
+                        "per_layer", "", kAny, "Write a file of each layer with its own voxels."),
+                    [](const void* owner) { return !static_cast<const Scene*>(owner)->density_files.per_layer; }),
+         written_if(key<&Scene::density_files, &DensityFileOptions::combined>(
+                        "combined", "", kAny,
+                        "Write a file of all layers together. Off: layers alone; a scene without layers has it always."),
+                    [](const void* owner) { return !static_cast<const Scene*>(owner)->density_files.combined; })},
         nullptr};
     return section;
 }

@@ -32,6 +32,7 @@ const Section& wet_ground_section();
 const Section& precipitation_section();
 const Section& detail_section();
 const Section& level_of_detail_section();
+const Section& georeference_section();
 
 // Owner: CameraKey.
 const Section& camera_path_section();

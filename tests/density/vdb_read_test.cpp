@@ -477,9 +477,17 @@ TEST(VdbRead, InfoListsEveryGrid) {
     EXPECT_EQ(info.grids[3].name, "cld");
     EXPECT_EQ(info.grids[3].type, "bool");
     const auto has = [](const auto& metadata, const std::string& name, const std::string& value) {
-        return std::ranges::find(metadata, std::pair(name, value)) != metadata.end();
+        return std::ranges::find_if(metadata, [&](const VdbMetadataEntry& e) {
+                   return e.name == name && e.value == value;
+               }) != metadata.end();
     };
     EXPECT_TRUE(has(density.metadata, "nephos_seed", "99"));
+    EXPECT_TRUE(has(density.metadata, "nephos_extinction_per_m", "0.03"));
+    EXPECT_TRUE(has(density.metadata, "nephos_bbox_max", "[32, 18, 9]") ||
+                has(density.metadata, "nephos_bbox_max", "[32, 19, 10]"));
+    const Vec3 origin = grid.placement().origin_m;
+    EXPECT_EQ(density.world_from_index,
+              (Matrix4{25, 0, 0, origin.x + 12.5, 0, 25, 0, origin.y + 12.5, 0, 0, 25, origin.z + 12.5, 0, 0, 0, 1}));
     EXPECT_TRUE(has(info.metadata, "nephos_scene_hash", "a"));
     // Without statistics in the file they are counted.
     auto fog = foreign_fog();

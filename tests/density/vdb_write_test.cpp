@@ -51,7 +51,8 @@ struct Scene {
         c.act = state.act.view();
         c.cld = state.cld.view();
         c.cells = placement;
-        c.wind = &wind;
+        for (int k = 0; k < density.extent().z; ++k)
+            c.wind.push_back(wind_at(wind, 300 + (k + 0.5) * 40, metadata.time_s));
         return c;
     }
 };
@@ -221,6 +222,7 @@ TEST(VdbWrite, RefinedGridsShareOneTransform) {
     const DensityGrid fine = resample(scene.density, 2, 2.0);
     VdbContent content = scene.content();
     content.density = &fine;
+    content.wind.assign(std::size_t(fine.extent().z), {2, 1});
     write_vdb(folder / "fine.vdb", content, scene.metadata);
     const auto file = read_with_openvdb(folder / "fine.vdb");
     for (const auto& grid : file.grids) {

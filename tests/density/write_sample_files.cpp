@@ -73,7 +73,7 @@ void write_veil(const std::filesystem::path& folder, const VdbMetadata& metadata
     const Velocity wind{7, -3};
     const DensityGrid density =
         veil_density(options, {{{0, {{0, wind}}}}}, extent, placement, metadata.time_s);
-    VdbContent content{&density, false, {}, {}, {}, placement, nullptr};
+    VdbContent content{&density, false, {}, {}, {}, placement};
     write_vdb(folder / "veil.vdb", content, metadata);
     const test::ReferenceVeil twin(options, wind, metadata.time_s);
     const VeilThresholds at = veil_thresholds(options);
@@ -110,7 +110,11 @@ void write_samples(const std::filesystem::path& folder) {
     for (const auto& [name, half, refine] :
          {std::tuple{"float", false, 1}, {"half", true, 1}, {"refined", false, 2}}) {
         const DensityGrid density = refine == 1 ? coarse : resample(coarse, refine, 1.5);
-        VdbContent content{&density, half, hum.view(), act.view(), cld.view(), placement, &wind};
+        VdbContent content{&density, half, hum.view(), act.view(), cld.view(), placement};
+        for (int k = 0; k < density.extent().z; ++k) {
+            const double height = 450 + (k + 0.5) * density.placement().cell_size_m;
+            content.wind.push_back(wind_at(wind, height, metadata.time_s));
+        }
         write_vdb(folder / (std::string(name) + ".vdb"), content, metadata);
         write_array(folder / (std::string(name) + ".density"), density.to_dense());
         write_array(folder / (std::string(name) + ".hum"), as_array(hum, refine));

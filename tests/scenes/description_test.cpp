@@ -59,7 +59,9 @@ std::size_t keys_at(const std::vector<std::string>& path) {
 // A field that somebody adds to an option struct must become a key, too. Whoever comes here: add it to
 // scenes/format/schema_automaton.cpp or scenes/format/schema_output.cpp and build the target scene_descriptions.
 TEST(Description, EveryOptionHasAKey) {
-    EXPECT_EQ(keys_at({"density"}), member_count<DensityOptions>() - 1);  // the other is [detail]
+    EXPECT_EQ(keys_at({"density"}),
+              member_count<DensityOptions>() - 1 + member_count<DensityFileOptions>());  // the other is [detail]
+    EXPECT_EQ(keys_at({"georeference"}), member_count<Georeference>() - 1);  // given: that the section is there
     EXPECT_EQ(keys_at({"detail"}), member_count<DetailOptions>());
     EXPECT_EQ(keys_at({"density", "smoothing"}), member_count<SmoothingOptions>());
     EXPECT_EQ(keys_at({"frames"}), member_count<FrameOptions>());
@@ -95,7 +97,7 @@ TEST(Description, EveryOptionHasAKey) {
     // The others of AutomatonOptions: time.step_s, seed, field, wind.
     EXPECT_EQ(member_count<AutomatonOptions>(), 8u);
     EXPECT_EQ(keys_at({"time"}), 2u);
-    EXPECT_EQ(member_count<Scene>(), 12u);
+    EXPECT_EQ(member_count<Scene>(), 14u);
 }
 
 TEST(Description, EveryOptionOfCloudsHasAKey) {

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// nephos metar: a scene from a report.
+
+#include <cmath>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "apps/nephos/arguments.h"
+#include "apps/nephos/commands.h"
+#include "apps/nephos/terminal.h"
+#include "core/atomic_file.h"
+#include "core/descriptor.h"
+#include "core/error.h"
+#include "scenes/format/reader.h"
+#include "simulation/metar_fit.h"
+#include "simulation/run_folder.h"
+
+namespace nephos {
+namespace {
+
+struct MetarArguments {
+    std::string report, scene, folder;
+    MetarSceneOptions options;
+    bool explain = false, lenient = false, run = false, no_render = false;
+    WorkArguments work;
+};
+
+std::string report_of(const std::string& argument) {
+    if (!argument.starts_with('@')) return argument;
+    const std::string path = argument.substr(1);
+    std::string text = read_beginning(path, 4096);
+    if (text.size() == 4096) throw Error(ErrorCode::usage, path + ": is too long for a report");
+    return text;
+}
+
+nlohmann::ordered_json explanation_json(const Metar& metar) {
+    nlohmann::ordered_json groups = nlohmann::ordered_json::array();
+    for (const MetarGroup& group : metar.groups)
+        groups.push_back({{"group", group.text}, {"meaning", group.meaning}, {"used", group.used}});
+    return groups;
+}
+
+void explain(const MetarArguments& a, const Metar& metar) {
+    Output output;
+    std::vector<std::pair<std::string, std::string>> becomes;
+    for (const MetarLayer& layer : layers_of(metar))
+        becomes.emplace_back(layer.group,
+                             fmt::format("layer {}: {} from {:.0f} to {:.0f} m, cover {:.2f}", layer.name,
+                                         layer.genus, layer.base_m, layer.top_m, layer.cover));
+    if (a.work.json) {
+        nlohmann::ordered_json layers = nlohmann::ordered_json::array();
+        for (const MetarLayer& l : layers_of(metar))
+            layers.push_back({{"group", l.group},
+                              {"name", l.name},
+                              {"genus", l.genus},
+                              {"base_m", l.base_m},
+                              {"top_m", l.top_m},
+                              {"cover", l.cover}});
+        output.line(json_text({{"report", metar.text},
+                               {"groups", explanation_json(metar)},
+                               {"layers", layers},
+                               {"notes", metar_notes(metar, a.options)}}));
+        return;
+    }
+    for (const MetarGroup& group : metar.groups)
+        output.line(
+            fmt::format("  {:14} {}{}", group.text, group.meaning, group.used ? "" : " (of no effect)"));
+    for (const auto& [group, text] : becomes) output.line(fmt::format("  {:14} -> {}", group, text));
+    for (const std::string& note : metar_notes(metar, a.options)) print_note(note);
+}
+
+int metar(const MetarArguments& a) {
+    const Metar report = parse_metar(report_of(a.report), a.lenient);
+    if (a.explain) {
+        explain(a, report);
+        return 0;
+    }
+    const ThreadLimit limit(a.work.threads);
+    const FittedScene fitted = fit_metar(report, a.options);
+    Scene scene = read_scene_text(fitted.text, "the scene of the report");
+    Output output;
+    if (!a.work.quiet)
+        for (const std::string& note : fitted.notes) print_note(note);
+    if (!a.scene.empty()) write_atomically(a.scene, std::string_view(fitted.text));
+    if (a.work.json) {
+        nlohmann::ordered_json layers = nlohmann::ordered_json::array();
+        for (const FittedLayer& l : fitted.layers)
+            layers.push_back({{"group", l.layer.group},
+                              {"name", l.layer.name},
+                              {"wanted", l.layer.cover},
+                              {"cover", l.cover},
+                              {"coverage", l.coverage},
+                              {"tries", l.tries}});
+        output.line(json_text(
+            {{"report", report.text}, {"scene", a.scene}, {"layers", layers}, {"notes", fitted.notes}}));
+    } else if (a.scene.empty() && !a.run) {
+        output.write(fitted.text);
+    } else if (!a.work.quiet) {
+        for (const FittedLayer& l : fitted.layers)
+            output.line(fmt::format("  {:10} {}: cover {:.2f}, {:.2f} wanted", l.layer.group, l.layer.name,
+                                    l.cover, l.layer.cover));
+    }
+    if (!a.run) return 0;
+    RunSettings settings =
+        run_settings(std::move(scene), a.scene.empty() ? report.station + ".toml" : a.scene);
+    if (!a.folder.empty()) settings.folder = a.folder;
+    settings.render = !a.no_render;
+    defer_signals();
+    std::unique_ptr<ProgressBar> bar;
+    RunObserver observer;
+    observer.progress = [&](const RunProgress& p) {
+        if (!bar) bar = std::make_unique<ProgressBar>("step", p.steps, p.steps_in_all, !a.work.quiet);
+        bar->update(p.steps, fmt::format("frame {}/{}", p.frames, p.frames_in_all));
+    };
+    observer.stop = [] { return pending_signal() != 0; };
+    const RunReport result = run_scene(std::move(settings), observer);
+    bar.reset();
+    if (!a.work.quiet && !a.work.json)
+        output.line(fmt::format("{}: {} frames in {}", result.scene, result.frames, result.folder.string()));
+    return result.complete ? 0 : 128 + pending_signal();
+}
+
+}  // namespace
+
+void add_metar_command(CLI::App& app, Action& action) {
+    CLI::App* command =
+        app.add_subcommand("metar", "Make the sky of an aerodrome's weather report (METAR, SPECI)");
+    const auto a = std::make_shared<MetarArguments>();
+    command->add_option("REPORT", a->report, "The report in quotes, or @FILE with one")
+        ->required()
+        ->type_name("REPORT");
+    command->add_option("-o,--scene", a->scene, "Write the scene to this file (default: print it)")
+        ->type_name("FILE");
+    command->add_flag("--explain", a->explain, "Only say what each group means and becomes");
+    command->add_flag("--run", a->run, "Also simulate the scene and draw it");
+    command->add_option("--out", a->folder, "Folder of the run (default: out/NAME)")->type_name("DIR");
+    command->add_flag("--no-render", a->no_render, "No pictures, only density grids and statistics");
+    command
+        ->add_option("--date", a->options.date,
+                     "Month of the report, such as 2024-06, which has only the day: for the sun")
+        ->type_name("YYYY-MM");
+    add_value(*command, "--at", "LAT,LON,M", "Place of the aerodrome, degrees, and its elevation in metres",
+              [a](const std::string& text) {
+                  const std::vector<double> numbers = parse_reals(text, 3, -180, 9000);
+                  if (std::abs(numbers[0]) > 90)
+                      throw Error(ErrorCode::usage, "'" + text + "' has a latitude beyond 90 degrees");
+                  if (numbers[1] > 180)
+                      throw Error(ErrorCode::usage, "'" + text + "' has a longitude beyond 180 degrees");
+                  a->options.place = MetarPlace{numbers[0], numbers[1], numbers[2]};
+              });
+    command->add_option("--name", a->options.name, "Name of the scene (default: the aerodrome's)")
+        ->type_name("NAME");
+    add_value(*command, "--seed", "N", "Seed of the clouds (default: 1)",
+              [a](const std::string& text) { a->options.seed = int(parse_integer(text, 0, 1'000'000'000)); });
+    command->add_flag("--lenient", a->lenient, "Leave out groups that cannot be read, with a note");
+    add_threads(*command, a->work);
+    add_json(*command, a->work);
+    add_quiet(*command, a->work);
+    command->footer(
+        "Each cloud group becomes a layer whose optical cover is met within half an okta; wind, visibility, "
+        "fog, rain, snow\n"
+        "and thunderstorms become those of the scene; what is left out is listed. The clock of this machine "
+        "is never used.\n"
+        "\n"
+        "Examples:\n"
+        "  nephos metar \"EGLL 211350Z 24012KT 9999 FEW020 SCT045 BKN200 14/08 Q1017\" --explain\n"
+        "  nephos metar \"EGLL 211350Z 24012KT 9999 SCT045 14/08 Q1017\" -o egll.toml --date 2024-06 --at "
+        "51.4775,-0.4614,25\n"
+        "  nephos metar @report.txt --run --out out/egll");
+    command->callback([a, &action] { action = [a] { return metar(*a); }; });
+}
+
+}  // namespace nephos

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// nephos verify: whether the folder of a run or of an export is whole and says the truth.
+
+#include "simulation/verify.h"
+
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "apps/nephos/arguments.h"
+#include "apps/nephos/commands.h"
+#include "apps/nephos/terminal.h"
+#include "core/error.h"
+#include "simulation/export/export.h"
+#include "simulation/run_listing.h"
+
+namespace nephos {
+namespace {
+
+struct VerifyArguments {
+    std::string folder, against;
+    VerifyOptions options;
+    WorkArguments work;
+};
+
+Verification verify_folder(const VerifyArguments& a) {
+    if (is_run_folder(a.folder)) return verify_run(a.folder, a.options);
+    if (is_export_folder(a.folder)) return verify_export(a.folder, a.options);
+    throw Error(ErrorCode::io,
+                a.folder + ": holds neither a run (manifest.json) nor an export (export.json)");
+}
+
+int verify(const VerifyArguments& a) {
+    const ThreadLimit limit(a.work.threads);
+    const Verification result = verify_folder(a);
+    Output output;
+    if (a.work.json) {
+        nlohmann::ordered_json checks = nlohmann::ordered_json::array();
+        for (const Check& check : result.checks) {
+            nlohmann::ordered_json json = {
+                {"name", check.name}, {"passed", check.passed}, {"detail", check.detail}};
+            for (const auto& [name, value] : check.figures) json["figures"][name] = value;
+            checks.push_back(std::move(json));
+        }
+        output.line(json_text(
+            {{"folder", a.folder}, {"kind", result.kind}, {"passed", result.passed()}, {"checks", checks}}));
+    } else if (!a.work.quiet || !result.passed()) {
+        const bool colours = colours_on(stdout);
+        for (const Check& check : result.checks) {
+            output.write_styled(fmt::format("  {}  {:9} {}\n",
+                                            check.passed ? "ok  " : styled("FAIL", Style::red, colours),
+                                            check.name, escaped_lines(check.detail)));
+        }
+    }
+    output.flush();
+    if (result.passed()) return 0;
+    throw Error(ErrorCode::check, a.folder + ": the " + result.kind + " is not what it claims to be");
+}
+
+}  // namespace
+
+void add_verify_command(CLI::App& app, Action& action) {
+    CLI::App* command =
+        app.add_subcommand("verify", "Check the files of a run or an export against their checksums");
+    const auto a = std::make_shared<VerifyArguments>();
+    command->add_option("DIR", a->folder, "Folder of a run (manifest.json) or of an export (export.json)")
+        ->required()
+        ->type_name("DIR");
+    command->add_flag("--hashes", a->options.hashes_only,
+                      "Compare the files' checksums alone; decode nothing");
+    command
+        ->add_option_function<std::string>(
+            "--against", [a](const std::string& text) { a->options.against = text; },
+            "Another run that must have the same states and voxels")
+        ->type_name("DIR");
+    add_value(*command, "--replay", "N", "Simulate the first N frames anew and compare states and voxels",
+              [a](const std::string& text) { a->options.replay = int(parse_integer(text, 1, kMaxFrames)); });
+    command->add_flag("--seam", a->options.seam,
+                      "Demand that the box continues into itself on both horizontal axes, periodic or not");
+    add_value(*command, "--max-change", "X", "Largest change of a voxel from frame to frame that passes",
+              [a](const std::string& text) { a->options.max_change = parse_real(text, 0, 1); });
+    add_threads(*command, a->work);
+    add_json(*command, a->work);
+    add_quiet(*command, a->work);
+    command->footer(
+        "Of a run: no frame or file is missing or extra; bytes and XXH3-128 of each file and of its decoded "
+        "voxels are\n"
+        "those of the manifest; transform, bounds and class are the same in all files; values are finite, 0 "
+        "to 1;\n"
+        "metadata agree with the manifest; layers add up to the common grid. Reported: roughness at the seam "
+        "of\n"
+        "periodic axes, largest change of a voxel and of sharpness. Of an export: checksums, and the voxels "
+        "read\n"
+        "back from each file against those of the source, within the error of their type.\n"
+        "\n"
+        "Exit status 0: everything holds; 1: a check failed; 3: the folder cannot be read.\n"
+        "\n"
+        "Examples:\n"
+        "  nephos verify out/cumulus\n"
+        "  nephos verify out/cumulus --replay 3 --json\n"
+        "  nephos verify out/cumulus --against /mnt/other/cumulus --hashes");
+    command->callback([a, &action] { action = [a] { return verify(*a); }; });
+}
+
+}  // namespace nephos

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// NanoVDB files, which renderers on graphics cards read: one float grid `density` with the transform of our VDB files.
+// NanoVDB has no metadata: what else is known of the grid is in the sidecar of an export.
+
+#include <filesystem>
+
+#include "density/density_grid.h"
+
+namespace nephos {
+
+enum class NanoCodec { none, zip, blosc };    // compression of the file
+enum class NanoQuantise { none, fp8, fp16 };  // bits of a value, by the range of its leaf
+
+// Writes atomically. Throws Error(io) naming the file. Thread-safe for different files.
+void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
+                   NanoQuantise quantise);
+
+// Reads the float grid of a file that was not quantised, as a grid of this extent and placement. Throws Error(io)
+// naming the file, also when it is quantised or has voxels outside of the extent.
+DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const Placement& placement);
+
+}  // namespace nephos

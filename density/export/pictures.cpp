@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+// VTK ImageData, and slices as a PNG.
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <csetjmp>
+#include <cstring>
+#include <string_view>
+
+#include <png.h>
+#include <zlib.h>
+
+#include "core/atomic_file.h"
+#include "core/text.h"
+#include "density/export/containers.h"
+#include "density/export/whole_file.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kZipBlock = std::size_t(1) << 18;  // bytes before compression
+
+std::string triple(double a, double b, double c) {
+    return number_text(a) + " " + number_text(b) + " " + number_text(c);
+}
+
+std::string_view vtk_type(VoxelType type) {
+    switch (type) {
+        case VoxelType::r8:
+            return "UInt8";
+        case VoxelType::r16:
+            return "UInt16";
+        case VoxelType::r32f:
+            return "Float32";
+        default:
+            throw Error(ErrorCode::usage,
+                        "a VTI file holds r8, r16 or r32f, not " + std::string(type_name(type)));
+    }
+}
+
+// Blocks of zlib behind their table: number, size, size of the last one (0 if whole), compressed sizes.
+std::vector<std::byte> zipped(const std::vector<std::byte>& bytes) {
+    ByteWriter table, blocks;
+    const std::size_t count = (bytes.size() + kZipBlock - 1) / kZipBlock;
+    table.put(std::uint64_t(count));
+    table.put(std::uint64_t(kZipBlock));
+    table.put(std::uint64_t(bytes.size() % kZipBlock));
+    std::vector<std::byte> out(compressBound(uLong(kZipBlock)));
+    for (std::size_t n = 0; n < count; ++n) {
+        const std::size_t size = std::min(kZipBlock, bytes.size() - n * kZipBlock);
+        uLongf length = uLongf(out.size());
+        if (compress2(reinterpret_cast<Bytef*>(out.data()), &length,
+                      reinterpret_cast<const Bytef*>(bytes.data() + n * kZipBlock), uLong(size), 1) != Z_OK)
+            throw Error(ErrorCode::io, "zlib cannot compress");
+        table.put(std::uint64_t(length));
+        blocks.put_bytes(std::span(out).first(length));
+    }
+    table.put_bytes(blocks.bytes());
+    return table.take();
+}
+
+std::vector<std::byte> unzipped(ByteReader& reader) {
+    const auto count = reader.get<std::uint64_t>(), block = reader.get<std::uint64_t>(),
+               last = reader.get<std::uint64_t>();
+    if (count > reader.rest().size() / 8 || block > (std::uint64_t(1) << 30) || last > block)
+        throw Error(ErrorCode::io, "its table of blocks is damaged");
+    std::vector<std::uint64_t> sizes(count);
+    for (std::uint64_t& size : sizes) size = reader.get<std::uint64_t>();
+    std::vector<std::byte> out;
+    for (std::size_t n = 0; n < sizes.size(); ++n) {
+        const std::uint64_t size = n + 1 == sizes.size() && last != 0 ? last : block;
+        if (sizes[n] > reader.rest().size()) throw Error(ErrorCode::io, "it ends inside of a block");
+        const std::size_t at = out.size();
+        out.resize(at + std::size_t(size));
+        uLongf length = uLongf(size);
+        if (uncompress(reinterpret_cast<Bytef*>(out.data() + at), &length,
+                       reinterpret_cast<const Bytef*>(reader.rest().data()), uLong(sizes[n])) != Z_OK ||
+            length != size)
+            throw Error(ErrorCode::io, "a block is damaged");
+        reader.skip(std::size_t(sizes[n]));
+    }
+    return out;
+}
+
+// The value of an attribute in our own XML.
+std::string_view attribute(std::string_view xml, std::string_view name) {
+    const std::string key = " " + std::string(name) + "=\"";
+    const std::size_t at = xml.find(key);
+    if (at == xml.npos) throw Error(ErrorCode::io, "its attribute " + std::string(name) + " is missing");
+    const std::size_t begin = at + key.size();
+    return xml.substr(begin, xml.find('"', begin) - begin);
+}
+
+struct PngWriting {
+    std::string bytes;
+};
+
+void append_png(png_structp png, png_bytep data, png_size_t size) {
+    static_cast<PngWriting*>(png_get_io_ptr(png))->bytes.append(reinterpret_cast<const char*>(data), size);
+}
+
+}  // namespace
+
+void write_vti(const std::filesystem::path& path, const EncodedVolume& volume, const VtiPlace& place,
+               bool zip) {
+    const VolumeLevel& top = volume.levels.front();
+    const std::string extent = "0 " + std::to_string(top.nx - 1) + " 0 " + std::to_string(top.ny - 1) +
+                               " 0 " + std::to_string(top.nz - 1);
+    std::string xml =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+        "header_type=\"UInt64\"";
+    if (zip) xml += " compressor=\"vtkZLibDataCompressor\"";
+    xml += ">\n<ImageData WholeExtent=\"" + extent + "\" Origin=\"" +
+           triple(place.first_m[0], place.first_m[1], place.first_m[2]) + "\" Spacing=\"" +
+           triple(place.voxel_m[0], place.voxel_m[1], place.voxel_m[2]) +
+           "\" Direction=\"1 0 0 0 1 0 0 0 1\">\n";
+    xml +=
+        "<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">" +
+        number_text(place.time_s) + "</DataArray></FieldData>\n";
+    xml += "<Piece Extent=\"" + extent + "\">\n<PointData Scalars=\"density\"><DataArray type=\"" +
+           std::string(vtk_type(volume.type)) +
+           "\" Name=\"density\" format=\"appended\" "
+           "offset=\"0\"/></PointData>\n</Piece>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_";
+    write_pieces_atomically(path, [&](const AppendPiece& append) {
+        append(xml);
+        std::vector<std::byte> packed;
+        if (zip) packed = zipped(top.bytes);
+        const std::uint64_t size = top.bytes.size();
+        if (!zip) append({reinterpret_cast<const char*>(&size), sizeof size});
+        const std::vector<std::byte>& data = zip ? packed : top.bytes;
+        append({reinterpret_cast<const char*>(data.data()), data.size()});
+        append("\n</AppendedData>\n</VTKFile>\n");
+    });
+}
+
+EncodedVolume read_vti(const std::filesystem::path& path) {
+    return with_whole_file(path, [&](ByteReader& reader) {
+        const std::span<const std::byte> all = reader.rest();
+        const std::string_view text(reinterpret_cast<const char*>(all.data()), all.size());
+        constexpr std::string_view kMark = "<AppendedData encoding=\"raw\">\n_";
+        const std::size_t mark = text.substr(0, 4096).find(kMark);
+        if (mark == text.npos) throw Error(ErrorCode::io, "it is no VTI file of nephos");
+        const std::string_view xml = text.substr(0, mark), extent = attribute(xml, "WholeExtent");
+        int bounds[6] = {};
+        const char* at = extent.data();
+        for (int& bound : bounds) {
+            while (at < extent.data() + extent.size() && *at == ' ') ++at;
+            at = std::from_chars(at, extent.data() + extent.size(), bound).ptr;
+        }
+        EncodedVolume volume{VoxelType::r32f, {}};
+        const std::string_view type = attribute(xml.substr(xml.find("<PointData")), "type");
+        for (const VoxelType one : {VoxelType::r8, VoxelType::r16, VoxelType::r32f})
+            if (vtk_type(one) == type) volume.type = one;
+        VolumeLevel level{bounds[1] + 1, bounds[3] + 1, bounds[5] + 1, {}};
+        reader.skip(mark + kMark.size());
+        if (xml.find("vtkZLibDataCompressor") != xml.npos) {
+            level.bytes = unzipped(reader);
+        } else {
+            const auto size = reader.get<std::uint64_t>();
+            if (size > reader.rest().size()) throw Error(ErrorCode::io, "it ends inside of its voxels");
+            level.bytes.assign(reader.rest().begin(), reader.rest().begin() + std::ptrdiff_t(size));
+        }
+        if (level.nx < 1 || level.ny < 1 || level.nz < 1 ||
+            level.bytes.size() != encoded_bytes(level.nx, level.ny, level.nz, volume.type))
+            throw Error(ErrorCode::io, "its voxels are not of the size that it states");
+        volume.levels.push_back(std::move(level));
+        return volume;
+    });
+}
+
+std::string pvd_text(const std::vector<PvdEntry>& entries) {
+    std::string text =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" "
+        "byte_order=\"LittleEndian\">\n<Collection>\n";
+    for (const PvdEntry& entry : entries)
+        text += "<DataSet timestep=\"" + number_text(entry.time_s) + "\" group=\"\" part=\"0\" file=\"" +
+                entry.file + "\"/>\n";
+    return text + "</Collection>\n</VTKFile>\n";
+}
+
+int slice_columns(int nx, int ny, int nz) {
+    return std::clamp(int(std::lround(std::sqrt(double(nz) * ny / nx))), 1, nz);
+}
+
+void write_slices(const std::filesystem::path& path, const EncodedVolume& volume, int columns) {
+    if (volume.type != VoxelType::r8 && volume.type != VoxelType::r16)
+        throw Error(ErrorCode::usage, "slices hold r8 or r16, not " + std::string(type_name(volume.type)));
+    const VolumeLevel& top = volume.levels.front();
+    const std::size_t bytes = volume.type == VoxelType::r8 ? 1 : 2;
+    const int rows = (top.nz + columns - 1) / columns;
+    const std::size_t row_bytes = std::size_t(top.nx) * bytes;
+    std::vector<std::byte> row(row_bytes * std::size_t(columns));
+    PngWriting writing;
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+    png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+    if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {  // NOLINT: libpng reports by longjmp
+        png_destroy_write_struct(&png, &info);
+        throw Error(ErrorCode::io, path.string() + ": libpng cannot encode the slices");
+    }
+    png_set_write_fn(png, &writing, append_png, nullptr);
+    png_set_IHDR(png, info, png_uint_32(top.nx * columns), png_uint_32(top.ny * rows), int(8 * bytes),
+                 PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    png_set_compression_level(png, 1);
+    png_write_info(png, info);
+    if (bytes == 2) png_set_swap(png);  // PNG is big-endian
+    for (int r = 0; r < rows; ++r) {
+        for (int y = 0; y < top.ny; ++y) {
+            for (int c = 0; c < columns; ++c) {
+                const int k = r * columns + c;
+                std::byte* to = row.data() + std::size_t(c) * row_bytes;
+                if (k >= top.nz)
+                    std::fill_n(to, row_bytes, std::byte{0});
+                else
+                    std::memcpy(to,
+                                top.bytes.data() +
+                                    (std::size_t(k) * std::size_t(top.ny) + std::size_t(y)) * row_bytes,
+                                row_bytes);
+            }
+            png_write_row(png, reinterpret_cast<png_const_bytep>(row.data()));
+        }
+    }
+    png_write_end(png, nullptr);
+    png_destroy_write_struct(&png, &info);
+    write_atomically(path, std::string_view(writing.bytes));
+}
+
+EncodedVolume read_slices(const std::filesystem::path& path, int nx, int ny, int nz, int columns) {
+    png_image image{};
+    image.version = PNG_IMAGE_VERSION;
+    const std::vector<std::byte> bytes = whole_file(path);
+    const auto fail = [&](const char* what) {
+        png_image_free(&image);
+        return Error(ErrorCode::io, path.string() + ": " + what);
+    };
+    if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
+        throw fail("it is no PNG file");
+    const bool wide = (image.format & PNG_FORMAT_FLAG_LINEAR) != 0;
+    const int rows = (nz + columns - 1) / columns;
+    if (int(image.width) != nx * columns || int(image.height) != ny * rows || wide)
+        throw fail("it is no picture of 8-bit slices of this size");
+    image.format = PNG_FORMAT_GRAY;
+    std::vector<std::byte> pixels(PNG_IMAGE_SIZE(image));
+    if (png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) == 0) throw fail("it is damaged");
+    VolumeLevel level{nx, ny, nz,
+                      std::vector<std::byte>(std::size_t(nx) * std::size_t(ny) * std::size_t(nz))};
+    for (int k = 0; k < nz; ++k) {
+        for (int y = 0; y < ny; ++y) {
+            const std::size_t from =
+                (std::size_t(k / columns) * std::size_t(ny) + std::size_t(y)) * image.width +
+                std::size_t(k % columns) * std::size_t(nx);
+            std::memcpy(
+                level.bytes.data() + (std::size_t(k) * std::size_t(ny) + std::size_t(y)) * std::size_t(nx),
+                pixels.data() + from, std::size_t(nx));
+        }
+    }
+    EncodedVolume volume{VoxelType::r8, {}};
+    volume.levels.push_back(std::move(level));
+    return volume;
+}
+
+}  // namespace nephos

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// Values as voxels of 8, 16 and 32 bits, and as BC4 (DirectX: BC4_UNORM; OpenGL: RGTC1): Khronos Data Format 1.3,
+// section 18.4. Loops are plain, so that the compiler makes vectors of them.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "density/export/volume.h"
+
+namespace nephos {
+namespace {
+
+// Voxels of a task: its part of source and result stays in the second-level cache.
+constexpr std::size_t kTask = std::size_t(1) << 16;
+
+template <class Code, class Convert>
+void convert_all(const std::vector<float>& values, std::vector<std::byte>& out, const Convert& convert) {
+    auto* codes = reinterpret_cast<Code*>(out.data());
+    const std::size_t tasks = (values.size() + kTask - 1) / kTask;
+    tbb::parallel_for(std::size_t(0), tasks, [&](std::size_t task) {
+        const std::size_t begin = task * kTask, end = std::min(values.size(), begin + kTask);
+        const float* in = values.data();
+        for (std::size_t n = begin; n < end; ++n) codes[n] = convert(in[n]);
+    });
+}
+
+// Of a value that is finite and not negative; ties to even. In a half's normal range 13 bits are rounded away, and the
+// exponent is moved from a single's bias to a half's. Below it a half counts units of 2^-24, which are also those of a
+// single from 0.5 to 1: adding 0.5 rounds to them.
+std::uint16_t half_bits(float value) {
+    value = std::min(value, 65504.0f);
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    const std::uint32_t normal = ((bits + 0xFFF + (bits >> 13 & 1)) >> 13) - (112u << 10);
+    const std::uint32_t small = std::bit_cast<std::uint32_t>(value + 0.5f) - 0x3F000000u;
+    return std::uint16_t(value < 0x1p-14f ? small : normal);
+}
+
+float half_value(std::uint16_t bits) { return std::bit_cast<float>(std::uint32_t(bits) << 13) * 0x1p112f; }
+
+// Four rows of four voxels as the eight bytes of a block: its largest and smallest value, and for each voxel how many
+// sevenths it lies below the largest.
+std::uint64_t bc4_block(const float (&v)[16], float to_code) {
+    float low = v[0], high = v[0];
+    for (int n = 1; n < 16; ++n) {
+        low = std::min(low, v[n]);
+        high = std::max(high, v[n]);
+    }
+    const auto code = [&](float value) { return std::uint32_t(std::min(value * to_code, 255.0f) + 0.5f); };
+    const std::uint32_t first = code(high), second = code(low);
+    std::uint64_t block = first | second << 8;
+    if (first == second) return block;
+    // Index of n sevenths: 0, 2, 3, .., 7, 1.
+    const float top = float(first), sevenths = 7.0f / float(first - second);
+    std::uint32_t index[16];
+    for (int n = 0; n < 16; ++n) {
+        const float below = (top - v[n] * to_code) * sevenths;
+        const auto t = std::uint32_t(std::clamp(below, 0.0f, 7.0f) + 0.5f);
+        index[n] = t == 0 ? 0 : t == 7 ? 1 : t + 1;
+    }
+    for (int n = 0; n < 16; ++n) block |= std::uint64_t(index[n]) << (16 + 3 * n);
+    return block;
+}
+
+void encode_bc4(const Volume& v, float to_code, std::vector<std::byte>& out) {
+    const int bx = (v.nx + 3) / 4, by = (v.ny + 3) / 4;
+    tbb::parallel_for(0, v.nz, [&](int k) {
+        const float* slice = v.values.data() + std::size_t(k) * std::size_t(v.nx) * std::size_t(v.ny);
+        std::byte* to = out.data() + std::size_t(k) * std::size_t(bx) * std::size_t(by) * 8;
+        for (int j = 0; j < by; ++j) {
+            for (int i = 0; i < bx; ++i, to += 8) {
+                float block[16];
+                for (int y = 0; y < 4; ++y) {
+                    const float* row = slice + std::size_t(std::min(4 * j + y, v.ny - 1)) * std::size_t(v.nx);
+                    if (4 * i + 4 <= v.nx)
+                        std::memcpy(block + 4 * y, row + 4 * i, 16);
+                    else
+                        for (int x = 0; x < 4; ++x) block[4 * y + x] = row[std::min(4 * i + x, v.nx - 1)];
+                }
+                float any = 0;
+                for (const float value : block) any += value;
+                const std::uint64_t bits = any == 0 ? 0 : bc4_block(block, to_code);
+                std::memcpy(to, &bits, 8);
+            }
+        }
+    });
+}
+
+void decode_bc4(const std::byte* bytes, Volume& v, float scale) {
+    const int bx = (v.nx + 3) / 4, by = (v.ny + 3) / 4;
+    for (int k = 0; k < v.nz; ++k) {
+        for (int j = 0; j < by; ++j) {
+            for (int i = 0; i < bx; ++i, bytes += 8) {
+                std::uint64_t bits;
+                std::memcpy(&bits, bytes, 8);
+                const float first = float(bits & 255), second = float(bits >> 8 & 255);
+                float palette[8] = {first, second};
+                for (int n = 2; n < 8; ++n) {
+                    palette[n] = first > second ? (float(8 - n) * first + float(n - 1) * second) / 7
+                                 : n < 6        ? (float(6 - n) * first + float(n - 1) * second) / 5
+                                                : (n == 6 ? 0.0f : 255.0f);
+                }
+                for (int n = 0; n < 16; ++n) {
+                    const int x = 4 * i + (n & 3), y = 4 * j + (n >> 2);
+                    if (x >= v.nx || y >= v.ny) continue;
+                    v.values[(std::size_t(k) * std::size_t(v.ny) + std::size_t(y)) * std::size_t(v.nx) +
+                             std::size_t(x)] = palette[bits >> (16 + 3 * n) & 7] / 255 * scale;
+                }
+            }
+        }
+    }
+}
+
+}  // namespace
+
+std::string_view type_name(VoxelType type) {
+    constexpr std::string_view kNames[] = {"r8", "r16", "r16f", "r32f", "bc4"};
+    return kNames[std::size_t(type)];
+}
+
+std::size_t encoded_bytes(int nx, int ny, int nz, VoxelType type) {
+    if (type == VoxelType::bc4)
+        return std::size_t((nx + 3) / 4) * std::size_t((ny + 3) / 4) * std::size_t(nz) * 8;
+    const std::size_t bytes = type == VoxelType::r8 ? 1 : type == VoxelType::r32f ? 4 : 2;
+    return std::size_t(nx) * std::size_t(ny) * std::size_t(nz) * bytes;
+}
+
+std::vector<std::byte> encode(const Volume& volume, VoxelType type, float scale) {
+    std::vector<std::byte> out(encoded_bytes(volume.nx, volume.ny, volume.nz, type));
+    const float inverse = 1 / scale;
+    switch (type) {
+        case VoxelType::r8:
+            convert_all<std::uint8_t>(volume.values, out, [factor = 255 * inverse](float value) {
+                return std::uint8_t(std::int32_t(std::clamp(value * factor, 0.0f, 255.0f) + 0.5f));
+            });
+            break;
+        case VoxelType::r16:
+            convert_all<std::uint16_t>(volume.values, out, [factor = 65535 * inverse](float value) {
+                return std::uint16_t(std::int32_t(std::clamp(value * factor, 0.0f, 65535.0f) + 0.5f));
+            });
+            break;
+        case VoxelType::r16f:
+            convert_all<std::uint16_t>(volume.values, out,
+                                       [inverse](float value) { return half_bits(value * inverse); });
+            break;
+        case VoxelType::r32f:
+            convert_all<float>(volume.values, out, [inverse](float value) { return value * inverse; });
+            break;
+        case VoxelType::bc4:
+            encode_bc4(volume, 255 * inverse, out);
+            break;
+    }
+    return out;
+}
+
+Volume decode(const std::byte* bytes, std::size_t count, int nx, int ny, int nz, VoxelType type,
+              float scale) {
+    if (count != encoded_bytes(nx, ny, nz, type))
+        throw Error(ErrorCode::io, "its voxels are not of the size that it states");
+    Volume volume{nx, ny, nz, std::vector<float>(std::size_t(nx) * std::size_t(ny) * std::size_t(nz))};
+    std::vector<float>& values = volume.values;
+    if (type == VoxelType::bc4) {
+        decode_bc4(bytes, volume, scale);
+    } else if (type == VoxelType::r32f) {
+        std::memcpy(values.data(), bytes, count);
+        for (float& value : values) value *= scale;
+    } else if (type == VoxelType::r8) {
+        for (std::size_t n = 0; n < values.size(); ++n)
+            values[n] = float(std::to_integer<int>(bytes[n])) / 255 * scale;
+    } else {
+        for (std::size_t n = 0; n < values.size(); ++n) {
+            std::uint16_t code;
+            std::memcpy(&code, bytes + 2 * n, 2);
+            values[n] = (type == VoxelType::r16f ? half_value(code) : float(code) / 65535) * scale;
+        }
+    }
+    return volume;
+}
+
+double largest_error(VoxelType type) {
+    switch (type) {
+        case VoxelType::r8:
+            return 1.0 / 510;
+        case VoxelType::r16:
+            return 1.0 / 131070;
+        case VoxelType::r16f:
+            return 0x1p-11;
+        case VoxelType::bc4:
+            return 1.0 / 14 + 1.0 / 255;
+        case VoxelType::r32f:
+            break;
+    }
+    return 1e-7;
+}
+
+}  // namespace nephos

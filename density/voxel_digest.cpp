@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "density/voxel_digest.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/digest.h"
+#include "density/openvdb_access.h"
+
+namespace nephos {
+
+std::string voxel_digest(const DensityGrid& density, bool half) {
+    const Extent extent = density.extent();
+    Digest digest;
+    const std::array<std::int32_t, 3> size{extent.x, extent.y, extent.z};
+    digest.add(std::as_bytes(std::span(size)));
+    std::array<float, kBlockVoxels> values;
+    for (const Block& block : blocks_of(density)) {
+        const openvdb::Coord& o = block.origin;
+        bool any = false;
+        for (int n = 0; n < kBlockVoxels; ++n) {
+            const bool inside =
+                o.x() + (n >> 6) < extent.x && o.y() + (n >> 3 & 7) < extent.y && o.z() + (n & 7) < extent.z;
+            float value = inside ? std::max(block.value(n), 0.0f) : 0.0f;
+            if (half) value = float(openvdb::math::half(value));
+            values[std::size_t(n)] = value;
+            any = any || value > 0;
+        }
+        if (!any) continue;
+        const std::array<std::int32_t, 3> origin{o.x(), o.y(), o.z()};
+        digest.add(std::as_bytes(std::span(origin)));
+        digest.add(std::as_bytes(std::span(values)));
+    }
+    return digest.hex();
+}
+
+}  // namespace nephos

@@ -1,0 +1,480 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "core/error.h"
+#include "scenes/metar/metar.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kKnot = 1852.0 / 3600;
+constexpr double kStatuteMile_m = 1609.344;
+
+bool all_digits(std::string_view text) {
+    return !text.empty() &&
+           std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+bool all_slashes(std::string_view text) { return !text.empty() && text.find_first_not_of('/') == text.npos; }
+int number(std::string_view text) {
+    int value = 0;
+    std::from_chars(text.data(), text.data() + text.size(), value);
+    return value;
+}
+
+// The report word by word. Each of the read_ functions takes the group at hand if it is of its kind.
+class Reader {
+  public:
+    Reader(std::string_view text, bool lenient) : lenient_(lenient) {
+        for (std::size_t at = 0; at < text.size();) {
+            at = text.find_first_not_of(" \t\r\n", at);
+            if (at == text.npos) break;
+            std::size_t end = std::min(text.find_first_of(" \t\r\n", at), text.size());
+            std::string_view word = text.substr(at, end - at);
+            if (word.ends_with('=')) word.remove_suffix(1);
+            if (!word.empty()) {
+                if (!metar_.text.empty()) metar_.text += ' ';
+                words_.push_back({std::string(word), metar_.text.size()});
+                metar_.text += word;
+            }
+            at = end;
+        }
+    }
+
+    Metar read() {
+        if (words_.empty())
+            throw Error(
+                ErrorCode::usage,
+                "the report is empty: expected one such as EGLL 211350Z 24012KT 9999 FEW020 14/08 Q1017");
+        while (is("METAR") || is("SPECI") || is("COR")) take("kind of report", false);
+        if (done() || words_[at_].text.size() != 4 || !std::all_of(word().begin(), word().end(), [](char c) {
+                return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+            }))
+            fail("expected the four letters of an aerodrome, such as EGLL");
+        metar_.station = word();
+        take("aerodrome");
+        read_time();
+        while (!done()) {
+            if (is("NIL")) fail("the report says that there is none (NIL)");
+            if (is("RMK")) return take_rest("remarks");
+            if (is("NOSIG") || is("BECMG") || is("TEMPO")) return take_rest("trend");
+            read_group();
+        }
+        return finished();
+    }
+
+  private:
+    struct Word {
+        std::string text;
+        std::size_t column;
+    };
+
+    bool done() const { return at_ >= words_.size(); }
+    const std::string& word() const { return words_[at_].text; }
+    bool is(std::string_view text) const { return !done() && word() == text; }
+
+    void take(std::string meaning, bool used = true, std::size_t words = 1) {
+        std::string text = word();
+        const std::size_t column = words_[at_].column;
+        for (std::size_t n = 1; n < words; ++n) text += " " + words_[at_ + n].text;
+        metar_.groups.push_back({std::move(text), column, std::move(meaning), used});
+        at_ += words;
+    }
+
+    [[noreturn]] void fail(const std::string& expected) const {
+        const std::size_t column = done() ? metar_.text.size() : words_[at_].column;
+        const std::size_t length = done() ? 1 : word().size();
+        throw Error(ErrorCode::usage, (done() ? std::string("the report ends early") : "`" + word() + "`") +
+                                          ": " + expected + "\n  " + metar_.text + "\n  " +
+                                          std::string(column, ' ') + std::string(length, '^'));
+    }
+
+    Metar take_rest(const char* meaning) {
+        take(meaning, false, words_.size() - at_);
+        return finished();
+    }
+
+    Metar finished() {
+        if (metar_.cavok && (!metar_.clouds.empty() || !metar_.weather.empty()))
+            throw Error(ErrorCode::usage,
+                        "CAVOK excludes clouds and weather, but the report has them:\n  " + metar_.text);
+        return std::move(metar_);
+    }
+
+    void read_time() {
+        if (done()) fail("expected day and time, such as 211350Z");
+        const std::string& w = word();
+        const bool good = w.size() == 7 && all_digits(std::string_view(w).substr(0, 6)) && w[6] == 'Z';
+        const int day = good ? number(w.substr(0, 2)) : 0, hour = good ? number(w.substr(2, 2)) : 0,
+                  minute = good ? number(w.substr(4, 2)) : 0;
+        if (!good || day < 1 || day > 31 || hour > 23 || minute > 59)
+            fail("expected day and time (UTC), such as 211350Z");
+        metar_.day = day;
+        metar_.hour = hour;
+        metar_.minute = minute;
+        take("day and time, UTC");
+    }
+
+    void read_group() {
+        if (is("AUTO") || is("COR")) {
+            metar_.automatic = metar_.automatic || is("AUTO");
+            return take(is("AUTO") ? "automatic station" : "corrected", false);
+        }
+        if (read_wind() || read_visibility() || read_sky() || read_temperature() || read_pressure() ||
+            read_other() || read_weather())
+            return;
+        if (!lenient_) fail("expected wind, visibility, weather, clouds, temperature or pressure");
+        metar_.warnings.push_back("`" + word() + "` is no group that is known, and was left out");
+        take("not understood", false);
+    }
+
+    // dddff[Gff]UNIT; parts may be slashes, the unit may be missing or a word of its own.
+    bool read_wind() {
+        std::string w = word();
+        std::size_t words = 1;
+        const auto gap = [&](std::size_t n) {
+            return at_ + n < words_.size() ? words_[at_ + n].text : std::string();
+        };
+        const bool head = w.size() == 5 && (all_digits(w) || w.starts_with("VRB"));
+        if (head && gap(1).size() >= 5 && gap(1).front() == 'G' &&
+            (gap(1).ends_with("KT") || gap(1).ends_with("MPS"))) {
+            w += gap(1);
+            words = 2;
+        } else if (w.size() == 7 && all_digits(w.substr(0, 3)) && w[3] == 'V' && all_digits(w.substr(4))) {
+            metar_.wind.from_between_deg = number(w.substr(0, 3));
+            metar_.wind.to_between_deg = number(w.substr(4));
+            take("wind between " + w.substr(0, 3) + " and " + w.substr(4) + " degrees", false);
+            return true;
+        }
+        double unit = kKnot;
+        bool with_unit = true;
+        std::string value = w;
+        if (w.ends_with("KT"))
+            value.resize(w.size() - 2);
+        else if (w.ends_with("MPS"))
+            unit = 1, value.resize(w.size() - 3);
+        else if (w.ends_with("KMH"))
+            unit = 1 / 3.6, value.resize(w.size() - 3);
+        else
+            with_unit = false;
+        if (value.size() < 5) return false;
+        const std::string direction = value.substr(0, 3);
+        std::string speed = value.substr(3), gust;
+        if (const std::size_t g = speed.find('G'); g != speed.npos) {
+            gust = speed.substr(g + 1);
+            speed.resize(g);
+        }
+        const bool known_direction = all_digits(direction), slashes = all_slashes(direction);
+        if (!(known_direction || slashes || direction == "VRB")) return false;
+        if (!(all_digits(speed) || all_slashes(speed)) || speed.size() > 3 || speed.size() < 2) return false;
+        if (!gust.empty() && !all_digits(gust) && !all_slashes(gust)) return false;
+        if (!with_unit && (gust.empty() || !known_direction)) return false;  // five digits alone are no wind
+        if (known_direction && number(direction) > 360 && lenient_) return false;
+        if (known_direction && number(direction) > 360) fail("a direction of more than 360 degrees");
+        if (seen_wind_) fail("the report has a wind already");
+        seen_wind_ = true;
+        MetarWind& wind = metar_.wind;
+        wind.known = all_digits(speed);
+        wind.variable = !known_direction;
+        wind.from_deg = known_direction ? number(direction) % 360 : 0;
+        wind.speed_m_per_s = wind.known ? number(speed) * unit : 0;
+        if (all_digits(gust)) wind.gust_m_per_s = number(gust) * unit;
+        take(!wind.known ? "wind unknown"
+             : wind.speed_m_per_s == 0
+                 ? "calm"
+                 : "wind at 10 m" + std::string(wind.gust_m_per_s ? ", gusts are not simulated" : ""),
+             wind.known, words);
+        return true;
+    }
+
+    bool set_visibility(int metres, const std::string& meaning, std::size_t words = 1) {
+        if (!metar_.visibility_m) metar_.visibility_m = metres;
+        take(meaning, true, words);
+        return true;
+    }
+
+    bool read_visibility() {
+        const std::string& w = word();
+        if (w == "CAVOK") {
+            metar_.cavok = true;
+            return set_visibility(9999, "visibility 10 km or more, no cloud below 5,000 ft, no weather");
+        }
+        if (w.size() >= 4 && all_digits(w.substr(0, 4))) {
+            const std::string rest = w.substr(4);
+            if (rest.empty() || rest == "NDV")
+                return set_visibility(number(w.substr(0, 4)), number(w.substr(0, 4)) == 9999
+                                                                  ? "visibility 10 km or more"
+                                                                  : "visibility");
+            for (const char* direction : {"N", "NE", "E", "SE", "S", "SW", "W", "NW"}) {
+                if (rest != direction) continue;
+                take("least visibility in one direction", false);
+                return true;
+            }
+        }
+        if (w == "////") {
+            take("visibility unknown", false);
+            return true;
+        }
+        if (w.size() > 2 && w.front() == 'R' && all_digits(w.substr(1, 2)) && w.find('/') != w.npos) {
+            take("runway visual range", false);
+            return true;
+        }
+        // Statute miles: 10SM, 1/2SM, 1 1/2SM, M1/4SM.
+        std::string miles = w;
+        double whole = 0;
+        std::size_t words = 1;
+        if (all_digits(w) && w.size() <= 2 && at_ + 1 < words_.size() &&
+            words_[at_ + 1].text.ends_with("SM")) {
+            whole = number(w);
+            miles = words_[at_ + 1].text;
+            words = 2;
+        }
+        if (!miles.ends_with("SM")) return false;
+        miles.resize(miles.size() - 2);
+        if (!miles.empty() && (miles.front() == 'M' || miles.front() == 'P')) miles.erase(0, 1);
+        const std::size_t slash = miles.find('/');
+        double value = 0;
+        if (slash == miles.npos) {
+            if (!all_digits(miles)) return false;
+            value = number(miles);
+        } else {
+            const std::string over = miles.substr(0, slash), under = miles.substr(slash + 1);
+            if (!all_digits(over) || !all_digits(under) || number(under) == 0) return false;
+            value = double(number(over)) / number(under);
+        }
+        return set_visibility(std::min(9999, int(std::lround((whole + value) * kStatuteMile_m))),
+                              "visibility", words);
+    }
+
+    bool read_sky() {
+        const std::string& w = word();
+        for (const auto& [text, meaning] : {std::pair{"NSC", "no significant cloud"},
+                                            {"NCD", "no cloud detected"},
+                                            {"CLR", "no cloud seen by the instrument"},
+                                            {"SKC", "sky clear"}}) {
+            if (w != text) continue;
+            take(meaning);
+            return true;
+        }
+        constexpr std::pair<std::string_view, CloudAmount> kAmounts[] = {{"FEW", CloudAmount::few},
+                                                                         {"SCT", CloudAmount::scattered},
+                                                                         {"BKN", CloudAmount::broken},
+                                                                         {"OVC", CloudAmount::overcast},
+                                                                         {"///", CloudAmount::unknown}};
+        if (w.size() == 5 && w.starts_with("VV") && (all_digits(w.substr(2)) || all_slashes(w.substr(2)))) {
+            MetarCloud cloud{CloudAmount::obscured, {}, {}};
+            if (all_digits(w.substr(2))) cloud.height_ft = 100 * number(w.substr(2));
+            metar_.clouds.push_back(cloud);
+            take(cloud.height_ft
+                     ? "sky obscured, vertical visibility " + std::to_string(*cloud.height_ft) + " ft"
+                     : "sky obscured");
+            return true;
+        }
+        for (const auto& [text, amount] : kAmounts) {
+            if (!w.starts_with(text) || w.size() < 6) continue;
+            const std::string height = w.substr(3, 3);
+            std::string type = w.substr(6);
+            // "FEW025CB///": slashes behind a type say nothing; "FEW025 CB" has a gap.
+            while (!type.empty() && type.back() == '/') type.pop_back();
+            std::size_t words = 1;
+            if (type.empty() && w.size() == 6 && at_ + 1 < words_.size() &&
+                (words_[at_ + 1].text == "CB" || words_[at_ + 1].text == "TCU")) {
+                type = words_[at_ + 1].text;
+                words = 2;
+            }
+            const bool readable = (all_digits(height) || all_slashes(height)) &&
+                                  (type.empty() || type == "CB" || type == "TCU");
+            if (!readable && lenient_) return false;
+            if (!readable)
+                fail("expected an amount, hundreds of feet and perhaps CB or TCU, such as BKN025CB");
+            MetarCloud cloud{amount, {}, type};
+            if (all_digits(height)) cloud.height_ft = 100 * number(height);
+            const bool known = amount != CloudAmount::unknown && cloud.height_ft;
+            if (!known && !(cloud.height_ft || !type.empty())) {
+                take("clouds unknown", false, words);
+                return true;
+            }
+            metar_.clouds.push_back(cloud);
+            take(known ? "cloud base at " + std::to_string(*cloud.height_ft) + " ft" +
+                             (type.empty() ? "" : ", " + type)
+                       : "cloud of unknown amount or height",
+                 cloud.height_ft.has_value(), words);
+            return true;
+        }
+        return false;
+    }
+
+    // 14/08, M02/M05, 14///, 14/, /////.
+    bool read_temperature() {
+        const std::string& w = word();
+        const std::size_t slash = w.find('/');
+        if (slash == w.npos || w.size() > 7) return false;
+        // Whether a part is a temperature, perhaps an unknown one, which leaves `degrees` empty.
+        const auto part = [](std::string_view text, std::optional<int>& degrees) {
+            if (text.empty() || all_slashes(text) || text == "XX") return true;
+            const bool minus = text.front() == 'M';
+            if (minus) text.remove_prefix(1);
+            if (text.size() != 2 || !all_digits(text)) return false;
+            degrees = minus ? -number(text) : number(text);
+            return true;
+        };
+        std::optional<int> temperature, dew;
+        if (!part(std::string_view(w).substr(0, slash), temperature) ||
+            !part(std::string_view(w).substr(slash + 1), dew))
+            return false;
+        if (!temperature && !dew && w != "/////" && w != "//" && w != "///") return false;
+        if (w == "//" || w == "///") {
+            take("not observed", false);
+            return true;
+        }
+        metar_.temperature_c = temperature;
+        metar_.dew_point_c = dew;
+        take(temperature ? "temperature and dew point" : "temperature unknown", temperature.has_value());
+        return true;
+    }
+
+    bool read_pressure() {
+        const std::string& w = word();
+        if (w.size() != 5 || (w[0] != 'Q' && w[0] != 'A')) return false;
+        const std::string value = w.substr(1);
+        if (all_slashes(value)) {
+            take("pressure unknown", false);
+            return true;
+        }
+        if (!all_digits(value)) return false;
+        metar_.pressure_hpa = w[0] == 'Q' ? number(value) : number(value) * 33.8639 / 100;
+        take("pressure at mean sea level", false);
+        return true;
+    }
+
+    // Recent weather, wind shear, runway states, colour states: known, and of no effect.
+    bool read_other() {
+        const std::string& w = word();
+        if (w == "WS") {
+            std::size_t words = 1;
+            while (at_ + words < words_.size() && words < 4 &&
+                   (words_[at_ + words].text == "ALL" || words_[at_ + words].text == "RWY" ||
+                    words_[at_ + words].text.starts_with("R")))
+                ++words;
+            take("wind shear", false, words);
+            return true;
+        }
+        for (const char* colour : {"BLU", "WHT", "GRN", "YLO", "YLO1", "YLO2", "AMB", "RED", "BLACK"}) {
+            if (w != colour) continue;
+            take("colour state", false);
+            return true;
+        }
+        if (w.starts_with("RE") && w.size() >= 4) {
+            take("recent weather", false);
+            return true;
+        }
+        if (w.size() == 8 && (all_digits(w) || (all_digits(w.substr(0, 2)) && w.find("//") != w.npos))) {
+            take("state of a runway", false);
+            return true;
+        }
+        if (w == "SNOCLO" || (w.starts_with("W") && w.find("/S") != w.npos)) {
+            take(w == "SNOCLO" ? "closed by snow" : "state of the sea", false);
+            return true;
+        }
+        return false;
+    }
+
+    bool read_weather() {
+        std::string_view w = word();
+        MetarWeather weather;
+        if (w.front() == '-' || w.front() == '+') {
+            weather.intensity = w.front();
+            w.remove_prefix(1);
+        }
+        if (w.starts_with("VC")) {
+            weather.vicinity = true;
+            w.remove_prefix(2);
+        }
+        const auto among = [](std::string_view two, const auto& list) {
+            return std::find(list.begin(), list.end(), two) != list.end();
+        };
+        static constexpr std::array<std::string_view, 8> kDescriptors{"SH", "TS", "FZ", "BL",
+                                                                      "DR", "MI", "BC", "PR"};
+        static constexpr std::array<std::string_view, 22> kPhenomena{
+            "RA", "DZ", "SN", "SG", "PL", "GR", "GS", "UP", "IC", "FG", "BR",
+            "HZ", "FU", "VA", "DU", "SA", "PO", "SQ", "FC", "SS", "DS", "PY"};
+        if (w.size() >= 2 && among(w.substr(0, 2), kDescriptors)) {
+            weather.descriptor = w.substr(0, 2);
+            w.remove_prefix(2);
+        }
+        while (w.size() >= 2 && among(w.substr(0, 2), kPhenomena)) {
+            weather.phenomena.emplace_back(w.substr(0, 2));
+            w.remove_prefix(2);
+        }
+        if (!w.empty() || (weather.phenomena.empty() && weather.descriptor.empty())) return false;
+        metar_.weather.push_back(weather);
+        take(weather.vicinity ? "weather in the vicinity" : "weather", !weather.vicinity);
+        return true;
+    }
+
+    Metar metar_;
+    std::vector<Word> words_;
+    std::size_t at_ = 0;
+    bool lenient_, seen_wind_ = false;
+};
+
+}  // namespace
+
+Metar parse_metar(std::string_view text, bool lenient) { return Reader(text, lenient).read(); }
+
+std::optional<CloudAmount> amount_of(double cover) {
+    const double oktas = 8 * cover;
+    if (oktas < 0.5) return {};
+    if (oktas < 2.5) return CloudAmount::few;
+    if (oktas < 4.5) return CloudAmount::scattered;
+    return oktas < 7.5 ? CloudAmount::broken : CloudAmount::overcast;
+}
+
+std::string_view amount_text(CloudAmount amount) {
+    constexpr std::string_view kTexts[] = {"FEW", "SCT", "BKN", "OVC", "VV", "///"};
+    return kTexts[std::size_t(amount)];
+}
+
+std::string metar_text(const Metar& m) {
+    const auto digits = [](int value, int width) {
+        std::string text = std::to_string(value);
+        return std::string(std::size_t(std::max(0, width - int(text.size()))), '0') + text;
+    };
+    std::string text = m.station + " " + digits(m.day, 2) + digits(m.hour, 2) + digits(m.minute, 2) + "Z";
+    if (m.wind.known) {
+        const int knots = int(std::lround(m.wind.speed_m_per_s / kKnot));
+        const int from = (m.wind.from_deg + 5) / 10 * 10;
+        const std::string direction = knots == 0        ? "000"
+                                      : m.wind.variable ? "VRB"
+                                                        : digits(from == 0 ? 360 : from, 3);
+        text += " " + direction + digits(knots, 2);
+        if (m.wind.gust_m_per_s) text += "G" + digits(int(std::lround(*m.wind.gust_m_per_s / kKnot)), 2);
+        text += "KT";
+    } else {
+        text += " /////KT";
+    }
+    if (m.cavok) return text + " CAVOK";
+    text += m.visibility_m ? " " + digits(*m.visibility_m, 4) : " ////";
+    for (const MetarWeather& w : m.weather) {
+        text += ' ';
+        if (w.intensity != 0) text += w.intensity;
+        if (w.vicinity) text += "VC";
+        text += w.descriptor;
+        for (const std::string& phenomenon : w.phenomena) text += phenomenon;
+    }
+    for (const MetarCloud& c : m.clouds) {
+        text += " " + std::string(amount_text(c.amount)) +
+                (c.height_ft ? digits(*c.height_ft / 100, 3) : "///") + c.type;
+    }
+    if (m.clouds.empty()) text += " NSC";
+    if (m.temperature_c && m.dew_point_c) {
+        const auto degrees = [&](int t) { return (t < 0 ? "M" : "") + digits(std::abs(t), 2); };
+        text += " " + degrees(*m.temperature_c) + "/" + degrees(*m.dew_point_c);
+    }
+    if (m.pressure_hpa) text += " Q" + digits(int(*m.pressure_hpa), 4);
+    return text;
+}
+
+}  // namespace nephos

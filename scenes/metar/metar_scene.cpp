@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scenes/metar/metar_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/place.h"
+#include "core/text.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kFoot_m = 0.3048;
+// Of the clouds' box, which stands around the aerodrome.
+constexpr double kSide_m = 20'000;
+constexpr double kDeep_m = 2000;        // deeper layers have coarser cells
+constexpr double kKoschmieder = 3.912;  // -ln 0.02: contrast that an eye still sees
+
+std::string text_of(double value) { return number_text(std::round(value * 1000) / 1000); }
+
+bool has_phenomenon(const Metar& m, std::string_view phenomenon) {
+    return std::ranges::any_of(m.weather, [&](const MetarWeather& w) {
+        return !w.vicinity && std::ranges::find(w.phenomena, phenomenon) != w.phenomena.end();
+    });
+}
+
+bool has_descriptor(const Metar& m, std::string_view descriptor) {
+    return std::ranges::any_of(
+        m.weather, [&](const MetarWeather& w) { return !w.vicinity && w.descriptor == descriptor; });
+}
+
+// Rain, drizzle or snow, the strongest of the groups.
+struct Precipitation {
+    bool any = false, snow = false, showers = false;
+    double mm_per_h = 0;
+};
+
+Precipitation precipitation_of(const Metar& m) {
+    Precipitation p;
+    for (const MetarWeather& w : m.weather) {
+        if (w.vicinity) continue;
+        for (const std::string& phenomenon : w.phenomena) {
+            const bool drizzle = phenomenon == "DZ", snow = phenomenon == "SN" || phenomenon == "SG";
+            if (!drizzle && !snow && phenomenon != "RA" && phenomenon != "PL" && phenomenon != "GR" &&
+                phenomenon != "GS" && phenomenon != "UP")
+                continue;
+            const double rate = drizzle ? 0.3 : w.intensity == '-' ? 1 : w.intensity == '+' ? 15 : 5;
+            p.any = true;
+            p.snow = p.snow || snow;
+            p.showers = p.showers || w.descriptor == "SH" || w.descriptor == "TS";
+            p.mm_per_h = std::max(p.mm_per_h, rate);
+        }
+    }
+    return p;
+}
+
+struct Genus {
+    const char* name;
+    double depth_m;
+};
+
+// Limits of the three levels of cloud at 6,500 and 20,000 ft.
+Genus genus_of(const MetarCloud& c, bool rain) {
+    const int amount = int(c.amount);  // 0 FEW .. 3 OVC
+    if (c.type == "CB") return {"Cb", 6000};
+    if (c.type == "TCU") return {"Cu", 2400};
+    if (*c.height_ft < 6500) {
+        constexpr Genus kLow[] = {{"Cu", 500}, {"Cu", 700}, {"Sc", 400}, {"St", 350}};
+        return amount == 3 && rain ? Genus{"Ns", 2400} : kLow[amount];
+    }
+    constexpr Genus kMiddle[] = {{"Ac", 280}, {"Ac", 280}, {"Ac", 320}, {"As", 600}};
+    constexpr Genus kHigh[] = {{"Ci", 600}, {"Ci", 600}, {"Cs", 500}, {"Cs", 500}};
+    return *c.height_ft < 20'000 ? kMiddle[amount] : kHigh[amount];
+}
+
+// The keys of a veil and of its detail, by genus. `coverage` and heights come first.
+struct Look {
+    const char* veil;
+    const char* detail;
+    double opacity, cell_m;
+};
+
+Look look_of(const std::string& genus, bool deep) {
+    if (deep && (genus == "Cu" || genus == "Cb"))
+        return {
+            "form = \"cumulus\"\noctaves = 3\nwavelength_m = 5000\nstretch_up = 1.6\nsoftness = "
+            "0.5\nevolution_m_per_s = 1\n",
+            "strength = 1\nsize_m = 400\n", 1, 160};
+    if (genus == "Cu" || genus == "Cb")
+        return {
+            "form = \"cumulus\"\noctaves = 4\nwavelength_m = 2600\nstretch_up = 1.2\nsoftness = "
+            "0.7\nevolution_m_per_s = 1\n",
+            "strength = 1\nsize_m = 300\n", 1, 100};
+    if (genus == "Sc")
+        return {
+            "form = \"stratus\"\nsoftness = 0.8\ndirection_deg = 20\noctave = [\n    { wavelength_m = [9000, "
+            "7000, 4000], weight = 0.45 },\n"
+            "    { wavelength_m = [6500, 1150, 4000], weight = 1, velocity_m_per_s = [0, 0.5, 0.2] },\n"
+            "    { wavelength_m = [1100, 620, 3000], weight = 0.5, velocity_m_per_s = [0.5, -0.5, 0.4] "
+            "},\n]\n",
+            "strength = 0.7\nsize_m = 260\nwisps = 0.4\nthermals = 0.3\n", 1, 100};
+    if (genus == "Ac")
+        return {
+            "form = \"stratus\"\nsoftness = 1\ndirection_deg = 30\noctave = [\n    { wavelength_m = [9000, "
+            "6000, 4000], weight = 0.6 },\n"
+            "    { wavelength_m = [820, 520, 2000], weight = 1, velocity_m_per_s = [0.3, 0.3, 0.2] },\n"
+            "    { wavelength_m = [400, 300, 1500], weight = 0.25, velocity_m_per_s = [0.5, -0.5, 0.4] "
+            "},\n]\n",
+            "strength = 0.6\nsize_m = 130\nwisps = 0.4\nthermals = 0.2\n", 0.6, 80};
+    if (genus == "Ci")
+        return {
+            "form = \"cirrus\"\noctaves = 4\nwavelength_m = 2200\nstretch = 6\ndisplacement = 0.3\nsoftness "
+            "= 1\nfallstreak_m = 3000\n",
+            "strength = 1.2\nsize_m = 220\nstretch = 20\nwisps = 0\nthermals = 0\n", 0.25, 100};
+    if (genus == "Cs")
+        return {
+            "form = \"cirrostratus\"\noctaves = 3\nwavelength_m = 9000\nstretch = 4\ndisplacement = "
+            "0.6\nsoftness = 0.5\n",
+            "strength = 0.3\nsize_m = 900\nstretch = 20\nthermals = 0.3\nwisps = 0\n", 0.2, 100};
+    // St, Ns, As
+    return {
+        "form = \"stratus\"\noctaves = 3\nwavelength_m = 3600\nstretch = 1.8\nstretch_up = 0.6\nsoftness = "
+        "0.6\n",
+        "strength = 0.35\nsize_m = 500\nthermals = 0.4\nmean_free_path_m = 200\n", 1, 100};
+}
+
+std::string layer_text(const MetarLayer& layer, double coverage) {
+    const double depth = layer.top_m - layer.base_m;
+    const Look look = look_of(layer.genus, depth > kDeep_m);
+    const double cell = depth > kDeep_m ? 160 : look.cell_m;
+    const int across = int(std::lround(kSide_m / cell)), levels = std::max(3, int(std::ceil(depth / cell)));
+    std::string text = "\n# " + layer.group + "\n[[layer]]\nname = \"" + layer.name + "\"\n";
+    if (look.opacity != 1) text += "opacity = " + text_of(look.opacity) + "\n";
+    text += "lattice = { cells = [" + std::to_string(across) + ", " + std::to_string(across) + ", " +
+            std::to_string(levels) + "], cell_size_m = " + text_of(cell) + ", origin_m = [" +
+            text_of(-kSide_m / 2) + ", " + text_of(-kSide_m / 2) + ", " + text_of(layer.base_m) +
+            "] }\n\n[layer.veil]\n";
+    text += std::string(look.veil) + "coverage = " + number_text(coverage) + "\n";
+    if (layer.sheet) text += "sheet = 0.5\n";
+    const bool flat = layer.genus == "Cu" || layer.genus == "Cb";
+    text += "base_m = " + text_of(layer.base_m - cell / 2) +
+            "\ntop_m = " + text_of(layer.base_m + levels * cell) + "\nsoft_base_m = " + text_of(cell / 4) +
+            "\nsoft_top_m = " + text_of((flat ? 0.75 : 0.4) * depth) + "\nmargin_m = 0\n\n[layer.detail]\n" +
+            look.detail;
+    return text;
+}
+
+// By 600 m the wind is 1.6 times as strong and turned by 20 degrees, to the right north of the equator.
+std::string wind_text(const Metar& m, const MetarSceneOptions& o) {
+    std::string text = "\n[[wind]]\nlevels = [\n";
+    const double turn = o.place && o.place->latitude_deg < 0 ? -20 : 20;
+    double from = m.wind.from_deg;
+    if (m.wind.variable) from = double((o.seed * 73) % 36) * 10;
+    const auto level = [&](double height, double speed, double direction) {
+        direction -= 360 * std::floor(direction / 360);
+        text += "    { height_m = " + text_of(height) + ", from_deg = " + text_of(direction) +
+                ", speed_m_per_s = " + text_of(speed) + " },\n";
+    };
+    const double speed = m.wind.speed_m_per_s;
+    level(10, speed, from);
+    level(600, 1.6 * speed, from + turn);
+    return text + "]\n";
+}
+
+std::string start_of(const Metar& m, const MetarSceneOptions& o) {
+    const auto two = [](int n) { return (n < 10 ? "0" : "") + std::to_string(n); };
+    std::string day = o.date;
+    if (day.size() == 7) day += "-" + two(m.day);
+    const std::string start = day + "T" + two(m.hour) + ":" + two(m.minute) + ":00Z";
+    if (!utc_seconds(start) || (o.date.size() == 10 && o.date.substr(8) != two(m.day)))
+        throw Error(ErrorCode::usage, "--date '" + o.date + "' does not fit the report's day " +
+                                          std::to_string(m.day) +
+                                          ": expected a month such as 2024-06, or that day of one");
+    return start;
+}
+
+std::string rain_text(const Metar& m, const Precipitation& p, double base_m) {
+    std::string text =
+        "\n# The area that it falls in; its clouds are those of the other layers.\n[[sky]]\nname = "
+        "\"none\"\nstate = 0\nclouds = 0\n\n[[layer]]\nname = \"precipitation\"\nskies = "
+        "\"none\"\nbase_height_m = " +
+        text_of(std::max(100.0, base_m)) +
+        "\nlattice = { cells = [20, 20, 3], cell_size_m = 1000, origin_m = [-10000, -10000, " +
+        text_of(base_m) + "] }\nbackground = { hum = 0, act = 0, ext = 1 }\n[layer.rain]\nplaced = [\n";
+    const std::string rate = ", intensity_mm_per_h = " + text_of(p.mm_per_h) + " },\n";
+    if (p.showers) {
+        text += "    { x_m = 0, y_m = 0, semi_a_m = 2200, semi_b_m = 1700, yaw_deg = 20" + rate +
+                "    { x_m = -5200, y_m = 4200, semi_a_m = 1800, semi_b_m = 1300, yaw_deg = 70" + rate +
+                "    { x_m = 4600, y_m = 5600, semi_a_m = 1500, semi_b_m = 1400" + rate;
+    } else {
+        text += "    { x_m = 0, y_m = 0, semi_a_m = 9500, semi_b_m = 9500" + rate;
+    }
+    text += "]\n\n[precipitation]\nenabled = true\n";
+    if (p.snow) text += "kind = \"snow\"\n";
+    text += "\n[wet_ground]\nenabled = true\n";
+    text += p.snow ? "initial_snow_mm = 2\n" : "initial_water_mm = 1\n";
+    if (has_descriptor(m, "TS"))
+        text += "\n[[lightning]]\nposition_m = [1500, 2500, " + text_of(base_m + 800) +
+                "]\ntime_s = 600\nduration_s = 0.4\nintensity = 3\n";
+    return text;
+}
+
+}  // namespace
+
+double cover_of(CloudAmount amount) {
+    constexpr double kCovers[] = {0.19, 0.44, 0.75, 1, 1, 0};
+    return kCovers[std::size_t(amount)];
+}
+
+std::vector<MetarLayer> layers_of(const Metar& m) {
+    const bool rain = precipitation_of(m).any && !precipitation_of(m).showers;
+    std::vector<MetarLayer> layers;
+    std::vector<MetarCloud> clouds = m.clouds;
+    std::ranges::stable_sort(clouds, {}, [](const MetarCloud& c) { return c.height_ft.value_or(0); });
+    for (const MetarCloud& c : clouds) {
+        if (c.amount == CloudAmount::obscured || c.amount == CloudAmount::unknown || !c.height_ft) continue;
+        const Genus genus = genus_of(c, rain);
+        MetarLayer layer;
+        layer.genus = genus.name;
+        layer.name = layer.genus + std::to_string(layers.size() + 1);
+        layer.base_m = std::max(30.0, *c.height_ft * kFoot_m);
+        layer.top_m = layer.base_m + genus.depth_m;
+        layer.cover = cover_of(c.amount);
+        layer.sheet = c.amount == CloudAmount::overcast;
+        const std::string height = std::to_string(*c.height_ft / 100);
+        layer.group = std::string(amount_text(c.amount)) +
+                      std::string(3 - std::min<std::size_t>(3, height.size()), '0') + height + c.type;
+        layers.push_back(layer);
+    }
+    return layers;
+}
+
+std::string metar_scene_text(const Metar& m, const MetarSceneOptions& o,
+                             const std::vector<double>& coverage) {
+    const std::vector<MetarLayer> layers = layers_of(m);
+    const Precipitation p = precipitation_of(m);
+    std::string text = "# SPDX-License-Identifier: Apache-2.0\n#\n# " + m.text +
+                       "\n#\n# The sky of this report. Heights are above the aerodrome, which is z = 0.\n\n";
+    text += "name = \"" + (o.name.empty() ? m.station : o.name) + "\"\nseed = " + std::to_string(o.seed) +
+            "\n\n[time]\nstep_s = 10\nsteps = 90\n";
+    if (o.place) {
+        text += "\n[georeference]\nlatitude_deg = " + number_text(o.place->latitude_deg) +
+                "\nlongitude_deg = " + number_text(o.place->longitude_deg) +
+                "\nheight_m = " + number_text(o.place->elevation_m) + "\n";
+        if (!o.date.empty()) text += "start_utc = \"" + start_of(m, o) + "\"\n";
+    } else if (!o.date.empty()) {
+        start_of(m, o);
+    }
+    text += wind_text(m, o);
+    double lowest = 1000;
+    for (std::size_t n = 0; n < layers.size(); ++n) {
+        text += layer_text(layers[n], coverage.at(n));
+        lowest = std::min(lowest, layers[n].base_m);
+    }
+    if (layers.empty()) {
+        text +=
+            "\n# No cloud: an empty layer, which gives the box its place.\n[[sky]]\nname = \"clear\"\nstate "
+            "= 0\nclouds = 0\n\n[[layer]]\nname = \"clear\"\nskies = \"clear\"\nbase_height_m = 1000\n"
+            "lattice = { cells = [20, 20, 3], cell_size_m = 1000, origin_m = [-10000, -10000, 1000] "
+            "}\nbackground = { hum = 0, act = 0, ext = 1 }\n";
+    }
+    if (p.any) text += rain_text(m, p, lowest);
+    text += "\n[density]\nextinction_per_m = 0.05\n";
+    int visibility = m.visibility_m.value_or(9999);
+    double depth = has_phenomenon(m, "FG") ? 150 : 1000;
+    for (const MetarCloud& c : m.clouds) {
+        if (c.amount != CloudAmount::obscured) continue;
+        if (c.height_ft) depth = std::max(20.0, 1.5 * *c.height_ft * kFoot_m);
+        if (!m.visibility_m) visibility = 500;
+    }
+    if (visibility < 9999) {
+        text += "\n# " + std::to_string(visibility) +
+                " m of visibility: 3.912 / visibility\n[fog]\nextinction_per_m = " +
+                number_text(kKoschmieder / std::max(visibility, 20), 6) + "\nheight_m = " + text_of(depth) +
+                "\n";
+    }
+    text +=
+        "\n[frames]\nstart_s = 600\ntime_scale = 60\nper_second = 12\ncount = 12\n\n[camera]\nposition_m = "
+        "[0, -9000, 120]\ntarget_m = [0, 0, " +
+        text_of(std::min(lowest, 2500.0)) +
+        "]\nvertical_fov_deg = 60\nexposure = \"automatic\"\ntone_curve = \"neutral\"\nglare = "
+        "0.1\n\n[atmosphere]\nmodel = \"physical\"\ncolours = \"spectral\"\n\n[ground]\npattern = "
+        "\"country\"\n";
+    return text;
+}
+
+std::vector<std::string> metar_notes(const Metar& m, const MetarSceneOptions& o) {
+    std::vector<std::string> notes = m.warnings;
+    if (o.date.empty() || !o.place)
+        notes.push_back("the sun is not that of the report: it takes --date and --at");
+    for (const MetarGroup& group : m.groups)
+        if (!group.used) notes.push_back("`" + group.text + "` (" + group.meaning + ") is not in the scene");
+    if (m.wind.known && m.wind.variable && m.wind.speed_m_per_s > 0)
+        notes.push_back("the wind's direction follows from the seed");
+    if (m.wind.gust_m_per_s) notes.push_back("gusts are not simulated");
+    if (m.temperature_c && m.dew_point_c) {
+        const double expected = 125.0 * (*m.temperature_c - *m.dew_point_c);
+        for (const MetarLayer& layer : layers_of(m)) {
+            if (layer.genus == "Cu" && std::abs(layer.base_m - expected) > 300) {
+                notes.push_back("cumulus at " + text_of(layer.base_m) +
+                                " m does not fit temperature and dew point, from which a base at " +
+                                text_of(expected) + " m follows");
+                break;
+            }
+        }
+    }
+    return notes;
+}
+
+}  // namespace nephos

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A scene from a report: a layer for each cloud group with the genus that its amount and height stand for, wind, fog,
+// rain or snow, and the sun. Functions are pure and thread-safe.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scenes/metar/metar.h"
+
+namespace nephos {
+
+struct MetarPlace {
+    double latitude_deg = 0, longitude_deg = 0, elevation_m = 0;
+};
+
+struct MetarSceneOptions {
+    std::string name;  // of the scene; empty: of the aerodrome
+    // "2024-06" or "2024-06-21"; the report has day and time. Empty: the sun is not set by a date.
+    std::string date;
+    std::optional<MetarPlace> place;
+    int seed = 1;
+};
+
+// A layer of clouds that a group becomes.
+struct MetarLayer {
+    std::string name;              // "Sc1": genus and number, from below
+    std::string genus;             // WMO abbreviation
+    double base_m = 0, top_m = 0;  // above the aerodrome, which is z = 0
+    double cover = 0;              // of optical depth above 1, to be met; 1: no gap
+    bool sheet = false;            // without gaps: nothing to fit
+    std::string group;             // of the report
+};
+
+// Returns the layers of a report from below. Groups of unknown amount or height are left out.
+std::vector<MetarLayer> layers_of(const Metar& metar);
+
+// Returns the target of an amount: FEW 0.19, SCT 0.44, BKN 0.75, OVC 1.
+double cover_of(CloudAmount amount);
+
+// Returns the scene as TOML with comments; `coverage` has the key of that name for each of layers_of(). Throws
+// Error(usage) when the date is none, or has no such day.
+std::string metar_scene_text(const Metar& metar, const MetarSceneOptions& options,
+                             const std::vector<double>& coverage);
+
+// Returns what the report says that the scene leaves out, a sentence each.
+std::vector<std::string> metar_notes(const Metar& metar, const MetarSceneOptions& options);
+
+}  // namespace nephos

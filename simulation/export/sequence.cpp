@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/export/sequence.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "simulation/run_listing.h"
+#include "simulation/scene_place.h"
+
+namespace nephos {
+namespace {
+
+// "cloud" and 12 of "cloud_0012.vdb"; without a number the whole stem.
+std::pair<std::string, std::optional<int>> split_name(const std::filesystem::path& file) {
+    const std::string stem = file.stem().string();
+    const std::size_t at = stem.find_last_not_of("0123456789");
+    const std::string digits = at == stem.npos ? stem : stem.substr(at + 1);
+    int number = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    if (digits.empty() || error != std::errc() || number < 1) return {stem, {}};
+    std::string name = stem.substr(0, stem.size() - digits.size());
+    while (!name.empty() && (name.back() == '_' || name.back() == '.' || name.back() == '-')) name.pop_back();
+    return {name.empty() ? "volume" : name, number};
+}
+
+bool is_wanted(const ExportOptions& o, int number) {
+    return number >= o.first_frame && number <= o.last_frame && (number - o.first_frame) % o.frame_step == 0;
+}
+
+std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> layer,
+                               const ExportSequence& s) {
+    std::vector<double> times;
+    const Wind& wind = layer ? layer_wind(scene, *layer) : scene.automaton.wind;
+    for (const WindKeyframe& keyframe : wind.keyframes) times.push_back(keyframe.time_s);
+    if (times.empty()) times.push_back(0);
+    std::vector<WindTable> tables;
+    for (const double time_s : times) {
+        WindTable table{time_s, wind_levels(scene, layer, s.placement, s.extent, time_s)};
+        if (!table.levels.empty()) tables.push_back(std::move(table));
+    }
+    return tables;
+}
+
+void read_first(const ExportOptions& options, ExportSequence& s) {
+    VdbReadOptions reading;
+    reading.grid = options.grid;
+    const LoadedDensity first = load_density(s.frames.front().file, reading);
+    s.extent = first.density.extent();
+    s.placement = first.density.placement();
+    s.refine = first.refine;
+    s.of_nephos = first.metadata.has_value();
+    if (first.metadata) s.metadata = *first.metadata;
+    if (s.of_nephos && s.metadata.frames_per_second > 0) s.frames_per_second = s.metadata.frames_per_second;
+}
+
+ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& run,
+                               const std::optional<std::string>& layer) {
+    ExportSequence s;
+    s.name = run.scene.name + (layer ? "_" + *layer : "");
+    s.layer = layer.value_or("");
+    for (const ListedFrame& frame : run.frames) {
+        if (!is_wanted(options, frame.number)) continue;
+        s.frames.push_back({density_file(run, frame, layer), frame.number, frame.time_s,
+                            utc_at(run.scene.georeference, frame.time_s)});
+    }
+    if (s.frames.empty()) throw Error(ErrorCode::usage, run.folder.string() + ": has no frame of this range");
+    read_first(options, s);
+    s.wind = wind_of(run.scene, layer ? std::optional(layer_index(run.scene, *layer)) : std::nullopt, s);
+    return s;
+}
+
+ExportSequence sequence_of_files(const ExportOptions& options) {
+    ExportSequence s;
+    const std::vector<std::filesystem::path> files =
+        options.files.empty() ? std::vector{options.source} : options.files;
+    s.name = split_name(files.front()).first;
+    int next = 1;
+    for (const std::filesystem::path& file : files) {
+        const int number =
+            files.size() == 1 ? split_name(file).second.value_or(1) : split_name(file).second.value_or(next);
+        if (number < next && !s.frames.empty())
+            throw Error(ErrorCode::usage,
+                        file.string() + ": its number does not follow that of the file before");
+        next = number + 1;
+        if (is_wanted(options, number)) s.frames.push_back({file, number, 0, {}});
+    }
+    if (s.frames.empty()) throw Error(ErrorCode::usage, "no file has a number of this range");
+    read_first(options, s);
+    if (!s.metadata.wind.empty()) s.wind.push_back({s.metadata.time_s, s.metadata.wind});
+    for (SourceFrame& frame : s.frames) frame.time_s = s.metadata.time_s;
+    return s;
+}
+
+// Sizes, levels and padding of one sequence.
+void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<std::string>& notes) {
+    s.layout = options.layout;
+    for (int axis = 0; axis < 3; ++axis) s.layout.periodic[std::size_t(axis)] = s.metadata.period_m[axis] > 0;
+    const double edge = s.placement.cell_size_m;
+    const int longest = std::max({s.extent.x, s.extent.y, s.extent.z});
+    if (options.voxel_m) {
+        const double ratio = *options.voxel_m / edge;
+        if (ratio < 0.999 || std::abs(ratio - std::round(ratio)) > 1e-6 * ratio) {
+            const double near = std::max(1.0, std::round(ratio)) * edge;
+            throw Error(ErrorCode::usage, fmt::format("--voxel {:g}: the grid's voxels are {:g} m, and only "
+                                                      "means of whole numbers of them keep the mass: "
+                                                      "expected a multiple such as {:g}",
+                                                      *options.voxel_m, edge, near));
+        }
+        s.layout.factor = int(std::lround(ratio));
+    } else if (options.largest_side) {
+        s.layout.factor = std::max(1, (longest + *options.largest_side - 1) / *options.largest_side);
+    }
+    const std::vector<ExportFormat> formats = all_formats(options);
+    if (!options.weather.empty() && options.files.empty() && !is_run_folder(options.source))
+        throw Error(
+            ErrorCode::usage,
+            options.source.string() + ": layers, metar, xplane, wpr and cigi summarise a run, not a file");
+    const bool dense = std::ranges::any_of(formats, is_dense);
+    const bool blocks = std::ranges::any_of(
+        formats, [&](ExportFormat f) { return is_dense(f) && type_of(options, f) == VoxelType::bc4; });
+    const auto fit = [&] {
+        s.layout.multiple = options.layout.multiple;
+        if (blocks) s.layout.multiple = std::lcm(s.layout.multiple, 4);
+        s.levels = options.mips ? level_count(box_of(s.extent, s.placement, s.layout).size) : 1;
+        s.layout.multiple = std::lcm(s.layout.multiple, 1 << (s.levels - 1));
+        if (options.mips) {
+            const VolumeBox box = box_of(s.extent, s.placement, s.layout);
+            s.levels = std::min(s.levels, level_count(box.size));
+        }
+    };
+    fit();
+    const auto frame_bytes = [&] {
+        std::uint64_t bytes = 0;
+        const VolumeBox box = box_of(s.extent, s.placement, s.layout);
+        for (const ExportFormat format : formats) {
+            for (int n = 0;
+                 is_dense(format) &&
+                 n < (format == ExportFormat::vti || format == ExportFormat::slices ? 1 : s.levels);
+                 ++n)
+                bytes += encoded_bytes(std::max(1, box.size[0] >> n), std::max(1, box.size[1] >> n),
+                                       std::max(1, box.size[2] >> n), type_of(options, format));
+        }
+        return bytes;
+    };
+    if (options.budget_bytes) {
+        if (!dense)
+            throw Error(ErrorCode::usage, "--budget counts dense formats: raw, vti, dds, ktx2 or slices");
+        while (frame_bytes() > *options.budget_bytes && s.layout.factor < longest) {
+            ++s.layout.factor;
+            fit();
+        }
+        if (frame_bytes() > *options.budget_bytes)
+            throw Error(ErrorCode::usage, "--budget " + bytes_text(std::size_t(*options.budget_bytes)) +
+                                              " is less than the smallest frame takes");
+        if (s.layout.factor > 1)
+            notes.push_back(
+                fmt::format("{}: voxels of {:g} m instead of {:g} m, so that a frame fits into {}", s.name,
+                            edge * s.layout.factor, edge, bytes_text(std::size_t(*options.budget_bytes))));
+    }
+    const VolumeBox box = box_of(s.extent, s.placement, s.layout);
+    const int side = std::max({box.size[0], box.size[1], box.size[2]});
+    if (options.limit_side > 0 && dense && side > options.limit_side) {
+        const int factor = s.layout.factor * ((side + options.limit_side - 1) / options.limit_side);
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: {} voxels on a side, but {} takes at most {}: give --voxel {:g} or a --size",
+                        s.name, side, options.target, options.limit_side, factor * edge));
+    }
+    if (dense && box.padding != std::array<int, 3>{}) {
+        notes.push_back(fmt::format("{}: padded with 0 by {} x {} x {} voxels to {} x {} x {}", s.name,
+                                    box.padding[0], box.padding[1], box.padding[2], box.size[0], box.size[1],
+                                    box.size[2]));
+    }
+}
+
+}  // namespace
+
+bool is_dense(ExportFormat format) {
+    return format != ExportFormat::nvdb && format != ExportFormat::usd && format != ExportFormat::vdb;
+}
+
+VoxelType format_type(ExportFormat format) {
+    switch (format) {
+        case ExportFormat::dds:
+        case ExportFormat::ktx2:
+            return VoxelType::bc4;
+        case ExportFormat::slices:
+            return VoxelType::r8;
+        default:
+            return VoxelType::r32f;
+    }
+}
+
+VoxelType type_of(const ExportOptions& options, ExportFormat format) {
+    if (!is_dense(format))
+        return options.type == VoxelType::r16f && format == ExportFormat::vdb ? VoxelType::r16f
+                                                                              : VoxelType::r32f;
+    return options.type.value_or(format_type(format));
+}
+
+std::vector<ExportFormat> all_formats(const ExportOptions& options) {
+    std::vector<ExportFormat> formats = options.formats;
+    if (std::ranges::count(formats, ExportFormat::usd) > 0) formats.push_back(ExportFormat::vdb);
+    std::sort(formats.begin(), formats.end());
+    formats.erase(std::unique(formats.begin(), formats.end()), formats.end());
+    return formats;
+}
+
+std::string frame_name(const ExportSequence& sequence, int number, ExportFormat format) {
+    for (const NamedFormat& named : export_formats())
+        if (named.format == format) return fmt::format("{}_{:04}{}", sequence.name, number, named.extension);
+    return {};
+}
+
+std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::vector<std::string>& notes) {
+    std::vector<ExportSequence> sequences;
+    std::error_code error;
+    if (options.files.empty() && std::filesystem::is_directory(options.source, error)) {
+        if (!is_run_folder(options.source))
+            throw Error(ErrorCode::io,
+                        options.source.string() + ": is no folder of a run (it has no manifest.json)");
+        const RunListing run = read_run(options.source);
+        if (!run.complete)
+            notes.push_back(run.folder.string() +
+                            ": the run is not complete; its frames so far are exported");
+        std::vector<std::optional<std::string>> layers{options.layer};
+        if (options.layer == "each") {
+            layers.clear();
+            for (const LayerOptions& layer : run.scene.layers)
+                if (has_density(layer)) layers.emplace_back(layer.name);
+            if (layers.empty()) throw Error(ErrorCode::usage, "--layer each: the scene has no layers");
+        } else if (options.layer == "all") {
+            layers = {std::nullopt};
+        }
+        for (const auto& layer : layers) sequences.push_back(sequence_of_run(options, run, layer));
+    } else {
+        if (options.layer && options.layer != "all")
+            throw Error(ErrorCode::usage, "--layer: layers are those of a run, not of a file");
+        sequences.push_back(sequence_of_files(options));
+    }
+    for (ExportSequence& s : sequences) choose_layout(options, s, notes);
+    return sequences;
+}
+
+}  // namespace nephos

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What an export reads: sequences of density files with all that is known of them (not installed).
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "density/vdb/vdb_file.h"
+#include "simulation/export/export.h"
+
+namespace nephos {
+
+struct SourceFrame {
+    std::filesystem::path file;
+    int number = 1;
+    double time_s = 0;
+    std::string utc;  // empty without a start
+};
+
+// A moment and the wind by height at it.
+struct WindTable {
+    double time_s = 0;
+    std::vector<WindLevel> levels;
+};
+
+struct ExportSequence {
+    std::string name;   // of its files
+    std::string layer;  // empty: all together
+    std::vector<SourceFrame> frames;
+    Extent extent;
+    Placement placement;
+    VdbMetadata metadata;  // of the first frame; defaults in a file of another program
+    bool of_nephos = false;
+    int refine = 1;
+    double frames_per_second = 24;
+    std::vector<WindTable> wind;
+    // How its boxes are made of its grids.
+    VolumeLayout layout;
+    int levels = 1;
+    float scale = 1;
+};
+
+// Lists the sequences of a run or of files, with their layout. Reads the first frame of each. Throws as plan_export().
+std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::vector<std::string>& notes);
+
+// Formats whose files hold the dense box.
+bool is_dense(ExportFormat format);
+VoxelType type_of(const ExportOptions& options, ExportFormat format);
+// USD refers to VDB files, which are written with it. Sorted, each once.
+std::vector<ExportFormat> all_formats(const ExportOptions& options);
+
+// Returns the name of a file: NAME_0001.EXT.
+std::string frame_name(const ExportSequence& sequence, int number, ExportFormat format);
+
+// What is known of a frame once it was read.
+struct FrameFigures {
+    double sum = 0, max = 0;
+};
+
+// Return the text of the sidecar, of the USD scene of all sequences, and of the README of the options' preset.
+std::string sidecar_text(const ExportOptions& options, const ExportSequence& sequence,
+                         const std::vector<FrameFigures>& figures);
+std::string usd_text(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
+std::string readme_text(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
+
+}  // namespace nephos

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// Summaries of layers in the forms of simulators: X-Plane, MSFS, CIGI 3.3 (SISO, "Common Image Generator Interface, ICD
+// 3.3", 2008, sections 4.1.1 and 4.1.12).
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "core/bytes.h"
+#include "simulation/export/weather.h"
+
+namespace nephos {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kKnot = 1852.0 / 3600;
+
+// X-Plane's types: 0 cirrus, 1 stratus, 2 cumulus, 3 cumulonimbus.
+int xplane_type(const std::string& genus) {
+    if (genus.starts_with("Ci") || genus == "Cc" || genus == "Cs") return 0;
+    if (genus == "Cb") return 3;
+    return genus == "Cu" ? 2 : 1;
+}
+
+// CIGI's cloud types 1 to 10; 0: none of them.
+int cigi_type(const std::string& genus) {
+    constexpr const char* kTypes[] = {"", "Ac", "As", "Cc", "Cs", "Ci", "Cb", "Cu", "Ns", "Sc", "St"};
+    for (int n = 1; n <= 10; ++n)
+        if (genus == kTypes[n]) return n;
+    return 0;
+}
+
+template <class T>
+void put_big(ByteWriter& w, T value) {
+    std::byte bytes[sizeof(T)];
+    std::memcpy(bytes, &value, sizeof(T));
+    std::reverse(std::begin(bytes), std::end(bytes));
+    w.put_bytes(bytes);
+}
+
+double from_of(const Velocity& v) {
+    const double degrees = std::atan2(-v.east_m_per_s, -v.north_m_per_s) * 180 / 3.14159265358979323846;
+    return degrees < 0 ? degrees + 360 : degrees;
+}
+
+// Internet checksum (RFC 1071) of an IPv4 header.
+std::uint16_t checksum(std::span<const std::byte> header) {
+    std::uint32_t sum = 0;
+    for (std::size_t n = 0; n + 1 < header.size(); n += 2)
+        sum += std::to_integer<std::uint32_t>(header[n]) << 8 | std::to_integer<std::uint32_t>(header[n + 1]);
+    while (sum >> 16 != 0) sum = (sum & 0xFFFF) + (sum >> 16);
+    return std::uint16_t(~sum);
+}
+
+}  // namespace
+
+std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>& frames) {
+    Json list = Json::array();
+    for (const WeatherSummary& w : frames) {
+        Json clouds = Json::array(), winds = Json::array();
+        for (const LayerSummary& s : three_layers(w.layers)) {
+            clouds.push_back({{"cloud_type", xplane_type(s.genus)},
+                              {"coverage", s.columns.cover},
+                              {"alt_top", s.columns.top_m + w.elevation_m},
+                              {"alt_base", s.columns.cloud_base_m + w.elevation_m}});
+        }
+        for (const auto& [height, v] : w.wind) {
+            if (winds.size() == 13) break;
+            winds.push_back({{"alt_msl", height + w.elevation_m},
+                             {"speed", std::hypot(v.east_m_per_s, v.north_m_per_s)},
+                             {"direction", from_of(v)},
+                             {"gust_speed", 0},
+                             {"shear", 0},
+                             {"turbulence", 0}});
+        }
+        Json entry = {{"number", w.number},           {"time_s", w.time_s},
+                      {"visibility", w.visibility_m}, {"precip_rate", std::min(1.0, w.rain_mm_per_h / 20)},
+                      {"cloud_layers", clouds},       {"wind_layers", winds}};
+        const Georeference& place = run.scene.georeference;
+        if (place.given)
+            entry.update(Json{{"latitude", place.latitude_deg},
+                              {"longitude", place.longitude_deg},
+                              {"ground_altitude_msl", place.height_m}});
+        list.push_back(std::move(entry));
+    }
+    return Json{{"structure", "XPLMWeatherInfo_t"}, {"frames", list}}.dump(2, ' ', false,
+                                                                           Json::error_handler_t::replace) +
+           "\n";
+}
+
+std::string wpr_text(const RunListing& run, const WeatherSummary& w) {
+    std::string text = fmt::format(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<SimBase.Document Type=\"WeatherPreset\" "
+        "version=\"1,3\">\n  <Descr>AceXML Document</Descr>\n"
+        "  <WeatherPreset.Preset>\n    <Name>{}</Name>\n    <IsAltitudeAMGL>False</IsAltitudeAMGL>\n",
+        run.scene.name);
+    for (const LayerSummary& s : three_layers(w.layers)) {
+        text += fmt::format(
+            "    <CloudLayer>\n      <CloudLayerAltitudeBot Value=\"{:.1f}\" Unit=\"m\"/>\n      "
+            "<CloudLayerAltitudeTop Value=\"{:.1f}\" Unit=\"m\"/>\n"
+            "      <CloudLayerDensity Value=\"{:.3f}\" Unit=\"(0 - 1)\"/>\n      <CloudLayerScattering "
+            "Value=\"{:.3f}\" Unit=\"(0 - 1)\"/>\n    </CloudLayer>\n",
+            s.columns.cloud_base_m + w.elevation_m, s.columns.top_m + w.elevation_m,
+            std::min(1.0, s.columns.median_depth / 20), s.columns.cover);
+    }
+    for (const auto& [height, v] : w.wind) {
+        text += fmt::format(
+            "    <WindLayer>\n      <WindLayerAltitude Value=\"{:.1f}\" Unit=\"m\"/>\n      <WindLayerAngle "
+            "Value=\"{:.1f}\" Unit=\"degrees\"/>\n"
+            "      <WindLayerSpeed Value=\"{:.1f}\" Unit=\"knts\"/>\n    </WindLayer>\n",
+            height + w.elevation_m, from_of(v), std::hypot(v.east_m_per_s, v.north_m_per_s) / kKnot);
+    }
+    text += fmt::format(
+        "    <Precipitations Value=\"{:.2f}\" Unit=\"mm/h\"/>\n    <ThunderstormIntensity Value=\"{:.1f}\" "
+        "Unit=\"(0 - 1)\"/>\n  </WeatherPreset.Preset>\n</SimBase.Document>\n",
+        w.rain_mm_per_h, w.thunder ? 1.0 : 0.0);
+    return text;
+}
+
+std::vector<std::byte> cigi_packets(const WeatherSummary& weather) {
+    ByteWriter w;
+    // IG Control: version 3.3, operate, byte swap magic number, frame.
+    for (const int byte : {1, 24, 3, 0, 3 << 4 | 1, 0}) w.put(std::uint8_t(byte));
+    put_big(w, std::uint16_t{0x8000});
+    put_big(w, std::uint32_t(weather.number));
+    for (int n = 0; n < 3; ++n) put_big(w, std::uint32_t{0});
+    int id = 0;
+    for (const LayerSummary& s : three_layers(weather.layers)) {
+        ++id;
+        w.put(std::uint8_t{12});
+        w.put(std::uint8_t{56});
+        put_big(w, std::uint16_t{0});  // of no region: global
+        w.put(std::uint8_t(id));       // cloud layer 1 to 3
+        w.put(std::uint8_t{95});       // humidity in it, per cent
+        w.put(std::uint8_t(1 | (weather.thunder && id == 1 ? 8 : 0) | cigi_type(s.genus) << 4));
+        w.put(std::uint8_t{0});  // global scope, no severity
+        const double direction = s.wind_from_deg > 180 ? s.wind_from_deg - 360 : s.wind_from_deg;
+        const double base = s.columns.cloud_base_m + weather.elevation_m;
+        for (const double value :
+             {15.0 - 0.0065 * base, 100.0, 0.0, 100 * s.columns.cover, base,
+              std::max(0.0, s.columns.top_m + weather.elevation_m - base), s.transition_m, s.wind_m_per_s,
+              0.0, direction, 1013.25 * std::pow(1 - 2.25577e-5 * base, 5.25588), 0.0})
+            put_big(w, float(value));
+    }
+    return w.take();
+}
+
+std::vector<std::byte> cigi_capture(const std::vector<WeatherSummary>& frames) {
+    ByteWriter w;
+    w.put(std::uint32_t{0xA1B2C3D4});  // microseconds
+    w.put(std::uint16_t{2});
+    w.put(std::uint16_t{4});
+    w.put(std::uint64_t{0});
+    w.put(std::uint32_t{65535});
+    w.put(std::uint32_t{1});  // Ethernet
+    for (const WeatherSummary& frame : frames) {
+        const std::vector<std::byte> payload = cigi_packets(frame);
+        ByteWriter ip;
+        for (const int byte : {0x45, 0}) ip.put(std::uint8_t(byte));
+        put_big(ip, std::uint16_t(28 + payload.size()));
+        put_big(ip, std::uint16_t(frame.number));
+        put_big(ip, std::uint16_t{0});
+        for (const int byte : {64, 17, 0, 0, 127, 0, 0, 1, 127, 0, 0, 1}) ip.put(std::uint8_t(byte));
+        std::vector<std::byte> header = ip.take();
+        const std::uint16_t sum = checksum(header);
+        header[10] = std::byte(sum >> 8);
+        header[11] = std::byte(sum & 0xFF);
+        const auto size = std::uint32_t(14 + 28 + payload.size());
+        w.put(std::uint32_t(frame.time_s));
+        w.put(std::uint32_t(std::fmod(frame.time_s, 1) * 1e6));
+        w.put(size);
+        w.put(size);
+        for (int n = 0; n < 12; ++n) w.put(std::uint8_t(n == 5 || n == 11 ? n : 2));  // locally administered
+        put_big(w, std::uint16_t{0x0800});
+        w.put_bytes(header);
+        put_big(w, std::uint16_t{8004});
+        put_big(w, std::uint16_t{8005});
+        put_big(w, std::uint16_t(8 + payload.size()));
+        put_big(w, std::uint16_t{0});  // no checksum
+        w.put_bytes(payload);
+    }
+    return w.take();
+}
+
+}  // namespace nephos

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "density/export/containers.h"
+#include "simulation/export/export_list.h"
+
+namespace nephos {
+namespace {
+
+struct Difference {
+    double largest = 0, squares = 0;
+    std::size_t voxels = 0;
+};
+
+void compare(const std::vector<float>& expected, const std::vector<float>& found, Difference& d) {
+    if (expected.size() != found.size()) throw Error(ErrorCode::io, "has another size than its source");
+    for (std::size_t n = 0; n < expected.size(); ++n) {
+        const double difference = std::abs(double(expected[n]) - double(found[n]));
+        d.largest = std::max(d.largest, difference);
+        d.squares += difference * difference;
+    }
+    d.voxels += expected.size();
+}
+
+EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
+                         const VolumeBox& box, int levels) {
+    const auto& [nx, ny, nz] = box.size;
+    if (format == "raw") return read_raw(path, type, nx, ny, nz, levels);
+    if (format == "dds") return read_dds(path);
+    if (format == "ktx2") return read_ktx2(path);
+    if (format == "vti") return read_vti(path);
+    return read_slices(path, nx, ny, nz, slice_columns(nx, ny, nz));
+}
+
+// Adds the differences of one file to its source. Returns false for what cannot be compared.
+bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
+                  const ListedExport::Sequence& s, const ExportedFile& file, Difference& d) {
+    VdbReadOptions reading;
+    reading.grid = list.grid;
+    const DensityGrid source = load_density(folder / file.source, reading).density;
+    const std::filesystem::path path = folder / file.path;
+    VolumeLayout plain;
+    plain.factor = s.layout.factor;
+    if (file.format == "vdb" || file.format == "nvdb") {
+        if (file.format == "nvdb" && list.quantise != NanoQuantise::none) return false;
+        const Volume expected = lay_out(source, plain);
+        const Extent extent{expected.nx, expected.ny, expected.nz};
+        Placement at = source.placement();
+        at.cell_size_m *= s.layout.factor;
+        if (file.format == "nvdb") {
+            compare(expected.values, read_nanovdb(path, extent, at).to_dense(), d);
+            return true;
+        }
+        const DensityGrid found = load_density(path).density;
+        if (list.half_voxel_shift)
+            for (int a = 0; a < 3; ++a) at.origin_m[a] -= at.cell_size_m / 2;
+        if (!(found.placement() == at))
+            throw Error(ErrorCode::io, path.string() + ": lies at another place than its source");
+        compare(expected.values, found.to_dense(), d);
+        return true;
+    }
+    const auto type = list.types.find(file.format);
+    if (type == list.types.end()) return false;
+    const VolumeBox box = box_of(source.extent(), source.placement(), s.layout);
+    const EncodedVolume encoded = read_dense(path, file.format, type->second, box, s.levels);
+    const VolumeLevel& top = encoded.levels.front();
+    if (encoded.type != type->second || std::array{top.nx, top.ny, top.nz} != box.size)
+        throw Error(ErrorCode::io, path.string() + ": has another type or size than the list says");
+    compare(lay_out(source, s.layout).values,
+            decode(top.bytes.data(), top.bytes.size(), top.nx, top.ny, top.nz, encoded.type, s.scale).values,
+            d);
+    return true;
+}
+
+const ListedExport::Sequence* sequence_of(const ListedExport& list, const std::string& name) {
+    const ListedExport::Sequence* best = nullptr;
+    for (const ListedExport::Sequence& s : list.sequences) {
+        if (name.starts_with(s.name + "_") && (best == nullptr || s.name.size() > best->name.size()))
+            best = &s;
+    }
+    return best;
+}
+
+std::vector<Check> check_voxels(const std::filesystem::path& folder, const ListedExport& list) {
+    std::map<std::string, Difference> formats;
+    std::map<std::string, std::size_t> counts;
+    std::string problem;
+    std::size_t lost = 0, bad = 0;
+    double scale = 1;
+    for (const ExportedFile& file : list.files) {
+        if (file.source.empty()) continue;
+        const ListedExport::Sequence* s = sequence_of(list, file.path.generic_string());
+        std::error_code error;
+        if (s == nullptr || !std::filesystem::exists(folder / file.source, error)) {
+            ++lost;
+            continue;
+        }
+        scale = s->scale;
+        try {
+            if (compare_file(folder, list, *s, file, formats[file.format])) ++counts[file.format];
+        } catch (const Error& failure) {
+            if (bad++ == 0) problem = failure.what();
+        }
+    }
+    std::vector<Check> checks;
+    for (const auto& [format, d] : formats) {
+        if (counts[format] == 0) continue;
+        const auto type = list.types.find(format);
+        const VoxelType t = type == list.types.end() ? VoxelType::r32f : type->second;
+        // A half is exact to its eleven bits; density is at most scale.
+        const double most = largest_error(t) * scale * 1.0001 + 1e-7;
+        const double rms = std::sqrt(d.squares / double(std::max<std::size_t>(1, d.voxels)));
+        checks.push_back(
+            {format,
+             d.largest <= most,
+             fmt::format("{} files read back: largest difference {:.3g} (at most {:.3g}), rms {:.3g}",
+                         counts[format], d.largest, most, rms),
+             {{"largest", d.largest}, {"rms", rms}}});
+    }
+    if (bad > 0)
+        checks.push_back(
+            {"voxels", false, bad > 1 ? fmt::format("{}; and {} more", problem, bad - 1) : problem});
+    if (lost > 0)
+        checks.push_back(
+            {"sources", true,
+             fmt::format("{} files were not compared: their sources are not there any more", lost)});
+    return checks;
+}
+
+}  // namespace
+
+Verification verify_export(const std::filesystem::path& folder, const VerifyOptions& options) {
+    const ListedExport list = read_export(folder);
+    if (options.against || options.replay > 0)
+        throw Error(ErrorCode::usage,
+                    folder.string() + ": is an export; --against and --replay are for runs");
+    Verification result{"export", {}};
+    if (!list.complete)
+        result.checks.push_back({"complete", false, "the export was interrupted: the same command goes on"});
+    std::vector<ListedFile> files;
+    std::set<std::filesystem::path> names{"export.json"};
+    for (const ExportedFile& file : list.files) {
+        files.push_back({file.path, file.digest.bytes, file.digest.xxh3});
+        names.insert(file.path);
+    }
+    std::vector<std::filesystem::path> extra;
+    for (const auto& entry : std::filesystem::directory_iterator(folder))
+        if (!names.contains(entry.path().filename())) extra.push_back(entry.path().filename());
+    for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
+    if (!options.hashes_only) {
+        for (Check& check : check_voxels(folder, list)) result.checks.push_back(std::move(check));
+    }
+    return result;
+}
+
+}  // namespace nephos

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/export/weather.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "density/vdb/vdb_file.h"
+#include "scenes/metar/metar.h"
+#include "simulation/scene_place.h"
+
+namespace nephos {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kFoot_m = 0.3048, kKoschmieder = 3.912, kSurface_m = 10;
+
+// The true bearing that a velocity comes from, 0..360.
+double bearing_from(const Velocity& v, double heading_deg) {
+    const double degrees =
+        std::atan2(-v.east_m_per_s, -v.north_m_per_s) * 180 / std::numbers::pi + heading_deg;
+    return degrees - 360 * std::floor(degrees / 360);
+}
+
+double speed_of(const Velocity& v) { return std::hypot(v.east_m_per_s, v.north_m_per_s); }
+
+// "Sc1" of a scene that was made of a report, or a model's genus.
+std::string genus_of(const Scene& scene, const LayerOptions& layer) {
+    static constexpr const char* kGenera[] = {"Ci", "Cc", "Cs", "Ac", "As", "Ns", "Sc", "St", "Cu", "Cb"};
+    for (const char* genus : kGenera) {
+        const std::string rest = layer.name.starts_with(genus) ? layer.name.substr(2) : "x";
+        if (rest.find_first_not_of("0123456789") == rest.npos) return genus;
+    }
+    for (const std::string& sky : layer.skies) {
+        for (const NamedSky& named : scene.skies) {
+            if (named.name != sky || named.models.empty()) continue;
+            for (const char* genus : kGenera)
+                if (named.models.front().starts_with(genus)) return genus;
+        }
+    }
+    return {};
+}
+
+LayerSummary summary_of(const RunListing& run, const std::string& name, const DensityGrid& density,
+                        const Wind& wind, double time_s) {
+    LayerSummary s;
+    s.name = name;
+    s.columns = optical_columns(density, run.scene.density.extinction_per_m);
+    s.oktas = 8 * s.columns.cover;
+    const bool any = s.columns.cover > 0;
+    const double base = any ? s.columns.cloud_base_m : density.placement().origin_m.z;
+    s.transition_m = any ? std::max(0.0, 0.5 * (s.columns.base_m - base)) : 0;
+    const Velocity v = wind_at(wind, base, time_s);
+    s.wind_m_per_s = speed_of(v);
+    s.wind_from_deg = bearing_from(v, run.scene.georeference.given ? run.scene.georeference.heading_deg : 0);
+    return s;
+}
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+}  // namespace
+
+WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
+    const Scene& scene = run.scene;
+    WeatherSummary w;
+    w.number = frame.number;
+    w.time_s = frame.time_s;
+    w.utc = utc_at(scene.georeference, frame.time_s);
+    w.elevation_m = scene.georeference.given ? scene.georeference.height_m : 0;
+    const double heading = scene.georeference.given ? scene.georeference.heading_deg : 0;
+    if (scene.layers.empty()) {
+        w.layers.push_back(summary_of(run, scene.name, read_density(density_file(run, frame, {})),
+                                      scene.automaton.wind, frame.time_s));
+    }
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        if (!has_density(scene.layers[n])) continue;
+        LayerSummary s = summary_of(run, scene.layers[n].name,
+                                    read_density(density_file(run, frame, scene.layers[n].name)),
+                                    layer_wind(scene, n), frame.time_s);
+        s.genus = genus_of(scene, scene.layers[n]);
+        for (const RainRecord& area : frame.rain)
+            if (area.layer == s.name) s.rain_mm_per_h = std::max(s.rain_mm_per_h, area.intensity_mm_per_h);
+        w.layers.push_back(std::move(s));
+    }
+    std::erase_if(w.layers, [](const LayerSummary& s) { return !(s.columns.cover > 0); });
+    std::ranges::stable_sort(w.layers, {}, [](const LayerSummary& s) { return s.columns.cloud_base_m; });
+    for (const WindLevel& level :
+         wind_levels(scene, scene.layers.empty() ? std::nullopt : std::optional<std::size_t>(0), {}, {},
+                     frame.time_s))
+        w.wind.emplace_back(level.height_m, level.velocity);
+    const Wind& wind = scene.layers.empty() || !scene.automaton.wind.keyframes.empty() ? scene.automaton.wind
+                                                                                       : layer_wind(scene, 0);
+    const Velocity surface = wind_at(wind, kSurface_m, frame.time_s);
+    w.surface_m_per_s = speed_of(surface);
+    w.surface_from_deg = bearing_from(surface, heading);
+    const Fog& fog = scene.render.fog;
+    if (fog.extinction_per_m > 0) w.visibility_m = std::min(9999.0, kKoschmieder / fog.extinction_per_m);
+    for (const RainRecord& area : frame.rain)
+        w.rain_mm_per_h = std::max(w.rain_mm_per_h, area.intensity_mm_per_h);
+    w.showers = frame.rain.size() > 1;
+    w.snow = scene.render.precipitation.kind == PrecipitationKind::snow;
+    w.thunder = !scene.render.lightning.empty();
+    return w;
+}
+
+std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
+    Metar m;
+    const std::string& name = run.scene.name;
+    const bool station =
+        name.size() == 4 && std::ranges::all_of(name, [](char c) { return c >= 'A' && c <= 'Z'; });
+    m.station = station ? name : "ZZZZ";
+    m.day = 1;
+    if (!weather.utc.empty()) {
+        m.day = std::stoi(weather.utc.substr(8, 2));
+        m.hour = std::stoi(weather.utc.substr(11, 2));
+        m.minute = std::stoi(weather.utc.substr(14, 2));
+    }
+    m.wind.known = true;
+    m.wind.speed_m_per_s = weather.surface_m_per_s;
+    m.wind.from_deg = int(std::lround(weather.surface_from_deg)) % 360;
+    // Rounded as reports are: to 50 m below 800 m, to 100 m below 5 km, to 1 km above.
+    const double v = weather.visibility_m;
+    const double step = v < 800 ? 50 : v < 5000 ? 100 : 1000;
+    m.visibility_m = v >= 9999 ? 9999 : int(std::lround(v / step) * step);
+    if (weather.rain_mm_per_h > 0) {
+        MetarWeather w;
+        const double rate = weather.rain_mm_per_h;
+        const bool drizzle = !weather.snow && rate <= 0.5;
+        w.intensity = drizzle || rate < 2.5 ? '-' : rate > 10 ? '+' : char(0);
+        if (drizzle) w.intensity = 0;
+        w.descriptor = weather.thunder ? "TS" : weather.showers ? "SH" : "";
+        w.phenomena = {drizzle ? "DZ" : weather.snow ? "SN" : "RA"};
+        m.weather.push_back(w);
+    }
+    if (*m.visibility_m < 1000)
+        m.weather.push_back({0, false, "", {"FG"}});
+    else if (*m.visibility_m <= 5000 && m.weather.empty())
+        m.weather.push_back({0, false, "", {"BR"}});
+    for (const LayerSummary& layer : weather.layers) {
+        const std::optional<CloudAmount> amount = amount_of(layer.columns.cover);
+        if (!amount) continue;
+        MetarCloud c;
+        c.amount = *amount;
+        c.height_ft = int(std::lround(layer.columns.cloud_base_m / kFoot_m / 100)) * 100;
+        if (layer.genus == "Cb") c.type = "CB";
+        m.clouds.push_back(c);
+    }
+    return metar_text(m);
+}
+
+std::string layers_json_text(const RunListing& run, const std::vector<WeatherSummary>& frames) {
+    Json list = Json::array();
+    for (const WeatherSummary& w : frames) {
+        Json layers = Json::array();
+        for (const LayerSummary& s : w.layers) {
+            layers.push_back({{"name", s.name},
+                              {"genus", s.genus},
+                              {"base_m", number_or_null(s.columns.base_m + w.elevation_m)},
+                              {"top_m", number_or_null(s.columns.top_m + w.elevation_m)},
+                              {"cloud_base_m", number_or_null(s.columns.cloud_base_m + w.elevation_m)},
+                              {"coverage", s.columns.cover},
+                              {"oktas", s.oktas},
+                              {"optical_depth_median", s.columns.median_depth},
+                              {"transition_m", s.transition_m},
+                              {"rain_mm_per_h", s.rain_mm_per_h},
+                              {"wind_from_deg", s.wind_from_deg},
+                              {"wind_m_per_s", s.wind_m_per_s}});
+        }
+        Json entry = {{"number", w.number}, {"time_s", w.time_s}};
+        if (!w.utc.empty()) entry["utc"] = w.utc;
+        entry.update(Json{{"layers", layers},
+                          {"visibility_m", w.visibility_m},
+                          {"rain_mm_per_h", w.rain_mm_per_h},
+                          {"kind", w.rain_mm_per_h == 0 ? "none"
+                                   : w.snow             ? "snow"
+                                                        : "rain"},
+                          {"surface_wind_from_deg", w.surface_from_deg},
+                          {"surface_wind_m_per_s", w.surface_m_per_s},
+                          {"metar", metar_of(run, w)}});
+        list.push_back(std::move(entry));
+    }
+    const Json json = {{"format", "nephos layers"},
+                       {"format_version", 1},
+                       {"scene_hash", run.scene_hash},
+                       {"heights", "metres above mean sea level"},
+                       {"frames", list}};
+    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::vector<LayerSummary> three_layers(std::vector<LayerSummary> layers) {
+    while (layers.size() > 3) {
+        std::size_t nearest = 0;
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t n = 0; n + 1 < layers.size(); ++n) {
+            const double gap = layers[n + 1].columns.base_m - layers[n].columns.top_m;
+            if (gap < least) {
+                least = gap;
+                nearest = n;
+            }
+        }
+        LayerSummary& low = layers[nearest];
+        const LayerSummary& high = layers[nearest + 1];
+        low.name += "+" + high.name;
+        if (high.columns.cover > low.columns.cover) low.genus = high.genus;
+        // Of clouds that lie over each other at random.
+        low.columns.cover = 1 - (1 - low.columns.cover) * (1 - high.columns.cover);
+        low.columns.top_m = std::max(low.columns.top_m, high.columns.top_m);
+        low.columns.median_depth = std::max(low.columns.median_depth, high.columns.median_depth);
+        low.rain_mm_per_h = std::max(low.rain_mm_per_h, high.rain_mm_per_h);
+        low.oktas = 8 * low.columns.cover;
+        layers.erase(layers.begin() + std::ptrdiff_t(nearest) + 1);
+    }
+    return layers;
+}
+
+}  // namespace nephos

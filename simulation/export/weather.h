@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Clouds without voxels: a summary of each layer in each frame, and what simulators make of such summaries.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "density/optical_columns.h"
+#include "simulation/run_listing.h"
+
+namespace nephos {
+
+struct LayerSummary {
+    std::string name, genus;  // genus: WMO abbreviation, "" where the scene names none
+    OpticalColumns columns;
+    double oktas = 0;         // 8 times the cover
+    double transition_m = 0;  // from the base to where the layer has half of its mean density
+    double wind_from_deg = 0, wind_m_per_s = 0;  // at the base; the bearing is true
+    double rain_mm_per_h = 0;                    // the strongest of its areas
+};
+
+struct WeatherSummary {
+    int number = 1;
+    double time_s = 0;
+    std::string utc;                                   // empty without a start
+    std::vector<LayerSummary> layers;                  // with any column of optical depth above 1; from below
+    std::vector<std::pair<double, Velocity>> wind;     // by height
+    double surface_from_deg = 0, surface_m_per_s = 0;  // at 10 m; true
+    double visibility_m = 9999;                        // of the fog; 9999: none
+    double rain_mm_per_h = 0;
+    bool snow = false, showers = false, thunder = false;
+    double elevation_m = 0;  // of z = 0 above mean sea level
+};
+
+// Reads the density files of a frame: of its layers, or the only one. Throws Error(io) as load_density().
+WeatherSummary summarise(const RunListing& run, const ListedFrame& frame);
+
+// Return the report of a summary, its station the scene's name if that is four capital letters, else ZZZZ; the element
+// of one frame for layers.json; X-Plane's XPLMWeatherInfo_t as JSON; MSFS's weather preset.
+std::string metar_of(const RunListing& run, const WeatherSummary& weather);
+std::string layers_json_text(const RunListing& run, const std::vector<WeatherSummary>& frames);
+std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>& frames);
+std::string wpr_text(const RunListing& run, const WeatherSummary& weather);
+
+// Returns CIGI 3.3 packets, big-endian: IG Control, then Weather Control of the (up to three) layers; and all frames as
+// a capture of UDP datagrams to port 8005 (pcap, Ethernet).
+std::vector<std::byte> cigi_packets(const WeatherSummary& weather);
+std::vector<std::byte> cigi_capture(const std::vector<WeatherSummary>& frames);
+
+// Returns at most three layers: the two nearest are merged until so many are left.
+std::vector<LayerSummary> three_layers(std::vector<LayerSummary> layers);
+
+}  // namespace nephos

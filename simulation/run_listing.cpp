@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/run_listing.h"
+
+#include <fstream>
+#include <system_error>
+
+#include <nlohmann/json.hpp>
+
+#include "core/descriptor.h"
+#include "core/error.h"
+#include "scenes/format/reader.h"
+
+namespace nephos {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+ListedFrame frame_of(const Json& json) {
+    ListedFrame frame;
+    frame.number = json.at("number").get<int>();
+    frame.time_s = json.at("time_s").get<double>();
+    frame.step = json.at("step").get<std::uint64_t>();
+    frame.state_hash = json.at("state_hash").get<std::string>();
+    return frame;
+}
+
+}  // namespace
+
+bool is_run_folder(const std::filesystem::path& folder) {
+    std::error_code error;
+    return std::filesystem::is_regular_file(folder / "manifest.json", error);
+}
+
+RunListing read_run(const std::filesystem::path& folder) {
+    const std::filesystem::path path = folder / "manifest.json";
+    const EarlierRun earlier = read_manifest(path);
+    RunListing run;
+    run.folder = folder;
+    run.scene_hash = earlier.scene_hash;
+    run.simulation_hash = earlier.simulation_hash;
+    run.complete = earlier.complete;
+    run.render = earlier.render;
+    run.range = earlier.range;
+    std::string text;
+    try {
+        std::ifstream stream(path, std::ios::binary);
+        const Json json = Json::parse(stream);
+        run.nephos_version = json.at("nephos_version").get<std::string>();
+        text = json.at("scene_text").get<std::string>();
+        for (const Json& frame : json.at("frames")) run.frames.push_back(frame_of(frame));
+        if (json.contains("run_files"))
+            for (const Json& file : json.at("run_files")) run.run_files.push_back(file_record(file));
+    } catch (const nlohmann::json::exception&) {
+        throw Error(ErrorCode::io, path.string() + ": is not a manifest of a run of nephos, or is damaged");
+    }
+    std::map<int, std::vector<FileRecord>> files = read_frame_files(path);
+    std::map<int, std::vector<RainRecord>> rain = read_rain(path);
+    for (ListedFrame& frame : run.frames) {
+        frame.files = std::move(files[frame.number]);
+        frame.rain = std::move(rain[frame.number]);
+    }
+    try {
+        run.scene = read_scene_text(text, path.string() + ": scene_text", {}, {}, SceneUse::without_frames);
+    } catch (const Error& error) {
+        throw Error(ErrorCode::io, path.string() + ": its scene cannot be read: " + error.what());
+    }
+    return run;
+}
+
+std::size_t layer_index(const Scene& scene, const std::string& name) {
+    std::string names;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        if (scene.layers[n].name == name) return n;
+        if (has_density(scene.layers[n])) names += (names.empty() ? "" : ", ") + scene.layers[n].name;
+    }
+    throw Error(ErrorCode::usage,
+                "there is no layer '" + name + "'; " +
+                    (names.empty() ? "the scene has no layers" : "the layers are " + names));
+}
+
+std::filesystem::path density_file(const RunListing& run, const ListedFrame& frame,
+                                   const std::optional<std::string>& layer) {
+    const RunFolder folder{run.folder, run.scene.name};
+    if (!has_density(run.scene))
+        throw Error(ErrorCode::usage, run.folder.string() + ": the run has no density files");
+    if (!layer) {
+        if (run.scene.layers.empty() || run.scene.density_files.combined) return folder.density(frame.number);
+        throw Error(ErrorCode::usage, run.folder.string() +
+                                          ": the run has no file of all layers together "
+                                          "(`density.combined` is false): name a layer");
+    }
+    const std::size_t n = layer_index(run.scene, *layer);
+    if (!has_density(run.scene.layers[n]) || !run.scene.density_files.per_layer)
+        throw Error(ErrorCode::usage, run.folder.string() + ": layer '" + *layer + "' has no density files");
+    return folder.density(frame.number, *layer);
+}
+
+}  // namespace nephos

@@ -1,0 +1,438 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/verify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "core/digest.h"
+#include "core/error.h"
+#include "density/combine.h"
+#include "density/vdb/vdb_file.h"
+#include "density/voxel_digest.h"
+#include "scenes/format/writer.h"
+#include "simulation/run_listing.h"
+#include "simulation/scene_place.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kNamed = 3;  // problems of one kind that are named
+constexpr double kLayersTolerance = 1e-3;
+
+// Counts problems of one kind, and names the first of them.
+class Problems {
+  public:
+    void add(const std::string& text) {
+        if (++count_ <= kNamed) text_ += (text_.empty() ? "" : "; ") + text;
+    }
+    bool none() const { return count_ == 0; }
+    // The text of the check: the problems, or what is said without any.
+    Check check(const std::string& name, const std::string& otherwise) const {
+        std::string text = count_ > kNamed ? fmt::format("{}; and {} more", text_, count_ - kNamed) : text_;
+        return {name, none(), none() ? otherwise : text};
+    }
+
+  private:
+    std::size_t count_ = 0;
+    std::string text_;
+};
+
+// Files of frames below the folder that the manifest does not list.
+std::vector<std::filesystem::path> extra_files(const RunListing& run, const std::set<std::string>& listed) {
+    std::vector<std::filesystem::path> extra;
+    for (const char* part : {"density", "frames", "statistics"}) {
+        std::error_code error;
+        for (std::filesystem::recursive_directory_iterator at(run.folder / part, error), end;
+             !error && at != end; at.increment(error)) {
+            if (at->is_directory()) continue;
+            const std::filesystem::path path = at->path().lexically_relative(run.folder);
+            if (!listed.contains(path.generic_string())) extra.push_back(path);
+        }
+    }
+    std::sort(extra.begin(), extra.end());
+    return extra;
+}
+
+Check check_numbers(const RunListing& run) {
+    Problems problems;
+    int next = run.range.first_frame;
+    std::set<int> numbers;
+    for (const ListedFrame& frame : run.frames) numbers.insert(frame.number);
+    const int last = run.complete ? run.range.last_frame : (numbers.empty() ? 0 : *numbers.rbegin());
+    for (; next <= last; ++next)
+        if (!numbers.contains(next)) problems.add(fmt::format("frame {} is missing", next));
+    if (!run.complete)
+        problems.add(fmt::format("the run is not complete: {} frames are done", numbers.size()));
+    return problems.check(
+        "frames", fmt::format("{} frames, {} to {}, no gap", numbers.size(), run.range.first_frame, last));
+}
+
+// The density of one file as a reader sees it; what is wrong with it goes into `problems`.
+class Decoder {
+  public:
+    explicit Decoder(const RunListing& run) : run_(run) {}
+
+    std::optional<DensityGrid> read(const ListedFrame& frame, const FileRecord& file) {
+        const std::filesystem::path path = run_.folder / file.path;
+        LoadedDensity loaded;
+        VdbInfo info;
+        try {
+            loaded = load_density(path);
+            info = read_vdb_info(path);
+        } catch (const Error& error) {
+            voxels_.add(error.what());
+            return std::nullopt;
+        }
+        ++count_;
+        for (const std::string& note : loaded.notes) values_.add(file.path + ": " + note);
+        const float most = loaded.density.max_value();
+        largest_ = std::max(largest_, double(most));
+        if (most > 1) values_.add(fmt::format("{}: a value of {:g} is above 1", file.path, most));
+        if (!file.voxels.empty() && voxel_digest(loaded.density) != file.voxels)
+            voxels_.add(file.path + ": its voxels are not those of the manifest");
+        check_metadata(frame, file, loaded);
+        check_geometry(file, info);
+        return loaded.density;
+    }
+
+    std::vector<Check> checks() const {
+        return {voxels_.check("voxels",
+                              fmt::format("{} density files decode to the voxels of the manifest", count_)),
+                values_.check("values", fmt::format("finite, 0 to {:.4g}", largest_)),
+                geometry_.check("geometry", "same transform, bounds and class in every file of a kind"),
+                metadata_.check("metadata", "time, extinction, scene and state as in the manifest")};
+    }
+
+  private:
+    void check_metadata(const ListedFrame& frame, const FileRecord& file, const LoadedDensity& loaded) {
+        if (!loaded.metadata) return metadata_.add(file.path + ": has no metadata of nephos");
+        const VdbMetadata& m = *loaded.metadata;
+        if (m.time_s != frame.time_s)
+            metadata_.add(
+                fmt::format("{}: time {} s, {} in the manifest", file.path, m.time_s, frame.time_s));
+        if (m.extinction_per_m != run_.scene.density.extinction_per_m)
+            metadata_.add(fmt::format("{}: extinction {} per m", file.path, m.extinction_per_m));
+        if (m.scene_hash != run_.scene_hash) metadata_.add(file.path + ": is of another scene");
+        if (run_.scene.layers.empty() && m.state_hash != frame.state_hash)
+            metadata_.add(file.path + ": is of another state");
+        if (!(m.georeference == run_.scene.georeference))
+            metadata_.add(file.path + ": lies at another place");
+    }
+
+    // Grids that hold only a part of the box (hum, act, cld, the wind) have its transform, not its bounds.
+    void check_geometry(const FileRecord& file, const VdbInfo& info) {
+        const std::string kind = std::filesystem::path(file.path).parent_path().generic_string();
+        for (const VdbGridInfo& grid : info.grids) {
+            VdbGridInfo expected = grid;
+            const auto [first, added] = first_.try_emplace(kind + ":" + grid.name, grid);
+            if (grid.name == "density" && grid.grid_class != "fog volume")
+                geometry_.add(file.path + ": `density` is of class " + grid.grid_class);
+            if (added) continue;
+            const VdbGridInfo& other = first->second;
+            if (other.world_from_index != grid.world_from_index)
+                geometry_.add(file.path + ": `" + grid.name + "` has another transform");
+            if (grid.name == "density" && !(other.active_box == grid.active_box))
+                geometry_.add(file.path + ": has other bounds");
+            if (other.grid_class != grid.grid_class || other.type != grid.type)
+                geometry_.add(file.path + ": `" + grid.name + "` is of another class or type");
+        }
+    }
+
+    const RunListing& run_;
+    Problems voxels_, values_, geometry_, metadata_;
+    std::map<std::string, VdbGridInfo> first_;
+    std::size_t count_ = 0;
+    double largest_ = 0;
+};
+
+// The density of layers must be that of the file of all together.
+void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
+                    const std::vector<DensityGrid>& layers, const std::vector<Boundaries>& boundaries,
+                    double& largest, Problems& problems) {
+    const DensityGrid sum = combine(layers, boundaries);
+    if (!(sum.extent() == whole.extent())) {
+        problems.add(fmt::format("frame {}: the layers' box is another", frame.number));
+        return;
+    }
+    const std::vector<float> a = sum.to_dense(), b = whole.to_dense();
+    double difference = 0;
+    for (std::size_t n = 0; n < a.size(); ++n)
+        difference = std::max(difference, double(std::abs(a[n] - b[n])));
+    largest = std::max(largest, difference);
+    if (difference > kLayersTolerance)
+        problems.add(fmt::format("frame {}: the layers differ from the common grid by {:.3g}", frame.number,
+                                 difference));
+}
+
+// How much a sequence moves from frame to frame.
+class Motion {
+  public:
+    void add(const DensityGrid& grid) {
+        std::vector<float> now = grid.to_dense();
+        double gradients = 0;
+        const std::size_t nx = std::size_t(grid.extent().x);
+        for (std::size_t n = 1; n < now.size(); ++n)
+            if (n % nx != 0) gradients += std::abs(double(now[n]) - double(now[n - 1]));
+        if (before_.size() == now.size()) {
+            for (std::size_t n = 0; n < now.size(); ++n)
+                change_ = std::max(change_, double(std::abs(now[n] - before_[n])));
+            if (sharpness_ > 0)
+                sharpness_change_ = std::max(sharpness_change_, std::abs(gradients / sharpness_ - 1));
+        }
+        sharpness_ = gradients;
+        before_ = std::move(now);
+    }
+    Check check(const std::optional<double>& most) const {
+        const bool good = !most || change_ <= *most;
+        std::string text = fmt::format(
+            "largest change of a voxel {:.3g}, of the sum of gradients {:.2g} %, from frame to frame",
+            change_, 100 * sharpness_change_);
+        if (!good) text += fmt::format("; at most {:g} is allowed", *most);
+        return {"motion", good, text, {{"largest_change", change_}, {"sharpness_change", sharpness_change_}}};
+    }
+
+  private:
+    std::vector<float> before_;
+    double sharpness_ = 0, change_ = 0, sharpness_change_ = 0;
+};
+
+Check check_seams(const RunListing& run, const DensityGrid& grid, bool all) {
+    const Vec3 period = period_m(run.scene, std::nullopt);
+    const std::vector<float> density = grid.to_dense();
+    Check check{"seam", true, {}};
+    const char* const names[] = {"x", "y"};
+    for (int axis = 0; axis < 2; ++axis) {
+        const Extent e = grid.extent();
+        if (!all && period[axis] == 0) continue;
+        const Seam seam = seam_of(density, e.x, e.y, e.z, axis);
+        const bool good = seam.at_seam <= seam.inside;
+        check.passed = check.passed && good;
+        check.detail +=
+            fmt::format("{}{}: {:.4f} at the seam, at most {:.4f} inside{}", check.detail.empty() ? "" : "; ",
+                        names[axis], seam.at_seam, seam.inside, good ? "" : " (the seam shows)");
+        check.figures.emplace_back(fmt::format("{}_seam", names[axis]), seam.at_seam);
+        check.figures.emplace_back(fmt::format("{}_inside", names[axis]), seam.inside);
+    }
+    if (check.detail.empty()) check.detail = "no axis repeats";
+    return check;
+}
+
+// Decodes every density file.
+void check_content(const RunListing& run, const VerifyOptions& options, std::vector<Check>& checks) {
+    Decoder decoder(run);
+    Motion motion;
+    Problems sums;
+    double largest = 0;
+    std::size_t compared = 0;
+    std::optional<DensityGrid> last;
+    const RunFolder folder{run.folder, run.scene.name};
+    for (const ListedFrame& frame : run.frames) {
+        std::map<std::string, DensityGrid> grids;
+        for (const FileRecord& file : frame.files) {
+            if (!file.path.ends_with(".vdb")) continue;
+            if (std::optional<DensityGrid> grid = decoder.read(frame, file))
+                grids.emplace(file.path, std::move(*grid));
+        }
+        if (grids.empty()) continue;
+        const auto path_of = [&](const std::filesystem::path& path) {
+            return path.lexically_relative(run.folder).generic_string();
+        };
+        const auto whole = grids.find(path_of(folder.density(frame.number)));
+        std::vector<DensityGrid> layers;
+        std::vector<Boundaries> boundaries;
+        for (const LayerOptions& layer : run.scene.layers) {
+            const auto found = grids.find(path_of(folder.density(frame.number, layer.name)));
+            if (found == grids.end()) continue;
+            layers.push_back(found->second);
+            boundaries.push_back(layer.boundaries);
+        }
+        if (whole != grids.end() && !layers.empty() &&
+            layers.size() == std::size_t(std::ranges::count_if(
+                                 run.scene.layers, [](const auto& l) { return has_density(l); }))) {
+            compare_layers(frame, whole->second, layers, boundaries, largest, sums);
+            ++compared;
+        }
+        const DensityGrid& shown = whole != grids.end() ? whole->second : grids.begin()->second;
+        motion.add(shown);
+        last = shown;
+    }
+    for (Check& check : decoder.checks()) checks.push_back(std::move(check));
+    if (compared > 0)
+        checks.push_back(sums.check(
+            "layers",
+            fmt::format("add up to the common grid within {:.2g} in {} frames", largest, compared)));
+    if (last) {
+        checks.push_back(check_seams(run, *last, options.seam));
+        checks.push_back(motion.check(options.max_change));
+    }
+}
+
+Check compare_runs(const RunListing& run, const std::filesystem::path& other_folder) {
+    const RunListing other = read_run(other_folder);
+    Problems problems;
+    std::map<int, const ListedFrame*> frames;
+    for (const ListedFrame& frame : other.frames) frames[frame.number] = &frame;
+    if (other.frames.size() != run.frames.size())
+        problems.add(fmt::format("it has {} frames, not {}", other.frames.size(), run.frames.size()));
+    for (const ListedFrame& frame : run.frames) {
+        const auto found = frames.find(frame.number);
+        if (found == frames.end()) continue;
+        if (found->second->state_hash != frame.state_hash)
+            problems.add(fmt::format("frame {}: another state", frame.number));
+        std::map<std::string, std::string> voxels;
+        for (const FileRecord& file : found->second->files) voxels[file.path] = file.voxels;
+        for (const FileRecord& file : frame.files)
+            if (!file.voxels.empty() && voxels[file.path] != file.voxels)
+                problems.add(file.path + ": other voxels");
+    }
+    return problems.check("against", fmt::format("{}: the same states and voxels in {} frames",
+                                                 other_folder.string(), run.frames.size()));
+}
+
+// Compares frames that are simulated anew with those of the manifest.
+class Replay : public SimulationSink {
+  public:
+    explicit Replay(const RunListing& run) {
+        for (const ListedFrame& frame : run.frames) frames_[frame.number] = &frame;
+        plain_ = run.scene.density.refine == 1;
+        half_ = run.scene.density.half;
+        folder_ = {run.folder, run.scene.name};
+    }
+    void step(const StepResult&) override {}
+    void frame(const FrameResult& frame) override {
+        const auto found = frames_.find(frame.number);
+        if (found == frames_.end()) return;
+        ++count;
+        if (found->second->state_hash != frame.hash.hex())
+            return problems.add(fmt::format("frame {}: state {}, {} in the manifest", frame.number,
+                                            frame.hash.hex(), found->second->state_hash));
+        const std::string name =
+            folder_.density(frame.number).lexically_relative(folder_.folder).generic_string();
+        for (const FileRecord& file : found->second->files) {
+            if (plain_ && file.path == name && file.voxels != voxel_digest(frame.density, half_))
+                problems.add(fmt::format("frame {}: other voxels", frame.number));
+        }
+    }
+    Problems problems;
+    int count = 0;
+
+  private:
+    std::map<int, const ListedFrame*> frames_;
+    RunFolder folder_;
+    bool plain_ = true, half_ = false;
+};
+
+Check replay_frames(const RunListing& run, int count) {
+    Replay sink(run);
+    try {
+        if (run.frames.empty()) return {"replay", true, "there is no frame to simulate"};
+        const int first = run.frames.front().number;
+        const int last = std::min(run.frames.back().number, first + count - 1);
+        Simulation simulation(run.scene, range_of_frames(run.scene, first, last), run.simulation_hash);
+        while (!simulation.finished()) simulation.advance(sink);
+    } catch (const Error& error) {
+        return {"replay", false, error.what()};
+    }
+    return sink.problems.check(
+        "replay", fmt::format("{} frames simulated anew have the same states and voxels", sink.count));
+}
+
+}  // namespace
+
+bool Verification::passed() const {
+    return std::ranges::all_of(checks, [](const Check& check) { return check.passed; });
+}
+
+Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis) {
+    const int n = axis == 0 ? nx : axis == 1 ? ny : nz;
+    const std::size_t stride = axis == 0   ? 1
+                               : axis == 1 ? std::size_t(nx)
+                                           : std::size_t(nx) * std::size_t(ny);
+    std::vector<double> planes(std::size_t(n), 0.0);
+    for (std::size_t at = 0; at < density.size(); ++at) {
+        const int i = int(at / stride % std::size_t(n));
+        const std::size_t base = at - std::size_t(i) * stride;
+        const auto value = [&](int k) { return double(density[base + std::size_t((k + n) % n) * stride]); };
+        planes[std::size_t(i)] += std::abs(value(i - 1) - 2 * value(i) + value(i + 1));
+    }
+    const double count = double(density.size()) / n;
+    Seam seam;
+    for (int i = 0; i < n; ++i) {
+        double& most = i == 0 || i == n - 1 ? seam.at_seam : seam.inside;
+        most = std::max(most, planes[std::size_t(i)] / count);
+    }
+    return seam;
+}
+
+std::vector<Check> check_files(const std::filesystem::path& folder, const std::vector<ListedFile>& files,
+                               const std::vector<std::filesystem::path>& extra) {
+    std::vector<std::string> wrong(files.size()), missing(files.size());
+    tbb::parallel_for(std::size_t(0), files.size(), [&](std::size_t n) {
+        const std::filesystem::path path = folder / files[n].path;
+        try {
+            std::error_code error;
+            if (!std::filesystem::exists(path, error)) {
+                missing[n] = files[n].path.generic_string() + " is missing";
+                return;
+            }
+            const FileDigest found = file_digest(path);
+            if (found.bytes != files[n].bytes)
+                wrong[n] = fmt::format("{}: {} bytes, not {}", files[n].path.generic_string(), found.bytes,
+                                       files[n].bytes);
+            else if (found.xxh3 != files[n].xxh3)
+                wrong[n] = fmt::format("{}: its bytes are not those that were written",
+                                       files[n].path.generic_string());
+        } catch (const Error& error) {
+            wrong[n] = error.what();
+        }
+    });
+    Problems presence, content;
+    for (const std::string& text : missing)
+        if (!text.empty()) presence.add(text);
+    for (const std::filesystem::path& path : extra)
+        presence.add(path.generic_string() + " is listed nowhere");
+    std::uint64_t bytes = 0;
+    for (const ListedFile& file : files) bytes += file.bytes;
+    for (const std::string& text : wrong)
+        if (!text.empty()) content.add(text);
+    return {presence.check("files", fmt::format("{} files, none missing, none extra", files.size())),
+            content.check("hashes", fmt::format("{} bytes agree with their checksums", bytes))};
+}
+
+Verification verify_run(const std::filesystem::path& folder, const VerifyOptions& options) {
+    const RunListing run = read_run(folder);
+    Verification result{"run", {}};
+    result.checks.push_back(check_numbers(run));
+    std::vector<ListedFile> files;
+    std::set<std::string> names;
+    const auto add = [&](const FileRecord& file) {
+        files.push_back({file.path, file.digest.bytes, file.digest.xxh3});
+        names.insert(file.path);
+    };
+    bool recorded = true;
+    for (const ListedFrame& frame : run.frames) {
+        recorded = recorded && !frame.files.empty();
+        for (const FileRecord& file : frame.files) add(file);
+    }
+    for (const FileRecord& file : run.run_files) add(file);
+    if (!run.complete) {
+        for (const LayerOptions& layer : run.scene.layers) names.insert("statistics/" + layer.name + ".csv");
+    }
+    if (!recorded && has_density(run.scene))
+        result.checks.push_back(
+            {"digests", false, "the manifest, of an earlier version, has no checksums: run the scene anew"});
+    for (Check& check : check_files(folder, files, extra_files(run, names)))
+        result.checks.push_back(std::move(check));
+    if (options.against) result.checks.push_back(compare_runs(run, *options.against));
+    if (!options.hashes_only) check_content(run, options, result.checks);
+    if (options.replay > 0) result.checks.push_back(replay_frames(run, options.replay));
+    return result;
+}
+
+}  // namespace nephos

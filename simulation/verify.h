@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Checks that the folder of a run is whole and says the truth: every file that its manifest lists, byte by byte and
+// voxel by voxel, and, if wanted, the simulation itself.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace nephos {
+
+// One line of the result.
+struct Check {
+    std::string name;    // "files", "hashes", ...
+    bool passed = true;  // a check that only measures has always passed
+    std::string detail;  // what was found: what is wrong first, then figures
+    // The figures of a check that measures, by name.
+    std::vector<std::pair<std::string, double>> figures{};
+};
+
+struct VerifyOptions {
+    bool hashes_only = false;  // of files: nothing is decoded
+    // Another run that must have the same voxels and states, frame by frame, with whatever compression.
+    std::optional<std::filesystem::path> against;
+    int replay = 0;  // frames to simulate anew and to compare, from the first on; 0: none
+    // The largest change of a voxel from frame to frame that passes; none: it is reported and always passes.
+    std::optional<double> max_change;
+    // Makes a seam that is rougher than the inside a failure, also of an axis that is not periodic.
+    bool seam = false;
+};
+
+struct Verification {
+    std::string kind;  // "run" or "export"
+    std::vector<Check> checks;
+    bool passed() const;
+};
+
+// Checks a run. Reads one frame after the other; keeps two. Throws Error(io) when its manifest cannot be read, and
+// Error(usage) when `against` is no run. Everything else that is wrong becomes a check that has not passed.
+Verification verify_run(const std::filesystem::path& folder, const VerifyOptions& options);
+
+// What a list of files says against what is there.
+struct ListedFile {
+    std::filesystem::path path;  // below the folder
+    std::uint64_t bytes = 0;
+    std::string xxh3;
+};
+
+// Checks that all files are there and have their size and checksum: two lines, which name the first problems. `extra`: files that are there and should not be.
+std::vector<Check> check_files(const std::filesystem::path& folder, const std::vector<ListedFile>& files,
+                               const std::vector<std::filesystem::path>& extra);
+
+// The roughness of a volume where it would meet its own repetition along an axis, 0 = x, against its inside: the
+// largest mean absolute second difference across a plane of voxels. Density, x fastest, size.x * size.y * size.z of it.
+struct Seam {
+    double at_seam = 0, inside = 0;
+};
+Seam seam_of(const std::vector<float>& density, int nx, int ny, int nz, int axis);
+
+}  // namespace nephos

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs whose files are damaged, missing or strange, and what `nephos verify` says of them."""
+
+import json
+import shutil
+import unittest
+
+from case import Case, SCENE
+
+PLACED = SCENE + """\
+[georeference]
+latitude_deg = 51.4775
+longitude_deg = -0.4614
+height_m = 25
+geoid_height_m = 45.5
+heading_deg = 30
+start_utc = "2024-06-21T13:50:00Z"
+"""
+
+LAYERED = """\
+seed = 5
+[density]
+write_velocity = true
+velocity_name = "velocity"
+[frames]
+per_second = 1
+time_scale = 10
+[time]
+steps = 2
+[[wind]]
+levels = [{ height_m = 0, from_deg = 270, speed_m_per_s = 5 }, { height_m = 2000, from_deg = 270, speed_m_per_s = 15 }]
+[[layer]]
+name = "low"
+lattice = { cells = [24, 24, 6], cell_size_m = 50, origin_m = [0, 0, 300] }
+[layer.veil]
+form = "stratus"
+base_m = 350
+top_m = 550
+margin_m = 0
+[[layer]]
+name = "high"
+lattice = { cells = [24, 24, 6], cell_size_m = 50, origin_m = [0, 0, 900] }
+[layer.veil]
+form = "cumulus"
+base_m = 950
+top_m = 1150
+margin_m = 0
+"""
+
+
+class Verify(Case):
+    def checks(self, *arguments, status=0):
+        """The checks by their name."""
+        result = self.call("verify", *arguments, "--json", status=status)
+        report = json.loads(result.stdout)
+        self.assertEqual(report["passed"], status == 0)
+        return {check["name"]: check for check in report["checks"]}
+
+    def failed(self, *arguments):
+        return sorted(name for name, check in self.checks(*arguments, status=1).items() if not check["passed"])
+
+    def test_a_run_is_what_it_says(self):
+        self.call("run", self.scene, "--out", "out", "--set", "frames.exr=true")
+        checks = self.checks("out", "--replay", 2)
+        self.assertEqual({"frames", "files", "hashes", "voxels", "values", "geometry", "metadata", "seam", "motion", "replay"},
+                         set(checks))
+        self.assertGreater(checks["motion"]["figures"]["largest_change"], 0)
+        manifest = json.loads((self.folder / "out/manifest.json").read_text())
+        for frame in manifest["frames"]:
+            self.assertEqual([pathname.split("/")[0] for pathname in (f["path"] for f in frame["files"])],
+                             ["density", "frames", "frames"])
+            for file in frame["files"]:
+                self.assertEqual((self.folder / "out" / file["path"]).stat().st_size, file["bytes"])
+        self.assertEqual([f["path"] for f in manifest["run_files"]], ["statistics.csv", "checkpoint.nephos"])
+
+    def test_checksums_are_those_of_xxhash(self):
+        import xxhash
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        for frame in json.loads((self.folder / "out/manifest.json").read_text())["frames"]:
+            for file in frame["files"]:
+                content = (self.folder / "out" / file["path"]).read_bytes()
+                self.assertEqual(xxhash.xxh3_128_hexdigest(content), file["xxh3"])
+
+    def test_three_bytes_inside_the_voxels(self):
+        self.call("run", self.scene, "--no-render", "--out", "out")
+        file = self.folder / "out/density/tiny_0003.vdb"
+        content = bytearray(file.read_bytes())
+        for at in (len(content) // 2, len(content) // 2 + 100, len(content) // 2 + 200):
+            content[at] ^= 0x55
+        file.write_bytes(content)
+        self.assertIn("hashes", self.failed("out"))
+        self.assertEqual(self.failed("out", "--hashes"), ["hashes"])
+        self.assertIn("tiny_0003.vdb", self.call("verify", "out", "--hashes", status=1).stdout)
+
+    def test_missing_extra_and_truncated_files(self):
+        self.call("run", self.scene, "--no-render", "--out", "whole")
+        def damaged(change):
+            shutil.rmtree(self.folder / "out", ignore_errors=True)
+            shutil.copytree(self.folder / "whole", self.folder / "out")
+            change(self.folder / "out")
+            return self.failed("out")
+        self.assertIn("files", damaged(lambda out: (out / "density/tiny_0002.vdb").unlink()))
+        self.assertEqual(["files"], damaged(lambda out: shutil.copy(out / "density/tiny_0002.vdb", out / "density/tiny_0099.vdb")))
+        self.assertEqual(["hashes", "voxels"], damaged(lambda out: (out / "density/tiny_0002.vdb").write_bytes(
+            (out / "density/tiny_0002.vdb").read_bytes()[:-50])))
+        self.assertEqual(["hashes"], damaged(lambda out: (out / "statistics.csv").write_text("step\n")))
+        # One frame in the place of another.
+        self.assertIn("metadata", damaged(lambda out: shutil.copy(out / "density/tiny_0001.vdb", out / "density/tiny_0002.vdb")))
+
+        def forget(out):
+            manifest = json.loads((out / "manifest.json").read_text())
+            del manifest["frames"][2]
+            (out / "manifest.json").write_text(json.dumps(manifest))
+        self.assertEqual(["files", "frames"], damaged(forget))
+
+        def lie(out):
+            manifest = json.loads((out / "manifest.json").read_text())
+            manifest["frames"][1]["state_hash"] = "0" * 32
+            (out / "manifest.json").write_text(json.dumps(manifest))
+        self.assertEqual(["metadata"], damaged(lie))
+        self.assertIn("replay", self.failed("out", "--replay", 3))
+
+    def test_against_another_run(self):
+        self.call("run", self.scene, "--no-render", "--out", "a")
+        self.call("run", self.scene, "--no-render", "--out", "b", "--set", "frames.count=4")
+        self.call("run", self.scene, "--no-render", "--out", "c", "--seed", 4)
+        self.call("verify", "a", "--against", "a")
+        self.assertEqual(self.failed("a", "--against", "b"), ["against"])
+        self.assertEqual(self.failed("a", "--against", "c"), ["against"])
+        self.assertEqual(self.failed("a", "--max-change", 0), ["motion"])
+
+    def test_folders_that_are_no_runs(self):
+        self.refused(3, "verify", ".", says="manifest.json")
+        self.write("bad/manifest.json", "{}")
+        self.refused(3, "verify", "bad", says="manifest.json")
+
+    def test_layers_and_their_files(self):
+        scene = self.write("layered.toml", LAYERED)
+        self.call("run", scene, "--no-render", "--out", "out")
+        self.assertIn("layers", self.checks("out"))
+        grids = json.loads(self.call("info", "out/density/layered_0001.vdb", "--json").stdout)["grids"]
+        self.assertEqual([grid["name"] for grid in grids], ["density", "velocity"])
+        for switch, left in (("per_layer", ["layered_0001.vdb"]), ("combined", ["high/layered_0001.vdb", "low/layered_0001.vdb"])):
+            self.call("run", scene, "--no-render", "--out", switch, "--set", f"density.{switch}=false")
+            folder = self.folder / switch / "density"
+            self.assertEqual(left, sorted(str(p.relative_to(folder)) for p in folder.rglob("*_0001.vdb")))
+            self.call("verify", switch)
+        for changes, says in ((["density.per_layer=false", "density.combined=false"], "neither `density.per_layer`"),
+                              (["density.velocity_name=cld"], "velocity_name")):
+            overrides = [word for change in changes for word in ("--set", change)]
+            self.assertIn(says, self.call("run", scene, *overrides, status=2).stderr)
+
+
+class Place(Case):
+    def test_metadata_are_typed_and_placed(self):
+        scene = self.write("placed.toml", PLACED)
+        self.call("run", scene, "--no-render", "--out", "out")
+        self.call("verify", "out")
+        info = json.loads(self.call("info", "out/density/placed_0002.vdb", "--json").stdout)
+        metadata, grid = info["metadata"], info["grids"][0]
+        self.assertEqual(metadata["nephos_latitude_deg"], 51.4775)
+        self.assertEqual(metadata["nephos_utc"], "2024-06-21T13:50:15Z")
+        self.assertEqual(metadata["nephos_bbox_max"], [31, 23, 11])
+        self.assertEqual(grid["world_from_index"][3::4][:3], grid["origin"])
+        manifest = json.loads((self.folder / "out/manifest.json").read_text())
+        self.assertEqual(manifest["georeference"]["ecef_from_world"], metadata["nephos_ecef_from_world"])
+        self.assertEqual(manifest["frames"][1]["utc"], "2024-06-21T13:50:15Z")
+
+    def test_the_matrix_is_that_of_proj(self):
+        import math
+        import pyproj
+        geodetic = pyproj.Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True)
+        for latitude, longitude, height, heading in ((51.4775, -0.4614, 70.5, 0), (-33.9, 151.2, 6, 123), (89.9, 10, 0, -45),
+                                                     (0, 180, 4000, 300), (-90, 0, 2835, 10)):
+            place = PLACED.split("[georeference]")[0] + (
+                f"[georeference]\nlatitude_deg = {latitude}\nlongitude_deg = {longitude}\nheight_m = {height}\n"
+                f'height_datum = "ellipsoid"\nheading_deg = {heading}\n')
+            self.call("run", self.write("placed.toml", place), "--no-render", "--out", "out", "--overwrite", "--frames", "1")
+            metadata = json.loads(self.call("info", "out/density/placed_0001.vdb", "--json").stdout)["metadata"]
+            m = metadata["nephos_ecef_from_world"]
+            local = pyproj.Transformer.from_pipeline(
+                f"+proj=pipeline +step +inv +proj=topocentric +ellps=WGS84 +lon_0={longitude} +lat_0={latitude} +h_0={height}")
+            for x, y, z in ((0, 0, 0), (5000, 0, 1000), (0, -3000, 200), (-7000, 8000, 9000)):
+                a = math.radians(heading)
+                east, north = x * math.cos(a) + y * math.sin(a), -x * math.sin(a) + y * math.cos(a)
+                expected = local.transform(east, north, z)
+                found = [sum(m[4 * row + k] * v for k, v in enumerate((x, y, z, 1))) for row in range(3)]
+                self.assertLess(math.dist(found, expected), 1e-5)
+            self.assertLess(math.dist(geodetic.transform(longitude, latitude, height), [m[3], m[7], m[11]]), 1e-5)
+
+    def test_the_sun_stands_where_it_does_there(self):
+        def canonical(text, *arguments):
+            scene = self.write("sunny.toml", text)
+            self.call("run", scene, "--no-render", "--statistics-only", "--out", "sun", "--overwrite", *arguments)
+            text = json.loads((self.folder / "sun/manifest.json").read_text())["scene_text"]
+            return text.split("[sun]\n")[1].split("\n\n")[0]
+        sun = canonical(PLACED)
+        for line in ('date = "2024-06-21"', 'time = "13:50:00"', "latitude_deg = 51.4775", "moves = true"):
+            self.assertIn(line, sun)
+        self.assertIn('date = ""', canonical(PLACED, "--set", "sun.elevation_deg=20"))
+
+    def test_mistakes_are_named(self):
+        for keys, says in (("latitude_deg = 51", "longitude_deg"), ("latitude_deg = 91\nlongitude_deg = 0", "-90 to 90"),
+                           ('latitude_deg = 1\nlongitude_deg = 2\nstart_utc = "yesterday"', "2024-06-21T13:50:00Z"),
+                           ('latitude_deg = 1\nlongitude_deg = 2\nheight_datum = "ellipsoid"\ngeoid_height_m = 3', "geoid_height_m")):
+            scene = self.write("bad.toml", f"{SCENE}[georeference]\n{keys}\n")
+            self.assertIn(says, self.call("validate", scene, status=2).stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

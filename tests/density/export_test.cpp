@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Dense boxes of voxels: layout, levels, encoding against a naive twin, and containers read back.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "density/export/containers.h"
+#include "density/export/nanovdb_file.h"
+#include "density/export/volume.h"
+#include "tests/density/vdb_test_files.h"
+
+namespace nephos {
+namespace {
+
+using test::TemporaryFolder;
+
+DensityGrid random_grid(Extent extent, unsigned seed) {
+    std::mt19937 random(seed);
+    std::vector<float> values(extent.cells());
+    for (float& value : values) {
+        const auto draw = random();
+        value = draw % 3 == 0 ? 0.0f : float(draw % 1000) / 1250.0f;
+    }
+    return DensityGrid::from_dense(values, extent, {{100, -200, 300}, 25});
+}
+
+double sum_of(const Volume& v) {
+    double sum = 0;
+    for (const float value : v.values) sum += double(value);
+    return sum;
+}
+
+TEST(Volume, LayoutPermutesPadsAndWraps) {
+    const Extent extent{11, 9, 6};
+    const DensityGrid grid = random_grid(extent, 1);
+    const std::vector<float> dense = grid.to_dense();
+    for (const AxisOrder axes : {AxisOrder::enu, AxisOrder::unity, AxisOrder::unreal}) {
+        for (const Border border : {Border::none, Border::zero, Border::wrap}) {
+            const VolumeLayout layout{1, axes, border, {true, false, false}, 4, false};
+            const VolumeBox box = box_of(extent, grid.placement(), layout);
+            const Volume v = lay_out(grid, layout);
+            ASSERT_EQ(v.voxels(), v.values.size());
+            const int cells[3] = {extent.x, extent.y, extent.z};
+            for (int z = 0; z < v.nz; ++z)
+                for (int y = 0; y < v.ny; ++y)
+                    for (int x = 0; x < v.nx; ++x) {
+                        const int at[3] = {x, y, z};
+                        int world[3] = {};
+                        bool inside = true;
+                        for (std::size_t a = 0; a < 3; ++a) {
+                            const int axis = box.axis[a], n = cells[axis];
+                            int i = at[a] - box.border;
+                            if (border == Border::wrap && axis == 0 && (i == -1 || i == n)) i = (i + n) % n;
+                            inside = inside && i >= 0 && i < n;
+                            world[axis] = i;
+                        }
+                        const float expected =
+                            inside ? dense[linear_index(extent, world[0], world[1], world[2])] : 0.0f;
+                        ASSERT_EQ(v.values[std::size_t((z * v.ny + y) * v.nx + x)], expected)
+                            << x << " " << y << " " << z;
+                    }
+            EXPECT_EQ(box.size[0] % 4, 0);
+            EXPECT_DOUBLE_EQ(box.min_m[2], (axes == AxisOrder::unity ? -200 : 300) - box.border * 25);
+        }
+    }
+    EXPECT_EQ(box_of(extent, grid.placement(), {.power_of_two = true}).size, (std::array{16, 16, 8}));
+}
+
+// Means of whole numbers of voxels, also where sizes do not divide, and levels of padded boxes keep the sum.
+TEST(Volume, CoarserVoxelsAndLevelsKeepTheMass) {
+    const DensityGrid grid = random_grid({43, 30, 17}, 2);
+    for (const int factor : {1, 2, 3, 5}) {
+        const Volume v = lay_out(grid, {.factor = factor, .multiple = 8});
+        EXPECT_NEAR(sum_of(v) * std::pow(factor, 3) / grid.sum(), 1, 1e-6);
+        Volume level = v;
+        for (int n = 1; n <= 3; ++n) {
+            level = halved(level);
+            EXPECT_EQ(level.nx, v.nx >> n);
+            EXPECT_NEAR(sum_of(level) * std::pow(8, n) / sum_of(v), 1, 1e-6);
+        }
+    }
+    EXPECT_EQ(level_count({256, 128, 32}), 4);
+    EXPECT_EQ(level_count({32, 8, 8}), 1);
+    EXPECT_EQ(level_count({33, 8, 8}), 2);
+}
+
+TEST(Volume, TypesAreWithinTheirError) {
+    const DensityGrid grid = random_grid({37, 22, 9}, 3);
+    const Volume v = lay_out(grid, {});
+    for (const float scale : {1.0f, 0.8f}) {
+        for (const VoxelType type :
+             {VoxelType::r8, VoxelType::r16, VoxelType::r16f, VoxelType::r32f, VoxelType::bc4}) {
+            const auto bytes = encode(v, type, scale);
+            ASSERT_EQ(bytes.size(), encoded_bytes(v.nx, v.ny, v.nz, type));
+            const Volume back = decode(bytes.data(), bytes.size(), v.nx, v.ny, v.nz, type, scale);
+            for (std::size_t n = 0; n < v.values.size(); ++n)
+                ASSERT_NEAR(back.values[n], v.values[n], largest_error(type) * scale * 1.001 + 1e-7)
+                    << type_name(type);
+            EXPECT_THROW(decode(bytes.data(), bytes.size() - 1, v.nx, v.ny, v.nz, type, scale), Error);
+        }
+    }
+}
+
+// Against rounding in double precision, denormals and ties included: each half back to itself, and the midpoints
+// between neighbours to the even one.
+TEST(Volume, HalvesAreRoundedToNearestEven) {
+    const auto bits_of = [](float value) {
+        const Volume one{1, 1, 1, {value}};
+        const auto bytes = encode(one, VoxelType::r16f, 1);
+        return std::uint16_t(std::to_integer<unsigned>(bytes[0]) | std::to_integer<unsigned>(bytes[1]) << 8);
+    };
+    const auto value_of = [](std::uint32_t half) {
+        return half < 0x400 ? std::ldexp(float(half), -24)
+                            : std::ldexp(float(0x400 + (half & 0x3FF)), int(half >> 10) - 25);
+    };
+    for (std::uint32_t half = 0; half < 0x7C00; ++half) ASSERT_EQ(bits_of(value_of(half)), half);
+    for (std::uint32_t half = 0; half < 0x7BFF; half += 7) {
+        const float middle = (value_of(half) + value_of(half + 1)) / 2;
+        ASSERT_EQ(bits_of(middle), half + (half & 1)) << half;
+        ASSERT_EQ(bits_of(std::nextafter(middle, 0.0f)), half);
+    }
+    EXPECT_EQ(bits_of(1e9f), 0x7BFF);
+}
+
+TEST(Volume, Bc4IsOfLittleError) {
+    // Smooth as clouds are: within 1/255 in the mean.
+    Volume v{64, 64, 16, {}};
+    for (int z = 0; z < v.nz; ++z)
+        for (int y = 0; y < v.ny; ++y)
+            for (int x = 0; x < v.nx; ++x)
+                v.values.push_back(float(0.5 + 0.5 * std::sin(x * 0.06) * std::cos(y * 0.05 + z * 0.2)));
+    const auto bytes = encode(v, VoxelType::bc4, 1);
+    const Volume back = decode(bytes.data(), bytes.size(), v.nx, v.ny, v.nz, VoxelType::bc4, 1);
+    double squares = 0;
+    for (std::size_t n = 0; n < v.values.size(); ++n)
+        squares += std::pow(double(back.values[n] - v.values[n]), 2);
+    EXPECT_LT(std::sqrt(squares / double(v.values.size())), 1.0 / 255);
+}
+
+TEST(Containers, AreReadBackAndRefuseWhatIsCut) {
+    const TemporaryFolder folder;
+    const DensityGrid grid = random_grid({32, 24, 16}, 4);
+    for (const VoxelType type :
+         {VoxelType::r8, VoxelType::r16, VoxelType::r16f, VoxelType::r32f, VoxelType::bc4}) {
+        EncodedVolume volume{type, {}};
+        Volume level = lay_out(grid, {});
+        for (int n = 0; n < 3; ++n) {
+            volume.levels.push_back({level.nx, level.ny, level.nz, encode(level, type, 1)});
+            level = halved(level);
+        }
+        const auto expect_same = [&](const EncodedVolume& back, std::size_t levels) {
+            EXPECT_EQ(back.type, type);
+            ASSERT_EQ(back.levels.size(), levels);
+            for (std::size_t n = 0; n < levels; ++n) {
+                EXPECT_EQ(back.levels[n].nx, volume.levels[n].nx);
+                EXPECT_TRUE(back.levels[n].bytes == volume.levels[n].bytes);
+            }
+        };
+        const auto expect_cut_is_refused = [&](const std::filesystem::path& path, const auto& read) {
+            std::filesystem::resize_file(path, std::filesystem::file_size(path) - 30);
+            EXPECT_THROW(read(), Error) << path;
+        };
+        write_raw(folder / "v.raw", volume);
+        const auto raw = [&] { return read_raw(folder / "v.raw", type, 32, 24, 16, 3); };
+        expect_same(raw(), 3);
+        expect_cut_is_refused(folder / "v.raw", raw);
+        write_dds(folder / "v.dds", volume);
+        const auto dds = [&] { return read_dds(folder / "v.dds"); };
+        expect_same(dds(), 3);
+        expect_cut_is_refused(folder / "v.dds", dds);
+        write_ktx2(folder / "v.ktx2", volume, "{}");
+        const auto ktx = [&] { return read_ktx2(folder / "v.ktx2"); };
+        expect_same(ktx(), 3);
+        expect_cut_is_refused(folder / "v.ktx2", ktx);
+        if (type == VoxelType::r8 || type == VoxelType::bc4) {
+            write_dds(folder / "old.dds", volume, true);
+            expect_same(read_dds(folder / "old.dds"), 3);
+        } else {
+            EXPECT_THROW(write_dds(folder / "old.dds", volume, true), Error);
+        }
+        if (type == VoxelType::bc4 || type == VoxelType::r16f) {
+            EXPECT_THROW(write_vti(folder / "v.vti", volume, {}, false), Error);
+            continue;
+        }
+        for (const bool zip : {false, true}) {
+            write_vti(folder / "v.vti", volume, {{1, 2, 3}, {25, 25, 25}, 7}, zip);
+            const auto vti = [&] { return read_vti(folder / "v.vti"); };
+            expect_same(vti(), 1);
+            std::filesystem::resize_file(folder / "v.vti", std::filesystem::file_size(folder / "v.vti") / 2);
+            EXPECT_THROW(vti(), Error);
+        }
+        if (type != VoxelType::r8) continue;
+        write_slices(folder / "v.png", volume, 3);
+        expect_same(read_slices(folder / "v.png", 32, 24, 16, 3), 1);
+    }
+}
+
+TEST(Containers, NanoVdbHoldsTheSameVoxels) {
+    const TemporaryFolder folder;
+    const DensityGrid grid = random_grid({37, 22, 19}, 5);
+    for (const NanoCodec codec : {NanoCodec::none, NanoCodec::zip, NanoCodec::blosc}) {
+        write_nanovdb(folder / "v.nvdb", grid, codec, NanoQuantise::none);
+        EXPECT_TRUE(read_nanovdb(folder / "v.nvdb", grid.extent(), grid.placement()).to_dense() ==
+                    grid.to_dense());
+    }
+    EXPECT_THROW(read_nanovdb(folder / "v.nvdb", {8, 8, 8}, grid.placement()), Error);
+    write_nanovdb(folder / "q.nvdb", grid, NanoCodec::none, NanoQuantise::fp8);
+    EXPECT_THROW(read_nanovdb(folder / "q.nvdb", grid.extent(), grid.placement()), Error);
+    write_nanovdb(folder / "v.nvdb", grid, NanoCodec::none, NanoQuantise::none);
+    EXPECT_LT(std::filesystem::file_size(folder / "q.nvdb"),
+              0.9 * double(std::filesystem::file_size(folder / "v.nvdb")));
+}
+
+}  // namespace
+}  // namespace nephos
