@@ -32,8 +32,13 @@ LiveSimulation::LiveSimulation(Scene scene) : scene_(with_whole_state(std::move(
     simulation_->go_to(0);
 }
 
+std::unique_lock<std::mutex> LiveSimulation::turn() const {
+    const std::scoped_lock next(next_);
+    return std::unique_lock(mutex_);
+}
+
 std::uint64_t LiveSimulation::step(std::uint64_t count, double seconds) {
-    const std::scoped_lock lock(mutex_);
+    const std::unique_lock lock = turn();
     const std::uint64_t present = simulation_->next_step();
     if (count > kMaxSteps - present) {
         throw Error(ErrorCode::usage, fmt::format("{} steps from step {} on are more than the {} of a run",
@@ -49,7 +54,7 @@ std::uint64_t LiveSimulation::step(std::uint64_t count, double seconds) {
 }
 
 std::uint64_t LiveSimulation::step_number() const {
-    const std::scoped_lock lock(mutex_);
+    const std::unique_lock lock = turn();
     return simulation_->next_step();
 }
 
@@ -85,13 +90,13 @@ std::size_t LiveSimulation::layer_number(const LayerKey& key) const {
 std::string LiveSimulation::hash() { return statistics(false).hash.hex(); }
 
 StepResult LiveSimulation::statistics(bool density) {
-    const std::scoped_lock lock(mutex_);
+    const std::unique_lock lock = turn();
     return simulation_->present_step(density);
 }
 
 LayerPlanes LiveSimulation::planes(const LayerKey& key) {
     const std::size_t number = layer_number(key);
-    const std::scoped_lock lock(mutex_);
+    const std::unique_lock lock = turn();
     const LayerSimulation& layer = simulation_->layers()[number];
     LayerPlanes result{simulation_->present_planes(number), {}, {}};
     if (!result.planes) {
@@ -106,7 +111,7 @@ LayerPlanes LiveSimulation::planes(const LayerKey& key) {
 DensityGrid LiveSimulation::density(const std::optional<LayerKey>& key) {
     std::optional<std::size_t> number;
     if (key) number = layer_number(*key);
-    const std::scoped_lock lock(mutex_);
+    const std::unique_lock lock = turn();
     DensityGrid density = simulation_->present_density(number);
     if (density.extent().cells() == 0) {
         throw Error(ErrorCode::usage,
@@ -118,7 +123,7 @@ DensityGrid LiveSimulation::density(const std::optional<LayerKey>& key) {
 }
 
 Rgb8Image LiveSimulation::picture() {
-    const std::scoped_lock lock(mutex_);
+    const std::unique_lock lock = turn();
     if (!painter_)
         painter_.emplace(scene_,
                          DeviceOptions{.device = scene_.frames.device, .splatting = scene_.frames.splatting});

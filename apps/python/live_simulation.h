@@ -55,7 +55,10 @@ class LiveSimulation {
     std::size_t layer_number(const LayerKey& layer) const;
 
   private:
-    mutable std::mutex mutex_;
+    // Who waits comes before one that just had its turn: a mutex alone may go to the same thread again and again.
+    std::unique_lock<std::mutex> turn() const;
+
+    mutable std::mutex mutex_, next_;  // next_: of the one that is next
     Scene scene_;
     std::optional<Simulation> simulation_;
     std::optional<FramePainter> painter_;
