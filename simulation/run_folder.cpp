@@ -194,7 +194,7 @@ class Recorder : public SimulationSink {
         std::vector<std::filesystem::path> files{folder_.statistics()};
         for (const LayerOptions& layer : settings_.scene.layers)
             files.push_back(folder_.statistics(layer.name));
-        files.push_back(folder_.checkpoint());
+        if (settings_.checkpoint) files.push_back(folder_.checkpoint());
         if (settings_.render && wants_video(settings_.scene)) files.push_back(folder_.video());
         return files;
     }

@@ -200,8 +200,46 @@ void Simulation::step() {
     remember();
 }
 
-void Simulation::report_step(SimulationSink& sink) {
+void Simulation::go_to(std::uint64_t step) {
+    assert(step >= next_step_ && step <= range_.last_step && range_.last_frame < range_.first_frame);
+    next_step_ = step;
+    forget();
+    while (!density_is_due(next_step_)) this->step();
+}
+
+StepResult Simulation::present_step(bool density) { return step_result(density); }
+
+FrameResult Simulation::present_frame() {
+    const Moment moment{next_step_, 0};
+    return frame_at(moment, time_s(moment), 0);
+}
+
+DensityGrid Simulation::present_density(std::optional<std::size_t> layer) {
     const std::vector<DensityGrid>& densities = densities_at_step(next_step_);
+    if (layer) return densities[*layer];
+    std::vector<DensityGrid> made;
+    std::vector<Boundaries> boundaries;
+    for (std::size_t n = 0; n < layers_.size(); ++n) {
+        if (!makes_density(n)) continue;
+        made.push_back(densities[n]);
+        boundaries.push_back(layers_[n].boundaries());
+    }
+    return made.empty() ? DensityGrid() : combine(made, boundaries);
+}
+
+std::shared_ptr<const Lattice> Simulation::present_planes(std::size_t layer) const {
+    return remembers_planes(layer) ? past(next_step_).layers[layer].planes : nullptr;
+}
+
+StepResult Simulation::step_result(bool density) {
+    std::vector<DensityGrid> densities(layers_.size());
+    if (density) {
+        densities = densities_at_step(next_step_);
+    } else {
+        for (std::size_t n = 0; n < layers_.size(); ++n) {
+            if (layers_[n].is_veil() && makes_density(n)) densities[n] = density_of(n, next_step_);
+        }
+    }
     const Past& state = past(next_step_);
     StepResult result;
     result.step = state.step;
@@ -218,17 +256,22 @@ void Simulation::report_step(SimulationSink& sink) {
         if (layers_[n].has_density()) {
             const GridBox box = layers_[n].box();
             if (layers_[n].is_veil() && makes_density(n)) layer.statistics = cloud_statistics(densities[n]);
-            layer.statistics.mean_density = makes_density(n) ? densities[n].sum() / double(box.extent.cells())
-                                                             : std::numeric_limits<double>::quiet_NaN();
-            layer.statistics.optical_cover = makes_density(n) ? optical_cover(densities[n], scene_.density.extinction_per_m)
-                                                              : std::numeric_limits<double>::quiet_NaN();
+            const bool made = makes_density(n) && (density || layers_[n].is_veil());
+            layer.statistics.mean_density = made ? densities[n].sum() / double(box.extent.cells())
+                                                 : std::numeric_limits<double>::quiet_NaN();
+            layer.statistics.optical_cover = made ? optical_cover(densities[n], scene_.density.extinction_per_m)
+                                                  : std::numeric_limits<double>::quiet_NaN();
             total.add(layer.statistics, volume_m3(box));
         }
         result.layers.push_back(std::move(layer));
     }
     result.statistics = layers_.size() == 1 ? result.layers.front().statistics : total.result();
     if (scene_.layers.empty()) result.layers.clear();
-    sink.step(result);
+    return result;
+}
+
+void Simulation::report_step(SimulationSink& sink) {
+    sink.step(step_result(true));
     ++next_step_;
     forget();
 }
@@ -315,11 +358,10 @@ std::shared_ptr<const GroundCoverMap> Simulation::ground_at(const Moment& moment
         mix(*before, *past(moment.step + 1).ground, moment.fraction));
 }
 
-void Simulation::report_frame(SimulationSink& sink) {
-    const Moment moment = moment_of_number(next_frame_);
+FrameResult Simulation::frame_at(const Moment& moment, double time_s, int number) {
     FrameResult result;
-    result.number = next_frame_;
-    result.time_s = frame_time_s(scene_.frames, next_frame_ - 1);
+    result.number = number;
+    result.time_s = time_s;
     result.step = moment.step;
     result.hash = past(moment.step).hash;
     std::vector<DensityGrid> densities;
@@ -340,7 +382,11 @@ void Simulation::report_frame(SimulationSink& sink) {
         result.moisture = result.layers.front().moisture;
         result.layers.clear();
     }
-    sink.frame(result);
+    return result;
+}
+
+void Simulation::report_frame(SimulationSink& sink) {
+    sink.frame(frame_at(moment_of_number(next_frame_), frame_time_s(scene_.frames, next_frame_ - 1), next_frame_));
     ++next_frame_;
     forget();
 }

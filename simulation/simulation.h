@@ -23,6 +23,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -163,6 +164,22 @@ class Simulation {
     // a step. Precondition: not finished().
     void advance(SimulationSink& sink);
 
+    // Instead of advance(): takes the steps up to `step`, and leaves all results of those before it unmade, until they are
+    // asked for by the functions below. Precondition: next_step() <= step <= last step of the range, no frames in it.
+    void go_to(std::uint64_t step);
+    // Return what a sink gets of next_step(), the present. Without `density` there is none but that of veils, which takes
+    // most of the time, and mean_density is NaN. The frame's number is 0. Precondition: after go_to().
+    StepResult present_step(bool density);
+    FrameResult present_frame();
+    // Returns the density of a layer at next_step(), or of all together; an empty grid where there is none.
+    // Precondition: after go_to().
+    DensityGrid present_density(std::optional<std::size_t> layer = {});
+    // Returns a layer's planes at next_step(), hum and act only where remembers_whole_state(); null without automaton.
+    // Precondition: after go_to(), SimulationResults::everything.
+    std::shared_ptr<const Lattice> present_planes(std::size_t layer) const;
+    // The layers as they are after steps_taken() steps, which may be later than next_step().
+    std::span<const LayerSimulation> layers() const { return layers_; }
+
     // Returns the complete state. First frees the cached densities, to make room for it; they are computed again when
     // they are needed.
     Checkpoint save();
@@ -213,7 +230,9 @@ class Simulation {
     DensityGrid moisture_of(std::size_t layer, std::uint64_t step);
     std::optional<DensityGrid> moisture_at(std::size_t layer, const Moment& moment);
     const Past& past(std::uint64_t step) const;
+    StepResult step_result(bool density);
     void report_step(SimulationSink& sink);
+    FrameResult frame_at(const Moment& moment, double time_s, int number);
     void report_frame(SimulationSink& sink);
     LayerFrame layer_frame(std::size_t layer, const Moment& moment);
     std::shared_ptr<const GroundCoverMap> ground_at(const Moment& moment) const;

@@ -28,6 +28,7 @@ MAY_USE = {
                     "scenes/metar", "simulation", "study"},
     "apps/editor": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format",
                     "simulation", "apps/nephos"},
+    "apps/python": {"core", "automaton", "statistics", "density", "render", "render/options", "scenes/format", "simulation"},
 }
 # Folders of render/ from the lowest to the highest: each may include those of the rows above its own. The renderer's
 # own files, at the root of render/, may include all of them, and none of them may include these.
@@ -59,6 +60,7 @@ LIBRARIES = {
     "Imf": {"render"},
     "png.h": {"density", "render"},
     "CLI/": {"apps/nephos"},
+    "pybind11/": {"apps/python"},
     "toml++/": {"scenes/format"},
     "Random123/": {"core", "automaton", "seeds"},
     "seccomp.h": {"density"},

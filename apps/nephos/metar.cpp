@@ -160,15 +160,14 @@ void add_metar_command(CLI::App& app, Action& action) {
     add_json(*command, a->work);
     add_quiet(*command, a->work);
     command->footer(
-        "Each cloud group becomes a layer whose optical cover is met within half an okta; wind, visibility, "
-        "fog, rain, snow\n"
-        "and thunderstorms become those of the scene; what is left out is listed. The clock of this machine "
-        "is never used.\n"
+        "Each cloud group becomes a layer whose optical cover is met within half an okta; wind, visibility,\n"
+        "fog, rain, snow and thunderstorms become those of the scene; what is left out is listed. The clock of\n"
+        "this machine is never used.\n"
         "\n"
         "Examples:\n"
         "  nephos metar \"EGLL 211350Z 24012KT 9999 FEW020 SCT045 BKN200 14/08 Q1017\" --explain\n"
-        "  nephos metar \"EGLL 211350Z 24012KT 9999 SCT045 14/08 Q1017\" -o egll.toml --date 2024-06 --at "
-        "51.4775,-0.4614,25\n"
+        "  nephos metar \"EGLL 211350Z 24012KT 9999 SCT045 14/08 Q1017\" -o egll.toml --date 2024-06 \\\n"
+        "               --at 51.4775,-0.4614,25\n"
         "  nephos metar @report.txt --run --out out/egll");
     command->callback([a, &action] { action = [a] { return metar(*a); }; });
 }

@@ -26,13 +26,15 @@ Scene coarse_storm() {
                                              "layer[0].lattice.cell_size_m=300",
                                              "layer[1].lattice.cells=[50, 50, 16]",
                                              "layer[1].lattice.cell_size_m=640",
+                                             "layer[2].lattice.cells=[50, 45, 4]",
+                                             "layer[2].lattice.cell_size_m=640",
                                              "wet_ground.texels=64",
                                              "precipitation.particles=5000",
                                              "fog.extinction_per_m=0.0002",
                                              "fog.height_m=300",
                                              "frames.exr=true",
                                              // `blended` has none; ShippedScenes and MarchBackends compare it.
-                                             "detail.enabled=false"};
+                                             "detail.enabled=false", "layer[2].detail.enabled=false"};
     return read_scene(std::filesystem::path(NEPHOS_SOURCE_DIR) / "scenes/storm.toml", overrides);
 }
 

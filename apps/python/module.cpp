@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The compiled part of the Python package `nephos`: classes and their docstrings. Types stand in nephos/__init__.pyi.
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+#include <tbb/global_control.h>
+
+#include "apps/python/arrays.h"
+#include "apps/python/live_simulation.h"
+#include "apps/python/scene_text.h"
+#include "core/error.h"
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace nephos {
+namespace {
+
+// Between two looks at whether Ctrl-C was pressed.
+constexpr double kSignalInterval_s = 0.05;
+
+std::string code_name(ErrorCode code) {
+    switch (code) {
+        case ErrorCode::check:
+            return "check";
+        case ErrorCode::usage:
+            return "usage";
+        case ErrorCode::io:
+            return "io";
+        case ErrorCode::gpu:
+            return "gpu";
+    }
+    return "usage";
+}
+
+py::object text_of(const std::string& text) {
+    return py::reinterpret_steal<py::object>(
+        PyUnicode_DecodeUTF8(text.data(), py::ssize_t(text.size()), "backslashreplace"));
+}
+
+// nephos::Error becomes nephos.Error.
+void add_error(py::module_& module) {
+    static py::exception<Error> type(module, "Error");
+    type.attr("__module__") = "nephos";
+    type.attr("__doc__") =
+        "A bad argument or scene, a file that cannot be read, a device that fails: the text is that of the "
+        "command.\n\n"
+        "code: 'usage', 'io', 'gpu' or 'check'. file, line, column: the place in a text, None where there is "
+        "none.";
+    py::register_exception_translator([](std::exception_ptr pointer) {
+        try {
+            if (pointer) std::rethrow_exception(pointer);
+        } catch (const Error& error) {
+            const py::handle make = type;
+            const py::object object = make(text_of(error.what()));
+            const SourcePosition& where = error.where();
+            object.attr("code") = code_name(error.code());
+            object.attr("file") = where.file.empty() ? py::object(py::none()) : text_of(where.file);
+            object.attr("line") = where.line > 0 ? py::object(py::int_(where.line)) : py::object(py::none());
+            object.attr("column") =
+                where.column > 0 ? py::object(py::int_(where.column)) : py::object(py::none());
+            PyErr_SetObject(type.ptr(), object.ptr());
+        }
+    });
+}
+
+void add_scene(py::module_& module) {
+    py::class_<SceneText>(
+        module, "Scene",
+        "A scene, which never changes: set() returns another one. Every key, its unit, range and "
+        "default stand in docs/scene-reference.md.")
+        .def(py::init([](const std::filesystem::path& path) {
+                 const py::gil_scoped_release released;
+                 return SceneText::from_file(path);
+             }),
+             "path"_a,
+             "Reads a scene file. Raises Error with every mistake of it, each with file, line and column.")
+        .def_static(
+            "from_text",
+            [](const std::string& text, const std::filesystem::path& folder) {
+                const py::gil_scoped_release released;
+                return SceneText::from_text(text, folder);
+            },
+            "text"_a, "folder"_a = std::filesystem::path(),
+            "Takes a scene as TOML text. Relative file names in it are relative to `folder`.")
+        .def(
+            "set",
+            [](const SceneText& scene, const std::string& key, const py::object& value) {
+                const std::string setting = key + "=" + toml_text(value);
+                const py::gil_scoped_release released;
+                return scene.with(setting);
+            },
+            "key"_a, "value"_a,
+            "Returns a copy with one key set, as --set of the command does: set('field.background.ext', "
+            "0.12),\n"
+            "set('lattice.cells', [64, 64, 16]). `value`: bool, int, float, str, or a list, dict or NumPy "
+            "array of "
+            "these.\nRaises Error where there is no such key or the value is out of range.")
+        .def(
+            "text", [](const SceneText& scene) { return text_of(scene.canonical()); },
+            "Returns the whole scene as TOML, every key with its value, defaults included. Equal scenes have "
+            "equal "
+            "text.")
+        .def_property_readonly("name", [](const SceneText& scene) { return text_of(scene.scene().name); })
+        .def_property_readonly("seed", [](const SceneText& scene) { return scene.scene().automaton.seed; })
+        .def_property_readonly(
+            "steps", [](const SceneText& scene) { return scene.scene().steps; },
+            "time.steps; step() is not bound to it.")
+        .def(
+            "__eq__", [](const SceneText& a, const SceneText& b) { return a.scene() == b.scene(); },
+            py::is_operator())
+        .def("__repr__", [](const SceneText& scene) {
+            return text_of(fmt::format("<nephos.Scene '{}'>", scene.scene().name));
+        });
+}
+
+void add_density(py::module_& module) {
+    py::class_<DensityGrid>(module, "Density",
+                            "Cloud density of the present moment, 0..1, on a regular grid.")
+        .def_property_readonly(
+            "values", &voxels_array,
+            "float32 array (nz, ny, nx), z up, y north, x east; read-only, made anew on each access.")
+        .def_property_readonly(
+            "origin_m",
+            [](const DensityGrid& grid) {
+                const Vec3& origin = grid.placement().origin_m;
+                return py::make_tuple(origin.x, origin.y, origin.z);
+            },
+            "(x, y, z) of the lower corner of voxel [0, 0, 0], metres; z is the height above ground. The "
+            "centre of\n"
+            "values[k, j, i] lies at origin_m + (i + 0.5, j + 0.5, k + 0.5) * cell_size_m.")
+        .def_property_readonly(
+            "cell_size_m", [](const DensityGrid& grid) { return grid.placement().cell_size_m; },
+            "Edge of a voxel, metres.")
+        .def("__repr__", [](const DensityGrid& grid) {
+            const Extent e = grid.extent();
+            return fmt::format("<nephos.Density of {} x {} x {} voxels of {} m>", e.x, e.y, e.z,
+                               grid.placement().cell_size_m);
+        });
+}
+
+// Takes the steps with the interpreter lock released, and looks for signals in between.
+LiveSimulation& take_steps(LiveSimulation& simulation, std::uint64_t count) {
+    while (count > 0) {
+        {
+            const py::gil_scoped_release released;
+            count -= simulation.step(count, kSignalInterval_s);
+        }
+        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    }
+    return simulation;
+}
+
+py::dict statistics_of(LiveSimulation& simulation, const std::optional<LayerKey>& layer, bool density) {
+    std::optional<std::size_t> number;
+    if (layer) number = simulation.layer_number(*layer);
+    StepResult result;
+    {
+        const py::gil_scoped_release released;
+        result = simulation.statistics(density);
+    }
+    return statistics_dict(result, number);
+}
+
+py::dict clouds_of(LiveSimulation& simulation, const LayerKey& layer, int dimensions, int neighbours) {
+    if (dimensions != 2 && dimensions != 3)
+        throw Error(ErrorCode::usage, fmt::format("dimensions is {}; expected 2 or 3", dimensions));
+    const bool corners = dimensions == 2 && neighbours == 8;
+    if (!corners && neighbours != (dimensions == 2 ? 4 : 6) && neighbours != 0) {
+        throw Error(ErrorCode::usage, fmt::format("neighbours is {}; expected {}", neighbours,
+                                                  dimensions == 2 ? "4 or 8" : "6 in 3 dimensions"));
+    }
+    LayerPlanes planes;
+    std::vector<ConnectedCloud> clouds;
+    {
+        const py::gil_scoped_release released;
+        planes = simulation.planes(layer);
+        const BitPlaneView cld = planes.planes->cld.view();
+        clouds = dimensions == 3
+                     ? clouds_3d(cld, planes.boundaries)
+                     : clouds_2d(cld, planes.boundaries, corners ? Neighbours::eight : Neighbours::four);
+    }
+    return clouds_dict(clouds, planes.placement, dimensions == 3);
+}
+
+Plane plane_named(const std::string& name) {
+    if (name == "hum") return &Lattice::hum;
+    if (name == "act") return &Lattice::act;
+    if (name == "cld") return &Lattice::cld;
+    throw Error(ErrorCode::usage, fmt::format("no plane '{}'; expected hum, act or cld", name));
+}
+
+LayerPlanes planes_of(LiveSimulation& simulation, const LayerKey& layer) {
+    const py::gil_scoped_release released;
+    return simulation.planes(layer);
+}
+
+template <Plane plane>
+py::array cells_of(LiveSimulation& simulation, const LayerKey& layer) {
+    return cells_array(planes_of(simulation, layer), plane);
+}
+
+#define NEPHOS_CELLS                                                                                        \
+    ", bool array (nz, ny, nx): z up, y north, x east. Read-only, a copy that later steps do not change.\n" \
+    "`layer`: number or name, of a scene with layers. Raises Error for a layer without automaton."
+
+void add_simulation(py::module_& module) {
+    py::class_<LiveSimulation>(
+        module, "Simulation",
+        "A scene that is stepped. Equal scenes and seeds give equal bits, whatever the number of threads. "
+        "Long calls\n"
+        "release the interpreter lock; calls of several threads on one simulation take turns.")
+        .def(py::init([](const SceneText& scene, std::optional<std::uint64_t> seed) {
+                 const py::gil_scoped_release released;
+                 Scene changed = scene.scene();
+                 if (seed) changed.automaton.seed = *seed;
+                 return std::make_unique<LiveSimulation>(std::move(changed));
+             }),
+             "scene"_a, "seed"_a = py::none(),
+             "Starts at step 0. `seed`, 0 to 2^64 - 1, replaces the scene's. Raises Error where it does not "
+             "fit into "
+             "memory.")
+        .def("step", &take_steps, "n"_a = 1, py::return_value_policy::reference_internal,
+             "Takes n steps, and returns the simulation. Ctrl-C ends it between two steps.")
+        .def_property_readonly("step_number", &LiveSimulation::step_number,
+                               py::call_guard<py::gil_scoped_release>(), "Steps taken.")
+        .def_property_readonly("time_s", &LiveSimulation::time_s, py::call_guard<py::gil_scoped_release>(),
+                               "Simulated time, seconds.")
+        .def_property_readonly("layers", &LiveSimulation::layers,
+                               "Names of the layers; [''] of a scene without layers.")
+        .def("hash", &LiveSimulation::hash, py::call_guard<py::gil_scoped_release>(),
+             "Returns the hash of the state, 32 hexadecimal digits: that of `nephos hash` and of "
+             "statistics.csv.")
+        .def("hum", &cells_of<&Lattice::hum>, "layer"_a = 0, "Vapour enough to form cloud" NEPHOS_CELLS)
+        .def("act", &cells_of<&Lattice::act>, "layer"_a = 0, "Phase transition about to happen" NEPHOS_CELLS)
+        .def("cld", &cells_of<&Lattice::cld>, "layer"_a = 0, "Cloud" NEPHOS_CELLS)
+        .def(
+            "words",
+            [](LiveSimulation& simulation, const std::string& plane, const LayerKey& layer) {
+                const Plane of = plane_named(plane);
+                return words_array(planes_of(simulation, layer), of);
+            },
+            "plane"_a, "layer"_a = 0,
+            "Returns the plane 'hum', 'act' or 'cld' as it is stored, a read-only view without a copy: "
+            "uint64 array\n"
+            "(nz, ny, words), cell [k, j, i] is bit i % 64 of word [k, j, i // 64], unused bits are 0. Later "
+            "steps do "
+            "not\nchange it.")
+        .def("statistics", &statistics_of, "layer"_a = py::none(), "density"_a = false,
+             "Returns the statistics of the present state, by the names of the columns of statistics.csv, or "
+             "of\n"
+             "statistics/LAYER.csv with `layer`; units stand in the names. None: no value. `mean_density` is "
+             "None unless\n"
+             "`density`, which smooths the bits first and takes far longer.")
+        .def("clouds", &clouds_of, "layer"_a = 0, "dimensions"_a = 2, "neighbours"_a = 0,
+             "Returns single clouds as read-only arrays, one value a cloud, by name, ready for "
+             "pandas.DataFrame.\n"
+             "dimensions 2, seen from above, columns joined by sides (neighbours 4) or also corners (8): "
+             "cells (columns),\n"
+             "area_m2, perimeter_m, x_m, y_m (centroid), cut (touches an open side), spans (reaches across "
+             "the box).\n"
+             "dimensions 3, cells joined by faces: cells, volume_m3, surface_m2, x_m, y_m, z_m, base_m, "
+             "top_m, cut, spans.\n"
+             "Clouds are joined across periodic sides.")
+        .def("density", &LiveSimulation::density, "layer"_a = py::none(),
+             py::call_guard<py::gil_scoped_release>(),
+             "Returns the Density of a layer, or of all together: cld smoothed in space and time, as in "
+             "density files\n"
+             "without density.refine. Raises Error where clouds are drawn without one.")
+        .def(
+            "picture",
+            [](LiveSimulation& simulation) {
+                Rgb8Image image;
+                {
+                    const py::gil_scoped_release released;
+                    image = simulation.picture();
+                }
+                return pixels_array(std::move(image));
+            },
+            "Returns a picture as camera, sun and the other keys of the scene have it: uint8 array (height, "
+            "width, 3), row 0\n"
+            "at the top, sRGB; read-only. camera.width and camera.height are its size, frames.splatting says "
+            "what draws.")
+        .def("__repr__", [](const LiveSimulation& simulation) {
+            const py::gil_scoped_release released;
+            return fmt::format("<nephos.Simulation at step {}>", simulation.step_number());
+        });
+}
+
+void set_threads(int count) {
+    static std::unique_ptr<tbb::global_control> limit;
+    if (count < 0)
+        throw Error(ErrorCode::usage, fmt::format("{} threads; expected 0 (all cores) or more", count));
+    limit.reset();
+    if (count > 0) {
+        limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                      std::size_t(count));
+    }
+}
+
+}  // namespace
+}  // namespace nephos
+
+PYBIND11_MODULE(_nephos, module) {
+    nephos::add_error(module);
+    nephos::add_scene(module);
+    nephos::add_density(module);
+    nephos::add_simulation(module);
+    module.def(
+        "set_threads", &nephos::set_threads, "count"_a,
+        "Limits the threads of all simulations of this process; 0: all cores. Results do not depend on it.");
+    module.def("version", &nephos::version, "Returns the version of nephos.");
+}

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python module against the `nephos` command: NEPHOS names the binary, SOURCE the source tree, and PYTHONPATH the
+folder of the package `nephos`. The arguments are those of unittest."""
+
+import inspect
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+import numpy
+
+SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
+sys.path.insert(1, str(SOURCE / "tests/apps/command"))
+
+import nephos  # noqa: E402
+from case import BAD, Case, rows_of  # noqa: E402
+
+FAIR = SOURCE / "docs/research/fair.toml"
+
+
+def number(text):
+    return None if text == "" else float(text)
+
+
+class Scenes(Case):
+    def test_keys_are_set_on_a_copy(self):
+        scene = nephos.Scene(self.scene)
+        changed = scene.set("field.background.ext", 0.5).set("lattice.cells", numpy.array([40, 24, 12])).set("seed", 9)
+        self.assertEqual((scene.name, scene.seed, scene.steps, changed.seed), ("tiny", 3, 6, 9))
+        self.assertNotEqual(scene, changed)
+        self.assertIn("cells = [40, 24, 12]", changed.text())
+        self.assertIn("cells = [32, 24, 12]", scene.text())
+        self.assertEqual(scene, scene.set("field.background.ext", 0.5).set("field.background.ext", numpy.float64(0.05)))
+        again = nephos.Scene.from_text(changed.text())
+        self.assertEqual(again, changed)
+        self.assertEqual(again.text(), changed.text())
+        self.assertEqual(scene.set("name", 'a-b').name, "a-b")
+        self.assertIn("enabled = false", scene.set("frames", {"enabled": False, "png": True}).text())
+
+    def test_errors_are_those_of_the_command(self):
+        path = self.write("bad.toml", BAD)
+        with self.assertRaises(nephos.Error) as caught:
+            nephos.Scene(path)
+        told = self.call("validate", path, status=2).stderr
+        self.assertIn(str(caught.exception), told)
+        self.assertIn("cell_sise_m", str(caught.exception))
+        self.assertEqual((caught.exception.code, caught.exception.file, caught.exception.line), ("usage", path, 2))
+        self.assertGreater(caught.exception.column, 0)
+        missing = str(self.folder / "none.toml")
+        with self.assertRaises(nephos.Error) as caught:
+            nephos.Scene(missing)
+        self.assertEqual((caught.exception.code, caught.exception.line), ("io", None))
+        self.assertIn(str(caught.exception), self.call("hash", missing, status=3).stderr)
+        scene = nephos.Scene(self.scene)
+        with self.assertRaisesRegex(nephos.Error, "field.background.ext"):
+            scene.set("field.background.ext", 1.5)
+        with self.assertRaisesRegex(nephos.Error, "hum"):
+            scene.set("field.background.humm", 0.5)
+        with self.assertRaisesRegex(nephos.Error, "type object"):
+            scene.set("seed", object())
+        with self.assertRaisesRegex(nephos.Error, "ext"):
+            scene.set("field.background.ext", float("nan"))
+        self.assertEqual(scene, nephos.Scene(self.scene))
+
+
+class States(Case):
+    def setUp(self):
+        super().setUp()
+        self.simulation = nephos.Simulation(nephos.Scene(self.scene))
+
+    def test_hashes_are_those_of_the_command(self):
+        expected = [line.split()[1] for line in self.hashes(self.scene, "--steps", "8").splitlines()]
+        got = [self.simulation.hash()] + [self.simulation.step().hash() for _ in range(8)]
+        self.assertEqual(got, expected)
+        self.assertEqual((self.simulation.step_number, self.simulation.time_s), (8, 80.0))
+        other = nephos.Simulation(nephos.Scene(self.scene), seed=2**64 - 1).step(8)
+        self.assertEqual(other.hash(), self.hashes(self.scene, "--steps", "8", "--seed", 2**64 - 1).split()[-1])
+        with self.assertRaises(TypeError):
+            self.simulation.step(-1)
+        with self.assertRaisesRegex(nephos.Error, "1000000000"):
+            self.simulation.step(10**9)
+        self.assertEqual(self.simulation.step(0).step_number, 8)
+
+    def test_layers_have_states_of_their_own(self):
+        scene = SOURCE / "scenes/climate.toml"
+        simulation = nephos.Simulation(nephos.Scene(scene)).step(2)
+        self.assertEqual(simulation.hash(), self.hashes(scene, "--steps", "2").split()[-1])
+        self.assertGreater(len(simulation.layers), 1)
+        of_layers = [simulation.statistics(layer=name) for name in simulation.layers]
+        self.assertEqual(simulation.statistics()["cld"], sum(row["cld"] for row in of_layers))
+        for number, row in enumerate(of_layers):
+            self.assertEqual(row, simulation.statistics(layer=number))
+            try:
+                cells = simulation.cld(simulation.layers[number])
+            except nephos.Error as error:
+                self.assertIn("no automaton", str(error))
+            else:
+                self.assertEqual(cells.sum(), row["cld"])
+        with self.assertRaisesRegex(nephos.Error, simulation.layers[1]):
+            simulation.cld("no such layer")
+
+    def test_planes_are_read_only_arrays(self):
+        self.simulation.step(4)
+        statistics = self.simulation.statistics()
+        for name in ("hum", "act", "cld"):
+            cells = getattr(self.simulation, name)()
+            self.assertEqual((cells.shape, cells.dtype), ((12, 24, 32), numpy.bool_))
+            self.assertEqual(cells.sum(), statistics[name])
+            self.assertGreater(statistics[name], 0)
+            words = self.simulation.words(name)
+            self.assertEqual((words.shape, words.dtype), ((12, 24, 1), numpy.uint64))
+            bits = numpy.unpackbits(words.astype("<u8").view(numpy.uint8), axis=2, bitorder="little")
+            numpy.testing.assert_array_equal(bits[:, :, :32].astype(bool), cells)
+            for array in (cells, words):
+                self.assertFalse(array.flags.writeable)
+                with self.assertRaises(ValueError):
+                    array[0, 0, 0] = 1
+                with self.assertRaises(ValueError):
+                    array.setflags(write=True)
+        # Arrays outlive steps and the simulation.
+        before, words = self.simulation.cld(), self.simulation.words("cld")
+        copy, copy_of_words = before.copy(), words.copy()
+        self.simulation.step(5)
+        self.assertTrue((self.simulation.cld() != before).any())
+        del self.simulation
+        numpy.testing.assert_array_equal(before, copy)
+        numpy.testing.assert_array_equal(words, copy_of_words)
+        with self.assertRaisesRegex(nephos.Error, "no plane"):
+            nephos.Simulation(nephos.Scene(self.scene)).words("cloud")
+
+    def test_order_is_z_y_x(self):
+        import pyopenvdb
+        self.simulation.step(3)
+        self.call("state", self.scene, "--steps", "3", "--out", "state.vdb")
+        for name in ("hum", "act", "cld"):
+            expected = numpy.zeros((32, 24, 12), dtype=bool)
+            pyopenvdb.read(str(self.folder / "state.vdb"), name).copyToArray(expected)
+            numpy.testing.assert_array_equal(getattr(self.simulation, name)(), expected.transpose(2, 1, 0))
+
+
+class Results(Case):
+    def test_statistics_are_those_of_a_run(self):
+        self.call("run", self.scene, "--no-render", "--out", "run")
+        rows = rows_of(self.folder / "run/statistics.csv")
+        simulation = nephos.Simulation(nephos.Scene(self.scene))
+        self.assertEqual(len(rows), 7)
+        for row in rows:
+            got = simulation.statistics(density=True)
+            self.assertEqual(list(got), list(row))
+            self.assertEqual(got.pop("hash"), row.pop("hash"))
+            self.assertEqual(got, {name: number(value) for name, value in row.items()})
+            without = simulation.statistics()
+            self.assertIsNone(without.pop("mean_density"))
+            del got["mean_density"], without["hash"]
+            self.assertEqual(without, got)
+            simulation.step()
+        with self.assertRaisesRegex(nephos.Error, "layers"):
+            simulation.statistics(layer=0)
+
+    def test_density_and_picture_are_those_of_a_run(self):
+        import PIL.Image
+        import pyopenvdb
+        # Frames of steps 0, 2 and 4.
+        self.call("run", self.scene, "--set", "frames.time_scale=20", "--set", "frames.splatting=cpu", "--out", "run")
+        scene = nephos.Scene(self.scene).set("frames.splatting", "cpu")
+        simulation = nephos.Simulation(scene)
+        for frame in (1, 2, 3):
+            density = simulation.density()
+            values = density.values
+            self.assertEqual((values.shape, values.dtype, values.flags.writeable), ((12, 24, 32), numpy.float32, False))
+            grid = pyopenvdb.read(str(self.folder / f"run/density/tiny_{frame:04}.vdb"), "density")
+            expected = numpy.zeros((32, 24, 12), dtype=numpy.float32)
+            grid.copyToArray(expected)
+            numpy.testing.assert_array_equal(values, expected.transpose(2, 1, 0))
+            self.assertEqual(density.cell_size_m, grid.transform.voxelSize()[0])
+            centre = grid.transform.indexToWorld((0, 0, 0))
+            numpy.testing.assert_allclose(numpy.array(density.origin_m) + density.cell_size_m / 2, centre)
+            mean = simulation.statistics(density=True)["mean_density"]
+            self.assertAlmostEqual(values.mean(dtype=float), mean, places=12)
+            picture = simulation.picture()
+            self.assertEqual((picture.shape, picture.dtype, picture.flags.writeable), ((48, 64, 3), numpy.uint8, False))
+            drawn = numpy.asarray(PIL.Image.open(self.folder / f"run/frames/tiny_{frame:04}.png").convert("RGB"))
+            numpy.testing.assert_array_equal(picture, drawn)
+            simulation.step(2)
+        self.assertGreater(picture.std(), 1)
+
+    def test_clouds_fill_the_shadow(self):
+        simulation = nephos.Simulation(nephos.Scene(FAIR)).step(40)
+        cells = simulation.cld()
+        shadow = cells.any(axis=0)
+        clouds = simulation.clouds()
+        self.assertEqual(clouds["cells"].sum(), shadow.sum())
+        numpy.testing.assert_array_equal(clouds["area_m2"], clouds["cells"] * 2500.0)
+        self.assertAlmostEqual(clouds["perimeter_m"].sum(), simulation.statistics()["perimeter_m"])
+        self.assertLess(len(simulation.clouds(neighbours=8)["cells"]), len(clouds["cells"]))
+        space = simulation.clouds(dimensions=3)
+        self.assertEqual(space["cells"].sum(), cells.sum())
+        self.assertGreaterEqual(len(space["cells"]), len(clouds["cells"]))
+        levels = numpy.flatnonzero(cells.any(axis=(1, 2)))
+        statistics = simulation.statistics()
+        self.assertEqual((space["base_m"].min(), space["top_m"].max()), (statistics["base_m"], statistics["top_m"]))
+        self.assertAlmostEqual(space["top_m"].max() - space["base_m"].min(), 50.0 * (levels[-1] - levels[0] + 1))
+        self.assertTrue(((space["z_m"] > space["base_m"]) & (space["z_m"] < space["top_m"])).all())
+        self.assertFalse(space["cut"].dtype != numpy.bool_ or space["cells"].flags.writeable)
+        for wrong in ({"dimensions": 4}, {"neighbours": 6}, {"dimensions": 3, "neighbours": 8}):
+            with self.assertRaisesRegex(nephos.Error, "expected"):
+                simulation.clouds(**wrong)
+
+
+class Threads(Case):
+    def test_threads_do_not_change_a_bit(self):
+        self.addCleanup(nephos.set_threads, 0)
+        scene = nephos.Scene(SOURCE / "scenes/cumulus.toml")
+        hashes = set()
+        for threads in (1, 2, 0):
+            nephos.set_threads(threads)
+            hashes.add(nephos.Simulation(scene).step(12).hash())
+        self.assertEqual(hashes, {self.hashes(SOURCE / "scenes/cumulus.toml", "--steps", "12").split()[-1]})
+        with self.assertRaisesRegex(nephos.Error, "-1 threads"):
+            nephos.set_threads(-1)
+
+    def test_python_goes_on_while_the_engine_works(self):
+        simulation = nephos.Simulation(nephos.Scene(FAIR).set("lattice.cells", [512, 512, 20]))
+        seen = []
+        worker = threading.Thread(target=lambda: simulation.step(200))
+        worker.start()
+        while worker.is_alive():
+            seen.append(simulation.step_number)  # waits for its turn, not for the end
+            time.sleep(0.001)
+        worker.join()
+        self.assertEqual(simulation.step_number, 200)
+        self.assertEqual(seen, sorted(seen))
+        self.assertTrue(any(0 < number < 200 for number in seen), seen)
+
+    def test_simulations_and_callers_do_not_disturb_each_other(self):
+        expected = [line.split()[1] for line in self.hashes(self.scene, "--steps", "60").splitlines()]
+        shared = nephos.Simulation(nephos.Scene(self.scene))
+        wrong = []
+
+        def work():
+            own = nephos.Simulation(nephos.Scene(self.scene))
+            for step in range(1, 31):
+                if own.step().hash() != expected[step]:
+                    wrong.append(step)
+                shared.step()
+                shared.cld()
+                shared.density()
+
+        workers = [threading.Thread(target=work) for _ in range(2)]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        self.assertEqual(wrong, [])
+        self.assertEqual((shared.step_number, shared.hash()), (60, expected[60]))
+
+    def test_ctrl_c_ends_a_long_call(self):
+        simulation = nephos.Simulation(nephos.Scene(self.scene))
+        timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+        timer.start()
+        with self.assertRaises(KeyboardInterrupt):
+            simulation.step(10**9)
+        steps = simulation.step_number
+        self.assertTrue(0 < steps < 10**9)
+        self.assertEqual(simulation.step().step_number, steps + 1)
+
+
+class Documentation(Case):
+    def test_the_example_of_the_page_runs(self):
+        page = (SOURCE / "docs/research.md").read_text()
+        section = page.split("## From Python\n")[1].split("\n## ")[0]
+        example = re.search(r"(?:^    .*\n|^\n(?=    ))+", section, re.M).group()
+        program = inspect.cleandoc(example)
+        self.assertIn("import nephos", program)
+        shutil.copy(FAIR, self.folder)
+        result = subprocess.run([sys.executable, "-c", program], cwd=self.folder, capture_output=True, text=True,
+                                timeout=120)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        shown = section.split("prints\n\n")[1]
+        self.assertEqual(result.stdout, inspect.cleandoc(shown.split("\n\n")[0]) + "\n")
+
+    def test_everything_has_a_docstring_and_a_type(self):
+        stub = pathlib.Path(nephos.__file__).with_name("__init__.pyi").read_text()
+        compile(stub, "stub", "exec")
+        self.assertTrue(pathlib.Path(nephos.__file__).with_name("py.typed").exists())
+        for owner in (nephos, nephos.Scene, nephos.Simulation, nephos.Density):
+            for name, member in vars(owner).items():
+                if name.startswith("_") or inspect.ismodule(member):
+                    continue
+                self.assertRegex(stub, rf"(def|class) {name}\b")
+                if name not in ("name", "seed"):
+                    self.assertTrue(member.__doc__, name)
+
+
+class Installation(Case):
+    def test_the_installed_package_is_whole(self):
+        build = pathlib.Path(nephos.__file__).parents[2]
+        script = build / "apps/python/cmake_install.cmake"
+        subprocess.run(["cmake", f"-DCMAKE_INSTALL_PREFIX={self.folder}", "-P", script], check=True, capture_output=True)
+        folder, = self.folder.glob("lib/python3*/dist-packages")
+        names = {path.name.split(".cpython")[0] for path in (folder / "nephos").iterdir()}
+        self.assertEqual(names, {"__init__.py", "__init__.pyi", "py.typed", "_nephos"})
+        program = "import nephos; print(nephos.__file__, nephos.Simulation(nephos.Scene('tiny.toml')).step(2).hash())"
+        result = subprocess.run([sys.executable, "-c", program], cwd=self.folder, capture_output=True, text=True,
+                                check=True, env={**os.environ, "PYTHONPATH": str(folder)})
+        self.assertTrue(result.stdout.startswith(str(folder)), result.stdout)
+        self.assertEqual(result.stdout.split()[-1], self.hashes(self.scene, "--steps", "2").split()[-1])
+
+
+if __name__ == "__main__":
+    unittest.main()
