@@ -51,6 +51,7 @@ void add_statistics(py::dict& to, const CloudStatistics& s) {
     to["top_mean_m"] = number_or_none(s.top_mean_m);
     to["perimeter_m"] = number_or_none(s.perimeter_m);
     to["mean_density"] = number_or_none(s.mean_density);
+    to["optical_cover"] = number_or_none(s.optical_cover);
 }
 
 // A basic string of TOML.
