@@ -79,10 +79,9 @@ DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const
     TreeBuilder builder;
     try {
         const auto handles = nanovdb::io::readGrids(stream);
-        if (handles.size() != 1 || handles.front().grid<float>() == nullptr)
-            throw Error(ErrorCode::io, path.string() + ": holds no float grid that is not quantised");
-        const auto base = nanovdb::nanoToOpenVDB(handles.front());
-        const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
+        const nanovdb::NanoGrid<float>* const nano = handles.size() == 1 ? handles.front().grid<float>() : nullptr;
+        if (nano == nullptr) throw Error(ErrorCode::io, path.string() + ": holds no float grid that is not quantised");
+        const auto grid = nanovdb::nanoToOpenVDB(*nano);  // of the handle: it would compile all kinds of grids
         const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
         const openvdb::Coord last(extent.x - 1, extent.y - 1, extent.z - 1);
         if (!box.empty() && !openvdb::CoordBBox(openvdb::Coord(0), last).isInside(box))
