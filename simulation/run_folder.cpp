@@ -232,14 +232,26 @@ class Recorder : public SimulationSink {
     FrameOutput output_;  // last: ends first
 };
 
-RunReport report_of(const Recorder& recorder, const RunSettings& settings, const Simulation& simulation) {
-    const ManifestState& state = recorder.state();
+// Returns what a report says of the settings alone.
+RunReport report_head(const RunSettings& settings) {
     RunReport report;
     report.scene = settings.scene.name;
     report.scene_hash = settings.scene_hash;
     report.simulation_hash = settings.simulation_hash;
     report.folder = settings.folder;
     report.last_step = settings.range.last_step;
+    return report;
+}
+
+RunFiles statistics_files(const RunSettings& settings, const RunFolder& folder) {
+    RunFiles statistics{"statistics", {folder.statistics()}};
+    for (const LayerOptions& layer : settings.scene.layers) statistics.files.push_back(folder.statistics(layer.name));
+    return statistics;
+}
+
+RunReport report_of(const Recorder& recorder, const RunSettings& settings, const Simulation& simulation) {
+    const ManifestState& state = recorder.state();
+    RunReport report = report_head(settings);
     report.complete = state.complete;
     report.steps_taken = simulation.steps_taken();
     report.steps_reported = state.steps_reported;
@@ -253,11 +265,7 @@ RunReport report_of(const Recorder& recorder, const RunSettings& settings, const
     if (state.complete && settings.render && settings.scene.frames.video) {
         report.files.push_back({"video", {folder.video()}});
     }
-    RunFiles statistics{"statistics", {folder.statistics()}};
-    for (const LayerOptions& layer : settings.scene.layers) {
-        statistics.files.push_back(folder.statistics(layer.name));
-    }
-    report.files.push_back(std::move(statistics));
+    report.files.push_back(statistics_files(settings, folder));
     report.files.push_back({"manifest", {folder.manifest()}});
     if (settings.checkpoint || !state.complete) report.files.push_back({"checkpoint", {folder.checkpoint()}});
     return report;
@@ -291,22 +299,14 @@ void simulate(Simulation& simulation, Recorder& recorder, const RunSettings& set
 
 // The report of a run that was complete before and has no checkpoint that could be read: of statistics alone.
 RunReport report_of_complete(const RunSettings& settings, const RunFolder& folder) {
-    RunReport report;
-    report.scene = settings.scene.name;
-    report.scene_hash = settings.scene_hash;
-    report.simulation_hash = settings.simulation_hash;
-    report.folder = settings.folder;
-    report.last_step = settings.range.last_step;
+    RunReport report = report_head(settings);
     report.complete = report.skipped = true;
     report.first_step = report.steps_taken = settings.range.last_step;
     report.steps_reported = settings.range.last_step + 1;
     read_statistics(
         folder.statistics(), report.steps_reported,
         [&](std::uint64_t, std::string_view, const StateHash& hash) { report.state_hash = hash.hex(); });
-    RunFiles statistics{"statistics", {folder.statistics()}};
-    for (const LayerOptions& layer : settings.scene.layers)
-        statistics.files.push_back(folder.statistics(layer.name));
-    report.files = {std::move(statistics), {"manifest", {folder.manifest()}}};
+    report.files = {statistics_files(settings, folder), {"manifest", {folder.manifest()}}};
     return report;
 }
 

@@ -56,7 +56,7 @@ void export_grid(Editor& editor, const fs::path& path) {
     write_vdb(path, content, metadata);
 }
 
-// What the dialog was for.
+// Does with the chosen file what the dialog was opened for.
 bool accept(Editor& editor, const fs::path& path) {
     try {
         switch (editor.dialog) {

@@ -387,7 +387,7 @@ Editor::Editor(const EditorOptions& from)
     of_window.height = options.height > 0 ? options.height : settings.height;
     of_window.device = options.device;
     of_window.validation = options.validation;
-    // What is to be seen is simulated while the window opens.
+    // Simulates the first picture while the window opens.
     follow_document(*this);
     live.run(running);
     window = std::make_unique<Window>(of_window);

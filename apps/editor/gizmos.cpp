@@ -151,7 +151,7 @@ TextPath with(const TextPath& path, const char* name) {
     return out;
 }
 
-// Where a model's own space stands while its seeds are edited: at the camera's target.
+// Returns the origin of a model's own space while its seeds are edited: the camera's target.
 bool model_gizmo(Editor& editor) {
     const TextPath model(editor.selected.begin(), editor.selected.begin() + 2);
     const auto count = [&] {  // asked again after each seed: a handle replaces the values

@@ -13,7 +13,7 @@
 namespace nephos {
 namespace {
 
-// How long nothing moves before a picture is drawn with its detail.
+// A picture is drawn with its detail when nothing has moved for so long.
 constexpr std::chrono::milliseconds kRest{180};
 constexpr std::size_t kMostCheckpointBytes = 512u << 20;
 // Checkpoints are compared by this name alone: which scene they belong to is known here.

@@ -28,11 +28,11 @@
 
 namespace nephos {
 
-// Whether a new text of a scene needs another simulation, or its pictures alone change. Pure.
+// Tells what a new text of a scene changes: nothing, its pictures alone, or the simulation. Pure.
 enum class SceneChange { none, picture, simulation };
 SceneChange change_between(const Scene& before, const Scene& after);
 
-// What the plots show of a step.
+// Holds what the plots show of a step.
 struct LiveStep {
     double time_s = 0;
     CloudStatistics statistics;
@@ -46,7 +46,7 @@ struct LiveFrame {
     std::uint64_t simulation_number = 0;  // rises with every scene that is simulated anew
 };
 
-// How a picture is drawn.
+// Says how a picture is drawn.
 struct LiveView {
     Camera camera;                  // of the window: without path
     int width = 640, height = 360;  // of the picture when nothing moves, pixels
@@ -143,7 +143,7 @@ class LiveScene {
     LiveStatus status_;
     std::uint64_t pictures_ = 0;
 
-    // Of the simulation thread alone.
+    // The simulation thread alone uses these.
     Scene scene_;
     std::shared_ptr<Simulation> simulation_;
     std::map<std::uint64_t, Checkpoint> checkpoints_;  // by the next step that they report
