@@ -295,9 +295,13 @@ void say(Editor& editor, std::string message, bool is_bad) {
 }
 
 void Controls::note(const std::string& name) {
-    const bool visible = ImGui::IsItemVisible();
+    const ImVec2 min = ImGui::GetItemRectMin(), max = ImGui::GetItemRectMax();
+    const ImVec2 middle(0.5f * (min.x + max.x), 0.5f * (min.y + max.y));
+    const ImDrawList& list = *ImGui::GetWindowDrawList();
+    const ImVec2 low = list.GetClipRectMin(), high = list.GetClipRectMax();
+    const bool visible = middle.x >= low.x && middle.y >= low.y && middle.x < high.x && middle.y < high.y;
     if (name == wanted && !visible) ImGui::SetScrollHereY(0.5f);
-    now[name] = {ImGui::GetItemRectMin(), ImGui::GetItemRectMax(), !visible};
+    now[name] = {min, max, !visible};
 }
 
 void tooltip_of_last(const char* text) {

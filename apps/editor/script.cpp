@@ -267,9 +267,14 @@ void Script::begin_line(Editor& editor) {
         const LiveStatus status = editor.live.status();
         const bool whole = editor.picture && editor.picture->step == status.step &&
                            status.goal == status.step && (editor.picture->refined || editor.running);
-        if (!whole || Clock::now() - line_begin_ < std::chrono::milliseconds(400)) return;
+        // One that stays: a draft of the last edit may be on its way.
+        if (!whole || editor.picture->number != still_) still_since_ = Clock::now();
+        still_ = editor.picture ? editor.picture->number : 0;
+        const auto wanted = editor.running ? std::chrono::milliseconds(0) : std::chrono::milliseconds(800);
+        if (!whole || Clock::now() - still_since_ < wanted) return;
     } else if (command == "screenshot") {
         editor.capture_to = rest_of(words, 1);
+        mouse_ = ImVec2(-1, -1);  // no tooltip in the picture
     } else if (command == "picture") {
         if (!editor.picture) return;
         std::string name = rest_of(words, 1);

@@ -78,6 +78,8 @@ class Script {
     bool line_begun_ = false;
     ImVec2 found_at_{-1, -1};  // where a control was in the frame before
     int found_frames_ = 0;     // for how many frames
+    std::uint64_t still_ = 0;  // the picture that was last seen, and since when
+    Clock::time_point still_since_ = Clock::now();
     std::uint64_t random_left_ = 0;
     std::mt19937 random_;
     int last_key_ = -1;
