@@ -200,6 +200,8 @@ void Script::begin_line(Editor& editor) {
     const std::string& command = words.front();
     if (!line_begun_) line_begin_ = Clock::now();
     if (!line_begun_) found_at_ = ImVec2(-1, -1);
+    // Two clicks are one however slow the machine is.
+    ImGui::GetIO().MouseDoubleClickTime = command == "double-click-at" ? 30.0f : 0.3f;
     line_begun_ = true;
     const auto done = [this] {
         lines_.pop_front();
