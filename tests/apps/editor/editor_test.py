@@ -388,6 +388,7 @@ class Story(Case):
         scene = self.folder / "live.toml"
         scene.write_text(LIVE_SCENE, encoding="utf-8")
         self.edit(scene, "--validation", size="1100x760", script="""
+            wait-step 1
             click tab View
             click "Record as key frames"
             click tab Properties
@@ -492,7 +493,7 @@ class Tutorial(Case):
         for step in range(1, 10):
             self.assertIn(f"pictures/tutorial-{step}.jpg", page)
             self.assertGreater(ImageStat.Stat(self.image(f"tutorial-{step}.png", (300, 60, 850, 500))).stddev[0], 5, step)
-        scene = self.folder / "my-sky.toml"
+        scene = self.folder / "SKY.toml"
         seen = (self.folder / "tutorial-hashes.txt").read_text(encoding="utf-8").splitlines()
         self.assertGreater(len(seen), 200)
         replay = subprocess.run([NEPHOS, "hash", str(scene), "--steps", str(len(seen) - 1)], capture_output=True, text=True,
