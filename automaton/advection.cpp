@@ -53,6 +53,13 @@ std::int64_t wrap(std::int64_t value, std::int64_t size) { return (value % size 
 
 }  // namespace
 
+Displacement displacement_of_layer(const AutomatonOptions& options, int k, double time_s) {
+    Vec3 place = options.placement.origin_m;  // anywhere in the layer
+    place.z += (k + 0.5) * options.placement.cell_size_m;
+    const Vec3 wind = wind_at(options.wind, place, time_s);
+    return displacement_of_step({wind.x, wind.y}, options.time_step_s, options.placement.cell_size_m);
+}
+
 void shift_layer(BitPlane& plane, int k, std::int64_t dx, std::int64_t dy, const Boundaries& boundaries,
                  std::vector<std::uint64_t>& scratch) {
     const std::int64_t nx = plane.extent().x, ny = plane.extent().y;

@@ -7,8 +7,13 @@
 #include <vector>
 
 #include "automaton/lattice.h"
+#include "automaton/options.h"
 
 namespace nephos {
+
+// Returns the displacement of layer k in the step that starts at `time_s`, by the wind at the centres of its cells.
+// Precondition: the fields of the wind are a profile (is_profile()). Pure.
+Displacement displacement_of_layer(const AutomatonOptions& options, int k, double time_s);
 
 // Shifts layer k of a plane in place by (dx, dy) cells of any size and sign. 0 flows in through open sides;
 // periodic sides wrap around. `scratch` is reused memory. Different layers may be shifted in different

@@ -39,7 +39,7 @@ AirParcel draw_parcel(const AutomatonOptions& options, int scatter, std::uint32_
                       std::uint32_t generation) {
     const EllipsoidScatter& s = options.field.scatters[std::size_t(scatter)];
     AirParcel parcel{
-        .ellipsoid = {}, .scatter = scatter, .index = index, .generation = generation, .carried = {}};
+        .ellipsoid = {}, .scatter = scatter, .index = index, .generation = generation, .carried = {}, .carried_up = 0};
     Ellipsoid& e = parcel.ellipsoid;
     e.centre_m = {draw(options, parcel, kX, s.x_m), draw(options, parcel, kY, s.y_m),
                   draw(options, parcel, kZ, s.z_m)};
@@ -109,7 +109,8 @@ void append_thermals(const AutomatonOptions& options, const AirParcel& plume, co
 Vec3 present_centre(const AirParcel& parcel, double cell_size_m) {
     const Vec3& born = parcel.ellipsoid.centre_m;
     return {born.x + double(parcel.carried.x) * 0x1p-32 * cell_size_m,
-            born.y + double(parcel.carried.y) * 0x1p-32 * cell_size_m, born.z};
+            born.y + double(parcel.carried.y) * 0x1p-32 * cell_size_m,
+            born.z + double(parcel.carried_up) * 0x1p-32 * cell_size_m};
 }
 
 struct Box {
@@ -122,34 +123,43 @@ Box box_of(const AutomatonOptions& o) {
 }
 
 // Returns true when the whole ellipsoid has left the box downwind, through an open side.
-bool has_left(const AutomatonOptions& options, const AirParcel& parcel, const Velocity& wind) {
+bool has_left(const AutomatonOptions& options, const AirParcel& parcel, const Vec3& wind) {
     const Box box = box_of(options);
     const Vec3 half = reach_m(parcel.ellipsoid);
     const Vec3 centre = present_centre(parcel, options.placement.cell_size_m);
     const bool left_x =
-        options.boundaries.x == Boundary::open && ((wind.east_m_per_s > 0 && centre.x - half.x >= box.x1) ||
-                                                   (wind.east_m_per_s < 0 && centre.x + half.x <= box.x0));
+        options.boundaries.x == Boundary::open && ((wind.x > 0 && centre.x - half.x >= box.x1) ||
+                                                   (wind.x < 0 && centre.x + half.x <= box.x0));
     const bool left_y =
-        options.boundaries.y == Boundary::open && ((wind.north_m_per_s > 0 && centre.y - half.y >= box.y1) ||
-                                                   (wind.north_m_per_s < 0 && centre.y + half.y <= box.y0));
+        options.boundaries.y == Boundary::open && ((wind.y > 0 && centre.y - half.y >= box.y1) ||
+                                                   (wind.y < 0 && centre.y + half.y <= box.y0));
     return left_x || left_y;
+}
+
+// Returns true when a field of the wind has carried the whole ellipsoid out of the box through its open top or bottom.
+bool has_risen_out(const AutomatonOptions& options, const AirParcel& parcel) {
+    if (parcel.carried_up == 0 || options.boundaries.z == Boundary::periodic) return false;
+    const double bottom = options.placement.origin_m.z,
+                 top = bottom + options.extent.z * options.placement.cell_size_m;
+    const double z = present_centre(parcel, options.placement.cell_size_m).z, half = parcel.ellipsoid.semi_axes_m.z;
+    return z - half >= top || z + half <= bottom;
 }
 
 // Puts a parcel outside the upwind sides so that it just touches the box. Air enters a side in proportion to
 // the wind across it and to its length; that decides which of two upwind sides it is.
-void place_upwind(const AutomatonOptions& options, AirParcel& parcel, const Velocity& wind) {
+void place_upwind(const AutomatonOptions& options, AirParcel& parcel, const Vec3& wind) {
     const Box box = box_of(options);
     const double inflow_x =
-        options.boundaries.x == Boundary::open ? std::abs(wind.east_m_per_s) * (box.y1 - box.y0) : 0;
+        options.boundaries.x == Boundary::open ? std::abs(wind.x) * (box.y1 - box.y0) : 0;
     const double inflow_y =
-        options.boundaries.y == Boundary::open ? std::abs(wind.north_m_per_s) * (box.x1 - box.x0) : 0;
+        options.boundaries.y == Boundary::open ? std::abs(wind.y) * (box.x1 - box.x0) : 0;
     Ellipsoid& e = parcel.ellipsoid;
     const Vec3 half = reach_m(e);
     if (draw(options, parcel, kSide, {0, inflow_x + inflow_y}) < inflow_x) {
-        e.centre_m.x = wind.east_m_per_s > 0 ? box.x0 - half.x : box.x1 + half.x;
+        e.centre_m.x = wind.x > 0 ? box.x0 - half.x : box.x1 + half.x;
         e.centre_m.y = draw(options, parcel, kAlong, {box.y0, box.y1});
     } else {
-        e.centre_m.y = wind.north_m_per_s > 0 ? box.y0 - half.y : box.y1 + half.y;
+        e.centre_m.y = wind.y > 0 ? box.y0 - half.y : box.y1 + half.y;
         e.centre_m.x = draw(options, parcel, kAlong, {box.x0, box.x1});
     }
 }
@@ -173,7 +183,7 @@ double fade_weight(const Ellipsoid& e, double time_s) {
 
 AirParcels::AirParcels(const AutomatonOptions& options) {
     for (const Ellipsoid& e : options.field.ellipsoids) {
-        parcels_.push_back({.ellipsoid = e, .scatter = -1, .index = 0, .generation = 0, .carried = {}});
+        parcels_.push_back({.ellipsoid = e, .scatter = -1, .index = 0, .generation = 0, .carried = {}, .carried_up = 0});
     }
     for (int s = 0; s < int(options.field.scatters.size()); ++s) {
         for (int i = 0; i < options.field.scatters[std::size_t(s)].count; ++i) {
@@ -201,15 +211,18 @@ void AirParcels::advance(const AutomatonOptions& options, double time_s) {
     const double end_s = time_s + options.time_step_s;
     for (AirParcel& parcel : parcels_) {
         const Ellipsoid& e = parcel.ellipsoid;
-        const Velocity wind = e.carried ? wind_at(options.wind, e.centre_m.z, time_s) : Velocity{};
+        const double cell = options.placement.cell_size_m;
+        const Vec3 wind = e.carried ? mean_wind(options.wind, present_centre(parcel, cell), time_s, options.time_step_s)
+                                    : Vec3{};
         if (e.carried && time_s >= e.birth_s) {
-            const Displacement d =
-                displacement_of_step(wind, options.time_step_s, options.placement.cell_size_m);
+            const Displacement d = displacement_of_step({wind.x, wind.y}, options.time_step_s, cell);
             parcel.carried.x = carry(parcel.carried.x, d.x, options.boundaries.x, options.extent.x);
             parcel.carried.y = carry(parcel.carried.y, d.y, options.boundaries.y, options.extent.y);
+            const Displacement up = displacement_of_step({wind.z, 0}, options.time_step_s, cell);
+            parcel.carried_up = carry(parcel.carried_up, up.x, options.boundaries.z, options.extent.z);
         }
         if (parcel.scatter < 0 || !options.field.scatters[std::size_t(parcel.scatter)].replace) continue;
-        const bool died = end_s >= e.birth_s + e.life_s;
+        const bool died = end_s >= e.birth_s + e.life_s || has_risen_out(options, parcel);
         const bool left = end_s >= e.birth_s && has_left(options, parcel, wind);
         if (!died && !left) continue;
         parcel = draw_parcel(options, parcel.scatter, parcel.index, parcel.generation + 1);
@@ -221,7 +234,7 @@ void AirParcels::advance(const AutomatonOptions& options, double time_s) {
     }
 }
 
-void AirParcels::save(ByteWriter& out) const {
+void AirParcels::save(ByteWriter& out, const AutomatonOptions& options) const {
     out.put(std::uint64_t(parcels_.size()));
     for (const AirParcel& p : parcels_) {
         const Ellipsoid& e = p.ellipsoid;
@@ -232,10 +245,11 @@ void AirParcels::save(ByteWriter& out) const {
         out.put(p.generation);
         out.put(p.carried.x);
         out.put(p.carried.y);
+        if (!options.wind.fields.empty()) out.put(p.carried_up);
     }
 }
 
-void AirParcels::restore(ByteReader& in) {
+void AirParcels::restore(ByteReader& in, const AutomatonOptions& options) {
     if (in.get<std::uint64_t>() != parcels_.size()) {
         throw Error(ErrorCode::io, "saved state has another number of ellipsoids than the scene");
     }
@@ -248,6 +262,7 @@ void AirParcels::restore(ByteReader& in) {
         p.generation = in.get<std::uint32_t>();
         p.carried.x = in.get<std::int64_t>();
         p.carried.y = in.get<std::int64_t>();
+        if (!options.wind.fields.empty()) p.carried_up = in.get<std::int64_t>();
     }
 }
 

@@ -21,6 +21,7 @@ struct AirParcel {
     std::uint32_t index = 0;       // number within the scatter
     std::uint32_t generation = 0;  // how often it has been drawn anew
     Displacement carried;          // by the wind since birth
+    std::int64_t carried_up = 0;   // cells * 2^32; only where the wind has fields
     bool operator==(const AirParcel&) const = default;
 };
 
@@ -37,8 +38,8 @@ class AirParcels {
     // its end.
     void advance(const AutomatonOptions& options, double time_s);
 
-    void save(ByteWriter& out) const;
-    void restore(ByteReader& in);
+    void save(ByteWriter& out, const AutomatonOptions& options) const;
+    void restore(ByteReader& in, const AutomatonOptions& options);
 
   private:
     std::vector<AirParcel> parcels_;

@@ -12,6 +12,7 @@
 #include "automaton/advection.h"
 #include "automaton/air_parcels.h"
 #include "automaton/block_field.h"
+#include "automaton/cell_motion.h"
 #include "automaton/kernels.h"
 #include "core/bytes.h"
 #include "core/error.h"
@@ -55,17 +56,20 @@ std::string StateHash::hex() const {
 }
 
 struct Automaton::Impl {
-    Impl(const AutomatonOptions& o, Lattice initial) : options(o), lattice(std::move(initial)), parcels(o) {
+    Impl(const AutomatonOptions& o, Lattice initial) : options(o), lattice(std::move(initial)), parcels(o), background(o) {
         check_extents(options, lattice);
         act_next = BitPlane(options.extent);
         zero_row.assign(lattice.hum.words_per_row() + 16, 0);
         fraction.resize(std::size_t(options.extent.z));
+        if (!is_profile(options.wind.fields)) motion.emplace(options.extent);
     }
 
-    BlockField field_now() const {
+    // Valid until the next call.
+    BlockField field_now() {
+        background.set_time(options, time_s());
         std::vector<ActiveEllipsoid> active = parcels.active(options, time_s());
         active.insert(active.end(), external.begin(), external.end());
-        return BlockField(options, active);
+        return BlockField(options, active, background);
     }
     double time_s() const { return double(steps) * options.time_step_s; }
 
@@ -80,9 +84,11 @@ struct Automaton::Impl {
     Lattice lattice;
     BitPlane act_next;
     AirParcels parcels;
+    Background background;
     PoissonLadder ladder;
     std::vector<std::uint64_t> zero_row;
     std::vector<Displacement> fraction;  // of a cell that each layer has moved beyond whole cells, 0..1
+    std::optional<CellMotion> motion;    // instead of shifts of whole layers, where the wind differs within them
     std::vector<ActiveEllipsoid> external;
     std::uint64_t steps = 0;
 };
@@ -126,15 +132,13 @@ void Automaton::Impl::grow_and_draw() {
 }
 
 void Automaton::Impl::advect() {
-    if (options.wind.keyframes.empty()) return;
+    if (is_calm(options.wind)) return;
+    if (motion) return motion->step(lattice, options, time_s());
     tbb::parallel_for(
         tbb::blocked_range<int>(0, options.extent.z), [&](const tbb::blocked_range<int>& layers) {
             std::vector<std::uint64_t> scratch;
             for (int k = layers.begin(); k != layers.end(); ++k) {
-                const double height =
-                    options.placement.origin_m.z + (k + 0.5) * options.placement.cell_size_m;
-                Displacement moved = displacement_of_step(wind_at(options.wind, height, time_s()),
-                                                          options.time_step_s, options.placement.cell_size_m);
+                Displacement moved = displacement_of_layer(options, k, time_s());
                 Displacement& rest = fraction[std::size_t(k)];
                 moved.x += rest.x;
                 moved.y += rest.y;
@@ -178,6 +182,8 @@ BitPlaneView Automaton::hum() const { return impl_->lattice.hum.view(); }
 BitPlaneView Automaton::act() const { return impl_->lattice.act.view(); }
 BitPlaneView Automaton::cld() const { return impl_->lattice.cld.view(); }
 
+std::uint64_t Automaton::crowded_out() const { return impl_->motion ? impl_->motion->crowded_out() : 0; }
+
 StateHash Automaton::hash() const { return hash_of(impl_->lattice); }
 
 StateHash hash_of(const Lattice& lattice) {
@@ -215,7 +221,8 @@ std::vector<std::byte> Automaton::save() const {
     out.put(impl_->options.extent);
     out.put(impl_->steps);
     for (const Displacement& d : impl_->fraction) out.put(d);
-    impl_->parcels.save(out);
+    impl_->parcels.save(out, impl_->options);
+    if (impl_->motion) impl_->motion->save(out);
     // The planes at their exact size: a growing buffer would hold them several times.
     std::vector<std::byte> bytes = out.take();
     const std::array planes{&impl_->lattice.hum, &impl_->lattice.act, &impl_->lattice.cld};
@@ -240,7 +247,9 @@ void Automaton::restore(std::span<const std::byte> bytes) {
     std::vector<Displacement> fraction(impl_->fraction.size());
     for (Displacement& d : fraction) d = in.get<Displacement>();
     AirParcels parcels = impl_->parcels;
-    parcels.restore(in);
+    parcels.restore(in, impl_->options);
+    std::optional<CellMotion> motion = impl_->motion;
+    if (motion) motion->restore(in);
     if (in.rest().size() != 3 * impl_->lattice.hum.words().size_bytes()) {
         throw Error(ErrorCode::io, "saved state has another size than the scene's");
     }
@@ -250,11 +259,14 @@ void Automaton::restore(std::span<const std::byte> bytes) {
     impl_->steps = steps;
     impl_->fraction = std::move(fraction);
     impl_->parcels = std::move(parcels);
+    impl_->motion = std::move(motion);
 }
 
 std::size_t Automaton::memory_bytes(const AutomatonOptions& options) {
     const std::size_t layer = std::size_t((options.extent.x + 63) / 64) * std::size_t(options.extent.y) * 8;
-    return 4 * BitPlane::bytes(options.extent) + layer +
+    const std::size_t motion =
+        is_profile(options.wind.fields) ? 0 : CellMotion::memory_bytes(options.extent);
+    return 4 * BitPlane::bytes(options.extent) + layer + motion + Background::memory_bytes(options) +
            std::size_t(ellipsoid_count(options)) *
                (sizeof(AirParcel) + sizeof(ActiveEllipsoid) + sizeof(FieldEllipsoid));
 }

@@ -63,6 +63,8 @@ class Automaton {
     BitPlaneView act() const;
     BitPlaneView cld() const;
     StateHash hash() const;
+    // Returns how many cells' contents were lost so far because the wind converges (cell_motion.h).
+    std::uint64_t crowded_out() const;
     std::vector<ActiveEllipsoid> ellipsoids() const;  // of options().field, with weight > 0 now
 
     // Sets further ellipsoids, in addition to those of options().field, for callers that control the field

@@ -39,8 +39,9 @@ FieldEllipsoid field_ellipsoid(const AutomatonOptions& options, const ActiveElli
     const double reach_c = kHalf * f.zz;
     f.block_reach =
         float(std::sqrt(reach_a * reach_a + reach_b * reach_b + reach_c * reach_c) * (1 + 1e-5) + 1e-6);
+    const bool varies = !options.field.profile.empty() || !options.field.grids.empty();
     const auto centre = as_array(active.ellipsoid.centre), rim = as_array(active.ellipsoid.rim),
-               background = as_array(options.field.background);
+               background = varies ? std::array<double, 3>{0, 0, 1} : as_array(options.field.background);
     for (std::size_t d = 0; d < 3; ++d) {
         f.rim[d] = float(background[d] + active.weight * (rim[d] - background[d]));
         f.span[d] = float(active.weight * (centre[d] - rim[d]));
@@ -48,16 +49,22 @@ FieldEllipsoid field_ellipsoid(const AutomatonOptions& options, const ActiveElli
     return f;
 }
 
+// The plan of a block without ellipsoids.
+DrawPlan plan_of_background(const BlockBackground& background, std::size_t draw) {
+    const float low = background.low[draw], high = background.high[draw];
+    if (!(high > 0)) return {};
+    if (low < high) return {DrawPlan::Kind::varying, high};
+    return {high < 1 ? DrawPlan::Kind::uniform : DrawPlan::Kind::certain, high};
+}
+
 }  // namespace
 
-BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> active) {
-    const auto background = as_array(options.field.background);
-    for (std::size_t d = 0; d < 3; ++d) {
-        background_[d] = float(background[d]);
-        if (background_[d] > 0) {
-            background_plan_[d] = {background_[d] < 1 ? DrawPlan::Kind::uniform : DrawPlan::Kind::certain,
-                                   background_[d]};
-        }
+BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> active,
+                       const Background& background)
+    : background_(&background) {
+    if (!background.varies()) {
+        uniform_ = background.of_block(0, 0, 0);
+        for (std::size_t d = 0; d < 3; ++d) uniform_plan_[d] = plan_of_background(uniform_, d);
     }
     by_slab_.resize(std::size_t(blocks(options.extent.z)));
 
@@ -68,12 +75,12 @@ BlockField::BlockField(const AutomatonOptions& options, std::span<const ActiveEl
     }
 
     const auto can_be_born = [](const std::array<float, 3>& p) { return p[kHum] > 0 || p[kAct] > 0; };
-    bool any_birth = can_be_born(background_);
+    bool any_birth = can_be_born(background.high());
     for (const FieldEllipsoid& e : ellipsoids_) {
         const std::array<float, 3> centre{e.rim[0] + e.span[0], e.rim[1] + e.span[1], 0};
         any_birth = any_birth || can_be_born(e.rim) || can_be_born(centre);
     }
-    any_extinction_ = background_[kExt] > 0;  // ellipsoids can only lower it
+    any_extinction_ = background.high()[kExt] > 0;  // ellipsoids can only lower it
     anything_ = any_birth || any_extinction_;
 }
 
@@ -129,9 +136,14 @@ void BlockField::collect(int by, int bz, std::vector<const FieldEllipsoid*>& out
 
 void BlockField::plan_blocks(int bx0, int by, int bz, std::span<const FieldEllipsoid* const> row,
                              std::span<BlockPlan> plans) const {
-    for (BlockPlan& plan : plans) {
-        plan.draws = background_plan_;
+    for (std::size_t n = 0; n < plans.size(); ++n) {
+        BlockPlan& plan = plans[n];
         plan.ellipsoids.clear();
+        plan.background = uniform_;
+        plan.draws = uniform_plan_;
+        if (!background_->varies()) continue;
+        plan.background = background_->of_block(bx0 + int(n), by, bz);
+        for (std::size_t d = 0; d < 3; ++d) plan.draws[d] = plan_of_background(plan.background, d);
     }
     const int bx1 = bx0 + int(plans.size());
     for (const FieldEllipsoid* e : row) {
@@ -184,14 +196,15 @@ void BlockField::add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const 
             if (draw.p_max <= 0) draw.kind = DrawPlan::Kind::none;
         } else if (bound > draw.p_max) {
             draw = {DrawPlan::Kind::varying, bound};
-        } else if (draw.kind != DrawPlan::Kind::none && bound > background_[d]) {
+        } else if (draw.kind != DrawPlan::Kind::none && bound > plan.background.low[d]) {
             draw.kind = DrawPlan::Kind::varying;
         }
     }
 }
 
-float probability_at(const BlockField& field, const BlockPlan& plan, int draw, int dx, int dy, int dz) {
-    float p = field.background()[std::size_t(draw)];
+float probability_at(const BlockPlan& plan, int draw, int dx, int dy, int dz) {
+    const float* background = plan.background.values[std::size_t(draw)];
+    float p = background != nullptr ? background[dx + 8 * dy + 64 * dz] : plan.background.low[std::size_t(draw)];
     for (const BlockEllipsoid& e : plan.ellipsoids) {
         const float inside = ellipsoid_probability(e, draw, float(dx), float(dy), float(dz));
         if (inside < 0) continue;

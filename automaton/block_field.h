@@ -17,12 +17,11 @@
 #include <vector>
 
 #include "automaton/automaton.h"
+#include "automaton/background.h"
 #include "automaton/options.h"
 #include "automaton/poisson.h"
 
 namespace nephos {
-
-inline constexpr int kBlockEdge = 8;
 
 // Index into per-draw arrays.
 enum : int { kHum = 0, kAct = 1, kExt = 2 };
@@ -48,8 +47,8 @@ struct DrawPlan {
     enum class Kind : std::uint8_t {
         none,     // p = 0 everywhere
         certain,  // p = 1 everywhere
-        uniform,  // p = background everywhere
-        varying,  // p from the ellipsoids, at most p_max
+        uniform,  // p = background everywhere, and it is the same in all cells
+        varying,  // p from the ellipsoids and the background, at most p_max
     };
     Kind kind = Kind::none;
     float p_max = 0;
@@ -57,15 +56,17 @@ struct DrawPlan {
 
 struct BlockPlan {
     std::array<DrawPlan, 3> draws;
+    BlockBackground background;
     std::vector<BlockEllipsoid> ellipsoids;  // those that touch the block; capacity is reused
 };
 
 // Immutable after construction, hence thread-safe.
 class BlockField {
   public:
-    BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> ellipsoids);
+    // `background` is that of the step; it must stay as it is for as long as this object lives.
+    BlockField(const AutomatonOptions& options, std::span<const ActiveEllipsoid> ellipsoids,
+               const Background& background);
 
-    const std::array<float, 3>& background() const { return background_; }
     // Returns false when no cell of the lattice can change by chance.
     bool anything() const { return anything_; }
     bool any_extinction() const { return any_extinction_; }
@@ -79,8 +80,9 @@ class BlockField {
     void add_with_images(const AutomatonOptions& options, const ActiveEllipsoid& active);
     void add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const;
 
-    std::array<float, 3> background_{};
-    std::array<DrawPlan, 3> background_plan_;
+    const Background* background_;
+    BlockBackground uniform_;                  // where the background does not vary, with its plan
+    std::array<DrawPlan, 3> uniform_plan_;
     bool anything_ = false, any_extinction_ = false;
     std::vector<FieldEllipsoid> ellipsoids_;
     std::vector<std::vector<std::uint32_t>> by_slab_;  // indices into ellipsoids_, rising
@@ -98,6 +100,6 @@ inline float ellipsoid_probability(const BlockEllipsoid& e, int draw, float dx, 
 }
 
 // Combines all ellipsoids of the block and the background: the largest hum and act, the smallest ext.
-float probability_at(const BlockField& field, const BlockPlan& plan, int draw, int dx, int dy, int dz);
+float probability_at(const BlockPlan& plan, int draw, int dx, int dy, int dz);
 
 }  // namespace nephos

@@ -54,22 +54,22 @@ inline void locate_columns(const BlockPlan& plan, std::vector<float>& columns) {
 
 // Collects the ellipsoids that reach into a layer. One whose p at the rim does not exceed the background may
 // be evaluated outside its rim as well (bounded = false): the maximum with the background hides it there.
-inline void find_in_layer(const Segment& g, const BlockPlan& plan, int draw, int layer, BirthScratch& s) {
+inline void find_in_layer(const BlockPlan& plan, int draw, int layer, BirthScratch& s) {
     const auto which = std::size_t(draw);
-    const float background = g.random.field->background()[which];
+    const float low = plan.background.low[which], high = plan.background.high[which];
     s.layer.clear();
     for (std::size_t i = 0; i < plan.ellipsoids.size(); ++i) {
         const BlockEllipsoid& e = plan.ellipsoids[i];
         const float c = e.base_c + float(layer) * e.zz;
         if (c * c >= 1) continue;
         const float rim = e.source->rim[which];
-        const bool bounded = draw == kExt ? rim < background : rim > background;
+        const bool bounded = draw == kExt ? rim < high : rim > low;
         s.layer.push_back({s.columns.data() + 64 * i, c * c, rim, e.source->span[which], bounded});
     }
 }
 
 // Computes the thresholds of a layer; skips vectors without a bit in `requested`.
-inline void make_thresholds(const Segment& g, int draw, std::uint64_t requested,
+inline void make_thresholds(const BlockPlan& plan, int draw, int layer, std::uint64_t requested,
                             const std::vector<LayerEllipsoid>& ellipsoids, LayerThresholds& out) {
     const hn::CappedTag<float, 16> d;
     const hn::RebindToSigned<decltype(d)> di;
@@ -77,9 +77,11 @@ inline void make_thresholds(const Segment& g, int draw, std::uint64_t requested,
     const hn::Rebind<std::uint8_t, decltype(d)> d8;
     constexpr std::size_t kLanes = hn::MaxLanes(d);
     const auto one = hn::Set(d, 1.0f);
+    const float* const values = plan.background.values[std::size_t(draw)];
     for (std::size_t c = 0; c < 64; c += kLanes) {
         if ((requested >> c & ((std::uint64_t{1} << kLanes) - 1)) == 0) continue;
-        auto p = hn::Set(d, g.random.field->background()[std::size_t(draw)]);
+        auto p = values != nullptr ? hn::LoadU(d, values + 64 * layer + c)
+                                   : hn::Set(d, plan.background.low[std::size_t(draw)]);
         for (const LayerEllipsoid& e : ellipsoids) {
             const auto u2 = hn::Add(hn::LoadU(d, e.columns + c), hn::Set(d, e.c2));
             const auto s = hn::Max(hn::Sub(one, u2), hn::Zero(d));
@@ -210,8 +212,8 @@ inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& pl
                 bytes, [same](auto d, std::size_t) HWY_ATTR { return hn::Set(d, std::uint8_t(same >> 24)); });
             queue_ties(block, draw, layer, bits.tie & requested[layer], tie_threshold(same), s);
         } else {
-            find_in_layer(g, plan, draw, layer, s);
-            make_thresholds(g, draw, requested[layer], s.layer, t);
+            find_in_layer(plan, draw, layer, s);
+            make_thresholds(plan, draw, layer, requested[layer], s.layer, t);
             bits = compare_bytes(
                 bytes, [&t](auto d, std::size_t c) HWY_ATTR { return hn::LoadU(d, t.top.data() + c); });
             for (std::uint64_t cells = bits.tie & requested[layer]; cells != 0; cells &= cells - 1) {

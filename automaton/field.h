@@ -13,9 +13,14 @@
 // smaller ext win, the background always taking part.
 
 #include <cstdint>
+#include <filesystem>
 #include <limits>
+#include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "core/sample_grid.h"
 #include "core/vec.h"
 
 namespace nephos {
@@ -88,10 +93,41 @@ struct EllipsoidScatter {
     bool operator==(const EllipsoidScatter&) const = default;
 };
 
+// The background at one height of a profile.
+struct BackgroundLevel {
+    double height_m = 0;  // world z; levels rise strictly
+    Probabilities background{0, 0, 0.1};
+    bool operator==(const BackgroundLevel&) const = default;
+};
+
+// The background by height at one time: linear between levels, constant below the first and above the last.
+struct BackgroundKeyframe {
+    double time_s = 0;  // keyframes rise strictly
+    std::vector<BackgroundLevel> levels;
+    bool operator==(const BackgroundKeyframe&) const = default;
+};
+
+// Which of the three probabilities; the numbers of kHum, kAct and kExt.
+enum class ProbabilityKind { hum, act, ext };
+
+// One probability of the background in each cell, from a file: linear between its points.
+struct ProbabilityGrid {
+    ProbabilityKind of = ProbabilityKind::hum;
+    std::optional<std::filesystem::path> file;
+    std::string grid;  // empty: the only one
+    std::shared_ptr<const SampleGrid> samples;  // of `file`; not null in an automaton; each value 0..1
+    bool operator==(const ProbabilityGrid&) const = default;
+};
+
+// The background is that of a grid where there is one, else that of the profile where there is one, else `background`.
+// Where it varies, an ellipsoid that fades in or out comes from and goes to no effect: it mixes with 0 of hum and act
+// and with 1 of ext in place of the background.
 struct FieldOptions {
     Probabilities background{0, 0, 0.1};
-    std::vector<Ellipsoid> ellipsoids;
-    std::vector<EllipsoidScatter> scatters;
+    std::vector<BackgroundKeyframe> profile{};
+    std::vector<ProbabilityGrid> grids{};  // at most one of each kind
+    std::vector<Ellipsoid> ellipsoids{};
+    std::vector<EllipsoidScatter> scatters{};
     bool operator==(const FieldOptions&) const = default;
 };
 

@@ -68,8 +68,8 @@ inline void draw_initial_block(const Segment& g, int block, const BlockPlan& pla
         for (const int draw : {kHum, kAct}) {
             if (kind(draw) == DrawPlan::Kind::none) continue;
             if (kind(draw) == DrawPlan::Kind::varying) {
-                find_in_layer(g, plan, draw, layer, s);
-                make_thresholds(g, draw, ~std::uint64_t{0}, s.layer, t[draw]);
+                find_in_layer(plan, draw, layer, s);
+                make_thresholds(plan, draw, layer, ~std::uint64_t{0}, s.layer, t[draw]);
             }
             s.dense_events[draw][block][layer] = initial_bits(words, draw, t[draw].full.data());
         }

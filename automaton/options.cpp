@@ -146,6 +146,37 @@ void check(const Wind& wind, const AutomatonOptions& o) {
             displacement_of_step(level.velocity, o.time_step_s, o.placement.cell_size_m);
         }
     }
+    check(wind.fields);
+}
+
+void check_profile(const std::vector<BackgroundKeyframe>& profile) {
+    for (std::size_t i = 0; i < profile.size(); ++i) {
+        const std::string name = "field.profile[" + std::to_string(i) + "]";
+        require_finite(profile[i].time_s, name + ".time_s");
+        require(i == 0 || profile[i].time_s > profile[i - 1].time_s, name + ".time_s: expected rising times");
+        require(!profile[i].levels.empty(), name + ".levels: expected at least one level");
+        for (std::size_t l = 0; l < profile[i].levels.size(); ++l) {
+            const BackgroundLevel& level = profile[i].levels[l];
+            const std::string level_name = name + ".levels[" + std::to_string(l) + "]";
+            require_finite(level.height_m, level_name + ".height_m");
+            require(l == 0 || level.height_m > profile[i].levels[l - 1].height_m,
+                    level_name + ".height_m: expected rising heights");
+            check(level.background, level_name);
+        }
+    }
+}
+
+void check_grids(const std::vector<ProbabilityGrid>& grids) {
+    for (std::size_t n = 0; n < grids.size(); ++n) {
+        const std::string name = "field.grids[" + std::to_string(n) + "]";
+        for (std::size_t m = 0; m < n; ++m)
+            require(grids[m].of != grids[n].of, name + ".of: there is a grid of this probability already");
+        if (!grids[n].samples) continue;
+        for (const float value : grids[n].samples->values)
+            require(value >= 0 && value <= 1,
+                    name + ": " + (grids[n].file ? grids[n].file->string() : std::string("its grid")) + " has the value " +
+                        number(value) + ": expected probabilities 0..1");
+    }
 }
 
 // Images of one ellipsoid around the periodic axes, itself included (BlockField visits as many).
@@ -232,6 +263,8 @@ void check(const AutomatonOptions& o) {
     require(o.time_step_s > 0 && std::isfinite(o.time_step_s),
             "time_step_s = " + number(o.time_step_s) + ": expected a finite number > 0 s");
     check(o.field.background, "field.background");
+    check_profile(o.field.profile);
+    check_grids(o.field.grids);
     for (std::size_t i = 0; i < o.field.ellipsoids.size(); ++i) {
         check(o.field.ellipsoids[i], o, "field.ellipsoids[" + std::to_string(i) + "]");
     }

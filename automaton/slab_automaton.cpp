@@ -74,12 +74,17 @@ struct SlabAutomaton::Impl {
           cld(own),
           level_words(hum.words_per_row() * std::size_t(o.extent.y)),
           act(level_words * std::size_t(o.extent.z)),
-          parcels(o) {
+          parcels(o),
+          background(o) {
         zero_row.assign(hum.words_per_row() + 16, 0);
         fraction.resize(std::size_t(own.z));
     }
 
-    BlockField field_now() const { return BlockField(options, parcels.active(options, time_s())); }
+    // Valid until the next call.
+    BlockField field_now() {
+        background.set_time(options, time_s());
+        return BlockField(options, parcels.active(options, time_s()), background);
+    }
     double time_s() const { return double(steps) * options.time_step_s; }
     std::uint64_t* act_of(int level) { return act.words() + std::size_t(level) * level_words; }
 
@@ -113,6 +118,7 @@ struct SlabAutomaton::Impl {
     std::size_t level_words;
     WholePlane act;
     AirParcels parcels;
+    Background background;
     PoissonLadder ladder;
     std::vector<std::uint64_t> zero_row;
     std::vector<Displacement> fraction;
@@ -136,14 +142,11 @@ void SlabAutomaton::Impl::grow_and_draw() {
 }
 
 void SlabAutomaton::Impl::advect() {
-    if (options.wind.keyframes.empty()) return;
+    if (is_calm(options.wind)) return;
     tbb::parallel_for(tbb::blocked_range<int>(0, own.z), [&](const tbb::blocked_range<int>& levels) {
         std::vector<std::uint64_t> scratch;
         for (int k = levels.begin(); k != levels.end(); ++k) {
-            const double height =
-                options.placement.origin_m.z + (first + k + 0.5) * options.placement.cell_size_m;
-            Displacement moved = displacement_of_step(wind_at(options.wind, height, time_s()),
-                                                      options.time_step_s, options.placement.cell_size_m);
+            Displacement moved = displacement_of_layer(options, first + k, time_s());
             Displacement& rest = fraction[std::size_t(k)];
             moved.x += rest.x;
             moved.y += rest.y;
@@ -157,6 +160,8 @@ void SlabAutomaton::Impl::advect() {
 
 SlabAutomaton::SlabAutomaton(const AutomatonOptions& options, int first, int end) {
     check(options);
+    if (!is_profile(options.wind.fields))
+        throw Error(ErrorCode::usage, "a wind field moves cells from level to level: expected one process for the lattice");
     if (first < 0 || end > options.extent.z || first >= end || first % kBlockEdge != 0 ||
         (end % kBlockEdge != 0 && end != options.extent.z))
         throw Error(ErrorCode::usage, "a slab of levels " + std::to_string(first) + " to " +

@@ -62,14 +62,14 @@ HWY_NOINLINE void run_close(DF d, const SparseJob& job, std::uint32_t close, con
 // Runs one sparse job whose words are ready. Makes the choice of sparse_draw() in float32, whose v and sums
 // of rates are right to 2^-22 of the level's rate, and leaves events to run_close() whose v lies within
 // 2^-21 of a sum: three in a million.
-inline void run_sparse(const Segment& g, const SparseJob& job, BirthScratch& s) {
+inline void run_sparse(const SparseJob& job, BirthScratch& s) {
     const hn::ScalableTag<float> d;
     const hn::RebindToUnsigned<decltype(d)> du;
     const hn::RebindToSigned<decltype(d)> di;
     const int lanes = int(hn::Lanes(d));
     const std::uint32_t* words = s.words + 4 * job.first;
     const BlockPlan& plan = s.plans[std::size_t(job.block)];
-    const auto& background = g.random.field->background();
+    const BlockBackground& background = plan.background;
     const auto seven = hn::Set(du, 7);
     const auto slack = hn::Set(d, job.rate_unit * 0x1p10f);
     const auto to_float = [&](auto v) HWY_ATTR { return hn::ConvertTo(d, hn::BitCast(di, v)); };
@@ -79,8 +79,12 @@ inline void run_sparse(const Segment& g, const SparseJob& job, BirthScratch& s) 
         const auto dx = to_float(hn::And(cell, seven));
         const auto dy = to_float(hn::And(hn::ShiftRight<3>(cell), seven));
         const auto dz = to_float(hn::And(hn::ShiftRight<6>(cell), seven));
-        auto hum = hn::Set(d, background[kHum]), act = hn::Set(d, background[kAct]),
-             ext = hn::Set(d, background[kExt]);
+        const auto of = [&](int draw) HWY_ATTR {
+            const float* values = background.values[std::size_t(draw)];
+            if (values == nullptr) return hn::Set(d, background.low[std::size_t(draw)]);
+            return hn::GatherIndex(d, values, hn::BitCast(di, hn::And(cell, hn::Set(du, 511))));
+        };
+        auto hum = of(kHum), act = of(kAct), ext = of(kExt);
         for (const BlockEllipsoid& ellipsoid : plan.ellipsoids) {
             const auto at = locate(d, ellipsoid, dx, dy, dz);
             hum = combine(d, ellipsoid, kHum, at, hum);
@@ -115,7 +119,7 @@ inline void run_sparse(const Segment& g, const SparseJob& job, BirthScratch& s) 
 // Makes the words of all queued sparse draws and runs them.
 inline void run_queue(const Segment& g, BirthScratch& s) {
     philox_counters(g.batch(), s.counters, s.counter_count, s.words);
-    for (int j = 0; j < s.job_count; ++j) run_sparse(g, s.jobs[j], s);
+    for (int j = 0; j < s.job_count; ++j) run_sparse(s.jobs[j], s);
     s.job_count = 0;
     s.counter_count = 0;
 }

@@ -49,6 +49,22 @@ Velocity wind_at(const Wind& wind, double height_m, double time_s) {
                (time_s - before.time_s) / (after->time_s - before.time_s));
 }
 
+Vec3 wind_at(const Wind& wind, const Vec3& place_m, double time_s) {
+    const Velocity profile = wind_at(wind, place_m.z, time_s);
+    const Vec3 horizontal(profile.east_m_per_s, profile.north_m_per_s, 0);
+    return wind.fields.empty() ? horizontal : horizontal + velocity_of(wind.fields, place_m, time_s);
+}
+
+Vec3 mean_wind(const Wind& wind, const Vec3& from_m, double time_s, double duration_s) {
+    const Vec3 a = wind_at(wind, from_m, time_s);
+    if (wind.fields.empty()) return a;  // horizontal: it stays at its height
+    const Vec3 b = wind_at(wind, from_m + 0.5 * duration_s * a, time_s);
+    const Vec3 c = wind_at(wind, from_m + 0.5 * duration_s * b, time_s);
+    const Vec3 d = wind_at(wind, from_m + duration_s * c, time_s);
+    if (a == b && b == c && c == d) return a;
+    return (a + 2.0 * b + 2.0 * c + d) / 6.0;
+}
+
 Displacement displacement_of_step(const Velocity& velocity, double time_step_s, double cell_size_m) {
     return {to_fixed(velocity.east_m_per_s * time_step_s / cell_size_m),
             to_fixed(velocity.north_m_per_s * time_step_s / cell_size_m)};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Wind: a horizontal velocity that depends on height and time, piecewise linear in both (D: advection; D
-// names vector fields as the improvement).
+// Wind: a horizontal velocity that depends on height and time, piecewise linear in both (D: advection), and
+// fields that differ from place to place (core/wind_field.h), which are added to it.
 //
 // Motion accumulates as fixed-point integers, without rounding drift: after n steps of a constant wind the
 // displacement is exactly floor(n * d) cells, with d = velocity * step / cell rounded up to a multiple of
@@ -12,6 +12,8 @@
 
 #include <cstdint>
 #include <vector>
+
+#include "core/wind_field.h"
 
 namespace nephos {
 
@@ -36,14 +38,25 @@ struct WindKeyframe {
 };
 
 // Profiles over time: linear between keyframes, constant before the first and after the last. Without
-// keyframes the air is calm.
+// keyframes the profile is calm.
 struct Wind {
     std::vector<WindKeyframe> keyframes;
+    std::vector<WindField> fields{};
     bool operator==(const Wind&) const = default;
 };
 
-// Returns the velocity at a height and time. Thread-safe; pure.
+// Returns true when there is neither a profile nor a field.
+inline bool is_calm(const Wind& wind) { return wind.keyframes.empty() && wind.fields.empty(); }
+
+// Returns the velocity of the profile alone at a height and time. Thread-safe; pure.
 Velocity wind_at(const Wind& wind, double height_m, double time_s);
+// Returns the velocity of profile and fields at a place and time, m/s towards east, north and up. Thread-safe; pure.
+Vec3 wind_at(const Wind& wind, const Vec3& place_m, double time_s);
+
+// Returns the mean velocity of air on its way from a place through the wind of a time, which stays as it is for
+// `duration_s`: by the classical Runge-Kutta method of fourth order, and where the velocity is the same on the whole
+// way exactly that. Thread-safe; pure.
+Vec3 mean_wind(const Wind& wind, const Vec3& from_m, double time_s, double duration_s);
 
 // A displacement in cells as a fixed-point number with 32 fractional bits: sums are exact, and the integer
 // part is the floor.

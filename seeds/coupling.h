@@ -23,6 +23,14 @@
 
 namespace nephos {
 
+// Probabilities of the ellipsoids of clouds of one genus.
+struct GenusCoupling {
+    std::optional<Genus> genus;  // none: of base models without genus
+    Probabilities centre{0.1, 0.001, 0.1};
+    Probabilities rim{0, 0, 0.1};
+    bool operator==(const GenusCoupling&) const = default;
+};
+
 struct CouplingOptions {
     double strength = 1;  // 0..1, weight of a whole box of strength 1; 0: the automaton ignores the clouds
     // Semi-axes of the ellipsoid = half the box's edges * size_scale, > 0: 1 inscribes it in the box, 1.24
@@ -35,11 +43,22 @@ struct CouplingOptions {
     double size_at_birth = 0.5;
     Probabilities centre{0.1, 0.001, 0.1};  // as in Ellipsoid
     Probabilities rim{0, 0, 0.1};
+    // Instead of these two for clouds of some genera; what a base model has of its own comes first.
+    std::vector<GenusCoupling> genera;
     bool operator==(const CouplingOptions&) const = default;
 };
 
 // Throws Error(usage) on values outside the ranges above.
 void check(const CouplingOptions& options);
+
+// Probabilities at the centre and the rim of an ellipsoid.
+struct CentreAndRim {
+    Probabilities centre, rim;
+};
+
+// Returns the probabilities of the ellipsoids of a base model: its own, else those of its genus, else those of all
+// clouds. Pure.
+CentreAndRim probabilities_of(const BaseModel& model, const CouplingOptions& options);
 
 // Appends the ellipsoids of one cloud at a world position, in the order of its boxes, without those of weight
 // 0; weight = strength * Seed::strength of the box * phase_weight() of the box. `softness` as

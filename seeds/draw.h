@@ -23,8 +23,8 @@ namespace nephos {
 enum class SeedDraw : std::uint32_t { box = 0, root = 1, child = 2, billboard = 3 };
 
 // Kinds of draws of a layer of the sky. The serial number counts the clouds made so far, for `dissolve` those
-// dissolved.
-enum class SkyDraw : std::uint32_t { cloud = 0, place = 1, dissolve = 2 };
+// dissolved, for `change` it is that of the cloud.
+enum class SkyDraw : std::uint32_t { cloud = 0, place = 1, dissolve = 2, change = 3 };
 
 inline PhiloxWords draw_for_cloud(std::uint64_t scene_seed, std::uint32_t model_index, std::uint32_t number,
                                   SeedDraw kind, std::uint32_t index, std::uint32_t sub_index = 0) {

@@ -130,6 +130,8 @@ void check(const BaseModel& model) {
         usage_error(where + ": light distance (m) is " + text_of(model.light_distance_m) +
                     ", expected a number above 0 or infinity");
     }
+    require_probabilities(where + ", centre", model.centre);
+    require_probabilities(where + ", rim", model.rim);
     for (std::size_t s = 0; s < model.seeds.size(); ++s) {
         check_seed(where + ", seed " + std::to_string(s), model.seeds[s]);
     }

@@ -73,6 +73,10 @@ struct BaseModel {
     std::vector<Seed> seeds;     // at least one
     // Path length in the cloud after which light is absorbed, > 0.
     double light_distance_m = std::numeric_limits<double>::infinity();
+    // Of the ellipsoids of its boxes, instead of CouplingOptions::centre and rim where they are its own.
+    bool own_centre = false, own_rim = false;
+    Probabilities centre{0.1, 0.001, 0.1};
+    Probabilities rim{0, 0, 0.1};
     bool operator==(const BaseModel&) const = default;
 };
 

@@ -107,11 +107,12 @@ std::vector<RainArea> attached_areas(std::span<const AttachedRain> rains, const 
         for (const SkyCloud& cloud : sky.clouds()) {
             const double state = sky.options().skies[cloud.sky].state;
             if (state < rain.state.min || state > rain.state.max) continue;
-            if (rain.model && sky.shapes()[cloud.shape].model != *rain.model) continue;
-            if (rain.genus && sky.model(cloud).genus != rain.genus) continue;
-            const double intensity = rain.intensity_mm_per_h * cloud.phase;
+            const CloudForm form = sky.forms(cloud).main();
+            if (rain.model && sky.shapes()[form.shape].model != *rain.model) continue;
+            if (rain.genus && sky.model(form).genus != rain.genus) continue;
+            const double intensity = rain.intensity_mm_per_h * form.phase;
             if (intensity <= 0) continue;
-            const Cloud& shape = sky.shape(cloud);
+            const Cloud& shape = sky.shapes()[form.shape].cloud;
             const Vec3 p = sky.position_m(cloud);
             areas.push_back(
                 {rain_id(RainSource::attached, sky.options().layer, std::uint32_t(r), cloud.serial),

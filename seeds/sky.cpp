@@ -49,12 +49,17 @@ void check_number_of_boxes(const std::string& where, const SkyOptions& options) 
             generated[m.model] = std::max<std::int64_t>(generated[m.model], m.generated);
             largest = std::max(largest, largest_cloud(options.models[m.model]));
         }
+        for (const Metamorphosis& m : options.metamorphoses)
+            largest = std::max(largest, largest_cloud(options.models[m.to]));
         if (sky.clouds * largest > kMaxSkyBoxes) {
             usage_error(where + ", sky \"" + sky.name + "\": " + std::to_string(sky.clouds) +
                         " clouds of up to " + std::to_string(largest) + " seeds each, at most " +
                         std::to_string(kMaxSkyBoxes) + " seeds are possible");
         }
     }
+    for (std::size_t round = 0; round < options.metamorphoses.size(); ++round)
+        for (const Metamorphosis& m : options.metamorphoses)
+            generated[m.to] = std::max(generated[m.to], generated[m.from]);
     std::int64_t boxes = 0;
     for (std::size_t m = 0; m < generated.size(); ++m)
         boxes += generated[m] * largest_cloud(options.models[m]);
@@ -76,6 +81,28 @@ void check_schedule(const std::string& where, const std::vector<StatePoint>& sch
                         text_of(schedule[i].time_s) + " s follows " + text_of(schedule[i - 1].time_s) + " s");
         }
     }
+}
+
+void check_metamorphoses(const std::string& where, const SkyOptions& options) {
+    const auto& all = options.metamorphoses;
+    for (const Metamorphosis& m : all) {
+        if (m.from >= options.models.size() || m.to >= options.models.size())
+            usage_error(where + ": a base model of a metamorphosis does not exist, there are " +
+                        std::to_string(options.models.size()));
+        const std::string which = where + ", metamorphosis of \"" + options.models[m.from].name + "\"";
+        require_range(which + ": state", m.state.min, m.state.max, 0, 1);
+        if (!(m.state.min < m.state.max)) usage_error(which + ": its states have no width, expected min < max");
+        if (std::ranges::count(all, m.from, &Metamorphosis::from) > 1)
+            usage_error(which + " is given twice, expected one change of a base model");
+        std::size_t model = m.to;
+        for (std::size_t step = 0; step <= all.size(); ++step) {
+            if (model == m.from) usage_error(which + " leads back to it, expected a chain with an end");
+            const auto next = std::ranges::find(all, model, &Metamorphosis::from);
+            if (next == all.end()) break;
+            model = next->to;
+        }
+    }
+    require_in(where + ": time of shear (s)", options.shear_s, 0, 1e6);
 }
 
 }  // namespace
@@ -100,6 +127,7 @@ void check(const SkyOptions& options) {
     if (options.models.size() > 65536) usage_error(where + ": more than 65536 base models");
     for (const BaseModel& model : options.models) check(model);
     check_skies(where, options);
+    check_metamorphoses(where, options);
     check_number_of_boxes(where, options);
     check_schedule(where, options.schedule);
 }

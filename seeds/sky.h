@@ -44,6 +44,20 @@ struct WorldRectangle {
     bool operator==(const WorldRectangle&) const = default;
 };
 
+// Where clouds appear and disappear while the number of clouds follows the state.
+enum class Entering {
+    anywhere,  // the number is that of the state in every step: missing clouds form, surplus ones dissolve inside
+    horizon,   // new clouds enter upwind alone, those that are there stay until they leave (T, 3.4)
+};
+
+// A change of genus: clouds of one base model turn into those of another while the state crosses a range.
+struct Metamorphosis {
+    std::size_t from = 0, to = 0;  // indices in SkyOptions::models
+    // Each cloud changes over half of this range, and begins at a state of its own in the other half.
+    Range state{0, 1};  // 0..1, min < max
+    bool operator==(const Metamorphosis&) const = default;
+};
+
 struct SkyOptions {
     std::string name;         // of the layer, for messages
     std::uint64_t seed = 1;   // the scene's
@@ -61,6 +75,12 @@ struct SkyOptions {
     // True: clouds cross the edge of the world whole. False: they form there while they enter and dissolve
     // once they have left, for images that show the edge.
     bool cross_edges_whole = true;
+    Entering entering = Entering::anywhere;
+    // Chains are followed: what has become `to` may change on. Each model is `from` at most once, and none leads back.
+    std::vector<Metamorphosis> metamorphoses{};
+    // Time over which billboards lean with the shear of the wind: those at another height than their cloud's centre
+    // are displaced by the difference of the winds times this, >= 0.
+    double shear_s = 0;
     bool operator==(const SkyOptions&) const = default;
 };
 

@@ -7,6 +7,7 @@
 #include <unordered_set>
 
 #include "core/bytes.h"
+#include "core/math.h"
 #include "seeds/checks.h"
 #include "seeds/climate.h"
 #include "seeds/draw.h"
@@ -52,6 +53,10 @@ void SkySimulation::make_shapes() {
     for (const Sky& sky : options_.skies) {
         for (const SkyModel& m : sky.models) generated[m.model] = std::max(generated[m.model], m.generated);
     }
+    // What clouds change into has as many shapes; chains are at most as long as there are changes.
+    for (std::size_t round = 0; round < options_.metamorphoses.size(); ++round)
+        for (const Metamorphosis& m : options_.metamorphoses)
+            generated[m.to] = std::max(generated[m.to], generated[m.from]);
     std::vector<std::uint32_t> first(options_.models.size(), 0);
     for (std::size_t m = 0; m < options_.models.size(); ++m) {
         first[m] = std::uint32_t(shapes_.size());
@@ -67,13 +72,49 @@ void SkySimulation::make_shapes() {
             shapes_.push_back({m, number, std::move(cloud)});
         }
     }
+    first_of_model_ = first;
+    generated_.assign(generated.begin(), generated.end());
     for (const Sky& sky : options_.skies) {
         auto& entry = first_shape_.emplace_back();
         for (const SkyModel& m : sky.models) entry.push_back(first[m.model]);
     }
 }
 
-double SkySimulation::state() const { return state_at(options_.schedule, time_s()); }
+double SkySimulation::state() const { return state_at(time_s()); }
+
+double SkySimulation::state_at(double time_s) const { return nephos::state_at(options_.schedule, time_s); }
+
+CloudForms SkySimulation::forms(const SkyCloud& cloud, double state) const {
+    CloudForms forms{{{cloud.shape, cloud.phase}, {}}, 1};
+    if (options_.metamorphoses.empty()) return forms;
+    const double own =
+        unit_interval(draw_for_sky(options_.seed, options_.layer, SkyDraw::change, cloud.serial)[0]);
+    const std::uint32_t number = shapes_[cloud.shape].number;
+    for (std::size_t model = shapes_[cloud.shape].model;;) {
+        const auto change = std::ranges::find(options_.metamorphoses, model, &Metamorphosis::from);
+        if (change == options_.metamorphoses.end()) return forms;
+        const double half = 0.5 * (change->state.max - change->state.min);
+        const double changed = smoothstep<double>(0, 1, (state - change->state.min) / half - own);
+        if (changed <= 0) return forms;
+        model = change->to;
+        const std::uint32_t shape = first_of_model_[model] + number % generated_[model];
+        if (changed < 1) {
+            forms.of[0].phase = cloud.phase * (1 - changed);
+            forms.of[1] = {shape, cloud.phase * changed};
+            forms.count = 2;
+            return forms;
+        }
+        forms.of[0].shape = shape;
+    }
+}
+
+Vec3 SkySimulation::lean_m(const SkyCloud& cloud, const CloudForm& form, double height_m, double time_s) const {
+    if (options_.shear_s == 0) return {};
+    const double centre_m = cloud.base_m + shapes_[form.shape].cloud.centre_m.z;
+    const Velocity there = wind_at(options_.wind, height_m, time_s), middle = wind_at(options_.wind, centre_m, time_s);
+    return {options_.shear_s * (there.east_m_per_s - middle.east_m_per_s),
+            options_.shear_s * (there.north_m_per_s - middle.north_m_per_s), 0};
+}
 
 std::size_t SkySimulation::count() const {
     return std::size_t(std::ranges::count_if(clouds_, [](const SkyCloud& c) { return !c.dissolving; }));
@@ -90,14 +131,23 @@ Sphere SkySimulation::sphere(const SkyCloud& cloud) const {
 }
 
 Displacement SkySimulation::wind_step(const SkyCloud& cloud, double time_s) const {
-    const Velocity v = wind_at(options_.wind, cloud.base_m + shape(cloud).centre_m.z, time_s);
-    const Displacement d = displacement_of_step(v, options_.time_step_s, 1);
+    const Vec3 v = mean_wind(options_.wind, position_m(cloud) + shape(cloud).centre_m, time_s, options_.time_step_s);
+    return checked_step(v);
+}
+
+Displacement SkySimulation::checked_step(const Vec3& velocity) const {
+    const Displacement d = displacement_of_step({velocity.x, velocity.y}, options_.time_step_s, 1);
     if (std::abs(metres(d.x)) > kMaxStep || std::abs(metres(d.y)) > kMaxStep) {
         usage_error("layer \"" + options_.name + "\": the wind moves clouds by " + text_of(metres(d.x)) +
                     ", " + text_of(metres(d.y)) + " m in one step, at most " + text_of(kMaxStep) +
                     " m are possible");
     }
     return d;
+}
+
+Displacement SkySimulation::inflow_step(const SkyCloud& cloud) const {
+    const Velocity v = wind_at(options_.wind, cloud.base_m + shape(cloud).centre_m.z, time_s());
+    return checked_step({v.east_m_per_s, v.north_m_per_s, 0});
 }
 
 SkyCloud SkySimulation::ahead(const SkyCloud& cloud, double at_s, double after_s) const {
@@ -116,7 +166,11 @@ void SkySimulation::step() {
     const std::size_t before = count();
     retire_clouds();
     ++steps_;
-    adjust_number(before - count());
+    if (options_.entering == Entering::horizon) {
+        let_enter();
+    } else {
+        adjust_number(before - count());
+    }
 }
 
 void SkySimulation::move_clouds() {
@@ -176,6 +230,63 @@ void SkySimulation::adjust_number(std::size_t left) {
             place_inside(cloud);
         }
         clouds_.push_back(cloud);
+    }
+    assign_slots(first_new);
+}
+
+// Returns the number of clouds of each shape that the wind brings in a step, at the middle of the base heights.
+std::vector<SkySimulation::Inflow> SkySimulation::inflow() const {
+    const SkyShares proportions = shares_at(options_.skies, state());
+    const double clouds = clouds_at(options_.skies, state());
+    const WorldRectangle& w = options_.world;
+    std::vector<Inflow> result;
+    double sum = 0;
+    const auto add = [&](std::size_t sky, double fraction) {
+        const std::vector<SkyModel>& models = options_.skies[sky].models;
+        for (std::size_t entry = 0; fraction > 0 && entry < models.size(); ++entry) {
+            const double share = fraction / double(models.size()) / models[entry].generated;
+            for (int number = 0; number < models[entry].generated; ++number) {
+                SkyCloud cloud;
+                cloud.shape = first_shape_[sky][entry] + std::uint32_t(number);
+                cloud.base_m = (options_.base_height_m.min + options_.base_height_m.max) / 2;
+                const Displacement wind = inflow_step(cloud);
+                const Cloud& c = shape(cloud);
+                const double width = w.max_x_m - w.min_x_m + c.high_m.x - c.low_m.x,
+                             depth = w.max_y_m - w.min_y_m + c.high_m.y - c.low_m.y;
+                const double exchanged = std::abs(metres(wind.x)) / width + std::abs(metres(wind.y)) / depth;
+                sum += clouds * share * std::min(exchanged, 1.0);
+                result.push_back({std::uint32_t(sky), cloud.shape, sum});
+            }
+        }
+    };
+    const bool lower_empty = options_.skies[proportions.lower].models.empty(),
+               upper_empty = options_.skies[proportions.upper].models.empty();
+    const double lower = upper_empty ? 1 : lower_empty ? 0 : proportions.lower_fraction;
+    add(proportions.lower, lower);
+    if (proportions.upper != proportions.lower) add(proportions.upper, 1 - lower);
+    return result;
+}
+
+void SkySimulation::let_enter() {
+    constexpr std::int64_t kOne = std::int64_t{1} << 32;
+    const std::vector<Inflow> kinds = inflow();
+    if (kinds.empty()) return;
+    const double all = kinds.back().up_to;
+    due_ += fixed(all);
+    const std::size_t first_new = clouds_.size();
+    for (; due_ >= kOne; due_ -= kOne) {
+        const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::cloud, born_);
+        const double drawn = unit_interval(words[0]) * all;
+        const auto kind = std::ranges::find_if(kinds, [&](const Inflow& k) { return drawn < k.up_to; });
+        if (kind == kinds.end()) continue;  // rounding
+        SkyCloud cloud;
+        cloud.serial = born_++;
+        cloud.sky = kind->sky;
+        cloud.shape = kind->shape;
+        cloud.base_m = draw_in(words[3], options_.base_height_m);
+        cloud.phase = options_.cross_edges_whole || options_.formation_s <= 0 ? 1 : 0;
+        // The wind at its own height may be calm although it is not in the middle.
+        if (place_upwind(cloud)) clouds_.push_back(cloud);
     }
     assign_slots(first_new);
 }
@@ -241,7 +352,7 @@ void SkySimulation::place_inside(SkyCloud& cloud) const {
 
 // Places a cloud outside an upwind side, so that it gets inside during the next step; false in calm air.
 bool SkySimulation::place_upwind(SkyCloud& cloud) const {
-    const Displacement wind = wind_step(cloud, time_s());
+    const Displacement wind = inflow_step(cloud);
     if (wind.x == 0 && wind.y == 0) return false;
     const auto words = draw_for_sky(options_.seed, options_.layer, SkyDraw::place, cloud.serial);
     const Cloud& c = shape(cloud);
@@ -293,6 +404,7 @@ std::vector<std::byte> SkySimulation::bytes_without_slots() const {
         out.put(c.phase);
         out.put(std::uint8_t(c.dissolving));
     }
+    if (options_.entering == Entering::horizon) out.put(due_);
     return out.take();
 }
 
@@ -324,6 +436,9 @@ void SkySimulation::restore(std::span<const std::byte> bytes) {
         c.dissolving = dissolving != 0;
         clouds.push_back(c);
     }
+    std::int64_t due = 0;
+    if (options_.entering == Entering::horizon) due = in.get<std::int64_t>();
+    if (due < 0 || due >= std::int64_t{1} << 32) bad("part of a cloud is impossible");
     std::unordered_set<std::uint32_t> slots;
     for (SkyCloud& c : clouds) {
         c.slot = in.get<std::uint32_t>();
@@ -334,6 +449,7 @@ void SkySimulation::restore(std::span<const std::byte> bytes) {
     steps_ = steps;
     born_ = born;
     dissolved_ = dissolved;
+    due_ = due;
     carried_ = {std::int64_t(carried_x), std::int64_t(carried_y)};
 }
 

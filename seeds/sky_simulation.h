@@ -10,7 +10,8 @@
 //     for (const SkyCloud& cloud : sky.clouds()) ... sky.shape(cloud), sky.position_m(cloud), cloud.phase ...
 //
 // A step moves every cloud by the wind at its centre's height at the step's begin, advances the phases,
-// removes the clouds that have left, and then adjusts the number of clouds to that of the state (climate.h):
+// removes the clouds that have left, and then adjusts the number of clouds to that of the state (climate.h).
+// With Entering::anywhere:
 // - For each cloud that left, one enters upwind, where its shape just touches the edge. Its position along
 //   the wind is random within the displacement of one step, so that fast wind leaves no gaps, and the two
 //   upwind sides get clouds in proportion to the air that crosses them.
@@ -18,10 +19,22 @@
 // - Wind that crosses the world in one step leaves no cloud for longer than two steps.
 // - A sky without base models supplies no cloud: the other bracketing sky then supplies all.
 //
+// With Entering::horizon the air that flows in carries clouds as densely as the state asks for, and no cloud forms
+// or dissolves inside. Of the n clouds of a kind at a state, that touch the world of width w (the world's and their
+// own) and depth d, the wind (x, y) of a step replaces
+//
+//     n (|x| / w + |y| / d), at most n
+//
+// so that their number follows the state while the air is exchanged, and in calm air stays. Fractions of a cloud
+// add up from step to step.
+//
+// Fields of the wind (core/wind_field.h) carry clouds too, along the ground: a cloud keeps its height. Those that enter
+// are brought by the profile.
+//
 // Positions are fixed-point sums of displacements (core/wind.h): there is no rounding drift, and the state
 // can be saved and restored exactly. One object is one simulation; while a thread steps, others may call the
-// functions that depend on the options alone: options(), shapes(), shape(), model(), position_m(), sphere()
-// and ahead().
+// functions that depend on the options alone: options(), shapes(), shape(), model(), forms() of a state, state_at(),
+// lean_m(), position_m(), sphere() and ahead().
 
 #include <cstddef>
 #include <cstdint>
@@ -57,6 +70,23 @@ struct SkyCloud {
     bool operator==(const SkyCloud&) const = default;
 };
 
+// One of the forms that a cloud has at a time: a shape and how far it is there.
+struct CloudForm {
+    std::uint32_t shape = 0;  // index in SkySimulation::shapes()
+    double phase = 1;         // as SkyCloud::phase, of this form
+    bool operator==(const CloudForm&) const = default;
+};
+
+// The forms of a cloud: one, or two while it changes; the second is what it changes into.
+struct CloudForms {
+    CloudForm of[2];
+    int count = 1;
+    const CloudForm* begin() const { return of; }
+    const CloudForm* end() const { return of + count; }
+    // The one that is there the most.
+    const CloudForm& main() const { return of[count == 2 && of[1].phase > of[0].phase ? 1 : 0]; }
+};
+
 class SkySimulation {
   public:
     // Throws Error(usage) on options that check() refuses, and when a cloud is larger than the world.
@@ -78,6 +108,15 @@ class SkySimulation {
     const BaseModel& model(const SkyCloud& cloud) const {
         return options_.models[shapes_[cloud.shape].model];
     }
+    const BaseModel& model(const CloudForm& form) const { return options_.models[shapes_[form.shape].model]; }
+    // Returns what a cloud looks like in a state of the atmosphere: its own shape, or, by SkyOptions::metamorphoses, the
+    // same number of another model; while it changes both, the first dissolving from its edges inwards and the second
+    // forming from its centre outwards, each in its own boxes. A function of cloud and state alone.
+    CloudForms forms(const SkyCloud& cloud, double state) const;
+    CloudForms forms(const SkyCloud& cloud) const { return forms(cloud, state()); }
+    double state_at(double time_s) const;  // of the atmosphere, by the schedule
+    // Returns how far billboards at a height of a cloud lean at a time, metres east and north (SkyOptions::shear_s).
+    Vec3 lean_m(const SkyCloud& cloud, const CloudForm& form, double height_m, double time_s) const;
     Vec3 position_m(const SkyCloud& cloud) const;  // world position of the model's origin
     Sphere sphere(const SkyCloud& cloud) const;    // around the cloud, in the world
 
@@ -98,11 +137,19 @@ class SkySimulation {
     void restore(std::span<const std::byte> bytes);
 
   private:
+    // The clouds of one shape that enter over the horizon in a step.
+    struct Inflow {
+        std::uint32_t sky = 0, shape = 0;  // as in SkyCloud
+        double up_to = 0;                  // their number, and that of the shapes before
+    };
+
     void make_shapes();
     void move_clouds();
     void retire_clouds();
     void adjust_number(std::size_t left);
+    void let_enter();
     void dissolve(std::size_t number);
+    std::vector<Inflow> inflow() const;
     SkyCloud new_cloud(std::size_t sky);
     void assign_slots(std::size_t first_new);
     std::vector<std::byte> bytes_without_slots() const;
@@ -110,16 +157,22 @@ class SkySimulation {
     void place_inside(SkyCloud& cloud) const;
     bool place_upwind(SkyCloud& cloud) const;
     Displacement wind_step(const SkyCloud& cloud, double time_s) const;
+    // By the profile alone: what brings clouds into the world.
+    Displacement inflow_step(const SkyCloud& cloud) const;
+    Displacement checked_step(const Vec3& velocity) const;
     bool outside(const SkyCloud& cloud, const Displacement& wind) const;
 
     SkyOptions options_;
     std::vector<CloudShape> shapes_;
+    std::vector<std::uint32_t> first_of_model_;  // index of number 0 of each model's shapes
+    std::vector<std::uint32_t> generated_;       // number of these
     std::vector<std::vector<std::uint32_t>>
         first_shape_;  // [sky][entry of its models]: index of its number 0
     std::vector<SkyCloud> clouds_;
     std::uint64_t steps_ = 0;
     std::uint32_t born_ = 0;       // clouds made so far, those entering, forming and scattered
     std::uint32_t dissolved_ = 0;  // clouds drawn to dissolve so far
+    std::int64_t due_ = 0;         // of a cloud that has not entered yet, clouds * 2^32; Entering::horizon
     Displacement carried_;
 };
 

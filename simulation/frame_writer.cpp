@@ -12,13 +12,14 @@
 #include "scenes/format/layers.h"
 #include "scenes/format/writer.h"
 #include "simulation/frame_detail.h"
+#include "simulation/scene_files.h"
 #include "simulation/scene_place.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
 
 FrameWriter::FrameWriter(const Scene& scene, RunFolder folder, int first_frame)
-    : scene_(scene), folder_(std::move(folder)), scene_hash_(scene_hash(scene)), first_frame_(first_frame) {}
+    : scene_(with_files(scene)), folder_(std::move(folder)), scene_hash_(scene_hash(scene)), first_frame_(first_frame) {}
 
 // The camera at the frame's time, with the exposure that the frame has.
 RenderOptions FrameWriter::exposed_options(const FrameResult& frame, const Picture& picture) {
@@ -86,6 +87,11 @@ WrittenFile FrameWriter::write(const FrameResult& frame, VdbContent content, std
     if (scene_.density.write_velocity) {
         content.wind = wind_of_levels(scene_, layer, density.placement(), density.extent(), frame.time_s);
         content.wind_name = scene_.density_files.velocity_name;
+        const std::vector<WindField>& fields = scene_.automaton.wind.fields;
+        if (!fields.empty())
+            content.wind_field = [&fields, time_s = frame.time_s](const Vec3& place_m) {
+                return velocity_of(fields, place_m, time_s);
+            };
     }
     const StateHash& hash = layer ? frame.layers[*layer].hash : frame.hash;
     const std::filesystem::path path =

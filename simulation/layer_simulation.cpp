@@ -12,6 +12,7 @@
 #include "scenes/format/writer.h"
 #include "seeds/coupling.h"
 #include "simulation/memory.h"
+#include "simulation/scene_files.h"
 
 namespace nephos {
 namespace {
@@ -46,6 +47,7 @@ std::string text_of_veil(const Scene& scene, std::size_t layer) {
     alone.automaton.seed = layer_seed(scene.automaton.seed, layer);
     alone.automaton.time_step_s = scene.automaton.time_step_s;
     alone.automaton.wind = layer_wind(scene, layer);
+    alone.automaton.wind.fields.clear();  // they do not carry veils
     alone.layers = {scene.layers[layer]};
     alone.layers.front().wind = {};
     alone.layers.front().own_detail = false;
@@ -174,12 +176,19 @@ void LayerSimulation::restore(std::span<const std::byte> bytes) {
     }
 }
 
+std::optional<Lattice> initial_state_of_layer(const Scene& scene, std::size_t layer) {
+    const LayerOptions& options = scene.layers[layer];
+    if (!options.initial_state_file) return {};
+    return read_state(*options.initial_state_file, options.extent, options.placement);
+}
+
 std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial,
                                          LayerParts parts) {
+    const Scene complete = with_files(scene);
     std::vector<LayerSimulation> layers;
     layers.reserve(lattice_count(scene));
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {
-        layers.emplace_back(scene, n, scene.layers.empty() ? std::move(initial) : std::nullopt, parts);
+        layers.emplace_back(complete, n, scene.layers.empty() ? std::move(initial) : initial_state_of_layer(scene, n), parts);
     }
     return layers;
 }
@@ -196,8 +205,10 @@ std::optional<Lattice> initial_state(const Scene& scene, const std::string& from
 SimulationStart simulation_start(const Scene& scene) {
     SimulationStart start;
     start.initial = initial_state(scene);
-    start.simulation_hash =
-        simulation_hash(scene, start.initial ? hash_of(*start.initial).hex() : std::string());
+    std::string states = start.initial ? hash_of(*start.initial).hex() : std::string();
+    for (std::size_t n = 0; n < scene.layers.size(); ++n)
+        if (const std::optional<Lattice> state = initial_state_of_layer(scene, n)) states += hash_of(*state).hex();
+    start.simulation_hash = simulation_hash(scene, states + hash_of_files(with_files(scene)));
     return start;
 }
 
@@ -205,7 +216,9 @@ std::vector<LayerSimulation> start_layers(const Scene& scene, const std::string&
                                           const std::string& from) {
     if (!from.empty() && !scene.layers.empty()) {
         throw Error(ErrorCode::usage,
-                    fmt::format("{}: has layers, but --from gives the state of one lattice", scene_file));
+                    fmt::format("{}: has layers, but --from gives the state of one lattice: name the file as "
+                                "`initial_state` in the `lattice` of its layer",
+                                scene_file));
     }
     std::size_t bytes = 0;
     for (std::size_t n = 0; n < lattice_count(scene); ++n) {

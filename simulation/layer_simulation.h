@@ -84,7 +84,11 @@ class LayerSimulation {
     std::optional<RainFinder> finder_;
 };
 
-// Makes every layer of a scene at step 0. `initial` only for a scene without layers.
+// Reads the state that a layer starts from; none where it names no file. Throws as read_state().
+std::optional<Lattice> initial_state_of_layer(const Scene& scene, std::size_t layer);
+
+// Makes every layer of a scene at step 0. `initial` only for a scene without layers; layers read their own. Throws as
+// read_state().
 std::vector<LayerSimulation> make_layers(const Scene& scene, std::optional<Lattice> initial = {},
                                          LayerParts parts = LayerParts::all);
 

@@ -195,6 +195,7 @@ Json head_json(const RunSettings& settings, const ManifestState& state) {
                      {"simulation_hash", settings.simulation_hash},
                      {"seed", std::to_string(scene.automaton.seed)},
                      {"steps", scene.steps}};
+    if (settings.branch) json["branch"] = {{"checkpoint", settings.branch->generic_string()}};
     json["range"] = {{"last_step", settings.range.last_step},
                      {"first_frame", settings.range.first_frame},
                      {"last_frame", settings.range.last_frame},
@@ -295,6 +296,10 @@ std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& pa
         }
         return rain;
     });
+}
+
+std::string read_scene_text_of(const std::filesystem::path& path) {
+    return with_manifest(path, [](const Json& json) { return json.at("scene_text").get<std::string>(); });
 }
 
 std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::path& path) {

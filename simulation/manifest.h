@@ -71,6 +71,9 @@ std::map<int, std::vector<RainRecord>> read_rain(const std::filesystem::path& pa
 // Returns the record of a file as a manifest has it. Throws a JSON exception when it is none.
 FileRecord file_record(const nlohmann::ordered_json& json);
 
+// Returns the canonical text of the scene of an earlier run. Throws Error(io) as read_manifest().
+std::string read_scene_text_of(const std::filesystem::path& path);
+
 // Reads the files of the frames that the manifest of an earlier run lists; none for frames of a manifest that has no
 // digests, as those of earlier versions. Throws Error(io) as read_manifest().
 std::map<int, std::vector<FileRecord>> read_frame_files(const std::filesystem::path& path);

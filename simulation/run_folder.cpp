@@ -14,6 +14,7 @@
 #include "density/voxel_digest.h"
 #include "render/image/video.h"
 #include "scenes/format/writer.h"
+#include "simulation/branch.h"
 #include "simulation/earlier_run.h"
 #include "simulation/frame_output.h"
 #include "simulation/manifest.h"
@@ -71,6 +72,18 @@ class Recorder : public SimulationSink {
             layer_statistics_.push_back(
                 StatisticsFile::create(folder_.statistics(layer.name), kLayerStatisticsHeader));
         }
+    }
+
+    // Goes on from the statistics of the run that this one branches off, with frames of its own.
+    void begin_branch(const Simulation& simulation) {
+        statistics_ = StatisticsFile::resume(
+            folder_.statistics(), simulation.next_step(),
+            [this](std::uint64_t, std::string_view, const StateHash& hash) { state_.state_hash = hash.hex(); });
+        for (const LayerOptions& layer : settings_.scene.layers)
+            layer_statistics_.push_back(StatisticsFile::resume(folder_.statistics(layer.name), simulation.next_step(),
+                                                               {}, kLayerStatisticsHeader));
+        state_.steps_reported = simulation.next_step();
+        write_manifest(false, 0);
     }
 
     // Takes over what an earlier run reported up to where `simulation` goes on, and checks that it is all
@@ -400,14 +413,16 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     const FolderLock lock(folder.folder);
     if (resumption == Resumption::nothing_there && !settings.overwrite) refuse_to_lose(folder, settings);
     if (lock.held()) remove_leftovers(folder);
-    Simulation simulation = settings.resume
-                                ? resumed_simulation(settings, folder)
-                                : Simulation(settings.scene, settings.range, settings.simulation_hash,
+    Simulation simulation = settings.resume   ? resumed_simulation(settings, folder)
+                            : settings.branch ? branched_simulation(settings, folder)
+                                              : Simulation(settings.scene, settings.range, settings.simulation_hash,
                                              std::move(settings.initial), settings.results());
     const std::uint64_t first_step = simulation.steps_taken();
     if (settings.resume) {
         recorder.take_over(simulation);
         if (!simulation.finished()) recorder.write_manifest(false, seconds_since(begin));
+    } else if (settings.branch) {
+        recorder.begin_branch(simulation);
     } else {
         remove_earlier_run(folder);
         recorder.begin();

@@ -61,6 +61,8 @@ struct RunSettings {
     bool render = true;            // pictures too
     DeviceOptions device{};        // what draws them, whatever scene.frames says
     std::filesystem::path folder;
+    // Start from this checkpoint of another run (simulation/branch.h); its state is part of simulation_hash.
+    std::optional<std::filesystem::path> branch{};
     // Go on from the folder's checkpoint; start where there is none, of nothing or of the same scene; do nothing where the
     // same run is complete.
     bool resume = false;

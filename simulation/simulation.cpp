@@ -13,6 +13,7 @@
 #include "density/optical_columns.h"
 #include "density/combine.h"
 #include "density/smoothing.h"
+#include "simulation/scene_files.h"
 
 namespace nephos {
 namespace {
@@ -111,11 +112,11 @@ Simulation::Simulation(const Scene& scene, SimulationStart start)
 
 Simulation::Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
                        std::optional<Lattice> initial, SimulationResults results)
-    : scene_(scene),
+    : scene_(with_files(scene)),
       range_(range),
       results_(results),
       simulation_hash_(std::move(simulation_hash)),
-      layers_(make_layers(scene, std::move(initial), parts_for(results))),
+      layers_(make_layers(scene_, std::move(initial), parts_for(results))),
       ground_(dry_or_covered(scene)),
       next_frame_(range.first_frame) {
     if (results_ == SimulationResults::statistics && range_.last_frame >= range_.first_frame)
@@ -131,21 +132,25 @@ Simulation::Simulation(const Scene& scene, const SimulationRange& range, std::st
 }
 
 Simulation::Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
-                       const Checkpoint& checkpoint, SimulationResults results)
-    : scene_(scene),
+                       const Checkpoint& checkpoint, SimulationResults results, Restart restart)
+    : scene_(with_files(scene)),
       range_(range),
       results_(results),
       simulation_hash_(std::move(simulation_hash)),
-      layers_(blank_layers(scene, parts_for(results))),
+      layers_(blank_layers(scene_, parts_for(results))),
       ground_(dry_or_covered(scene)) {
-    if (checkpoint.simulation_hash != simulation_hash_) {
+    if (restart == Restart::same && checkpoint.simulation_hash != simulation_hash_) {
         throw Error(ErrorCode::usage, "the checkpoint belongs to another simulation");
     }
-    restore_layers(checkpoint);
-    if (steps_taken() != checkpoint.steps || combined_hash(layers_) != checkpoint.state) {
-        throw Error(ErrorCode::io, "the checkpoint's state does not have the hash that it names");
+    try {
+        this->restore(checkpoint, restart);
+    } catch (const Error& error) {
+        if (restart == Restart::same || error.code() != ErrorCode::io) throw;
+        throw Error(ErrorCode::usage,
+                    std::string("the checkpoint does not fit the changed scene (") + error.what() +
+                        "): expected its lattices, layers, skies, numbers of ellipsoids, ground cover, kinds of wind "
+                        "fields and smoothing");
     }
-    restore_history(checkpoint);
 }
 
 std::uint64_t Simulation::steps_in_all() const { return range_.last_step + window(); }

@@ -141,6 +141,22 @@ inline constexpr int kLastFrame = std::numeric_limits<int>::max();
 SimulationRange full_range(const Scene& scene);
 SimulationRange range_of_frames(const Scene& scene, int first, int last);
 
+// Where the simulation that saved a checkpoint went on from: the first step and frame that it had not reported yet.
+struct SavedPoint {
+    std::uint64_t next_step = 0;
+    int next_frame = 1;
+};
+
+// Throws Error(io) when the checkpoint is damaged or of another version.
+SavedPoint saved_point(const Checkpoint& checkpoint);
+
+// How a simulation starts from a checkpoint.
+enum class Restart {
+    same,    // the scene is that of the simulation that saved it
+    branch,  // it has changed: the state goes on under the new scene, whose lattices, layers, skies and numbers of
+             // ellipsoids, smoothing window and kept bits are the same
+};
+
 // Not thread-safe: one call at a time. Works in parallel itself; results do not depend on the number of threads.
 class Simulation {
   public:
@@ -154,9 +170,11 @@ class Simulation {
     // Starts where `checkpoint` was saved. The range may end later than that of the simulation that saved it, with
     // frames that follow those it had. Throws Error(usage) when the checkpoint belongs to another simulation,
     // other results, another smoothing window or another range, or does not hold the states that a longer
-    // range goes on from; Error(io) when its content is damaged.
+    // range goes on from; Error(io) when its content is damaged. A branch begins with the checkpoint's next frame;
+    // Error(usage) when the scene has changed so much that its state does not fit.
     Simulation(const Scene& scene, const SimulationRange& range, std::string simulation_hash,
-               const Checkpoint& checkpoint, SimulationResults results = SimulationResults::everything);
+               const Checkpoint& checkpoint, SimulationResults results = SimulationResults::everything,
+               Restart restart = Restart::same);
 
     bool finished() const;
 
@@ -241,8 +259,9 @@ class Simulation {
     bool makes_density(std::size_t layer) const;
     bool remembers_planes(std::size_t layer) const;
     std::uint64_t lowest_needed() const;
+    void restore(const Checkpoint& checkpoint, Restart restart);
     void restore_layers(const Checkpoint& checkpoint);
-    void restore_history(const Checkpoint& checkpoint);
+    void restore_history(const Checkpoint& checkpoint, Restart restart);
     void restore_ground(ByteReader& reader);
 
     Scene scene_;

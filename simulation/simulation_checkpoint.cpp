@@ -172,6 +172,26 @@ Checkpoint Simulation::save() {
     return {simulation_hash_, steps_taken(), combined_hash(layers_), saved_layers(layers_), std::move(bytes)};
 }
 
+SavedPoint saved_point(const Checkpoint& checkpoint) {
+    ByteReader reader(checkpoint.history);
+    if (reader.get<std::uint32_t>() != kHistoryVersion)
+        throw Error(ErrorCode::io, "the checkpoint was written by another version of nephos");
+    get_range(reader);
+    reader.get<std::int32_t>();  // window
+    reader.get<std::uint8_t>();  // content
+    SavedPoint point;
+    point.next_step = reader.get<std::uint64_t>();
+    point.next_frame = reader.get<std::int32_t>();
+    return point;
+}
+
+void Simulation::restore(const Checkpoint& checkpoint, Restart restart) {
+    restore_layers(checkpoint);
+    if (steps_taken() != checkpoint.steps || combined_hash(layers_) != checkpoint.state)
+        throw Error(ErrorCode::io, "the checkpoint's state does not have the hash that it names");
+    restore_history(checkpoint, restart);
+}
+
 // The layers' states one after the other, each with its length before it.
 void Simulation::restore_layers(const Checkpoint& checkpoint) {
     if (ByteReader(checkpoint.history).get<std::uint32_t>() != kHistoryVersion) {
@@ -203,7 +223,7 @@ void Simulation::restore_ground(ByteReader& reader) {
     ground_->restore(std::move(map));
 }
 
-void Simulation::restore_history(const Checkpoint& checkpoint) {
+void Simulation::restore_history(const Checkpoint& checkpoint, Restart restart) {
     ByteReader reader(checkpoint.history);
     reader.skip(sizeof kHistoryVersion);  // read by restore_layers()
     const SimulationRange before = get_range(reader);
@@ -217,7 +237,8 @@ void Simulation::restore_history(const Checkpoint& checkpoint) {
                         : "the checkpoint belongs to a run without detail and without the state: expected "
                           "`detail.enabled = false` and no `density.write_state`, as then");
     }
-    if (!continues(before, range_) || !same_window || content != expected) {
+    const bool may_continue = restart == Restart::branch || continues(before, range_);
+    if (!may_continue || !same_window || content != expected) {
         throw Error(ErrorCode::usage,
                     "the checkpoint belongs to a run with other frames or another smoothing window");
     }
@@ -263,7 +284,7 @@ void Simulation::restore_history(const Checkpoint& checkpoint) {
                 history_.back().step == steps_taken() && history_.back().hash == combined_hash(layers_);
     for (std::size_t n = 1; good && n < history_.size(); ++n)
         good = history_[n].step == history_[n - 1].step + 1;
-    if (good && !reaches_back && !finished() && before != range_) {
+    if (good && !reaches_back && !finished() && (before != range_ || restart == Restart::branch)) {
         throw Error(ErrorCode::usage,
                     "the checkpoint does not hold the states that further steps go on from: start anew");
     }

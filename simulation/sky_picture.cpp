@@ -19,6 +19,14 @@ namespace {
 
 constexpr double kLeastFlash = 1.0 / 512;  // relative to the sun; less does not show
 
+double fastest_m_per_s(const Wind& wind) {
+    double fastest = 0;
+    for (const WindKeyframe& key : wind.keyframes)
+        for (const WindLevel& level : key.levels)
+            fastest = std::max(fastest, std::hypot(level.velocity.east_m_per_s, level.velocity.north_m_per_s));
+    return fastest;
+}
+
 }  // namespace
 
 Light light_of(const Sun& sun) { return {direction_to_sun(sun), true}; }
@@ -29,13 +37,13 @@ GroundCoverView view_of(const GroundCoverMap& map) {
 }
 
 const SkyBillboards::ScatteredBillboards& SkyBillboards::scattered(const SkySimulation& sky,
-                                                                   const SkyCloud& cloud) {
+                                                                   const CloudForm& form) {
     scattered_.resize(sky.shapes().size());
-    std::optional<ScatteredBillboards>& result = scattered_[cloud.shape];
+    std::optional<ScatteredBillboards>& result = scattered_[form.shape];
     if (result) return *result;
-    const CloudShape& shape = sky.shapes()[cloud.shape];
+    const CloudShape& shape = sky.shapes()[form.shape];
     result.emplace();
-    result->billboards = scatter_billboards(sky.model(cloud), shape.cloud, sky.options().seed,
+    result->billboards = scatter_billboards(sky.model(form), shape.cloud, sky.options().seed,
                                             std::uint32_t(shape.model), shape.number);
     result->low_m = shape.cloud.low_m.z;
     result->high_m = std::max(shape.cloud.high_m.z, result->low_m + 1e-3);
@@ -47,7 +55,7 @@ const SkyBillboards::ScatteredBillboards& SkyBillboards::scattered(const SkySimu
     return *result;
 }
 
-std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<const FormedCloud> clouds,
                                         const RenderOptions& options, const std::optional<FilmFrame>& film) {
     const LightSchedule schedule(sky.options(), film ? options.light.cfa_clouds_per_frame : 0);
     const Light present = light_of(options.sun);
@@ -61,41 +69,44 @@ std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<cons
         return found->second;
     };
     std::vector<CloudToLight> lit;
-    for (const SkyCloud& cloud : clouds)
-        lit.push_back({cloud.serial, &sky.shape(cloud), sky.position_m(cloud), light_for(cloud)});
+    for (const auto& [cloud, form] : clouds)
+        lit.push_back({light_id(*cloud, form), &sky.shapes()[form.shape].cloud, sky.position_m(*cloud), light_for(*cloud)});
     return sun_.update(lit);
 }
 
 void SkyBillboards::light_by_flash(const SkySimulation& sky, const Flash& flash,
-                                   const std::vector<const SkyCloud*>& seen) {
+                                   const std::vector<FormedCloud>& seen) {
     std::vector<CloudToLight> lit;
-    for (const SkyCloud* cloud : seen) {
-        const Sphere sphere = sky.sphere(*cloud);
+    for (const auto& [cloud, form] : seen) {
+        const Cloud& shape = sky.shapes()[form.shape].cloud;
+        const Vec3 place = sky.position_m(*cloud);
         const double nearest = std::max(
-            length(sphere.centre_m - flash.position_m) - sphere.radius_m - scattered(sky, *cloud).reach_m,
-            1.0);
+            length(place + shape.centre_m - flash.position_m) - shape.radius_m - scattered(sky, form).reach_m, 1.0);
         if (flash.intensity * 1e6 / (nearest * nearest) < kLeastFlash) continue;
-        lit.push_back({cloud->serial, &sky.shape(*cloud), sky.position_m(*cloud), light_of(flash)});
+        lit.push_back({light_id(*cloud, form), &shape, place, light_of(flash)});
     }
     flash_.update(lit);
 }
 
-void SkyBillboards::list(const SkySimulation& sky, const SkyCloud& cloud, bool flash, DrawnClouds& out) {
-    const Cloud& shape = sky.shape(cloud);
-    const ScatteredBillboards& what = scattered(sky, cloud);
-    const Vec3 place = sky.position_m(cloud);
-    const std::span<const double> sun = sun_.absorbed(cloud.serial);
+void SkyBillboards::list(const SkySimulation& sky, const FormedCloud& formed, bool flash, double time_s,
+                         DrawnClouds& out) {
+    const auto& [cloud, form] = formed;
+    const Cloud& shape = sky.shapes()[form.shape].cloud;
+    const ScatteredBillboards& what = scattered(sky, form);
+    const Vec3 place = sky.position_m(*cloud);
+    const std::span<const double> sun = sun_.absorbed(light_id(*cloud, form));
     // A cloud that the lightning does not reach is as dark in it as one that absorbs it all.
     const std::span<const double> lightning =
-        flash ? flash_.absorbed(cloud.serial) : std::span<const double>{};
+        flash ? flash_.absorbed(light_id(*cloud, form)) : std::span<const double>{};
     const auto index = std::uint32_t(out.clouds.size());
     out.clouds.push_back({shape.centre_m + place, what.low_m + place.z, what.high_m + place.z});
     for (const Billboard& billboard : what.billboards) {
         const double weight =
-            phase_weight(shape.boxes[billboard.box].distance, cloud.phase, sky.options().formation_softness);
+            phase_weight(shape.boxes[billboard.box].distance, form.phase, sky.options().formation_softness);
         if (weight <= 0) continue;
         CloudBillboard& drawn = out.billboards.emplace_back();
         drawn.centre_m = billboard.centre_m + place;
+        drawn.centre_m += sky.lean_m(*cloud, form, drawn.centre_m.z, time_s);
         drawn.width_m = float(billboard.width_m);
         drawn.height_m = float(billboard.height_m);
         drawn.sun_absorbed = float(sun[billboard.box]);
@@ -110,27 +121,33 @@ void SkyBillboards::list(const SkySimulation& sky, const SkyCloud& cloud, bool f
 std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
                                   const RenderOptions& options, const std::optional<Flash>& flash,
                                   DrawnClouds& out, bool cull, const std::optional<Camera>& mirrored,
-                                  const std::optional<FilmFrame>& film) {
-    const std::size_t computed = light_by_sun(sky, clouds, options, film);
+                                  const std::optional<FilmFrame>& film, std::optional<double> at_s) {
+    const double time_s = at_s.value_or(sky.time_s()), state = sky.state_at(time_s);
+    std::vector<FormedCloud> formed;
+    for (const SkyCloud& cloud : clouds)
+        for (const CloudForm& form : sky.forms(cloud, state)) formed.push_back({&cloud, form});
+    const std::size_t computed = light_by_sun(sky, formed, options, film);
     const CameraFrame camera = camera_frame(options.camera),
                       mirror = camera_frame(mirrored.value_or(options.camera));
     const Frustum frustum(camera), below(mirror);
-    std::vector<const SkyCloud*> seen;
-    for (const SkyCloud& cloud : clouds) {
-        const Sphere sphere = sky.sphere(cloud);
-        const double radius_m = sphere.radius_m + scattered(sky, cloud).reach_m;
-        if (!cull || frustum.may_see(sphere.centre_m - camera.position_m, radius_m) ||
-            below.may_see(sphere.centre_m - mirror.position_m, radius_m))
-            seen.push_back(&cloud);
+    const double lean_m = 2 * sky.options().shear_s * fastest_m_per_s(sky.options().wind);
+    std::vector<FormedCloud> seen;
+    for (const FormedCloud& each : formed) {
+        const Cloud& shape = sky.shapes()[each.form.shape].cloud;
+        const Vec3 centre_m = sky.position_m(*each.cloud) + shape.centre_m;
+        const double radius_m = shape.radius_m + scattered(sky, each.form).reach_m + lean_m;
+        if (!cull || frustum.may_see(centre_m - camera.position_m, radius_m) ||
+            below.may_see(centre_m - mirror.position_m, radius_m))
+            seen.push_back(each);
     }
     if (flash) light_by_flash(sky, *flash, seen);
     std::size_t billboards = out.billboards.size();
-    for (const SkyCloud* cloud : seen) billboards += scattered(sky, *cloud).billboards.size();
+    for (const FormedCloud& each : seen) billboards += scattered(sky, each.form).billboards.size();
     // With what the renderer makes of one: its order and its form on the device.
     require_memory(billboards * (sizeof(CloudBillboard) + 128),
                    "the billboards of " + std::to_string(seen.size()) + " clouds");
     out.billboards.reserve(billboards);
-    for (const SkyCloud* cloud : seen) list(sky, *cloud, flash.has_value(), out);
+    for (const FormedCloud& each : seen) list(sky, each, flash.has_value(), time_s, out);
     return computed;
 }
 
@@ -163,7 +180,7 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     for (std::size_t i = 0; i < layers.size(); ++i) {
         const SkyLayer& layer = layers[i];
         if (layer.direct)
-            layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn, true, mirrored, film);
+            layers_[i].append(*layer.sky, layer.clouds, options, flash, drawn, true, mirrored, film, time_s);
     }
     std::vector<std::vector<WorldLine>> lines;
     for (const SkyLayer& layer : layers)

@@ -48,14 +48,18 @@ class SkyBillboards {
     // are computed in a frame, the sun of the frame whose turn it was; and the lightning's of those that it
     // reaches. What is listed never depends on earlier calls. `cull` false lists also what the camera cannot
     // see: the picture is the same. `mirrored`: another camera whose clouds are listed as well. Returns of
-    // how many clouds the sun's absorption was computed anew.
+    // how many clouds the sun's absorption was computed anew. `time_s`: decides the forms of clouds that change, and their
+    // lean; none: the time of `sky`.
     std::size_t append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
                        const RenderOptions& options, const std::optional<Flash>& flash, DrawnClouds& out,
                        bool cull = true, const std::optional<Camera>& mirrored = {},
-                       const std::optional<FilmFrame>& film = {});
+                       const std::optional<FilmFrame>& film = {}, std::optional<double> time_s = {});
 
-    // Returns the absorbed sunlight of a cloud's boxes as it was used last; empty before the first append().
-    std::span<const double> sun_absorbed(const SkyCloud& cloud) const { return sun_.absorbed(cloud.serial); }
+    // Returns the absorbed sunlight of the boxes of a cloud's own shape as it was used last; empty before the first
+    // append(), and where the cloud has become another.
+    std::span<const double> sun_absorbed(const SkyCloud& cloud) const {
+        return sun_.absorbed(light_id(cloud, {cloud.shape, cloud.phase}));
+    }
 
   private:
     // What does not change with a cloud's place.
@@ -64,12 +68,20 @@ class SkyBillboards {
         double reach_m = 0;            // how far billboards reach beyond their boxes, at most
         double low_m = 0, high_m = 1;  // of all billboards, model space
     };
-    const ScatteredBillboards& scattered(const SkySimulation& sky, const SkyCloud& cloud);
-    std::size_t light_by_sun(const SkySimulation& sky, std::span<const SkyCloud> clouds,
+    // A cloud in one of its forms.
+    struct FormedCloud {
+        const SkyCloud* cloud = nullptr;  // not null
+        CloudForm form;
+    };
+    // The light of a form is kept by the cloud and the shape.
+    static std::uint64_t light_id(const SkyCloud& cloud, const CloudForm& form) {
+        return std::uint64_t{form.shape} << 32 | cloud.serial;
+    }
+    const ScatteredBillboards& scattered(const SkySimulation& sky, const CloudForm& form);
+    std::size_t light_by_sun(const SkySimulation& sky, std::span<const FormedCloud> clouds,
                              const RenderOptions& options, const std::optional<FilmFrame>& film);
-    void light_by_flash(const SkySimulation& sky, const Flash& flash,
-                        const std::vector<const SkyCloud*>& seen);
-    void list(const SkySimulation& sky, const SkyCloud& cloud, bool flash, DrawnClouds& out);
+    void light_by_flash(const SkySimulation& sky, const Flash& flash, const std::vector<FormedCloud>& seen);
+    void list(const SkySimulation& sky, const FormedCloud& formed, bool flash, double time_s, DrawnClouds& out);
 
     std::vector<std::optional<ScatteredBillboards>> scattered_;  // one for each of SkySimulation::shapes()
     LightAbsorption sun_, flash_;

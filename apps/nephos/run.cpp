@@ -16,6 +16,7 @@
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "simulation/branch.h"
 #include "simulation/memory.h"
 #include "simulation/run_folder.h"
 
@@ -24,7 +25,7 @@ namespace {
 
 struct RunArguments {
     SceneArguments scene;
-    std::string out;
+    std::string out, from;
     std::optional<FrameRange> frames;
     bool no_render = false, statistics_only = false, checkpoint = false, video = false, resume = false,
          overwrite = false, needs = false;
@@ -36,7 +37,16 @@ struct RunArguments {
 };
 
 Scene scene_of(const RunArguments& a) {
-    Scene scene = load_scene(a.scene, a.statistics_only ? SceneUse::without_frames : SceneUse::everything);
+    const SceneUse use = a.statistics_only ? SceneUse::without_frames : SceneUse::everything;
+    if (a.scene.file.empty() && a.from.empty())
+        throw Error(ErrorCode::usage, "SCENE is missing: expected a scene file, or --from with the run to branch off");
+    Scene scene;
+    if (a.scene.file.empty()) {
+        scene = read_scene_text(scene_text_beside(a.from), "scene_text of " + a.from, {}, a.scene.overrides, use);
+        if (a.scene.seed) scene.automaton.seed = *a.scene.seed;
+    } else {
+        scene = load_scene(a.scene, use);
+    }
     if (!a.needs && !a.work.quiet) print_warnings(scene);
     if (a.video && !scene.frames.enabled)
         throw Error(
@@ -64,6 +74,7 @@ RunSettings settings_of(const RunArguments& a) {
     RunSettings settings = run_settings(std::move(scene), a.scene.file);
     if (a.frames) settings.range = range_of_frames(settings.scene, a.frames->first, a.frames->last);
     if (!a.out.empty()) settings.folder = a.out;
+    if (!a.from.empty()) branch_off(settings, a.from);
     settings.statistics_only = a.statistics_only;
     settings.render = !a.no_render && !a.statistics_only;
     settings.device = device_options(a.device, settings.scene.frames);
@@ -166,6 +177,10 @@ int run(const RunArguments& a) {
     if (a.resume && a.overwrite) throw Error(ErrorCode::usage, "--resume and --overwrite exclude each other");
     if (a.checkpoint && !a.statistics_only)
         throw Error(ErrorCode::usage, "--checkpoint is for --statistics-only: other runs always leave one");
+    if (!a.from.empty() && a.out.empty())
+        throw Error(ErrorCode::usage, "--from needs --out: a folder of its own for the run that branches off");
+    if (!a.from.empty() && (a.frames || a.until))
+        throw Error(ErrorCode::usage, "--from begins with the frame after the checkpoint: leave out --frames and --until");
     if (a.until && !a.statistics_only) throw Error(ErrorCode::usage, "--until needs --statistics-only");
     if (a.max_steps && !a.until) throw Error(ErrorCode::usage, "--max-steps is for --until");
     if (a.statistics_only && (a.frames || a.video))
@@ -226,6 +241,11 @@ void add_run_command(CLI::App& app, Action& action) {
     CLI::App* command = app.add_subcommand("run", "Simulate a scene: density grids, pictures, statistics");
     const auto a = std::make_shared<RunArguments>();
     add_scene_arguments(*command, a->scene);
+    command->get_option("SCENE")->required(false);
+    command->add_option("--from", a->from,
+                        "Branch off another run: start from its checkpoint (its folder, or the file) with the scene that "
+                        "--set changes; without SCENE that of the run. Needs --out")
+        ->type_name("RUN");
     command->add_option("-o,--out", a->out, "Folder to write to (default: out/NAME)")->type_name("DIR");
     add_value(*command, "--frames", "A..B",
               "Write only these frames, counted from 1; A.., ..B and A alone work too",
@@ -273,7 +293,8 @@ void add_run_command(CLI::App& app, Action& action) {
         "Examples:\n"
         "  nephos run scenes/cumulus.toml\n"
         "  nephos run scenes/stratus.toml --out /tmp/st --no-render --set time.steps=500\n"
-        "  nephos run scenes/cumulus.toml --resume");
+        "  nephos run scenes/cumulus.toml --resume\n"
+        "  nephos run --from out/cumulus --set field.background.ext=0.4 --set time.steps=600 --out out/drier");
     command->callback([a, &action] { action = [a] { return run(*a); }; });
 }
 

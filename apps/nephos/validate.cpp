@@ -55,6 +55,7 @@ Json scene_json(const std::string& file, const Scene& scene) {
             {"frames", frame_count(scene)},
             {"scene_hash", scene_hash(scene)},
             {"warnings", warnings(scene)},
+            {"keys_without_effect", keys_without_effect(scene)},
             {"memory_bytes", memory_estimate_bytes(scene)},
             {"memory_bytes_without_pictures", memory_estimate_bytes(scene, RunParts::density)},
             {"memory_bytes_statistics_only", memory_estimate_bytes(scene, RunParts::statistics)}};
@@ -91,6 +92,7 @@ int validate(const ValidateArguments& a) {
         try {
             const Scene scene = load_scene(one);
             print_warnings(scene);
+            for (const std::string& note : keys_without_effect(scene)) print_note(file + ": " + note);
             if (a.print) {
                 output.write(to_toml(scene));
             } else if (a.work.json) {

@@ -13,7 +13,7 @@
 //     grid          type            content
 //     density       float, half     fog volume, 0..1; the two extreme corners are active with value 0
 //     hum act cld   bool            active and true where the bit is 1; on request
-//     vel           vec3s           wind in m/s (east, north, 0), in blocks of 8x8x8 that hold density; on request
+//     vel           vec3s           wind in m/s (east, north, up), in blocks of 8x8x8 that hold density; on request
 //
 // The two corner voxels of `density` make the active bounds, and with them OpenVDB's own `file_bbox_min` and
 // `file_bbox_max`, the same in every file of a sequence, clouds or none. The other grids keep the bounds of
@@ -51,6 +51,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -58,6 +59,7 @@
 
 #include "automaton/lattice.h"
 #include "core/place.h"
+#include "core/sample_grid.h"
 #include "core/wind.h"
 #include "density/density_grid.h"
 
@@ -90,6 +92,8 @@ struct VdbContent {
     // Writes the wind by height, one velocity a level of voxels, as a grid of this name; needs density.
     std::vector<Velocity> wind;
     std::string wind_name = "vel";
+    // Returns what the wind has in addition at a place of world space, m/s; may be empty. Called in one thread.
+    std::function<Vec3(const Vec3& place_m)> wind_field;
 };
 
 // Writes atomically (atomic_file.h): the file is complete or absent. Throws Error(usage) when the content
@@ -146,6 +150,12 @@ DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions
 // counts as unspecified and fits every placement.
 Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
                    const VdbReadLimits& limits = {});
+
+// Reads the points of a float or double grid (`parts` 1) or of one of vectors (3) as they stand in the file: the box of
+// its active voxels, those between that are not active with their value as well. `grid` empty: the only one of that
+// type. Throws Error(io) as above, and when the grid's axes are not those of the world or a value is not finite.
+SampleGrid read_samples(const std::filesystem::path& path, const std::string& grid, int parts,
+                        const VdbReadLimits& limits = {});
 
 // One value of the metadata of a file.
 struct VdbMetadataEntry {

@@ -165,7 +165,7 @@ BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const GridGeometry& geometry)
     return grid;
 }
 
-// The wind at the height of each voxel, in every block of the density grid.
+// The wind at each voxel's centre, in every block of the density grid.
 VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geometry) {
     if (content.wind.size() != std::size_t(geometry.voxels.z))
         throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
@@ -182,7 +182,14 @@ VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geo
             if (voxel.x() >= geometry.voxels.x || voxel.y() >= geometry.voxels.y ||
                 voxel.z() >= geometry.voxels.z)
                 continue;
-            leaf->setValueOn(openvdb::Index(n), profile[std::size_t(voxel.z())]);
+            openvdb::Vec3s velocity = profile[std::size_t(voxel.z())];
+            if (content.wind_field) {
+                const Placement& at = content.density->placement();
+                const Vec3 more = content.wind_field(
+                    at.origin_m + at.cell_size_m * (Vec3(voxel.x(), voxel.y(), voxel.z()) + 0.5));
+                velocity += openvdb::Vec3s(openvdb::Vec3d(more.x, more.y, more.z));
+            }
+            leaf->setValueOn(openvdb::Index(n), velocity);
         }
         accessor.addLeaf(leaf.release());
     }

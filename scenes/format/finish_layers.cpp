@@ -115,6 +115,15 @@ void check_references(const SectionReader& reader, const Scene& scene) {
         const SectionReader item = item_of(reader, "layer", n);
         if (layer.is_veil) continue;
         if (skies_known) check_all_known(item, "skies", layer.skies, scene.skies, "sky");
+        for (std::size_t m = 0; models_known && m < layer.metamorphoses.size(); ++m) {
+            const SectionReader change = rule_of(item, "metamorphoses", m);
+            for (const char* key : {"from", "to"}) {
+                const NamedMetamorphosis& names = layer.metamorphoses[m];
+                const std::string& name = key == std::string_view("from") ? names.from : names.to;
+                if (!name.empty())
+                    check_known(change, change.find(key)->value, name, key, scene.models, "base model");
+            }
+        }
         const SectionReader rain = below(item, "rain");
         for (std::size_t r = 0; models_known && r < layer.rain.attached.size(); ++r) {
             const std::string& model = layer.rain.attached[r].model;
@@ -188,7 +197,12 @@ void fill_in(const SectionReader& reader, const Scene& scene, LayerOptions& laye
     const AutomatonOptions& shared = scene.automaton;
     fill_in_lattice(reader, scene, layer);
     fill_in_centres(layer.scatters, layer.extent, layer.placement);
+    if (layer.initial_state_file && !layer.automaton) {
+        lattice.report("initial_state", lattice.quoted("initial_state") + " stands in a layer without automaton",
+                       "expected `automaton` = true, or no initial state");
+    }
     if (!lattice.find("boundaries")) layer.boundaries = shared.boundaries;
+    if (!reader.find("profile") && !reader.find("background")) layer.profile = shared.field.profile;
     if (!background.find("hum")) layer.background.hum = shared.field.background.hum;
     if (!background.find("act")) layer.background.act = shared.field.background.act;
     if (!background.find("ext")) layer.background.ext = shared.field.background.ext;
@@ -209,7 +223,9 @@ void fill_in_base_height(const SectionReader& reader, const Scene& scene, LayerO
     const double top = bottom + layer.extent.z * layer.placement.cell_size_m;
     const std::string lattice_text = number_text(bottom) + " to " + number_text(top) + " m of its lattice";
     if (const Entry* genus = reader.find("genus")) {
-        const Range heights = base_height_m(genus_from_name(genus->value.text), scene.climate.region);
+        const Range above_ground = base_height_m(genus_from_name(genus->value.text), scene.climate.region);
+        const double ground_m = scene.render.ground.height_m;
+        const Range heights{above_ground.min + ground_m, above_ground.max + ground_m};
         layer.base_height_m = heights;
         if (!layer.automaton) return;
         layer.base_height_m = {std::max(heights.min, bottom), std::min(heights.max, top)};
@@ -255,6 +271,10 @@ void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOpt
     if (lattice.find("boundaries") != nullptr) {
         lattice.report("boundaries", lattice.quoted("boundaries") + " stands beside `veil`",
                        "expected none: a veil is a function of place and goes on beyond its lattice");
+    }
+    if (lattice.find("initial_state") != nullptr) {
+        lattice.report("initial_state", lattice.quoted("initial_state") + " stands beside `veil`",
+                       "expected none: a veil has no state");
     }
     fill_in_lattice(reader, scene, layer);
     const double bottom = layer.placement.origin_m.z;
@@ -366,14 +386,9 @@ void check_layers_or_field(const SectionReader& reader, const Scene& scene) {
         }
         return;
     }
-    const FieldOptions& field = scene.automaton.field;
-    if (!field.ellipsoids.empty() || !field.scatters.empty()) {
-        reader.report("field", "the scene has layers and ellipsoids in `field`",
-                      "expected ellipsoids in a scene without layers, or clouds in the skies of layers");
-    }
     if (scene.initial_state_file) {
         reader.report("lattice", "the scene has layers and `lattice.initial_state`",
-                      "expected the state of a file in a scene without layers alone");
+                      "expected `initial_state` in the `lattice` of the layer that starts from the file");
     }
 }
 
@@ -392,6 +407,7 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
         LayerOptions& layer = scene.layers[n];
         check_layer_name(item, layer.name);
         check_wind_times(item, layer.wind);
+        check_profile_times(item, layer.profile);
         if (layer.is_veil) {
             finish_veil_layer(item, scene, layer);
             continue;

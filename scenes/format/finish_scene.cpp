@@ -154,6 +154,24 @@ void check_wind_times(const SectionReader& owner, const Wind& wind) {
     }
 }
 
+// Fields without heights fill the lattice. Layers with a wind of their own have them, too.
+void finish_wind_fields(const SectionReader& reader, Scene& scene) {
+    const Placement& placement = scene.automaton.placement;
+    const double top_m = placement.origin_m.z + scene.automaton.extent.z * placement.cell_size_m;
+    std::vector<WindField>& fields = scene.automaton.wind.fields;
+    for (std::size_t n = 0; n < fields.size(); ++n) {
+        WindField& field = fields[n];
+        if (std::isinf(field.bottom_m)) field.bottom_m = placement.origin_m.z;
+        if (std::isinf(field.top_m)) field.top_m = top_m;
+        if (field.kind == WindFieldKind::grid || field.bottom_m < field.top_m) continue;
+        const SectionReader item{reader.document, reader.find("wind_field")->value.items[n], indexed("wind_field", n), {}};
+        item.report("kind", "the field ends at " + number_text(field.top_m) + " m and begins at " + number_text(field.bottom_m) + " m",
+                    "expected `bottom_m` below `top_m`; what is missing is that of `[lattice]`");
+    }
+    for (LayerOptions& layer : scene.layers)
+        if (!layer.wind.keyframes.empty()) layer.wind.fields = fields;
+}
+
 // The sun of the scene's place and start, unless the scene says where it stands. The moment of a sun with a date of its
 // own stays; a place of its own, too.
 void place_sun(const SectionReader& reader, Scene& scene) {
@@ -199,13 +217,14 @@ void finish_scene(const SectionReader& reader, void* owner) {
     check_name(reader, scene);
     if (reader.sound({"wind"})) check_wind_times(reader, scene.automaton.wind);
     check_wind_speed(reader, scene);
+    if (reader.sound({"wind_field", "lattice", "layer"})) finish_wind_fields(reader, scene);
     check_periodic_sizes(reader, scene);
     check_frames(reader, scene);
     place_sun(reader, scene);
     check_velocity_name(reader, scene);
-    finish_layers(reader, scene);
     const AutomatonOptions& automaton = scene.automaton;
     fill_in_centres(scene.automaton.field.scatters, automaton.extent, automaton.placement);
+    finish_layers(reader, scene);
 }
 
 }  // namespace nephos

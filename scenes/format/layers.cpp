@@ -109,6 +109,11 @@ SkyOptions sky_options(const Scene& scene, std::size_t layer) {
     options.dissolution_s = given.dissolution_s;
     options.formation_softness = given.formation_softness;
     options.cross_edges_whole = given.cross_edges_whole;
+    options.entering = given.entering;
+    for (const NamedMetamorphosis& m : given.metamorphoses)
+        options.metamorphoses.push_back({index_of(scene.models, m.from, "base model"),
+                                         index_of(scene.models, m.to, "base model"), m.state});
+    options.shear_s = given.shear_s;
     return options;
 }
 
@@ -120,7 +125,10 @@ AutomatonOptions automaton_options(const Scene& scene, std::size_t layer) {
     options.placement = given.placement;
     options.boundaries = given.boundaries;
     options.seed = layer_seed(scene.automaton.seed, layer);
-    options.field = {given.background, {}, given.scatters};
+    options.field.background = given.background;
+    options.field.profile = given.profile;
+    options.field.ellipsoids.insert(options.field.ellipsoids.end(), given.ellipsoids.begin(), given.ellipsoids.end());
+    options.field.scatters.insert(options.field.scatters.end(), given.scatters.begin(), given.scatters.end());
     options.wind = layer_wind(scene, layer);
     return options;
 }

@@ -10,6 +10,7 @@
 //
 // A scene without layers is one lattice with the field of [field] and uses none of this.
 
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
@@ -68,6 +69,13 @@ struct LayerRain {
     bool operator==(const LayerRain&) const = default;
 };
 
+// Metamorphosis (seeds/sky.h) with the base models by name.
+struct NamedMetamorphosis {
+    std::string from, to;
+    Range state{0, 1};
+    bool operator==(const NamedMetamorphosis&) const = default;
+};
+
 struct LayerOptions {
     std::string name;  // letters, digits, '-' and '_': part of file names; no two layers share one
     // True: the density is that of `veil`, a function of position and time, without skies, clouds and
@@ -83,7 +91,12 @@ struct LayerOptions {
     Placement placement;
     Boundaries boundaries;
     Probabilities background{0, 0, 0.1};  // of the field, everywhere (field.h)
-    std::vector<EllipsoidScatter> scatters;  // of the field, beside the clouds of the skies
+    std::vector<BackgroundKeyframe> profile;  // of it by height and time, as FieldOptions::profile
+    // Of the field, beside the clouds of the skies and what the scene's [field] has for all layers.
+    std::vector<Ellipsoid> ellipsoids;
+    std::vector<EllipsoidScatter> scatters;
+    // As Scene::initial_state_file, of this layer.
+    std::optional<std::filesystem::path> initial_state_file;
 
     Range base_height_m{1000, 1000};   // world z of a cloud's base, drawn for each cloud
     Wind wind;                         // without keyframes: the scene's wind
@@ -91,6 +104,9 @@ struct LayerOptions {
 
     double formation_s = 300, dissolution_s = 300, formation_softness = 0.5;  // as in SkyOptions
     bool cross_edges_whole = true;  // the reader's default: only with an automaton
+    Entering entering = Entering::anywhere;
+    std::vector<NamedMetamorphosis> metamorphoses;
+    double shear_s = 0;  // as in SkyOptions
     CouplingOptions coupling;
     LayerRain rain;
     bool own_detail = false;  // true: `detail` holds for this layer instead of the scene's

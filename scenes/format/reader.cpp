@@ -179,12 +179,34 @@ std::string name_from(const std::filesystem::path& file) {
     return name.empty() ? "scene" : name;
 }
 
-void resolve_initial_state(Scene& scene, const Document& document, const std::filesystem::path& folder) {
-    if (!scene.initial_state_file) return;
-    const Entry* lattice = document.root.find("lattice");
-    const Entry* entry = lattice != nullptr ? lattice->value.find("initial_state") : nullptr;
-    const bool from_file = entry == nullptr || document.origin(entry->value.place.origin).is_file;
-    if (from_file) scene.initial_state_file = (folder / *scene.initial_state_file).lexically_normal();
+// Makes the files that the scene names relative to its folder, but for those of options.
+void resolve_files(Scene& scene, const Document& document, const std::filesystem::path& folder) {
+    const auto resolve = [&](const Node& owner, std::optional<std::filesystem::path>& file) {
+        if (!file) return;
+        const Entry* lattice = owner.find("lattice");
+        const Entry* entry = lattice != nullptr ? lattice->value.find("initial_state") : nullptr;
+        const bool from_file = entry == nullptr || document.origin(entry->value.place.origin).is_file;
+        if (from_file) file = (folder / *file).lexically_normal();
+    };
+    resolve(document.root, scene.initial_state_file);
+    const Entry* fields = document.root.find("wind_field");
+    for (std::size_t n = 0; fields != nullptr && n < scene.automaton.wind.fields.size(); ++n) {
+        const Entry* files = fields->value.items[n].find("files");
+        if (files == nullptr || !document.origin(files->value.place.origin).is_file) continue;
+        for (std::string& file : scene.automaton.wind.fields[n].files)
+            file = (folder / file).lexically_normal().string();
+    }
+    const Entry* field = document.root.find("field");
+    const Entry* grids = field != nullptr ? field->value.find("grids") : nullptr;
+    for (std::size_t n = 0; grids != nullptr && n < scene.automaton.field.grids.size(); ++n) {
+        std::optional<std::filesystem::path>& file = scene.automaton.field.grids[n].file;
+        const Entry* entry = grids->value.items[n].find("file");
+        if (entry != nullptr && file && document.origin(entry->value.place.origin).is_file)
+            file = (folder / *file).lexically_normal();
+    }
+    const Entry* layers = document.root.find("layer");
+    for (std::size_t n = 0; layers != nullptr && n < scene.layers.size(); ++n)
+        resolve(layers->value.items[n], scene.layers[n].initial_state_file);
 }
 
 // Throws the problems of the scene's own file first, then those of other files, then those of options.
@@ -254,7 +276,7 @@ Scene read_scene_text(std::string_view text, const std::string& label, const std
     SceneReader(document).read_section(scene_section(), document.root, {}, &scene);
     if (!document.problems.empty()) throw_problems(std::move(document.problems), label);
     if (document.root.find("name") == nullptr) scene.name = name_from(label);
-    resolve_initial_state(scene, document, folder);
+    resolve_files(scene, document, folder);
     try {
         check(scene.automaton);  // what this reader overlooked would otherwise pass validation and fail in
                                  // the run

@@ -54,7 +54,7 @@ struct Scene {
     // A VDB file with bool grids hum, act and cld for the state at step 0; none: automaton.initial.
     std::optional<std::filesystem::path> initial_state_file;
     // Clouds from base models (layers.h). With layers, `automaton` holds their common options: seed, time
-    // step, wind, initial state, and the defaults of lattice and background.
+    // step, wind, initial state, ellipsoids and scatters of every field, and the defaults of lattice and background.
     std::vector<BaseModel> models;
     std::vector<NamedSky> skies;
     ClimateOptions climate;

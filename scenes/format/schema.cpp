@@ -195,6 +195,8 @@ const Section& scene_section() {
              group("field", field_section()),
              tables<&Scene::automaton, &AutomatonOptions::wind, &Wind::keyframes>("wind", wind_section(), 0,
                                                                                   10'000),
+             tables<&Scene::automaton, &AutomatonOptions::wind, &Wind::fields>("wind_field", wind_field_section(), 0,
+                                                                               1000),
              tables<&Scene::models>("model", model_section(), 0, kMaxModels),
              tables<&Scene::skies>("sky", sky_section(), 0, 10'000),
              std::move(climate),

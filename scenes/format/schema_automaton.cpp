@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sections that decide the bits: lattice, time, field and wind.
+// The sections that decide the bits: lattice, time and field.
+
+#include <algorithm>
 
 #include "automaton/air_parcels.h"
 #include "scenes/format/schema_build.h"
@@ -29,7 +31,6 @@ namespace {
 
 constexpr double kFarthest_m = 1e7;  // beyond any weather on Earth
 constexpr double kLongest_s = 1e9;   // about 30 years
-constexpr double kFastest_m_per_s = 1000;
 
 const std::vector<std::string_view> kBoundaryWords{"open", "periodic"};
 
@@ -72,36 +73,6 @@ const char* const kCarriedEffect =
 std::string with_periodic_reach(const char* effect) {
     return effect + (" Along a periodic axis of the lattice an ellipsoid reaches at most " +
                      number_text(kMaxPeriodicReach) + " times the length of that axis from its centre.");
-}
-
-const Section& ellipsoid_section() {
-    static const Section section{
-        "An ellipsoid placed by hand",
-        "Parcels of humid air, placed by hand: inside, clouds are born and live longer. Of all that "
-        "overlap, and of the background, the larger `hum` and `act` and the smaller `ext` count.",
-        {required(key<&Ellipsoid::centre_m>("centre_m", "m", between(-kFarthest_m, kFarthest_m),
-                                            "Centre at its birth, or at time 0 if `birth_s` is below 0: "
-                                            "east, north, height.",
-                                            "D, control of motion")),
-         key<&Ellipsoid::semi_axes_m>("semi_axes_m", "m", above(0, kFarthest_m),
-                                      with_periodic_reach("Half of its length, width and height, before the "
-                                                          "turn by `yaw_deg`.")),
-         key<&Ellipsoid::yaw_deg>("yaw_deg", "deg", between(-360, 360),
-                                  "Turn about the vertical, counter-clockwise seen from above."),
-         table<&Ellipsoid::centre>("centre", probabilities_section(), kCentreEffect),
-         table<&Ellipsoid::rim>("rim", probabilities_section(), kRimEffect),
-         key<&Ellipsoid::birth_s>(
-             "birth_s", "s", between(-kLongest_s, kLongest_s),
-             "Simulated time at which it appears; before 0: it is there from the start."),
-         key<&Ellipsoid::life_s>("life_s", "s", or_infinite(above(0, 0)),
-                                 "Time until it is gone, fades included."),
-         key<&Ellipsoid::fade_in_s>("fade_in_s", "s", between(0, kLongest_s),
-                                    "Time in which it comes to full strength."),
-         key<&Ellipsoid::fade_out_s>("fade_out_s", "s", between(0, kLongest_s),
-                                     "Time in which it vanishes at the end of its life."),
-         key<&Ellipsoid::carried>("carried", "", kAny, kCarriedEffect, "D, control of motion")},
-        &finish_ellipsoid};
-    return section;
 }
 
 void finish_thermals(const SectionReader& reader, void* owner) {
@@ -152,6 +123,36 @@ const Section& thermals_section() {
 }
 
 }  // namespace
+
+const Section& ellipsoid_section() {
+    static const Section section{
+        "An ellipsoid placed by hand",
+        "Parcels of humid air, placed by hand: inside, clouds are born and live longer. Of all that "
+        "overlap, and of the background, the larger `hum` and `act` and the smaller `ext` count.",
+        {required(key<&Ellipsoid::centre_m>("centre_m", "m", between(-kFarthest_m, kFarthest_m),
+                                            "Centre at its birth, or at time 0 if `birth_s` is below 0: "
+                                            "east, north, height.",
+                                            "D, control of motion")),
+         key<&Ellipsoid::semi_axes_m>("semi_axes_m", "m", above(0, kFarthest_m),
+                                      with_periodic_reach("Half of its length, width and height, before the "
+                                                          "turn by `yaw_deg`.")),
+         key<&Ellipsoid::yaw_deg>("yaw_deg", "deg", between(-360, 360),
+                                  "Turn about the vertical, counter-clockwise seen from above."),
+         table<&Ellipsoid::centre>("centre", probabilities_section(), kCentreEffect),
+         table<&Ellipsoid::rim>("rim", probabilities_section(), kRimEffect),
+         key<&Ellipsoid::birth_s>(
+             "birth_s", "s", between(-kLongest_s, kLongest_s),
+             "Simulated time at which it appears; before 0: it is there from the start."),
+         key<&Ellipsoid::life_s>("life_s", "s", or_infinite(above(0, 0)),
+                                 "Time until it is gone, fades included."),
+         key<&Ellipsoid::fade_in_s>("fade_in_s", "s", between(0, kLongest_s),
+                                    "Time in which it comes to full strength."),
+         key<&Ellipsoid::fade_out_s>("fade_out_s", "s", between(0, kLongest_s),
+                                     "Time in which it vanishes at the end of its life."),
+         key<&Ellipsoid::carried>("carried", "", kAny, kCarriedEffect, "D, control of motion")},
+        &finish_ellipsoid};
+    return section;
+}
 
 const Section& scatter_section() {
     Key thermals = default_is(
@@ -206,71 +207,6 @@ const Section& scatter_section() {
     return section;
 }
 
-namespace {
-
-// The wind that comes from a direction, clockwise from north. sin_cos_deg() has the same bits on every
-// machine, which matters because the velocity decides the bits of the simulation.
-Velocity velocity_from(double from_deg, double speed_m_per_s) {
-    const Rotation from = sin_cos_deg(from_deg);
-    return {0.0 - speed_m_per_s * from.sin, 0.0 - speed_m_per_s * from.cos};
-}
-
-void finish_level(const SectionReader& reader, void* owner) {
-    auto& level = *static_cast<WindLevel*>(owner);
-    const bool components = reader.find("east_m_per_s") != nullptr || reader.find("north_m_per_s") != nullptr;
-    const bool direction = reader.find("from_deg") != nullptr && reader.find("speed_m_per_s") != nullptr;
-    if (components && direction) {
-        reader.report(
-            "from_deg", "the wind of this level is given twice",
-            "expected either `east_m_per_s` and `north_m_per_s`, or `from_deg` and `speed_m_per_s`");
-    } else if (direction) {
-        level.velocity = velocity_from(reader.number("from_deg", 0), reader.number("speed_m_per_s", 0));
-    } else if (!components) {
-        reader.report("", "this level has no wind",
-                      "expected `east_m_per_s` and `north_m_per_s`, or `from_deg` and `speed_m_per_s`");
-    }
-}
-
-const Section& level_section() {
-    constexpr Limits kSpeed = between(-kFastest_m_per_s, kFastest_m_per_s);
-    static const Section section{
-        "A level of the wind",
-        "The wind at a height, by its components or as pilots say it; between levels it is linear, below the "
-        "first "
-        "and above the last constant.",
-        {required(key<&WindLevel::height_m>("height_m", "m", between(-kFarthest_m, kFarthest_m),
-                                            "Height above the ground; levels rise.", "D, advection")),
-         key<&WindLevel::velocity, &Velocity::east_m_per_s>("east_m_per_s", "m/s", kSpeed,
-                                                            "Velocity towards east."),
-         key<&WindLevel::velocity, &Velocity::north_m_per_s>("north_m_per_s", "m/s", kSpeed,
-                                                             "Velocity towards north."),
-         together(
-             derived_number("from_deg", "deg", between(-360, 360),
-                            "Where the wind comes from, clockwise from north: 270 is a west wind. Instead of "
-                            "`east_m_per_s` and `north_m_per_s`."),
-             {"speed_m_per_s"}),
-         together(derived_number("speed_m_per_s", "m/s", between(0, kFastest_m_per_s), "Its speed."),
-                  {"from_deg"})},
-        &finish_level};
-    return section;
-}
-
-void finish_wind(const SectionReader& reader, void* owner) {
-    const auto& levels = static_cast<const WindKeyframe*>(owner)->levels;
-    const Entry* entry = reader.find("levels");
-    for (std::size_t n = 1; entry != nullptr && n < levels.size(); ++n) {
-        if (levels[n].height_m > levels[n - 1].height_m) continue;
-        const Node& item = entry->value.items[n];
-        const SectionReader level{reader.document, item, indexed(reader.path + ".levels", n), {}};
-        level.report("height_m",
-                     level.quoted("height_m") + " is " + number_text(levels[n].height_m) +
-                         ", not above the level before it at " + number_text(levels[n - 1].height_m),
-                     "expected heights that rise from level to level, in metres");
-    }
-}
-
-}  // namespace
-
 const Section& probabilities_section() {
     static const Section section{
         "Probabilities",
@@ -287,38 +223,108 @@ const Section& probabilities_section() {
     return section;
 }
 
-const Section& wind_section() {
+namespace {
+
+const Section& background_level_section() {
     static const Section section{
-        "Wind",
-        "The wind, at one or several times: each `[[wind]]` is a profile over height. Between their times "
-        "profiles "
-        "are mixed linearly. Without any, the air is calm. Cells move by whole cells: after n steps of a "
-        "constant wind a layer has moved floor(n * d) cells, d = velocity * `time.step_s` / "
-        "`lattice.cell_size_m` (0.3 cells a step: 2 after 9 steps, 3 after 10; -0.3: -3 after 9 and after "
-        "10). "
-        "d is rounded up to a multiple of 2^-32 cells, so that decimal fractions arrive in time.",
-        {key<&WindKeyframe::time_s>("time_s", "s", between(-kLongest_s, kLongest_s),
-                                    "Simulated time of this profile; times rise."),
-         required(tables<&WindKeyframe::levels>("levels", level_section(), 1, 1000))},
-        &finish_wind};
+        "A level of the background",
+        "The background at a height; between levels it is linear, below the first and above the last constant.",
+        {required(key<&BackgroundLevel::height_m>("height_m", "m", between(-kFarthest_m, kFarthest_m),
+                                                  "Height of the world; levels rise.")),
+         key<&BackgroundLevel::background, &Probabilities::hum>("hum", "per step", between(0, 1),
+                                                                "As `field.background.hum`, there."),
+         key<&BackgroundLevel::background, &Probabilities::act>("act", "per step", between(0, 1),
+                                                                "As `field.background.act`, there."),
+         key<&BackgroundLevel::background, &Probabilities::ext>("ext", "per step", between(0, 1),
+                                                                "As `field.background.ext`, there.")},
+        nullptr};
     return section;
+}
+
+void finish_background_keyframe(const SectionReader& reader, void* owner) {
+    const auto& levels = static_cast<const BackgroundKeyframe*>(owner)->levels;
+    const Entry* entry = reader.find("levels");
+    for (std::size_t n = 1; entry != nullptr && n < levels.size(); ++n) {
+        if (levels[n].height_m > levels[n - 1].height_m) continue;
+        const SectionReader level{reader.document, entry->value.items[n], indexed(reader.path + ".levels", n), {}};
+        level.report("height_m",
+                     level.quoted("height_m") + " is " + number_text(levels[n].height_m) +
+                         ", not above the level before it at " + number_text(levels[n - 1].height_m),
+                     "expected heights that rise from level to level, in metres");
+    }
+}
+
+const Section& probability_grid_section() {
+    static const Section section{
+        "Probabilities from files",
+        "One probability of the background in each cell, from a VDB file: linear between its points, beyond them constant. "
+        "It comes before the profile and the constant background.",
+        {required(word<&ProbabilityGrid::of>("of", {"hum", "act", "ext"}, "Which probability; each at most once.")),
+         required(key<&ProbabilityGrid::file>("file", "", kAny,
+                                              "The VDB file; its values are probabilities, 0 to 1. Relative to the scene's "
+                                              "folder.")),
+         default_is(key<&ProbabilityGrid::grid>("grid", "", kAny, "Name of its float grid."), "the only one")},
+        nullptr};
+    return section;
+}
+
+void finish_field(const SectionReader& reader, void* owner) {
+    const FieldOptions& field = static_cast<const Scene*>(owner)->automaton.field;
+    check_profile_times(reader, field.profile);
+    for (std::size_t n = 0; n < field.grids.size(); ++n) {
+        const auto first = std::ranges::find(field.grids, field.grids[n].of, &ProbabilityGrid::of);
+        if (first == field.grids.begin() + std::ptrdiff_t(n)) continue;
+        const SectionReader item{reader.document, reader.find("grids")->value.items[n], indexed("field.grids", n), {}};
+        item.report("of", item.quoted("of") + " has a file already", "expected one file for a probability");
+    }
+}
+
+}  // namespace
+
+const Section& background_profile_section() {
+    static const Section section{
+        "Background by height and time",
+        "The background at one or several times, each a profile over height: mixed linearly between their times, constant "
+        "before the first and after the last. Instead of the constant background; ellipsoids that fade in or out then come "
+        "from no effect instead of from it.",
+        {key<&BackgroundKeyframe::time_s>("time_s", "s", between(-kLongest_s, kLongest_s),
+                                          "Simulated time of this profile; times rise."),
+         required(tables<&BackgroundKeyframe::levels>("levels", background_level_section(), 1, 1000))},
+        &finish_background_keyframe};
+    return section;
+}
+
+void check_profile_times(const SectionReader& owner, const std::vector<BackgroundKeyframe>& profile) {
+    for (std::size_t n = 1; n < profile.size(); ++n) {
+        if (profile[n].time_s > profile[n - 1].time_s) continue;
+        const SectionReader item{owner.document, owner.find("profile")->value.items[n],
+                                 indexed(owner.path + ".profile", n), {}};
+        item.report("time_s",
+                    item.quoted("time_s") + " is " + number_text(profile[n].time_s) +
+                        ", not after the profile before it at " + number_text(profile[n - 1].time_s),
+                    "expected times that rise from profile to profile, in seconds");
+    }
 }
 
 const Section& field_section() {
     static const Section section{
         "Probability field",
         "How likely vapour, activation and extinction are: the same everywhere, plus ellipsoids of humid "
-        "air.",
+        "air. In a scene with layers these ellipsoids act in the lattice of every layer, beside its own.",
         {table<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::background>(
              "background", probabilities_section(),
              "Probabilities everywhere. Inside ellipsoids the background counts as well: the larger `hum` "
              "and "
              "`act` and the smaller `ext` of both."),
+         tables<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::profile>(
+             "profile", background_profile_section(), 0, 10'000),
+         tables<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::grids>("grids", probability_grid_section(),
+                                                                                   0, 3),
          tables<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::ellipsoids>(
              "ellipsoids", ellipsoid_section(), 0, 100'000),
          tables<&Scene::automaton, &AutomatonOptions::field, &FieldOptions::scatters>(
              "scatters", scatter_section(), 0, 1000)},
-        nullptr};
+        &finish_field};
     return section;
 }
 

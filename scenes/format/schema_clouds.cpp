@@ -65,8 +65,11 @@ const Section& seed_section() {
 }
 
 void finish_model(const SectionReader& reader, void* owner) {
+    auto& model = *static_cast<BaseModel*>(owner);
+    model.own_centre = reader.find("centre") != nullptr;
+    model.own_rim = reader.find("rim") != nullptr;
     try {
-        check(*static_cast<const BaseModel*>(owner));
+        check(model);
     } catch (const Error& error) {
         reader.report("", error.what(), "expected fewer seeds, children or reproductions");
     }
@@ -88,6 +91,14 @@ const Section& model_section() {
          key<&BaseModel::light_distance_m>(
              "light_distance_m", "m", or_infinite(above(0, 0)),
              "Way of light in the cloud after which it is absorbed, for billboards.", "T, CFA"),
+         default_is(written_if(table<&BaseModel::centre>(
+                                   "centre", probabilities_section(),
+                                   "Probabilities at the centre of its boxes' ellipsoids, in every layer's automaton."),
+                               [](const void* model) { return static_cast<const BaseModel*>(model)->own_centre; }),
+                    "that of `layer.coupling`"),
+         default_is(written_if(table<&BaseModel::rim>("rim", probabilities_section(), "The same at their rim."),
+                               [](const void* model) { return static_cast<const BaseModel*>(model)->own_rim; }),
+                    "that of `layer.coupling`"),
          required(tables<&BaseModel::seeds>("seeds", seed_section(), 1, 10'000))},
         &finish_model};
     return section;

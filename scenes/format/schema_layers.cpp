@@ -118,9 +118,38 @@ const Section& layer_lattice_section() {
                         "origin_m", "m", between(-kFarthest_m, kFarthest_m),
                         "Where the lower south-west corner of the box stands."),
                     same),
-         written_if(&of_clouds, default_is(boundaries, same))},
+         written_if(&of_clouds, default_is(boundaries, same)),
+         default_is(key<&LayerOptions::initial_state_file>(
+                        "initial_state", "", kAny,
+                        "A VDB file whose bool grids `hum`, `act` and `cld` are the start of this layer (`nephos "
+                        "state --layer` writes one); relative to the scene's folder. Its cells, their size and its "
+                        "place are those of the layer's lattice."),
+                    "none: by `lattice.initial`")},
         nullptr};
     return section;
+}
+
+const Section& genus_coupling_section() {
+    static const Section section{
+        "Coupling of a genus",
+        "Other probabilities for the clouds of one genus, so that dark Ns and bright Cu of one layer obey rules of their "
+        "own; `model.centre` and `model.rim` come before them.",
+        {required(genus_word<&GenusCoupling::genus>("genus", "Whose clouds; \"none\": of base models without genus.")),
+         table<&GenusCoupling::centre>("centre", probabilities_section(), kCentreEffect),
+         table<&GenusCoupling::rim>("rim", probabilities_section(), kRimEffect)},
+        nullptr};
+    return section;
+}
+
+void finish_coupling(const SectionReader& reader, void* owner) {
+    const std::vector<GenusCoupling>& genera = static_cast<const CouplingOptions*>(owner)->genera;
+    for (std::size_t n = 0; n < genera.size(); ++n) {
+        const auto first = std::ranges::find(genera, genera[n].genus, &GenusCoupling::genus);
+        if (first == genera.begin() + std::ptrdiff_t(n)) continue;
+        const SectionReader item{reader.document, reader.find("genera")->value.items[n],
+                                 indexed(reader.path + ".genera", n), {}};
+        item.report("genus", item.quoted("genus") + " has a table already", "expected one table for a genus");
+    }
 }
 
 const Section& coupling_section() {
@@ -143,8 +172,9 @@ const Section& coupling_section() {
              "size_at_birth", "", between(0, 1),
              "Size of an ellipsoid when its box begins to form, as a fraction."),
          table<&CouplingOptions::centre>("centre", probabilities_section(), kCentreEffect),
-         table<&CouplingOptions::rim>("rim", probabilities_section(), kRimEffect)},
-        nullptr};
+         table<&CouplingOptions::rim>("rim", probabilities_section(), kRimEffect),
+         tables<&CouplingOptions::genera>("genera", genus_coupling_section(), 0, kGenusCount + 1)},
+        &finish_coupling};
     return section;
 }
 
@@ -282,6 +312,27 @@ const Section& rain_section() {
     return section;
 }
 
+void finish_metamorphosis(const SectionReader& reader, void* owner) {
+    const auto& change = *static_cast<const NamedMetamorphosis*>(owner);
+    if (change.state.min < change.state.max) return;
+    reader.report("state", reader.quoted("state") + " is " + number_text(change.state.min) + " alone",
+                  "expected a range of states in which clouds change, such as [0.4, 0.8]");
+}
+
+const Section& metamorphosis_section() {
+    static const Section section{
+        "Change of genus",
+        "Clouds of one base model turn into those of another while the state of the atmosphere crosses a range, and back "
+        "when it falls: the boxes of the first go from the edges inwards, those of the second come from the centre "
+        "outwards, each with its model's probabilities. Each cloud changes over half of the range, at a state of its own.",
+        {required(key<&NamedMetamorphosis::from>("from", "", kAny, "Base model that changes; each at most once.", "T, 5")),
+         required(key<&NamedMetamorphosis::to>("to", "", kAny, "Base model that it becomes; this one may change on.",
+                                               "T, 5")),
+         key<&NamedMetamorphosis::state>("state", "", between(0, 1), "States between which it happens.")},
+        &finish_metamorphosis};
+    return section;
+}
+
 void finish_layer(const SectionReader& reader, void* owner) {
     auto& layer = *static_cast<LayerOptions*>(owner);
     layer.is_veil = reader.find("veil") != nullptr;
@@ -310,16 +361,14 @@ const Section& layer_section() {
     static const Section section = [] {
         Key genus =
             plain_key(KeyKind::word, "genus", {}, {},
-                      "Instead of `base_height_m`: the heights of this genus in `climate.region`, as far as "
-                      "they lie in the lattice.",
+                      "Instead of `base_height_m`: the heights of this genus in `climate.region` above "
+                      "`ground.height_m`, as far as they lie in the lattice.",
                       "T, 2");
         for (const GenusFacts& facts : genera()) genus.words.push_back(facts.abbreviation);
         Section layers{
             "Layers",
             "Layers of clouds, simulated together: each has its own lattice, skies and wind, or is a veil. "
-            "With layers, "
-            "the field "
-            "comes from their clouds alone.",
+            "The field of each comes from its clouds, its own ellipsoids and those of `[field]`.",
             {required(key<&LayerOptions::name>("name", "", kAny,
                                                "Part of its files' names: letters, digits, `-` and `_`.")),
              default_is(key<&LayerOptions::skies>("skies", "", kAny, "Names of its skies.", "T, 3.4"),
@@ -337,6 +386,9 @@ const Section& layer_section() {
                             "Probabilities everywhere, inside clouds' ellipsoids as well; keys that "
                             "are missing are those of `[field.background]`."),
                         "that of `[field.background]`"),
+             default_is(tables<&LayerOptions::profile>("profile", background_profile_section(), 0, 10'000),
+                        "that of `[field]`, in a layer without `background`"),
+             tables<&LayerOptions::ellipsoids>("ellipsoids", ellipsoid_section(), 0, 100'000),
              tables<&LayerOptions::scatters>("scatters", scatter_section(), 0, 1000),
              default_is(key<&LayerOptions::base_height_m>("base_height_m", "m", between(-1e5, 1e5),
                                                           "Height of clouds' bases, drawn for each.", "T, 2"),
@@ -359,6 +411,20 @@ const Section& layer_section() {
                             "Whether clouds cross the world's edge whole; otherwise they form "
                             "while they enter and dissolve once they have left."),
                         "that of `automaton`: clouds that are drawn directly can be seen beyond the edge"),
+             word<&LayerOptions::entering>(
+                 "entering", {"anywhere", "horizon"},
+                 "How the number of clouds follows the state. \"anywhere\": in every step, so that missing "
+                 "clouds form and surplus ones dissolve inside. \"horizon\": new clouds enter upwind, as "
+                 "densely as the state asks for, and those that are there stay until they leave; in calm "
+                 "air nothing changes.",
+                 "T, 3.4"),
+             tables<&LayerOptions::metamorphoses>("metamorphoses", metamorphosis_section(), 0, 1000),
+             key<&LayerOptions::shear_s>(
+                 "shear_s", "s", between(0, 1e6),
+                 "Time over which billboards of clouds that are drawn directly lean with the wind's shear: at another "
+                 "height than the cloud's centre by the difference of the winds times this. Clouds of an automaton are "
+                 "sheared by its wind.",
+                 "T, 5"),
              table<&LayerOptions::coupling>("coupling", coupling_section(), coupling_section().effect),
              table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect),
              default_is(table<&LayerOptions::detail>("detail", detail_section(), detail_section().effect),
@@ -370,6 +436,16 @@ const Section& layer_section() {
             if (std::ranges::find(keys_of_clouds(), key.name) != keys_of_clouds().end()) {
                 key.written = &of_clouds;
             }
+            if (key.name == "entering")
+                key.written = [](const void* owner) {
+                    const auto& layer = *static_cast<const LayerOptions*>(owner);
+                    return !layer.is_veil && layer.entering != Entering::anywhere;
+                };
+            if (key.name == "shear_s")
+                key.written = [](const void* owner) {
+                    const auto& layer = *static_cast<const LayerOptions*>(owner);
+                    return !layer.is_veil && layer.shear_s != 0;
+                };
             if (key.name == "detail")
                 key.written = [](const void* owner) { return static_cast<const LayerOptions*>(owner)->own_detail; };
         }
@@ -382,7 +458,8 @@ std::span<const std::string_view> keys_of_clouds() {
     static constexpr std::string_view kKeys[] = {
         "skies",    "automaton",   "background",    "base_height_m",      "genus",
         "climate",  "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole",
-        "coupling", "rain",        "scatters"};
+        "coupling", "rain",        "scatters",      "ellipsoids",         "profile",
+        "entering", "metamorphoses", "shear_s"};
     return kKeys;
 }
 

@@ -36,9 +36,14 @@ const Section& georeference_section();
 
 // Owner: CameraKey.
 const Section& camera_path_section();
+// Owner: BackgroundKeyframe.
+const Section& background_profile_section();
 // Owner: WindKeyframe.
 const Section& wind_section();
-// Ellipsoids at random: of the field, or of a layer.
+// Owner: WindField.
+const Section& wind_field_section();
+// Ellipsoids placed by hand and at random: of the field, or of a layer.
+const Section& ellipsoid_section();
 const Section& scatter_section();
 // Owner: Probabilities.
 const Section& probabilities_section();
@@ -62,6 +67,9 @@ void finish_scene(const SectionReader& reader, void* owner);
 
 // Reports profiles of the key `wind` of a scene or a layer unless their times rise strictly.
 void check_wind_times(const SectionReader& owner, const Wind& wind);
+
+// Reports profiles of the key `profile` of the field or a layer unless their times rise strictly.
+void check_profile_times(const SectionReader& owner, const std::vector<BackgroundKeyframe>& profile);
 
 // Reports key frames of the camera unless their times rise strictly; the reader is that of [camera].
 void check_camera_path(const SectionReader& reader, const Camera& camera);

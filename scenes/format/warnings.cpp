@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -45,6 +46,14 @@ void add_cuts(const std::string& key, const Vec3& low_m, const Vec3& high_m, con
     }
 }
 
+void add_ellipsoids(const std::vector<Ellipsoid>& ellipsoids, const std::string& table, const Box& box,
+                    std::vector<std::string>& to) {
+    for (std::size_t n = 0; n < ellipsoids.size(); ++n) {
+        const Ellipsoid& e = ellipsoids[n];
+        add_cuts(fmt::format("{} number {}", table, n + 1), e.centre_m, e.centre_m, reach_m(e), box, to);
+    }
+}
+
 // `table`: "[[field.scatters]]", and of which layer.
 void add_scatters(const std::vector<EllipsoidScatter>& scatters, const std::string& table, const Box& box,
                   std::vector<std::string>& to) {
@@ -68,17 +77,47 @@ std::vector<std::string> warnings(const Scene& scene) {
     if (scene.layers.empty()) {
         const AutomatonOptions& a = scene.automaton;
         const Box box = box_of(a.extent, a.placement, a.boundaries, scene.density.detail);
-        for (std::size_t n = 0; n < a.field.ellipsoids.size(); ++n) {
-            const Ellipsoid& e = a.field.ellipsoids[n];
-            add_cuts(fmt::format("[[field.ellipsoids]] number {}", n + 1), e.centre_m, e.centre_m, reach_m(e), box, result);
-        }
+        add_ellipsoids(a.field.ellipsoids, "[[field.ellipsoids]]", box, result);
         add_scatters(a.field.scatters, "[[field.scatters]]", box, result);
     }
     for (std::size_t n = 0; n < scene.layers.size(); ++n) {
         const LayerOptions& layer = scene.layers[n];
         if (layer.is_veil || !layer.automaton) continue;
-        add_scatters(layer.scatters, fmt::format("[[layer.scatters]] of layer '{}',", layer.name),
-                     box_of(layer.extent, layer.placement, layer.boundaries, layer_detail(scene, n)), result);
+        const Box box = box_of(layer.extent, layer.placement, layer.boundaries, layer_detail(scene, n));
+        add_ellipsoids(layer.ellipsoids, fmt::format("[[layer.ellipsoids]] of layer '{}',", layer.name), box, result);
+        add_scatters(layer.scatters, fmt::format("[[layer.scatters]] of layer '{}',", layer.name), box, result);
+    }
+    return result;
+}
+
+std::vector<std::string> keys_without_effect(const Scene& scene) {
+    std::vector<std::string> result;
+    std::set<std::string> drawn, grown;  // base models of layers without and with an automaton
+    for (const LayerOptions& layer : scene.layers) {
+        if (layer.is_veil) continue;
+        std::set<std::string>& used = layer.automaton ? grown : drawn;
+        for (const NamedSky& sky : scene.skies)
+            if (std::ranges::count(layer.skies, sky.name) > 0) used.insert(sky.models.begin(), sky.models.end());
+        for (const NamedMetamorphosis& change : layer.metamorphoses) used.insert(change.to);
+        const bool field = !layer.scatters.empty() || !layer.ellipsoids.empty() || !layer.profile.empty() ||
+                           !layer.coupling.genera.empty();
+        if (!layer.automaton && field)
+            result.push_back(fmt::format("layer '{}' is drawn directly: its ellipsoids, scatters, profile and coupling have no "
+                                         "effect without `automaton`", layer.name));
+        if (layer.automaton && layer.shear_s > 0)
+            result.push_back(fmt::format("layer '{}': `shear_s` has no effect on the clouds of an automaton, which the wind "
+                                         "shears itself", layer.name));
+    }
+    const Seed plain;
+    for (const BaseModel& model : scene.models) {
+        if (!grown.contains(model.name) || drawn.contains(model.name)) continue;
+        const bool given = std::ranges::any_of(model.seeds, [&](const Seed& seed) {
+            return std::isfinite(model.light_distance_m) || !(seed.billboards == plain.billboards && seed.billboard_width_m == plain.billboard_width_m &&
+                     seed.billboard_height_m == plain.billboard_height_m && seed.texture == plain.texture);
+        });
+        if (given)
+            result.push_back(fmt::format("base model '{}': `light_distance_m` and the numbers, sizes and textures of billboards "
+                                         "have no effect: all layers that use it have an automaton", model.name));
     }
     return result;
 }

@@ -15,4 +15,8 @@ namespace nephos {
 // these (detail.apron_cells, or no detail). Ellipsoids count as far as their radius. Pure.
 std::vector<std::string> warnings(const Scene& scene);
 
+// Returns a sentence for each group of keys that have no effect because of how layers draw their clouds: billboards of
+// base models that only automata use, what only automata read in layers without one. Pure.
+std::vector<std::string> keys_without_effect(const Scene& scene);
+
 }  // namespace nephos

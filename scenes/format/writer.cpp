@@ -222,9 +222,15 @@ std::vector<std::pair<std::string, std::string>> parameters(const Scene& scene) 
 }
 
 std::string scene_hash(const Scene& scene) {
-    if (!scene.initial_state_file) return hash_of(to_toml(scene));
-    Scene named = scene;  // the folder that the state's file was found in does not make another scene
-    named.initial_state_file = scene.initial_state_file->filename();
+    Scene named = scene;  // the folder that a state's file was found in does not make another scene
+    const auto shorten = [](std::optional<std::filesystem::path>& file) {
+        if (file) file = file->filename();
+    };
+    shorten(named.initial_state_file);
+    for (LayerOptions& layer : named.layers) shorten(layer.initial_state_file);
+    for (ProbabilityGrid& grid : named.automaton.field.grids) shorten(grid.file);
+    for (WindField& field : named.automaton.wind.fields)
+        for (std::string& file : field.files) file = std::filesystem::path(file).filename().string();
     return hash_of(to_toml(named));
 }
 
@@ -243,6 +249,11 @@ std::string simulation_hash(const Scene& scene, std::string_view initial_state_h
     }
     simulation.steps = 0;
     if (scene.initial_state_file) simulation.initial_state_file = "state";
+    for (LayerOptions& layer : simulation.layers)
+        if (layer.initial_state_file) layer.initial_state_file = "state";
+    for (ProbabilityGrid& grid : simulation.automaton.field.grids) grid.file = "probabilities";
+    for (WindField& field : simulation.automaton.wind.fields)
+        for (std::string& file : field.files) file = "wind";
     std::string text = to_toml(simulation);
     text += initial_state_hash;
     return hash_of(text);

@@ -255,7 +255,8 @@ TEST(Field, EvaluatesTheFormulaOfItsHead) {
         e.rim = {0.2, 0.003, 0.3};
         ellipsoids.push_back({e, 0.3 + 0.15 * n});
     }
-    const BlockField field(o, ellipsoids);
+    const Background background(o);
+    const BlockField field(o, ellipsoids, background);
     std::vector<const FieldEllipsoid*> row;
     BlockPlan plan;
     for (int bz = 0; bz < 5; ++bz) {
@@ -268,7 +269,7 @@ TEST(Field, EvaluatesTheFormulaOfItsHead) {
                     const int i = 8 * bx + dx, j = 8 * by + dy, k = 8 * bz + dz;
                     if (i >= 60 || j >= 50 || k >= 40) continue;
                     for (int draw : {kHum, kAct, kExt}) {
-                        EXPECT_NEAR(double(probability_at(field, plan, draw, dx, dy, dz)),
+                        EXPECT_NEAR(double(probability_at(plan, draw, dx, dy, dz)),
                                     reference::probability(o, ellipsoids, draw, i, j, k), 2e-5)
                             << i << ' ' << j << ' ' << k << " draw " << draw;
                     }

@@ -64,6 +64,15 @@ AutomatonOptions any_options(Dice& dice) {
         e.carried = dice.coin();
         o.field.ellipsoids.push_back(e);
     }
+    if (dice.integer(0, 2) == 0) {
+        o.field.profile = {{0, {{origin.z + 4 * cell, any_probabilities(dice)}, {origin.z + 9 * cell, any_probabilities(dice)}}},
+                           {50, {{origin.z, any_probabilities(dice)}}}};
+    }
+    if (dice.integer(0, 2) == 0) {
+        SampleGrid grid{origin, Vec3(cell * 7.3), {4, 3, 2}, 1, {}};
+        for (int n = 0; n < 24; ++n) grid.values.push_back(float(dice.coin() ? 0.02 : dice.real(0, 1)));
+        o.field.grids.push_back({ProbabilityKind(dice.integer(0, 2)), {}, {}, std::make_shared<const SampleGrid>(grid)});
+    }
     if (dice.coin()) {
         const auto speed = [&] { return dice.pick({0, 0.3, -2, 40, 3000, -1e5}) * dice.real(0.5, 1); };
         o.wind.keyframes = {{0, {{origin.z, {speed(), speed()}}, {origin.z + 900, {speed(), speed()}}}},

@@ -48,7 +48,7 @@ struct BlockDraws {
         return random_word(options.seed, draw_id, step, bx, by, bz, sub, n);
     }
     float p(int draw, int cell) const {
-        const float value = probability_at(field, plan, draw, cell % 8, cell / 8 % 8, cell / 64);
+        const float value = probability_at(plan, draw, cell % 8, cell / 8 % 8, cell / 64);
         if (value > plan.draws[std::size_t(draw)].p_max)
             throw std::logic_error("a cell exceeds the bound of its block");
         return value;
@@ -164,7 +164,9 @@ Cells grow(const Cells& now, const Boundaries& b) {
 
 void extinguish_and_bear(Cells& cells, const AutomatonOptions& options, std::uint32_t step,
                          const std::vector<ActiveEllipsoid>& ellipsoids) {
-    const BlockField field(options, ellipsoids);
+    Background background(options);
+    background.set_time(options, double(step) * options.time_step_s);
+    const BlockField field(options, ellipsoids, background);
     const PoissonLadder ladder;
     const Extent e = options.extent;
     for (int bz = 0; bz * 8 < e.z; ++bz) {

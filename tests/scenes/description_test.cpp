@@ -89,6 +89,11 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());
     EXPECT_EQ(keys_at({"field", "scatters"}), member_count<EllipsoidScatter>());
     EXPECT_EQ(keys_at({"field", "scatters", "thermals"}), member_count<ThermalPlume>());
+    EXPECT_EQ(keys_at({"field", "profile"}), member_count<BackgroundKeyframe>());
+    // A level's background has three keys.
+    EXPECT_EQ(keys_at({"field", "profile", "levels"}), member_count<BackgroundLevel>() - 1 + member_count<Probabilities>());
+    EXPECT_EQ(keys_at({"field", "grids"}), member_count<ProbabilityGrid>() - 1);  // the samples are the file's
+    EXPECT_EQ(keys_at({"wind_field"}), member_count<WindField>() - 1);            // likewise
     EXPECT_EQ(keys_at({"wind"}), member_count<WindKeyframe>());
     // A level's velocity has two keys.
     EXPECT_EQ(keys_at({"wind", "levels"}), member_count<WindLevel>() - 1 + member_count<Velocity>());
@@ -101,19 +106,21 @@ TEST(Description, EveryOptionHasAKey) {
 }
 
 TEST(Description, EveryOptionOfCloudsHasAKey) {
-    EXPECT_EQ(keys_at({"model"}), member_count<BaseModel>());
+    EXPECT_EQ(keys_at({"model"}), member_count<BaseModel>() - 2);  // whether it has a centre and a rim of its own
     EXPECT_EQ(keys_at({"model", "seeds"}), member_count<Seed>());
     EXPECT_EQ(keys_at({"model", "seeds", "roots"}), member_count<Root>());
     EXPECT_EQ(keys_at({"sky"}), member_count<NamedSky>());
     EXPECT_EQ(keys_at({"climate"}), member_count<ClimateOptions>());
     EXPECT_EQ(keys_at({"climate", "schedule"}), member_count<StatePoint>());
-    // [layer.lattice] holds extent, placement (two keys) and boundaries, [layer.climate] the schedule.
+    // [layer.lattice] holds extent, placement (two keys), boundaries and initial state, [layer.climate] the schedule.
     // Whether it is a veil is said by the table of that name, as is whether it has detail of its own.
-    EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 4);
+    EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 5);
+    EXPECT_EQ(keys_at({"layer", "metamorphoses"}), member_count<NamedMetamorphosis>());
+    EXPECT_EQ(keys_at({"layer", "coupling", "genera"}), member_count<GenusCoupling>());
     EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 1);  // the seed is the layer's
     EXPECT_EQ(keys_at({"layer", "veil", "area"}), member_count<VeilArea>());
     EXPECT_EQ(keys_at({"layer", "veil", "octave"}), member_count<VeilOctave>());
-    EXPECT_EQ(keys_at({"layer", "lattice"}), 4u);
+    EXPECT_EQ(keys_at({"layer", "lattice"}), 5u);
     EXPECT_EQ(keys_at({"layer", "climate"}), 1u);
     EXPECT_EQ(keys_at({"layer", "coupling"}), member_count<CouplingOptions>());
     EXPECT_EQ(keys_at({"layer", "rain"}), member_count<LayerRain>());
@@ -137,6 +144,13 @@ x_m = [0, 5]
 semi_axis_x_m = 300
 [[wind]]
 levels = [{ height_m = 100, east_m_per_s = 2 }, { height_m = 400, north_m_per_s = 3 }]
+[[wind_field]]
+kind = "vortex"
+[[field.profile]]
+levels = [{ height_m = 100, hum = 0.2 }, { height_m = 400, ext = 0.3 }]
+[[field.grids]]
+of = "act"
+file = "p.vdb"
 )",
                            "full.toml");
 }
@@ -167,8 +181,13 @@ schedule = [{ time_s = 0, state = 0 }, { time_s = 900, state = 1 }]
 [[model]]
 name = "billboard"
 genus = "Cu"
+centre = { hum = 0.3 }
+rim = { ext = 0.2 }
 [[model.seeds]]
 roots = [{ reproductions = [1, 2], seeds_start = 3, seeds_end = 2 }]
+[[model]]
+name = "other"
+seeds = [{}]
 [[sky]]
 name = "fair"
 state = 0
@@ -184,6 +203,12 @@ name = "low"
 skies = ["fair", "storm"]
 base_height_m = [100, 150]
 climate = { schedule = [{ time_s = 10, state = 0.5 }] }
+entering = "horizon"
+shear_s = 60
+coupling = { genera = [{ genus = "Cu", centre = { act = 0.2 } }] }
+metamorphoses = [{ from = "billboard", to = "other", state = [0.3, 0.6] }]
+ellipsoids = [{ centre_m = [5, 6, 120] }]
+profile = [{ levels = [{ height_m = 10, hum = 0.1 }] }]
 wind = [{ levels = [{ height_m = 100, east_m_per_s = 2 }] }]
 [layer.rain]
 placed = [{ x_m = 100, y_m = 200 }]
@@ -291,7 +316,7 @@ void for_every_value(const Section& section, void* owner, const std::string& pat
 // What names something else: changed alone, the scene is no longer valid, but its hash is another one.
 bool is_reference(const std::string& path) {
     return path.ends_with("/name") || path.ends_with("/models") || path.ends_with("/skies") ||
-           path.ends_with("/model") || path.ends_with("/initial_state");
+           path.ends_with("/model") || path.ends_with("/from") || path.ends_with("/to") || path.ends_with("/initial_state");
 }
 
 // What must fit its neighbours.

@@ -36,6 +36,36 @@ TEST(Coupling, EveryBoxBecomesAnEllipsoid) {
     }
 }
 
+// Dark rain clouds and bright fair ones in one layer: a model's own probabilities come before those of its genus, these
+// before the layer's.
+TEST(Coupling, ModelsAndGeneraHaveProbabilitiesOfTheirOwn) {
+    CouplingOptions options;
+    options.centre = {0.1, 0, 0};
+    options.rim = {0.01, 0, 0};
+    options.genera = {{Genus::Ns, {0.2, 0, 0}, {0.02, 0, 0}}, {std::nullopt, {0.3, 0, 0}, {0.03, 0, 0}}};
+    BaseModel model = test::single_box_model(100);
+    model.genus = Genus::Cu;
+    EXPECT_EQ(probabilities_of(model, options).centre.hum, 0.1);
+    model.genus = Genus::Ns;
+    EXPECT_EQ(probabilities_of(model, options).centre.hum, 0.2);
+    EXPECT_EQ(probabilities_of(model, options).rim.hum, 0.02);
+    model.own_centre = true;
+    model.centre = {0.4, 0, 0};
+    EXPECT_EQ(probabilities_of(model, options).centre.hum, 0.4);
+    EXPECT_EQ(probabilities_of(model, options).rim.hum, 0.02) << "the rim is still the genus's";
+    model.genus.reset();
+    model.own_rim = true;
+    model.rim = {0.05, 0, 0};
+    EXPECT_EQ(probabilities_of(model, options).rim.hum, 0.05);
+    std::vector<ActiveEllipsoid> out;
+    append_ellipsoids(out, model, reproduce(model, 1, 0, 0), {}, 1, 0.5, options);
+    ASSERT_EQ(out.size(), 1u);
+    EXPECT_EQ(out[0].ellipsoid.centre, model.centre);
+    EXPECT_EQ(out[0].ellipsoid.rim, model.rim);
+    options.genera[0].centre.act = 1.5;
+    test::expect_error(ErrorCode::usage, "coupling of a genus", [&] { check(options); });
+}
+
 // Weight and size follow the phase of each box: the centre before the edge, nothing at phase 0.
 TEST(Coupling, FollowsThePhase) {
     const BaseModel model = test::branching_model();
