@@ -183,6 +183,11 @@ BitPlaneView Automaton::act() const { return impl_->lattice.act.view(); }
 BitPlaneView Automaton::cld() const { return impl_->lattice.cld.view(); }
 
 std::uint64_t Automaton::crowded_out() const { return impl_->motion ? impl_->motion->crowded_out() : 0; }
+Displacement Automaton::displacement_of_layer(int k, std::uint64_t step) const {
+    return nephos::displacement_of_layer(impl_->options, k, double(step) * impl_->options.time_step_s);
+}
+
+std::span<const Displacement> Automaton::beyond_whole_cells() const { return impl_->fraction; }
 
 StateHash Automaton::hash() const { return hash_of(impl_->lattice); }
 

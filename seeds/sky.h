@@ -81,6 +81,9 @@ struct SkyOptions {
     // Time over which billboards lean with the shear of the wind: those at another height than their cloud's centre
     // are displaced by the difference of the winds times this, >= 0.
     double shear_s = 0;
+    // True: the world repeats. A cloud whose centre crosses an edge goes on at the opposite one, none leaves or enters, and
+    // those of a new state form inside.
+    bool periodic = false;
     bool operator==(const SkyOptions&) const = default;
 };
 

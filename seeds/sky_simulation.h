@@ -17,6 +17,7 @@
 //   upwind sides get clouds in proportion to the air that crosses them.
 // - Missing clouds form inside; surplus ones, drawn at random, dissolve inside. In calm air all form inside.
 // - Wind that crosses the world in one step leaves no cloud for longer than two steps.
+// - In a world that repeats (SkyOptions::periodic) clouds re-enter where they leave, and all others form inside.
 // - A sky without base models supplies no cloud: the other bracketing sky then supplies all.
 //
 // With Entering::horizon the air that flows in carries clouds as densely as the state asks for, and no cloud forms
@@ -145,6 +146,7 @@ class SkySimulation {
 
     void make_shapes();
     void move_clouds();
+    void re_enter(SkyCloud& cloud) const;
     void retire_clouds();
     void adjust_number(std::size_t left);
     void let_enter();

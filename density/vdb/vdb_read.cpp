@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "density/metaballs.h"
 #include "density/openvdb_access.h"
+#include "density/vdb/block_stream.h"
 #include "density/vdb/mask_file.h"
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
@@ -23,9 +24,6 @@ namespace {
 
 using openvdb::Coord;
 using openvdb::CoordBBox;
-
-// The type of the next record in the stream of blocks.
-enum class Record : std::uint8_t { end, leaf, tile };
 
 template <class Grid>
 bool is(const openvdb::GridBase& grid) {
@@ -214,40 +212,20 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, bool masks
     send_metadata(writer, metadata ? metadata : from_meta_map(archive.metadata()));
     writer.value(refine_of(header));
 
-    const auto coord = [&](const Coord& c) {
-        for (int a = 0; a < 3; ++a) writer.value(std::int32_t(c[a]));
-    };
     DensityReceiver receiver;
     receiver.begin = [&](const Extent& extent, const Placement& placement) {
         writer.value(extent);
         writer.value(placement);
     };
-    receiver.leaf = [&](const Coord& origin, const float* values) {
-        writer.value(Record::leaf);
-        coord(origin);
-        writer.bytes(values, kBlockVoxels * sizeof(float));
-    };
-    receiver.tile = [&](const Coord& origin, float value) {
-        writer.value(Record::tile);
-        coord(origin);
-        writer.value(value);
-    };
+    receiver.leaf = [&](const Coord& origin, const float* values) { send_leaf(writer, origin, values); };
+    receiver.tile = [&](const Coord& origin, float value) { send_tile(writer, origin, value); };
     const bool y_up = has_y_up(header, archive.metadata(), options.up_axis);
     const ForeignGrid foreign{grid.get(), bounds_of(*grid, header), y_up, options.metres_per_unit,
                               memory_bytes};
     const ForeignResult result = convert_foreign(foreign, receiver);
-    writer.value(Record::end);
+    send_end(writer);
     writer.value(std::uint8_t(result.resampled));
     writer.value(result.negative);
-}
-
-Coord receive_origin(SandboxReader& reader, const Extent& extent) {
-    const auto x = reader.value<std::int32_t>(), y = reader.value<std::int32_t>(),
-               z = reader.value<std::int32_t>();
-    const bool inside = x >= 0 && y >= 0 && z >= 0 && x < extent.x && y < extent.y && z < extent.z;
-    if (!inside || ((x | y | z) & (kBlock - 1)) != 0)
-        throw std::runtime_error("the reading process sent a misplaced block");
-    return {x, y, z};
 }
 
 // The parent's part: builds the grid from the child's stream.
@@ -265,31 +243,10 @@ LoadedDensity receive_density(SandboxReader& reader) {
     if (!possible || !(placement.cell_size_m > 0) ||
         !std::isfinite(origin_m.x + origin_m.y + origin_m.z + placement.cell_size_m))
         throw std::runtime_error("the reading process sent an impossible size");
-    const auto check = [](std::span<const float> values) {
-        for (const float value : values)
-            if (!(value >= 0 && std::isfinite(value)))
-                throw std::runtime_error("the reading process sent an impossible density");
-    };
-    TreeBuilder builder;
-    for (;;) {
-        const auto record = reader.value<Record>();
-        if (record == Record::end) break;
-        const Coord origin = receive_origin(reader, extent);
-        if (record == Record::tile) {
-            const auto density = reader.value<float>();
-            check({&density, 1});
-            NewBlock{nullptr, density}.move_to(builder, origin);
-            continue;
-        }
-        auto leaf = uninitialised_leaf(origin);
-        reader.bytes(leaf->buffer().data(), kBlockVoxels * sizeof(float));
-        check({leaf->buffer().data(), kBlockVoxels});
-        NewBlock::from(std::move(leaf)).move_to(builder, origin);
-    }
+    loaded.density = receive_blocks(reader, extent, placement);
     ForeignResult result;
     result.resampled = reader.value<std::uint8_t>() != 0;
     result.negative = reader.value<std::uint64_t>();
-    loaded.density = builder.finish(extent, placement);
     if (result.resampled) {
         loaded.notes.push_back("its voxels are not cubes along the axes: resampled to voxels of " +
                                number_text(placement.cell_size_m, 6) + " m");
@@ -336,7 +293,7 @@ void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& na
             }
         }
     }
-    writer.value(Record::end);
+    send_end(writer);
 }
 
 constexpr const char* kStateGrids[] = {"hum", "act", "cld"};
@@ -446,11 +403,13 @@ void receive_plane(SandboxReader& reader, BitPlane& plane) {
     }
 }
 
+void check_options(const VdbReadOptions& options) {
+    if (options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit)) return;
+    throw Error(ErrorCode::usage, number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
+}
+
 LoadedDensity load(const std::filesystem::path& path, const VdbReadOptions& options, bool masks) {
-    if (!(options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit))) {
-        throw Error(ErrorCode::usage,
-                    number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
-    }
+    check_options(options);
     LoadedDensity loaded;
     const std::size_t memory_bytes = memory_limit(options.limits);  // here: the child cannot ask the system
     in_sandbox(
@@ -470,6 +429,26 @@ LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptio
 
 LoadedDensity load_mask(const std::filesystem::path& path, const VdbReadOptions& options) {
     return load(path, options, true);
+}
+
+void load_densities(std::span<const std::filesystem::path> paths, const VdbReadOptions& options,
+                    const std::function<bool(std::size_t, LoadedDensity&&)>& each) {
+    check_options(options);
+    struct Stopped {};
+    const std::size_t memory_bytes = memory_limit(options.limits);
+    try {
+        for (std::size_t first = 0; first < paths.size(); first += kMostFilesOfAChild) {
+            in_sandbox(
+                paths.subspan(first, std::min(kMostFilesOfAChild, paths.size() - first)), options.limits,
+                [&](VdbArchive& archive, SandboxWriter& writer) {
+                    send_density(archive, options, false, memory_bytes, writer);
+                },
+                [&](SandboxReader& reader, std::size_t n) {
+                    if (!each(first + n, receive_density(reader))) throw Stopped();
+                });
+        }
+    } catch (const Stopped&) {
+    }
 }
 
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options) {

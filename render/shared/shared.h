@@ -45,6 +45,9 @@ NEPHOS_CONST uint kSkyColumns = 64u, kSkyRows = 96u;  // of the tables of the sk
 // Scattered, haze, sunlight by altitude; and of the air up to a distance: extinction, the source of what is
 // scattered and of haze, each towards the sun, beside it and away from it.
 NEPHOS_CONST uint kSkyLayers = 10u;
+// Of the azimuths of the latter three, from the sun's: 1, 0 and -1 times this is their cosine. So the error of what is
+// square in the cosine between them is less than with 1, and beyond them no larger.
+NEPHOS_CONST float kAirAzimuth = 0.93f;
 NEPHOS_CONST uint kAirLayer = 3u;             // the first of the latter
 NEPHOS_CONST uint kAirRows = 48u;             // of those above the horizon, and of those below
 // Metres within which light shafts lie: what they take away is no more than the source of this air.
@@ -71,7 +74,10 @@ struct ViewBall {
     float x, y, z;      // centre relative to the eye
     float radius;       // metres
     float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * line_integral()
-    float sun_depth;    // optical depth towards the sun: exp(-sun_depth) arrives
+    // Optical depth towards the sun: exp(-sun_depth) arrives. Below 0 its bits hold two halfs without their signs: of light
+    // that is scattered once, and behind it the one at which scattered_often() gives the light that diffuses
+    // (two_depths() in render/frame/scattering_table.h).
+    float sun_depth;
     float height;       // in the cloud: 0 base, 1 top
     uint flags;  // lower half; upper half: transmitted fraction of the lightning, 0..65535. On the device a
                  // ViewBall with kBillboardFlag stands for a billboard and has nothing but its centre
