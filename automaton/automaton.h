@@ -69,7 +69,7 @@ class Automaton {
 
     // Returns the displacement by the wind of layer k, 0..extent.z - 1, in the step that begins at `step`, in cells. The sum
     // over all steps is the way of the air; bits lie at its floor, and beyond_whole_cells() is the rest of each layer now.
-    // Precondition: the wind is a profile (is_profile() in core/wind.h).
+    // Precondition: the wind is a profile (is_profile() in core/wind_field.h).
     Displacement displacement_of_layer(int k, std::uint64_t step) const;
     std::span<const Displacement> beyond_whole_cells() const;
 

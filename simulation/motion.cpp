@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/wind_field.h"
 #include "density/smoothing.h"
 
 namespace nephos {
@@ -36,7 +37,7 @@ std::vector<Vec2> displacement_of_density(const Automaton& automaton, const Smoo
     const int layers = automaton.options().extent.z;
     std::vector<Vec2> displacements(std::size_t(layers), Vec2(0));
     const Wind& wind = automaton.options().wind;
-    if (is_calm(wind) || !is_profile(wind)) return displacements;
+    if (is_calm(wind) || !is_profile(wind.fields)) return displacements;
     const std::vector<std::uint32_t> weights = kernel_weights(smoothing.kernel, smoothing.t0);
     const auto reach = std::uint64_t(smoothing.t0);
     const std::uint64_t window = of > reach ? of - reach : 0, first = std::min(window, to.step),
