@@ -157,43 +157,71 @@ void gather_rows(const DiffusionCells& cells, const std::vector<LightOfCells>& l
     }
 }
 
-// The light that the sun loses: what enters a cell through faces and does not leave it. Exact, as neighbours share
-// faces.
-BrickOfCells lost_by_sun(const DiffusionCells& cells, std::size_t brick, const float* depths, const Vec3& to_sun,
-                         double albedo) {
-    constexpr std::size_t kCorners = 3;  // of cells, on an edge of a brick
-    const float towards[3] = {float(to_sun.x), float(to_sun.y), float(to_sun.z)};
+constexpr std::size_t kCorners = 3;  // of cells, on an edge of a brick
+
+// The light that the sun loses in a cell, and the mean of where on each axis, -1 to 1.
+struct LostLight {
+    float light = 0;
+    std::array<float, 3> place{};
+};
+
+// What enters a cell through faces and does not leave it: exact, as neighbours share faces. Multiplied with the distance
+// from the middle, what enters less what leaves is the sum of where light is lost, but for the light of the whole cell
+// times its direction; of that each optical depth of `thickness` loses one part. `corner`: light at the cell's lower
+// corner, kCorners on an edge; between corners it is bilinear.
+LostLight lost_by_sun(const float* corner, const std::array<float, 3>& towards, float thickness) {
+    constexpr float kArm = 1.0f / 3;  // the mean of where a corner's part of a face's light lies
+    LostLight lost;
+    for (std::size_t n = 0; n < 8; ++n) {
+        const std::size_t o[3] = {n % 2, n / 2 % 2, n / 4};
+        const float light = corner[(o[2] * kCorners + o[1]) * kCorners + o[0]];
+        for (std::size_t face = 0; face < 3; ++face) {
+            const float entering = 0.25f * light * (o[face] == 1 ? towards[face] : -towards[face]);
+            lost.light += entering;
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                const float arm = axis == face ? 1.0f : kArm;
+                lost.place[axis] += (o[axis] == 1 ? arm : -arm) * entering;
+            }
+        }
+    }
+    if (!(lost.light > 0)) return {};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        lost.place[axis] = std::clamp(lost.place[axis] / lost.light - 2 * towards[axis] / thickness, -1.0f, 1.0f);
+    return lost;
+}
+
+StartingLight lost_by_sun(const DiffusionCells& cells, std::size_t brick, const float* depths, const Vec3& to_sun,
+                          double albedo) {
+    const std::array<float, 3> towards{float(to_sun.x), float(to_sun.y), float(to_sun.z)};
     std::array<float, kCorners * kCorners * kCorners> light;
     for (std::size_t n = 0; n < light.size(); ++n) {
         const std::size_t x = 2 * (n % kCorners), y = 2 * (n / kCorners % kCorners), z = 2 * (n / kCorners / kCorners);
         light[n] = std::exp((cells.mean_cosine - 1) * depths[(z * kLightNodes + y) * kLightNodes + x]);
     }
-    BrickOfCells source;
+    StartingLight starting;
     for (std::size_t cell = 0; cell < kDiffusionCells; ++cell) {
-        if (!(cells.thickness[brick].of[cell] > 0)) continue;
-        const float* const corner = &light[(cell / 4 * kCorners + cell / 2 % 2) * kCorners + cell % 2];
-        float lost = 0;
-        for (std::size_t n = 0; n < 8; ++n) {
-            const std::size_t o[3] = {n % 2, n / 2 % 2, n / 4};
-            const float weighted = 0.25f * corner[(o[2] * kCorners + o[1]) * kCorners + o[0]];
-            for (std::size_t axis = 0; axis < 3; ++axis)
-                lost += weighted * (o[axis] == 1 ? towards[axis] : -towards[axis]);
-        }
-        source.of[cell] = float(albedo) * std::max(lost, 0.0f);
+        const float thickness = cells.thickness[brick].of[cell];
+        if (!(thickness > 0)) continue;
+        const LostLight lost =
+            lost_by_sun(&light[(cell / 4 * kCorners + cell / 2 % 2) * kCorners + cell % 2], towards, thickness);
+        starting.light.of[cell] = float(albedo) * lost.light;
+        for (std::size_t axis = 0; axis < 3; ++axis) starting.place[axis].of[cell] = lost.place[axis];
     }
-    return source;
+    return starting;
 }
 
 }  // namespace
 
 DiffuseLight diffuse_sunlight(const DiffusionCells& cells, std::span<const float> sun_depths, const Vec3& to_sun,
                               double albedo) {
-    std::vector<BrickOfCells> source(cells.bricks);
+    std::vector<StartingLight> starting(cells.bricks);
     tbb::parallel_for(std::size_t{0}, cells.active.size(), [&](std::size_t n) {
         const auto brick = std::size_t(cells.active[n]);
-        source[brick] = lost_by_sun(cells, brick, &sun_depths[brick * kLightNodesOfBrick], to_sun, albedo);
+        starting[brick] = lost_by_sun(cells, brick, &sun_depths[brick * kLightNodesOfBrick], to_sun, albedo);
     });
-    const std::vector<LightOfCells> light = light_of_cells(cells, solve(cells, source, albedo), {});
+    const SharedLight shared = share_light(cells, starting);
+    const std::vector<LightOfCells> light =
+        light_of_cells(cells, solve(cells, shared.source, albedo), {}, shared.leaving);
     DiffuseLight result;
     result.upwards.assign(sun_depths.size() + 1, 0);
     result.sideways.assign(result.upwards.size(), 0);

@@ -182,23 +182,86 @@ void take_light(const DiffusionCells& cells, const FluenceOutside& outside, Bric
     }
 }
 
+// The share of a face: the resistance from the middle of the cell to where light starts, over that to beyond the face.
+void find_shares(const DiffusionCells& cells, const std::vector<StartingLight>& starting, Bricks some,
+                 std::vector<NumbersOfFaces>& shares) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        const auto& to = cells.to_neighbours[brick];
+        const Cells resistance = times(1.5f, load(cells.thickness[brick])), open = load(cells.to_outside[brick]);
+        Cells shared[6], sum = same(0);
+        const auto add = [&](std::size_t face, const Cells& towards) {
+            const auto share = [](Quad conducted, Quad outside, Quad of, Quad place) {
+                return pick(place, of * place * pick(conducted, conducted, outside), number(0));
+            };
+            shared[face] = each(share, load(to[face]), open, resistance, towards);
+            sum = plus(sum, shared[face]);
+        };
+        const auto add_axis = [&](auto axis) {
+            constexpr int kAxis = decltype(axis)::value;
+            const Cells up = load(starting[brick].place[kAxis]), down = minus(same(0), up);
+            add(2 * kAxis, halves<kAxis>(down, up));
+            add(2 * kAxis + 1, halves<kAxis>(up, down));
+        };
+        add_axis(std::integral_constant<int, 0>());
+        add_axis(std::integral_constant<int, 1>());
+        add_axis(std::integral_constant<int, 2>());
+        const auto part = [](Quad light, Quad all) { return light / (all > 1 ? all : number(1)); };
+        const Cells light = each(part, load(starting[brick].light), sum);
+        for (std::size_t face = 0; face < 6; ++face) store(times(light, shared[face]), shares[brick][face]);
+    }
+}
+
+void take_shares(const DiffusionCells& cells, const std::vector<StartingLight>& starting,
+                 const std::vector<NumbersOfFaces>& shares, Bricks some, std::vector<BrickOfCells>& source) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        Cells sum = load(starting[brick].light);
+        const auto take = [&](auto axis) {
+            constexpr int kAxis = decltype(axis)::value;
+            const Cells inner = load(shares[brick][2 * kAxis]), beyond = load(shares[brick][2 * kAxis + 1]);
+            const auto of_neighbour = [&](std::size_t n) { return load(shares[n][2 * kAxis + 1]); };
+            sum = plus(minus(sum, plus(inner, beyond)),
+                       plus(exchanged<kAxis>(inner), outer<kAxis>(cells.beside[brick], of_neighbour)));
+        };
+        take(std::integral_constant<int, 0>());
+        take(std::integral_constant<int, 1>());
+        take(std::integral_constant<int, 2>());
+        store(where_positive(load(cells.thickness[brick]), sum), source[brick]);
+    }
+}
+
+void keep_leaving(const DiffusionCells& cells, Bricks some, std::vector<NumbersOfFaces>& shares) {
+    for (const std::int32_t one : some) {
+        const auto brick = std::size_t(one);
+        for (std::size_t face = 0; face < 6; ++face) {
+            BrickOfCells& share = shares[brick][face];
+            store(where_not_positive(load(cells.to_neighbours[brick][face]), load(share)), share);
+        }
+    }
+}
+
 using Fluxes = std::array<BrickOfCells, 3>;
 
-// Net flux through the middle of cells, half of that through both faces.
+// Net flux through the middle of cells, half of that through both faces. `leaving`: through faces without cloud besides,
+// or none.
 void find_fluxes(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence, const FluenceOutside& outside,
-                 Bricks some, std::vector<Fluxes>& fluxes) {
+                 const std::vector<NumbersOfFaces>& leaving, Bricks some, std::vector<Fluxes>& fluxes) {
+    constexpr NumbersOfFaces kNone{};
     for (const std::int32_t one : some) {
         const auto brick = std::size_t(one);
         const auto of_brick = [&](std::size_t n) { return load(fluence[n]); };
         const Cells own = of_brick(brick), open = load(cells.to_outside[brick]);
         for_neighbours(cells, brick, of_brick, [&](auto axis, const Cells& inner, const Cells& beyond) {
             constexpr int kAxis = decltype(axis)::value;
-            const auto towards = [&](const BrickOfCells& conducted, const Cells& other, const Cells& light) {
-                const Cells by = load(conducted);
-                return each(pick, by, times(by, minus(own, other)), times(open, minus(own, light)));
+            const NumbersOfFaces& besides = leaving.empty() ? kNone : leaving[brick];
+            const auto towards = [&](std::size_t face, const Cells& other, const Cells& light) {
+                const Cells by = load(cells.to_neighbours[brick][face]);
+                return each(pick, by, times(by, minus(own, other)),
+                            plus(times(open, minus(own, light)), load(besides[face])));
             };
-            const Cells in = towards(cells.to_neighbours[brick][2 * kAxis], inner, beyond_inner<kAxis>(outside)),
-                        out = towards(cells.to_neighbours[brick][2 * kAxis + 1], beyond, beyond_outer<kAxis>(outside));
+            const Cells in = towards(2 * kAxis, inner, beyond_inner<kAxis>(outside)),
+                        out = towards(2 * kAxis + 1, beyond, beyond_outer<kAxis>(outside));
             const Cells upwards = times(0.5f, minus(out, in));
             store(halves<kAxis>(upwards, minus(same(0), upwards)), fluxes[brick][std::size_t(kAxis)]);
         });
@@ -207,15 +270,18 @@ void find_fluxes(const DiffusionCells& cells, const std::vector<BrickOfCells>& f
 
 // The light of cells without cloud.
 void add_light_of_faces(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence,
-                        const FluenceOutside& outside, const std::vector<Fluxes>& fluxes, std::size_t brick,
-                        const Cells& empty, LightOfCells& light) {
+                        const FluenceOutside& outside, const std::vector<NumbersOfFaces>& leaving,
+                        const std::vector<Fluxes>& fluxes, std::size_t brick, const Cells& empty, LightOfCells& light) {
     Cells count = same(0), values[4] = {count, count, count, count};
     const auto load_flux = [&](std::size_t axis) {
         return [&fluxes, axis](std::size_t n) { return load(fluxes[n][axis]); };
     };
-    const auto add = [&](const Cells& thickness, const Cells& there, const Cells (&flux)[3], const Cells& arriving) {
+    // The fluence at a face is what arrives there and twice what leaves.
+    const auto add = [&](const Cells& thickness, const Cells& there, const Cells (&flux)[3], const Cells& arriving,
+                         const Cells& besides) {
         const auto through = [](Quad of) { return 2 * loss(of); };
-        const Cells fluence_there = plus(arriving, times(each(through, thickness), minus(there, arriving)));
+        const Cells fluence_there = plus(plus(arriving, times(each(through, thickness), minus(there, arriving))),
+                                         times(2, besides));
         values[0] = plus(values[0], where_positive(thickness, fluence_there));
         for (int axis = 0; axis < 3; ++axis)
             values[axis + 1] = plus(values[axis + 1], where_positive(thickness, flux[axis]));
@@ -228,13 +294,16 @@ void add_light_of_faces(const DiffusionCells& cells, const std::vector<BrickOfCe
         constexpr int kAxis = decltype(axis)::value;
         const auto inner_of = [&](std::size_t n) { return exchanged<kAxis>(load_flux(n)(brick)); };
         const auto outer_of = [&](std::size_t n) { return outer<kAxis>(beside, load_flux(n)); };
+        const auto leaving_of = [&](std::size_t face) {
+            return [&leaving, face](std::size_t n) { return leaving.empty() ? same(0) : load(leaving[n][face]); };
+        };
         // What arrives at the neighbour's face comes from where the cell itself looks away from.
         if (any_positive(inner))
             add(inner, exchanged<kAxis>(fluence_of(brick)), {inner_of(0), inner_of(1), inner_of(2)},
-                beyond_outer<kAxis>(outside));
+                beyond_outer<kAxis>(outside), exchanged<kAxis>(leaving_of(2 * kAxis)(brick)));
         if (any_positive(beyond))
             add(beyond, outer<kAxis>(beside, fluence_of), {outer_of(0), outer_of(1), outer_of(2)},
-                beyond_inner<kAxis>(outside));
+                beyond_inner<kAxis>(outside), outer<kAxis>(beside, leaving_of(2 * kAxis + 1)));
     });
     constexpr float kWeight = 1 / kLeastThickness;
     const auto mean = [](Quad sum, Quad number_of) { return kWeight * sum / (number_of > 1 ? number_of : number(1)); };
@@ -247,7 +316,8 @@ void add_light_of_faces(const DiffusionCells& cells, const std::vector<BrickOfCe
 }
 
 void collect_light(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence, const FluenceOutside& outside,
-                   const std::vector<Fluxes>& fluxes, Bricks some, std::vector<LightOfCells>& light) {
+                   const std::vector<NumbersOfFaces>& leaving, const std::vector<Fluxes>& fluxes, Bricks some,
+                   std::vector<LightOfCells>& light) {
     for (const std::int32_t one : some) {
         const auto brick = std::size_t(one);
         LightOfCells& to = light[brick];
@@ -258,7 +328,7 @@ void collect_light(const DiffusionCells& cells, const std::vector<BrickOfCells>&
         store(times(weight, load(fluence[brick])), to[1]);
         for (std::size_t axis = 0; axis < 3; ++axis) store(times(weight, load(fluxes[brick][axis])), to[axis + 2]);
         const Cells empty = where_not_positive(thickness, same(1));
-        if (any_positive(empty)) add_light_of_faces(cells, fluence, outside, fluxes, brick, empty, to);
+        if (any_positive(empty)) add_light_of_faces(cells, fluence, outside, leaving, fluxes, brick, empty, to);
     }
 }
 
@@ -379,6 +449,16 @@ std::vector<BrickOfCells> light_from_outside(const DiffusionCells& cells, const 
     return source;
 }
 
+SharedLight share_light(const DiffusionCells& cells, const std::vector<StartingLight>& starting) {
+    SharedLight shared{std::vector<BrickOfCells>(cells.bricks + 1), std::vector<NumbersOfFaces>(cells.bricks + 1)};
+    for_parts(cells.active, [&](std::size_t, Bricks some) { find_shares(cells, starting, some, shared.leaving); });
+    for_parts(cells.active, [&](std::size_t, Bricks some) {
+        take_shares(cells, starting, shared.leaving, some, shared.source);
+    });
+    for_parts(cells.active, [&](std::size_t, Bricks some) { keep_leaving(cells, some, shared.leaving); });
+    return shared;
+}
+
 // Conjugate gradients, with the diagonal as preconditioner (M. R. Hestenes and E. Stiefel 1952).
 std::vector<BrickOfCells> solve(const DiffusionCells& cells, const std::vector<BrickOfCells>& source, double albedo) {
     const std::size_t bricks = cells.bricks;
@@ -407,14 +487,14 @@ std::vector<BrickOfCells> solve(const DiffusionCells& cells, const std::vector<B
 }
 
 std::vector<LightOfCells> light_of_cells(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence,
-                                         const FluenceOutside& outside) {
+                                         const FluenceOutside& outside, const std::vector<NumbersOfFaces>& leaving) {
     std::vector<Fluxes> fluxes(cells.bricks + 1);
     for_parts(cells.active, [&](std::size_t, Bricks some) {
-        find_fluxes(cells, fluence, outside, some, fluxes);
+        find_fluxes(cells, fluence, outside, leaving, some, fluxes);
     });
     std::vector<LightOfCells> light(cells.bricks + 1);
     for_parts(first_numbers(cells.bricks), [&](std::size_t, Bricks some) {
-        collect_light(cells, fluence, outside, fluxes, some, light);
+        collect_light(cells, fluence, outside, leaving, fluxes, some, light);
     });
     return light;
 }

@@ -48,6 +48,28 @@ using FluenceOutside = std::array<float, 6>;
 // Returns the light that comes in through faces without cloud.
 std::vector<BrickOfCells> light_from_outside(const DiffusionCells& cells, const FluenceOutside& outside);
 
+// Light that starts in the cells of a brick. `place`: the mean of where, on each axis, from -1 at the lower face of a cell
+// to 1 at the upper one.
+struct StartingLight {
+    BrickOfCells light;
+    std::array<BrickOfCells, 3> place;
+};
+
+// A number of each face of the cells of a brick, in the order of DiffusionCells::to_neighbours.
+using NumbersOfFaces = std::array<BrickOfCells, 6>;
+
+// `source`: light that starts in the middles of cells. `leaving`: light that leaves through faces without cloud at once.
+struct SharedLight {
+    std::vector<BrickOfCells> source;
+    std::vector<NumbersOfFaces> leaving;
+};
+
+// Returns the light of middles of cells that has the fluence of light that starts anywhere in them. Sunlight starts near
+// lit faces where cells are optically thick: from their middles too little of it would come back, and too much would come
+// through. Along a line the fluence of a source between two points of a lattice is that of two sources on these points,
+// which share its light by the resistance to them; so each axis takes its share, and all together take at most all.
+SharedLight share_light(const DiffusionCells& cells, const std::vector<StartingLight>& starting);
+
 // Returns the fluence in all cells. `source`: the light that each of them scatters first or gets from outside. `albedo`:
 // of single scattering. Results depend neither on the number of threads nor on the instruction set.
 std::vector<BrickOfCells> solve(const DiffusionCells& cells, const std::vector<BrickOfCells>& source, double albedo);
@@ -57,8 +79,8 @@ std::vector<BrickOfCells> solve(const DiffusionCells& cells, const std::vector<B
 // at the faces of those beside it; weight 0 where there are none.
 using LightOfCells = std::array<BrickOfCells, 5>;
 
-// Returns that of all bricks and, last, of none.
+// Returns that of all bricks and, last, of none. `leaving`: that of SharedLight, or none.
 std::vector<LightOfCells> light_of_cells(const DiffusionCells& cells, const std::vector<BrickOfCells>& fluence,
-                                         const FluenceOutside& outside);
+                                         const FluenceOutside& outside, const std::vector<NumbersOfFaces>& leaving = {});
 
 }  // namespace nephos

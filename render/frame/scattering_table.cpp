@@ -35,6 +35,16 @@ double diffuse_light(const CloudLight& light, double depth) {
     return 1 / (1 + 1.5 * (1 - mean_cosine(light.phase)) * depth);
 }
 
+// Diffusion has too little light on its way back near lit surfaces: slabs of optical depth 5 to 80 are up to an eighth too
+// dark from the side of the sun. This, in units of 1/4 (1 - g) ((1 - cos) / 2)^2, gives them their albedo.
+constexpr double kTurnedBack = 2;
+
+// Of light that was scattered forwards a few times, pi times what is scattered into an angle.
+double scattered_forwards(const PhaseFunction& function, double cos_theta) {
+    const double directed = std::max(mean_cosine(function), 0.0), back = 0.5 * (1 - cos_theta);
+    return kPi * phase(function, cos_theta, directed) + 0.25 * kTurnedBack * (1 - directed) * back * back;
+}
+
 void add_diffusion(const CloudLight& light, std::vector<float>& table) {
     for (std::size_t row = 0; row < kDepths; ++row) {
         const double value = light.multiple_scattering * diffuse_light(light, depth_of_row(row));
@@ -84,9 +94,8 @@ std::vector<float> scattering_table(const CloudLight& light) {
     std::vector<float> table((2 + kDepths) * kAngles);
     for (std::size_t column = 0; column < kAngles; ++column)
         table[column] = float(kPi * phase(light.phase, cosine_of_column(column)));
-    const double directed = std::max(mean_cosine(light.phase), 0.0);
     for (std::size_t column = 0; column < kAngles; ++column)
-        table[(1 + kDepths) * kAngles + column] = float(kPi * phase(light.phase, cosine_of_column(column), directed));
+        table[(1 + kDepths) * kAngles + column] = float(scattered_forwards(light.phase, cosine_of_column(column)));
     if (light.multiple == MultipleScattering::diffusion)
         add_diffusion(light, table);
     else

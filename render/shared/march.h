@@ -45,9 +45,9 @@ NEPHOS_CONST float kTap0_m = 3.0f, kTap1_m = 10.0f, kTap2_m = 22.0f;
 NEPHOS_CONST float kTap0Length_m = 6.5f, kTap1Length_m = 9.5f, kTap2Length_m = 14.5f;
 NEPHOS_CONST float kTapsEnd_m = 30.5f;
 // Light that diffuses (render/cloud/diffusion.h): of fluence f and flux F, 1/4 (kDiffuseBase f + kDiffuseFlux g omega F)
-// is scattered towards omega. By Eddington's approximation the numbers are 1 and 3; with these the albedo of slabs of
-// optical depth 5, 20 and 80 is within 5 % of the exact one for g of 0.85, and at smaller g of a finer lattice.
-NEPHOS_CONST float kDiffuseBase = 1.2f, kDiffuseFlux = 2.4f;
+// is scattered towards omega, by Eddington's approximation. Deep in a cloud and where light leaves it that is right; near
+// lit surfaces it misses light that soon turned back, which the scattering table has (render/frame/scattering_table.h).
+NEPHOS_CONST float kDiffuseBase = 1.0f, kDiffuseFlux = 3.0f;
 // By how much diffuse light falls off with a depth that the lattice does not know: as 1 / (1 + kDiffuseDecay (1 - g)
 // depth), diffusion through a slab; and the most that a bump has more than the lattice.
 NEPHOS_CONST float kDiffuseDecay = 1.5f, kMostRelief = 2.0f;

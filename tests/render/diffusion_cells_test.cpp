@@ -78,11 +78,18 @@ class Naive {
         for (int n = 0; n < 6; ++n) open[n / 2] += thickness(beside(at, n)) > 0 ? 0 : 1;
         return std::hypot(open[0], open[1], open[2]) / (open[0] + open[1] + open[2]) * loss(a);
     }
+    // Light that leaves through a face without cloud at once.
+    double leaves(const Place& at, int direction) const {
+        if (leaving.empty() || thickness(beside(at, direction)) > 0) return 0;
+        const Cell& cell = all_.at(at);
+        const bool upper = (cell.number >> (direction / 2) & 1) != 0, outer = upper == (direction % 2 != 0);
+        return double(leaving[cell.brick][std::size_t(direction / 2 * 2 + (outer ? 1 : 0))].of[cell.number]);
+    }
     // Flux out of a cell through a face.
     double flux(const Place& at, int direction, const std::vector<BrickOfCells>& fluence, const FluenceOutside& sky) const {
         const Place next = beside(at, direction);
         const double other = thickness(next) > 0 ? double(of(fluence, all_.at(next))) : double(sky[std::size_t(direction)]);
-        return through(at, direction) * (double(of(fluence, all_.at(at))) - other);
+        return through(at, direction) * (double(of(fluence, all_.at(at))) - other) + leaves(at, direction);
     }
     // Weight, fluence, and flux to the east, north and up.
     std::array<double, 5> light(const Place& at, const std::vector<BrickOfCells>& fluence, const FluenceOutside& sky) const {
@@ -99,7 +106,7 @@ class Naive {
             if (!(thickness(next) > 0)) continue;
             const std::array<double, 5> there = light(next, fluence, sky);
             const double arriving = double(sky[std::size_t(n ^ 1)]);
-            result[1] += arriving + 2 * loss(thickness(next)) * (there[1] - arriving);
+            result[1] += arriving + 2 * loss(thickness(next)) * (there[1] - arriving) + 2 * leaves(next, n ^ 1);
             for (std::size_t i = 2; i < 5; ++i) result[i] += there[i];
             ++count;
         }
@@ -107,6 +114,8 @@ class Naive {
         result[0] = count > 0 ? 10 : 0;
         return result;
     }
+
+    std::vector<NumbersOfFaces> leaving;
 
   private:
     const DiffusionCells& cells_;
@@ -165,18 +174,86 @@ TEST(DiffusionCells, SolutionsBalanceInEveryCell) {
     EXPECT_LT(std::sqrt(squares / all), 2e-3);
 }
 
+// Light that starts somewhere in each cell of cloud.
+std::vector<StartingLight> lamps(const Naive& naive, std::size_t bricks) {
+    std::vector<StartingLight> starting(bricks);
+    int seed = 100;
+    const auto random = [&](const Place& at) { return float(test::voxel_noise(at[0], at[1], at[2], ++seed)); };
+    for (const auto& [place, cell] : naive.all()) {
+        if (!(naive.thickness(place) > 0)) continue;
+        starting[cell.brick].light.of[cell.number] = random(place);
+        for (BrickOfCells& axis : starting[cell.brick].place) axis.of[cell.number] = 2 * random(place) - 1;
+    }
+    return starting;
+}
+
+// The part of a cell's light that each of its faces takes.
+std::array<double, 6> shares(const Naive& naive, const Place& at, const StartingLight& brick, std::size_t number) {
+    std::array<double, 6> result{};
+    double sum = 0;
+    for (int n = 0; n < 6; ++n) {
+        const double place = (n % 2 == 0 ? -1 : 1) * double(brick.place[std::size_t(n / 2)].of[number]);
+        result[std::size_t(n)] = 1.5 * naive.thickness(at) * std::max(place, 0.0) * naive.through(at, n);
+        sum += result[std::size_t(n)];
+    }
+    for (double& share : result) share /= std::max(sum, 1.0);
+    return result;
+}
+
+TEST(DiffusionCells, LightThatStartsBesideTheMiddleIsShared) {
+    const CloudVolume volume = heaps(13);
+    const DiffusionCells cells(volume.field, volume.extinction, double(kCosine));
+    const Naive naive(volume.field, cells);
+    const std::vector<StartingLight> starting = lamps(naive, cells.bricks);
+    std::map<Place, double> source, leaving[6];
+    double started = 0;
+    for (const auto& [place, cell] : naive.all()) {
+        const double light = double(starting[cell.brick].light.of[cell.number]);
+        const std::array<double, 6> parts = shares(naive, place, starting[cell.brick], cell.number);
+        started += light;
+        source[place] += light;
+        for (int n = 0; n < 6; ++n) {
+            const Place next = Naive::beside(place, n);
+            const double share = light * parts[std::size_t(n)];
+            source[place] -= share;
+            if (naive.thickness(next) > 0)
+                source[next] += share;
+            else
+                leaving[n][place] = share;
+        }
+    }
+    const SharedLight shared = share_light(cells, starting);
+    double arrived = 0, left = 0;
+    for (const auto& [place, cell] : naive.all()) {
+        ASSERT_NEAR(double(Naive::of(shared.source, cell)), source[place], 1e-5);
+        arrived += double(Naive::of(shared.source, cell));
+        for (int axis = 0; axis < 3; ++axis) {
+            // Of an upper cell the inner face is the lower one.
+            const int inner = 2 * axis + ((cell.number >> axis & 1) != 0 ? 0 : 1);
+            const NumbersOfFaces& faces = shared.leaving[cell.brick];
+            ASSERT_NEAR(double(faces[std::size_t(2 * axis)].of[cell.number]), leaving[inner][place], 1e-5);
+            ASSERT_NEAR(double(faces[std::size_t(2 * axis + 1)].of[cell.number]), leaving[inner ^ 1][place], 1e-5);
+            left += leaving[inner][place] + leaving[inner ^ 1][place];
+        }
+    }
+    EXPECT_NEAR(arrived + left, started, 1e-4 * started);
+    EXPECT_GT(left, 0.02 * started);
+}
+
 TEST(DiffusionCells, LightIsThatOfItsDefinition) {
     const CloudVolume volume = heaps(7);
     const DiffusionCells cells(volume.field, volume.extinction, double(kCosine));
-    const Naive naive(volume.field, cells);
-    const std::vector<BrickOfCells> fluence = solve(cells, light_from_outside(cells, kSky), kAlbedo);
-    const std::vector<LightOfCells> light = light_of_cells(cells, fluence, kSky);
+    Naive naive(volume.field, cells);
+    const SharedLight shared = share_light(cells, lamps(naive, cells.bricks));
+    const std::vector<BrickOfCells> fluence = solve(cells, shared.source, kAlbedo);
+    naive.leaving = shared.leaving;
+    const std::vector<LightOfCells> light = light_of_cells(cells, fluence, kSky, naive.leaving);
     for (const auto& [place, cell] : naive.all()) {
         const std::array<double, 5> expected = naive.light(place, fluence, kSky);
         for (std::size_t n = 0; n < expected.size(); ++n) {
             const double found = double(light[cell.brick][n].of[cell.number]),
                          weighted = n == 0 ? expected[0] : expected[0] * expected[n];
-            ASSERT_NEAR(found, weighted, 2e-5 * std::max(1.0, expected[0])) << "cell " << cell.number << " of brick "
+            ASSERT_NEAR(found, weighted, 2e-5 * std::max(1.0, std::abs(weighted))) << "cell " << cell.number << " of brick "
                                                                           << cell.brick << ", number " << n;
         }
     }
