@@ -99,10 +99,6 @@ std::array<Vec3, 3> repeating(const std::array<Vec3, 3>& rows, const Boundaries&
     return result;
 }
 
-double bump_size_m(const DetailOptions& options, double cell_m) {
-    return options.size_m > 0 ? options.size_m : 4 * cell_m;
-}
-
 CoverageCells::CoverageCells(const DensityGrid& grid, const DetailSetting& setting, const DensityGrid* moisture)
     : blocks_(blocks_of(grid)), boundaries_(setting.images ? setting.boundaries : Boundaries{}), extent_(grid.extent()) {
     std::erase_if(blocks_, [](const Block& block) { return block.positive_count() == 0; });

@@ -20,9 +20,6 @@ inline constexpr double kBumpsOfTile = 8;
 // Rows that turn places so that the period of the noise shows along no axis.
 inline constexpr double kNoiseTurn[3][3] = {{.8, .6, 0}, {-.48, .64, .6}, {.36, -.48, .8}};
 
-// Returns the size of the largest bumps, metres, in cells with edges of `cell_m`.
-double bump_size_m(const DetailOptions& options, double cell_m);
-
 // Returns a matrix near the given one, rows from metres to periods of a noise, that takes the edges of a grid along its
 // periodic axes to whole numbers of periods: the noise then repeats with the grid. Bumps are skewed a little by that:
 // for n periods along an edge by up to 1 / (2 n), for n >= 1; on smaller grids they are stretched and turned.

@@ -108,12 +108,12 @@ CoverageField::CoverageField(const DensityGrid& grid, const DetailSetting& setti
     mass_ = std::accumulate(masses.begin(), masses.end(), 0.0);
     const double base_m = (before + base_cells(masses, mass_)) * cell;
     mean_density_ = cells.mean_density();
-    set_erosion(setting, grid.extent(), base_m);
+    set_erosion(setting, grid, base_m);
     const Boundaries beyond = setting.images ? setting.boundaries : Boundaries{};
     find_places(cells, beyond, extent, before, sums.reach());
     sample_nodes(cells, sums, before);
     mass_ *= 8;  // nodes for each cell
-    set_erosion(setting, grid.extent(), base_m);
+    set_erosion(setting, grid, base_m);
     clearance_ = clearance_of_cells(nodes_, places_, table_, bricks_, erosion_.least_coverage,
                                     repeats(setting) ? kMostInImages : 1);
     set_distances(table_, bricks_);
@@ -292,7 +292,7 @@ float CoverageField::gain_at(double footprint_m) const {
     return drawn > 0 ? float(std::clamp(mass_ / drawn, 0.5, 4.0)) : 1.0f;
 }
 
-void CoverageField::set_erosion(const DetailSetting& setting, const Extent& extent, double base_m) {
+void CoverageField::set_erosion(const DetailSetting& setting, const DensityGrid& grid, double base_m) {
     const DetailOptions& o = setting.options;
     ErosionConstants& e = erosion_;
     // Extinction of zero: nothing shows; any number will do.
@@ -327,12 +327,24 @@ void CoverageField::set_erosion(const DetailSetting& setting, const Extent& exte
         const double shrink = 1 / o.stretch - 1, of_along = turn.x * along.x + turn.y * along.y;
         rows[row] = (turn + Vec3(along * (shrink * of_along), 0.0)) / tile;
     }
-    rows = repeating(rows, setting.boundaries, extent, 2 * node_m_);
+    rows = repeating(rows, setting.boundaries, grid.extent(), 2 * node_m_);
     for (std::size_t row = 0; row < 3; ++row) {
         const Vec3& to = rows[row];
         const double offset = glm::dot(to, corner_m_ - setting.drift_m);
         e.to_noise[row] = {float(to.x), float(to.y), float(to.z), float(offset - std::floor(offset))};
     }
+    const DriftBands& bands = setting.bands;
+    e.bands.resize(bands.apart_m.size());
+    for (std::size_t n = 0; n < e.bands.size(); ++n) {
+        for (std::size_t row = 0; row < 3; ++row) {
+            const double offset = -glm::dot(Vec2(rows[row]), bands.apart_m[n]);
+            e.bands[n][row] = float(offset - std::floor(offset));
+        }
+        const Vec2 to_next = bands.apart_m[std::min(n + 1, e.bands.size() - 1)] - bands.apart_m[n];
+        e.bands[n][3] = float(std::min(2 * glm::length(to_next) / size_m, 1.0));
+    }
+    e.bands_begin_m = float(grid.placement().origin_m.z - corner_m_.z);
+    e.bands_per_m = e.bands.empty() ? 0.0f : float(1 / bands.height_m);
     // The offset of the small noises is that of the large one: a whole number of their tiles in one of its.
     e.medium_scale = kMediumTiles;
     e.fine_scale = 128;

@@ -135,6 +135,50 @@ HWY_INLINE Node node_at(const DetailKernel& field, Ints brick, Floats x, Floats 
             hn::MulSub(growth, number(1.0f / 127.0f), number(128.0f / 127.0f))};
 }
 
+// Places in the tiles of the large noise: of the band of height that a point is in and, where it passes into the next, of
+// that one, too.
+struct InTiles {
+    Floats u, v, w;
+    Floats next_u, next_v, next_w;
+    Floats share, apart;  // of the next; mean_of_uniform()
+    bool two = false;     // whether any lane has two
+};
+
+// Adds the drift of bands at heights `z`; `used`: lanes that count.
+HWY_INLINE void add_drift(const ErosionConstants& e, Floats z, Mask used, InTiles& at) {
+    const Lanes d;
+    const IntLanes di;
+    const Floats place = hn::MulAdd(hn::Sub(z, number(e.bands_begin_m)), number(e.bands_per_m), number(-0.5f));
+    const Floats last = number(float(e.bands.size() - 1));
+    const Floats below = hn::Min(hn::Max(hn::Floor(place), hn::Zero(d)), last),
+                 above = hn::Min(hn::Add(below, number(1.0f)), last);
+    at.share = text::share_of_upper(hn::Sub(place, below));
+    const Mask passed = hn::Ge(at.share, number(1.0f));
+    const auto first_of = [&](Floats band) { return hn::ShiftLeft<2>(hn::ConvertTo(di, band)); };
+    const Ints own = first_of(hn::IfThenElse(passed, above, below)), next = first_of(above);
+    const float* const words = e.bands.front().data();
+    const auto of = [&](Ints band, int n) { return hn::GatherIndex(d, words + n, band); };
+    at.apart = of(first_of(below), 3);
+    at.share = hn::IfThenElseZero(hn::Lt(at.share, number(1.0f)), at.share);
+    at.two = !hn::AllFalse(d, hn::And(used, hn::Gt(at.share, hn::Zero(d))));
+    if (at.two) {
+        at.next_u = hn::Add(at.u, of(next, 0));
+        at.next_v = hn::Add(at.v, of(next, 1));
+        at.next_w = hn::Add(at.w, of(next, 2));
+    }
+    at.u = hn::Add(at.u, of(own, 0));
+    at.v = hn::Add(at.v, of(own, 1));
+    at.w = hn::Add(at.w, of(own, 2));
+}
+
+// Returns look_up(u, v, w), a noise that is uniform, where it passes from one band into the next that of both.
+template <class LookUp>
+HWY_INLINE Floats of_bands(const InTiles& at, Floats apart, const LookUp& look_up) {
+    const Floats own = look_up(at.u, at.v, at.w);
+    if (!at.two) return own;
+    return text::mean_of_uniform(own, look_up(at.next_u, at.next_v, at.next_w), at.share, apart);
+}
+
 struct Eroded {
     Floats density;
     Floats margin;  // coverage that is missing to be cloud; not above 0 inside
@@ -164,18 +208,20 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
         return hn::MulAdd(number(to[0]), x,
                           hn::MulAdd(number(to[1]), y, hn::MulAdd(number(to[2]), z, number(to[3]))));
     };
-    Floats u = turned(0), v = turned(1), w = turned(2);
+    InTiles at{turned(0), turned(1), turned(2), zero, zero, zero, zero, zero};
     const Floats edge = number(float(kLargeNoiseVoxels));
     Mask unsure = needed;
     if (!kMargins) {
         const Floats most = hn::MulAdd(half, large, hn::Add(number(0.5001f), others));
         unsure = hn::And(needed, hn::Lt(c, most));
-        u = hn::IfThenElseZero(unsure, u);
-        v = hn::IfThenElseZero(unsure, v);
-        w = hn::IfThenElseZero(unsure, w);
+        at.u = hn::IfThenElseZero(unsure, at.u);
+        at.v = hn::IfThenElseZero(unsure, at.v);
+        at.w = hn::IfThenElseZero(unsure, at.w);
     }
-    Floats noise = noise_at(field.large_noise, integer(0), integer(7), hn::Mul(u, edge), hn::Mul(v, edge),
-                            hn::Mul(w, edge));
+    if (!e.bands.empty()) add_drift(e, z, unsure, at);
+    Floats noise = of_bands(at, at.apart, [&](Floats u, Floats v, Floats w) {
+        return noise_at(field.large_noise, integer(0), integer(7), hn::Mul(u, edge), hn::Mul(v, edge), hn::Mul(w, edge));
+    });
     noise = hn::MulAdd(large, hn::Sub(noise, half), half);
     const Mask near = hn::And(unsure, hn::Lt(hn::Abs(hn::Sub(c, noise)), others));
     if (!hn::AllFalse(d, hn::And(near, hn::Gt(medium, zero)))) {
@@ -189,20 +235,22 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
             return hn::Min(hn::Add(exponent, hn::Sub(mantissa, number(1.0f))), number(3.0f));
         };
         const Floats scale = number(e.medium_scale * float(kSmallNoiseVoxels));
-        const Floats a = hn::Mul(u, scale), b = hn::Mul(v, scale), g = hn::Mul(w, scale);
-        const Floats bumps = hn::Sub(
-            small_noise_at(field, level_of(e.medium_per_m),
-                           hn::NegMulAdd(number(0.8f), g, hn::Mul(number(0.6f), a)), b,
-                           hn::MulAdd(number(0.8f), a, hn::Mul(number(0.6f), g))),
-            half);
+        const Floats medium_level = level_of(e.medium_per_m);
+        const Floats uniform = of_bands(at, text::apart_of_small(at.apart), [&](Floats u, Floats v, Floats w) {
+            const Floats a = hn::Mul(u, scale), b = hn::Mul(v, scale), g = hn::Mul(w, scale);
+            return small_noise_at(field, medium_level, hn::NegMulAdd(number(0.8f), g, hn::Mul(number(0.6f), a)), b,
+                                  hn::MulAdd(number(0.8f), a, hn::Mul(number(0.6f), g)));
+        });
+        const Floats bumps = hn::Sub(uniform, half);
         const Floats sign = text::billows(top, node.growth, e.wisps);
         noise = hn::IfThenElse(near, hn::MulAdd(hn::Mul(medium, sign), bumps, noise), noise);
         if (!hn::AllFalse(d, hn::And(near, hn::Gt(fine, zero)))) {
             const Floats finer = number(e.fine_scale * float(kSmallNoiseVoxels));
-            const Floats grain = hn::Sub(small_noise_at(field, level_of(e.fine_per_m), hn::Mul(u, finer),
-                                                        hn::Mul(v, finer), hn::Mul(w, finer)),
-                                         half);
-            noise = hn::IfThenElse(near, hn::MulAdd(fine, grain, noise), noise);
+            const Floats fine_level = level_of(e.fine_per_m);
+            const Floats grain = of_bands(at, text::apart_of_small(at.apart), [&](Floats u, Floats v, Floats w) {
+                return small_noise_at(field, fine_level, hn::Mul(u, finer), hn::Mul(v, finer), hn::Mul(w, finer));
+            });
+            noise = hn::IfThenElse(near, hn::MulAdd(fine, hn::Sub(grain, half), noise), noise);
         }
     }
     const Floats margin = hn::Sub(hn::NegMulAdd(half, soft, noise), c);

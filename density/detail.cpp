@@ -245,6 +245,10 @@ void detailed_density_of_brick(const CoverageField& field, std::size_t number, d
     HWY_DYNAMIC_DISPATCH(sample_brick)(kernel, std::int32_t(number), corner, float(footprint_m), samples, out.data());
 }
 
+double bump_size_m(const DetailOptions& options, double cell_m) {
+    return options.size_m > 0 ? options.size_m : 4 * cell_m;
+}
+
 float detailed_density_at(const CoverageField& field, const Vec3& place_m, float footprint) {
     const Vec3 from = place_m - field.corner_m();
     const auto& bricks = field.bricks();
@@ -281,26 +285,48 @@ float detailed_density_at(const CoverageField& field, const Vec3& place_m, float
                 fine = text::fine_width(footprint, e.fine_width), soft = text::edge_softness(footprint);
     const float others = 0.5f * (medium + fine + soft);
     if (!(c > 0.5f - 0.5f * large - others && coverage > e.least_coverage)) return 0;
-    float turned[3];
+    std::array<float, 3> own{}, next{};
     for (std::size_t row = 0; row < 3; ++row) {
         const auto& to = e.to_noise[row];
-        turned[row] = to[0] * float(from.x) + to[1] * float(from.y) + to[2] * float(from.z) + to[3];
+        own[row] = to[0] * float(from.x) + to[1] * float(from.y) + to[2] * float(from.z) + to[3];
     }
-    const auto [u, v, w] = turned;
+    float share = 0, all_apart = 0;
+    if (!e.bands.empty()) {
+        const int last = int(e.bands.size()) - 1;
+        const float place = (float(from.z) - e.bands_begin_m) * e.bands_per_m - 0.5f;
+        const int below = std::clamp(int(std::floor(place)), 0, last), above = std::min(below + 1, last);
+        share = text::share_of_upper(place - float(below));
+        all_apart = e.bands[std::size_t(below)][3];
+        for (std::size_t row = 0; row < 3; ++row) {
+            next[row] = own[row] + e.bands[std::size_t(above)][row];
+            own[row] += e.bands[std::size_t(below)][row];
+        }
+    }
+    const auto of_bands = [&](float apart, const auto& look_up) {
+        const float of_own = look_up(own[0], own[1], own[2]);
+        return share > 0 ? text::mean_of_uniform(of_own, look_up(next[0], next[1], next[2]), share, apart) : of_own;
+    };
     const auto edge = float(kLargeNoiseVoxels);
-    float noise =
-        0.5f + large * (scalar_noise(detail_noise().large, kLargeNoiseVoxels, u * edge, v * edge, w * edge) - 0.5f);
+    float noise = 0.5f + large * (of_bands(all_apart, [&](float u, float v, float w) {
+                                      return scalar_noise(detail_noise().large, kLargeNoiseVoxels, u * edge, v * edge,
+                                                          w * edge);
+                                  }) - 0.5f);
     const auto level = [&](float voxels_per_m) {
         int exponent = 0;
         const float mantissa = std::frexp(std::max(footprint * voxels_per_m, 1.0f), &exponent);
         return std::min(float(exponent - 1) + (2 * mantissa - 1), 3.0f);
     };
     if (std::abs(c - noise) < others && medium > 0) {
-        const float s = e.medium_scale * float(kSmallNoiseVoxels), a = u * s, g = w * s;
-        noise += medium * text::billows(top, growth, e.wisps) *
-                 (scalar_small_noise(level(e.medium_per_m), 0.6f * a - 0.8f * g, v * s, 0.8f * a + 0.6f * g) - 0.5f);
-        const float f = e.fine_scale * float(kSmallNoiseVoxels);
-        if (fine > 0) noise += fine * (scalar_small_noise(level(e.fine_per_m), u * f, v * f, w * f) - 0.5f);
+        const float s = e.medium_scale * float(kSmallNoiseVoxels), f = e.fine_scale * float(kSmallNoiseVoxels);
+        const float bumps = of_bands(text::apart_of_small(all_apart), [&](float u, float v, float w) {
+            const float a = u * s, g = w * s;
+            return scalar_small_noise(level(e.medium_per_m), 0.6f * a - 0.8f * g, v * s, 0.8f * a + 0.6f * g);
+        });
+        noise += medium * text::billows(top, growth, e.wisps) * (bumps - 0.5f);
+        const auto grain = [&](float u, float v, float w) {
+            return scalar_small_noise(level(e.fine_per_m), u * f, v * f, w * f);
+        };
+        if (fine > 0) noise += fine * (of_bands(text::apart_of_small(all_apart), grain) - 0.5f);
     }
     const float mask = text::saturate((c - noise) / soft + 0.5f);
     const float small = std::min(std::sqrt(medium * medium + soft * soft), large);

@@ -20,7 +20,8 @@
 // drawn, at the caps, and where a small cloud has few bumps: one gain for the whole field makes up for it, within
 // limits, so that conservation is approximate (tests measure 0.98 to 1.02 of the grid's mass).
 //
-// The noise is fixed in air that drifts with the wind. It varies with the height above the base (billows above, wisps
+// The noise is fixed in air that drifts with the wind. Where the wind changes with height, bands of height drift each with
+// the wind in its middle, and the noise of one passes into that of the next. It varies with the height above the base (billows above, wisps
 // below) and with the growth of the cloud, -1 where it dissolves (shreds) to 1 where it grows (crisp bumps). Detail
 // smaller than the footprint, the filter width in metres (that of a pixel or a voxel), fades.
 
@@ -38,6 +39,14 @@
 
 namespace nephos {
 
+// How much farther than DetailSetting::drift_m the wind has carried bands of height, one above the other from the bottom of
+// the grid; without bands it has carried all heights alike.
+struct DriftBands {
+    double height_m = 0;  // of each band; above 0 where there are some
+    std::vector<Vec2> apart_m;
+    bool operator==(const DriftBands&) const = default;
+};
+
 // Inputs of detail beside the density.
 struct DetailSetting {
     DetailOptions options;
@@ -45,6 +54,7 @@ struct DetailSetting {
     double metaball_radius_cells = 2.0;  // 1..8
     double opacity = 1;                  // density of a fully cloudy cell, 0..1
     Vec3 drift_m{};                      // how far the wind has carried the air
+    DriftBands bands;                    // ... at different heights
     // Direction of DetailOptions::stretch: east and north. Precondition: of length 1.
     Vec2 along{1, 0};
     // Sides of the grid: open, no cloud beyond, and cloud thins out towards them over DetailOptions::apron_cells cells;
@@ -93,6 +103,11 @@ struct ErosionConstants {
     // Voxels of these noises at mip level 0 per metre of a scaled footprint. A scaled footprint is footprint *
     // footprint_scale, 160 m / size of the large bumps: the formulas are written for bumps of 160 m.
     float medium_per_m = 1, fine_per_m = 1, footprint_scale = 1;
+    // Of DriftBands: texture coordinates of the large noise that are added to to_noise's, and last by how much the noise
+    // of a band differs from that of the next: 0 not at all, 1 entirely. The middle of band n is at height (n + 1/2) /
+    // bands_per_m above bands_begin_m, relative to corner_m(). Empty: there are none.
+    std::vector<std::array<float, 4>> bands;
+    float bands_begin_m = 0, bands_per_m = 0;
     bool operator==(const ErosionConstants&) const = default;
 };
 
@@ -158,7 +173,7 @@ class CoverageField {
     void sample_nodes(const CoverageCells& cells, const NodeSums& sums, int before);
     // `counted`: 1 for each layer of cells on each axis whose mass is that of the grid, not of an image.
     void measure_cells(const std::array<std::vector<std::uint8_t>, 3>& counted);
-    void set_erosion(const DetailSetting& setting, const Extent& extent, double base_m);
+    void set_erosion(const DetailSetting& setting, const DensityGrid& grid, double base_m);
     float gain_at(double footprint_m) const;
 
     Vec3 corner_m_{};
@@ -195,6 +210,9 @@ float detailed_density_at(const CoverageField& field, const Vec3& place_m, float
 // Samples detailed density at the centres of voxels `refine` (1..8) times smaller than the cells of the grid that
 // `field` was made of; `extent` and `placement` are those of that coarse grid. Throws as resample() in metaballs.h.
 DensityGrid resample_with_detail(const CoverageField& field, Extent extent, const Placement& placement, int refine);
+
+// Returns the size of the largest bumps, metres, in cells with edges of `cell_m`.
+double bump_size_m(const DetailOptions& options, double cell_m);
 
 // Throws Error(usage) naming the first option that is out of its range.
 void check(const DetailOptions& options);

@@ -44,6 +44,26 @@ NEPHOS_FUNCTION Real billows(Real top, Real growth, float wisps) {
     return max(min(1.0f - 2.0f * wisps * (1.0f - top) + growth, Real(1.0f)), Real(-1.0f));
 }
 
+// The share of the upper of two neighbouring bands of noise, at a height between their middles, 0..1: they pass into each
+// other in the middle third.
+NEPHOS_FUNCTION Real share_of_upper(Real between) {
+    Real x = saturate(3.0f * between - 1.0f);
+    return x * x * (3.0f - 2.0f * x);
+}
+
+// A mean of two numbers that are uniform over 0..1, uniform again: `share` of `b`. The mean of independent numbers has a
+// trapezoid for a density, whose distribution makes it uniform; `apart`, 0..1, is how independent they are.
+NEPHOS_FUNCTION Real mean_of_uniform(Real a, Real b, Real share, Real apart) {
+    Real x = mul_add(share, b - a, a), most = max(share, 1.0f - share), least = 1.0f - most;
+    Real end = min(x, 1.0f - x);
+    Real flank = end * end / max(2.0f * most * least, Real(1.0e-6f));
+    Real low = select(end < least, flank, (end - 0.5f * least) / most);
+    return mul_add(apart, select(x > Real(0.5f), 1.0f - low, low) - x, x);
+}
+
+// `apart` of the small noises, from that of the large one: their bumps are others sooner.
+NEPHOS_FUNCTION Real apart_of_small(Real apart) { return min(8.0f * apart, Real(1.0f)); }
+
 // Fraction of the places of coverage `c` that are cloud: the distribution at c - 1/2 of a sum of two uniform numbers,
 // of widths `large` and `small` < large. Density divided by it keeps the mean over the noise.
 NEPHOS_FUNCTION Real cloudy_fraction(Real c, Real large, Real small) {

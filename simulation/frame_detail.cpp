@@ -20,6 +20,26 @@ bool is_box_of(const DensityGrid& grid, const AutomatonOptions& lattice) {
            a.cell_size_m * m.y == b.cell_size_m * n.y && a.cell_size_m * m.z == b.cell_size_m * n.z;
 }
 
+constexpr double kBandBumps = 1;           // large bumps in a band's height, at least
+constexpr std::size_t kMostBands = 64;
+constexpr double kLeastApart_m = 0.01;  // of drifts that are not the same
+
+// Returns the drift of bands of height of a grid, `setting.drift_m` that of its middle; none where all drift alike.
+DriftBands drift_bands(const Wind& wind, const DensityGrid& grid, const DetailSetting& setting, double time_s) {
+    const Placement& placement = grid.placement();
+    const double height_m = grid.extent().z * placement.cell_size_m,
+                 band_m = kBandBumps * bump_size_m(setting.options, placement.cell_size_m);
+    const auto count = std::min(std::size_t(std::ceil(height_m / band_m)), kMostBands);
+    DriftBands bands{height_m / double(count), {}};
+    bool all_alike = true;
+    for (std::size_t n = 0; n < count; ++n) {
+        const double middle_m = placement.origin_m.z + (double(n) + 0.5) * bands.height_m;
+        bands.apart_m.emplace_back(wind_displacement_m(wind, middle_m, time_s) - setting.drift_m);
+        all_alike = all_alike && glm::length(bands.apart_m.back()) < kLeastApart_m;
+    }
+    return all_alike ? DriftBands{} : bands;
+}
+
 }  // namespace
 
 DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> layer, const DensityGrid& density,
@@ -46,6 +66,7 @@ DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> laye
         setting.along = Vec2(fibres.cos, fibres.sin);
         return setting;
     }
+    setting.bands = drift_bands(wind, density, setting, time_s);
     const Velocity now = wind_at(wind, height, time_s);
     const double speed = std::hypot(now.east_m_per_s, now.north_m_per_s);
     if (speed > 0) setting.along = Vec2(now.east_m_per_s, now.north_m_per_s) / speed;

@@ -84,6 +84,8 @@ CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, cons
                                     double(part.density.extent().y), double(part.density.extent().z), origin.x, origin.y, origin.z,
                                     part.density.placement().cell_size_m, part.moisture ? part.moisture->sum() : -1.0})
             rest.push_back(number);
+        rest.push_back(s.bands.height_m);
+        for (const Vec2& apart : s.bands.apart_m) rest.insert(rest.end(), {apart.x, apart.y});
     }
     return key_of({metaballs[0], metaballs[1]}, rest);
 }

@@ -75,6 +75,17 @@ float noise_level(float footprint, float voxels_per_m) {
     return min(float(int(bits >> 23) - 127) + (mantissa - 1.0), 3.0);
 }
 
+// The small noises at a place in tiles of the large one, for a scaled footprint; 0..1.
+float medium_noise(uint v, float footprint, vec3 tiles) {
+    vec3 at = tiles * (march.volumes[v].medium_scale * 64.0);
+    return small_noise_at(noise_level(footprint, march.volumes[v].medium_per_m),
+                          vec3(0.6 * at.x - 0.8 * at.z, at.y, 0.8 * at.x + 0.6 * at.z));
+}
+float fine_noise(uint v, float footprint, vec3 tiles) {
+    return small_noise_at(noise_level(footprint, march.volumes[v].fine_per_m),
+                          tiles * (march.volumes[v].fine_scale * 64.0));
+}
+
 struct Node {
     float t, growth;
 };
@@ -98,6 +109,33 @@ float turned(vec4 row, vec3 place) {
     return fma(row.x, place.x, fma(row.y, place.y, fma(row.z, place.z, row.w)));
 }
 
+// Places in the tiles of the large noise: of the band of height that a point is in and, where it passes into the next, of
+// that one, too.
+struct InTiles {
+    vec3 own, next;
+    float share, apart;  // of the next; mean_of_uniform()
+};
+
+vec4 band_of(uint v, float number) {
+    uint first = march.volumes[v].first_bands + 4u * uint(number);
+    return uintBitsToFloat(uvec4(march_cells[first], march_cells[first + 1u], march_cells[first + 2u], march_cells[first + 3u]));
+}
+
+InTiles in_tiles(uint v, vec3 place) {
+    vec3 tiles = vec3(turned(march.volumes[v].to_noise[0], place), turned(march.volumes[v].to_noise[1], place),
+                      turned(march.volumes[v].to_noise[2], place));
+    InTiles at = InTiles(tiles, tiles, 0.0, 0.0);
+    if (march.volumes[v].bands == 0u) return at;
+    float height = (place.z - march.volumes[v].bands_begin) * march.volumes[v].bands_per_m - 0.5;
+    float last = float(march.volumes[v].bands - 1u), below = clamp(floor(height), 0.0, last), above = min(below + 1.0, last);
+    vec4 lower = band_of(v, below), upper = band_of(v, above);
+    at.own += lower.xyz;
+    at.next += upper.xyz;
+    at.share = share_of_upper(height - below);
+    at.apart = lower.w;
+    return at;
+}
+
 struct Eroded {
     float density;
     float margin;  // coverage that is missing to be cloud; not above 0 inside
@@ -115,17 +153,20 @@ Eroded eroded(uint v, Node node, vec3 place, float footprint, bool margins) {
     float others = 0.5 * (medium + fine + soft);
     bool needed = c > 0.5 - others - 0.5 * large && coverage > march.volumes[v].least_coverage;
     if (!needed && !margins) return Eroded(0.0, 0.0);
-    vec3 tiles = vec3(turned(march.volumes[v].to_noise[0], place), turned(march.volumes[v].to_noise[1], place),
-                      turned(march.volumes[v].to_noise[2], place));
-    float noise = large * (noise_at(0u, 7u, tiles * 128.0) - 0.5) + 0.5;
+    InTiles at = in_tiles(v, place);
+    bool two = at.share > 0.0;
+    float uniform_noise = noise_at(0u, 7u, at.own * 128.0);
+    if (two) uniform_noise = mean_of_uniform(uniform_noise, noise_at(0u, 7u, at.next * 128.0), at.share, at.apart);
+    float noise = large * (uniform_noise - 0.5) + 0.5;
     if (needed && abs(c - noise) < others && medium > 0.0) {
-        vec3 at = tiles * (march.volumes[v].medium_scale * 64.0);
-        float bumps = small_noise_at(noise_level(footprint, march.volumes[v].medium_per_m),
-                                     vec3(0.6 * at.x - 0.8 * at.z, at.y, 0.8 * at.x + 0.6 * at.z)) - 0.5;
-        float grain = 0.0;
-        if (fine > 0.0)
-            grain = small_noise_at(noise_level(footprint, march.volumes[v].fine_per_m),
-                                   tiles * (march.volumes[v].fine_scale * 64.0)) - 0.5;
+        float apart = apart_of_small(at.apart), bumps = medium_noise(v, footprint, at.own), grain = 0.0;
+        if (two) bumps = mean_of_uniform(bumps, medium_noise(v, footprint, at.next), at.share, apart);
+        bumps -= 0.5;
+        if (fine > 0.0) {
+            grain = fine_noise(v, footprint, at.own);
+            if (two) grain = mean_of_uniform(grain, fine_noise(v, footprint, at.next), at.share, apart);
+            grain -= 0.5;
+        }
         noise += medium * billows(top, node.growth, march.volumes[v].wisps) * bumps;
         noise += fine * grain;
     }

@@ -106,7 +106,10 @@ struct MarchVolume {
     uint first_shade;             // word
     uint shade_columns, shade_rows;
     float mean_sunlight;          // that passes, over a period
-    float unused0, unused1, unused2;
+    uint bands, first_bands;      // of heights that drift apart: how many, and their first word (ErosionConstants::bands)
+    float bands_begin;
+    float bands_per_m;
+    uint unused0, unused1, unused2;
 };
 
 struct March {
@@ -124,7 +127,7 @@ struct March {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(MarchVolume) == 304 && offsetof(MarchVolume, to_patches) == 208 && offsetof(MarchVolume, first_table) == 80 &&
+static_assert(sizeof(MarchVolume) == 320 && offsetof(MarchVolume, to_patches) == 208 && offsetof(MarchVolume, first_table) == 80 &&
               offsetof(MarchVolume, cap) == 112 && offsetof(March, ground_light) == 32 && offsetof(March, volumes) == 64);
 
 }  // namespace nephos::shader

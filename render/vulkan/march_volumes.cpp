@@ -25,7 +25,7 @@ static_assert(shader::kLargeNoiseWords == kLargeNoiseVoxels * kLargeNoiseVoxels 
 
 // Where the words of a volume begin.
 struct Places {
-    std::size_t table = 0, clearance = 0, nodes = 0, light = 0, shade = 0;
+    std::size_t table = 0, clearance = 0, nodes = 0, bands = 0, light = 0, shade = 0;
     std::size_t cells_end = 0, light_end = 0;
 };
 
@@ -35,7 +35,8 @@ Places places_after(const Places& before, const CloudVolume& volume) {
     at.table = before.cells_end;
     at.clearance = at.table + volume.field.table().size();
     at.nodes = at.clearance + bricks * shader::kClearanceWords;
-    at.cells_end = at.nodes + bricks * kNodes;
+    at.bands = at.nodes + bricks * kNodes;
+    at.cells_end = at.bands + 4 * volume.field.erosion().bands.size();
     at.light = before.light_end;
     at.shade = at.light + 4 * bricks * kLightNodesOfBrick;
     at.light_end = at.shade + volume.shade.size();
@@ -73,6 +74,8 @@ std::vector<std::uint32_t> march_cells(std::span<const CloudVolume> volumes) {
     for_each_volume(volumes, [&](const CloudVolume& volume, const Places& at) {
         const CoverageField& field = volume.field;
         std::memcpy(&words[at.table], field.table().data(), 4 * field.table().size());
+        const auto& bands = field.erosion().bands;
+        if (!bands.empty()) std::memcpy(&words[at.bands], bands.data(), sizeof bands[0] * bands.size());
         for (std::size_t i = 0; i < field.clearance().size(); ++i)
             words[at.clearance + i / 4] |= std::uint32_t(field.clearance()[i]) << (i % 4 * 8);
         tbb::parallel_for(std::size_t{0}, field.places().size(), [&](std::size_t brick) {
@@ -168,6 +171,10 @@ shader::March march_constants(const LitCloud& cloud, const CameraFrame& camera, 
         to.shade_columns = shader::uint(from.shade_columns);
         to.shade_rows = shader::uint(from.shade_rows);
         to.mean_sunlight = from.mean_sunlight;
+        to.bands = shader::uint(e.bands.size());
+        to.first_bands = shader::uint(at.bands);
+        to.bands_begin = e.bands_begin_m;
+        to.bands_per_m = e.bands_per_m;
     });
     march.first_ground_light = shader::uint(end.light_end);
     return march;

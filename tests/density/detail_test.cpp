@@ -99,11 +99,15 @@ TEST(Detail, KernelsAgreeWithTheReference) {
     setting.options.stretch = 3;
     setting.along = Vec2(0.6, 0.8);
     setting.drift_m = Vec3(1234.5, -321, 0);
-    const CoverageField field(grid, setting);
+    DetailSetting sheared = setting;
+    sheared.bands = {170, {{-300, 20}, {-10, 0}, {15, 40}, {400, 70}}};
+    const CoverageField alike(grid, setting), apart(grid, sheared);
     const std::int64_t targets = hwy::SupportedTargets();
     for (std::int64_t rest = targets; rest != 0; rest &= rest - 1) {
         hwy::SetSupportedTargetsForTest(rest & -rest);
-        for (const double footprint : {30.0, 10.0, 1.5}) {
+        for (const auto& [of, footprint] : std::vector<std::pair<const CoverageField*, double>>{
+                 {&alike, 30.0}, {&alike, 10.0}, {&alike, 1.5}, {&apart, 30.0}, {&apart, 10.0}, {&apart, 1.5}}) {
+            const CoverageField& field = *of;
             const Vec3 corner = grid.placement().origin_m + Vec3(300, 250, 0);
             const std::array<int, 3> count{23, 7, int(700 / footprint)};
             const auto values = detailed_density(field, corner, count, footprint);
@@ -129,7 +133,66 @@ TEST(Detail, KeepsTheMass) {
         const double mass = grid.sum() * kCell * kCell * kCell;
         EXPECT_NEAR(mass_of(field, 20) / mass, 1, 0.01) << seed;
         EXPECT_NEAR(mass_of(field, 10) / mass, 1, 0.02) << seed;
+        DetailSetting sheared = cumulus_setting();
+        sheared.bands = {160, {{-600, 0}, {-300, 0}, {0, 0}, {300, 0}, {600, 0}}};
+        EXPECT_NEAR(mass_of(CoverageField(grid, sheared), 10) / mass, 1, 0.02) << seed;
     }
+}
+
+// In a layer of one density, which looks the same from everywhere but for its noise.
+TEST(Detail, EachHeightDriftsWithItsOwnWind) {
+    const Extent extent{48, 48, 20};
+    const DensityGrid grid =
+        DensityGrid::from_dense(std::vector<float>(extent.cells(), 0.08f), extent, {Vec3(-1000, 300, 900), kCell});
+    DetailSetting setting = cumulus_setting();
+    setting.options.thermals = 0;
+    DetailSetting later = setting;
+    later.drift_m = {50, -20, 0};
+    later.bands = {160, {{-120, 30}, {-60, 0}, {0, 0}, {90, 10}, {200, -40}}};
+    const CoverageField before(grid, setting), after(grid, later);
+    double worst = 0;
+    int some = 0;
+    for (int n = 0; n < 4000; ++n) {
+        const int band = n % 5;
+        const double middle = 160 * (band + 0.5), at_height = middle + 50 * (n * 17 % 101 / 50.0 - 1);
+        const Vec3 place = grid.placement().origin_m + Vec3(500 + n * 37 % 900, 500 + n * 53 % 900, at_height);
+        const Vec3 way = later.drift_m + Vec3(later.bands.apart_m[std::size_t(band)], 0.0);
+        const float was = detailed_density_at(before, place, 3), is = detailed_density_at(after, place + way, 3);
+        some += was > 0 && was < 0.08f * 4 ? 1 : 0;
+        worst = std::max(worst, double(std::abs(was - is)));
+    }
+    EXPECT_LT(worst, 0.02);
+    EXPECT_GT(some, 500);
+}
+
+// Where one band passes into the next, there is neither more nor less cloud than elsewhere, and no step.
+TEST(Detail, BandsPassIntoEachOther) {
+    const Extent extent{64, 64, 20};
+    const DensityGrid grid =
+        DensityGrid::from_dense(std::vector<float>(extent.cells(), 0.08f), extent, {Vec3(0, 0, 900), kCell});
+    DetailSetting setting = cumulus_setting();
+    setting.options.thermals = 0;
+    setting.options.wisps = 0;
+    setting.bands = {160, {{-500, 300}, {-200, 100}, {0, 0}, {200, -100}, {500, -300}}};
+    const CoverageField field(grid, setting);
+    const auto plane_at = [&](double height) {
+        return detailed_density(field, grid.placement().origin_m + Vec3(300, 300, height), {200, 200, 1}, 10);
+    };
+    const auto mean_of = [](const std::vector<float>& values) {
+        return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+    };
+    const double in_band = mean_of(plane_at(395)), between = mean_of(plane_at(475));
+    EXPECT_NEAR(between / in_band, 1, 0.1);
+    double usual = 0, largest = 0;
+    for (double height = 322; height < 480; height += 1) {
+        const std::vector<float> low = plane_at(height), high = plane_at(height + 1);
+        double change = 0;
+        for (std::size_t n = 0; n < low.size(); ++n) change += double(std::abs(high[n] - low[n]));
+        usual += change / 158;
+        largest = std::max(largest, change);
+    }
+    EXPECT_LT(largest, 2 * usual);
+    EXPECT_GT(usual, 0);
 }
 
 // The same places in air that has drifted, and in a grid that has moved with it.

@@ -44,6 +44,7 @@ struct DetailedCloud {
         DetailedVoxels& part = detailed.emplace_back();
         part.density = DensityGrid::from_dense(values, extent, {origin_m, 40.0});
         part.setting = {.options = options, .extinction_per_m = extinction_per_m, .drift_m = {1234, -567, 0}};
+        if (detailed.size() % 2 == 1) part.setting.bands = {140, {{-90, 10}, {0, 0}, {70, -5}, {300, 40}}};
         const std::vector<Metaball> own = metaballs(part.density, part.setting.metaball_radius_cells);
         part.first = balls.size();
         part.count = own.size();

@@ -143,6 +143,7 @@ TEST(VeilLayer, HasDetailByATableOfItsOwn) {
     EXPECT_NEAR(setting.along.x, std::sqrt(0.75), 1e-12);
     EXPECT_NEAR(setting.along.y, 0.5, 1e-12);
     const Vec3 carried = wind_displacement_m(scene.automaton.wind, scene.layers[0].veil.top_m, 40);
+    EXPECT_TRUE(setting.bands.apart_m.empty());  // a veil has one wind
     EXPECT_EQ(setting.drift_m.x, carried.x);
     EXPECT_EQ(setting.drift_m.y, carried.y);
     const Scene turned = scene_of({"layer[0].veil.direction_deg=30"});
