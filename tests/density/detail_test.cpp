@@ -100,7 +100,7 @@ TEST(Detail, KernelsAgreeWithTheReference) {
     setting.along = Vec2(0.6, 0.8);
     setting.drift_m = Vec3(1234.5, -321, 0);
     DetailSetting sheared = setting;
-    sheared.bands = {170, {{-300, 20}, {-10, 0}, {15, 40}, {400, 70}}};
+    sheared.bands = {170, {{-30, 20}, {-10, 0}, {15, 40}, {30, 70}}};
     const CoverageField alike(grid, setting), apart(grid, sheared);
     const std::int64_t targets = hwy::SupportedTargets();
     for (std::int64_t rest = targets; rest != 0; rest &= rest - 1) {

@@ -237,7 +237,7 @@ TEST(DiffusionCells, LightThatStartsBesideTheMiddleIsShared) {
         }
     }
     EXPECT_NEAR(arrived + left, started, 1e-4 * started);
-    EXPECT_GT(left, 0.02 * started);
+    EXPECT_GT(left, 0.001 * started);
 }
 
 TEST(DiffusionCells, LightIsThatOfItsDefinition) {
