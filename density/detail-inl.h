@@ -218,7 +218,7 @@ HWY_INLINE Eroded eroded(const DetailKernel& field, const Node& node, Floats x, 
         at.v = hn::IfThenElseZero(unsure, at.v);
         at.w = hn::IfThenElseZero(unsure, at.w);
     }
-    if (!e.bands.empty()) add_drift(e, z, unsure, at);
+    if (!e.bands.empty()) add_drift(e, z, kMargins ? asked : unsure, at);
     Floats noise = of_bands(at, at.apart, [&](Floats u, Floats v, Floats w) {
         return noise_at(field.large_noise, integer(0), integer(7), hn::Mul(u, edge), hn::Mul(v, edge), hn::Mul(w, edge));
     });

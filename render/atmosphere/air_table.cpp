@@ -66,7 +66,7 @@ AirTable Atmosphere::air(double eye_altitude_m, double sun_elevation_deg) const 
         const double level = std::sqrt(std::max(0.0, 1 - ray.sine * ray.sine));
         double cos_to_sun[3], phase[3];  // towards the sun, beside it, away from it
         for (std::size_t a = 0; a < 3; ++a) {
-            cos_to_sun[a] = ray.sine * sun + (1 - double(a)) * level * sun_cosine;
+            cos_to_sun[a] = ray.sine * sun + (1 - double(a)) * double(shader::kAirAzimuth) * level * sun_cosine;
             phase[a] = double(shader::molecule_phase(float(cos_to_sun[a])));
         }
         Rgb scattered[3]{}, haze[3]{};

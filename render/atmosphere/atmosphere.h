@@ -73,8 +73,8 @@ struct SkyTable {
 
 // The air along rays up to a distance, for one elevation of the sun and one height of the eye, four numbers a
 // texel: kSkyColumns distances by kSkyRows elevations, by air_distance() and air_row(). Radiances are those of
-// SkyTable, towards the azimuth of the sun, at right angles to it and away from it; between, they are square in
-// its cosine, as the phase function of molecules is.
+// SkyTable, at azimuths from the sun's whose cosines are kAirAzimuth, 0 and -kAirAzimuth; between, they are square in the
+// cosine, as the phase function of molecules is.
 struct AirTable {
     std::vector<float> transmittance;
     std::array<std::vector<float>, 3> scattered, haze;

@@ -84,6 +84,7 @@ HWY_INLINE Floats3 sunlight_nearby(const PictureFrame& frame, Floats heights) {
 
 namespace formulas {
 
+using shader::kAirAzimuth;
 using shader::kAirLayer;
 using shader::kAirRows;
 using shader::kShaftsReach;

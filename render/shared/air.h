@@ -60,10 +60,11 @@ NEPHOS_FUNCTION Real3 clear_air(Real3 ray, Real distance) { return exp(-air_dept
 // Returns the source of the light of sunlit air along a ray, up to a distance: light / (1 - transmittance).
 NEPHOS_FUNCTION Real3 air_source(Real3 ray, Real distance) {
     if (!kPhysicalSky) return rgb(frame.horizon);
-    Real cosine = beside_sun(ray), square = cosine * cosine;
+    Real cosine = (1.0f / kAirAzimuth) * beside_sun(ray), square = cosine * cosine;
     Real3 around = Real3(0.5f * (square + cosine), 1.0f - square, 0.5f * (square - cosine));
-    return light_of_air(air_column(ray, distance), air_upwards(ray), around,
-                        particle_phase(dot(xyz(frame.to_sun), ray), frame.air.y));
+    Real3 light = light_of_air(air_column(ray, distance), air_upwards(ray), around,
+                               particle_phase(dot(xyz(frame.to_sun), ray), frame.air.y));
+    return max(light, Real(0.0f));
 }
 
 // Returns the radiance of sunlit air over a distance; `beta` is its transmittance.

@@ -45,6 +45,9 @@ NEPHOS_CONST uint kSkyColumns = 64u, kSkyRows = 96u;  // of the tables of the sk
 // Scattered, haze, sunlight by altitude; and of the air up to a distance: extinction, the source of what is
 // scattered and of haze, each towards the sun, beside it and away from it.
 NEPHOS_CONST uint kSkyLayers = 10u;
+// Of the azimuths of the latter three, from the sun's: 1, 0 and -1 times this is their cosine. So the error of what is
+// square in the cosine between them is less than with 1, and beyond them no larger.
+NEPHOS_CONST float kAirAzimuth = 0.93f;
 NEPHOS_CONST uint kAirLayer = 3u;             // the first of the latter
 NEPHOS_CONST uint kAirRows = 48u;             // of those above the horizon, and of those below
 // Metres within which light shafts lie: what they take away is no more than the source of this air.
