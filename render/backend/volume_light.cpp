@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "render/backend/processor_light.h"
+#include "render/frame/scattering_table.h"
 
 namespace nephos {
 
@@ -36,7 +37,7 @@ void complete_light_of_volumes(LitCloud& cloud, std::span<const std::uint8_t> ba
         for (const CloudVolume& volume : cloud.volumes) {
             if (volume.diffuse.upwards.empty()) continue;
             const float depth = equivalent_depth_at(volume, centre, cloud.sun_depths[i]);
-            if (depth != cloud.sun_depths[i]) cloud.drawn_depths[i] = depth;
+            if (depth != cloud.sun_depths[i]) cloud.drawn_depths[i] = two_depths({cloud.sun_depths[i], depth});
         }
     });
     if (std::ranges::count(tiles, 1) > 0) cast_shadows(cloud.volumes, cloud.frame, cloud.shadow_size, cloud.shadow);

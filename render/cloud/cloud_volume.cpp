@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
@@ -235,33 +236,23 @@ float sun_depth_at(const CloudVolume& volume, const Vec3& place_m) {
     return root * root * kMostMarchedDepth;
 }
 
-// What leaves a cloud towards the eye goes outwards: the flux along it is about a third of the fluence.
+// Metaballs are seen from far away, so nearly along the ground, and those whose light goes away from the eye hide behind
+// others: of the level part of the flux the mean over directions towards the eye counts.
 float equivalent_depth_at(const CloudVolume& volume, const Vec3& place_m, float sun_depth) {
-    constexpr double kOutwards = 1.0 / 3;
-    constexpr double kLitThin = 0.1, kLitThick = 0.4;  // light scattered often: of cloud that is thin, and is not
+    constexpr double kTowardsEye = 2 / std::numbers::pi;
     const PlaceInField at(volume.field, place_m);
     if (at.number < 0) return sun_depth;
     std::size_t node = std::size_t(at.number) * kLightNodesOfBrick, stride = 1;
     for (int axis = 0; axis < 3; ++axis, stride *= kLightNodes)
         node += stride * std::size_t(std::lround(at.local[axis]));
     const double root = double(volume.diffuse.upwards[node] & 255u) / 255, g = volume.mean_cosine;
+    const unsigned sideways = volume.diffuse.sideways[node];
+    const double outwards =
+        kTowardsEye * std::hypot(double(sideways & 255u) - 128, double(sideways >> 8) - 128) / 127;
     const double diffuse = 0.25 * double(shader::kMostFluence) * root * root *
-                           (double(shader::kDiffuseBase) + double(shader::kDiffuseFlux) * g * kOutwards);
+                           (double(shader::kDiffuseBase) + double(shader::kDiffuseFlux) * g * outwards);
     const double near = 0.25 * (std::exp((g - 1) * double(sun_depth)) - std::exp(-double(sun_depth)));
-    const double often_here = std::max(diffuse + near, 1e-3), decay = 1.5 * std::max(1 - g, 0.01);
-    const double depth = std::max(1 / often_here - 1, 0.0) / decay;
-    // In thin cloud little is scattered often, and that depth would dim what is scattered once: there both together, of
-    // all directions alike. Their sum falls with the depth, ever slower: Newton's steps from a smaller depth never pass
-    // the solution.
-    const double thin = std::clamp((kLitThick - often_here) / (kLitThick - kLitThin), 0.0, 1.0);
-    if (thin == 0) return float(depth);
-    const double all = often_here + 0.25 * std::exp(-double(sun_depth));
-    double of_all = std::max(1 / all - 1, 0.0) / decay;
-    for (int step = 0; step < 4; ++step) {
-        const double often = 1 / (1 + decay * of_all), once = 0.25 * std::exp(-of_all);
-        of_all += std::max(often + once - all, 0.0) / (decay * often * often + once);
-    }
-    return float(depth + thin * (of_all - depth));
+    return float(std::max(1 / std::max(diffuse + near, 1e-3) - 1, 0.0) / (1.5 * std::max(1 - g, 0.01)));
 }
 
 void cast_shadows(std::span<const CloudVolume> volumes, const ShadowFrame& frame, int size,

@@ -61,8 +61,8 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
 // Returns the optical depth of a volume alone towards the sun, at any place of the world. After light_volumes().
 float sun_depth_at(const CloudVolume& volume, const Vec3& place_m);
 
-// Returns the depth at which a metaball at the place scatters as much light as the volume there, once and often, if it is
-// not lit by diffuse light itself: 1 / (1 + 1.5 (1 - g) depth) of it (scattering_table.h). Where diffuses(light).
+// Returns the depth at which a metaball at the place has as much light that was scattered often as the volume there:
+// 1 / (1 + 1.5 (1 - g) depth) (scattering_table.h). Where diffuses(light).
 float equivalent_depth_at(const CloudVolume& volume, const Vec3& place_m, float sun_depth);
 
 // Multiplies the texels of a shadow map by the light that the volumes leave.

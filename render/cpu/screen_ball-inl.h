@@ -20,6 +20,7 @@
 #include <hwy/highway.h>
 
 #include "render/cpu/screen_ball.h"
+#include "render/frame/scattering_table.h"
 #include "render/shading/background-inl.h"
 #include "render/shading/formulas-inl.h"
 #include "render/shading/shells-inl.h"
@@ -33,7 +34,7 @@ inline constexpr std::size_t kMaxLanes = 2 * shader::kTileWidth;
 // Balls of one vector, turned from rows into columns.
 struct BallColumns {
     HWY_ALIGN float x[kMaxLanes], y[kMaxLanes], z[kMaxLanes], radius[kMaxLanes], least_radius[kMaxLanes],
-        depth_scale[kMaxLanes], sun_depth[kMaxLanes], height[kMaxLanes], flash[kMaxLanes];
+        depth_scale[kMaxLanes], sun_depth[kMaxLanes], often_depth[kMaxLanes], height[kMaxLanes], flash[kMaxLanes];
 
     BallColumns(std::span<const shader::ViewBall> balls, const PictureFrame& frame) {
         const std::size_t lanes = hn::Lanes(Lanes());
@@ -46,7 +47,9 @@ struct BallColumns {
             const bool widens = (ball.flags & shader::kAround) == 0;
             least_radius[lane] = widens ? shader::kMinRadiusPixels / frame.up.w : 0.0f;
             depth_scale[lane] = ball.depth_scale;
-            sun_depth[lane] = ball.sun_depth;
+            const SunDepths depths = depths_of(ball.sun_depth);
+            sun_depth[lane] = depths.once;
+            often_depth[lane] = depths.often;
             height[lane] = ball.height;
             flash[lane] = float(ball.flags >> 16) * (1.0f / 65535.0f);
         }
@@ -67,7 +70,7 @@ HWY_INLINE Scattered scattered_light(const BallColumns& ball, const Floats3& cen
     const Floats height = hn::Load(d, ball.height), albedo = set(frame.ambient_top.w);
     const Floats3 sunlight = sunlight_at(frame, centre.z);
     Floats3 arriving =
-        times_add(scattered_often(frame, ray, sun_depth), sunlight,
+        times_add(scattered_often(frame, ray, hn::Load(d, ball.often_depth)), sunlight,
                   mix(set3(frame.ambient_base), set3(frame.ambient_top), {height, height, height}));
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), centre);

@@ -3,8 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+
+#include <glm/gtc/packing.hpp>
 
 #include "render/shared/shared.h"
 
@@ -112,6 +116,19 @@ float scattered_often(const std::vector<float>& table, float cos_theta, float de
     const Between angle = between(shader::scatter_column(cos_theta), kAngles),
                   row = between(shader::scatter_row(depth), kDepths);
     return mix(at(table, 1 + row.below, angle), at(table, 2 + row.below, angle), row.fraction);
+}
+
+// Bit 30 keeps the float that these bits make from being denormal, which processors may take for 0; as a half of a depth
+// is finite it is no NaN either.
+float two_depths(const SunDepths& depths) {
+    const auto bits = [](float depth) { return std::uint32_t(glm::packHalf1x16(std::min(depth, shader::kMaxSunDepth))); };
+    return std::bit_cast<float>(0xc0000000u | bits(depths.once) << 15 | bits(depths.often));
+}
+
+SunDepths depths_of(float sun_depth) {
+    if (!(sun_depth < 0)) return {sun_depth, sun_depth};
+    const auto both = std::bit_cast<std::uint32_t>(sun_depth);
+    return {glm::unpackHalf1x16(std::uint16_t(both >> 15 & 0x7fffu)), glm::unpackHalf1x16(std::uint16_t(both & 0x7fffu))};
 }
 
 void to_sun_depths(std::vector<float>& light) {

@@ -25,6 +25,16 @@ std::vector<float> scattering_table(const CloudLight& light);
 float scattered_once(const std::vector<float>& table, float cos_theta);
 float scattered_often(const std::vector<float>& table, float cos_theta, float depth);
 
+// Optical depths towards the sun of light that is scattered once, and of the row of the table for light scattered often.
+struct SunDepths {
+    float once = 0, often = 0;
+};
+
+// Returns both in the bits of shader::ViewBall::sun_depth, as halfs: within 0.05 %. Precondition: neither is negative.
+float two_depths(const SunDepths& depths);
+// Returns what a shader::ViewBall::sun_depth stands for.
+SunDepths depths_of(float sun_depth);
+
 // Converts transmittances to optical depths in place, clamped to shader::kMaxSunDepth so that shaders meet no
 // infinity.
 void to_sun_depths(std::vector<float>& light);

@@ -6,6 +6,13 @@ struct Scattered {
     vec3 direct;   // radiance per light that is scattered once
 };
 
+// Returns the optical depths of light that is scattered once, and often (ViewBall::sun_depth).
+vec2 depths_of(float sun_depth) {
+    uint both = floatBitsToUint(sun_depth);
+    vec2 two = vec2(unpackHalf2x16((both >> 15) & 0x7fffu).x, unpackHalf2x16(both & 0x7fffu).x);
+    return sun_depth < 0.0 ? two : vec2(sun_depth);
+}
+
 // There are no branches on uniforms: lavapipe would recompile the shader for each draw.
 Scattered scattered_light(ViewBall ball, float distance) {
     vec3 ambient = mix(frame.ambient_base.rgb, frame.ambient_top.rgb, ball.height);
@@ -13,13 +20,14 @@ Scattered scattered_light(ViewBall ball, float distance) {
     vec3 beta = air_transmittance(ray, distance);
     float albedo = frame.ambient_top.w;
     vec3 sunlight = sunlight_at(ball.z);
-    vec3 arriving = sunlight * scattered_often(ray, ball.sun_depth) + ambient;
+    vec2 depths = depths_of(ball.sun_depth);
+    vec3 arriving = sunlight * scattered_often(ray, depths.y) + ambient;
     vec3 way = frame.flash.xyz - vec3(ball.x, ball.y, ball.z);  // lightning; adds nothing in the dark
     float share = float(ball.flags >> 16) / 65535.0;
     arriving += frame.flash.w * flash_falloff(dot(way, way)) * share * frame.flash_colour.rgb;
     Scattered light;
     light.diffuse = beta * albedo * arriving + air_light(ray, distance, beta);
-    light.direct = beta * albedo * exp(-ball.sun_depth) * sunlight;
+    light.direct = beta * albedo * exp(-depths.x) * sunlight;
     return light;
 }
 

@@ -74,7 +74,10 @@ struct ViewBall {
     float x, y, z;      // centre relative to the eye
     float radius;       // metres
     float depth_scale;  // extinction at the centre * radius: optical depth = depth_scale * line_integral()
-    float sun_depth;    // optical depth towards the sun: exp(-sun_depth) arrives
+    // Optical depth towards the sun: exp(-sun_depth) arrives. Below 0 its bits hold two halfs without their signs: of light
+    // that is scattered once, and behind it the one at which scattered_often() gives the light that diffuses
+    // (two_depths() in render/frame/scattering_table.h).
+    float sun_depth;
     float height;       // in the cloud: 0 base, 1 top
     uint flags;  // lower half; upper half: transmitted fraction of the lightning, 0..65535. On the device a
                  // ViewBall with kBillboardFlag stands for a billboard and has nothing but its centre

@@ -110,6 +110,18 @@ TEST(Phase, FitOfDroplets) {
     }
 }
 
+TEST(ScatteringTable, TwoDepthsFitIntoOneNumber) {
+    for (const float once : {0.0f, 1e-3f, 0.37f, 12.0f, 64.0f})
+        for (const float often : {0.0f, 0.02f, 5.0f, 4095.0f, 1e6f}) {
+            const float both = two_depths({once, often}), most = std::min(often, shader::kMaxSunDepth);
+            EXPECT_TRUE(std::isnormal(both) && both < 0);
+            EXPECT_NEAR(depths_of(both).once, once, 5e-4f * once + 1e-7f);
+            EXPECT_NEAR(depths_of(both).often, most, 5e-4f * most + 1e-7f);
+        }
+    EXPECT_EQ(depths_of(0.25f).once, 0.25f);
+    EXPECT_EQ(depths_of(0.25f).often, 0.25f);
+}
+
 // The nodes of the table are those of its coordinates, and no angle or depth leaves it.
 TEST(ScatteringTable, CoordinatesStayInside) {
     EXPECT_EQ(shader::scatter_column(1), 0.0f);
