@@ -146,7 +146,7 @@ class Sampler {
     const Mapping& map_;
     const Extent extent_;
     const Boundaries boundaries_;
-    openvdb::FloatGrid::ConstAccessor accessor_;
+    FloatGrid::ConstAccessor accessor_;
 };
 
 // Adds one grid to the values of a block of the common box.
@@ -254,7 +254,7 @@ DensityGrid scaled(const DensityGrid& grid, double factor) {
 
 DensityGrid placed_at(const DensityGrid& grid, const Placement& placement) {
     const auto tree = OpenvdbAccess::grid(grid).treePtr();
-    return OpenvdbAccess::wrap(openvdb::FloatGrid::create(openvdb::ConstPtrCast<openvdb::FloatTree>(tree)), grid.extent(), placement);
+    return OpenvdbAccess::wrap(FloatGrid::create(openvdb::ConstPtrCast<FloatTree>(tree)), grid.extent(), placement);
 }
 
 }  // namespace nephos

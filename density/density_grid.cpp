@@ -17,14 +17,14 @@
 namespace nephos {
 
 struct DensityGrid::Impl {
-    openvdb::FloatGrid::Ptr grid;
+    FloatGrid::Ptr grid;
     Extent extent;
     Placement placement;
 };
 
 namespace {
 
-using Node1 = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
+using Node1 = FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
 
 void check_placement(const Placement& placement) {
     if (!(placement.cell_size_m > 0) || !std::isfinite(placement.cell_size_m)) {
@@ -53,7 +53,7 @@ void fill_leaf(FloatLeaf& leaf, std::span<const float> values, Extent extent, co
 
 }  // namespace
 
-TreeBuilder::TreeBuilder() : grid_(openvdb::FloatGrid::create(0.0f)), accessor_(grid_->tree()) {}
+TreeBuilder::TreeBuilder() : grid_(FloatGrid::create(0.0f)), accessor_(grid_->tree()) {}
 
 void TreeBuilder::add(std::unique_ptr<FloatLeaf> leaf) { accessor_.addLeaf(leaf.release()); }
 
@@ -69,9 +69,9 @@ DensityGrid TreeBuilder::finish(Extent extent, const Placement& placement) {
     return OpenvdbAccess::wrap(std::move(grid_), extent, placement);
 }
 
-const openvdb::FloatGrid& OpenvdbAccess::grid(const DensityGrid& density) { return *density.impl_->grid; }
+const FloatGrid& OpenvdbAccess::grid(const DensityGrid& density) { return *density.impl_->grid; }
 
-DensityGrid OpenvdbAccess::wrap(openvdb::FloatGrid::Ptr grid, Extent extent, const Placement& placement) {
+DensityGrid OpenvdbAccess::wrap(FloatGrid::Ptr grid, Extent extent, const Placement& placement) {
     return DensityGrid(
         std::make_shared<const DensityGrid::Impl>(DensityGrid::Impl{std::move(grid), extent, placement}));
 }
@@ -135,7 +135,7 @@ std::vector<Block> blocks_of(const DensityGrid& density) {
 }
 
 DensityGrid::DensityGrid()
-    : impl_(std::make_shared<const Impl>(Impl{openvdb::FloatGrid::create(0.0f), Extent{}, Placement{}})) {}
+    : impl_(std::make_shared<const Impl>(Impl{FloatGrid::create(0.0f), Extent{}, Placement{}})) {}
 
 DensityGrid::DensityGrid(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 

@@ -175,7 +175,7 @@ class Resampler {
         return float(sum / phase.sum);
     }
 
-    const openvdb::FloatGrid& grid_;
+    const FloatGrid& grid_;
     const Extent cells_;
     const Boundaries boundaries_;
     const int refine_;

@@ -14,13 +14,12 @@
 #include <tuple>
 #include <vector>
 
-#include <openvdb/openvdb.h>
-
 #include "density/density_grid.h"
+#include "density/openvdb_grids.h"
 
 namespace nephos {
 
-using FloatLeaf = openvdb::FloatTree::LeafNodeType;
+using FloatLeaf = FloatTree::LeafNodeType;
 
 inline constexpr int kBlock = 8;  // voxels along the edge of a leaf
 inline constexpr int kBlockVoxels = 512;
@@ -50,14 +49,14 @@ class TreeBuilder {
     DensityGrid finish(Extent extent, const Placement& placement);
 
   private:
-    openvdb::FloatGrid::Ptr grid_;
-    openvdb::tree::ValueAccessor<openvdb::FloatTree> accessor_;
+    FloatGrid::Ptr grid_;
+    openvdb::tree::ValueAccessor<FloatTree> accessor_;
 };
 
 struct OpenvdbAccess {
-    static const openvdb::FloatGrid& grid(const DensityGrid& density);
+    static const FloatGrid& grid(const DensityGrid& density);
     // Wraps a grid that satisfies the invariants above; its transform is not used.
-    static DensityGrid wrap(openvdb::FloatGrid::Ptr grid, Extent extent, const Placement& placement);
+    static DensityGrid wrap(FloatGrid::Ptr grid, Extent extent, const Placement& placement);
 };
 
 // Returns all blocks of the tree, ordered by z, y, x of their origins. A corner's block may have no value

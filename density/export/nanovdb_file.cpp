@@ -27,9 +27,9 @@ namespace nephos {
 namespace {
 
 // The same tree with the transform and the class of the files of vdb_file.h.
-openvdb::FloatGrid::Ptr described(const DensityGrid& density) {
+FloatGrid::Ptr described(const DensityGrid& density) {
     const auto tree = OpenvdbAccess::grid(density).treePtr();
-    const auto grid = openvdb::FloatGrid::create(openvdb::ConstPtrCast<openvdb::FloatTree>(tree));
+    const auto grid = FloatGrid::create(openvdb::ConstPtrCast<FloatTree>(tree));
     const Placement& at = density.placement();
     const double size = at.cell_size_m;
     const auto transform = openvdb::math::Transform::createLinearTransform(size);
@@ -40,12 +40,12 @@ openvdb::FloatGrid::Ptr described(const DensityGrid& density) {
     return grid;
 }
 
-nanovdb::GridHandle<> converted(const openvdb::FloatGrid& grid, NanoQuantise quantise) {
+nanovdb::GridHandle<> converted(const FloatGrid& grid, NanoQuantise quantise) {
     switch (quantise) {
         case NanoQuantise::fp8:
-            return nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, nanovdb::Fp8>(grid);
+            return nanovdb::openToNanoVDB<nanovdb::HostBuffer, FloatTree, nanovdb::Fp8>(grid);
         case NanoQuantise::fp16:
-            return nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, nanovdb::Fp16>(grid);
+            return nanovdb::openToNanoVDB<nanovdb::HostBuffer, FloatTree, nanovdb::Fp16>(grid);
         case NanoQuantise::none:
             break;
     }

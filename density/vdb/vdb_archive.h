@@ -16,7 +16,6 @@
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>
-#include <openvdb/openvdb.h>
 
 namespace nephos {
 

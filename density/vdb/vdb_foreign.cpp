@@ -116,7 +116,7 @@ class Permuter {
     Permuter(const CoordBBox& bounds, const AxisMap& map, const DensityReceiver& receiver)
         : bounds_(bounds), map_(map), receiver_(receiver), work_(0.0f), voxels_(work_) {}
 
-    ForeignResult run(const openvdb::FloatTree& tree) {
+    ForeignResult run(const FloatTree& tree) {
         const bool blocks_stay =
             map_.axis == std::array<int, 3>{0, 1, 2} && map_.same == std::array<bool, 3>{true, true, true} &&
             ((bounds_.min().x() | bounds_.min().y() | bounds_.min().z()) & (kBlock - 1)) == 0;
@@ -132,7 +132,7 @@ class Permuter {
             }
         }
         auto tile = tree.cbeginValueOn();
-        tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
+        tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
         for (; tile; ++tile) move_tile(tile.getBoundingBox(), sanitise_(*tile));
         for (auto leaf = work_.cbeginLeaf(); leaf; ++leaf)
             receiver_.leaf(leaf->origin(), leaf->buffer().data());
@@ -186,8 +186,8 @@ class Permuter {
     const CoordBBox bounds_;
     const AxisMap map_;
     const DensityReceiver& receiver_;
-    openvdb::FloatTree work_;
-    openvdb::tree::ValueAccessor<openvdb::FloatTree> voxels_;
+    FloatTree work_;
+    openvdb::tree::ValueAccessor<FloatTree> voxels_;
     Sanitiser sanitise_;
 };
 
@@ -265,10 +265,10 @@ class Skewed {
             }
             if (result.size() > foreign_.memory_bytes / 64) throw std::bad_alloc();
         };
-        const openvdb::FloatTree& tree = foreign_.grid->tree();
+        const FloatTree& tree = foreign_.grid->tree();
         for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) add(leaf->getNodeBoundingBox());
         auto tile = tree.cbeginValueOn();
-        tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
+        tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
         for (; tile; ++tile) add(tile.getBoundingBox());
         std::ranges::sort(result, {}, block_order);
         result.erase(std::unique(result.begin(), result.end()), result.end());

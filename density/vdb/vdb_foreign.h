@@ -8,9 +8,8 @@
 #include <cstdint>
 #include <functional>
 
-#include <openvdb/openvdb.h>
-
 #include "automaton/lattice.h"
+#include "density/openvdb_grids.h"
 
 namespace nephos {
 
@@ -23,7 +22,7 @@ struct DensityReceiver {
 };
 
 struct ForeignGrid {
-    const openvdb::FloatGrid* grid = nullptr;
+    const FloatGrid* grid = nullptr;
     openvdb::CoordBBox bounds;  // of the voxels to take, in the file's index space
     bool y_up = false;
     double metres_per_unit = 1;

@@ -9,8 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include <openvdb/openvdb.h>
-
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_metadata.h"

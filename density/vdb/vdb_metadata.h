@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include <openvdb/openvdb.h>
+#include <openvdb/MetaMap.h>
 
 #include "density/density_grid.h"
 #include "density/vdb/vdb_file.h"

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include <openvdb/openvdb.h>
+
 #include "core/error.h"
 #include "core/text.h"
 #include "density/metaballs.h"
@@ -30,7 +32,7 @@ bool is(const openvdb::GridBase& grid) {
 }
 
 bool is_fog(const openvdb::GridBase& grid) {
-    return (is<openvdb::FloatGrid>(grid) || is<openvdb::DoubleGrid>(grid)) &&
+    return (is<FloatGrid>(grid) || is<openvdb::DoubleGrid>(grid)) &&
            grid.getGridClass() != openvdb::GRID_LEVEL_SET;
 }
 
@@ -81,17 +83,17 @@ void check_stated_size(const openvdb::GridBase& header, std::size_t memory_bytes
     }
 }
 
-openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
-    if (const auto typed = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return typed;
+FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
+    if (const auto typed = openvdb::gridPtrCast<FloatGrid>(grid)) return typed;
     const auto typed = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
     if (!typed) throw std::runtime_error("it is damaged: a grid changed its type");
-    auto result = openvdb::FloatGrid::create(openvdb::FloatTree::Ptr(new openvdb::FloatTree(typed->tree())));
+    auto result = FloatGrid::create(FloatTree::Ptr(new FloatTree(typed->tree())));
     result->setTransform(grid->transformPtr());
     return result;
 }
 
 // Returns nephos_bbox where present and valid for all voxels, else the bounds of the active voxels.
-CoordBBox bounds_of(const openvdb::FloatGrid& grid, const openvdb::GridBase& header) {
+CoordBBox bounds_of(const FloatGrid& grid, const openvdb::GridBase& header) {
     CoordBBox active;
     const bool any = grid.tree().evalActiveVoxelBoundingBox(active);
     const auto low = meta_value<openvdb::Vec3i>(header, kMetaBoxMin);
@@ -385,7 +387,7 @@ void send_state(VdbArchive& archive, Extent extent, const Placement& placement, 
         writer.value(refine);
         const Coord last(extent.x * refine - 1, extent.y * refine - 1, extent.z * refine - 1);
         const auto grid = archive.read(std::size_t(entry - entries.begin()));
-        if (const auto bits = openvdb::gridPtrCast<openvdb::BoolGrid>(grid)) {
+        if (const auto bits = openvdb::gridPtrCast<BoolGrid>(grid)) {
             send_bits(bits->tree(), {Coord(0), last}, name, writer);
         } else if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) {
             send_bits(mask->tree(), {Coord(0), last}, name, writer);

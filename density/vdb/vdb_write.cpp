@@ -7,6 +7,7 @@
 #include <string>
 
 #include <openvdb/io/Archive.h>
+#include <openvdb/openvdb.h>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
@@ -18,8 +19,8 @@
 namespace nephos {
 namespace {
 
-using BoolLeaf = openvdb::BoolTree::LeafNodeType;
-using VectorLeaf = openvdb::Vec3STree::LeafNodeType;
+using BoolLeaf = BoolTree::LeafNodeType;
+using VectorLeaf = VectorTree::LeafNodeType;
 using Mask = openvdb::util::NodeMask<3>;
 
 // io::File::write leaves its stream's errors unseen, so that a full disk passes for success. This archive
@@ -140,9 +141,9 @@ Mask refined_block_bits(const BitPlaneView& plane, int refine, int x, int y, int
     return mask;
 }
 
-openvdb::BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const GridGeometry& geometry) {
-    auto grid = openvdb::BoolGrid::create(false);
-    openvdb::tree::ValueAccessor<openvdb::BoolTree> accessor(grid->tree());
+BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const GridGeometry& geometry) {
+    auto grid = BoolGrid::create(false);
+    openvdb::tree::ValueAccessor<BoolTree> accessor(grid->tree());
     for (int z = 0; z < geometry.voxels.z; z += kBlock) {
         for (int y = 0; y < geometry.voxels.y; y += kBlock) {
             for (int x = 0; x < geometry.voxels.x; x += kBlock) {
@@ -165,15 +166,15 @@ openvdb::BoolGrid::Ptr bool_grid(const BitPlaneView& plane, const GridGeometry& 
 }
 
 // The wind at the height of each voxel, in every block of the density grid.
-openvdb::Vec3SGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geometry) {
+VectorGrid::Ptr velocity_grid(const VdbContent& content, const GridGeometry& geometry) {
     if (content.wind.size() != std::size_t(geometry.voxels.z))
         throw Error(ErrorCode::usage, "a VDB file needs one velocity of the wind a level of voxels");
     std::vector<openvdb::Vec3s> profile;
     for (const Velocity& v : content.wind)
         profile.emplace_back(float(v.east_m_per_s), float(v.north_m_per_s), 0.0f);
-    auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3s(0.0f));
+    auto grid = VectorGrid::create(openvdb::Vec3s(0.0f));
     grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
-    openvdb::tree::ValueAccessor<openvdb::Vec3STree> accessor(grid->tree());
+    openvdb::tree::ValueAccessor<VectorTree> accessor(grid->tree());
     for (const Block& block : blocks_of(*content.density)) {
         auto leaf = std::make_unique<VectorLeaf>(block.origin);
         for (int n = 0; n < kBlockVoxels; ++n) {
@@ -194,7 +195,7 @@ openvdb::GridCPtrVec make_grids(const VdbContent& content, const GridGeometry& g
     if (content.density) {
         // A new grid around the same tree: its own metadata, no copy of the voxels.
         const auto tree = OpenvdbAccess::grid(*content.density).treePtr();
-        const auto grid = openvdb::FloatGrid::create(openvdb::ConstPtrCast<openvdb::FloatTree>(tree));
+        const auto grid = FloatGrid::create(openvdb::ConstPtrCast<FloatTree>(tree));
         grid->setGridClass(openvdb::GRID_FOG_VOLUME);
         grid->setSaveFloatAsHalf(content.half);
         describe(*grid, "density", geometry, metadata);

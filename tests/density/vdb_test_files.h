@@ -15,6 +15,8 @@
 #include <openvdb/openvdb.h>
 #include <unistd.h>
 
+#include "density/openvdb_grids.h"
+
 namespace nephos::test {
 
 class TemporaryFolder {

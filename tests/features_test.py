@@ -1,0 +1,133 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Fails when docs/features.md does not agree with the tree: a row names a file, a symbol, a scene, a key or a test that is
+not there, lacks one of them, or a shipped scene stands in no row. The root of the source tree is the argument; with
+--self-test the checker itself is tested: it must see each kind of wrong row."""
+
+import json
+import pathlib
+import re
+import sys
+import tempfile
+
+PAGE = "docs/features.md"
+COLUMNS = ("feature", "code", "scene", "test")
+GOOGLE_TEST = re.compile(r"^TEST(?:_P|_F)?\((\w+),\s*(\w+)\)", re.M)
+
+
+def names_of_tests(root):
+    """Names Suite.Test of all GoogleTest tests."""
+    return {f"{suite}.{name}" for path in (root / "tests").rglob("*.cpp")
+            for suite, name in GOOGLE_TEST.findall(path.read_text(encoding="utf-8"))}
+
+
+def is_key(schema, path):
+    """Whether the JSON schema has a key at a path such as layer[0].slab.enabled."""
+    at = schema
+    for name in re.sub(r"\[\d+\]", "", path).split("."):
+        choices = [at, *at.get("anyOf", []), *at.get("oneOf", [])]
+        choices += [choice["items"] for choice in choices if isinstance(choice.get("items"), dict)]
+        found = [choice["properties"][name] for choice in choices if name in choice.get("properties", {})]
+        if not found:
+            return False
+        at = found[0]
+    return True
+
+
+def rows(text):
+    """Line numbers and cells of the rows of all tables, without heads."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.startswith("|"):
+            continue
+        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        if tuple(cells) != COLUMNS and not set(line) <= set("|-"):
+            yield number, cells
+
+
+def row_problems(root, cells, tests, schema):
+    """What is wrong with the cells of one row."""
+    if len(cells) != len(COLUMNS) or not all(cells):
+        yield f"expected {len(COLUMNS)} columns with something in each"
+        return
+    code, scene, test = (re.findall(r"`([^`]+)`", cell) for cell in cells[1:])
+    if len(code) != 2:
+        yield "expected a file and a symbol as code"
+    elif not (root / code[0]).is_file():
+        yield f"there is no {code[0]}"
+    elif not re.search(rf"\b{re.escape(code[1])}\b", (root / code[0]).read_text(encoding="utf-8")):
+        yield f"{code[0]} has no {code[1]}"
+    if not scene or not scene[0].startswith("scenes/"):
+        yield "expected a scene"
+    elif not (root / scene[0]).is_file():
+        yield f"there is no {scene[0]}"
+    for setting in scene[1:]:
+        match = re.fullmatch(r"--set ([^=]+)=.+", setting)
+        if not match or not is_key(schema, match.group(1)):
+            yield f"{setting} sets no key"
+    if len(test) == 2:
+        path = root / test[0]
+        if not path.is_file() or not re.search(rf"def {re.escape(test[1])}\b", path.read_text(encoding="utf-8")):
+            yield f"{test[0]} has no {test[1]}"
+    elif len(test) != 1 or test[0] not in tests:
+        yield f"there is no test {' '.join(test) or cells[3]}"
+
+
+def problems(root):
+    """How many rows there are, and a line for each problem."""
+    text = (root / PAGE).read_text(encoding="utf-8")
+    tests = names_of_tests(root)
+    schema = json.loads((root / "scenes" / "nephos.schema.json").read_text(encoding="utf-8"))
+    count, found = 0, []
+    for number, cells in rows(text):
+        count += 1
+        found += [f"{PAGE}:{number}: {problem}" for problem in row_problems(root, cells, tests, schema)]
+    shown = set(re.findall(r"`(scenes/[^`]+\.toml)`", text))
+    shipped = {path.relative_to(root).as_posix() for path in (root / "scenes").rglob("*.toml")}
+    found += [f"{PAGE}: no row shows {scene}" for scene in sorted(shipped - shown)]
+    return count, found
+
+
+def self_test():
+    head = "| feature | code | scene | test |\n|---|---|---|---|\n"
+    good = "| a | `a.h` `thing` | `scenes/a.toml` `--set layer[0].deep.key=1` | `Suite.Test` |\n"
+    wrong = {
+        "| b | `gone.h` `thing` | `scenes/a.toml` | `Suite.Test` |": "there is no gone.h",
+        "| c | `a.h` `thin` | `scenes/a.toml` | `Suite.Test` |": "a.h has no thin",
+        "| d | `a.h` `thing` | `scenes/gone.toml` | `Suite.Test` |": "there is no scenes/gone.toml",
+        "| e | `a.h` `thing` | `scenes/a.toml` `--set layer.none=1` | `Suite.Test` |":
+            "--set layer.none=1 sets no key",
+        "| f | `a.h` `thing` | `scenes/a.toml` | `Suite.Gone` |": "there is no test Suite.Gone",
+        "| g | `a.h` `thing` | `scenes/a.toml` | `tests/t.py` `test_gone` |": "tests/t.py has no test_gone",
+        "| h | `a.h` `thing` | | `Suite.Test` |": "expected 4 columns with something in each",
+        "| i | `a.h` | `scenes/a.toml` | `tests/t.py` `test_it` |": "expected a file and a symbol as code",
+    }
+    schema = {"properties": {"layer": {"type": "array", "items": {"properties": {
+        "deep": {"properties": {"key": {"type": "number"}}}}}}}}
+    tree = {PAGE: head + good + "\n".join(wrong) + "\n", "a.h": "void thing();\n", "scenes/a.toml": "", "scenes/b.toml": "",
+            "scenes/nephos.schema.json": json.dumps(schema), "tests/t.cpp": "TEST(Suite, Test) {}\n",
+            "tests/t.py": "def test_it():\n    pass\n"}
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        for path, text in tree.items():
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(text, encoding="utf-8")
+        count, found = problems(root)
+    expected = [f"{PAGE}:{number}: {problem}" for number, problem in enumerate(wrong.values(), 4)]
+    expected.append(f"{PAGE}: no row shows scenes/b.toml")
+    if found != expected or count != len(wrong) + 1:
+        sys.exit(f"seen {found}, not {expected}")
+    print(f"{len(expected)} wrong rows seen")
+
+
+def main():
+    if sys.argv[1:] == ["--self-test"]:
+        return self_test()
+    count, found = problems(pathlib.Path(sys.argv[1]).resolve())
+    if count < 50:
+        sys.exit(f"only {count} rows found: wrong folder?")
+    print("\n".join(found) or f"{count} features, all of them there")
+    sys.exit(1 if found else 0)
+
+
+if __name__ == "__main__":
+    main()
