@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/nephos/man_page.h"
 #include "core/random.h"
 #include "simulation/simulation.h"
 
@@ -46,6 +47,7 @@ void add_commands(CLI::App& app, Action& action, const EditFunction& edit) {
     add_verify_command(app, action);
     add_edit_command(app, action, edit);
     add_completion_command(app, action);
+    add_man_command(app, action);
     for (CLI::App* sub : app.get_subcommands({})) {
         sub->formatter(std::make_shared<HelpPage>());
         sub->set_help_flag("-h,--help", "This page")->group("General");

@@ -338,6 +338,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
     try {
+        list.write(false);  // the folder is known as that of an export, whenever this one is killed
         for (std::size_t n = 0; n < sequences.size(); ++n) {
             ExportSequence& s = sequences[n];
             if (all_formats(options).empty()) break;

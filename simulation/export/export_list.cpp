@@ -2,7 +2,9 @@
 #include "simulation/export/export_list.h"
 
 #include <fstream>
+#include <set>
 #include <system_error>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -89,6 +91,24 @@ Json parsed_list(const std::filesystem::path& path) {
     return json;
 }
 
+// Removes the temporary files that a killed export left. Throws Error(usage) when anything is there and no export.
+void claim(const std::filesystem::path& folder) {
+    std::error_code error;
+    std::vector<std::filesystem::path> leftovers;
+    for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
+         at.increment(error)) {
+        if (!published_name(at->path().filename().string()).empty()) {
+            leftovers.push_back(at->path());
+        } else if (!is_export_folder(folder)) {
+            throw Error(ErrorCode::usage,
+                        folder.string() + ": is not empty and holds no export: choose another folder");
+        }
+    }
+    for (const std::filesystem::path& leftover : leftovers)
+        if (!error) std::filesystem::remove(leftover, error);
+    if (error) throw Error(ErrorCode::io, folder.string() + ": cannot be examined: " + error.message());
+}
+
 }  // namespace
 
 bool is_export_folder(const std::filesystem::path& folder) {
@@ -102,12 +122,8 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     std::error_code error;
     std::filesystem::create_directories(folder_, error);
     if (error) throw Error(ErrorCode::io, folder_.string() + ": cannot make the folder: " + error.message());
-    if (!is_export_folder(folder_)) {
-        if (!std::filesystem::is_empty(folder_, error) || error)
-            throw Error(ErrorCode::usage,
-                        folder_.string() + ": is not empty and holds no export: choose another folder");
-        return;
-    }
+    claim(folder_);
+    if (!is_export_folder(folder_)) return;
     Json json = parsed_list(folder_ / "export.json");
     const Json files = json.value("files", Json::array());
     json.erase("files");
@@ -148,12 +164,20 @@ void ExportList::write(bool complete) const {
     Json json = Json::parse(head_);
     json["complete"] = complete;
     Json files = Json::array();
-    for (const ExportedFile& file : files_) {
+    const auto add = [&files](const ExportedFile& file) {
         Json entry = {
             {"path", file.path.generic_string()}, {"bytes", file.digest.bytes}, {"xxh3", file.digest.xxh3}};
         if (!file.source.empty()) entry.update(Json{{"format", file.format}, {"source", file.source}});
         files.push_back(std::move(entry));
+    };
+    std::set<std::string> listed;
+    for (const ExportedFile& file : files_) {
+        add(file);
+        listed.insert(file.path.generic_string());
     }
+    // What an earlier export wrote is not to be written again after a second interruption.
+    for (const auto& [path, file] : earlier_)
+        if (!complete && !listed.contains(path)) add(file);
     json["files"] = std::move(files);
     write_atomically(folder_ / "export.json",
                      std::string_view(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"));

@@ -203,5 +203,25 @@ class Completion(Case):
                 subprocess.run([shell, *arguments, path], check=True, timeout=60)
 
 
+class Manual(Case):
+    def test_a_page_of_each_command_has_all_of_its_options(self):
+        commands = re.findall(r"^  ([a-z]+) ", self.call("--help").stdout.split("Commands:")[1].split("\n\n")[0], re.M)
+        self.assertIn("man", commands)
+        for command in commands:
+            page = self.call("man", command).stdout.replace("\\-", "-")
+            self.assertIn(f"nephos {command}", page)
+            for option in re.findall(r"^  (?:-\w, )?(--[a-z-]+)", self.call(command, "--help").stdout, re.M):
+                self.assertRegex(page, rf"(?m)^\.B .*{option}\b", command)
+        whole = self.call("man").stdout.replace("\\-", "-")
+        for command in commands:
+            self.assertIn(f".BR nephos-{command} (1)", whole)
+
+    def test_all_pages_are_written_into_a_folder(self):
+        self.call("man", "--out", "pages")
+        self.assertEqual((self.folder / "pages/nephos-run.1").read_text(), self.call("man", "run").stdout)
+        self.refused(2, "man", "rum", says="is not one of run,")
+        self.refused(2, "man", "run", "--out", "pages", says="exclude each other")
+
+
 if __name__ == "__main__":
     unittest.main(verbosity=2)

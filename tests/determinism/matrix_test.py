@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The same bits whatever computes them: the scenes of golden_scenes.py, each step's 128-bit hash and the decoded density of
+each frame, over vector targets, numbers of threads, and interruptions at random steps; with NEPHOS_TEST_ALL=1 over all scenes
+and combinations, and over compilers and optimisation, whose programs are built for it. ../golden/matrix.txt has the hashes.
+
+    NEPHOS=... SOURCE=. TARGETS_LIBRARY=... /usr/bin/python3 tests/determinism/matrix_test.py [Matrix.test_...]
+    ... matrix_test.py --write        writes the hashes anew: a decision for docs/adr/, not a habit"""
+
+import csv
+import json
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import golden_scenes
+
+SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
+GOLDEN = SOURCE / "tests/golden/matrix.txt"
+ALL = os.environ.get("NEPHOS_TEST_ALL") == "1"
+THREADS = (1, 2, 3, 8)
+
+# Bits of Highway's list of targets. What a processor lacks is left out: it runs the next one below.
+SCALAR = 1 << 61 | 1 << 62
+SSE4 = SCALAR | 1 << 11 | 1 << 12
+AVX2 = SSE4 | 1 << 9 | 1 << 10
+AVX512 = AVX2 | 1 << 8 | 1 << 7
+FUSED = 1 << 9 | 1 << 8 | 1 << 7  # have fused multiply-add, which refined density takes (docs/determinism.md)
+TARGETS = {"scalar": SCALAR, "sse4": SSE4, "avx2": AVX2, "avx512": AVX512}
+
+
+class Runner:
+    """Runs scenes in a temporary folder by one program."""
+
+    def __init__(self, program, folder):
+        self.program, self.folder = str(program), pathlib.Path(folder)
+        self.fused = True  # whether the last program that was told its targets had fused multiply-add
+
+    def run(self, scene, out, *more, targets=None, threads=2):
+        environment = dict(os.environ, LC_ALL="C.UTF-8")
+        log = self.folder / "targets.log"
+        if targets is not None:
+            log.unlink(missing_ok=True)
+            environment.update(LD_PRELOAD=os.environ["TARGETS_LIBRARY"], NEPHOS_TARGETS=str(targets),
+                               NEPHOS_TARGETS_LOG=str(log))
+        result = subprocess.run([self.program, "run", scene, "--no-render", "--quiet", "--out", out, "--threads", str(threads),
+                                 *more], capture_output=True, text=True, env=environment, timeout=600)
+        assert result.returncode == 0, result.stderr
+        if targets is not None:  # Highway asked, and got no more than it was to get
+            asked, found = map(int, log.read_text().split()[:2])
+            assert asked == targets and found & ~targets == 0, (asked, found)
+            self.fused = found & FUSED != 0
+
+    def hashes(self, scene, *more, split=None, **options):
+        """The lines of the golden file for a scene; run up to step `split`, and then resumed, when that is given."""
+        out = self.folder / "out"
+        shutil.rmtree(out, ignore_errors=True)
+        if split is not None:
+            self.run(scene, out, "--set", f"time.steps={split}", **options)
+            more = (*more, "--resume")
+        self.run(scene, out, *more, **options)
+        return lines_of(scene.stem, out)
+
+
+def lines_of(name, out):
+    with open(out / "statistics.csv", newline="") as file:
+        lines = [f"{name} step {row['step']} {row['hash']}" for row in csv.DictReader(file)]
+    manifest = json.loads((out / "manifest.json").read_text())
+    for frame in manifest["frames"]:
+        lines += [f"{name} {file['path']} {file['voxels_xxh3']}" for file in frame["files"] if "voxels_xxh3" in file]
+    return lines
+
+
+def is_refined(scene):
+    return "refine = 1" not in scene.read_text()
+
+
+def steps_of(lines):
+    return [line for line in lines if " step " in line]
+
+
+def promised(scene, lines):
+    """Those that are the same everywhere: all, but of refined density (docs/determinism.md)."""
+    return steps_of(lines) if is_refined(scene) else lines
+
+
+def golden():
+    lines = {}
+    for line in GOLDEN.read_text().splitlines():
+        if not line.startswith("#"):
+            lines.setdefault(line.split()[0], []).append(line)
+    return lines
+
+
+def build(compiler, optimisation):
+    """The command, built by this compiler into the folder of builds."""
+    tree = SOURCE / "build" / f"matrix-{compiler}-{optimisation}"
+    subprocess.run(["cmake", "-S", SOURCE, "-B", tree, "-G", "Ninja", f"-DCMAKE_CXX_COMPILER={compiler}",
+                    "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_BUILD_TYPE=None",
+                    f"-DCMAKE_CXX_FLAGS=-{optimisation}", "-DNEPHOS_BUILD_TESTS=OFF", "-DNEPHOS_BUILD_BENCHMARKS=OFF"],
+                   check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(["ninja", "-C", tree, "nephos"], check=True, stdout=subprocess.DEVNULL)
+    return tree / "bin/nephos"
+
+
+class Matrix(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="nephos matrix "))
+        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
+        cls.scenes = golden_scenes.write_all(cls.folder / "scenes")
+        cls.golden = golden()
+        cls.runs = 0
+
+    @classmethod
+    def tearDownClass(cls):
+        print(f"{cls.runs} runs compared", file=sys.stderr)
+
+    def compare(self, runner, scene, expected, **options):
+        found = runner.hashes(scene, **options)
+        type(self).runs += 1
+        if is_refined(scene) and not runner.fused:
+            found, expected = steps_of(found), steps_of(expected)
+        self.assertEqual(found, expected)
+
+    def every_way(self, program):
+        runner = Runner(program, self.folder)
+        draw = random.Random(7)
+        for number, scene in enumerate(self.scenes if ALL else self.scenes[::9]):
+            combinations = [(target, threads) for target in TARGETS for threads in THREADS]
+            if not ALL:  # a target and a number of threads each, other ones for the next scene
+                combinations = [(target, THREADS[(n + number) % 4]) for n, target in enumerate(TARGETS)]
+            runner.fused = True
+            reference = runner.hashes(scene)
+            with self.subTest(scene=scene.stem):
+                self.assertEqual(promised(scene, reference), self.golden[scene.stem])
+            for target, threads in combinations:
+                with self.subTest(scene=scene.stem, target=target, threads=threads):
+                    self.compare(runner, scene, reference, targets=TARGETS[target], threads=threads)
+            split = draw.randrange(1, len(steps_of(reference)) - 1)
+            with self.subTest(scene=scene.stem, resumed_at=split):
+                self.compare(runner, scene, reference, split=split, targets=AVX512, threads=draw.choice(THREADS))
+
+    def test_this_build(self):
+        self.every_way(os.environ["NEPHOS"])
+
+    def test_the_scenes_do_not_repeat_or_stand_still(self):
+        """A golden file that nothing moves in would agree with anything."""
+        self.assertEqual(len(self.golden), golden_scenes.COUNT)
+        last = {lines[-1].split()[-1] for lines in self.golden.values()}
+        self.assertGreater(len(last), 0.9 * golden_scenes.COUNT)
+        moving = [lines for lines in self.golden.values() if len({line.split()[-1] for line in lines}) > len(lines) // 2]
+        self.assertGreater(len(moving), 0.9 * golden_scenes.COUNT)
+
+    def test_another_seed_is_noticed(self):
+        scene = self.scenes[0]
+        out = self.folder / "other"
+        Runner(os.environ["NEPHOS"], self.folder).run(scene, out, "--seed", "1")
+        self.assertNotEqual(promised(scene, lines_of(scene.stem, out)), self.golden[scene.stem])
+
+    @unittest.skipUnless(ALL, "builds the command three times: ./test --all")
+    def test_other_compilers_and_no_optimisation(self):
+        for compiler, optimisation in (("g++", "O0"), ("clang++", "O3"), ("clang++", "O0")):
+            with self.subTest(compiler=compiler, optimisation=optimisation):
+                self.every_way(build(compiler, optimisation))
+
+
+def write():
+    with tempfile.TemporaryDirectory() as folder:
+        runner = Runner(os.environ["NEPHOS"], folder)
+        lines = ["# Written by tests/determinism/matrix_test.py --write: scene, step or file, XXH3-128 of state or voxels."]
+        for scene in golden_scenes.write_all(pathlib.Path(folder) / "scenes"):
+            lines += promised(scene, runner.hashes(scene))
+        GOLDEN.write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--write"]:
+        write()
+    else:
+        unittest.main(verbosity=2)
