@@ -65,6 +65,15 @@ Regime regime_of(const std::string& name) {
     throw Error(ErrorCode::io, "'" + name + "' is not a regime");
 }
 
+// Returns the text where it is base64, so that a page may contain it as it is; nothing otherwise.
+std::string base64_only(std::string text) {
+    const bool good = std::ranges::all_of(text, [](char c) {
+        return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '+' ||
+               c == '/' || c == '=';
+    });
+    return good ? text : std::string();
+}
+
 RunRecord record_of(const Json& json) {
     RunRecord record;
     record.id = json.at("run").get<std::string>();
@@ -89,6 +98,8 @@ RunRecord record_of(const Json& json) {
     result.snapshots = json.at("snapshots").get<std::uint64_t>();
     result.state_hash = json.at("state_hash").get<std::string>();
     record.series_offset = json.at("series_offset").get<std::uint64_t>();
+    if (const auto thumbnail = json.find("thumbnail"); thumbnail != json.end())
+        result.thumbnail = base64_only(thumbnail->get<std::string>());
     return record;
 }
 
@@ -130,6 +141,7 @@ std::string record_line(const PlannedRun& run, const RunResult& result, std::uin
     json["snapshots"] = result.snapshots;
     json["state_hash"] = result.state_hash;
     json["series_offset"] = series_offset;
+    if (!result.thumbnail.empty()) json["thumbnail"] = result.thumbnail;
     return sealed(json);
 }
 
