@@ -374,7 +374,7 @@ class Story(Case):
     def replayed(self, scene, step, size):
         """The picture of a step as `nephos run` draws it from the saved scene, of the size that the window showed."""
         out = self.folder / f"replay-{step}"
-        number = f"{step}..{step}"
+        number = f"{step + 1}..{step + 1}"  # frames count from 1, steps from 0
         subprocess.run([NEPHOS, "run", str(scene), "--out", str(out), "--quiet", "--splatting", "cpu", "--frames", number,
                         "--set", "frames.start_s=0", "--set", "frames.per_second=1", "--set", "frames.time_scale=10",
                         "--set", f"camera.width={size[0]}", "--set", f"camera.height={size[1]}"], check=True)
