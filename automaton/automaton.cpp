@@ -74,6 +74,7 @@ struct Automaton::Impl {
     void for_parts(const Work& work);
     void draw_initial_state();
     void grow_and_draw();
+    Displacement displacement_of_layer(int k, double at_s) const;
     void advect();
 
     AutomatonOptions options;
@@ -125,16 +126,19 @@ void Automaton::Impl::grow_and_draw() {
     std::swap(lattice.act, act_next);
 }
 
+Displacement Automaton::Impl::displacement_of_layer(int k, double at_s) const {
+    const double height = options.placement.origin_m.z + (k + 0.5) * options.placement.cell_size_m;
+    return displacement_of_step(wind_at(options.wind, height, at_s), options.time_step_s,
+                                options.placement.cell_size_m);
+}
+
 void Automaton::Impl::advect() {
     if (options.wind.keyframes.empty()) return;
     tbb::parallel_for(
         tbb::blocked_range<int>(0, options.extent.z), [&](const tbb::blocked_range<int>& layers) {
             std::vector<std::uint64_t> scratch;
             for (int k = layers.begin(); k != layers.end(); ++k) {
-                const double height =
-                    options.placement.origin_m.z + (k + 0.5) * options.placement.cell_size_m;
-                Displacement moved = displacement_of_step(wind_at(options.wind, height, time_s()),
-                                                          options.time_step_s, options.placement.cell_size_m);
+                Displacement moved = displacement_of_layer(k, time_s());
                 Displacement& rest = fraction[std::size_t(k)];
                 moved.x += rest.x;
                 moved.y += rest.y;
@@ -177,6 +181,12 @@ double Automaton::time_s() const { return impl_->time_s(); }
 BitPlaneView Automaton::hum() const { return impl_->lattice.hum.view(); }
 BitPlaneView Automaton::act() const { return impl_->lattice.act.view(); }
 BitPlaneView Automaton::cld() const { return impl_->lattice.cld.view(); }
+
+Displacement Automaton::displacement_of_layer(int k, std::uint64_t step) const {
+    return impl_->displacement_of_layer(k, double(step) * impl_->options.time_step_s);
+}
+
+std::span<const Displacement> Automaton::beyond_whole_cells() const { return impl_->fraction; }
 
 StateHash Automaton::hash() const { return hash_of(impl_->lattice); }
 

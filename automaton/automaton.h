@@ -65,6 +65,11 @@ class Automaton {
     StateHash hash() const;
     std::vector<ActiveEllipsoid> ellipsoids() const;  // of options().field, with weight > 0 now
 
+    // Returns the displacement by the wind of layer k, 0..extent.z - 1, in the step that begins at `step`, in cells. The sum
+    // over all steps is the way of the air; bits lie at its floor, and beyond_whole_cells() is the rest of each layer now.
+    Displacement displacement_of_layer(int k, std::uint64_t step) const;
+    std::span<const Displacement> beyond_whole_cells() const;
+
     // Sets further ellipsoids, in addition to those of options().field, for callers that control the field
     // themselves. They act from the next step until the next call, which replaces them. Not part of a
     // checkpoint. Throws Error(usage) on an ellipsoid that check() refuses or a weight outside 0..1.

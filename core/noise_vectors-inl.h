@@ -43,6 +43,17 @@ HWY_INLINE Floats wrapped(Floats n, float period) {
     return hn::IfThenElse(hn::Ge(n, p), hn::Sub(n, p), n);
 }
 
+// Fills in the distances and the weight of a coordinate; `floor` is that of the coordinate.
+HWY_INLINE void set_fraction(AxisPoint& axis, Floats at, Floats floor) {
+    const NoiseFloats d;
+    axis.from_low = hn::Sub(at, floor);
+    axis.from_high = hn::Sub(axis.from_low, hn::Set(d, 1.0f));
+    // ((6 f - 15) f + 10) f^3
+    const Floats f = axis.from_low;
+    const Floats inner = hn::Sub(hn::Mul(hn::Set(d, 6.0f), f), hn::Set(d, 15.0f));
+    axis.blend = hn::Mul(hn::Add(hn::Mul(inner, f), hn::Set(d, 10.0f)), hn::Mul(hn::Mul(f, f), f));
+}
+
 // Locates the coordinate `at`, relative to lattice cell `cell`, on one axis; a period of 0 is none.
 template <bool kPeriodic>
 HWY_INLINE AxisPoint axis_point(Floats at, std::uint32_t cell, std::uint32_t seed, float period) {
@@ -51,8 +62,7 @@ HWY_INLINE AxisPoint axis_point(Floats at, std::uint32_t cell, std::uint32_t see
     const NoiseInts di;
     const Floats floor = hn::Floor(at);
     AxisPoint axis;
-    axis.from_low = hn::Sub(at, floor);
-    axis.from_high = hn::Sub(axis.from_low, hn::Set(d, 1.0f));
+    set_fraction(axis, at, floor);
     Floats low = floor, high = hn::Add(floor, hn::Set(d, 1.0f));
     if (kPeriodic && period > 0) {
         low = wrapped(low, period);
@@ -64,10 +74,6 @@ HWY_INLINE AxisPoint axis_point(Floats at, std::uint32_t cell, std::uint32_t see
     };
     axis.low = hash(low);
     axis.high = hash(high);
-    // ((6 f - 15) f + 10) f^3
-    const Floats f = axis.from_low;
-    const Floats inner = hn::Sub(hn::Mul(hn::Set(d, 6.0f), f), hn::Set(d, 15.0f));
-    axis.blend = hn::Mul(hn::Add(hn::Mul(inner, f), hn::Set(d, 10.0f)), hn::Mul(hn::Mul(f, f), f));
     return axis;
 }
 
@@ -90,19 +96,33 @@ HWY_INLINE Floats between(Floats a, Floats b, Floats blend) {
     return hn::Add(a, hn::Mul(hn::Sub(b, a), blend));
 }
 
-HWY_INLINE Floats noise(const AxisPoint& x, const AxisPoint& y, const AxisPoint& z) {
+// Sums of the hashes of x and y of the four columns of lattice points around a point.
+struct ColumnHashes {
+    Words low_low, high_low, low_high, high_high;  // x, then y
+};
+
+HWY_INLINE ColumnHashes column_hashes(const AxisPoint& x, const AxisPoint& y) {
+    return {hn::Add(x.low, y.low), hn::Add(x.high, y.low), hn::Add(x.low, y.high), hn::Add(x.high, y.high)};
+}
+
+// Of x and y the hashes are not used, but those of the columns.
+HWY_INLINE Floats noise(const ColumnHashes& columns, const AxisPoint& x, const AxisPoint& y, const AxisPoint& z) {
     const NoiseFloats d;
-    const auto row = [&](Words yz, Floats fy, Floats fz) HWY_ATTR {
-        const Floats low = gradient_dot(hn::Add(yz, x.low), x.from_low, fy, fz);
-        const Floats high = gradient_dot(hn::Add(yz, x.high), x.from_high, fy, fz);
+    const auto row = [&](Words low_hash, Words high_hash, Floats fy, Floats fz) HWY_ATTR {
+        const Floats low = gradient_dot(low_hash, x.from_low, fy, fz);
+        const Floats high = gradient_dot(high_hash, x.from_high, fy, fz);
         return between(low, high, x.blend);
     };
     const auto level = [&](Words hz, Floats fz) HWY_ATTR {
-        return between(row(hn::Add(hz, y.low), y.from_low, fz), row(hn::Add(hz, y.high), y.from_high, fz),
-                       y.blend);
+        return between(row(hn::Add(hz, columns.low_low), hn::Add(hz, columns.high_low), y.from_low, fz),
+                       row(hn::Add(hz, columns.low_high), hn::Add(hz, columns.high_high), y.from_high, fz), y.blend);
     };
     const Floats sum = between(level(z.low, z.from_low), level(z.high, z.from_high), z.blend);
     return hn::Mul(sum, hn::Set(d, kNoiseScale));
+}
+
+HWY_INLINE Floats noise(const AxisPoint& x, const AxisPoint& y, const AxisPoint& z) {
+    return noise(column_hashes(x, y), x, y, z);
 }
 
 }  // namespace HWY_NAMESPACE

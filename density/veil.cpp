@@ -114,12 +114,18 @@ VeilOctavePlan octave_plan(const VeilOctave& octave, std::uint64_t seed, std::si
 
 VeilPlan plan_of(const VeilOptions& options, double time_s) {
     VeilPlan plan;
+    plan.repeats = options.period_m.x > 0;
+    const Rotation fibres = rotation_of_degrees(options.direction_deg);
     plan.ridged = is_ridged(options.form);
     plan.displaced = is_displaced(options.form);
     const std::vector<VeilOctave> octaves = veil_octaves(options);
     double weights = 0;
     for (std::size_t k = 0; k < octaves.size(); ++k) {
         plan.octaves.push_back(octave_plan(octaves[k], options.seed, k, time_s));
+        const Vec3& wavelength = octaves[k].wavelength_m;
+        if (plan.repeats) {
+            plan.octaves.back().lattice = veil_lattice({wavelength.x, wavelength.y}, fibres, options.period_m);
+        }
         const Reach reach = reach_of(octaves[k], plan.ridged);
         weights += std::abs(octaves[k].weight) * std::max(std::abs(reach.low), std::abs(reach.high));
     }
@@ -146,6 +152,7 @@ struct VeilField {
     bool is_limited = false;  // by the area
     Rotation of_area;
     double area_x_m = 0, area_y_m = 0;  // of its centre from the lattice's corner
+    Vec2 period_m{0, 0};                // as VeilOptions::period_m
 };
 
 std::vector<float> side_weights(int cells, double cell_m, double margin_m) {
@@ -185,6 +192,7 @@ VeilField field_of(const VeilOptions& options, const Wind& wind, const Extent& e
     field.area = options.area;
     field.is_limited = std::isfinite(options.area.semi_a_m) || std::isfinite(options.area.semi_b_m);
     field.of_area = rotation_of_degrees(options.area.yaw_deg);
+    field.period_m = options.period_m;
     field.area_x_m = options.area.x_m + (options.area.carried ? carried.x : 0) - placement.origin_m.x;
     field.area_y_m = options.area.y_m + (options.area.carried ? carried.y : 0) - placement.origin_m.y;
     return field;
@@ -193,8 +201,11 @@ VeilField field_of(const VeilOptions& options, const Wind& wind, const Extent& e
 // The weight of a column by the area.
 float area_weight(const VeilField& field, int i, int j) {
     if (!field.is_limited) return 1;
-    const double east = (i + 0.5) * field.cell_m - field.area_x_m,
-                 north = (j + 0.5) * field.cell_m - field.area_y_m;
+    double east = (i + 0.5) * field.cell_m - field.area_x_m, north = (j + 0.5) * field.cell_m - field.area_y_m;
+    if (field.period_m.x > 0) {  // from the nearest image of the centre
+        east = std::remainder(east, field.period_m.x);
+        north = std::remainder(north, field.period_m.y);
+    }
     const double a = (east * field.of_area.cos + north * field.of_area.sin) / field.area.semi_a_m,
                  b = (north * field.of_area.cos - east * field.of_area.sin) / field.area.semi_b_m;
     return float(fade(1 - std::sqrt(a * a + b * b), field.area.softness));
@@ -281,7 +292,9 @@ NewBlock make_block(const VeilField& field, const openvdb::Coord& origin) {
 }  // namespace
 
 VeilThresholds veil_thresholds(const VeilOptions& options) {
-    VeilPlan plan = plan_of(options, 0);
+    VeilOptions endless = options;  // quantiles of the noise, not of one period of it
+    endless.period_m = {0, 0};
+    VeilPlan plan = plan_of(endless, 0);
     set_thresholds(plan, options);
     return {plan.low, plan.high};
 }

@@ -27,6 +27,10 @@
 // towards the rim of the area, smoothstep((1 - r) / softness), r = 1 being the rim.
 // Densities below 2^-10 are 0.
 //
+// With a period the noise lattice of each octave is turned and stretched a little until both edges of the period are
+// whole vectors of it, and lattice points that differ by such a vector have one gradient; the area's nearest image
+// counts. So the density is periodic, whatever the direction of the fibres.
+//
 // The bits are the same on every machine, for any number of threads and any vector width: see core/noise.h.
 // All functions are pure and thread-safe.
 
@@ -84,6 +88,9 @@ struct VeilOptions {
     double fallstreak_m = 0;                     // displacement of streaks at the base, against the wind
     double margin_m = 0;  // width along the sides of the lattice over which density fades; >= 0
     VeilArea area;
+    // Lengths after which the veil repeats towards east and north, both above 0; {0, 0}: it does not. Wavelengths and the
+    // direction of the fibres are then rounded so that whole lattice cells of each octave's noise fit (veil_lattice.h).
+    Vec2 period_m{0, 0};
     std::uint64_t seed = 1;
     bool operator==(const VeilOptions&) const = default;
 };
@@ -101,7 +108,8 @@ struct VeilThresholds {
 VeilThresholds veil_thresholds(const VeilOptions& options);
 
 // Throws Error(usage) that names the first option out of range or too fine for the cells: a wavelength is at
-// least two cells, and some cell's centre must lie between base and top.
+// least two cells, and some cell's centre must lie between base and top. With a period: where an octave has no two
+// lattice cells that differ in it, has more than 2^20, or where the area reaches beyond half of the period.
 void check(const VeilOptions& options, const Extent& extent, const Placement& placement);
 
 // Returns the integral of the wind at a height from time 0 to `time_s`: the displacement of the air in metres

@@ -25,24 +25,94 @@ namespace {
 struct LocalOctave {
     std::uint32_t cell[3];
     float within[3], per_m[3];
+    float turned[2][2];  // VeilLattice::per_m
 };
 
 LocalOctave local_octave(const VeilOctavePlan& octave, const std::array<double, 3>& base_m) {
     LocalOctave local;
+    const bool repeats = octave.lattice.wide > 0;
+    std::int64_t cells[3];
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double at = base_m[axis] * octave.per_m[axis] + octave.phase[axis];
+        double at = base_m[axis] * octave.per_m[axis];
+        if (repeats && axis < 2) {
+            const std::array<double, 2>& row = octave.lattice.per_m[axis];
+            at = base_m[0] * row[0] + base_m[1] * row[1];
+            for (std::size_t n = 0; n < 2; ++n) local.turned[axis][n] = float(row[n]);
+        }
+        at += octave.phase[axis];
         const double cell = std::floor(at);
-        local.cell[axis] = std::uint32_t(std::int64_t(cell));
+        cells[axis] = std::int64_t(cell);
         local.within[axis] = float(at - cell);
         local.per_m[axis] = float(octave.per_m[axis]);
     }
+    if (repeats) {
+        const std::array<std::int64_t, 2> home = representative(octave.lattice, cells[0], cells[1]);
+        cells[0] = home[0];
+        cells[1] = home[1];
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) local.cell[axis] = std::uint32_t(cells[axis]);
     return local;
+}
+
+using Ints = hn::Vec<NoiseInts>;
+
+// n modulo m, 0 .. m - 1, and the quotient, of which the estimate in floats may be off by one: |n / m| < 2^20.
+struct Divided {
+    Ints rest, quotient;
+};
+
+HWY_INLINE Divided divided(Ints n, std::int32_t m) {
+    const NoiseFloats d;
+    const NoiseInts di;
+    const Ints whole = hn::Set(di, m), one = hn::Set(di, 1), zero = hn::Zero(di);
+    Ints quotient = hn::ConvertTo(di, hn::Floor(hn::Mul(hn::ConvertTo(d, n), hn::Set(d, 1 / float(m)))));
+    Ints rest = hn::Sub(n, hn::Mul(quotient, whole));
+    const auto below = hn::Lt(rest, zero);
+    rest = hn::IfThenElse(below, hn::Add(rest, whole), rest);
+    quotient = hn::IfThenElse(below, hn::Sub(quotient, one), quotient);
+    const auto above = hn::Gt(rest, hn::Sub(whole, one));
+    return {hn::IfThenElse(above, hn::Sub(rest, whole), rest),
+            hn::IfThenElse(above, hn::Add(quotient, one), quotient)};
+}
+
+// Returns the sum of both hashes of the representative of a lattice point.
+HWY_INLINE Words hash_of_column(const VeilOctavePlan& octave, Ints i, Ints j) {
+    const NoiseInts di;
+    const NoiseWords dw;
+    const VeilLattice& lattice = octave.lattice;
+    const Divided row = divided(j, lattice.high);
+    const Ints moved = hn::Sub(i, hn::Mul(row.quotient, hn::Set(di, lattice.shift)));
+    const Words step = hn::Set(dw, kAxisStep);
+    const auto hash = [&](Ints n, std::uint32_t seed) HWY_ATTR {
+        return mixed(hn::Add(hn::Mul(hn::BitCast(dw, n), step), hn::Set(dw, seed)));
+    };
+    return hn::Add(hash(divided(moved, lattice.wide).rest, octave.seeds[0]), hash(row.rest, octave.seeds[1]));
+}
+
+// N of a point of a veil that repeats.
+HWY_INLINE Floats repeating_noise(const VeilOctavePlan& octave, const LocalOctave& local, const Floats (&point)[3],
+                                  const AxisPoint& z) {
+    const NoiseFloats d;
+    const NoiseInts di;
+    AxisPoint axes[2];
+    Ints low[2], high[2];
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+        const Floats turned = hn::Add(hn::Mul(point[0], hn::Set(d, local.turned[axis][0])),
+                                      hn::Mul(point[1], hn::Set(d, local.turned[axis][1])));
+        const Floats at = hn::Add(turned, hn::Set(d, local.within[axis])), floor = hn::Floor(at);
+        set_fraction(axes[axis], at, floor);
+        low[axis] = hn::Add(hn::ConvertTo(di, floor), hn::Set(di, std::int32_t(local.cell[axis])));
+        high[axis] = hn::Add(low[axis], hn::Set(di, 1));
+    }
+    const ColumnHashes columns{hash_of_column(octave, low[0], low[1]), hash_of_column(octave, high[0], low[1]),
+                               hash_of_column(octave, low[0], high[1]), hash_of_column(octave, high[0], high[1])};
+    return noise(columns, axes[0], axes[1], z);
 }
 
 constexpr std::size_t kMostOctaves = 12;
 
 // q of one vector of points.
-template <bool kRidged, bool kDisplaced>
+template <bool kRidged, bool kDisplaced, bool kRepeats>
 HWY_INLINE Floats sum_of_octaves(const VeilPlan& plan, const LocalOctave* local, Floats (&point)[3],
                                  float threshold) {
     const NoiseFloats d;
@@ -59,7 +129,12 @@ HWY_INLINE Floats sum_of_octaves(const VeilPlan& plan, const LocalOctave* local,
                                       hn::Set(d, local[k].within[axis]));
             return axis_point<false>(at, local[k].cell[axis], octave.seeds[axis], 0);
         };
-        const Floats n = noise(axis_at(0), axis_at(1), axis_at(2));
+        Floats n;
+        if constexpr (kRepeats) {
+            n = repeating_noise(octave, local[k], point, axis_at(2));
+        } else {
+            n = noise(axis_at(0), axis_at(1), axis_at(2));
+        }
         value = hn::Add(hn::Mul(n, hn::Set(d, octave.gain)), hn::Set(d, octave.offset));
         if (kRidged) {
             value = hn::Sub(hn::Set(d, octave.ridge), hn::Abs(hn::Sub(hn::Set(d, octave.crest), value)));
@@ -70,7 +145,7 @@ HWY_INLINE Floats sum_of_octaves(const VeilPlan& plan, const LocalOctave* local,
     return sum;
 }
 
-template <bool kRidged, bool kDisplaced>
+template <bool kRidged, bool kDisplaced, bool kRepeats>
 void sums(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out) {
     const NoiseFloats d;
     LocalOctave local[kMostOctaves];
@@ -80,18 +155,23 @@ void sums(const VeilPlan& plan, const VeilPoints& points, float threshold, float
     for (std::size_t n = 0; n < points.count; n += hn::Lanes(d)) {
         Floats point[3] = {hn::LoadU(d, points.from_base_m[0] + n), hn::LoadU(d, points.from_base_m[1] + n),
                            hn::LoadU(d, points.from_base_m[2] + n)};
-        hn::StoreU(sum_of_octaves<kRidged, kDisplaced>(plan, local, point, threshold), d, out + n);
+        hn::StoreU(sum_of_octaves<kRidged, kDisplaced, kRepeats>(plan, local, point, threshold), d, out + n);
+    }
+}
+
+template <bool kRepeats>
+void sums_of_form(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out) {
+    if (plan.ridged) {
+        (plan.displaced ? sums<true, true, kRepeats> : sums<true, false, kRepeats>)(plan, points, threshold, out);
+    } else {
+        (plan.displaced ? sums<false, true, kRepeats> : sums<false, false, kRepeats>)(plan, points, threshold, out);
     }
 }
 
 }  // namespace
 
 void sums_of_points(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out) {
-    if (plan.ridged) {
-        (plan.displaced ? sums<true, true> : sums<true, false>)(plan, points, threshold, out);
-    } else {
-        (plan.displaced ? sums<false, true> : sums<false, false>)(plan, points, threshold, out);
-    }
+    (plan.repeats ? sums_of_form<true> : sums_of_form<false>)(plan, points, threshold, out);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -8,11 +8,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "density/veil_lattice.h"
+
 namespace nephos {
 
 // One octave at one time, in the form that the kernel reads.
 struct VeilOctavePlan {
     std::array<double, 3> per_m{};  // lattice cells per metre along, across, up
+    VeilLattice lattice;            // of a veil that repeats, instead of the first two of per_m
     std::array<double, 3> phase{};  // origin of p in lattice cells of the noise: random, minus v t
     std::array<std::uint32_t, 3> seeds{};
     std::array<float, 3> displacement_m{};
@@ -22,7 +25,7 @@ struct VeilOctavePlan {
 
 struct VeilPlan {
     std::vector<VeilOctavePlan> octaves;
-    bool ridged = false, displaced = false;
+    bool ridged = false, displaced = false, repeats = false;
     float low = 0, high = 1;  // q at density 0 and 1
 };
 

@@ -2,6 +2,7 @@
 
 // Derived octaves and validation of a veil's options.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -9,6 +10,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "density/veil.h"
+#include "density/veil_lattice.h"
 
 namespace nephos {
 namespace {
@@ -85,6 +87,30 @@ void check_heights(const VeilOptions& o, const Extent& extent, const Placement& 
                                       number_text(bottom + extent.z * size, 9) + " m");
 }
 
+// A veil that repeats: lattice cells that fit into the period, and an area that does not meet its own image.
+void check_period(const VeilOptions& o, const std::vector<VeilOctave>& octaves) {
+    if (o.period_m == Vec2(0, 0)) return;
+    for (const double period : {o.period_m.x, o.period_m.y}) require(period > 0, "period_m", period, "above 0");
+    const Rotation fibres = rotation_of_degrees(o.direction_deg);
+    for (std::size_t k = 0; k < octaves.size(); ++k) {
+        const Vec3& wavelength = octaves[k].wavelength_m;
+        if (veil_lattice({wavelength.x, wavelength.y}, fibres, o.period_m).wide > 0) continue;
+        throw Error(ErrorCode::usage,
+                    "octave " + std::to_string(k + 1) + " of the veil, " + number_text(wavelength.x, 9) + " m along and " +
+                        number_text(wavelength.y, 9) + " m across the fibres, does not fit into a tile of " +
+                        number_text(o.period_m.x, 9) + " x " + number_text(o.period_m.y, 9) +
+                        " m: expected wavelengths of at most the tile's edges, and at most " +
+                        std::to_string(kMostVeilCells) + " cells of the noise in it");
+    }
+    const Rotation yaw = rotation_of_degrees(o.area.yaw_deg);
+    const double east = std::hypot(o.area.semi_a_m * yaw.cos, o.area.semi_b_m * yaw.sin),
+                 north = std::hypot(o.area.semi_a_m * yaw.sin, o.area.semi_b_m * yaw.cos);
+    if (std::isinf(o.area.semi_a_m) && std::isinf(o.area.semi_b_m)) return;
+    require(east <= o.period_m.x / 2 && north <= o.period_m.y / 2, "area", std::max(east, north),
+            "an ellipse that reaches at most half of the tile from its centre, " + number_text(o.period_m.x / 2, 9) + " and " +
+                number_text(o.period_m.y / 2, 9) + " m");
+}
+
 }  // namespace
 
 std::vector<VeilOctave> veil_octaves(const VeilOptions& options) {
@@ -138,6 +164,7 @@ void check(const VeilOptions& o, const Extent& extent, const Placement& placemen
         check_octave(octaves[k], name, placement.cell_size_m);
     }
     check_displacements(octaves);
+    check_period(o, octaves);
 }
 
 }  // namespace nephos

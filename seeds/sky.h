@@ -61,6 +61,9 @@ struct SkyOptions {
     // True: clouds cross the edge of the world whole. False: they form there while they enter and dissolve
     // once they have left, for images that show the edge.
     bool cross_edges_whole = true;
+    // True: the world repeats. A cloud whose centre crosses an edge goes on at the opposite one, none leaves or enters, and
+    // those of a new state form inside.
+    bool periodic = false;
     bool operator==(const SkyOptions&) const = default;
 };
 

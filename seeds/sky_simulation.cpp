@@ -132,7 +132,21 @@ void SkySimulation::move_clouds() {
         c.place = {c.place.x + d.x, c.place.y + d.y};
         c.phase = c.dissolving ? receded(c.phase, options_.time_step_s, options_.dissolution_s)
                                : advanced(c.phase, options_.time_step_s, options_.formation_s);
+        if (options_.periodic) re_enter(c);
     }
+}
+
+// Takes the cloud's centre back into the world by whole periods.
+void SkySimulation::re_enter(SkyCloud& cloud) const {
+    const WorldRectangle& w = options_.world;
+    const Vec3& centre = shape(cloud).centre_m;
+    const auto inside = [](std::int64_t place, double centre_m, double min_m, double max_m) {
+        const std::int64_t period = fixed(max_m - min_m), low = fixed(min_m) - fixed(centre_m);
+        const std::int64_t from_low = (place - low) % period;
+        return low + (from_low < 0 ? from_low + period : from_low);
+    };
+    cloud.place = {inside(cloud.place.x, centre.x, w.min_x_m, w.max_x_m),
+                   inside(cloud.place.y, centre.y, w.min_y_m, w.max_y_m)};
 }
 
 // Returns true when the whole cloud is beyond a side through which the wind does not bring it back.
@@ -150,7 +164,7 @@ void SkySimulation::retire_clouds() {
     const double reach = std::max(w.max_x_m - w.min_x_m, w.max_y_m - w.min_y_m);
     std::erase_if(clouds_, [&](SkyCloud& c) {
         if (c.dissolving && c.phase <= 0) return true;
-        if (!outside(c, wind_step(c, now))) return false;
+        if (options_.periodic || !outside(c, wind_step(c, now))) return false;
         if (options_.cross_edges_whole || options_.dissolution_s <= 0) return true;
         c.dissolving = true;
         const Vec3 p =

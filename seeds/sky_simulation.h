@@ -16,6 +16,7 @@
 //   upwind sides get clouds in proportion to the air that crosses them.
 // - Missing clouds form inside; surplus ones, drawn at random, dissolve inside. In calm air all form inside.
 // - Wind that crosses the world in one step leaves no cloud for longer than two steps.
+// - In a world that repeats (SkyOptions::periodic) clouds re-enter where they leave, and all others form inside.
 // - A sky without base models supplies no cloud: the other bracketing sky then supplies all.
 //
 // Positions are fixed-point sums of displacements (core/wind.h): there is no rounding drift, and the state
@@ -100,6 +101,7 @@ class SkySimulation {
   private:
     void make_shapes();
     void move_clouds();
+    void re_enter(SkyCloud& cloud) const;
     void retire_clouds();
     void adjust_number(std::size_t left);
     void dissolve(std::size_t number);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/frame_detail.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/math.h"
@@ -54,7 +55,8 @@ DetailSetting detail_setting(const Scene& scene, std::optional<std::size_t> laye
     setting.options = layer ? layer_detail(scene, *layer) : scene.density.detail;
     setting.extinction_per_m = scene.density.extinction_per_m;
     setting.metaball_radius_cells = scene.density.metaball_radius_cells;
-    if (layer) setting.opacity = scene.layers[*layer].opacity;
+    // Of a veil that is about to go, no less than can be divided by.
+    if (layer) setting.opacity = std::max(1e-3, opacity_at(scene.layers[*layer], scene.climate, time_s));
     // A file with another box than the lattice is not cut by its sides.
     const bool whole = layer || is_box_of(density, scene.automaton);
     if (!whole) setting.options.apron_cells = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/layer_simulation.h"
 
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -43,6 +44,8 @@ double metres(std::int64_t after, std::int64_t before) {
 // All that a veil's density depends on, but for the time.
 std::string text_of_veil(const Scene& scene, std::size_t layer) {
     Scene alone;
+    alone.tile = scene.tile;
+    if (!scene.layers[layer].presence.empty()) alone.climate = scene.climate;
     alone.automaton.seed = layer_seed(scene.automaton.seed, layer);
     alone.automaton.time_step_s = scene.automaton.time_step_s;
     alone.automaton.wind = layer_wind(scene, layer);
@@ -63,6 +66,7 @@ LayerSimulation::LayerSimulation(const Scene& scene, std::size_t layer, std::opt
         options_ = scene.layers[layer];
         if (options_.is_veil) {
             veil_ = veil_options(scene, layer);
+            climate_ = scene.climate;
             wind_ = layer_wind(scene, layer);
             veil_text_ = text_of_veil(scene, layer);
             return;
@@ -87,13 +91,16 @@ std::uint64_t LayerSimulation::steps() const {
 }
 
 DensityGrid LayerSimulation::veil_at(double time_s) const {
-    return scaled(veil_density(veil_, wind_, options_.extent, options_.placement, time_s), options_.opacity);
+    const double opacity = opacity_at(options_, climate_, time_s);
+    if (opacity <= 0)
+        return DensityGrid::from_dense(std::vector<float>(options_.extent.cells(), 0.0f), options_.extent, options_.placement);
+    return scaled(veil_density(veil_, wind_, options_.extent, options_.placement, time_s), opacity);
 }
 
 GridBox LayerSimulation::box() const { return box_; }
 
 Boundaries LayerSimulation::boundaries() const {
-    return automaton_ ? automaton_->options().boundaries : Boundaries{};
+    return automaton_ ? automaton_->options().boundaries : options_.boundaries;
 }
 
 void LayerSimulation::step() {
@@ -122,6 +129,16 @@ std::vector<RainArea> LayerSimulation::rain() const {
     if (!sky_) return {};
     std::vector<RainArea> areas =
         placed_areas(options_.rain.placed, sky_->time_s(), sky_->carried(), number_);
+    if (sky_->options().periodic) {
+        const WorldRectangle& w = sky_->options().world;
+        const auto inside = [](double at, double min, double max) {
+            return at - (max - min) * std::floor((at - min) / (max - min));
+        };
+        for (RainArea& area : areas) {
+            area.x_m = inside(area.x_m, w.min_x_m, w.max_x_m);
+            area.y_m = inside(area.y_m, w.min_y_m, w.max_y_m);
+        }
+    }
     const auto add = [&](const std::vector<RainArea>& more) {
         areas.insert(areas.end(), more.begin(), more.end());
     };

@@ -55,7 +55,7 @@ class LayerSimulation {
     // Return whether there is a density, and the box that it fills.
     bool has_density() const { return options_.automaton || options_.is_veil; }
     GridBox box() const;
-    // Returns what lies beyond the box of its density; a veil ends at its sides.
+    // Returns what lies beyond the box of its density; a veil ends at its sides, but for that of a tile.
     Boundaries boundaries() const;
     // Returns the rain areas now: placed, attached, found.
     std::vector<RainArea> rain() const;
@@ -75,6 +75,7 @@ class LayerSimulation {
     double time_step_s_ = 10;
     VeilOptions veil_;
     Wind wind_;                // of a veil
+    ClimateOptions climate_;   // that a veil comes and goes with
     std::string veil_text_;    // what its hash is made of
     std::uint64_t steps_ = 0;  // of a layer without automaton and sky
     GridBox box_;              // of its density

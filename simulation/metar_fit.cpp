@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/metar_fit.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -24,6 +25,8 @@ double cover_of_layer(const Scene& scene, std::size_t layer) {
                            scene.density.extinction_per_m)
         .cover;
 }
+
+bool is_same(const MetarLayer& a, const MetarLayer& b) { return a.group == b.group && a.genus == b.genus; }
 
 }  // namespace
 
@@ -59,6 +62,46 @@ FittedScene fit_metar(const Metar& metar, const MetarSceneOptions& options) {
     }
     fitted.text = metar_scene_text(metar, options, coverage);
     for (std::string& note : metar_notes(metar, options)) fitted.notes.push_back(std::move(note));
+    return fitted;
+}
+
+FittedScene fit_taf(const Taf& taf, const MetarSceneOptions& options) {
+    FittedScene fitted;
+    const std::vector<TafLayer> layers = layers_of(taf);
+    std::vector<double> coverage(layers.size(), 1.0);
+    fitted.layers.resize(layers.size());
+    MetarSceneOptions undated = options;  // a period has no day of its own
+    undated.date.clear();
+    for (const TafPeriod& period : taf.periods) {
+        const auto is_new = [&](const MetarLayer& wanted) {
+            return std::ranges::none_of(fitted.layers,
+                                        [&](const FittedLayer& f) { return is_same(f.layer, wanted); });
+        };
+        if (std::ranges::none_of(layers_of(period.weather), is_new)) continue;
+        const FittedScene sky = fit_metar(period.weather, undated);
+        for (const FittedLayer& fit : sky.layers) {
+            if (!is_new(fit.layer)) continue;
+            const auto known =
+                std::ranges::find_if(layers, [&](const TafLayer& l) { return is_same(l.layer, fit.layer); });
+            const auto n = std::size_t(known - layers.begin());
+            coverage[n] = fit.coverage;
+            fitted.layers[n] = fit;
+            fitted.layers[n].layer.name = known->layer.name;
+        }
+        for (const std::string& note : sky.notes)
+            if (note.find("is not met") != note.npos) fitted.notes.push_back(note);
+    }
+    fitted.text = taf_scene_text(taf, options, coverage);
+    if (options.date.empty() || !options.place)
+        fitted.notes.push_back("the sun is not that of the forecast: it takes --date and --at");
+    const auto visibility = [](const TafPeriod& period) {
+        return period.weather.visibility_m.value_or(9999);
+    };
+    if (std::ranges::any_of(taf.periods, [&](const TafPeriod& p) {
+            return visibility(p) != visibility(taf.periods.front());
+        }))
+        fitted.notes.push_back("visibility that changes is not in the scene: it is that of the beginning");
+    fitted.notes.insert(fitted.notes.end(), taf.notes.begin(), taf.notes.end());
     return fitted;
 }
 

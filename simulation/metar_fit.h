@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "scenes/metar/metar_scene.h"
+#include "scenes/metar/taf.h"
 
 namespace nephos {
 
@@ -28,5 +29,9 @@ struct FittedScene {
 // Throws Error(usage) as metar_scene_text().
 inline constexpr int kMostTries = 10;
 FittedScene fit_metar(const Metar& metar, const MetarSceneOptions& options);
+
+// The same for a forecast: each layer has the coverage that it gets in the report of the first period that has it. The sky
+// of a period is met as that of a report is; between periods layers come and go (LayerOptions::presence).
+FittedScene fit_taf(const Taf& taf, const MetarSceneOptions& options);
 
 }  // namespace nephos

@@ -2,6 +2,9 @@
 #include "simulation/scene_place.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
 #include <set>
 
 namespace nephos {
@@ -75,6 +78,21 @@ std::vector<WindLevel> wind_levels(const Scene& scene, std::optional<std::size_t
     const std::vector<Velocity> velocities = wind_of_levels(scene, {}, box, size, time_s);
     for (int k = 0; k < size.z; ++k) levels.push_back({height_of_level(box, k), velocities[std::size_t(k)]});
     return levels;
+}
+
+// Bowring's formula of one step, exact to 1e-9 degrees near the surface: Survey Review 23 (1976), p. 323.
+GeodeticPlace geodetic_place(const Georeference& place, const Vec3& world_m) {
+    constexpr double kA = 6378137.0, kF = 1 / 298.257223563, kB = kA * (1 - kF), kE2 = kF * (2 - kF),
+                     kSecond = kE2 / (1 - kE2), kDegrees = 180 / std::numbers::pi;
+    const Matrix4 m = ecef_from_world(place);
+    std::array<double, 3> p{};
+    for (std::size_t row = 0; row < 3; ++row)
+        p[row] =
+            m[4 * row] * world_m.x + m[4 * row + 1] * world_m.y + m[4 * row + 2] * world_m.z + m[4 * row + 3];
+    const double from_axis = std::hypot(p[0], p[1]), u = std::atan2(p[2] * kA, from_axis * kB);
+    const double latitude = std::atan2(p[2] + kSecond * kB * std::pow(std::sin(u), 3),
+                                       from_axis - kE2 * kA * std::pow(std::cos(u), 3));
+    return {latitude * kDegrees, std::atan2(p[1], p[0]) * kDegrees};
 }
 
 Vec3 period_m(const Scene& scene, std::optional<std::size_t> layer) {

@@ -27,4 +27,12 @@ std::vector<Velocity> wind_of_levels(const Scene& scene, std::optional<std::size
 // does not. Of several layers an axis repeats if it does so in all of them, over the same stretch of the world.
 Vec3 period_m(const Scene& scene, std::optional<std::size_t> layer);
 
+// Latitude and longitude on WGS 84, in degrees.
+struct GeodeticPlace {
+    double latitude_deg = 0, longitude_deg = 0;
+};
+
+// Returns where a point of the world lies on Earth. Precondition: place.given. Pure.
+GeodeticPlace geodetic_place(const Georeference& place, const Vec3& world_m);
+
 }  // namespace nephos

@@ -10,9 +10,11 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
-#include "density/optical_columns.h"
+#include "density/carry.h"
 #include "density/combine.h"
+#include "density/optical_columns.h"
 #include "density/smoothing.h"
+#include "simulation/motion.h"
 
 namespace nephos {
 namespace {
@@ -283,8 +285,20 @@ double Simulation::time_s(const Moment& moment) const {
 DensityGrid Simulation::density_at(std::size_t layer, const Moment& moment) {
     if (moment.fraction != 0 && layers_[layer].is_veil()) return layers_[layer].veil_at(time_s(moment));
     const DensityGrid before = densities_at_step(moment.step)[layer];
-    if (moment.fraction == 0 || !layers_[layer].automaton()) return before;
-    return mix(before, densities_at_step(moment.step + 1)[layer], moment.fraction);
+    if (!layers_[layer].automaton()) return before;
+    return carried_to(layer, moment, before, moment.fraction == 0 ? before : densities_at_step(moment.step + 1)[layer]);
+}
+
+// A grid of the step at or before a moment and that of the step after it, both carried by the wind to the moment.
+DensityGrid Simulation::carried_to(std::size_t layer, const Moment& moment, const DensityGrid& before,
+                                   const DensityGrid& after) const {
+    const Automaton& automaton = *layers_[layer].automaton();
+    const SmoothingOptions& smoothing = scene_.density.smoothing;
+    const Boundaries boundaries = layers_[layer].boundaries();
+    const std::vector<Vec2> from = displacement_of_density(automaton, smoothing, moment.step, moment);
+    if (moment.fraction == 0) return carried({&before, from}, boundaries);
+    const std::vector<Vec2> to = displacement_of_density(automaton, smoothing, moment.step + 1, moment);
+    return carried_mix({&before, from}, {&after, to}, moment.fraction, boundaries);
 }
 
 // The same window in time as the density, and a wider one in space: growth belongs to parts of a cloud, not to cells.
@@ -318,9 +332,8 @@ std::optional<DensityGrid> Simulation::moisture_at(std::size_t layer, const Mome
     const bool detailed =
         scene_.layers.empty() ? scene_.density.detail.enabled : layer_detail(scene_, layer).enabled;
     if (!detailed || !remembers_planes(layer)) return std::nullopt;
-    DensityGrid before = moisture_of(layer, moment.step);
-    if (moment.fraction == 0) return before;
-    return mix(before, moisture_of(layer, moment.step + 1), moment.fraction);
+    const DensityGrid before = moisture_of(layer, moment.step);
+    return carried_to(layer, moment, before, moment.fraction == 0 ? before : moisture_of(layer, moment.step + 1));
 }
 
 // A layer at a moment between two steps.

@@ -86,8 +86,8 @@ struct LayerFrame {
     std::vector<RainArea> rain;    // at the frame's time
 };
 
-// One frame: density at a moment that need not be a step; q is linear between steps, a veil is evaluated at the
-// time. A copy is cheap, shares voxels and planes, and stays valid while the simulation lives; another thread may
+// One frame: density at a moment that need not be a step. q of the steps before and after it is carried to where the
+// wind has taken the air by then (simulation/motion.h) and mixed; a veil is evaluated at the time. A copy is cheap, shares voxels and planes, and stays valid while the simulation lives; another thread may
 // use it while the simulation advances.
 struct FrameResult {
     int number = 1;  // as in file names, counted from 1; 0: a moment that is no frame of the scene
@@ -227,6 +227,8 @@ class Simulation {
     DensityGrid density_of(std::size_t layer, std::uint64_t step) const;
     double time_s(const Moment& moment) const;
     DensityGrid density_at(std::size_t layer, const Moment& moment);
+    DensityGrid carried_to(std::size_t layer, const Moment& moment, const DensityGrid& before,
+                           const DensityGrid& after) const;
     DensityGrid moisture_of(std::size_t layer, std::uint64_t step);
     std::optional<DensityGrid> moisture_at(std::size_t layer, const Moment& moment);
     const Past& past(std::uint64_t step) const;

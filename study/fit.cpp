@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "study/cloud_mask.h"
 #include "study/emulator.h"
 #include "study/run_statistics.h"
 #include "study/toml_table.h"
@@ -375,6 +376,46 @@ FitResult fit(const FitProblem& problem, const Simulate& simulate) {
     return Fitter(problem, simulate).result();
 }
 
+namespace {
+
+// A target that a cloud mask gives: its value, and the standard error of it where the file does not say another sd.
+void read_target_mask(TomlTable& target, const std::filesystem::path& folder, FitTarget& to) {
+    constexpr double kLargest = std::numeric_limits<double>::max(),
+                     kSmallest = std::numeric_limits<double>::min();
+    MaskOptions mask;
+    const std::string file = target.text("from").value_or("");
+    mask.variable = target.text("variable").value_or("");
+    mask.threshold = target.number("threshold", -kLargest, kLargest);
+    mask.cell_size_m = target.number("cell_size_m", kSmallest, kLargest);
+    mask.level_height_m = target.number("level_height_m", kSmallest, kLargest);
+    for (const std::string& axis : target.texts("periodic")) {
+        if (axis != "x" && axis != "y")
+            target.report("periodic", "'" + axis + "' is no axis of a mask",
+                          "expected periodic = [\"x\", \"y\"]");
+        (axis == "x" ? mask.boundaries.x : mask.boundaries.y) = Boundary::periodic;
+    }
+    const std::optional<double> sd = target.number("sd", kSmallest, kLargest);
+    if (target.has("value"))
+        target.report("value", "a target has both value and from", "expected one of them");
+    SeriesMean mean{};
+    try {
+        mean = mask_statistics(read_masks({folder / file}, mask)).statistics[statistic_index(to.statistic)];
+    } catch (const Error& error) {
+        target.report("from", error.what(), "expected a cloud mask: .vdb, .nc or .png");
+        return;
+    }
+    to.value = mean.mean;
+    to.sd = sd.value_or(mean.error);
+    if (!std::isfinite(to.value))
+        target.report("from", fmt::format("{} has no value of `{}`", file, to.statistic),
+                      "expected another statistic");
+    else if (!(to.sd > 0))
+        target.report("from", fmt::format("{} does not say how uncertain its `{}` is", file, to.statistic),
+                      "expected sd = ... beside it: a single snapshot has no standard error");
+}
+
+}  // namespace
+
 FitOptions read_fit_file(const std::filesystem::path& path) {
     constexpr double kLargest = std::numeric_limits<double>::max();
     FitOptions options;
@@ -423,10 +464,15 @@ FitOptions read_fit_file(const std::filesystem::path& path) {
             FitTarget& to = options.problem.targets.emplace_back();
             std::vector<std::string_view> names;
             for (const StatisticInfo& info : kStatistics) names.push_back(info.name);
-            if (!target.has("statistic") || !target.has("value") || !target.has("sd"))
-                target.report("statistic", "a target needs statistic, value and sd",
-                              "expected statistic = \"cover\", value = 0.3, sd = 0.015");
             to.statistic = names[target.word("statistic", names).value_or(0)];
+            if (target.has("from")) {
+                read_target_mask(target, path.parent_path(), to);
+                return;
+            }
+            if (!target.has("statistic") || !target.has("value") || !target.has("sd"))
+                target.report(
+                    "statistic", "a target needs statistic, and value and sd or from",
+                    "expected statistic = \"cover\", value = 0.3, sd = 0.015, or from = \"observed.nc\"");
             to.value = target.number("value", -kLargest, kLargest).value_or(0);
             to.sd = target.number("sd", std::numeric_limits<double>::min(), kLargest).value_or(1);
         });

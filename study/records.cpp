@@ -17,6 +17,7 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "core/random.h"
+#include "simulation/layer_simulation.h"
 
 namespace nephos {
 namespace {
@@ -26,6 +27,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::string_view kHashField = ",\"xxh3\":\"";
 constexpr double kFlushAfter_s = 1;
 constexpr int kFlushAfter = 64;
+constexpr std::uint64_t kMostValues = std::uint64_t(1) << 48;  // of a file of series: no disk holds more
 
 std::string hash_text(std::string_view text) { return hash_of_bytes(std::as_bytes(std::span(text))).hex(); }
 
@@ -63,6 +65,15 @@ Regime regime_of(const std::string& name) {
     throw Error(ErrorCode::io, "'" + name + "' is not a regime");
 }
 
+// Returns the text where it is base64, so that a page may contain it as it is; nothing otherwise.
+std::string base64_only(std::string text) {
+    const bool good = std::ranges::all_of(text, [](char c) {
+        return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '+' ||
+               c == '/' || c == '=';
+    });
+    return good ? text : std::string();
+}
+
 RunRecord record_of(const Json& json) {
     RunRecord record;
     record.id = json.at("run").get<std::string>();
@@ -87,6 +98,8 @@ RunRecord record_of(const Json& json) {
     result.snapshots = json.at("snapshots").get<std::uint64_t>();
     result.state_hash = json.at("state_hash").get<std::string>();
     record.series_offset = json.at("series_offset").get<std::uint64_t>();
+    if (const auto thumbnail = json.find("thumbnail"); thumbnail != json.end())
+        result.thumbnail = base64_only(thumbnail->get<std::string>());
     return record;
 }
 
@@ -98,7 +111,8 @@ RunRecord record_of(const Json& json) {
 void append(const std::filesystem::path& path, const Descriptor& file, std::span<const std::byte> content,
             std::uint64_t& size) {
     int error = write_all(file.get(), content);
-    if (error == 0 && ::fdatasync(file.get()) != 0) error = errno;
+    while (error == 0 && ::fdatasync(file.get()) != 0)
+        if (errno != EINTR) error = errno;
     if (error != 0) {
         [[maybe_unused]] const int ignored = ::ftruncate(file.get(), off_t(size));
         fail(path, error);
@@ -127,6 +141,7 @@ std::string record_line(const PlannedRun& run, const RunResult& result, std::uin
     json["snapshots"] = result.snapshots;
     json["state_hash"] = result.state_hash;
     json["series_offset"] = series_offset;
+    if (!result.thumbnail.empty()) json["thumbnail"] = result.thumbnail;
     return sealed(json);
 }
 
@@ -162,6 +177,9 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
                                 "choose another --out, or give --overwrite");
             RunRecord record = record_of(json);
             record.shard = shard;
+            if (record.result.steps > kMaxSteps || record.series_offset > kMostValues)
+                throw Error(ErrorCode::io, fmt::format("{}: the record at byte {} has impossible numbers",
+                                                       path.string(), bytes));
             if (!record.failed)
                 values = std::max(values, record.series_offset + kSeries.size() * (record.result.steps + 1));
             const auto known = runs_.find(record.id);
@@ -177,6 +195,14 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
         bytes += line.size() + 1;
     }
     check_reading(stream, path);
+    if (values == 0) return {bytes, values};
+    // Series are written before the records that name them: fewer are damage, and not to be filled with zeros.
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(files_.back(), error);
+    if (error) throw Error(ErrorCode::io, files_.back().string() + ": " + error.message());
+    if (size < values * sizeof(float))
+        throw Error(ErrorCode::io, fmt::format("{}: has {} bytes, fewer than the {} that the records name",
+                                               files_.back().string(), size, values * sizeof(float)));
     return {bytes, values};
 }
 

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "statistics/cloud_statistics.h"
-#include "statistics/clouds.h"
-#include "statistics/structure.h"
+#include "study/snapshot.h"
+#include "study/thumbnail.h"
 #include <fmt/format.h>
 
 #include "core/error.h"
@@ -27,8 +27,8 @@ bool has_wind(const Wind& wind) {
     return false;
 }
 
-// What one snapshot says of the clouds in it.
-struct Snapshot {
+// The sizes of clouds at a step.
+struct StepSizes {
     std::uint64_t step;
     CloudSizes sizes;
 };
@@ -91,22 +91,21 @@ class Measurement {
         sampled_;                         // clouds_per_km2, cloud_area_m2, correlation_length_m, overlap
     std::vector<double> cells_, deaths_;  // of each step
     std::vector<std::uint32_t> levels_;   // cloud cells of each level, step by step
-    std::vector<Snapshot> snapshots_;
+    std::vector<StepSizes> snapshots_;
 };
 
 void Measurement::observe() {
     const BitPlaneView cld = automaton().cld();
     const CloudCounts counts = count_cloud(cld, lattice_.boundaries);
     const CloudStatistics s = cloud_statistics(counts, lattice_.placement);
-    const double cells = double(lattice_.extent.cells()), size = lattice_.placement.cell_size_m;
-    const double columns = double(lattice_.extent.x) * lattice_.extent.y;
+    const double cells = double(lattice_.extent.cells());
     series_[0].push_back(s.cover);
     series_[1].push_back(s.mean_density);
     series_[2].push_back(double(count_cells(automaton().act())) / cells);
     series_[3].push_back(double(count_cells(automaton().hum())) / cells);
     series_[4].push_back(s.base_mean_m);
     series_[5].push_back(s.top_mean_m);
-    series_[6].push_back(1000 * s.perimeter_m / (columns * size * size));
+    series_[6].push_back(edge_per_km(s.perimeter_m, lattice_.extent, lattice_.placement.cell_size_m));
     for (const std::uint64_t level : counts.level_cells) levels_.push_back(std::uint32_t(level));
     if (counts_deaths_ && !before_.empty()) {
         const BitPlaneView before{cld.extent, cld.words_per_row, before_.data()};
@@ -121,18 +120,9 @@ void Measurement::observe() {
 }
 
 void Measurement::observe_clouds(const BitPlaneView& cld, std::uint64_t step) {
-    const double size = lattice_.placement.cell_size_m;
-    const double area_km2 = double(lattice_.extent.x) * lattice_.extent.y * size * size / 1e6;
-    const std::vector<ConnectedCloud> clouds = clouds_2d(cld, lattice_.boundaries);
-    Snapshot snapshot{step, CloudSizes(size_range_)};
-    snapshot.sizes.add(clouds);
-    const double number = double(clouds.size());
-    sampled_[0].push_back(number / area_km2);
-    sampled_[1].push_back(clouds.empty() ? kNaN : double(snapshot.sizes.area()) / number * size * size);
-    sampled_[2].push_back(
-        correlation_length_m(shadow_correlation(shadow_of(cld).view(), lattice_.boundaries), size));
-    sampled_[3].push_back(mean_overlap_of_neighbours(cld));
-    snapshots_.push_back(std::move(snapshot));
+    Snapshot snapshot = take_snapshot(cld, lattice_.boundaries, lattice_.placement.cell_size_m, size_range_);
+    for (std::size_t n = 0; n < sampled_.size(); ++n) sampled_[n].push_back(snapshot.values[n]);
+    snapshots_.push_back({step, std::move(snapshot.sizes)});
 }
 
 // A ratio of sums L = cells / deaths; its error from the series of cells - L deaths, whose mean is 0 (delta method).
@@ -152,7 +142,7 @@ SeriesMean Measurement::lifetime(const Judgement& judgement) const {
 
 CloudSizes Measurement::sizes_used(const Judgement& judgement) const {
     CloudSizes all(size_range_);
-    for (const Snapshot& snapshot : snapshots_)
+    for (const StepSizes& snapshot : snapshots_)
         if (is_used(snapshot.step, judgement)) all.add(snapshot.sizes);
     return all;
 }
@@ -171,11 +161,7 @@ SeriesMean Measurement::mean(std::size_t statistic, const Judgement& judgement) 
         if (judgement.regime != Regime::pulsing) return kNone;
         return {double(judgement.period) * lattice_.time_step_s, kNaN, kNaN, kNaN, kNaN};
     }
-    const CloudSizes sizes = sizes_used(judgement);
-    const Estimate estimate = name == "size_exponent"        ? sizes.likelihood_exponent()
-                              : name == "size_exponent_line" ? sizes.line_exponent()
-                                                             : sizes.fractal_dimension();
-    return {estimate.value, estimate.error, kNaN, kNaN, kNaN};
+    return size_statistic(name, sizes_used(judgement));
 }
 
 RunResult Measurement::result(const Judgement& judgement) const {
@@ -198,10 +184,11 @@ RunResult Measurement::result(const Judgement& judgement) const {
     int last = kSizeBins;
     while (last > 0 && sizes.count(last - 1) == 0) --last;
     for (int bin = 0; bin < last; ++bin) result.sizes.push_back(sizes.count(bin));
-    for (const Snapshot& snapshot : snapshots_) result.snapshots += is_used(snapshot.step, judgement);
+    for (const StepSizes& snapshot : snapshots_) result.snapshots += is_used(snapshot.step, judgement);
     result.state_hash = combined_hash(layers_).hex();
     for (const std::vector<double>& series : series_)
         for (const double value : series) result.series.push_back(float(value));
+    result.thumbnail = thumbnail_of(automaton().cld());
     return result;
 }
 

@@ -69,6 +69,7 @@ struct RunResult {
     std::uint64_t snapshots = 0;
     std::string state_hash;     // after the last step
     std::vector<float> series;  // kSeries one after the other, steps + 1 values each
+    std::string thumbnail;      // of the last state, thumbnail.h; a sweep keeps that of the first replicate
 };
 
 // Runs the scene from its start by the rules of `options`, which has its `layer` set where the scene has layers. Throws as

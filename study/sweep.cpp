@@ -32,11 +32,13 @@ std::string packed(const RunResult& result) {
     writer.put(std::array{result.steps, result.warm_up, result.used, result.period, result.snapshots});
     writer.put(result.statistics);
     writer.put(std::array{std::uint64_t(result.profile.size()), std::uint64_t(result.sizes.size()),
-                          std::uint64_t(result.series.size()), std::uint64_t(result.state_hash.size())});
+                          std::uint64_t(result.series.size()), std::uint64_t(result.state_hash.size()),
+                          std::uint64_t(result.thumbnail.size())});
     writer.put_bytes(std::as_bytes(std::span(result.profile)));
     writer.put_bytes(std::as_bytes(std::span(result.sizes)));
     writer.put_bytes(std::as_bytes(std::span(result.series)));
     writer.put_bytes(std::as_bytes(std::span(result.state_hash)));
+    writer.put_bytes(std::as_bytes(std::span(result.thumbnail)));
     const std::vector<std::byte> bytes = writer.take();
     std::string text(bytes.size(), '\0');
     std::memcpy(text.data(), bytes.data(), bytes.size());
@@ -54,21 +56,18 @@ RunResult unpacked(const std::string& text) {
     result.period = counts[3];
     result.snapshots = counts[4];
     result.statistics = reader.get<decltype(result.statistics)>();
-    const auto sizes = reader.get<std::array<std::uint64_t, 4>>();
+    const auto sizes = reader.get<std::array<std::uint64_t, 5>>();
     result.profile.resize(sizes[0]);
     result.sizes.resize(sizes[1]);
     result.series.resize(sizes[2]);
     result.state_hash.resize(sizes[3]);
+    result.thumbnail.resize(sizes[4]);
     reader.get_bytes(std::as_writable_bytes(std::span(result.profile)));
     reader.get_bytes(std::as_writable_bytes(std::span(result.sizes)));
     reader.get_bytes(std::as_writable_bytes(std::span(result.series)));
     reader.get_bytes(std::as_writable_bytes(std::span(result.state_hash)));
+    reader.get_bytes(std::as_writable_bytes(std::span(result.thumbnail)));
     return result;
-}
-
-void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
-    write_atomically(folder / "scene.toml", plan.scene_text());
-    write_atomically(folder / "sweep.toml", plan.to_toml());
 }
 
 // Counts what is there. Goes over all runs, but keeps none.
@@ -96,6 +95,11 @@ SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records&
 }
 
 }  // namespace
+
+void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
+    write_atomically(folder / "scene.toml", plan.scene_text());
+    write_atomically(folder / "sweep.toml", plan.to_toml());
+}
 
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
     return status_of(plan, job, Records::read({job.folder}));
@@ -139,7 +143,9 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
     };
     const Task task = [&](std::uint64_t number) {
         const PlannedRun run = plan.run(number);
-        return packed(run_for_statistics(plan.scene_of(run), plan.options()));
+        RunResult result = run_for_statistics(plan.scene_of(run), plan.options());
+        if (run.replicate != 0) result.thumbnail.clear();
+        return packed(result);
     };
     const TaskEnd end = [&](std::uint64_t number, const std::string& result,
                             const std::optional<std::string>& failure) {

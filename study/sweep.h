@@ -44,6 +44,9 @@ struct SweepReport {
     std::vector<std::string> failures;  // "point 3, replicate 1: message", at most five
 };
 
+// Writes the plan and the scene, as run_sweep() does, and runs nothing. Throws Error(io).
+void write_plan(const SweepPlan& plan, const std::filesystem::path& folder);
+
 // Returns what is done of a plan in some folders.
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job);
 

@@ -147,6 +147,11 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
     simulation_hash_ = simulation_start(scene_).simulation_hash;
 }
 
+std::size_t SweepPlan::measured_lattice() const {
+    const auto found = std::ranges::find(scene_.layers, options_.layer, &LayerOptions::name);
+    return found == scene_.layers.end() ? 0 : std::size_t(found - scene_.layers.begin());
+}
+
 void SweepPlan::check_axes() const {
     for (const Axis& axis : options_.axes) {
         std::vector<std::string> values = axis.values;

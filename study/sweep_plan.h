@@ -83,6 +83,8 @@ class SweepPlan {
     const SweepOptions& options() const { return options_; }
     const Scene& scene() const { return scene_; }                  // with the overrides of all runs
     const std::string& scene_text() const { return scene_text_; }  // canonical
+    // Returns the place of the lattice that is measured among those of the scene.
+    std::size_t measured_lattice() const;
     std::uint64_t points() const { return points_; }
     std::uint64_t runs() const { return points_ * options_.replicates; }
     std::vector<std::string> values_of_point(std::uint64_t point) const;

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "scenes/format/writer.h"
+#include "simulation/layer_simulation.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -159,11 +160,7 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
         return;
     }
     levels = std::max<std::size_t>(levels, 1);
-    const Scene& scene = plan.scene();
-    const std::size_t n_layer = std::size_t(
-        std::ranges::find(scene.layers, plan.options().layer, &LayerOptions::name) - scene.layers.begin());
-    const Placement placement =
-        scene.layers.empty() ? scene.automaton.placement : scene.layers[n_layer].placement;
+    const Placement placement = automaton_options(plan.scene(), plan.measured_lattice()).placement;
     const std::vector<NetcdfDimension> dimensions{{"run", done.size()},
                                                   {"step", steps + 1},
                                                   {"level", levels},
@@ -208,7 +205,7 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
     variables.push_back(variable("time", NetcdfType::float64, {1},
                                  described("s", "simulated time since the start"), [&](const Put& put) {
                                      for (std::uint64_t n = 0; n <= steps; ++n)
-                                         put(double(n) * scene.automaton.time_step_s);
+                                         put(double(n) * plan.scene().automaton.time_step_s);
                                  }));
     variables.push_back(variable("height", NetcdfType::float64, {2},
                                  described("m", "centre of the level", "height"), [&](const Put& put) {

@@ -28,6 +28,7 @@ MAY_USE = {
                     "scenes/metar", "simulation", "study"},
     "apps/editor": {"core", "automaton", "statistics", "seeds", "density", "render", "render/options", "scenes/format",
                     "simulation", "apps/nephos"},
+    "apps/mpi": {"core", "automaton", "statistics", "density", "scenes/format"},
     "apps/python": {"core", "automaton", "statistics", "density", "render", "render/options", "scenes/format", "simulation"},
 }
 # Folders of render/ from the lowest to the highest: each may include those of the rows above its own. The renderer's
@@ -58,8 +59,9 @@ LIBRARIES = {
     "backends/imgui": {"apps/editor"},
     "OpenEXR/": {"render"},
     "Imf": {"render"},
-    "png.h": {"density", "render"},
-    "CLI/": {"apps/nephos"},
+    "png.h": {"density", "render", "study"},
+    "CLI/": {"apps/mpi", "apps/nephos"},
+    "mpi.h": {"apps/mpi"},
     "pybind11/": {"apps/python"},
     "toml++/": {"scenes/format"},
     "Random123/": {"core", "automaton", "seeds"},

@@ -311,7 +311,7 @@ void run_window(Editor& editor) {
 
 void shortcuts_window(Editor& editor) {
     if (!editor.show_shortcuts) return;
-    static constexpr std::array<std::array<const char*, 2>, 25> kKeys{{
+    static constexpr std::array<std::array<const char*, 2>, 28> kKeys{{
         {"Space", "run or pause"},
         {",   .", "a step back, a step on"},
         {"Home", "back to the start"},
@@ -321,9 +321,12 @@ void shortcuts_window(Editor& editor) {
         {"Wheel", "nearer, farther"},
         {"W A S D   Q E", "fly; Shift: four times as fast"},
         {"F", "look at all clouds"},
+        {"Double-click, V", "go to the cloud under the mouse"},
+        {"L", "the next click is lightning"},
+        {"M, B", "set a checkpoint; back to the last one"},
         {"C", "camera of the scene"},
         {"G", "shapes of the scene over the picture"},
-        {"1 2 3 4", "beauty, density, transmittance, light only"},
+        {"1 ... 6", "beauty, density, transmittance, light only, wireframe, voxels"},
         {"Ctrl+N", "new scene"},
         {"Ctrl+O", "open"},
         {"Ctrl+S", "save"},
@@ -385,6 +388,8 @@ void do_pending(Editor& editor) {
             editor.quit = true;
         } else if (what == Pending::new_scene) {
             open_document(editor, std::make_unique<SceneDocument>(first_scene_text()));
+        } else if (what == Pending::empty_scene) {
+            open_document(editor, std::make_unique<SceneDocument>(empty_scene_text()));
         } else if (what == Pending::open && editor.pending_path.extension() == ".vdb") {
             say(editor,
                 "A grid is no scene: name it as `initial_state` in [lattice], or draw it with `nephos "

@@ -24,112 +24,6 @@ double seconds_since(Clock::time_point begin) {
     return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-ImGuiWindowFlags panel_flags() {
-    return ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
-           ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
-           ImGuiWindowFlags_NoBringToFrontOnFocus;
-}
-
-// A bar between two panels that the mouse moves; `size` is in points at scale 1.
-void splitter(Editor& editor, const char* name, const ImVec2& min, const ImVec2& max, bool vertical,
-              float sign, float& size, float scale) {
-    ImGui::SetNextWindowPos(min);
-    ImGui::SetNextWindowSize(ImVec2(std::max(1.0f, max.x - min.x), std::max(1.0f, max.y - min.y)));
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
-    ImGui::Begin(name, nullptr, panel_flags() | ImGuiWindowFlags_NoScrollbar);
-    ImGui::InvisibleButton("bar", ImVec2(std::max(1.0f, max.x - min.x), std::max(1.0f, max.y - min.y)));
-    editor.controls.note(name);
-    const bool hot = ImGui::IsItemHovered() || ImGui::IsItemActive();
-    if (hot) ImGui::SetMouseCursor(vertical ? ImGuiMouseCursor_ResizeEW : ImGuiMouseCursor_ResizeNS);
-    if (hot)
-        ImGui::GetWindowDrawList()->AddRectFilled(min, max, ImGui::GetColorU32(ImGuiCol_SeparatorHovered));
-    if (ImGui::IsItemActive()) {
-        const float by = vertical ? ImGui::GetIO().MouseDelta.x : ImGui::GetIO().MouseDelta.y;
-        size = std::clamp(size + sign * by / scale, 60.0f, 1600.0f);
-    }
-    ImGui::End();
-    ImGui::PopStyleVar();
-}
-
-void panel(const char* name, const ImVec2& min, const ImVec2& max, ImGuiWindowFlags more,
-           const std::function<void()>& fill) {
-    if (max.x - min.x < 2 || max.y - min.y < 2) return;
-    ImGui::SetNextWindowPos(min);
-    ImGui::SetNextWindowSize(ImVec2(max.x - min.x, max.y - min.y));
-    if (ImGui::Begin(name, nullptr, panel_flags() | more)) fill();
-    ImGui::End();
-}
-
-// Panels around the picture; those that find no room are left out.
-void layout(Editor& editor, float scale) {
-    const ImVec2 size = ImGui::GetIO().DisplaySize;
-    const float bar = 5 * scale, top = ImGui::GetFrameHeight(), status = ImGui::GetFrameHeight() + 2 * scale;
-    const float room = std::max(1.0f, size.x - 60 * scale);
-    float left = std::floor(editor.settings.left * scale), right = std::floor(editor.settings.right * scale);
-    if (left + right > room) {  // a narrow window: the picture keeps a third
-        const float fit = std::max(0.0f, 0.66f * size.x) / (left + right);
-        left = std::floor(left * fit);
-        right = std::floor(right * fit);
-    }
-    if (size.x < 420 * scale) left = right = 0;
-    float bottom = std::floor(editor.settings.bottom * scale);
-    bottom = std::min(bottom, std::floor(0.45f * size.y));
-    if (size.y < 260 * scale) bottom = 0;
-    const float low = size.y - status, middle = std::max(top + 1, low - bottom);
-    panel("Outline", {0, top}, {left, low}, 0, [&] { outline_panel(editor); });
-    panel("Properties", {size.x - right, top}, {size.x, low}, 0, [&] {
-        if (ImGui::BeginTabBar("tabs")) {
-            const auto tab = [&](const char* name, int number) {
-                const bool wanted = editor.wanted_tab == number;
-                const bool open = ImGui::BeginTabItem(
-                    name, nullptr, wanted ? ImGuiTabItemFlags_SetSelected : ImGuiTabItemFlags_None);
-                editor.controls.note(std::string("tab ") + name);
-                if (open) editor.tab = number;
-                return open;
-            };
-            const int wanted = editor.wanted_tab;
-            if (tab("Properties", 0)) {
-                properties_panel(editor);
-                ImGui::EndTabItem();
-            }
-            if (tab("View", 1)) {
-                view_options_panel(editor);
-                ImGui::EndTabItem();
-            }
-            if (tab("Text", 2)) {
-                text_panel(editor);
-                ImGui::EndTabItem();
-            }
-            if (wanted == editor.wanted_tab) editor.wanted_tab = -1;
-            ImGui::EndTabBar();
-        }
-    });
-    if (bottom > 0) {
-        panel("Time", {left + (left > 0 ? bar : 0), middle + bar},
-              {size.x - right - (right > 0 ? bar : 0), low}, ImGuiWindowFlags_NoScrollbar,
-              [&] { timeline_panel(editor); });
-    }
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
-    panel("Picture", {left + (left > 0 ? bar : 0), top},
-          {size.x - right - (right > 0 ? bar : 0), bottom > 0 ? middle : low},
-          ImGuiWindowFlags_NoBackground | ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse,
-          [&] { view_panel(editor); });
-    ImGui::PopStyleVar();
-    if (left > 0)
-        splitter(editor, "left bar", {left, top}, {left + bar, low}, true, 1, editor.settings.left, scale);
-    if (right > 0) {
-        splitter(editor, "right bar", {size.x - right - bar, top}, {size.x - right, low}, true, -1,
-                 editor.settings.right, scale);
-    }
-    if (bottom > 0) {
-        splitter(editor, "bottom bar", {left + bar, middle}, {size.x - right - bar, middle + bar}, false, -1,
-                 editor.settings.bottom, scale);
-    }
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(9 * scale, 3 * scale));
-    panel("Status", {0, low}, {size.x, size.y}, ImGuiWindowFlags_NoScrollbar, [&] { status_bar(editor); });
-    ImGui::PopStyleVar();
-}
-
 // Sends what the document became to the live scene.
 void follow_document(Editor& editor) {
     if (editor.shown_version == editor.document->version()) return;
@@ -239,6 +133,10 @@ void shortcuts(Editor& editor) {
     if (pressed('F')) frame_scene(editor);
     if (pressed('C')) take_scene_camera(editor);
     if (pressed('G')) editor.show_gizmos = !editor.show_gizmos;
+    if (pressed('M')) keep_checkpoint(editor);
+    if (pressed('B')) back_to_checkpoint(editor);
+    if (pressed('L')) editor.flash_on_click = !editor.flash_on_click;
+    if (pressed('V') && ImGui::IsMousePosValid()) go_to_cloud(editor, io.MousePos);
     for (int mode = 0; mode < int(std::size(kViewModes)); ++mode) {
         if (pressed('1' + mode)) editor.view.mode = mode;
     }
@@ -248,14 +146,7 @@ void save_capture(Editor& editor) {
     if (editor.capture_to.empty()) return;
     const WindowImage& image = editor.window->captured();
     const std::filesystem::path path = std::exchange(editor.capture_to, {});
-    Rgb8Image out;
-    out.width = image.width;
-    out.height = image.height;
-    out.rgb.reserve(std::size_t(3) * std::size_t(image.width) * std::size_t(image.height));
-    for (std::size_t at = 0; at + 3 < image.rgba.size(); at += 4) {
-        out.rgb.insert(out.rgb.end(), {image.rgba[at], image.rgba[at + 1], image.rgba[at + 2]});
-    }
-    write_png(path, out, RenderOptions{}, PictureMetadata{});
+    save_rgba(path, image.width, image.height, image.rgba);
     say(editor, "Picture of the window: " + path.string());
 }
 
@@ -404,9 +295,13 @@ void say(Editor& editor, std::string message, bool is_bad) {
 }
 
 void Controls::note(const std::string& name) {
-    const bool visible = ImGui::IsItemVisible();
+    const ImVec2 min = ImGui::GetItemRectMin(), max = ImGui::GetItemRectMax();
+    const ImVec2 middle(0.5f * (min.x + max.x), 0.5f * (min.y + max.y));
+    const ImDrawList& list = *ImGui::GetWindowDrawList();
+    const ImVec2 low = list.GetClipRectMin(), high = list.GetClipRectMax();
+    const bool visible = middle.x >= low.x && middle.y >= low.y && middle.x < high.x && middle.y < high.y;
     if (name == wanted && !visible) ImGui::SetScrollHereY(0.5f);
-    now[name] = {ImGui::GetItemRectMin(), ImGui::GetItemRectMax(), !visible};
+    now[name] = {min, max, !visible};
 }
 
 void tooltip_of_last(const char* text) {
@@ -436,16 +331,36 @@ bool toggle(Editor& editor, const std::string& name, bool& on, const char* hint)
     return changed;
 }
 
+void save_rgba(const std::filesystem::path& path, int width, int height, std::span<const std::uint8_t> rgba) {
+    Rgb8Image out;
+    out.width = width;
+    out.height = height;
+    out.rgb.reserve(rgba.size() / 4 * 3);
+    for (std::size_t at = 0; at + 3 < rgba.size(); at += 4)
+        out.rgb.insert(out.rgb.end(), {rgba[at], rgba[at + 1], rgba[at + 2]});
+    write_png(path, out, RenderOptions{}, PictureMetadata{});
+}
+
 void change_text(Editor& editor, std::string text, const std::string& what, const std::string& merge) {
     editor.document->edit(std::move(text), what, merge);
 }
 
 void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging) {
+    set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging);
+}
+
+void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging) {
+    TextPath path = table;
+    path.push_back({entries.front().first, 0});
     const std::string name = path_text(path);
     try {
-        if (editor.record && record_live(editor, path, value)) return;
-        change_text(editor, with_value(editor.document->text(), path, value), "Change " + name,
-                    dragging ? name : "");
+        std::string text = editor.document->text();
+        for (const auto& [key, value] : entries) {
+            path.back().name = key;
+            text = with_value(text, path, value);
+        }
+        if (editor.record && record_live(editor, path, text)) return;
+        change_text(editor, text, "Change " + name, dragging ? name : "");
     } catch (const Error& error) {
         say(editor, error.what(), true);
     }
@@ -458,6 +373,7 @@ void open_document(Editor& editor, std::unique_ptr<SceneDocument> document) {
     editor.shown_scene.reset();
     editor.selected.clear();
     editor.steps.clear();
+    editor.checkpoints.clear();
     editor.text_version = 0;
     editor.defaults.clear();
     editor.defaults_version = 0;
@@ -482,10 +398,7 @@ int run_editor(const EditorOptions& options) {
     Report report;
     Editor editor(options);
     if (editor.document->has_file()) note_recent(editor.settings, editor.document->path());
-    if (editor.document->found_autosave(editor.folder) && options.script.empty() &&
-        options.screenshot.empty()) {
-        editor.show_recovery = true;
-    }
+    if (editor.document->found_autosave(editor.folder) && options.screenshot.empty()) editor.show_recovery = true;
     int status = 0;
     try {
         status = loop(editor, report);

@@ -80,4 +80,22 @@ pattern = "country"
 )toml";
 }
 
+std::string empty_scene_text() {
+    return R"toml(# Nothing but a sky over the ground. docs/editor.md fills it in ten minutes.
+
+name = "untitled"
+seed = 1
+
+[camera]
+exposure = "automatic"
+tone_curve = "neutral"
+
+[atmosphere]
+model = "physical"
+
+[ground]
+pattern = "country"
+)toml";
+}
+
 }  // namespace nephos

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shapes of the scene as lines over the picture: the lattice, parcels of air, seeds of a base model. Those of the
-// selected element have handles: its centre moves, its ends give it its size.
+// Shapes of the scene as lines over the picture: the lattice, parcels of air, seeds and roots of a base model, rain areas.
+// Those of the selected element have handles, which move, stretch and turn it.
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <string_view>
+#include <vector>
 
+#include "apps/editor/handles.h"
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
 #include "core/text.h"
@@ -13,137 +17,9 @@
 namespace nephos {
 namespace {
 
-void world_line(const Editor& editor, const Vec3& from, const Vec3& to, ImU32 colour, float width = 1.2f) {
-    const auto a = on_screen(editor, from), b = on_screen(editor, to);
-    if (a && b) ImGui::GetWindowDrawList()->AddLine(*a, *b, colour, width);
-}
-
-void box_lines(const Editor& editor, const Vec3& min, const Vec3& max, ImU32 colour) {
-    const auto corner = [&](int bits) {
-        return Vec3{(bits & 1) != 0 ? max.x : min.x, (bits & 2) != 0 ? max.y : min.y,
-                    (bits & 4) != 0 ? max.z : min.z};
-    };
-    for (int bits = 0; bits < 8; ++bits) {
-        for (const int axis : {1, 2, 4}) {
-            if ((bits & axis) == 0) world_line(editor, corner(bits), corner(bits | axis), colour);
-        }
-    }
-}
-
-Vec3 turned(const Vec3& v, double yaw_deg) {
-    const double angle = yaw_deg * std::numbers::pi / 180, c = std::cos(angle), s = std::sin(angle);
-    return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
-}
-
-void ellipsoid_lines(const Editor& editor, const Vec3& centre, const Vec3& axes, double yaw_deg,
-                     ImU32 colour) {
-    constexpr int kParts = 40;
-    for (int plane = 0; plane < 3; ++plane) {
-        Vec3 before{};
-        for (int n = 0; n <= kParts; ++n) {
-            const double angle = 2 * std::numbers::pi * n / kParts, c = std::cos(angle), s = std::sin(angle);
-            const Vec3 unit = plane == 0 ? Vec3{c, s, 0} : plane == 1 ? Vec3{c, 0, s} : Vec3{0, c, s};
-            const Vec3 at = centre + turned({unit.x * axes.x, unit.y * axes.y, unit.z * axes.z}, yaw_deg);
-            if (n > 0) world_line(editor, before, at, colour);
-            before = at;
-        }
-    }
-}
-
-// A handle that the mouse takes. Returns true while it drags, with the metres that it went along `axis` (unit length).
-struct Handle {
-    bool dragging = false;
-    double metres = 0;
-};
-
-Handle axis_handle(Editor& editor, const char* name, const Vec3& from, const Vec3& axis, double size_m,
-                   ImU32 colour) {
-    const auto a = on_screen(editor, from), b = on_screen(editor, from + size_m * axis);
-    if (!a || !b) return {};
-    ImDrawList& list = *ImGui::GetWindowDrawList();
-    list.AddLine(*a, *b, colour, 2.2f);
-    const float radius = 0.42f * ImGui::GetFontSize();
-    static std::string taken;  // the handle that the mouse holds; one mouse
-    const ImVec2 mouse = ImGui::GetIO().MousePos;
-    const bool near = std::hypot(mouse.x - b->x, mouse.y - b->y) < 1.6f * radius;
-    const bool down = ImGui::IsMouseDown(ImGuiMouseButton_Left);
-    if (!down) taken.clear();
-    if (near && ImGui::IsMouseClicked(ImGuiMouseButton_Left) && taken.empty()) taken = name;
-    const bool mine = taken == name;
-    list.AddCircleFilled(*b, mine || near ? 1.25f * radius : radius, colour);
-    list.AddCircle(*b, radius, IM_COL32(0, 0, 0, 160));
-    editor.controls.now[std::string("handle ") + name] = {ImVec2(b->x - radius, b->y - radius),
-                                                          ImVec2(b->x + radius, b->y + radius)};
-    if (!mine) return {};
-    const double px = double(b->x) - a->x, py = double(b->y) - a->y, length2 = px * px + py * py;
-    const ImVec2 by = ImGui::GetIO().MouseDelta;
-    if (length2 < 4) return {true, 0};
-    return {true, (by.x * px + by.y * py) / length2 * size_m};
-}
-
-std::string vector_toml(const Vec3& v) {
-    return "[" + number_text(std::round(v.x), 7) + ", " + number_text(std::round(v.y), 7) + ", " +
-           number_text(std::round(v.z), 7) + "]";
-}
-
-// The unrounded place of what is dragged: rounding to metres in every frame would lose slow moves.
-struct Dragged {
-    TextPath path;
-    Vec3 value{};
-};
-
-Vec3& precise(const TextPath& path, const Vec3& now, bool dragging) {
-    static Dragged dragged;  // one mouse
-    if (!dragging || dragged.path != path) dragged = {path, now};
-    return dragged.value;
-}
-
+constexpr ImU32 kYellow = IM_COL32(245, 215, 90, 255);
 constexpr ImU32 kAxisColours[3] = {IM_COL32(235, 80, 80, 255), IM_COL32(90, 200, 90, 255),
                                    IM_COL32(90, 140, 250, 255)};
-
-// Handles of a thing with a place and a size along its axes. Returns true while one moves.
-bool shape_handles(Editor& editor, const TextPath& place_path, const TextPath& size_path, Vec3 origin,
-                   Vec3 place, Vec3 half_size, double yaw_deg) {
-    bool drags = false;
-    const Vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    const double sizes[3] = {half_size.x, half_size.y, half_size.z};
-    constexpr const char* kMoves[3] = {"move east", "move north", "move up"};
-    constexpr const char* kSizes[3] = {"size x", "size y", "size z"};
-    const double arrow = 0.6 * std::max({sizes[0], sizes[1], sizes[2]});
-    for (int axis = 0; axis < 3; ++axis) {
-        const Handle handle =
-            axis_handle(editor, kMoves[axis], origin + place, unit[axis], arrow, kAxisColours[axis]);
-        if (!handle.dragging) continue;
-        drags = true;
-        Vec3& exact = precise(place_path, place,
-                              handle.metres != 0 || ImGui::IsMouseDragging(ImGuiMouseButton_Left, 0));
-        exact = exact + handle.metres * unit[axis];
-        set_value(editor, place_path, vector_toml(exact), true);
-    }
-    for (int axis = 0; axis < 3; ++axis) {
-        const Vec3 way = turned(-1.0 * unit[axis], yaw_deg);
-        const Handle handle =
-            axis_handle(editor, kSizes[axis], origin + place, way, sizes[axis], IM_COL32(245, 215, 90, 255));
-        if (!handle.dragging) continue;
-        drags = true;
-        Vec3& exact = precise(size_path, half_size,
-                              handle.metres != 0 || ImGui::IsMouseDragging(ImGuiMouseButton_Left, 0));
-        exact = exact + handle.metres * unit[axis];
-        exact = {std::max(exact.x, 1.0), std::max(exact.y, 1.0), std::max(exact.z, 1.0)};
-        const bool whole_size = size_path.back().name == "size_m";
-        set_value(editor, size_path, vector_toml(whole_size ? 2.0 * exact : exact), true);
-    }
-    return drags;
-}
-
-Vec3 vector_of(const Node* node, const Vec3& otherwise) {
-    if (node == nullptr || node->items.size() != 3) return otherwise;
-    const auto number = [&](std::size_t n) {
-        const Node& item = node->items[n];
-        return item.kind == Node::Kind::integer ? double(item.integer) : item.number;
-    };
-    return {number(0), number(1), number(2)};
-}
 
 TextPath with(const TextPath& path, const char* name) {
     TextPath out = path;
@@ -151,89 +27,199 @@ TextPath with(const TextPath& path, const char* name) {
     return out;
 }
 
-// Returns the origin of a model's own space while its seeds are edited: the camera's target.
-bool model_gizmo(Editor& editor) {
-    const TextPath model(editor.selected.begin(), editor.selected.begin() + 2);
-    const auto count = [&] {  // asked again after each seed: a handle replaces the values
-        const Node* seeds = value_node(editor.document->values(), with(model, "seeds"));
-        return seeds != nullptr ? seeds->items.size() : 0;
-    };
-    const Vec3 origin = editor.camera.camera.target_m;
-    bool drags = false;
-    for (std::size_t n = 0; n < count(); ++n) {
-        TextPath path = with(model, "seeds");
-        path.push_back({{}, n});
-        const Vec3 place = vector_of(value_node(editor.document->values(), with(path, "position_m")), {});
-        const Vec3 size =
-            vector_of(value_node(editor.document->values(), with(path, "size_m")), {100, 100, 100});
-        const bool chosen =
-            editor.selected.size() >= 4 && std::equal(path.begin(), path.end(), editor.selected.begin());
-        const Vec3 half = 0.5 * size;
-        box_lines(editor, origin + (place - half), origin + (place + half),
-                  chosen ? IM_COL32(120, 190, 255, 255) : IM_COL32(60, 110, 235, 200));
-        if (chosen) {
-            drags |=
-                shape_handles(editor, with(path, "position_m"), with(path, "size_m"), origin, place, half, 0);
-        }
-    }
-    return drags;
+std::string number_of(const Editor& editor, double metres) { return number_text(tidy_m(editor, metres), 9); }
+
+std::string vector_toml(const Editor& editor, const Vec3& v) {
+    return "[" + number_of(editor, v.x) + ", " + number_of(editor, v.y) + ", " + number_of(editor, v.z) + "]";
 }
 
-// The lattice that is shown: of a scene with layers the first with an automaton.
-struct ShownBits {
-    BitPlaneView hum, act, cld;
-    Placement placement;
-};
-std::optional<ShownBits> shown_bits(const Editor& editor, const FrameResult& frame) {
-    if (!editor.shown_scene) return std::nullopt;
-    const Scene& scene = *editor.shown_scene;
-    if (frame.layers.empty() && frame.hum) {
-        return ShownBits{*frame.hum, *frame.act, *frame.cld, scene.automaton.placement};
+void drag_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries) {
+    set_values(editor, table, entries, true);
+}
+
+constexpr Vec3 kUnits[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+constexpr const char* kMoves[3] = {"move east", "move north", "move up"};
+constexpr const char* kSizes[3] = {"size x", "size y", "size z"};
+
+// Handles of a place; returns the new one while one of them is held.
+std::optional<Vec3> place_handles(Editor& editor, const Vec3& origin, const Vec3& place, double arrow_m,
+                                  int axes = 3) {
+    std::optional<Vec3> out;
+    for (int axis = 0; axis < axes; ++axis) {
+        const auto moved = axis_handle(editor, kMoves[axis], origin + place, kUnits[axis], arrow_m,
+                                       kAxisColours[axis], place[axis]);
+        if (!moved) continue;
+        out = place;
+        (*out)[axis] = *moved;
     }
-    for (std::size_t n = 0; n < frame.layers.size() && n < scene.layers.size(); ++n) {
-        const LayerFrame& layer = frame.layers[n];
-        if (layer.hum) return ShownBits{*layer.hum, *layer.act, *layer.cld, scene.layers[n].placement};
+    return out;
+}
+
+// Handles of half the size along axes that are turned; on their negative sides.
+std::optional<Vec3> size_handles(Editor& editor, const Vec3& centre, const Vec3& half, double yaw_deg,
+                                 int axes = 3) {
+    std::optional<Vec3> out;
+    for (int axis = 0; axis < axes; ++axis) {
+        const auto size = axis_handle(editor, kSizes[axis], centre, turned(-1.0 * kUnits[axis], yaw_deg),
+                                      half[axis], kYellow, half[axis]);
+        if (!size) continue;
+        out = half;
+        (*out)[axis] = std::max(*size, 1.0);
     }
-    return std::nullopt;
+    return out;
+}
+
+// A handle that turns something about the vertical.
+std::optional<double> turn_handle(Editor& editor, const Vec3& centre, double radius_m, double yaw_deg) {
+    const auto point = [&](double yaw) { return centre + turned({radius_m, 0, 0}, yaw); };
+    loop_lines(editor, [&](double part) { return point(360 * part); }, IM_COL32(200, 120, 235, 110));
+    const auto now = angle_handle(editor, "turn", point, IM_COL32(200, 120, 235, 255), yaw_deg);
+    if (!now) return std::nullopt;
+    return std::round(std::remainder(*now, 360.0));
+}
+
+// Handles of a thing with a place, a size along its axes, and `yaw` where it can be turned.
+void shape_handles(Editor& editor, const TextPath& table, const char* place_key, const char* size_key,
+                   const Vec3& origin, const Vec3& place, const Vec3& half, std::optional<double> yaw_deg) {
+    const double arrow = 0.6 * std::max({half.x, half.y, half.z});
+    if (const auto moved = place_handles(editor, origin, place, arrow))
+        drag_values(editor, table, {{place_key, vector_toml(editor, *moved)}});
+    const bool whole = std::string_view(size_key) == "size_m";
+    if (const auto size = size_handles(editor, origin + place, half, yaw_deg.value_or(0)))
+        drag_values(editor, table, {{size_key, vector_toml(editor, whole ? 2.0 * *size : *size)}});
+    if (!yaw_deg) return;
+    if (const auto yaw = turn_handle(editor, origin + place, 1.3 * std::max(half.x, half.y), *yaw_deg))
+        drag_values(editor, table, {{"yaw_deg", number_text(*yaw)}});
+}
+
+// A seed's root as an arrow with its opening; the chosen one has handles for its direction and its two openings.
+void root_gizmo(Editor& editor, const TextPath& path, const Root& root, const Vec3& centre, double size_m,
+                bool chosen) {
+    const ImU32 blue = chosen ? IM_COL32(120, 190, 255, 255) : IM_COL32(60, 110, 235, 200);
+    const auto towards = [&](double yaw_off, double pitch_off) {
+        Root turned_root = root;
+        turned_root.yaw_deg += yaw_off;
+        turned_root.pitch_deg += pitch_off;
+        return centre + size_m * axes_of(turned_root).ahead;
+    };
+    const Vec3 tip = towards(0, 0);
+    world_line(editor, centre, tip, blue, chosen ? 2.4f : 1.6f);
+    for (const double off : {-7.0, 7.0}) world_line(editor, 0.15 * centre + 0.85 * towards(off, 0), tip, blue, 1.6f);
+    if (!chosen) return;
+    const double a = 0.5 * root.open_yaw_deg, b = 0.5 * root.open_pitch_deg;
+    const auto rim = [&](double part) {
+        const double angle = 2 * std::numbers::pi * part;
+        return towards(a * std::cos(angle), b * std::sin(angle));
+    };
+    loop_lines(editor, rim, IM_COL32(120, 190, 255, 130), 72);
+    for (int n = 0; n < 8; ++n) world_line(editor, centre, rim(n / 8.0), IM_COL32(120, 190, 255, 70));
+    if (const auto at = free_handle(editor, "root direction", tip, blue)) {
+        const Vec3 way = *at - centre;
+        const double flat = std::hypot(way.x, way.y);
+        if (flat + std::abs(way.z) > 1e-6 * size_m) {
+            const double yaw = flat > 1e-6 ? std::atan2(way.y, way.x) : root.yaw_deg * std::numbers::pi / 180;
+            drag_values(editor, path,
+                       {{"pitch_deg", number_text(std::round(std::atan2(way.z, flat) * 180 / std::numbers::pi))},
+                        {"yaw_deg", number_text(std::round(yaw * 180 / std::numbers::pi))}});
+        }
+    }
+    const auto opening = [&](const char* name, const char* key, double half,
+                             const std::function<Vec3(double)>& point) {
+        if (const auto now = angle_handle(editor, name, point, kYellow, half))
+            drag_values(editor, path, {{key, number_text(std::clamp(std::round(2 * *now), 0.0, 360.0))}});
+    };
+    opening("root opening sideways", "open_yaw_deg", a, [&](double angle) { return towards(angle, 0); });
+    opening("root opening upwards", "open_pitch_deg", b, [&](double angle) { return towards(0, angle); });
+}
+
+// The seeds of a model, in its own space about the camera's target, and the roots of the chosen one.
+void model_gizmo(Editor& editor) {
+    const TextPath model(editor.selected.begin(), editor.selected.begin() + 2);
+    const Scene scene = *editor.document->scene();  // a handle replaces it
+    const std::size_t index = editor.selected[1].index + models_from_files(editor);
+    if (index >= scene.models.size()) return;
+    const Vec3 origin = editor.camera.camera.target_m;
+    for (std::size_t n = 0; n < scene.models[index].seeds.size(); ++n) {
+        const Seed& seed = scene.models[index].seeds[n];
+        TextPath path = with(model, "seeds");
+        path.push_back({{}, n});
+        const bool chosen =
+            editor.selected.size() >= 4 && std::equal(path.begin(), path.end(), editor.selected.begin());
+        const Vec3 half = 0.5 * seed.size_m, centre = origin + seed.position_m;
+        box_lines(editor, centre - half, centre + half,
+                  chosen ? IM_COL32(120, 190, 255, 255) : IM_COL32(60, 110, 235, 200));
+        const bool in_roots = chosen && editor.selected.size() >= 6;
+        for (std::size_t r = 0; r < seed.roots.size(); ++r) {
+            TextPath root = with(path, "roots");
+            root.push_back({{}, r});
+            root_gizmo(editor, root, seed.roots[r], centre, 0.75 * length(seed.size_m),
+                       in_roots && editor.selected[5].index == r);
+        }
+        if (chosen && !in_roots)
+            shape_handles(editor, path, "position_m", "size_m", origin, seed.position_m, half, std::nullopt);
+    }
+}
+
+// Rain areas that were placed by hand, as ellipses below the clouds.
+void placed_rain(Editor& editor, std::size_t layer, const LayerOptions& options) {
+    const double ground = editor.document->scene()->render.ground.height_m, base = options.base_height_m.min;
+    const bool in_rain = editor.selected.size() >= 5 && editor.selected[2].name == "rain" &&
+                         editor.selected[3].name == "placed";
+    for (std::size_t n = 0; n < options.rain.placed.size(); ++n) {
+        const PlacedRain rain = options.rain.placed[n];
+        const bool chosen = in_rain && editor.selected[4].index == n;
+        const Vec3 centre{rain.x_m, rain.y_m, ground};
+        const auto rim = [&](double part, double z) {
+            const double angle = 2 * std::numbers::pi * part;
+            return Vec3{0, 0, z - ground} + centre +
+                   turned({rain.semi_a_m * std::cos(angle), rain.semi_b_m * std::sin(angle), 0}, rain.yaw_deg);
+        };
+        const ImU32 colour = chosen ? IM_COL32(130, 210, 230, 255) : IM_COL32(130, 210, 230, 150);
+        for (const double z : {ground, base}) loop_lines(editor, [&](double part) { return rim(part, z); }, colour);
+        for (int side = 0; side < 8; ++side) world_line(editor, rim(side / 8.0, ground), rim(side / 8.0, base), colour);
+        if (!chosen) continue;
+        const TextPath path = text_path("layer[" + std::to_string(layer) + "].rain.placed[" + std::to_string(n) + "]");
+        const Vec3 half{rain.semi_a_m, rain.semi_b_m, 0};
+        if (const auto at = place_handles(editor, {}, centre, 0.6 * std::max(half.x, half.y), 2))
+            drag_values(editor, path, {{"x_m", number_of(editor, at->x)}, {"y_m", number_of(editor, at->y)}});
+        if (const auto size = size_handles(editor, centre, half, rain.yaw_deg, 2))
+            drag_values(editor, path,
+                       {{"semi_a_m", number_of(editor, size->x)}, {"semi_b_m", number_of(editor, size->y)}});
+        if (const auto yaw = turn_handle(editor, centre, 1.3 * std::max(half.x, half.y), rain.yaw_deg))
+            drag_values(editor, path, {{"yaw_deg", number_text(*yaw)}});
+    }
+}
+
+// The box of a scatter, which moves and stretches, and the largest of its parcels.
+void scatter_gizmo(Editor& editor, const TextPath& path, const EllipsoidScatter& scatter) {
+    const ImU32 orange = IM_COL32(250, 190, 60, 230);
+    const Vec3 low{scatter.x_m.min, scatter.y_m.min, scatter.z_m.min},
+        high{scatter.x_m.max, scatter.y_m.max, scatter.z_m.max};
+    const Vec3 centre = 0.5 * (low + high), half = 0.5 * (high - low);
+    box_lines(editor, low, high, orange);
+    ellipsoid_lines(editor, centre,
+                    {scatter.semi_axis_x_m.max, scatter.semi_axis_y_m.max, scatter.semi_axis_z_m.max}, 0, orange);
+    std::optional<Vec3> place = place_handles(editor, {}, centre, 0.4 * std::max(half.x, half.y)), size;
+    if (!place) size = size_handles(editor, centre, glm::max(half, Vec3{1, 1, 1}), 0);
+    if (!place && !size) return;
+    const Vec3 at = place.value_or(centre), reach = size.value_or(half);
+    const auto range = [&](int axis) {
+        if (reach[axis] <= 1 && !size) return number_of(editor, at[axis]);  // flat, as it was
+        return "[" + number_of(editor, at[axis] - reach[axis]) + ", " + number_of(editor, at[axis] + reach[axis]) + "]";
+    };
+    drag_values(editor, path, {{"x_m", range(0)}, {"y_m", range(1)}, {"z_m", range(2)}});
 }
 
 }  // namespace
 
-void slice_of_bits(Editor& editor) {
-    if (!editor.show_slice) return;
-    const std::shared_ptr<const LiveFrame> frame = editor.live.frame();
-    const auto bits = frame ? shown_bits(editor, frame->frame) : std::nullopt;
-    if (!bits) return;
-    constexpr int kMostCells = 5000;  // that are looked at: a large slice is drawn coarser
-    const Extent& cells = bits->cld.extent;
-    const int k = std::clamp(editor.slice, 0, cells.z - 1);
-    int stride = 1;
-    while ((cells.x / stride) * (cells.y / stride) > kMostCells) ++stride;
-    const Vec3& origin = bits->placement.origin_m;
-    const double edge = bits->placement.cell_size_m;
-    const auto at = [&](int i, int j) {
-        return on_screen(editor, {origin.x + edge * i, origin.y + edge * j, origin.z + edge * (k + 0.5)});
-    };
-    ImDrawList& list = *ImGui::GetWindowDrawList();
-    for (int j = 0; j < cells.y; j += stride) {
-        for (int i = 0; i < cells.x; i += stride) {
-            const ImU32 colour = bits->cld.get(i, j, k)   ? IM_COL32(225, 90, 90, 170)
-                                 : bits->act.get(i, j, k) ? IM_COL32(240, 150, 60, 170)
-                                 : bits->hum.get(i, j, k) ? IM_COL32(90, 190, 110, 120)
-                                                          : 0;
-            if (colour == 0) continue;
-            const auto a = at(i, j), b = at(i + stride, j), c = at(i + stride, j + stride),
-                       d = at(i, j + stride);
-            if (a && b && c && d) list.AddQuadFilled(*a, *b, *c, *d, colour);
-        }
-    }
-}
-
 bool gizmos(Editor& editor) {
-    const std::optional<Scene>& scene = editor.document->scene();
-    if (!editor.show_gizmos || !scene || editor.selected.empty()) return false;
+    const std::optional<Scene>& now = editor.document->scene();
+    if (!editor.show_gizmos || !now || editor.selected.empty()) return false;
     const std::string& section = editor.selected.front().name;
-    if (section == "model" && editor.selected.size() >= 2) return model_gizmo(editor);
+    if (section == "model" && editor.selected.size() >= 2) {
+        model_gizmo(editor);
+        return holds_handle();
+    }
     const auto lattice_lines = [&](const Extent& cells, const Placement& place, ImU32 colour) {
         const double edge = place.cell_size_m;
         box_lines(editor, place.origin_m,
@@ -241,42 +227,36 @@ bool gizmos(Editor& editor) {
     };
     const ImU32 white = IM_COL32(255, 255, 255, 150);
     if (section == "layer") {
-        for (std::size_t n = 0; n < scene->layers.size(); ++n) {
+        const std::vector<LayerOptions> layers = now->layers;  // a handle replaces the scene
+        for (std::size_t n = 0; n < layers.size(); ++n) {
             const bool chosen = editor.selected.size() < 2 || editor.selected[1].index == n;
-            if (chosen) lattice_lines(scene->layers[n].extent, scene->layers[n].placement, white);
+            if (!chosen) continue;
+            lattice_lines(layers[n].extent, layers[n].placement, white);
+            placed_rain(editor, n, layers[n]);
         }
-        return false;
+        return holds_handle();
     }
     if (section == "lattice" || section == "field") {
-        lattice_lines(scene->automaton.extent, scene->automaton.placement, white);
+        lattice_lines(now->automaton.extent, now->automaton.placement, white);
     }
     if (section != "field") return false;
-    bool drags = false;
-    for (std::size_t n = 0; n < scene->automaton.field.ellipsoids.size(); ++n) {
-        const Ellipsoid parcel = scene->automaton.field.ellipsoids[n];  // a handle replaces the scene
+    const FieldOptions field = now->automaton.field;
+    for (std::size_t n = 0; n < field.ellipsoids.size(); ++n) {
+        const Ellipsoid& parcel = field.ellipsoids[n];
         const TextPath path{{"field", 0}, {"ellipsoids", 0}, {{}, n}};
         const bool chosen = editor.selected == path;
         ellipsoid_lines(editor, parcel.centre_m, parcel.semi_axes_m, parcel.yaw_deg,
                         chosen ? IM_COL32(255, 225, 120, 255) : IM_COL32(250, 190, 60, 150));
-        if (chosen) {
-            drags |= shape_handles(editor, with(path, "centre_m"), with(path, "semi_axes_m"), {},
-                                   parcel.centre_m, parcel.semi_axes_m, parcel.yaw_deg);
-        }
+        if (chosen)
+            shape_handles(editor, path, "centre_m", "semi_axes_m", {}, parcel.centre_m, parcel.semi_axes_m,
+                          parcel.yaw_deg);
     }
     if (editor.selected.size() >= 3 && editor.selected[1].name == "scatters" &&
-        editor.selected[2].index < scene->automaton.field.scatters.size()) {
-        const EllipsoidScatter& scatter = scene->automaton.field.scatters[editor.selected[2].index];
-        const ImU32 orange = IM_COL32(250, 190, 60, 230);
-        box_lines(editor, {scatter.x_m.min, scatter.y_m.min, scatter.z_m.min},
-                  {scatter.x_m.max, scatter.y_m.max, scatter.z_m.max}, orange);
-        const Vec3 centre{0.5 * (scatter.x_m.min + scatter.x_m.max),
-                          0.5 * (scatter.y_m.min + scatter.y_m.max),
-                          0.5 * (scatter.z_m.min + scatter.z_m.max)};
-        ellipsoid_lines(editor, centre,
-                        {scatter.semi_axis_x_m.max, scatter.semi_axis_y_m.max, scatter.semi_axis_z_m.max}, 0,
-                        orange);
+        editor.selected[2].index < field.scatters.size()) {
+        scatter_gizmo(editor, TextPath(editor.selected.begin(), editor.selected.begin() + 3),
+                      field.scatters[editor.selected[2].index]);
     }
-    return drags;
+    return holds_handle();
 }
 
 }  // namespace nephos

@@ -8,6 +8,7 @@
 
 #include "apps/editor/live_picture.h"
 #include "core/error.h"
+#include "seeds/coupling.h"
 #include "simulation/memory.h"
 
 namespace nephos {
@@ -21,20 +22,31 @@ const std::string kLive = "live";
 
 // The scene as it is simulated here: a frame a step, for as long as anybody looks.
 Scene live_scene(Scene scene) {
-    scene.frames = FrameOptions{};
-    scene.frames.start_s = 0;
-    scene.frames.per_second = 1;
-    scene.frames.time_scale = scene.automaton.time_step_s;
-    scene.frames.count = 0;
+    scene.frames = film_of_steps(scene);
     scene.steps = kMaxFrames - 1;
     scene.density.write_state = true;  // planes for the views of hum, act and cld
     return scene;
 }
 
+std::vector<LiveField> fields_of(const Simulation& simulation, const Scene& scene) {
+    std::vector<LiveField> fields;
+    for (const LayerSimulation& layer : simulation.layers()) {
+        LiveField& field = fields.emplace_back();
+        if (layer.automaton() == nullptr) continue;
+        field = {layer.automaton()->ellipsoids(), layer.automaton()->options().field.background};
+        if (layer.sky() == nullptr) continue;
+        const LayerOptions& options = scene.layers[fields.size() - 1];
+        std::vector<ActiveEllipsoid> of_clouds = ellipsoids_of(*layer.sky(), options.coupling);
+        append_columns(of_clouds, layer.rain(), options.rain.column);
+        field.ellipsoids.insert(field.ellipsoids.end(), of_clouds.begin(), of_clouds.end());
+    }
+    return fields;
+}
+
 // Keeps the last frame and all steps that a simulation hands out.
 struct Collector : SimulationSink {
     void step(const StepResult& result) override {
-        steps.push_back({result.step, {result.time_s, result.statistics, result.hash}});
+        steps.push_back({result.step, {result.time_s, result.statistics, result.hash, result.layers}});
     }
     void frame(const FrameResult& result) override { last = result; }
     std::vector<std::pair<std::uint64_t, LiveStep>> steps;
@@ -42,6 +54,15 @@ struct Collector : SimulationSink {
 };
 
 }  // namespace
+
+FrameOptions film_of_steps(const Scene& scene) {
+    FrameOptions frames;
+    frames.start_s = 0;
+    frames.per_second = 1;
+    frames.time_scale = scene.automaton.time_step_s;
+    frames.count = 0;
+    return frames;
+}
 
 SceneChange change_between(const Scene& before, const Scene& after) {
     if (before == after) return SceneChange::none;
@@ -315,6 +336,7 @@ void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) 
             if (interrupted || Clock::now() - begin > std::chrono::milliseconds(is_first ? 0 : 150)) break;
         }
     }
+    std::vector<LiveField> fields = fields_of(*simulation_, scene_);
     const double spent_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     lock.lock();
     for (const auto& [step, row] : collector.steps) {
@@ -323,7 +345,8 @@ void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) 
     auto frame = std::make_shared<LiveFrame>();
     frame->simulation = simulation_;
     frame->frame = std::move(*collector.last);
-    frame->frame.number = 0;
+    frame->frame.number = int(frame->frame.step) + 1;  // a film of a frame a step, see film_of_steps()
+    frame->fields = std::move(fields);
     frame->simulation_number = simulation_number_;
     status_.step = frame->frame.step;
     status_.steps_taken = simulation_->steps_taken();

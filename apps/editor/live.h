@@ -32,30 +32,49 @@ namespace nephos {
 enum class SceneChange { none, picture, simulation };
 SceneChange change_between(const Scene& before, const Scene& after);
 
+// Returns the frames that the window shows: one a step. A run with these frames has the same pictures, also of clouds that
+// follow a moving sun in turn (light.cfa_clouds_per_frame).
+FrameOptions film_of_steps(const Scene& scene);
+
 // Holds what the plots show of a step.
 struct LiveStep {
     double time_s = 0;
     CloudStatistics statistics;
     StateHash hash;
+    std::vector<LayerStep> layers;
+};
+
+// The probability field that a lattice's next step has.
+struct LiveField {
+    std::vector<ActiveEllipsoid> ellipsoids;
+    Probabilities background;
 };
 
 // A step's density and clouds, and the simulation that the clouds' shapes belong to.
 struct LiveFrame {
     std::shared_ptr<const Simulation> simulation;
     FrameResult frame;
+    std::vector<LiveField> fields;        // of each layer; empty ones without automaton
     std::uint64_t simulation_number = 0;  // rises with every scene that is simulated anew
 };
+
+// What pictures show, in the order of the keys 1 to 6.
+inline constexpr const char* kViewModes[] = {"beauty",     "density",   "transmittance",
+                                             "light only", "wireframe", "voxels"};
+enum ViewMode { kBeauty, kDensityMode, kTransmittanceMode, kLightOnly, kWireframe, kVoxels };
 
 // Says how a picture is drawn.
 struct LiveView {
     Camera camera;                  // of the window: without path
     int width = 640, height = 360;  // of the picture when nothing moves, pixels
     bool detail = true;             // procedural detail when nothing moves
-    int mode = 0;                   // kViewModes: index
+    int mode = kBeauty;             // a ViewMode, index of kViewModes
+    bool hum = false, act = true, cld = true;  // cells that are cubes in the mode voxels
+    double slab_low = 0, slab_high = 1;       // fractions of a lattice's height: only cells between them are
     DebugView debug;
+    std::vector<bool> hidden;  // layers that are not drawn; shorter than their number: the others are
     bool operator==(const LiveView&) const = default;
 };
-inline constexpr const char* kViewModes[] = {"beauty", "density", "transmittance", "light only"};
 
 struct LivePicture {
     int width = 0, height = 0;

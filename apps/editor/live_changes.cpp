@@ -105,12 +105,10 @@ const Wind& wind_at_path(const Scene& scene, const TextPath& path) {
     return path.size() == 1 ? scene.automaton.wind : scene.layers.at(path[1].index).wind;
 }
 
-bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, const std::string& value) {
+bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, const std::string& edited) {
     const Held held(editor.live);
     const Scene before = *editor.shown_scene;
     const std::string& text = editor.document->text();
-    // The edit as it would be without recording says which profile is wanted.
-    const std::string edited = with_value(text, path, value);
     const std::filesystem::path folder =
         editor.document->has_file() ? std::filesystem::absolute(editor.document->path()).parent_path() : "";
     Scene wanted;
@@ -139,12 +137,12 @@ bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, co
 
 }  // namespace
 
-bool record_live(Editor& editor, const TextPath& path, const std::string& value) {
+bool record_live(Editor& editor, const TextPath& path, const std::string& edited) {
     if (!editor.shown_scene || !editor.document->problems().empty()) return false;
     const std::size_t length = wind_length(path);
     if (length > 0 && path.size() > length + 1 && path.back().name != "time_s") {
         return record_wind(editor, TextPath(path.begin(), path.begin() + std::ptrdiff_t(length)), path,
-                           value);
+                           edited);
     }
     return false;
 }
@@ -193,9 +191,8 @@ void record_climate(Editor& editor, double final_state, double duration_s) {
     say(editor, "The climate changes from step " + std::to_string(held.step) + " on");
 }
 
-void add_flash(Editor& editor) {
+void add_flash(Editor& editor, const Vec3& at) {
     if (!editor.shown_scene) return;
-    const Vec3 at = editor.camera.camera.target_m;
     const double time_s = editor.picture ? editor.picture->time_s : 0;
     const auto rounded = [](double number) { return number_text(std::round(number), 7); };
     const std::vector<TextEntry> entries{

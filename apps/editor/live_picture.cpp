@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "apps/editor/voxel_picture.h"
 #include "render/image/tone_map.h"
 
 namespace nephos {
@@ -15,7 +16,7 @@ constexpr double kSmallestScale = 0.3;
 // The scene as a picture of the window shows it.
 Scene scene_of_view(const Scene& scene, const LiveView& view, double scale, bool detail) {
     Scene out = scene;
-    out.frames.exr = false;
+    out.frames = film_of_steps(scene);
     Camera& camera = out.render.camera;
     camera.position_m = view.camera.position_m;
     camera.target_m = view.camera.target_m;
@@ -30,9 +31,27 @@ Scene scene_of_view(const Scene& scene, const LiveView& view, double scale, bool
         camera.glare = 0;
         out.render.shadow_map_size = std::min(out.render.shadow_map_size, 512);
     }
-    if (view.mode == 3) {  // clouds without a sun-lit sky before them
+    if (view.mode == kLightOnly) {  // clouds without a sun-lit sky before them
         out.render.light.ambient_top = out.render.light.ambient_base = {0, 0, 0};
     }
+    return out;
+}
+
+// A frame without the layers that are hidden.
+FrameResult shown_part(const FrameResult& frame, const LiveView& view) {
+    FrameResult out = frame;
+    bool any = false;
+    for (std::size_t n = 0; n < out.layers.size() && n < view.hidden.size(); ++n) {
+        if (!view.hidden[n]) continue;
+        any = true;
+        LayerFrame& layer = out.layers[n];
+        layer.density = DensityGrid();
+        layer.moisture.reset();
+        layer.clouds.clear();
+        layer.rain.clear();
+        layer.hum.reset();
+    }
+    if (any) out.density = DensityGrid();  // of all together
     return out;
 }
 
@@ -82,15 +101,26 @@ std::shared_ptr<LivePicture> LivePictureMaker::draw(FramePainter& painter, const
     const auto begin = Clock::now();
     const double scale = refine ? 1 : draft_scale_;
     const Scene drawn = scene_of_view(scene, view, scale, refine && view.detail);
-    painter.set_scene(drawn, same_layers);
-    const Picture picture = painter.draw(frame->frame);
+    Picture picture;
+    Camera seen = drawn.render.camera;
+    if (view.mode == kWireframe || view.mode == kVoxels) {
+        seen.exposure = Exposure::manual;
+        seen.exposure_ev = seen.glare = 0;
+        seen.tone_curve = ToneCurve::exponential;
+        picture = voxel_picture(drawn, shown_part(frame->frame, view), seen,
+                                {view.hum, view.act, view.cld, view.slab_low, view.slab_high,
+                                 view.mode == kWireframe});
+    } else {
+        painter.set_scene(drawn, same_layers);
+        picture = painter.draw(shown_part(frame->frame, view));
+    }
     std::vector<std::uint8_t> rgb;
-    if (view.mode == 1) {
+    if (view.mode == kDensityMode) {
         rgb = optical_depth_colours(picture);
-    } else if (view.mode == 2) {
+    } else if (view.mode == kTransmittanceMode) {
         rgb = grey(picture);
     } else {
-        rgb = to_srgb8(picture, drawn.render.camera);
+        rgb = to_srgb8(picture, seen);
     }
     auto made = std::make_shared<LivePicture>();
     made->width = picture.width;

@@ -29,6 +29,7 @@ bool begin_menu(Editor& editor, const char* label, bool enabled = true) {
 
 void file_menu(Editor& editor) {
     if (item(editor, "New", "Ctrl+N")) ask_before(editor, Pending::new_scene);
+    if (item(editor, "New, empty")) ask_before(editor, Pending::empty_scene);
     if (item(editor, "Open...", "Ctrl+O")) open_dialog(editor, FileDialog::open);
     if (begin_menu(editor, "Recent", !editor.settings.recent.empty())) {
         const std::vector<std::string> recent = editor.settings.recent;
@@ -214,8 +215,24 @@ void view_options_panel(Editor& editor) {
         if (ImGui::RadioButton(kViewModes[mode], editor.view.mode == mode)) editor.view.mode = mode;
         editor.controls.note(std::string("mode ") + kViewModes[mode]);
     }
+    if (editor.view.mode == kVoxels || editor.view.mode == kWireframe) {
+        toggle(editor, "hum", editor.view.hum, "Cells with vapour, green");
+        ImGui::SameLine();
+        toggle(editor, "act", editor.view.act, "Cells in phase transition, orange");
+        ImGui::SameLine();
+        toggle(editor, "cld", editor.view.cld, "Cells with cloud, red");
+        float slab[2] = {float(100 * editor.view.slab_low), float(100 * editor.view.slab_high)};
+        ImGui::SetNextItemWidth(-1);
+        if (ImGui::DragFloatRange2("##slab", &slab[0], &slab[1], 0.5f, 0, 100, "slab from %.0f %%", "to %.0f %%")) {
+            editor.view.slab_low = std::clamp(double(slab[0]) / 100, 0.0, 0.99);
+            editor.view.slab_high = std::clamp(double(slab[1]) / 100, editor.view.slab_low + 0.01, 1.0);
+        }
+        editor.controls.note("slab");
+        tooltip_of_last("Only cells between these fractions of the lattice's height are there");
+    }
     toggle(editor, "Detail when nothing moves", editor.view.detail,
            "Noise below the voxel, as frames have it; drafts while something moves are drawn without");
+    simulations_list(editor);
     ImGui::Spacing();
     ImGui::TextDisabled("CLOUDS FROM BASE MODELS");
     toggle(editor, "Seed boxes", editor.view.debug.boxes, "Edges of the boxes, blue (T, figure 28)");
@@ -227,9 +244,21 @@ void view_options_panel(Editor& editor) {
     ImGui::TextDisabled("OVER THE PICTURE");
     toggle(editor, "Shapes of the selection", editor.show_gizmos,
            "Lattice, parcels, seeds; handles of the selected one (G)");
-    toggle(editor, "Slice of the bits", editor.show_slice,
-           "Cells of the automaton at one height: hum green, act orange, cld red, as in the plots");
-    if (editor.show_slice && editor.shown_scene) {
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::BeginCombo("##slice of", kSliceNames[int(editor.slice_of)])) {
+        for (int kind = 0; kind < int(std::size(kSliceNames)); ++kind) {
+            if (ImGui::Selectable(kSliceNames[kind], int(editor.slice_of) == kind)) editor.slice_of = SliceOf(kind);
+            editor.controls.note(std::string("choice ") + kSliceNames[kind]);
+        }
+        ImGui::EndCombo();
+    }
+    editor.controls.note("slice of");
+    tooltip_of_last(
+        "A slice of the automaton at one height: its bits, hum green, act orange, cld red, as in the plots; or the "
+        "probabilities of its field, from blue to red for the largest in the slice");
+    if (editor.slice_of >= SliceOf::p_hum)
+        ImGui::TextDisabled("red: %.4g per step", editor.slice_most);
+    if (editor.slice_of != SliceOf::nothing && editor.shown_scene) {
         const Scene& scene = *editor.shown_scene;
         const int height = scene.layers.empty() ? scene.automaton.extent.z : scene.layers.front().extent.z;
         ImGui::SetNextItemWidth(-1);
@@ -274,7 +303,8 @@ void view_options_panel(Editor& editor) {
                            60 * std::round(double(editor.climate_minutes)));
         }
     }
-    if (button(editor, "Lightning in the middle", "A flash where the camera looks, now")) add_flash(editor);
+    toggle(editor, "Lightning where I click", editor.flash_on_click,
+           "The next click on the picture is a flash at that place, at the step that is shown (L)");
 }
 
 void text_panel(Editor& editor) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <iomanip>
 #include <map>
 #include <sstream>
 
@@ -22,6 +23,9 @@ constexpr std::chrono::seconds kPatience{10}, kLongPatience{60};
 
 const std::map<std::string, int>& commands() {  // and how many words follow at least
     static const std::map<std::string, int> known{{"click", 1},
+                                                  {"click-at", 3},
+                                                  {"double-click-at", 3},
+                                                  {"picture", 1},
                                                   {"drag", 3},
                                                   {"set", 2},
                                                   {"type", 1},
@@ -83,7 +87,7 @@ Script::Script(const std::filesystem::path& path) : path_(path) {
         ++number;
         std::istringstream in(text);
         Line line{number, {}};
-        for (std::string word; in >> word;) line.words.push_back(word);
+        for (std::string word; in >> std::quoted(word);) line.words.push_back(word);
         if (line.words.empty() || line.words.front().starts_with('#')) continue;
         const auto known = commands().find(line.words.front());
         if (known == commands().end() || int(line.words.size()) - 1 < known->second) {
@@ -196,6 +200,8 @@ void Script::begin_line(Editor& editor) {
     const std::string& command = words.front();
     if (!line_begun_) line_begin_ = Clock::now();
     if (!line_begun_) found_at_ = ImVec2(-1, -1);
+    // Two clicks are one however slow the machine is.
+    ImGui::GetIO().MouseDoubleClickTime = command == "double-click-at" ? 30.0f : 0.3f;
     line_begun_ = true;
     const auto done = [this] {
         lines_.pop_front();
@@ -215,6 +221,14 @@ void Script::begin_line(Editor& editor) {
     if (command == "click") {
         if (!find(editor, rest_of(words, 1), at)) return;
         click(at);
+    } else if (command == "click-at" || command == "double-click-at") {
+        const std::string name = rest_of({words.begin(), words.end() - 2}, 1);
+        if (!find(editor, name, at)) return;
+        const Controls::Place& place = editor.controls.last.at(name);
+        at = ImVec2(place.min.x + float(number(words.size() - 2)) * (place.max.x - place.min.x),
+                    place.min.y + float(number(words.size() - 1)) * (place.max.y - place.min.y));
+        click(at);
+        if (command == "double-click-at") click(at);
     } else if (command == "drag") {
         if (!find(editor, rest_of({words.begin(), words.end() - 2}, 1), at)) return;
         const float x = float(number(words.size() - 2)), y = float(number(words.size() - 1));
@@ -255,9 +269,20 @@ void Script::begin_line(Editor& editor) {
         const LiveStatus status = editor.live.status();
         const bool whole = editor.picture && editor.picture->step == status.step &&
                            status.goal == status.step && (editor.picture->refined || editor.running);
-        if (!whole || Clock::now() - line_begin_ < std::chrono::milliseconds(400)) return;
+        // One that stays: a draft of the last edit may be on its way.
+        if (!whole || editor.picture->number != still_) still_since_ = Clock::now();
+        still_ = editor.picture ? editor.picture->number : 0;
+        const auto wanted = editor.running ? std::chrono::milliseconds(0) : std::chrono::milliseconds(800);
+        if (!whole || Clock::now() - still_since_ < wanted) return;
     } else if (command == "screenshot") {
         editor.capture_to = rest_of(words, 1);
+        mouse_ = ImVec2(-1, -1);  // no tooltip in the picture
+    } else if (command == "picture") {
+        if (!editor.picture) return;
+        std::string name = rest_of(words, 1);
+        const std::size_t percent = name.find('%');
+        if (percent != std::string::npos) name.replace(percent, 1, std::to_string(editor.picture->step));
+        save_rgba(name, editor.picture->width, editor.picture->height, editor.picture->rgba);
     } else if (command == "hashes") {
         std::string text;
         const std::vector<LiveStep> steps = editor.live.steps();

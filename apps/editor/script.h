@@ -5,14 +5,17 @@
 // command; controls have names, those of keys are their paths ("sun.elevation_deg"):
 //
 //     click NAME             the left button on the middle of a control
+//     click-at NAME X Y      on a part of a control: 0 0 is its upper left, 1 1 its lower right
+//     double-click-at NAME X Y
 //     drag NAME X Y          from there by so many pixels
-//     set NAME VALUE         types a value into a number's control, or a text's
+//     set NAME VALUE         types a value into a number's control, or a text's; a NAME with blanks stands in quotes
 //     type TEXT              types where the cursor is
 //     key CTRL+S             presses keys: letters, digits, SPACE, ENTER, ESCAPE, DELETE, HOME, F1 ..., with CTRL, SHIFT
 //     wait SECONDS           lets time pass
 //     wait-step N            until that step is shown (a minute at most)
 //     wait-picture           until the picture is drawn with all its detail (a minute at most)
 //     screenshot FILE        saves a picture of the window
+//     picture FILE           saves the picture of the clouds alone; "%" in the name becomes its step
 //     hashes FILE            saves the state hashes of the steps that were simulated, as `nephos hash` prints them
 //     expect-control NAME    fails unless the control is there
 //     resize X Y, minimise, restore
@@ -75,6 +78,8 @@ class Script {
     bool line_begun_ = false;
     ImVec2 found_at_{-1, -1};  // where a control was in the frame before
     int found_frames_ = 0;     // for how many frames
+    std::uint64_t still_ = 0;  // the picture that was last seen, and since when
+    Clock::time_point still_since_ = Clock::now();
     std::uint64_t random_left_ = 0;
     std::mt19937 random_;
     int last_key_ = -1;

@@ -12,6 +12,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -58,9 +59,13 @@ struct BackgroundRun {
     }
 };
 
+enum class SliceOf { nothing, bits, p_hum, p_act, p_ext };
+inline constexpr const char* kSliceNames[] = {"no slice", "bits", "probability of hum", "probability of act",
+                                              "probability of ext"};
+
 enum class FileDialog { none, open, save_as, export_grid, screenshot };
 // What waits for an answer about unsaved edits.
-enum class Pending { none, close, open, new_scene, folder_scene };
+enum class Pending { none, close, open, new_scene, empty_scene };
 
 struct Editor {
     explicit Editor(const EditorOptions& options);
@@ -84,6 +89,7 @@ struct Editor {
     ImVec2 view_min{}, view_max{};  // of the picture in the window
     std::shared_ptr<const LivePicture> picture;
     std::vector<LiveStep> steps;
+    std::vector<std::uint64_t> checkpoints;  // steps that the user wants to come back to, rising
     bool record = false;  // edits of wind, climate and lights become key frames at the present step
     float final_state = 1, climate_minutes = 30;  // of a change of climate
     std::uint64_t pictures = 0;                   // that were shown
@@ -97,9 +103,11 @@ struct Editor {
     int tab = 0, wanted_tab = -1;  // properties, text
     std::string text_buffer;
     std::uint64_t text_version = 0;
-    bool show_slice = false;  // of the bits hum, act and cld, over the picture
-    int slice = 0;            // its height, in cells
+    SliceOf slice_of = SliceOf::nothing;  // what a slice over the picture shows
+    int slice = 0;                        // its height, in cells
+    double slice_most = 0;                // the largest probability in it
     bool show_gizmos = true, show_plots = true;
+    bool flash_on_click = false;  // the next click on the picture is lightning
 
     // Of dialogs.
     FileDialog dialog = FileDialog::none;
@@ -116,17 +124,25 @@ struct Editor {
     std::filesystem::path capture_to;  // a picture of the window that is due
 };
 
+// Writes pixels of 4 bytes, row 0 at the top, as PNG without the fourth. Throws Error(io).
+void save_rgba(const std::filesystem::path& path, int width, int height, std::span<const std::uint8_t> rgba);
+
 // Says something in the status bar.
 void say(Editor& editor, std::string message, bool is_bad = false);
 
 // editor.cpp: changes of the document reach the live scene; `what` names the step for undo.
 void change_text(Editor& editor, std::string text, const std::string& what, const std::string& merge = {});
 void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false);
+// Several keys of a table as one step of the history.
+void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging = false);
 void open_document(Editor& editor, std::unique_ptr<SceneDocument> document);
 // Ends what waited for an answer about unsaved edits.
 void do_pending(Editor& editor);
 void ask_before(Editor& editor, Pending what, std::filesystem::path path = {});
 bool save_document(Editor& editor);
+
+// layout.cpp: panels around the picture; those that find no room are left out. `scale` is that of text.
+void layout(Editor& editor, float scale);
 
 // Panels; each fills the ImGui window that its caller opened.
 void menu_bar(Editor& editor);
@@ -142,6 +158,9 @@ void dialogs(Editor& editor);
 // dialogs.cpp
 void open_dialog(Editor& editor, FileDialog dialog);
 
+// properties.cpp: how many base models of the scene come from other files; they stand before those of the text.
+std::size_t models_from_files(const Editor& editor);
+
 // Controls with names; each returns as its ImGui namesake.
 bool button(Editor& editor, const std::string& name, const char* hint = nullptr);
 bool toggle(Editor& editor, const std::string& name, bool& on, const char* hint = nullptr);
@@ -152,23 +171,43 @@ void tooltip(const char* text);
 void frame_scene(Editor& editor);        // a camera that shows all of the clouds
 void take_scene_camera(Editor& editor);  // that of the scene
 std::optional<ImVec2> on_screen(const Editor& editor, const Vec3& world_m);
+Camera camera_of_view(const Editor& editor);  // with the size of the picture in the window
+
+// pick.cpp: the point of the first cloud under the mouse; beside clouds none, or a point as far as what is looked at.
+std::optional<Vec3> cloud_under(const Editor& editor, const ImVec2& mouse);
+Vec3 point_under(const Editor& editor, const ImVec2& mouse);
+// Looks at the cloud under the mouse from half as far. Returns false when there is none.
+bool go_to_cloud(Editor& editor, const ImVec2& mouse);
+
+// key_frames.cpp: marks below the time line's slider, `from` on in the window; checkpoints that the user set.
+void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last_step);
+void keep_checkpoint(Editor& editor);     // at the step that is shown
+void back_to_checkpoint(Editor& editor);  // the last before the present step
+
+// simulations.cpp: the layers that run.
+void simulations_list(Editor& editor);
+
+// hodograph.cpp: of the wind that is selected.
+void hodograph(Editor& editor);
 
 // gizmos.cpp: shapes of the scene over the picture. Returns true while the mouse moves one.
 bool gizmos(Editor& editor);
-// Cells with hum, act or cld in a slice of the lattice, over the picture.
-void slice_of_bits(Editor& editor);
+// slice.cpp: cells with hum, act or cld at one height of a lattice, or probabilities of its field, over the picture.
+void slice_over_picture(Editor& editor);
 
-// live_changes.cpp: writes a change that was made while the scene runs as key frames at the present step.
-bool record_live(Editor& editor, const TextPath& path, const std::string& value);
+// live_changes.cpp: writes a change of a key that was made while the scene runs as key frames at the present step;
+// `edited`: the text as it would be without recording. Returns false for keys that cannot be recorded.
+bool record_live(Editor& editor, const TextPath& path, const std::string& edited);
 // From the present step on the climate goes to a state, 0..1, within a time.
 void record_climate(Editor& editor, double final_state, double duration_s);
-void add_flash(Editor& editor);    // lightning where the camera looks, now
+void add_flash(Editor& editor, const Vec3& at_m);  // lightning at the step that is shown
 void keep_camera(Editor& editor);  // writes it into the scene
 
 // theme.cpp
 void apply_theme(Editor& editor);
 
-// first_scene.cpp
+// first_scene.cpp: scenes that begin with something to see, and with nothing.
 std::string first_scene_text();
+std::string empty_scene_text();
 
 }  // namespace nephos

@@ -141,6 +141,8 @@ void transport(Editor& editor, const LiveStatus& status) {
         editor.live.seek(status.step + 1);
     }
     ImGui::SameLine();
+    if (button(editor, "Mark", "A checkpoint at this step (M); B goes back to the last one")) keep_checkpoint(editor);
+    ImGui::SameLine();
     ImGui::SetNextItemWidth(6.5f * ImGui::GetFontSize());
     char now[32];
     std::snprintf(now, sizeof now, "%gx", editor.speed);
@@ -167,6 +169,7 @@ void timeline_panel(Editor& editor) {
     std::uint64_t last = editor.shown_scene ? editor.shown_scene->steps : 1;
     last = std::max<std::uint64_t>({last, status.step, std::uint64_t(editor.steps.size())});
     ImGui::SameLine();
+    const float from = ImGui::GetCursorScreenPos().x, width = ImGui::GetContentRegionAvail().x;
     ImGui::SetNextItemWidth(-1);
     std::uint64_t step = editor.running ? status.step : status.goal;
     const std::uint64_t first = 0;
@@ -177,6 +180,7 @@ void timeline_panel(Editor& editor) {
     editor.controls.note("time");
     tooltip_of_last(
         "Step that is shown; drag it. Steps that were seen come back from checkpoints in memory.");
+    key_frame_strip(editor, from, width, last);
     if (!editor.show_plots) return;
     const ImVec2 room = ImGui::GetContentRegionAvail();
     const float gap = ImGui::GetStyle().ItemSpacing.x;

@@ -135,10 +135,15 @@ void captions(Editor& editor, const LiveStatus& status) {
 
 }  // namespace
 
-std::optional<ImVec2> on_screen(const Editor& editor, const Vec3& world_m) {
+Camera camera_of_view(const Editor& editor) {
     Camera camera = editor.camera.camera;
     camera.width = std::max(1, int(editor.view_max.x - editor.view_min.x));
     camera.height = std::max(1, int(editor.view_max.y - editor.view_min.y));
+    return camera;
+}
+
+std::optional<ImVec2> on_screen(const Editor& editor, const Vec3& world_m) {
+    const Camera camera = camera_of_view(editor);
     const PixelPosition at = project(camera_frame(camera), camera, world_m);
     if (!at.in_front || std::abs(at.x) > 1e5 || std::abs(at.y) > 1e5) return std::nullopt;
     return ImVec2(editor.view_min.x + float(at.x), editor.view_min.y + float(at.y));
@@ -184,8 +189,7 @@ void frame_scene(Editor& editor) {
         return;
     }
     Camera& camera = editor.camera.camera;
-    camera.width = std::max(1, int(editor.view_max.x - editor.view_min.x));
-    camera.height = std::max(1, int(editor.view_max.y - editor.view_min.y));
+    camera = camera_of_view(editor);
     nephos::frame(camera, box, View::side, editor.shown_scene->render.ground.height_m);
     editor.camera.moved = true;
 }
@@ -204,9 +208,17 @@ void view_panel(Editor& editor) {
     editor.controls.note("view");
     const bool hovered = ImGui::IsItemHovered(), active = ImGui::IsItemActive();
     ImGui::GetWindowDrawList()->PushClipRect(editor.view_min, editor.view_max, true);
-    slice_of_bits(editor);
+    slice_over_picture(editor);
     const bool drags = gizmos(editor);
-    if (active && !drags) mouse(editor);
+    if (hovered && !drags && editor.flash_on_click && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
+        add_flash(editor, point_under(editor, ImGui::GetIO().MousePos));
+        editor.flash_on_click = false;
+    } else if (hovered && !drags && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) {
+        go_to_cloud(editor, ImGui::GetIO().MousePos);
+    } else if (active && !drags) {
+        mouse(editor);
+    }
+    if (hovered && editor.flash_on_click) ImGui::SetTooltip("Lightning here");
     if (hovered) wheel(editor);
     if (ImGui::IsWindowFocused() || hovered) keys(editor);
     captions(editor, editor.live.status());

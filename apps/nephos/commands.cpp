@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "apps/nephos/man_page.h"
+#include "apps/nephos/study_commands.h"
 #include "core/random.h"
 #include "simulation/simulation.h"
 
@@ -37,7 +38,9 @@ void add_commands(CLI::App& app, Action& action, const EditFunction& edit) {
     add_render_command(app, action);
     add_sweep_command(app, action);
     add_merge_command(app, action);
+    add_report_command(app, action);
     add_fit_command(app, action);
+    add_stats_command(app, action);
     add_validate_command(app, action);
     add_info_command(app, action);
     add_hash_command(app, action);

@@ -171,7 +171,7 @@ void add_shape_options(CLI::App& command, const std::shared_ptr<ExportArguments>
     ExportOptions& o = a->options;
     add_value(
         command, "--type", "TYPE",
-        "Voxels of raw, dds, ktx2, vti and slices: r8, r16, r16f, r32f or bc4 (r16f: VDB of 16-bit floats)",
+        "Voxels of raw, bricks, dds, ktx2, vti and slices: r8, r16, r16f, r32f or bc4 (r16f: VDB of 16-bit floats)",
         [&o](const std::string& text) {
             o.type = word_of<VoxelType>(text, {"r8", "r16", "r16f", "r32f", "bc4"});
         });
@@ -189,7 +189,9 @@ void add_shape_options(CLI::App& command, const std::shared_ptr<ExportArguments>
               [&o](const std::string& text) { o.budget_bytes = parse_bytes(text); });
     command.add_flag(
         "--mips", o.mips,
-        "Levels of detail down to 32 voxels in dds, ktx2 and raw; each has the mass of the first");
+        "Levels of detail down to 32 voxels in dds, ktx2, raw and bricks; each has the mass of the first");
+    add_value(command, "--bricks", "N", "Edge of the bricks of `bricks`, without their border of 1 (default: 32)",
+              [&o](const std::string& text) { o.brick_edge = int(parse_integer(text, 8, 256)); });
     add_value(command, "--border", "KIND",
               "One voxel around the box: none, zero, or wrap (of the opposite side where it repeats)",
               [&o](const std::string& text) {

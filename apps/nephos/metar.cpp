@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -72,14 +73,53 @@ void explain(const MetarArguments& a, const Metar& metar) {
     for (const std::string& note : metar_notes(metar, a.options)) print_note(note);
 }
 
+// Says what each period of a forecast is.
+void explain(const MetarArguments& a, const Taf& taf) {
+    Output output;
+    nlohmann::ordered_json periods = nlohmann::ordered_json::array();
+    const std::vector<TafLayer> all = layers_of(taf);
+    for (std::size_t n = 0; n < taf.periods.size(); ++n) {
+        const TafPeriod& period = taf.periods[n];
+        std::string layers;
+        for (const TafLayer& layer : all)
+            if (layer.present[n])
+                layers += (layers.empty() ? "" : ", ") + layer.layer.name + " (" + layer.layer.group + ")";
+        periods.push_back({{"change", period.change},
+                           {"from_s", period.from_s},
+                           {"until_s", period.until_s},
+                           {"weather", metar_text(period.weather)},
+                           {"layers", layers}});
+        if (a.work.json) continue;
+        output.line(fmt::format("  {:18} {}", period.change.empty() ? "from the beginning" : period.change,
+                                layers.empty() ? "no clouds" : layers));
+    }
+    if (a.work.json) {
+        output.line(json_text({{"forecast", taf.text},
+                               {"length_s", taf.length_s},
+                               {"periods", periods},
+                               {"notes", taf.notes}}));
+        return;
+    }
+    for (const std::string& note : taf.notes) print_note(note);
+}
+
 int metar(const MetarArguments& a) {
-    const Metar report = parse_metar(report_of(a.report), a.lenient);
+    const std::string text = report_of(a.report);
+    std::optional<Taf> taf;
+    Metar report;
+    if (is_taf(text)) {
+        taf = parse_taf(text, a.lenient);
+        report.text = taf->text;
+        report.station = taf->station;
+    } else {
+        report = parse_metar(text, a.lenient);
+    }
     if (a.explain) {
-        explain(a, report);
+        taf ? explain(a, *taf) : explain(a, report);
         return 0;
     }
     const ThreadLimit limit(a.work.threads);
-    const FittedScene fitted = fit_metar(report, a.options);
+    const FittedScene fitted = taf ? fit_taf(*taf, a.options) : fit_metar(report, a.options);
     Scene scene = read_scene_text(fitted.text, "the scene of the report");
     Output output;
     if (!a.work.quiet)
@@ -126,10 +166,12 @@ int metar(const MetarArguments& a) {
 }  // namespace
 
 void add_metar_command(CLI::App& app, Action& action) {
-    CLI::App* command =
-        app.add_subcommand("metar", "Make the sky of an aerodrome's weather report (METAR, SPECI)");
+    CLI::App* command = app.add_subcommand(
+        "metar", "Make the sky of an aerodrome's weather report (METAR, SPECI) or forecast (TAF)");
     const auto a = std::make_shared<MetarArguments>();
-    command->add_option("REPORT", a->report, "The report in quotes, or @FILE with one")
+    command
+        ->add_option("REPORT", a->report,
+                     "The report in quotes, or @FILE with one; a forecast begins with TAF")
         ->required()
         ->type_name("REPORT");
     command->add_option("-o,--scene", a->scene, "Write the scene to this file (default: print it)")
@@ -161,14 +203,18 @@ void add_metar_command(CLI::App& app, Action& action) {
     add_quiet(*command, a->work);
     command->footer(
         "Each cloud group becomes a layer whose optical cover is met within half an okta; wind, visibility,\n"
-        "fog, rain, snow and thunderstorms become those of the scene; what is left out is listed. The clock of\n"
-        "this machine is never used.\n"
+        "fog, rain, snow and thunderstorms become those of the scene; what is left out is listed. The clock "
+        "of\n"
+        "this machine is never used. A TAF becomes a climate: its periods are states, layers come and go, "
+        "and an\n"
+        "hour is a second of film.\n"
         "\n"
         "Examples:\n"
         "  nephos metar \"EGLL 211350Z 24012KT 9999 FEW020 SCT045 BKN200 14/08 Q1017\" --explain\n"
         "  nephos metar \"EGLL 211350Z 24012KT 9999 SCT045 14/08 Q1017\" -o egll.toml --date 2024-06 \\\n"
         "               --at 51.4775,-0.4614,25\n"
-        "  nephos metar @report.txt --run --out out/egll");
+        "  nephos metar @report.txt --run --out out/egll\n"
+        "  nephos metar \"TAF EGLL 2112/2218 24012KT 9999 FEW020 BECMG 2115/2118 BKN030\" -o egll.toml");
     command->callback([a, &action] { action = [a] { return metar(*a); }; });
 }
 

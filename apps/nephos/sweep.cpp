@@ -15,6 +15,7 @@
 
 #include "apps/nephos/arguments.h"
 #include "apps/nephos/commands.h"
+#include "apps/nephos/emit.h"
 #include "apps/nephos/terminal.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -36,6 +37,8 @@ struct SweepArguments {
     std::optional<StopAt> until;
     std::optional<std::uint64_t> clouds_every;
     std::uint32_t shard = 0, shards = 1;
+    std::optional<Engine> emit;
+    std::uint32_t tasks = 16;
     int workers = 0;
     WorkArguments work;
 };
@@ -156,7 +159,8 @@ void write_and_print_tables(const SweepPlan& plan, const Records& records, const
     output.line(
         fmt::format("{0}/points.csv  a row a point: means, 95 % intervals, regimes\n"
                     "{0}/runs.csv    a row a run\n"
-                    "{0}/series.nc   every step of every run (NetCDF)",
+                    "{0}/series.nc   every step of every run (NetCDF)\n"
+                    "`nephos report {0}` shows them as one page",
                     folder));
 }
 
@@ -196,6 +200,12 @@ int sweep(const SweepArguments& a) {
                                     plan.command_of(plan.run(n))));
         if (a.dry_run && plan.runs() > 10)
             output.line(fmt::format("  ... and {} more", human_count(plan.runs() - 10)));
+        return 0;
+    }
+    if (a.emit) {
+        const std::string next = emit_sweep(plan, *a.emit, a.tasks, job.folder);
+        if (!a.work.quiet) print_note(describe(plan));
+        output.line(next);
         return 0;
     }
     check_memory_of(plan, job.workers);
@@ -292,6 +302,12 @@ void add_sweep_command(CLI::App& app, Action& action) {
     add_value(*command, "--shard", "I/N",
               "Only the I-th of N parts of the runs, I from 0; `nephos merge` makes the tables",
               [a](const std::string& text) { parse_shard(text, *a); });
+    add_value(*command, "--emit", "ENGINE",
+              "Run nothing, write what slurm, snakemake or parallel needs to run the sweep on many machines",
+              [a](const std::string& text) { a->emit = parse_engine(text); });
+    add_value(*command, "--tasks", "N",
+              "With --emit: parts of the sweep, each a task of the engine (default: 16)",
+              [a](const std::string& text) { a->tasks = std::uint32_t(parse_unsigned(text, 1, 100'000)); });
     command->add_flag("--dry-run", a->dry_run, "Only check all values, and print what would be run");
     command->add_flag("--status", a->status, "Only print how many runs are done");
     command->add_flag("--retry-failed", a->retry_failed, "Run again what failed");

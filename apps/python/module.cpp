@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "statistics/cloud_statistics.h"
+#include "statistics/organisation.h"
 #include <fmt/format.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -192,6 +194,32 @@ py::dict clouds_of(LiveSimulation& simulation, const LayerKey& layer, int dimens
     return clouds_dict(clouds, planes.placement, dimensions == 3);
 }
 
+py::dict organisation_of(LiveSimulation& simulation, const LayerKey& layer, int draws) {
+    if (draws < 2 || draws > 10'000)
+        throw Error(ErrorCode::usage, fmt::format("draws is {}; expected 2 to 10000", draws));
+    Organisation found;
+    NullOrganisation random;
+    {
+        const py::gil_scoped_release released;
+        const LayerPlanes planes = simulation.planes(layer);
+        const BitPlaneView cld = planes.planes->cld.view();
+        const double cover =
+            double(count_cells(shadow_of(cld).view())) / (double(cld.extent.x) * cld.extent.y);
+        found = organisation(clouds_2d(cld, planes.boundaries), cld.extent, planes.boundaries);
+        random = null_organisation(cld.extent, planes.boundaries, cover, draws, 1);
+    }
+    py::dict row;
+    const auto add = [&row, &found, &random](const std::string& name, double Organisation::*index) {
+        row[name.c_str()] = found.*index;
+        row[(name + "_random").c_str()] = random.mean.*index;
+        row[(name + "_random_sd").c_str()] = random.deviation.*index;
+    };
+    add("iorg", &Organisation::iorg);
+    add("scai", &Organisation::scai);
+    add("cop", &Organisation::cop);
+    return row;
+}
+
 Plane plane_named(const std::string& name) {
     if (name == "hum") return &Lattice::hum;
     if (name == "act") return &Lattice::act;
@@ -271,6 +299,18 @@ void add_simulation(py::module_& module) {
              "dimensions 3, cells joined by faces: cells, volume_m3, surface_m2, x_m, y_m, z_m, base_m, "
              "top_m, cut, spans.\n"
              "Clouds are joined across periodic sides.")
+        .def("organisation", &organisation_of, "layer"_a = 0, "draws"_a = 20,
+             "Returns how clouds stand, seen from above: iorg (0.5 at random for points, above clustered), "
+             "scai "
+             "(low is\n"
+             "organised), cop (high is organised), nan with fewer than two clouds; beside each its mean and "
+             "standard deviation\n"
+             "over `draws` shadows of the same cover without organisation, iorg_random and iorg_random_sd "
+             "...: "
+             "compare with\n"
+             "these, as clouds have a size. Definitions and sources: docs/research.md. Takes n^2 operations "
+             "for "
+             "n clouds.")
         .def("density", &LiveSimulation::density, "layer"_a = py::none(),
              py::call_guard<py::gil_scoped_release>(),
              "Returns the Density of a layer, or of all together: cld smoothed in space and time, as in "
@@ -318,5 +358,7 @@ PYBIND11_MODULE(_nephos, module) {
     module.def(
         "set_threads", &nephos::set_threads, "count"_a,
         "Limits the threads of all simulations of this process; 0: all cores. Results do not depend on it.");
+    module.def("_toml_text", &nephos::toml_text, "value"_a,
+               "Returns a value as it stands in a scene or a plan.");
     module.def("version", &nephos::version, "Returns the version of nephos.");
 }

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/export/nanovdb_file.h"
 
-#include <fstream>
+#include <algorithm>
+#include <istream>
+#include <new>
 #include <sstream>
+#include <stdexcept>
+
+#include <ext/stdio_filebuf.h>
+#include <fcntl.h>
 
 #define NANOVDB_USE_OPENVDB
 #define NANOVDB_USE_ZIP
@@ -22,6 +28,8 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "density/openvdb_access.h"
+#include "density/vdb/block_stream.h"
+#include "density/vdb/vdb_sandbox.h"
 
 namespace nephos {
 namespace {
@@ -72,41 +80,54 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
     write_atomically(path, std::string_view(stream.view()));
 }
 
-DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const Placement& placement) {
-    openvdb::initialize();
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
-    TreeBuilder builder;
-    try {
-        const auto handles = nanovdb::io::readGrids(stream);
-        const nanovdb::NanoGrid<float>* const nano = handles.size() == 1 ? handles.front().grid<float>() : nullptr;
-        if (nano == nullptr) throw Error(ErrorCode::io, path.string() + ": holds no float grid that is not quantised");
-        const auto grid = nanovdb::nanoToOpenVDB(*nano);  // of the handle: it would compile all kinds of grids
-        const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
-        const openvdb::Coord last(extent.x - 1, extent.y - 1, extent.z - 1);
-        if (!box.empty() && !openvdb::CoordBBox(openvdb::Coord(0), last).isInside(box))
-            throw Error(ErrorCode::io, path.string() + ": has voxels outside of its box");
-        for (int z = 0; z < extent.z; z += kBlock) {
-            for (int y = 0; y < extent.y; y += kBlock) {
-                for (int x = 0; x < extent.x; x += kBlock) {
-                    auto leaf = uninitialised_leaf({x, y, z});
-                    const FloatLeaf* from = grid->tree().probeConstLeaf({x, y, z});
-                    for (int n = 0; n < kBlockVoxels; ++n) {
-                        leaf->buffer().data()[n] =
-                            from != nullptr
-                                ? from->buffer().data()[n]
-                                : grid->tree().getValue({x + (n >> 6), y + (n >> 3 & 7), z + (n & 7)});
-                    }
-                    NewBlock::from(std::move(leaf)).move_to(builder, {x, y, z});
-                }
-            }
-        }
-    } catch (const Error&) {
-        throw;
-    } catch (const std::exception& error) {
-        throw Error(ErrorCode::io, path.string() + ": is no NanoVDB file, or is damaged: " + error.what());
+namespace {
+
+// In the child: the blocks of the only grid of an open file.
+void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
+    __gnu_cxx::stdio_filebuf<char> buffer(file, std::ios::in | std::ios::binary);
+    std::istream stream(&buffer);
+    const auto handles = nanovdb::io::readGrids(stream);
+    const nanovdb::NanoGrid<float>* const nano = handles.size() == 1 ? handles.front().grid<float>() : nullptr;
+    if (nano == nullptr) throw std::runtime_error("it holds no float grid that is not quantised");
+    const auto grid = nanovdb::nanoToOpenVDB(*nano);  // of the handle: it would compile all kinds of grids
+    const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
+    const openvdb::Coord last(extent.x - 1, extent.y - 1, extent.z - 1);
+    if (!box.empty() && !openvdb::CoordBBox(openvdb::Coord(0), last).isInside(box))
+        throw std::runtime_error("it has voxels outside of its box");
+    for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) send_leaf(writer, leaf->origin(), leaf->buffer().data());
+    auto tile = grid->tree().cbeginValueOn();
+    tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        const openvdb::CoordBBox block = tile.getBoundingBox();
+        for (int z = block.min().z(); z <= block.max().z(); z += kBlock)
+            for (int y = block.min().y(); y <= block.max().y(); y += kBlock)
+                for (int x = block.min().x(); x <= block.max().x(); x += kBlock) send_tile(writer, {x, y, z}, *tile);
     }
-    return builder.finish(extent, placement);
+    send_end(writer);
+}
+
+}  // namespace
+
+DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const Placement& placement) {
+    openvdb::initialize();  // before the fork, so that the child finds it done
+    const Descriptor file = open_regular_file(path, O_RDONLY);
+    constexpr double kSeconds = 120;
+    const std::size_t memory = std::min(memory_limit({}), memory_bound(path));
+    const int kept[] = {file.get()};
+    DensityGrid density;
+    run_sandboxed(
+        path, "NanoVDB", {kSeconds, memory, memory}, kept,
+        [&](SandboxWriter& writer) {
+            try {
+                send_grid(file.get(), extent, writer);
+            } catch (const std::bad_alloc&) {
+                throw;
+            } catch (const std::exception& error) {
+                throw std::runtime_error(std::string("it is no NanoVDB file, or is damaged: ") + error.what());
+            }
+        },
+        [&](SandboxReader& reader) { density = receive_blocks(reader, extent, placement); });
+    return density;
 }
 
 }  // namespace nephos

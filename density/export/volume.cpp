@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
+#include "density/export/voxel_kernel.h"
 #include "density/openvdb_access.h"
 
 namespace nephos {
@@ -117,6 +118,10 @@ Volume halved(const Volume& volume) {
             const float *b = a + dy, *c = a + dz, *d = c + dy;
             float* to = next.values.data() +
                         (std::size_t(k) * std::size_t(next.ny) + std::size_t(j)) * std::size_t(next.nx);
+            if (step == 2) {
+                halve_rows(a, b, c, d, std::size_t(next.nx), to);
+                continue;
+            }
             for (std::size_t i = 0; i < std::size_t(next.nx); ++i) {
                 const std::size_t n = i * step;
                 to[i] = 0.125f * (((a[n] + a[n + dx]) + (b[n] + b[n + dx])) +

@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "density/export/volume.h"
+#include "density/export/voxel_kernel.h"
 
 namespace nephos {
 namespace {
@@ -18,26 +19,15 @@ namespace {
 // Voxels of a task: its part of source and result stays in the second-level cache.
 constexpr std::size_t kTask = std::size_t(1) << 16;
 
+// Calls convert(values, count, codes) for parts of the values.
 template <class Code, class Convert>
 void convert_all(const std::vector<float>& values, std::vector<std::byte>& out, const Convert& convert) {
     auto* codes = reinterpret_cast<Code*>(out.data());
     const std::size_t tasks = (values.size() + kTask - 1) / kTask;
     tbb::parallel_for(std::size_t(0), tasks, [&](std::size_t task) {
         const std::size_t begin = task * kTask, end = std::min(values.size(), begin + kTask);
-        const float* in = values.data();
-        for (std::size_t n = begin; n < end; ++n) codes[n] = convert(in[n]);
+        convert(values.data() + begin, end - begin, codes + begin);
     });
-}
-
-// Of a value that is finite and not negative; ties to even. In a half's normal range 13 bits are rounded away, and the
-// exponent is moved from a single's bias to a half's. Below it a half counts units of 2^-24, which are also those of a
-// single from 0.5 to 1: adding 0.5 rounds to them.
-std::uint16_t half_bits(float value) {
-    value = std::min(value, 65504.0f);
-    const auto bits = std::bit_cast<std::uint32_t>(value);
-    const std::uint32_t normal = ((bits + 0xFFF + (bits >> 13 & 1)) >> 13) - (112u << 10);
-    const std::uint32_t small = std::bit_cast<std::uint32_t>(value + 0.5f) - 0x3F000000u;
-    return std::uint16_t(value < 0x1p-14f ? small : normal);
 }
 
 float half_value(std::uint16_t bits) { return std::bit_cast<float>(std::uint32_t(bits) << 13) * 0x1p112f; }
@@ -134,21 +124,28 @@ std::vector<std::byte> encode(const Volume& volume, VoxelType type, float scale)
     const float inverse = 1 / scale;
     switch (type) {
         case VoxelType::r8:
-            convert_all<std::uint8_t>(volume.values, out, [factor = 255 * inverse](float value) {
-                return std::uint8_t(std::int32_t(std::clamp(value * factor, 0.0f, 255.0f) + 0.5f));
-            });
+            convert_all<std::uint8_t>(volume.values, out,
+                                      [&](const float* values, std::size_t count, std::uint8_t* codes) {
+                                          to_codes(values, count, 255 * inverse, codes);
+                                      });
             break;
         case VoxelType::r16:
-            convert_all<std::uint16_t>(volume.values, out, [factor = 65535 * inverse](float value) {
-                return std::uint16_t(std::int32_t(std::clamp(value * factor, 0.0f, 65535.0f) + 0.5f));
-            });
+            convert_all<std::uint16_t>(volume.values, out,
+                                       [&](const float* values, std::size_t count, std::uint16_t* codes) {
+                                           to_codes(values, count, 65535 * inverse, codes);
+                                       });
             break;
         case VoxelType::r16f:
             convert_all<std::uint16_t>(volume.values, out,
-                                       [inverse](float value) { return half_bits(value * inverse); });
+                                       [&](const float* values, std::size_t count, std::uint16_t* halves) {
+                                           to_halves(values, count, inverse, halves);
+                                       });
             break;
         case VoxelType::r32f:
-            convert_all<float>(volume.values, out, [inverse](float value) { return value * inverse; });
+            convert_all<float>(volume.values, out,
+                               [&](const float* values, std::size_t count, float* scaled) {
+                                   for (std::size_t n = 0; n < count; ++n) scaled[n] = values[n] * inverse;
+                               });
             break;
         case VoxelType::bc4:
             encode_bc4(volume, 255 * inverse, out);

@@ -223,6 +223,7 @@ void attempt(std::string_view parser, const SandboxLimits& limits, std::span<con
         throw std::runtime_error(std::string("no pipe to a reading process: ") + std::strerror(errno));
     }
     Descriptor out(ends[0]), in(ends[1]);
+    ::fcntl(ends[1], F_SETPIPE_SZ, 1 << 20);  // fewer turns of both; without the right to it the pipe is small
     const pid_t self = ::getpid(), pid = ::fork();
     if (pid < 0) throw std::runtime_error(std::string("no process to read it in: ") + std::strerror(errno));
     if (pid == 0) run_child(self, ends[1], limits, kept, child);

@@ -42,12 +42,11 @@ class SandboxWriter {
         bytes(&v, sizeof v);
     }
     void text(std::string_view text);  // sends the first 64 KiB
-    void finish();                     // marks the result as complete
+    void flush();   // sends what was gathered, so that a failure that follows does not lose it
+    void finish();  // marks the result as complete
     void fail(std::string_view message);
 
   private:
-    void flush();
-
     int fd_;
     std::vector<std::byte> buffer_;
 };

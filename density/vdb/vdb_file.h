@@ -51,7 +51,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -138,6 +140,12 @@ struct LoadedDensity {
 // defect, Error(usage) on bad options. Thread-safe.
 LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
+
+// Reads files one after the other, as load_density(), and calls `each` with the index and the content of each; false stops.
+// One process reads up to 64 files ahead while `each` works, which takes a tenth of the time of a process for each small
+// file. Throws as load_density() and `each`; the files before the one that cannot be read were handed over.
+void load_densities(std::span<const std::filesystem::path> paths, const VdbReadOptions& options,
+                    const std::function<bool(std::size_t index, LoadedDensity&& loaded)>& each);
 
 // Reads the bool (or mask) grids hum, act and cld as a state of this extent and placement. Throws Error(io)
 // as above, and when a grid is missing, has another extent by its nephos_bbox_max or (without one) a voxel

@@ -11,6 +11,8 @@
 #include "core/text.h"
 #include "density/metaballs.h"
 #include "density/openvdb_access.h"
+#include "density/vdb/block_stream.h"
+#include "density/vdb/mask_file.h"
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_foreign.h"
@@ -22,9 +24,6 @@ namespace {
 
 using openvdb::Coord;
 using openvdb::CoordBBox;
-
-// The type of the next record in the stream of blocks.
-enum class Record : std::uint8_t { end, leaf, tile };
 
 template <class Grid>
 bool is(const openvdb::GridBase& grid) {
@@ -45,11 +44,19 @@ std::string names_of(const VdbArchive& archive) {
     return names.empty() ? "none" : names;
 }
 
-std::size_t choose_grid(const VdbArchive& archive, const std::string& requested) {
+bool is_mask(const openvdb::GridBase& grid) { return is<BoolGrid>(grid) || is<openvdb::MaskGrid>(grid); }
+
+std::size_t choose_grid(const VdbArchive& archive, const std::string& requested, bool masks) {
     const auto& entries = archive.entries();
     const auto find = [&](const auto& matches) {
         return std::size_t(std::ranges::find_if(entries, matches) - entries.begin());
     };
+    if (masks) {
+        const std::string mask = requested.empty() ? "cld" : requested;
+        const std::size_t n =
+            find([&](const auto& e) { return e.descriptor.gridName() == mask && is_mask(*e.header); });
+        if (n < entries.size()) return n;
+    }
     const std::string name = requested.empty() ? "density" : requested;
     std::size_t n = find([&](const auto& e) { return e.descriptor.gridName() == name && is_fog(*e.header); });
     if (n < entries.size()) return n;
@@ -60,6 +67,7 @@ std::size_t choose_grid(const VdbArchive& archive, const std::string& requested)
                                      : "there is no grid `" + name + "`; it has " + names_of(archive));
     }
     n = find([](const auto& e) { return is_fog(*e.header); });
+    if (n == entries.size() && masks) n = find([](const auto& e) { return is_mask(*e.header); });
     if (n == entries.size())
         throw std::runtime_error("there is no float fog volume in it; it has " + names_of(archive));
     return n;
@@ -83,8 +91,21 @@ void check_stated_size(const openvdb::GridBase& header, std::size_t memory_bytes
     }
 }
 
+// 1 where a voxel of a mask is active, and true where it has a value.
+template <typename Grid>
+FloatGrid::Ptr mask_as_float(const Grid& mask) {
+    auto result =
+        FloatGrid::create(FloatTree::Ptr(new FloatTree(mask.tree(), 0.0f, 1.0f, openvdb::TopologyCopy())));
+    for (auto value = mask.tree().cbeginValueOn(); value; ++value)
+        if (!*value) result->tree().fill(value.getBoundingBox(), 0.0f, false);
+    result->setTransform(mask.transform().copy());
+    return result;
+}
+
 FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
     if (const auto typed = openvdb::gridPtrCast<FloatGrid>(grid)) return typed;
+    if (const auto mask = openvdb::gridPtrCast<BoolGrid>(grid)) return mask_as_float(*mask);
+    if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) return mask_as_float(*mask);
     const auto typed = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
     if (!typed) throw std::runtime_error("it is damaged: a grid changed its type");
     auto result = FloatGrid::create(FloatTree::Ptr(new FloatTree(typed->tree())));
@@ -136,8 +157,8 @@ void send_metadata(SandboxWriter& writer, const std::optional<VdbMetadata>& meta
     }
     const Georeference& place = metadata->georeference;
     writer.value(std::uint8_t(place.given));
-    for (const double number : {place.latitude_deg, place.longitude_deg, place.height_m, place.geoid_height_m,
-                                place.heading_deg})
+    for (const double number :
+         {place.latitude_deg, place.longitude_deg, place.height_m, place.geoid_height_m, place.heading_deg})
         writer.value(number);
     writer.value(std::uint8_t(place.height_datum == HeightDatum::ellipsoid));
     writer.text(place.start_utc);
@@ -154,8 +175,8 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
     metadata.time_step_s = reader.value<double>();
     metadata.frames_per_second = reader.value<double>();
     metadata.time_scale = reader.value<double>();
-    if (!std::isfinite(metadata.extinction_per_m + metadata.time_s + metadata.time_step_s + metadata.frames_per_second +
-                       metadata.time_scale))
+    if (!std::isfinite(metadata.extinction_per_m + metadata.time_s + metadata.time_step_s +
+                       metadata.frames_per_second + metadata.time_scale))
         throw std::runtime_error("the reading process sent an impossible number");
     metadata.seed = reader.value<std::uint64_t>();
     metadata.random_stream_version = reader.value<int>();
@@ -175,9 +196,9 @@ std::optional<VdbMetadata> receive_metadata(SandboxReader& reader) {
 }
 
 // The child's part: sends header, geometry, blocks and counts.
-void send_density(VdbArchive& archive, const VdbReadOptions& options, std::size_t memory_bytes,
+void send_density(VdbArchive& archive, const VdbReadOptions& options, bool masks, std::size_t memory_bytes,
                   SandboxWriter& writer) {
-    const std::size_t n = choose_grid(archive, options.grid);
+    const std::size_t n = choose_grid(archive, options.grid, masks);
     const openvdb::GridBase& header = *archive.entries()[n].header;
     check_stated_size(header, memory_bytes);
     const auto grid = as_float(archive.read(n));
@@ -191,40 +212,20 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, std::size_
     send_metadata(writer, metadata ? metadata : from_meta_map(archive.metadata()));
     writer.value(refine_of(header));
 
-    const auto coord = [&](const Coord& c) {
-        for (int a = 0; a < 3; ++a) writer.value(std::int32_t(c[a]));
-    };
     DensityReceiver receiver;
     receiver.begin = [&](const Extent& extent, const Placement& placement) {
         writer.value(extent);
         writer.value(placement);
     };
-    receiver.leaf = [&](const Coord& origin, const float* values) {
-        writer.value(Record::leaf);
-        coord(origin);
-        writer.bytes(values, kBlockVoxels * sizeof(float));
-    };
-    receiver.tile = [&](const Coord& origin, float value) {
-        writer.value(Record::tile);
-        coord(origin);
-        writer.value(value);
-    };
+    receiver.leaf = [&](const Coord& origin, const float* values) { send_leaf(writer, origin, values); };
+    receiver.tile = [&](const Coord& origin, float value) { send_tile(writer, origin, value); };
     const bool y_up = has_y_up(header, archive.metadata(), options.up_axis);
     const ForeignGrid foreign{grid.get(), bounds_of(*grid, header), y_up, options.metres_per_unit,
                               memory_bytes};
     const ForeignResult result = convert_foreign(foreign, receiver);
-    writer.value(Record::end);
+    send_end(writer);
     writer.value(std::uint8_t(result.resampled));
     writer.value(result.negative);
-}
-
-Coord receive_origin(SandboxReader& reader, const Extent& extent) {
-    const auto x = reader.value<std::int32_t>(), y = reader.value<std::int32_t>(),
-               z = reader.value<std::int32_t>();
-    const bool inside = x >= 0 && y >= 0 && z >= 0 && x < extent.x && y < extent.y && z < extent.z;
-    if (!inside || ((x | y | z) & (kBlock - 1)) != 0)
-        throw std::runtime_error("the reading process sent a misplaced block");
-    return {x, y, z};
 }
 
 // The parent's part: builds the grid from the child's stream.
@@ -236,35 +237,16 @@ LoadedDensity receive_density(SandboxReader& reader) {
     const auto extent = reader.value<Extent>();
     const auto placement = reader.value<Placement>();
     constexpr int kMost = kMaxExtent * kMaxRefine;
-    const bool possible = std::min({extent.x, extent.y, extent.z}) >= 1 && std::max({extent.x, extent.y, extent.z}) <= kMost;
+    const bool possible =
+        std::min({extent.x, extent.y, extent.z}) >= 1 && std::max({extent.x, extent.y, extent.z}) <= kMost;
     const Vec3 origin_m = placement.origin_m;
     if (!possible || !(placement.cell_size_m > 0) ||
         !std::isfinite(origin_m.x + origin_m.y + origin_m.z + placement.cell_size_m))
         throw std::runtime_error("the reading process sent an impossible size");
-    const auto check = [](std::span<const float> values) {
-        for (const float value : values)
-            if (!(value >= 0 && std::isfinite(value))) throw std::runtime_error("the reading process sent an impossible density");
-    };
-    TreeBuilder builder;
-    for (;;) {
-        const auto record = reader.value<Record>();
-        if (record == Record::end) break;
-        const Coord origin = receive_origin(reader, extent);
-        if (record == Record::tile) {
-            const auto density = reader.value<float>();
-            check({&density, 1});
-            NewBlock{nullptr, density}.move_to(builder, origin);
-            continue;
-        }
-        auto leaf = uninitialised_leaf(origin);
-        reader.bytes(leaf->buffer().data(), kBlockVoxels * sizeof(float));
-        check({leaf->buffer().data(), kBlockVoxels});
-        NewBlock::from(std::move(leaf)).move_to(builder, origin);
-    }
+    loaded.density = receive_blocks(reader, extent, placement);
     ForeignResult result;
     result.resampled = reader.value<std::uint8_t>() != 0;
     result.negative = reader.value<std::uint64_t>();
-    loaded.density = builder.finish(extent, placement);
     if (result.resampled) {
         loaded.notes.push_back("its voxels are not cubes along the axes: resampled to voxels of " +
                                number_text(placement.cell_size_m, 6) + " m");
@@ -311,7 +293,7 @@ void send_bits(const Tree& tree, const CoordBBox& allowed, const std::string& na
             }
         }
     }
-    writer.value(Record::end);
+    send_end(writer);
 }
 
 constexpr const char* kStateGrids[] = {"hum", "act", "cld"};
@@ -421,20 +403,52 @@ void receive_plane(SandboxReader& reader, BitPlane& plane) {
     }
 }
 
-}  // namespace
+void check_options(const VdbReadOptions& options) {
+    if (options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit)) return;
+    throw Error(ErrorCode::usage, number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
+}
 
-LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options) {
-    if (!(options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit))) {
-        throw Error(ErrorCode::usage,
-                    number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
-    }
+LoadedDensity load(const std::filesystem::path& path, const VdbReadOptions& options, bool masks) {
+    check_options(options);
     LoadedDensity loaded;
     const std::size_t memory_bytes = memory_limit(options.limits);  // here: the child cannot ask the system
     in_sandbox(
         path, options.limits,
-        [&](VdbArchive& archive, SandboxWriter& writer) { send_density(archive, options, memory_bytes, writer); },
+        [&](VdbArchive& archive, SandboxWriter& writer) {
+            send_density(archive, options, masks, memory_bytes, writer);
+        },
         [&](SandboxReader& reader) { loaded = receive_density(reader); });
     return loaded;
+}
+
+}  // namespace
+
+LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options) {
+    return load(path, options, false);
+}
+
+LoadedDensity load_mask(const std::filesystem::path& path, const VdbReadOptions& options) {
+    return load(path, options, true);
+}
+
+void load_densities(std::span<const std::filesystem::path> paths, const VdbReadOptions& options,
+                    const std::function<bool(std::size_t, LoadedDensity&&)>& each) {
+    check_options(options);
+    struct Stopped {};
+    const std::size_t memory_bytes = memory_limit(options.limits);
+    try {
+        for (std::size_t first = 0; first < paths.size(); first += kMostFilesOfAChild) {
+            in_sandbox(
+                paths.subspan(first, std::min(kMostFilesOfAChild, paths.size() - first)), options.limits,
+                [&](VdbArchive& archive, SandboxWriter& writer) {
+                    send_density(archive, options, false, memory_bytes, writer);
+                },
+                [&](SandboxReader& reader, std::size_t n) {
+                    if (!each(first + n, receive_density(reader))) throw Stopped();
+                });
+        }
+    } catch (const Stopped&) {
+    }
 }
 
 DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options) {

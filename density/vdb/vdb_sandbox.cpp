@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -7,6 +8,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <fcntl.h>
 #include <openvdb/openvdb.h>
@@ -44,7 +46,9 @@ Descriptor opened(const std::filesystem::path& path) {
     return open_regular_file(path, O_RDONLY);
 }
 
-// The most memory that reading a file of this size may take. Leaves of 512 voxels take at least 100 bytes in a file and
+}  // namespace
+
+// Leaves of 512 voxels take at least 100 bytes in a file and
 // some 3 KiB in memory; Blosc compresses values to 1/255 at best. A length that a damaged header states is not bounded
 // by anything in the file, so that 100 bytes could take what the machine has.
 std::size_t memory_bound(const std::filesystem::path& path) {
@@ -56,8 +60,6 @@ std::size_t memory_bound(const std::filesystem::path& path) {
     return size > (kMost - kLeast) / kPerByte ? kMost : kLeast + kPerByte * size;
 }
 
-}  // namespace
-
 std::size_t memory_limit(const VdbReadLimits& limits) {
     return limits.memory_bytes > 0 ? limits.memory_bytes : available_memory().bytes / 2;
 }
@@ -65,18 +67,38 @@ std::size_t memory_limit(const VdbReadLimits& limits) {
 void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
                 const std::function<void(VdbArchive&, SandboxWriter&)>& child,
                 const std::function<void(SandboxReader&)>& parent) {
-    const Descriptor file = opened(path);
-    SandboxLimits bounded{limits.seconds, memory_limit(limits), memory_limit(limits)};
-    const bool by_size = limits.memory_bytes == 0 && memory_bound(path) < bounded.memory_bytes;
-    if (by_size) bounded.memory_bytes = bounded.most_bytes = memory_bound(path);
+    in_sandbox(std::span(&path, 1), limits, child, [&](SandboxReader& reader, std::size_t) { parent(reader); });
+}
+
+void in_sandbox(std::span<const std::filesystem::path> paths, const VdbReadLimits& limits,
+                const std::function<void(VdbArchive&, SandboxWriter&)>& child,
+                const std::function<void(SandboxReader&, std::size_t)>& parent) {
+    std::vector<Descriptor> files;
+    std::vector<int> kept;
+    std::size_t bound = 0;
+    for (const std::filesystem::path& path : paths) {
+        files.push_back(opened(path));
+        kept.push_back(files.back().get());
+        bound = std::max(bound, memory_bound(path));
+    }
+    const double count = double(paths.size());
+    SandboxLimits bounded{std::min(1e6, limits.seconds * count), memory_limit(limits), 0};
+    const bool by_size = limits.memory_bytes == 0 && bound < bounded.memory_bytes;
+    if (by_size) bounded.memory_bytes = bound;
+    bounded.most_bytes = bounded.memory_bytes > std::numeric_limits<std::size_t>::max() / paths.size()
+                             ? std::numeric_limits<std::size_t>::max()
+                             : bounded.memory_bytes * paths.size();
     openvdb::initialize();  // before the fork, so that the child finds it done
-    const int kept[] = {file.get()};
+    std::filesystem::path subject = paths.front();  // of errors: the file that is read
     run_sandboxed(
-        path, "OpenVDB", bounded, kept,
+        subject, "OpenVDB", bounded, kept,
         [&](SandboxWriter& writer) {
             try {
-                VdbArchive archive(file.get());
-                child(archive, writer);
+                for (const int file : kept) {
+                    VdbArchive archive(file);
+                    child(archive, writer);
+                    writer.flush();
+                }
             } catch (const std::bad_alloc&) {
                 if (!by_size) throw;
                 throw std::runtime_error("reading it takes more than " + bytes_text(bounded.memory_bytes) +
@@ -87,7 +109,12 @@ void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
                 throw std::runtime_error(std::string("it is damaged or not supported: ") + error.what());
             }
         },
-        parent);
+        [&](SandboxReader& reader) {
+            for (std::size_t n = 0; n < paths.size(); ++n) {
+                subject = paths[n];
+                parent(reader, n);
+            }
+        });
 }
 
 }  // namespace nephos

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <span>
 
 #include "density/vdb/sandbox.h"
 #include "density/vdb/vdb_file.h"
@@ -22,6 +23,17 @@ inline constexpr std::size_t kMaxMetadataText = 1000;  // characters of one text
 void in_sandbox(const std::filesystem::path& path, const VdbReadLimits& limits,
                 const std::function<void(VdbArchive&, SandboxWriter&)>& child,
                 const std::function<void(SandboxReader&)>& parent);
+
+// The same for several files by one child: it reads ahead while `parent` works, called for each file in order with its
+// index. Limits of time are those of all files together, of memory that of the largest. Errors name the file that was
+// being read. Precondition: at most kMostFilesOfAChild files.
+void in_sandbox(std::span<const std::filesystem::path> paths, const VdbReadLimits& limits,
+                const std::function<void(VdbArchive&, SandboxWriter&)>& child,
+                const std::function<void(SandboxReader&, std::size_t)>& parent);
+inline constexpr std::size_t kMostFilesOfAChild = 64;  // all are open at once
+
+// Returns the most memory that reading a file of this size may take, however much its header promises.
+std::size_t memory_bound(const std::filesystem::path& path);
 
 // Returns limits.memory_bytes, or half of the free memory where that is 0.
 std::size_t memory_limit(const VdbReadLimits& limits);

@@ -242,14 +242,29 @@ void check_rain(const SectionReader& reader, const LayerOptions& layer) {
     }
 }
 
+// Presence is that of veils, at states that rise.
+void check_presence(const SectionReader& reader, const LayerOptions& layer) {
+    if (!layer.presence.empty() && !layer.is_veil) {
+        reader.report("presence", reader.quoted("presence") + " stands in a layer without `veil`",
+                      "expected none: how many clouds there are at a state is that of the layer's skies");
+    }
+    for (std::size_t n = 1; n < layer.presence.size(); ++n) {
+        if (layer.presence[n].state > layer.presence[n - 1].state) continue;
+        const SectionReader item = rule_of(reader, "presence", n);
+        item.report("state", item.quoted("state") + " is " + number_text(layer.presence[n].state) +
+                                 ", not above the one before it",
+                    "expected states that rise");
+    }
+}
+
 // Finishes a layer that is a veil: defaults by its lattice and wind, and keys without effect.
 void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
     for (const std::string_view key : keys_of_clouds()) {
         if (reader.find(key) == nullptr) continue;
         reader.report(
             key, reader.quoted(key) + " stands beside `veil`",
-            "expected `name`, `opacity`, `lattice`, `wind`, `veil` and `detail` alone: a veil has no clouds "
-            "and no automaton");
+            "expected `name`, `opacity`, `lattice`, `wind`, `presence`, `veil` and `detail` alone: a veil has no "
+            "clouds and no automaton");
     }
     const SectionReader lattice = below(reader, "lattice"), veil = below(reader, "veil");
     if (lattice.find("boundaries") != nullptr) {
@@ -257,6 +272,7 @@ void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOpt
                        "expected none: a veil is a function of place and goes on beyond its lattice");
     }
     fill_in_lattice(reader, scene, layer);
+    if (scene.tile) layer.boundaries = {Boundary::periodic, Boundary::periodic, Boundary::open};
     const double bottom = layer.placement.origin_m.z;
     if (!veil.find("base_m")) layer.veil.base_m = bottom;
     if (!veil.find("top_m")) layer.veil.top_m = bottom + layer.extent.z * layer.placement.cell_size_m;
@@ -342,6 +358,42 @@ void check_simulation(const SectionReader& reader, const Scene& scene, std::size
     }
 }
 
+// Reports layers that do not repeat over the rectangle of the first.
+void check_tile(const SectionReader& reader, const Scene& scene) {
+    if (!scene.tile) return;
+    const LayerOptions& first = scene.layers.front();
+    const auto edge = [](const LayerOptions& layer, int axis) {
+        return (axis == 0 ? layer.extent.x : layer.extent.y) * layer.placement.cell_size_m;
+    };
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        const LayerOptions& layer = scene.layers[n];
+        const SectionReader item = item_of(reader, "layer", n), lattice = below(item, "lattice");
+        if (!has_density(layer)) {
+            item.report("automaton", "the layer " + enclosed(layer.name, '"') + " of a tile has no density",
+                        "expected `automaton` = true: clouds drawn as billboards do not repeat");
+            continue;
+        }
+        if (layer.boundaries.x != Boundary::periodic || layer.boundaries.y != Boundary::periodic) {
+            lattice.report("boundaries", lattice.quoted("boundaries") + " is open in a tile",
+                           "expected [\"periodic\", \"periodic\", \"open\"], or none");
+        }
+        for (int axis = 0; axis < 2; ++axis) {
+            const bool same = std::abs(layer.placement.origin_m[axis] - first.placement.origin_m[axis]) < 1e-6 &&
+                              std::abs(edge(layer, axis) - edge(first, axis)) < 1e-6;
+            if (same) continue;
+            const auto text = [&](const LayerOptions& of) {
+                const double low = of.placement.origin_m[axis];
+                return number_text(low) + " to " + number_text(low + edge(of, axis)) + " m";
+            };
+            lattice.report("cells",
+                           "the layer " + enclosed(layer.name, '"') + " goes from " + text(layer) + " along " +
+                               (axis == 0 ? "x" : "y"),
+                           "expected the rectangle of the layer " + enclosed(first.name, '"') + ", " + text(first) +
+                               ": all layers of a tile share one period");
+        }
+    }
+}
+
 // Reports the first layer with detail that is one too many for a picture.
 void check_count_of_detailed(const SectionReader& reader, const Scene& scene) {
     if (count_detailed(scene) <= kMaxDetailedClouds) return;
@@ -391,6 +443,7 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
         const SectionReader item = item_of(reader, "layer", n);
         LayerOptions& layer = scene.layers[n];
         check_layer_name(item, layer.name);
+        check_presence(item, layer);
         check_wind_times(item, layer.wind);
         if (layer.is_veil) {
             finish_veil_layer(item, scene, layer);
@@ -401,6 +454,7 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
         fill_in_base_height(item, scene, layer);
         check_rain(item, layer);
     }
+    if (!scene.layers.empty() && reader.document.problems.empty()) check_tile(reader, scene);
     if (!reader.document.problems.empty()) return;
     for (std::size_t n = 0; n < scene.layers.size(); ++n)
         check_simulation(item_of(reader, "layer", n), scene, n);

@@ -194,8 +194,23 @@ void check_velocity_name(const SectionReader& reader, const Scene& scene) {
     }
 }
 
+// The lattice of a tile is periodic, unless the scene says that it is not.
+void repeat_lattice(const SectionReader& reader, Scene& scene) {
+    if (!scene.tile || !reader.sound({"lattice"})) return;
+    const Entry* given = reader.find("lattice");
+    Boundaries& boundaries = scene.automaton.boundaries;
+    if (given == nullptr || given->value.find("boundaries") == nullptr) {
+        boundaries.x = boundaries.y = Boundary::periodic;
+    } else if (boundaries.x != Boundary::periodic || boundaries.y != Boundary::periodic) {
+        below(reader, "lattice")
+            .report("boundaries", "`lattice.boundaries` is open in a tile",
+                    "expected [\"periodic\", \"periodic\", \"open\"], or none");
+    }
+}
+
 void finish_scene(const SectionReader& reader, void* owner) {
     auto& scene = *static_cast<Scene*>(owner);
+    repeat_lattice(reader, scene);
     check_name(reader, scene);
     if (reader.sound({"wind"})) check_wind_times(reader, scene.automaton.wind);
     check_wind_speed(reader, scene);

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "scenes/format/scene.h"
+#include "seeds/climate.h"
 
 namespace nephos {
 namespace {
@@ -109,6 +110,7 @@ SkyOptions sky_options(const Scene& scene, std::size_t layer) {
     options.dissolution_s = given.dissolution_s;
     options.formation_softness = given.formation_softness;
     options.cross_edges_whole = given.cross_edges_whole;
+    options.periodic = scene.tile;
     return options;
 }
 
@@ -138,9 +140,27 @@ std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer) {
     return rains;
 }
 
+double opacity_at(const LayerOptions& layer, const ClimateOptions& climate, double time_s) {
+    if (layer.presence.empty()) return layer.opacity;
+    const double state = climate.schedule.empty() ? 0 : state_at(climate.schedule, time_s);
+    const auto above =
+        std::ranges::find_if(layer.presence, [&](const VeilPresence& p) { return p.state >= state; });
+    if (above == layer.presence.begin()) return layer.opacity * above->fraction;
+    const VeilPresence& below = *(above - 1);
+    if (above == layer.presence.end()) return layer.opacity * below.fraction;
+    const double between = (state - below.state) / (above->state - below.state);
+    return layer.opacity * (below.fraction + (above->fraction - below.fraction) * between);
+}
+
 VeilOptions veil_options(const Scene& scene, std::size_t layer) {
     VeilOptions options = scene.layers[layer].veil;
     options.seed = layer_seed(scene.automaton.seed, layer);
+    if (scene.tile) {
+        const LayerOptions& given = scene.layers[layer];
+        options.period_m = {given.extent.x * given.placement.cell_size_m,
+                            given.extent.y * given.placement.cell_size_m};
+        options.margin_m = 0;
+    }
     return options;
 }
 

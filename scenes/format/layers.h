@@ -57,6 +57,13 @@ struct AttachedRainRule {
     bool operator==(const AttachedRainRule&) const = default;
 };
 
+// How much of a veil there is at one state of the atmosphere.
+struct VeilPresence {
+    double state = 0;     // 0 clear .. 1 storm
+    double fraction = 1;  // of its opacity, 0..1
+    bool operator==(const VeilPresence&) const = default;
+};
+
 struct LayerRain {
     std::vector<PlacedRain> placed;
     std::vector<AttachedRainRule> attached;
@@ -74,6 +81,7 @@ struct LayerOptions {
     // automaton. Of the fields below such a layer uses lattice, opacity, wind and detail alone.
     bool is_veil = false;
     VeilOptions veil;                // its seed is that of veil_options()
+    std::vector<VeilPresence> presence;  // of a veil; states rise strictly; without any it is always there, whole
     std::vector<std::string> skies;  // names, at least one
     bool automaton = true;           // false: clouds are drawn directly as billboards, without density
     double opacity = 1;              // factor of the density, above 0, at most 1
@@ -117,8 +125,12 @@ bool has_density(const Scene& scene);
 SkyOptions sky_options(const Scene& scene, std::size_t layer);
 AutomatonOptions automaton_options(const Scene& scene, std::size_t layer);
 std::vector<AttachedRain> attached_rain(const Scene& scene, std::size_t layer);
-// Returns the options of a layer that is a veil, with the layer's seed. Pure.
+// Returns the options of a layer that is a veil, with the layer's seed; of a tile with its period and no margin. Pure.
 VeilOptions veil_options(const Scene& scene, std::size_t layer);
+
+// Returns the factor of a layer's density at a time: its opacity, of a veil times its presence, linear in the state of the
+// climate between its points and constant beyond them. 0..1; pure.
+double opacity_at(const LayerOptions& layer, const ClimateOptions& climate, double time_s);
 
 // Returns the bounding rectangle of the worlds of all layers, which the map of the ground covers. Pure.
 WorldRectangle whole_world(const Scene& scene);

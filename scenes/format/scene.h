@@ -49,6 +49,9 @@ struct DensityFileOptions {
 
 struct Scene {
     std::string name;  // base name of output files; letters, digits, '-', '_' and '.'
+    // True: the density repeats along x and y. Lattices are periodic over one common rectangle, clouds re-enter it where
+    // they leave it, and veils are periodic noise without margins.
+    bool tile = false;
     AutomatonOptions automaton;
     std::uint64_t steps = 240;  // length of the simulation
     // A VDB file with bool grids hum, act and cld for the state at step 0; none: automaton.initial.

@@ -188,6 +188,13 @@ const Section& scene_section() {
             "",
             {name,
              seed,
+             written_if(
+                 key<&Scene::tile>(
+                     "tile", "", kAny,
+                     "Make density that repeats towards east and north, so that copies of it fit side by side: all "
+                     "lattices cover one rectangle and are periodic there, clouds that leave it enter on the other side, "
+                     "and veils repeat (their `margin_m` does not count)."),
+                 [](const void* scene) { return static_cast<const Scene*>(scene)->tile; }),
              model_files_key(),
              group("lattice", lattice_section()),
              group("time", time_section()),

@@ -247,6 +247,18 @@ const Section& finder_section() {
     return section;
 }
 
+const Section& presence_section() {
+    static const Section section{
+        "Presence of a veil",
+        "How much of a veil there is by the state of the atmosphere (`[climate]`), linear between these states and "
+        "constant beyond them: sheets that come and go with the weather.",
+        {required(key<&VeilPresence::state>("state", "", between(0, 1), "The state; states rise.")),
+         required(key<&VeilPresence::fraction>("fraction", "", between(0, 1),
+                                               "Of the layer's `opacity`: 0 there is none, 1 the whole veil."))},
+        nullptr};
+    return section;
+}
+
 const Section& column_section() {
     constexpr Limits kHeight = between(-kFarthest_m, kFarthest_m);
     static const Section section{
@@ -363,6 +375,7 @@ const Section& layer_section() {
              table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect),
              default_is(table<&LayerOptions::detail>("detail", detail_section(), detail_section().effect),
                         "that of `[detail]`; a veil has none"),
+             written_if(&of_veils, tables<&LayerOptions::presence>("presence", presence_section(), 0, 10'000)),
              written_if(&of_veils,
                         table<&LayerOptions::veil>("veil", veil_section(), veil_section().effect))},
             &finish_layer};

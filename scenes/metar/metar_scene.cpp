@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scenes/metar/metar_scene.h"
+#include "scenes/metar/taf.h"
 
 #include <algorithm>
 #include <cmath>
@@ -125,14 +126,15 @@ Look look_of(const std::string& genus, bool deep) {
         "strength = 0.35\nsize_m = 500\nthermals = 0.4\nmean_free_path_m = 200\n", 1, 100};
 }
 
-std::string layer_text(const MetarLayer& layer, double coverage) {
+// `keys` are further ones of the layer, a line each.
+std::string layer_text(const MetarLayer& layer, double coverage, const std::string& keys = {}) {
     const double depth = layer.top_m - layer.base_m;
     const Look look = look_of(layer.genus, depth > kDeep_m);
     const double cell = depth > kDeep_m ? 160 : look.cell_m;
     const int across = int(std::lround(kSide_m / cell)), levels = std::max(3, int(std::ceil(depth / cell)));
     std::string text = "\n# " + layer.group + "\n[[layer]]\nname = \"" + layer.name + "\"\n";
     if (look.opacity != 1) text += "opacity = " + text_of(look.opacity) + "\n";
-    text += "lattice = { cells = [" + std::to_string(across) + ", " + std::to_string(across) + ", " +
+    text += keys + "lattice = { cells = [" + std::to_string(across) + ", " + std::to_string(across) + ", " +
             std::to_string(levels) + "], cell_size_m = " + text_of(cell) + ", origin_m = [" +
             text_of(-kSide_m / 2) + ", " + text_of(-kSide_m / 2) + ", " + text_of(layer.base_m) +
             "] }\n\n[layer.veil]\n";
@@ -147,8 +149,10 @@ std::string layer_text(const MetarLayer& layer, double coverage) {
 }
 
 // By 600 m the wind is 1.6 times as strong and turned by 20 degrees, to the right north of the equator.
-std::string wind_text(const Metar& m, const MetarSceneOptions& o) {
-    std::string text = "\n[[wind]]\nlevels = [\n";
+std::string wind_text(const Metar& m, const MetarSceneOptions& o, double time_s = 0) {
+    std::string text = "\n[[wind]]\n";
+    if (time_s > 0) text += "time_s = " + text_of(time_s) + "\n";
+    text += "levels = [\n";
     const double turn = o.place && o.place->latitude_deg < 0 ? -20 : 20;
     double from = m.wind.from_deg;
     if (m.wind.variable) from = double((o.seed * 73) % 36) * 10;
@@ -163,42 +167,93 @@ std::string wind_text(const Metar& m, const MetarSceneOptions& o) {
     return text + "]\n";
 }
 
-std::string start_of(const Metar& m, const MetarSceneOptions& o) {
+// The moment of a report's day, hour and minute: "2024-06-21T13:50:00Z".
+std::string start_of(int of_month, int hour, int minute, const MetarSceneOptions& o) {
     const auto two = [](int n) { return (n < 10 ? "0" : "") + std::to_string(n); };
     std::string day = o.date;
-    if (day.size() == 7) day += "-" + two(m.day);
-    const std::string start = day + "T" + two(m.hour) + ":" + two(m.minute) + ":00Z";
-    if (!utc_seconds(start) || (o.date.size() == 10 && o.date.substr(8) != two(m.day)))
+    if (day.size() == 7) day += "-" + two(of_month);
+    const std::string start = day + "T" + two(hour) + ":" + two(minute) + ":00Z";
+    if (!utc_seconds(start) || (o.date.size() == 10 && o.date.substr(8) != two(of_month)))
         throw Error(ErrorCode::usage, "--date '" + o.date + "' does not fit the report's day " +
-                                          std::to_string(m.day) +
+                                          std::to_string(of_month) +
                                           ": expected a month such as 2024-06, or that day of one");
     return start;
 }
 
-std::string rain_text(const Metar& m, const Precipitation& p, double base_m) {
+// The areas of rain as items of a list; `times` are further keys of each.
+std::string rain_areas(const Precipitation& p, const std::string& times) {
+    const std::string rate = ", intensity_mm_per_h = " + text_of(p.mm_per_h) + times + " },\n";
+    if (!p.showers) return "    { x_m = 0, y_m = 0, semi_a_m = 9500, semi_b_m = 9500" + rate;
+    return "    { x_m = 0, y_m = 0, semi_a_m = 2200, semi_b_m = 1700, yaw_deg = 20" + rate +
+           "    { x_m = -5200, y_m = 4200, semi_a_m = 1800, semi_b_m = 1300, yaw_deg = 70" + rate +
+           "    { x_m = 4600, y_m = 5600, semi_a_m = 1500, semi_b_m = 1400" + rate;
+}
+
+std::string rain_text(const Precipitation& p, bool thunder, double base_m, const std::string& areas) {
     std::string text =
         "\n# The area that it falls in; its clouds are those of the other layers.\n[[sky]]\nname = "
         "\"none\"\nstate = 0\nclouds = 0\n\n[[layer]]\nname = \"precipitation\"\nskies = "
         "\"none\"\nbase_height_m = " +
         text_of(std::max(100.0, base_m)) +
         "\nlattice = { cells = [20, 20, 3], cell_size_m = 1000, origin_m = [-10000, -10000, " +
-        text_of(base_m) + "] }\nbackground = { hum = 0, act = 0, ext = 1 }\n[layer.rain]\nplaced = [\n";
-    const std::string rate = ", intensity_mm_per_h = " + text_of(p.mm_per_h) + " },\n";
-    if (p.showers) {
-        text += "    { x_m = 0, y_m = 0, semi_a_m = 2200, semi_b_m = 1700, yaw_deg = 20" + rate +
-                "    { x_m = -5200, y_m = 4200, semi_a_m = 1800, semi_b_m = 1300, yaw_deg = 70" + rate +
-                "    { x_m = 4600, y_m = 5600, semi_a_m = 1500, semi_b_m = 1400" + rate;
-    } else {
-        text += "    { x_m = 0, y_m = 0, semi_a_m = 9500, semi_b_m = 9500" + rate;
-    }
+        text_of(base_m) + "] }\nbackground = { hum = 0, act = 0, ext = 1 }\n[layer.rain]\nplaced = [\n" + areas;
     text += "]\n\n[precipitation]\nenabled = true\n";
     if (p.snow) text += "kind = \"snow\"\n";
     text += "\n[wet_ground]\nenabled = true\n";
     text += p.snow ? "initial_snow_mm = 2\n" : "initial_water_mm = 1\n";
-    if (has_descriptor(m, "TS"))
+    if (thunder)
         text += "\n[[lightning]]\nposition_m = [1500, 2500, " + text_of(base_m + 800) +
                 "]\ntime_s = 600\nduration_s = 0.4\nintensity = 3\n";
     return text;
+}
+
+// The scene's head; `day` to `minute` are its start.
+std::string head_text(const std::string& report, const std::string& station, int day, int hour, int minute,
+                      const MetarSceneOptions& o, const std::string& time) {
+    std::string text = "# SPDX-License-Identifier: Apache-2.0\n#\n# " + report +
+                       "\n#\n# The sky of this report. Heights are above the aerodrome, which is z = 0.\n\n";
+    text += "name = \"" + (o.name.empty() ? station : o.name) + "\"\nseed = " + std::to_string(o.seed) +
+            "\n\n[time]\n" + time;
+    if (o.place) {
+        text += "\n[georeference]\nlatitude_deg = " + number_text(o.place->latitude_deg) +
+                "\nlongitude_deg = " + number_text(o.place->longitude_deg) +
+                "\nheight_m = " + number_text(o.place->elevation_m) + "\n";
+        if (!o.date.empty()) text += "start_utc = \"" + start_of(day, hour, minute, o) + "\"\n";
+    } else if (!o.date.empty()) {
+        start_of(day, hour, minute, o);
+    }
+    return text;
+}
+
+constexpr const char* kClearLayer =
+    "\n# No cloud: an empty layer, which gives the box its place.\n[[sky]]\nname = \"clear\"\nstate "
+    "= 0\nclouds = 0\n\n[[layer]]\nname = \"clear\"\nskies = \"clear\"\nbase_height_m = 1000\n"
+    "lattice = { cells = [20, 20, 3], cell_size_m = 1000, origin_m = [-10000, -10000, 1000] "
+    "}\nbackground = { hum = 0, act = 0, ext = 1 }\n";
+
+std::string fog_text(const Metar& m) {
+    int visibility = m.visibility_m.value_or(9999);
+    double depth = has_phenomenon(m, "FG") ? 150 : 1000;
+    for (const MetarCloud& c : m.clouds) {
+        if (c.amount != CloudAmount::obscured) continue;
+        if (c.height_ft) depth = std::max(20.0, 1.5 * *c.height_ft * kFoot_m);
+        if (!m.visibility_m) visibility = 500;
+    }
+    if (visibility >= 9999) return {};
+    return "\n# " + std::to_string(visibility) + " m of visibility: 3.912 / visibility\n[fog]\nextinction_per_m = " +
+           number_text(kKoschmieder / std::max(visibility, 20), 6) + "\nheight_m = " + text_of(depth) + "\n";
+}
+
+std::string picture_text(const std::string& frames, double lowest_m) {
+    return "\n[frames]\n" + frames + "\n[camera]\nposition_m = [0, -9000, 120]\ntarget_m = [0, 0, " +
+           text_of(std::min(lowest_m, 2500.0)) +
+           "]\nvertical_fov_deg = 60\nexposure = \"automatic\"\ntone_curve = \"neutral\"\nglare = "
+           "0.1\n\n[atmosphere]\nmodel = \"physical\"\ncolours = \"spectral\"\n\n[ground]\npattern = "
+           "\"country\"\n";
+}
+
+bool is_same(const MetarWind& a, const MetarWind& b) {
+    return a.variable == b.variable && a.from_deg == b.from_deg && a.speed_m_per_s == b.speed_m_per_s;
 }
 
 }  // namespace
@@ -235,54 +290,118 @@ std::string metar_scene_text(const Metar& m, const MetarSceneOptions& o,
                              const std::vector<double>& coverage) {
     const std::vector<MetarLayer> layers = layers_of(m);
     const Precipitation p = precipitation_of(m);
-    std::string text = "# SPDX-License-Identifier: Apache-2.0\n#\n# " + m.text +
-                       "\n#\n# The sky of this report. Heights are above the aerodrome, which is z = 0.\n\n";
-    text += "name = \"" + (o.name.empty() ? m.station : o.name) + "\"\nseed = " + std::to_string(o.seed) +
-            "\n\n[time]\nstep_s = 10\nsteps = 90\n";
-    if (o.place) {
-        text += "\n[georeference]\nlatitude_deg = " + number_text(o.place->latitude_deg) +
-                "\nlongitude_deg = " + number_text(o.place->longitude_deg) +
-                "\nheight_m = " + number_text(o.place->elevation_m) + "\n";
-        if (!o.date.empty()) text += "start_utc = \"" + start_of(m, o) + "\"\n";
-    } else if (!o.date.empty()) {
-        start_of(m, o);
-    }
-    text += wind_text(m, o);
+    std::string text =
+        head_text(m.text, m.station, m.day, m.hour, m.minute, o, "step_s = 10\nsteps = 90\n") + wind_text(m, o);
     double lowest = 1000;
     for (std::size_t n = 0; n < layers.size(); ++n) {
         text += layer_text(layers[n], coverage.at(n));
         lowest = std::min(lowest, layers[n].base_m);
     }
-    if (layers.empty()) {
-        text +=
-            "\n# No cloud: an empty layer, which gives the box its place.\n[[sky]]\nname = \"clear\"\nstate "
-            "= 0\nclouds = 0\n\n[[layer]]\nname = \"clear\"\nskies = \"clear\"\nbase_height_m = 1000\n"
-            "lattice = { cells = [20, 20, 3], cell_size_m = 1000, origin_m = [-10000, -10000, 1000] "
-            "}\nbackground = { hum = 0, act = 0, ext = 1 }\n";
+    if (layers.empty()) text += kClearLayer;
+    if (p.any) text += rain_text(p, has_descriptor(m, "TS"), lowest, rain_areas(p, {}));
+    text += "\n[density]\nextinction_per_m = 0.05\n" + fog_text(m);
+    return text + picture_text("start_s = 600\ntime_scale = 60\nper_second = 12\ncount = 12\n", lowest);
+}
+
+std::vector<TafLayer> layers_of(const Taf& taf) {
+    std::vector<TafLayer> layers;
+    for (std::size_t n = 0; n < taf.periods.size(); ++n) {
+        for (const MetarLayer& layer : layers_of(taf.periods[n].weather)) {
+            auto known = std::ranges::find_if(layers, [&](const TafLayer& l) {
+                return l.layer.group == layer.group && l.layer.genus == layer.genus;
+            });
+            if (known == layers.end()) {
+                layers.push_back({layer, std::vector<bool>(taf.periods.size())});
+                known = layers.end() - 1;
+            }
+            known->present[n] = true;
+        }
     }
-    if (p.any) text += rain_text(m, p, lowest);
-    text += "\n[density]\nextinction_per_m = 0.05\n";
-    int visibility = m.visibility_m.value_or(9999);
-    double depth = has_phenomenon(m, "FG") ? 150 : 1000;
-    for (const MetarCloud& c : m.clouds) {
-        if (c.amount != CloudAmount::obscured) continue;
-        if (c.height_ft) depth = std::max(20.0, 1.5 * *c.height_ft * kFoot_m);
-        if (!m.visibility_m) visibility = 500;
+    std::ranges::stable_sort(layers, {}, [](const TafLayer& l) { return l.layer.base_m; });
+    for (std::size_t n = 0; n < layers.size(); ++n)
+        layers[n].layer.name = layers[n].layer.genus + std::to_string(n + 1);
+    return layers;
+}
+
+namespace {
+
+// States of the climate are the periods of a forecast, evenly from 0 to 1.
+std::string state_text(const Taf& taf, std::size_t period) {
+    return number_text(taf.periods.size() > 1 ? double(period) / double(taf.periods.size() - 1) : 0, 6);
+}
+
+std::string schedule_text(const Taf& taf) {
+    if (taf.periods.size() == 1) return {};
+    std::string text = "\n[climate]\nschedule = [\n";
+    for (std::size_t n = 1; n < taf.periods.size(); ++n) {
+        const TafPeriod& period = taf.periods[n];
+        text += "    { time_s = " + text_of(period.from_s) + ", state = " + state_text(taf, n - 1) +
+                " },\n    { time_s = " + text_of(period.until_s) + ", state = " + state_text(taf, n) + " },  # " +
+                period.change + "\n";
     }
-    if (visibility < 9999) {
-        text += "\n# " + std::to_string(visibility) +
-                " m of visibility: 3.912 / visibility\n[fog]\nextinction_per_m = " +
-                number_text(kKoschmieder / std::max(visibility, 20), 6) + "\nheight_m = " + text_of(depth) +
-                "\n";
+    return text + "]\n";
+}
+
+std::string winds_text(const Taf& taf, const MetarSceneOptions& o) {
+    std::string text = wind_text(taf.periods.front().weather, o);
+    double last_s = 0;
+    for (std::size_t n = 1; n < taf.periods.size(); ++n) {
+        const TafPeriod &before = taf.periods[n - 1], &period = taf.periods[n];
+        if (is_same(period.weather.wind, before.weather.wind)) continue;
+        if (period.from_s > last_s) text += wind_text(before.weather, o, period.from_s);
+        text += wind_text(period.weather, o, period.until_s);
+        last_s = period.until_s;
     }
-    text +=
-        "\n[frames]\nstart_s = 600\ntime_scale = 60\nper_second = 12\ncount = 12\n\n[camera]\nposition_m = "
-        "[0, -9000, 120]\ntarget_m = [0, 0, " +
-        text_of(std::min(lowest, 2500.0)) +
-        "]\nvertical_fov_deg = 60\nexposure = \"automatic\"\ntone_curve = \"neutral\"\nglare = "
-        "0.1\n\n[atmosphere]\nmodel = \"physical\"\ncolours = \"spectral\"\n\n[ground]\npattern = "
-        "\"country\"\n";
     return text;
+}
+
+std::string presence_text(const Taf& taf, const TafLayer& layer) {
+    if (std::ranges::all_of(layer.present, [](bool there) { return there; })) return {};
+    std::string text;
+    for (std::size_t n = 0; n < layer.present.size(); ++n)
+        text += (n > 0 ? ", { state = " : "presence = [{ state = ") + state_text(taf, n) +
+                ", fraction = " + (layer.present[n] ? "1" : "0") + " }";
+    return text + "]\n";
+}
+
+// Rain of all periods, which begins and ends as they do.
+std::string rain_of_periods(const Taf& taf, double base_m, double step_s) {
+    std::string areas;
+    Precipitation all;
+    bool thunder = false;
+    for (std::size_t n = 0; n < taf.periods.size(); ++n) {
+        const TafPeriod& period = taf.periods[n];
+        const Precipitation p = precipitation_of(period.weather);
+        if (!p.any) continue;
+        all.any = true;
+        all.snow = all.snow || p.snow;
+        thunder = thunder || has_descriptor(period.weather, "TS");
+        const double end_s = n + 1 < taf.periods.size() ? taf.periods[n + 1].until_s : taf.length_s + step_s;
+        const double fade_s = std::min(std::max(step_s, period.until_s - period.from_s), (end_s - period.from_s) / 2);
+        areas += rain_areas(p, ", start_s = " + text_of(period.from_s) + ", end_s = " + text_of(end_s) +
+                                   ", fade_s = " + text_of(fade_s));
+    }
+    return all.any ? rain_text(all, thunder, base_m, areas) : std::string();
+}
+
+}  // namespace
+
+std::string taf_scene_text(const Taf& taf, const MetarSceneOptions& o, const std::vector<double>& coverage) {
+    constexpr double kStep_s = 300;
+    const std::vector<TafLayer> layers = layers_of(taf);
+    std::string text = head_text(taf.text, taf.station, taf.day, taf.hour, 0, o,
+                                 "step_s = " + text_of(kStep_s) +
+                                     "\nsteps = " + std::to_string(int(std::ceil(taf.length_s / kStep_s))) + "\n");
+    text += schedule_text(taf) + winds_text(taf, o);
+    double lowest = 1000;
+    for (std::size_t n = 0; n < layers.size(); ++n) {
+        text += layer_text(layers[n].layer, coverage.at(n), presence_text(taf, layers[n]));
+        lowest = std::min(lowest, layers[n].layer.base_m);
+    }
+    if (layers.empty()) text += kClearLayer;
+    text += rain_of_periods(taf, lowest, kStep_s);
+    text += "\n[density]\nextinction_per_m = 0.05\n" + fog_text(taf.periods.front().weather);
+    return text + picture_text("time_scale = 3600\nper_second = 12\n", lowest);  // an hour is a second of film
 }
 
 std::vector<std::string> metar_notes(const Metar& m, const MetarSceneOptions& o) {

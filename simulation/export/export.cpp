@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "density/combine.h"
+#include "density/export/bricks.h"
 #include "density/export/containers.h"
 #include "simulation/export/export_list.h"
 #include "simulation/export/sequence.h"
@@ -44,6 +45,8 @@ void check_options(const ExportOptions& o) {
         if (format == ExportFormat::vti && (type == VoxelType::bc4 || type == VoxelType::r16f))
             throw Error(ErrorCode::usage,
                         "--type " + std::string(type_name(type)) + ": VTK has r8, r16 and r32f");
+        if (format == ExportFormat::bricks && type == VoxelType::bc4)
+            throw Error(ErrorCode::usage, "--type bc4: bricks with a border have r8, r16, r16f or r32f");
         if (format == ExportFormat::slices && !whole)
             throw Error(ErrorCode::usage,
                         "--type " + std::string(type_name(type)) + ": slices are r8 or r16");
@@ -72,11 +75,7 @@ PlannedSequence planned(const ExportOptions& options, const ExportSequence& s) {
             plan.estimated_bytes += error ? 0 : source * (format == ExportFormat::nvdb ? 5 : 2);
             continue;
         }
-        const bool one = format == ExportFormat::vti || format == ExportFormat::slices;
-        for (int n = 0; n < (one ? 1 : s.levels); ++n)
-            plan.bytes_a_frame +=
-                encoded_bytes(std::max(1, plan.box.size[0] >> n), std::max(1, plan.box.size[1] >> n),
-                              std::max(1, plan.box.size[2] >> n), type_of(options, format));
+        plan.bytes_a_frame += dense_bytes(options, s, format);
     }
     return plan;
 }
@@ -91,8 +90,13 @@ ExportReport report_of(const ExportOptions& options, const std::vector<ExportSeq
     return report;
 }
 
-// The disk that holds the folder, or will.
+// The disk that holds the folder, or will; of an export that goes on, what it has written already is not counted again.
 void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
+    std::error_code none;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
+        const std::uintmax_t size = entry.is_regular_file(none) ? entry.file_size(none) : 0;
+        if (size != std::uintmax_t(-1)) bytes -= std::min<std::uint64_t>(bytes, size);
+    }
     std::filesystem::path at = std::filesystem::absolute(folder);
     while (!std::filesystem::exists(at) && at.has_parent_path() && at != at.parent_path())
         at = at.parent_path();
@@ -104,20 +108,35 @@ void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
                             bytes_text(std::size_t(bytes)), bytes_text(std::size_t(space.available))));
 }
 
-// Keeps grids that were read once, as long as they are small.
+// Reads the files of sequences, and keeps grids that were read once, as long as they are small.
 class GridReader {
   public:
     explicit GridReader(const ExportOptions& options) { reading_.grid = options.grid; }
 
-    LoadedDensity read(const std::filesystem::path& file, bool keep) {
-        if (const auto found = kept_.find(file); found != kept_.end()) return found->second;
-        LoadedDensity loaded = load_density(file, reading_);
-        const std::size_t bytes = loaded.density.memory_bytes();
-        if (keep && bytes_ + bytes < kMostKept) {
-            bytes_ += bytes;
-            kept_.emplace(file, loaded);
+    using Each = std::function<bool(std::size_t frame, const LoadedDensity& loaded)>;  // false: stop
+
+    void read(const std::vector<SourceFrame>& frames, bool keep, const Each& each) {
+        for (std::size_t n = 0; n < frames.size();) {
+            if (const auto found = kept_.find(frames[n].file); found != kept_.end()) {
+                if (!each(n++, found->second)) return;
+                continue;
+            }
+            std::vector<std::filesystem::path> files;
+            for (std::size_t m = n; m < frames.size() && !kept_.contains(frames[m].file); ++m)
+                files.push_back(frames[m].file);
+            bool goes_on = true;
+            load_densities(files, reading_, [&](std::size_t index, LoadedDensity&& loaded) {
+                goes_on = each(n + index, loaded);
+                const std::size_t bytes = loaded.density.memory_bytes();
+                if (keep && bytes_ + bytes < kMostKept) {
+                    bytes_ += bytes;
+                    kept_.emplace(files[index], std::move(loaded));
+                }
+                return goes_on;
+            });
+            if (!goes_on) return;
+            n += files.size();
         }
-        return loaded;
     }
 
   private:
@@ -168,7 +187,7 @@ class FrameExporter {
             throw Error(ErrorCode::io,
                         frame.file.string() + ": has another box than the first file of its sequence");
         std::map<VoxelType, EncodedVolume> encoded;
-        std::optional<Volume> volume;
+        std::vector<Volume> levels;
         for (const ExportFormat format : all_formats(options_)) {
             if (format == ExportFormat::usd) continue;
             const std::string name = frame_name(s, frame.number, format);
@@ -180,13 +199,16 @@ class FrameExporter {
                 write_nanovdb(path, grid_of(loaded.density, s.layout.factor),
                               options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
             } else {
+                if (levels.empty()) levels = levels_of(loaded.density, s);
                 const VoxelType type = type_of(options_, format);
-                auto found = encoded.find(type);
-                if (found == encoded.end()) {
-                    if (!volume) volume = lay_out(loaded.density, s.layout);
-                    found = encoded.emplace(type, levels_of(*volume, s, type)).first;
+                if (format == ExportFormat::bricks) {
+                    write_bricks(path, levels, brick_options(s, type));
+                } else {
+                    auto found = encoded.find(type);
+                    if (found == encoded.end())
+                        found = encoded.emplace(type, encoded_levels(levels, type, s.scale)).first;
+                    write_dense(path, format, s, frame, found->second);
                 }
-                write_dense(path, format, s, frame, found->second);
             }
             list_.add(name, frame.file, name_of(format));
         }
@@ -194,15 +216,26 @@ class FrameExporter {
     }
 
   private:
-    EncodedVolume levels_of(const Volume& volume, const ExportSequence& s, VoxelType type) const {
+    static std::vector<Volume> levels_of(const DensityGrid& density, const ExportSequence& s) {
+        std::vector<Volume> levels{lay_out(density, s.layout)};
+        for (int n = 1; n < s.levels; ++n) levels.push_back(halved(levels.back()));
+        return levels;
+    }
+
+    static EncodedVolume encoded_levels(const std::vector<Volume>& levels, VoxelType type, float scale) {
         EncodedVolume encoded{type, {}};
-        encoded.levels.push_back({volume.nx, volume.ny, volume.nz, encode(volume, type, s.scale)});
-        Volume smaller;
-        for (int n = 1; n < s.levels; ++n) {
-            smaller = halved(n == 1 ? volume : smaller);
-            encoded.levels.push_back({smaller.nx, smaller.ny, smaller.nz, encode(smaller, type, s.scale)});
-        }
+        for (const Volume& v : levels) encoded.levels.push_back({v.nx, v.ny, v.nz, encode(v, type, scale)});
         return encoded;
+    }
+
+    // Bricks wrap around where the box repeats and nothing stands between its sides.
+    BrickOptions brick_options(const ExportSequence& s, VoxelType type) const {
+        const VolumeBox box = box_of(s.extent, s.placement, s.layout);
+        BrickOptions bricks{options_.brick_edge, type, s.scale, {}};
+        for (std::size_t a = 0; a < 3; ++a)
+            bricks.periodic[a] =
+                s.layout.periodic[std::size_t(box.axis[a])] && box.border == 0 && box.padding[a] == 0;
+        return bricks;
     }
 
     void write_dense(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
@@ -330,8 +363,10 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
         frames += s.frames.size();
         if (!options.range_auto) continue;
         float most = 0;
-        for (const SourceFrame& frame : s.frames)
-            most = std::max(most, reader.read(frame.file, true).density.max_value());
+        reader.read(s.frames, true, [&](std::size_t, const LoadedDensity& loaded) {
+            most = std::max(most, loaded.density.max_value());
+            return true;
+        });
         if (most > 0) s.scale = most;
     }
     ExportList list(options, sequences);
@@ -342,8 +377,9 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
         for (std::size_t n = 0; n < sequences.size(); ++n) {
             ExportSequence& s = sequences[n];
             if (all_formats(options).empty()) break;
-            for (SourceFrame& frame : s.frames) {
-                const LoadedDensity loaded = reader.read(frame.file, false);
+            bool stopped = false;
+            reader.read(s.frames, false, [&](std::size_t index, const LoadedDensity& loaded) {
+                SourceFrame& frame = s.frames[index];
                 if (loaded.metadata) {
                     frame.time_s = loaded.metadata->time_s;
                     frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
@@ -357,11 +393,13 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                                     "(--range auto keeps them)",
                                     frame.file.string(), figures[n].back().max, s.scale));
                 if (++done % kListEvery == 0) list.write(false);
-                if (progress && !progress(done, frames)) {
-                    list.write(false);
-                    report.notes = std::move(notes);
-                    return report;
-                }
+                stopped = progress && !progress(done, frames);
+                return !stopped;
+            });
+            if (stopped) {
+                list.write(false);
+                report.notes = std::move(notes);
+                return report;
             }
         }
         write_texts(options, sequences, figures, list);

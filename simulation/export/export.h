@@ -30,7 +30,7 @@ namespace nephos {
 // Forms of a summary of the layers, for simulators that take no voxels.
 enum class WeatherFormat { layers, metar, xplane, wpr, cigi };
 
-enum class ExportFormat { raw, vti, dds, ktx2, nvdb, usd, slices, vdb };
+enum class ExportFormat { raw, vti, dds, ktx2, nvdb, usd, slices, vdb, bricks };
 
 struct ExportOptions {
     std::filesystem::path source;                // folder of a run, or a VDB file
@@ -47,6 +47,7 @@ struct ExportOptions {
     std::optional<double> voxel_m;  // edge of a voxel; a multiple of the grid's
     std::optional<int> largest_side;
     bool mips = false;
+    int brick_edge = 32;            // of `bricks`, without the border
     std::string velocity_name;      // of the wind in VDB files; empty: none
     bool half_voxel_shift = false;  // VDB and USD: moved by half a voxel along -x -y -z, for Blender
     bool zip = false;               // compress VTI and NanoVDB

@@ -65,6 +65,7 @@ Json head_json(const ExportOptions& o, const std::vector<ExportSequence>& sequen
               {"quantise", int(o.quantise)},
               {"half_voxel_shift", o.half_voxel_shift},
               {"velocity", o.velocity_name},
+              {"brick_edge", o.brick_edge},
               {"grid", o.grid}}},
             {"sequences", list}};
 }

@@ -31,11 +31,11 @@ Json format_json(const ExportOptions& options, const ExportSequence& s, const Na
     json["type"] = type_name(type);
     Json levels = Json::array();
     std::size_t offset = 0;
-    const int count =
-        named.format == ExportFormat::vti || named.format == ExportFormat::slices ? 1 : s.levels;
-    for (int n = 0; n < count; ++n) {
-        std::array<int, 3> size = box.size;
-        for (int& side : size) side = std::max(1, side >> n);
+    for (const std::array<int, 3>& size : level_sizes(s, named.format)) {
+        if (named.format == ExportFormat::bricks) {
+            levels.push_back({{"size", size}});
+            continue;
+        }
         const std::size_t bytes = encoded_bytes(size[0], size[1], size[2], type);
         Json level = {{"size", size}, {"bytes", bytes}};
         if (named.format == ExportFormat::raw) level["offset"] = offset;
@@ -43,6 +43,7 @@ Json format_json(const ExportOptions& options, const ExportSequence& s, const Na
         levels.push_back(std::move(level));
     }
     json["levels"] = std::move(levels);
+    if (named.format == ExportFormat::bricks) json["brick"] = {{"edge", options.brick_edge}, {"border", 1}};
     if (named.format == ExportFormat::slices) {
         const int columns = slice_columns(box.size[0], box.size[1], box.size[2]);
         json["columns"] = columns;

@@ -71,8 +71,11 @@ constexpr const char* kMsfs =
 constexpr const char* kCigi =
     "CIGI 3.3 (packets decoded by Wireshark's dissector)\n\n"
     "{NAME}.pcap has a datagram a frame: IG Control, then a Weather Control for each of up to three layers, "
-    "global scope,\n"
-    "big-endian. Play it with tcpreplay, or take the payloads as they are.\n";
+    "big-endian: of "
+    "a\n"
+    "region around the scene's place (Environmental Region Control) where it has a [georeference], else "
+    "global. Play it with\n"
+    "tcpreplay, or take the payloads as they are.\n";
 
 constexpr const char* kFlightgear =
     "FlightGear 2020.3 (not tried on its screen; its METAR syntax is that of FM 15)\n\n"
@@ -153,6 +156,8 @@ const std::vector<NamedFormat>& export_formats() {
         {ExportFormat::usd, "usd", ".usda", "USD scene of VDB files"},
         {ExportFormat::slices, "slices", ".png", "flipbook of slices"},
         {ExportFormat::vdb, "vdb", ".vdb", "OpenVDB with names of a flat folder"},
+        {ExportFormat::bricks, "bricks", ".bricks",
+         "bricks with a border, a table of ranges, nothing where it is empty"},
     };
     return formats;
 }

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "density/export/bricks.h"
 #include "simulation/run_listing.h"
 #include "simulation/scene_place.h"
 
@@ -137,15 +138,8 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
     fit();
     const auto frame_bytes = [&] {
         std::uint64_t bytes = 0;
-        const VolumeBox box = box_of(s.extent, s.placement, s.layout);
-        for (const ExportFormat format : formats) {
-            for (int n = 0;
-                 is_dense(format) &&
-                 n < (format == ExportFormat::vti || format == ExportFormat::slices ? 1 : s.levels);
-                 ++n)
-                bytes += encoded_bytes(std::max(1, box.size[0] >> n), std::max(1, box.size[1] >> n),
-                                       std::max(1, box.size[2] >> n), type_of(options, format));
-        }
+        for (const ExportFormat format : formats)
+            bytes += is_dense(format) ? dense_bytes(options, s, format) : 0;
         return bytes;
     };
     if (options.budget_bytes) {
@@ -185,12 +179,32 @@ bool is_dense(ExportFormat format) {
     return format != ExportFormat::nvdb && format != ExportFormat::usd && format != ExportFormat::vdb;
 }
 
+std::vector<std::array<int, 3>> level_sizes(const ExportSequence& s, ExportFormat format) {
+    const bool one = format == ExportFormat::vti || format == ExportFormat::slices;
+    std::vector<std::array<int, 3>> sizes{box_of(s.extent, s.placement, s.layout).size};
+    for (int n = 1; n < s.levels && !one; ++n) {
+        sizes.push_back(sizes.back());
+        for (int& side : sizes.back()) side = std::max(1, side / 2);
+    }
+    return sizes;
+}
+
+std::uint64_t dense_bytes(const ExportOptions& options, const ExportSequence& s, ExportFormat format) {
+    const VoxelType type = type_of(options, format);
+    const std::vector<std::array<int, 3>> sizes = level_sizes(s, format);
+    if (format == ExportFormat::bricks) return most_brick_bytes(sizes, options.brick_edge, type);
+    std::uint64_t bytes = 0;
+    for (const std::array<int, 3>& size : sizes) bytes += encoded_bytes(size[0], size[1], size[2], type);
+    return bytes;
+}
+
 VoxelType format_type(ExportFormat format) {
     switch (format) {
         case ExportFormat::dds:
         case ExportFormat::ktx2:
             return VoxelType::bc4;
         case ExportFormat::slices:
+        case ExportFormat::bricks:
             return VoxelType::r8;
         default:
             return VoxelType::r32f;

@@ -3,6 +3,8 @@
 
 // What an export reads: sequences of density files with all that is known of them (not installed).
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -50,6 +52,10 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
 // Formats whose files hold the dense box.
 bool is_dense(ExportFormat format);
 VoxelType type_of(const ExportOptions& options, ExportFormat format);
+// Sizes of the levels of a sequence in files of a format: of most all, of some the first alone.
+std::vector<std::array<int, 3>> level_sizes(const ExportSequence& sequence, ExportFormat format);
+// Returns the bytes of a frame in a dense format; of bricks the most.
+std::uint64_t dense_bytes(const ExportOptions& options, const ExportSequence& sequence, ExportFormat format);
 // USD refers to VDB files, which are written with it. Sorted, each once.
 std::vector<ExportFormat> all_formats(const ExportOptions& options);
 

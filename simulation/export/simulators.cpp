@@ -19,6 +19,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kKnot = 1852.0 / 3600;
+constexpr std::uint16_t kCigiRegion = 1;
 
 // X-Plane's types: 0 cirrus, 1 stratus, 2 cumulus, 3 cumulonimbus.
 int xplane_type(const std::string& genus) {
@@ -43,11 +44,6 @@ void put_big(ByteWriter& w, T value) {
     w.put_bytes(bytes);
 }
 
-double from_of(const Velocity& v) {
-    const double degrees = std::atan2(-v.east_m_per_s, -v.north_m_per_s) * 180 / 3.14159265358979323846;
-    return degrees < 0 ? degrees + 360 : degrees;
-}
-
 // Internet checksum (RFC 1071) of an IPv4 header.
 std::uint16_t checksum(std::span<const std::byte> header) {
     std::uint32_t sum = 0;
@@ -55,6 +51,23 @@ std::uint16_t checksum(std::span<const std::byte> header) {
         sum += std::to_integer<std::uint32_t>(header[n]) << 8 | std::to_integer<std::uint32_t>(header[n + 1]);
     while (sum >> 16 != 0) sum = (sum & 0xFFFF) + (sum >> 16);
     return std::uint16_t(~sum);
+}
+
+// Environmental Region Control (section 4.1.11): the rectangle of the clouds around their place on Earth, with the weather
+// of its own; turned by the heading of the world's y axis. In a region of no transition clouds would end like a wall.
+void put_region(ByteWriter& w, const WeatherRegion& region) {
+    w.put(std::uint8_t{11});
+    w.put(std::uint8_t{48});
+    put_big(w, kCigiRegion);
+    w.put(std::uint8_t{
+        1});  // active; its weather, aerosol, sea and land are not merged with those of other regions
+    for (int n = 0; n < 3; ++n) w.put(std::uint8_t{0});
+    put_big(w, region.latitude_deg);
+    put_big(w, region.longitude_deg);
+    for (const double value : {region.east_m, region.north_m, 0.0, std::remainder(region.heading_deg, 360.0),
+                               0.1 * std::min(region.east_m, region.north_m)})
+        put_big(w, float(value));
+    put_big(w, std::uint32_t{0});
 }
 
 }  // namespace
@@ -73,7 +86,7 @@ std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>
             if (winds.size() == 13) break;
             winds.push_back({{"alt_msl", height + w.elevation_m},
                              {"speed", std::hypot(v.east_m_per_s, v.north_m_per_s)},
-                             {"direction", from_of(v)},
+                             {"direction", bearing_from(v, w.heading_deg)},
                              {"gust_speed", 0},
                              {"shear", 0},
                              {"turbulence", 0}});
@@ -99,6 +112,16 @@ std::string wpr_text(const RunListing& run, const WeatherSummary& w) {
         "version=\"1,3\">\n  <Descr>AceXML Document</Descr>\n"
         "  <WeatherPreset.Preset>\n    <Name>{}</Name>\n    <IsAltitudeAMGL>False</IsAltitudeAMGL>\n",
         run.scene.name);
+    // Pressure and temperature are those of the standard atmosphere; aerosol is that of the fog, 1 at 1,000 m of visibility.
+    text += fmt::format(
+        "    <MSLPressure Value=\"101325.0\" Unit=\"pa\"/>\n    <MSLTemperature Value=\"288.15\" "
+        "Unit=\"k\"/>\n"
+        "    <AerosolDensity Value=\"{:.3f}\" Unit=\"(0 - 1)\"/>\n    <Precipitations Value=\"{:.2f}\" "
+        "Unit=\"mm/h\"/>\n"
+        "    <SnowCover Value=\"{:.3f}\" Unit=\"m\"/>\n    <ThunderstormIntensity Value=\"{:.1f}\" "
+        "Unit=\"(0 - 1)\"/>\n",
+        w.visibility_m < 9999 ? std::min(1.0, 1000 / w.visibility_m) : 0.0, w.rain_mm_per_h, w.snow_depth_m,
+        w.thunder ? 1.0 : 0.0);
     for (const LayerSummary& s : three_layers(w.layers)) {
         text += fmt::format(
             "    <CloudLayer>\n      <CloudLayerAltitudeBot Value=\"{:.1f}\" Unit=\"m\"/>\n      "
@@ -113,13 +136,10 @@ std::string wpr_text(const RunListing& run, const WeatherSummary& w) {
             "    <WindLayer>\n      <WindLayerAltitude Value=\"{:.1f}\" Unit=\"m\"/>\n      <WindLayerAngle "
             "Value=\"{:.1f}\" Unit=\"degrees\"/>\n"
             "      <WindLayerSpeed Value=\"{:.1f}\" Unit=\"knts\"/>\n    </WindLayer>\n",
-            height + w.elevation_m, from_of(v), std::hypot(v.east_m_per_s, v.north_m_per_s) / kKnot);
+            height + w.elevation_m, bearing_from(v, w.heading_deg),
+            std::hypot(v.east_m_per_s, v.north_m_per_s) / kKnot);
     }
-    text += fmt::format(
-        "    <Precipitations Value=\"{:.2f}\" Unit=\"mm/h\"/>\n    <ThunderstormIntensity Value=\"{:.1f}\" "
-        "Unit=\"(0 - 1)\"/>\n  </WeatherPreset.Preset>\n</SimBase.Document>\n",
-        w.rain_mm_per_h, w.thunder ? 1.0 : 0.0);
-    return text;
+    return text + "  </WeatherPreset.Preset>\n</SimBase.Document>\n";
 }
 
 std::vector<std::byte> cigi_packets(const WeatherSummary& weather) {
@@ -129,16 +149,18 @@ std::vector<std::byte> cigi_packets(const WeatherSummary& weather) {
     put_big(w, std::uint16_t{0x8000});
     put_big(w, std::uint32_t(weather.number));
     for (int n = 0; n < 3; ++n) put_big(w, std::uint32_t{0});
+    const bool regional = weather.region.has_value();
+    if (regional) put_region(w, *weather.region);
     int id = 0;
     for (const LayerSummary& s : three_layers(weather.layers)) {
         ++id;
         w.put(std::uint8_t{12});
         w.put(std::uint8_t{56});
-        put_big(w, std::uint16_t{0});  // of no region: global
-        w.put(std::uint8_t(id));       // cloud layer 1 to 3
-        w.put(std::uint8_t{95});       // humidity in it, per cent
+        put_big(w, regional ? kCigiRegion : std::uint16_t{0});
+        w.put(std::uint8_t(id));  // cloud layer 1 to 3
+        w.put(std::uint8_t{95});  // humidity in it, per cent
         w.put(std::uint8_t(1 | (weather.thunder && id == 1 ? 8 : 0) | cigi_type(s.genus) << 4));
-        w.put(std::uint8_t{0});  // global scope, no severity
+        w.put(std::uint8_t(regional ? 1 : 0));  // scope: regional or global; no severity
         const double direction = s.wind_from_deg > 180 ? s.wind_from_deg - 360 : s.wind_from_deg;
         const double base = s.columns.cloud_base_m + weather.elevation_m;
         for (const double value :

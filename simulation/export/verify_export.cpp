@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "density/export/bricks.h"
 #include "density/export/containers.h"
 #include "simulation/export/export_list.h"
 
@@ -30,6 +31,7 @@ void compare(const std::vector<float>& expected, const std::vector<float>& found
 EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
                          const VolumeBox& box, int levels) {
     const auto& [nx, ny, nz] = box.size;
+    if (format == "bricks") return read_bricks(path);
     if (format == "raw") return read_raw(path, type, nx, ny, nz, levels);
     if (format == "dds") return read_dds(path);
     if (format == "ktx2") return read_ktx2(path);

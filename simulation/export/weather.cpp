@@ -20,13 +20,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kFoot_m = 0.3048, kKoschmieder = 3.912, kSurface_m = 10;
 
-// The true bearing that a velocity comes from, 0..360.
-double bearing_from(const Velocity& v, double heading_deg) {
-    const double degrees =
-        std::atan2(-v.east_m_per_s, -v.north_m_per_s) * 180 / std::numbers::pi + heading_deg;
-    return degrees - 360 * std::floor(degrees / 360);
-}
-
 double speed_of(const Velocity& v) { return std::hypot(v.east_m_per_s, v.north_m_per_s); }
 
 // "Sc1" of a scene that was made of a report, or a model's genus.
@@ -61,9 +54,24 @@ LayerSummary summary_of(const RunListing& run, const std::string& name, const De
     return s;
 }
 
+WeatherRegion region_of(const Scene& scene) {
+    const WorldRectangle world = whole_world(scene);
+    const Georeference& at = scene.georeference;
+    const GeodeticPlace centre =
+        geodetic_place(at, {(world.min_x_m + world.max_x_m) / 2, (world.min_y_m + world.max_y_m) / 2, 0});
+    return {centre.latitude_deg, centre.longitude_deg, world.max_x_m - world.min_x_m,
+            world.max_y_m - world.min_y_m, at.heading_deg};
+}
+
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 }  // namespace
+
+double bearing_from(const Velocity& v, double heading_deg) {
+    const double degrees =
+        std::atan2(-v.east_m_per_s, -v.north_m_per_s) * 180 / std::numbers::pi + heading_deg;
+    return degrees - 360 * std::floor(degrees / 360);
+}
 
 WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
     const Scene& scene = run.scene;
@@ -73,6 +81,10 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
     w.utc = utc_at(scene.georeference, frame.time_s);
     w.elevation_m = scene.georeference.given ? scene.georeference.height_m : 0;
     const double heading = scene.georeference.given ? scene.georeference.heading_deg : 0;
+    w.heading_deg = heading;
+    if (scene.georeference.given) w.region = region_of(scene);
+    // Fresh snow has a tenth of the density of water.
+    if (scene.ground_cover.enabled) w.snow_depth_m = scene.ground_cover.initial_snow_mm / 100;
     if (scene.layers.empty()) {
         w.layers.push_back(summary_of(run, scene.name, read_density(density_file(run, frame, {})),
                                       scene.automaton.wind, frame.time_s));

@@ -21,6 +21,11 @@ struct LayerSummary {
     double rain_mm_per_h = 0;                    // the strongest of its areas
 };
 
+// The rectangle of all lattices on Earth: its centre, its edges and the true bearing of its y axis.
+struct WeatherRegion {
+    double latitude_deg = 0, longitude_deg = 0, east_m = 0, north_m = 0, heading_deg = 0;
+};
+
 struct WeatherSummary {
     int number = 1;
     double time_s = 0;
@@ -32,6 +37,9 @@ struct WeatherSummary {
     double rain_mm_per_h = 0;
     bool snow = false, showers = false, thunder = false;
     double elevation_m = 0;  // of z = 0 above mean sea level
+    double heading_deg = 0;  // true bearing of the y axis
+    std::optional<WeatherRegion> region;  // of a scene with a place on Earth
+    double snow_depth_m = 0;              // on the ground
 };
 
 // Reads the density files of a frame: of its layers, or the only one. Throws Error(io) as load_density().
@@ -44,7 +52,11 @@ std::string layers_json_text(const RunListing& run, const std::vector<WeatherSum
 std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>& frames);
 std::string wpr_text(const RunListing& run, const WeatherSummary& weather);
 
-// Returns CIGI 3.3 packets, big-endian: IG Control, then Weather Control of the (up to three) layers; and all frames as
+// Returns the true bearing that a velocity of the world comes from, 0..360.
+double bearing_from(const Velocity& velocity, double heading_deg);
+
+// Returns CIGI 3.3 packets, big-endian: IG Control, of a scene with a place Environmental Region Control, then Weather
+// Control of the (up to three) layers, of that region or global; and all frames as
 // a capture of UDP datagrams to port 8005 (pcap, Ethernet).
 std::vector<std::byte> cigi_packets(const WeatherSummary& weather);
 std::vector<std::byte> cigi_capture(const std::vector<WeatherSummary>& frames);

@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <fstream>
+#include <iterator>
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "density/export/bricks.h"
 #include "density/export/containers.h"
 #include "density/export/nanovdb_file.h"
 #include "density/export/volume.h"
@@ -216,6 +219,95 @@ TEST(Containers, NanoVdbHoldsTheSameVoxels) {
     write_nanovdb(folder / "v.nvdb", grid, NanoCodec::none, NanoQuantise::none);
     EXPECT_LT(std::filesystem::file_size(folder / "q.nvdb"),
               0.9 * double(std::filesystem::file_size(folder / "v.nvdb")));
+}
+
+// Every voxel of every level is in a brick, its neighbours are in the border, and empty bricks have no data.
+TEST(Bricks, AreReadBackAndHaveTheirNeighbours) {
+    const TemporaryFolder folder;
+    std::vector<float> values = random_grid({40, 24, 17}, 9).to_dense();
+    for (std::size_t n = 0; n < values.size(); ++n)
+        if (n % 40 >= 26) values[n] = 0;  // so that the last bricks along x are empty
+    Volume volume{40, 24, 17, values};
+    volume.nz = 16;
+    volume.values.resize(40 * 24 * 16);
+    const std::vector<Volume> levels{volume, halved(volume)};
+    for (const VoxelType type : {VoxelType::r8, VoxelType::r16, VoxelType::r16f, VoxelType::r32f}) {
+        const BrickOptions options{8, type, 0.8f, {true, true, false}};
+        const auto path = folder / "v.bricks";
+        write_bricks(path, levels, options);
+        EXPECT_LE(std::filesystem::file_size(path), most_brick_bytes({{40, 24, 16}, {20, 12, 8}}, 8, type));
+        const EncodedVolume back = read_bricks(path);
+        ASSERT_EQ(back.type, type);
+        ASSERT_EQ(back.levels.size(), 2u);
+        for (std::size_t n = 0; n < 2; ++n) {
+            EXPECT_EQ(back.levels[n].nx, levels[n].nx);
+            EXPECT_TRUE(back.levels[n].bytes == encode(levels[n], type, 0.8f)) << type_name(type);
+        }
+    }
+    EXPECT_THROW(write_bricks(folder / "b.bricks", levels, {8, VoxelType::bc4, 1, {}}), Error);
+    // The table by hand, as another program reads it.
+    write_bricks(folder / "f.bricks", levels, {8, VoxelType::r32f, 1, {true, true, false}});
+    std::ifstream stream(folder / "f.bricks", std::ios::binary);
+    const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+    const auto at = [&]<class T>(std::size_t offset, T) {
+        T value;
+        std::memcpy(&value, bytes.data() + offset, sizeof value);
+        return value;
+    };
+    ASSERT_EQ(bytes.substr(0, 8), "NPHBRIC1");
+    const std::uint64_t count = at(24, std::uint64_t{});
+    ASSERT_EQ(count, 5u * 3 * 2 + 3 * 2 * 1);
+    std::size_t empty = 0, checked = 0;
+    for (std::uint64_t n = 0; n < count; ++n) {
+        const std::size_t entry = 32 + 2 * 12 + 40 * n;
+        const auto level = at(entry, std::uint32_t{}), i = at(entry + 4, std::uint32_t{}), j = at(entry + 8, std::uint32_t{}),
+                   k = at(entry + 12, std::uint32_t{});
+        const auto offset = at(entry + 16, std::uint64_t{}), size = at(entry + 24, std::uint64_t{});
+        const auto least = at(entry + 32, 0.0f), most = at(entry + 36, 0.0f);
+        if (size == 0) {
+            EXPECT_EQ(most, 0.0f);
+            ++empty;
+            continue;
+        }
+        ASSERT_EQ(size, 1000u * 4);
+        const Volume& v = levels[level];
+        float low = 1e9f, high = 0;
+        for (int z = -1; z <= 8; ++z)
+            for (int y = -1; y <= 8; ++y)
+                for (int x = -1; x <= 8; ++x) {
+                    const int sx = (int(8 * i) + x + v.nx) % v.nx, sy = (int(8 * j) + y + v.ny) % v.ny, sz = int(8 * k) + z;
+                    const bool there = int(8 * i) + x <= v.nx && int(8 * j) + y <= v.ny && sz >= 0 && sz < v.nz;
+                    const float expected = there ? v.values[std::size_t((sz * v.ny + sy) * v.nx + sx)] : 0.0f;
+                    const float found = at(offset + 4 * std::size_t(((z + 1) * 10 + y + 1) * 10 + x + 1), 0.0f);
+                    ASSERT_EQ(found, expected) << n << ": " << x << " " << y << " " << z;
+                    low = std::min(low, found);
+                    high = std::max(high, found);
+                    ++checked;
+                }
+        EXPECT_EQ(least, low);
+        EXPECT_EQ(most, high);
+    }
+    EXPECT_GT(empty, 0u);
+    EXPECT_GT(checked, 10000u);
+}
+
+TEST(Bricks, DamagedFilesAreRefused) {
+    const TemporaryFolder folder;
+    const Volume volume = lay_out(random_grid({20, 20, 20}, 4), {});
+    write_bricks(folder / "v.bricks", {volume}, {16, VoxelType::r8, 1, {}});
+    std::ifstream stream(folder / "v.bricks", std::ios::binary);
+    const std::string whole((std::istreambuf_iterator<char>(stream)), {});
+    const auto refused = [&](std::string bytes) {
+        std::ofstream(folder / "bad.bricks", std::ios::binary) << bytes;
+        EXPECT_THROW(read_bricks(folder / "bad.bricks"), Error);
+    };
+    for (const std::size_t length : {0ul, 7ul, 40ul, 100ul, whole.size() - 1}) refused(whole.substr(0, length));
+    std::mt19937 random(1);
+    for (const std::size_t at : {0ul, 8ul, 12ul, 16ul, 20ul, 24ul, 32ul, 44ul, 68ul}) {
+        std::string bytes = whole;
+        bytes[at + 1] = char(0x7f);
+        refused(bytes);
+    }
 }
 
 }  // namespace

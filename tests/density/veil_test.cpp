@@ -146,6 +146,91 @@ TEST(Veil, IsAFunctionOfPlace) {
     EXPECT_LT(worst, 1e-4);
 }
 
+// A tile of 24 x 20 cells, seen through a window of two by two; fibres lie askew.
+VeilOptions repeating(VeilForm form) {
+    VeilOptions o = every_option();
+    o.form = form;
+    o.wavelength_m = 700;
+    o.lacunarity = 2;
+    o.stretch = 2;
+    o.margin_m = 0;
+    o.period_m = {24 * 80.0, 20 * 80.0};
+    o.area = {.x_m = 100, .y_m = 900, .semi_a_m = 900, .semi_b_m = 700, .yaw_deg = 25, .softness = 0.3};
+    return o;
+}
+
+// Beyond an edge of the period the veil goes on as at the opposite edge, at any time and in any wind.
+TEST(Veil, RepeatsWithItsPeriod) {
+    for (const VeilOptions& form : every_form()) {
+        const VeilOptions options = repeating(form.form);
+        const DensityGrid grid = veil_density(options, steady_wind(21, -7), {48, 40, 21}, kPlacement, 4321);
+        double worst = 0, largest = 0, other = 0;
+        for (int k = 0; k < 21; ++k) {
+            for (int j = 0; j < 20; ++j) {
+                for (int i = 0; i < 24; ++i) {
+                    const double here = double(grid.value(i, j, k));
+                    for (const auto& [di, dj] : {std::pair{24, 0}, {0, 20}, {24, 20}})
+                        worst = std::max(worst, std::abs(double(grid.value(i + di, j + dj, k)) - here));
+                    largest = std::max(largest, here);
+                    other = std::max(other, std::abs(double(grid.value((i + 12) % 24, j, k)) - here));
+                }
+            }
+        }
+        EXPECT_LT(worst, 2e-4) << int(options.form);
+        EXPECT_GT(largest, 0.2);
+        EXPECT_GT(other, 0.2);  // and not with half of it
+    }
+}
+
+// A place of the lattice that is n cells further shows the array rolled by n cells.
+TEST(Veil, OfAPeriodRollsWithTheLattice) {
+    const VeilOptions options = repeating(VeilForm::cirrus);
+    const Extent tile{24, 20, 21};
+    const DensityGrid home = veil_density(options, {}, tile, kPlacement, 50);
+    for (const auto& [di, dj] : {std::pair{1, 0}, {5, 13}, {-7, 3}, {24, 20}}) {
+        Placement moved = kPlacement;
+        moved.origin_m += Vec3(di * 80.0, dj * 80.0, 0);
+        const DensityGrid rolled = veil_density(options, {}, tile, moved, 50);
+        double worst = 0;
+        for (int k = 0; k < tile.z; ++k)
+            for (int j = 0; j < tile.y; ++j)
+                for (int i = 0; i < tile.x; ++i)
+                    worst = std::max(worst, std::abs(double(rolled.value(i, j, k)) -
+                                                     double(home.value((i + di + 24) % 24, (j + dj + 20) % 20, k))));
+        EXPECT_LT(worst, 2e-4) << di << " " << dj;
+    }
+}
+
+TEST(Veil, OfAPeriodEqualsTheTwin) {
+    for (const VeilOptions& form : every_form()) {
+        VeilOptions options = repeating(form.form);
+        options.area = {};
+        const DensityGrid grid = veil_density(options, steady_wind(3, 2), {24, 20, 21}, kPlacement, 100);
+        const VeilThresholds at = veil_thresholds(options);
+        const test::ReferenceVeil twin(options, {3, 2}, 100);
+        double worst = 0;
+        for (int n = 0; n < 300; ++n) {
+            const int i = n * 7 % 24, j = n * 11 % 20, k = 1 + n * 5 % 19;
+            const Vec3 p = centre(i, j, k);
+            const double expected = twin.density(twin.sum_at(p), double(at.low), double(at.high), twin.weight_at(p.z, 1, 1));
+            const double value = double(grid.value(i, j, k));
+            if (std::min(value, expected) < 0x1.01p-10) continue;
+            worst = std::max(worst, std::abs(value - expected));
+        }
+        EXPECT_LT(worst, 1e-4) << int(options.form);
+    }
+}
+
+// Half as many wavelengths as fit, and an area as large as the tile.
+TEST(Veil, ThatDoesNotFitIntoItsPeriodIsRefused) {
+    VeilOptions wide = repeating(VeilForm::stratus);
+    wide.wavelength_m = 5000;
+    EXPECT_THROW(veil_density(wide, {}, {24, 20, 21}, kPlacement, 0), Error);
+    VeilOptions area = repeating(VeilForm::stratus);
+    area.area.semi_a_m = 1500;
+    EXPECT_THROW(veil_density(area, {}, {24, 20, 21}, kPlacement, 0), Error);
+}
+
 // With octaves that stand still in the wind, the veil is moved and nothing else.
 TEST(Veil, IsCarriedByTheWindOfItsTop) {
     VeilOptions options = every_option();

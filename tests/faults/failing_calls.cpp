@@ -2,10 +2,11 @@
 // Preloaded into a command, this lets calls of the system fail as a bad disk, a network file system or a kill would.
 //
 //     FAIL_CALL="NAME HOW FIRST COUNT"  of the calls NAME, numbered from 1 among those that FAIL_PATH allows, COUNT fail
-//                                       from FIRST on. NAME: open, read, write (with pwrite, writev), lseek, fsync, rename,
-//                                       mkdir, stat (with lstat, fstat), mmap, or allocate (memory of 32 KiB or more). HOW:
-//                                       an error (EIO, EINTR, ENOSPC, EACCES, EMFILE, ENOMEM), KILL, SHORT (of read and
-//                                       write: half of the bytes), or COUNT (a byte into the file FAIL_COUNT for each)
+//                                       from FIRST on. NAME: open, read, write (with pwrite, writev), lseek, fsync (with
+//                                       fdatasync), rename, mkdir, stat (with lstat, fstat), mmap, or allocate (memory of
+//                                       32 KiB or more). HOW: an error (EIO, EINTR, ENOSPC, EACCES, EMFILE, ENOMEM), KILL,
+//                                       SHORT (of read and write: half of the bytes), or COUNT (a byte into the file
+//                                       FAIL_COUNT for each)
 //     FAIL_PATH=TEXT                    only on files in whose path TEXT occurs
 //     FAIL_PROGRAM=NAME                 only in this program
 
@@ -181,6 +182,7 @@ off_t lseek(int fd, off_t offset, int whence) noexcept {
 off64_t lseek64(int fd, off64_t offset, int whence) noexcept {
     return fails("lseek", fd) ? -1 : next(&lseek64, "lseek64")(fd, offset, whence);
 }
+int fdatasync(int fd) { return fails("fsync", fd) ? -1 : next(&fdatasync, "fdatasync")(fd); }
 int fsync(int fd) { return fails("fsync", fd) ? -1 : next(&fsync, "fsync")(fd); }
 ssize_t read(int fd, void* to, size_t size) {
     bool shorten = false;

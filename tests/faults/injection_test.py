@@ -48,20 +48,21 @@ REASONS = {"ENOSPC": "No space left", "EIO": "Input/output error", "EINTR": "Int
 LISTS = ("manifest.json", "export.json")  # written anew as the command proceeds
 
 LAYERS = SCENE.replace("[field.background]\nhum = 0.15\nact = 0.01\next = 0.05\n", "") + """\
+[[sky]]
+name = "clear"
+state = 0
+clouds = 0
 [[layer]]
 name = "low"
-[layer.field.background]
-hum = 0.15
-act = 0.01
-ext = 0.05
+skies = "clear"
+base_height_m = 0
+background = { hum = 0.15, act = 0.01, ext = 0.05 }
 [[layer]]
 name = "high"
-[layer.lattice]
-origin_m = [0, 0, 2000]
-[layer.field.background]
-hum = 0.1
-act = 0.02
-ext = 0.05
+skies = "clear"
+base_height_m = 2000
+lattice = { origin_m = [0, 0, 2000] }
+background = { hum = 0.1, act = 0.02, ext = 0.05 }
 """
 NULL = """\
 [lattice]

@@ -9,11 +9,13 @@ compare_with_cycles.py.
 """
 
 import argparse
+import json
 import pathlib
 import subprocess
 import sys
 import tempfile
 
+import numpy
 from PIL import Image, ImageDraw
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -74,16 +76,39 @@ def sheet(nephos, columns, size, parts, labelled):
     return whole
 
 
+def tiles(nephos):
+    """Nine copies of a frame of tile.toml from above, north up: opacity of each column, lit from the west."""
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        subprocess.run([nephos, "run", ROOT / "scenes/tile.toml", "--no-render", "--out", folder / "run", "--frames", "24", "--quiet"], check=True)
+        subprocess.run([nephos, "export", folder / "run", "--to", "raw", "--type", "r32f", "-o", folder / "raw", "--quiet"], check=True)
+        sidecar = json.loads((folder / "raw/tile.volume.json").read_text())
+        nx, ny, nz = sidecar["size"]
+        density = numpy.fromfile(next((folder / "raw").glob("*.raw")), "<f4").reshape(nz, ny, nx)
+    depth = density.sum(0) * sidecar["extinction_per_m"] * sidecar["voxel_size_m"][2]
+    opacity = 1 - numpy.exp(-depth / 2)
+    height = (density * numpy.arange(nz)[:, None, None]).sum(0) / numpy.maximum(density.sum(0), 1e-6)
+    light = numpy.clip(0.86 + 0.05 * (height - numpy.roll(height, 1, 1)), 0.55, 1)
+    colour = opacity[..., None] * light[..., None] * numpy.array([255, 252, 246]) + (1 - opacity[..., None]) * numpy.array([58, 92, 66])
+    whole = Image.fromarray(numpy.tile(colour[::-1], (3, 3, 1)).astype("u1"))
+    ticks = ImageDraw.Draw(whole)
+    for edge in (nx, 2 * nx):
+        ticks.line([(edge, 0), (edge, 9)], fill="red")
+        ticks.line([(0, edge * ny // nx), (9, edge * ny // nx)], fill="red")
+    return whole
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help="files without their ending (default: all)")
     parser.add_argument("--nephos", required=True, type=pathlib.Path, help="the command")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs/pictures", help="folder (default: docs/pictures)")
     arguments = parser.parse_args()
-    unknown = set(arguments.names) - {pathlib.Path(name).stem for name in PICTURES}
+    names = [*PICTURES, "tiles.jpg"]
+    unknown = set(arguments.names) - {pathlib.Path(name).stem for name in names}
     if unknown:
         parser.error(f"no such picture: {', '.join(sorted(unknown))}; known: "
-                     f"{', '.join(pathlib.Path(name).stem for name in PICTURES)}")
+                     f"{', '.join(pathlib.Path(name).stem for name in names)}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     for name, (columns, size, parts) in PICTURES.items():
         if arguments.names and pathlib.Path(name).stem not in arguments.names:
@@ -91,6 +116,8 @@ def main():
         picture = sheet(arguments.nephos, columns, size, parts, labelled=name == "genera.jpg")
         picture.save(arguments.out / name, **({"quality": 88} if name.endswith(".jpg") else {"optimize": True}))
         print(f"{name}: {picture.width} x {picture.height}", flush=True)
+    if not arguments.names or "tiles" in arguments.names:
+        tiles(arguments.nephos).save(arguments.out / "tiles.jpg", quality=88)
     return 0
 
 

@@ -45,9 +45,11 @@ class ReferenceVeil {
             const std::uint32_t x = reference_mix(seeds_[k] + kStep), y = reference_mix(x + kStep);
             const std::uint32_t z = reference_mix(y + kStep);
             const auto place = [](std::uint32_t seed) { return reference_mix(seed + 1) / 65536.0; };
-            const double n = reference_noise((along - v.x * time_s_) / a.x + place(x),
-                                             (across - v.y * time_s_) / a.y + place(y),
-                                             (up - v.z * time_s_) / a.z + place(z), seeds_[k]);
+            const double own_x = place(x) - v.x * time_s_ / a.x, own_y = place(y) - v.y * time_s_ / a.y,
+                         at_z = (up - v.z * time_s_) / a.z + place(z);
+            const double n = o_.period_m.x > 0
+                                 ? repeating_noise(along, across, own_x, own_y, at_z, a, seeds_[k])
+                                 : reference_noise(along / a.x + own_x, across / a.y + own_y, at_z, seeds_[k]);
             const double value = n * octave.gain + octave.offset;
             before = ridged ? octave.ridge - std::abs(octave.crest - value) : value;
             q += octave.weight * before;
@@ -79,6 +81,33 @@ class ReferenceVeil {
         if (width <= 0) return 1;
         const double t = std::min(1.0, from_end / width);
         return 3 * t * t - 2 * t * t * t;
+    }
+
+    // N on a lattice of which both edges of the period are whole vectors. All lattice points that differ by sums of these
+    // have the gradient of one of them: that of the least j >= 0, and among those of the least i >= 0, found by trial.
+    double repeating_noise(double along, double across, double own_x, double own_y, double at_z, const Vec3& a,
+                           std::uint32_t seed) const {
+        const double px = o_.period_m.x, py = o_.period_m.y;
+        const std::array e1{std::llround(px * cos_ / a.x), std::llround(-px * sin_ / a.y)},
+            e2{std::llround(py * sin_ / a.x), std::llround(py * cos_ / a.y)};
+        const double east = along * cos_ - across * sin_, north = along * sin_ + across * cos_;
+        const double u = east / px * double(e1[0]) + north / py * double(e2[0]) + own_x,
+                     v = east / px * double(e1[1]) + north / py * double(e2[1]) + own_y;
+        constexpr std::int64_t kTrials = 60;
+        return reference_noise_of(u, v, at_z, seed, [&](std::int64_t i, std::int64_t j, std::int64_t k) {
+            std::array<std::int64_t, 3> best{1 << 30, 1 << 30, k};
+            // Near the sums that take the point to the origin.
+            const double det = double(e1[0] * e2[1] - e1[1] * e2[0]);
+            const auto m0 = std::int64_t(-double(i * e2[1] - j * e2[0]) / det), n0 = std::int64_t(-double(j * e1[0] - i * e1[1]) / det);
+            for (std::int64_t m = m0 - kTrials; m <= m0 + kTrials; ++m) {
+                for (std::int64_t n = n0 - kTrials; n <= n0 + kTrials; ++n) {
+                    const std::int64_t x = i + m * e1[0] + n * e2[0], y = j + m * e1[1] + n * e2[1];
+                    if (x < 0 || y < 0 || y > best[1] || (y == best[1] && x >= best[0])) continue;
+                    best = {x, y, k};
+                }
+            }
+            return best;
+        });
     }
 
     VeilOptions o_;

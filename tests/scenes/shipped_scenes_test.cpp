@@ -72,7 +72,12 @@ TEST(ShippedScenes, HaveTheNumbersOfTheirSource) {
     EXPECT_EQ(by_hand.automaton.extent, (Extent{256, 128, 20}));
     EXPECT_TRUE(by_hand.automaton.field.scatters.empty());
     EXPECT_GE(by_hand.automaton.field.ellipsoids.size(), 3u);
-    EXPECT_EQ(read_scene(kFolder / "stratus.toml").automaton.extent, (Extent{256, 256, 20}));
+    for (const char* file : {"shafts.toml", "stratus.toml"}) {  // his third and fourth example
+        const Scene shafts = read_scene(kFolder / file);
+        EXPECT_EQ(shafts.automaton.extent, (Extent{256, 256, 20})) << file;
+        EXPECT_EQ(shafts.render.shells.count, 40) << file;
+        EXPECT_GT(shafts.render.light_shafts.strength, 0) << file;
+    }
     EXPECT_EQ(read_scene(kFolder / "large.toml").automaton.extent, (Extent{1024, 1024, 64}));
 }
 

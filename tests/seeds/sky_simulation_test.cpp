@@ -399,5 +399,48 @@ TEST(SkySimulation, DeterministicAndSeparate) {
     EXPECT_NE(first, run(other));
 }
 
+// In a world that repeats no cloud leaves and none is made: each is carried, and re-enters where the period ends.
+TEST(SkySimulation, CloudsReEnterAPeriodicWorld) {
+    SkyOptions options = small_sky();
+    options.periodic = true;
+    options.wind = constant_wind(-31, 17);
+    SkySimulation sky(options);
+    const WorldRectangle& w = options.world;
+    const std::map<std::uint32_t, SkyCloud> before = by_serial(sky);
+    constexpr int kSteps = 400;  // the wind crosses the world more than ten times
+    for (int step = 0; step < kSteps; ++step) {
+        sky.step();
+        for (const SkyCloud& c : sky.clouds()) {
+            const Vec3 centre = sky.sphere(c).centre_m;
+            ASSERT_TRUE(centre.x >= w.min_x_m - 1e-3 && centre.x <= w.max_x_m + 1e-3) << centre.x;
+            ASSERT_TRUE(centre.y >= w.min_y_m - 1e-3 && centre.y <= w.max_y_m + 1e-3) << centre.y;
+        }
+    }
+    ASSERT_EQ(sky.clouds().size(), before.size());
+    const auto periods = [](double difference_m, double period_m) { return std::remainder(difference_m, period_m); };
+    for (const SkyCloud& c : sky.clouds()) {
+        const Vec3 from = sky.position_m(before.at(c.serial)), to = sky.position_m(c);
+        EXPECT_NEAR(periods(to.x - from.x + 31 * 10.0 * kSteps, w.max_x_m - w.min_x_m), 0, 1e-3);
+        EXPECT_NEAR(periods(to.y - from.y - 17 * 10.0 * kSteps, w.max_y_m - w.min_y_m), 0, 1e-3);
+    }
+}
+
+// A change of state makes clouds inside, and they form; the saved state goes on with the same bits.
+TEST(SkySimulation, ChangesStateInAPeriodicWorld) {
+    SkyOptions options = small_sky();
+    options.periodic = true;
+    options.wind = constant_wind(12, -3);
+    options.schedule = {{0, 0}, {600, 1}};
+    SkySimulation sky(options), restored(options);
+    for (int step = 0; step < 50; ++step) sky.step();
+    restored.restore(sky.save());
+    for (int step = 0; step < 70; ++step) {
+        sky.step();
+        restored.step();
+    }
+    EXPECT_EQ(fingerprint(sky), fingerprint(restored));
+    EXPECT_EQ(sky.count(), 80u);
+}
+
 }  // namespace
 }  // namespace nephos

@@ -2,13 +2,14 @@
 // A Vulkan layer for tests: a graphics card that is lost. It calls every device a virtual graphics card, so
 // that pictures are drawn by shaders, and after NEPHOS_LOSE_DEVICE_AFTER submissions (all of the process)
 // each further one fails with VK_ERROR_DEVICE_LOST. So do waits for fences after NEPHOS_LOSE_WAIT_AFTER of
-// them, counted while that variable is there; what they wait for is done all the same. For one instance and
-// one device in one thread at a time.
+// them, counted while that variable is there; what they wait for is done all the same. Submissions fail also from the
+// moment on when the file NEPHOS_LOSE_DEVICE_WHEN is there. For one instance and one device in one thread at a time.
 
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
 
+#include <unistd.h>
 #include <vulkan/vk_layer.h>
 #include <vulkan/vulkan.h>
 
@@ -18,6 +19,7 @@ PFN_vkGetInstanceProcAddr next_of_instance = nullptr;
 PFN_vkGetDeviceProcAddr next_of_device = nullptr;
 PFN_vkGetPhysicalDeviceProperties next_properties = nullptr;
 PFN_vkQueueSubmit2 next_submit = nullptr;
+PFN_vkQueueSubmit next_old_submit = nullptr;
 PFN_vkWaitForFences next_wait = nullptr;
 std::atomic<long> submissions{0}, waits{0};
 
@@ -36,11 +38,19 @@ VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceP
     result->deviceType = VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU;
 }
 
+bool is_lost() {
+    const char* after = std::getenv("NEPHOS_LOSE_DEVICE_AFTER");
+    const char* when = std::getenv("NEPHOS_LOSE_DEVICE_WHEN");
+    return (after != nullptr && submissions++ >= std::atol(after)) || (when != nullptr && access(when, F_OK) == 0);
+}
+
 VKAPI_ATTR VkResult VKAPI_CALL submit(VkQueue queue, std::uint32_t count, const VkSubmitInfo2* infos,
                                       VkFence fence) {
-    const char* after = std::getenv("NEPHOS_LOSE_DEVICE_AFTER");
-    if (after != nullptr && submissions++ >= std::atol(after)) return VK_ERROR_DEVICE_LOST;
-    return next_submit(queue, count, infos, fence);
+    return is_lost() ? VK_ERROR_DEVICE_LOST : next_submit(queue, count, infos, fence);
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL old_submit(VkQueue queue, std::uint32_t count, const VkSubmitInfo* infos, VkFence fence) {
+    return is_lost() ? VK_ERROR_DEVICE_LOST : next_old_submit(queue, count, infos, fence);
 }
 
 VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice device, std::uint32_t count, const VkFence* fences, VkBool32 all,
@@ -76,6 +86,7 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const Vk
     const VkResult result = create(physical, info, allocator, device);
     if (result != VK_SUCCESS) return result;
     next_submit = reinterpret_cast<PFN_vkQueueSubmit2>(next_of_device(*device, "vkQueueSubmit2"));
+    next_old_submit = reinterpret_cast<PFN_vkQueueSubmit>(next_of_device(*device, "vkQueueSubmit"));
     next_wait = reinterpret_cast<PFN_vkWaitForFences>(next_of_device(*device, "vkWaitForFences"));
     return result;
 }
@@ -84,6 +95,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_function(VkDevice device, const 
     if (std::strcmp(name, "vkGetDeviceProcAddr") == 0)
         return reinterpret_cast<PFN_vkVoidFunction>(&device_function);
     if (std::strcmp(name, "vkQueueSubmit2") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&submit);
+    if (std::strcmp(name, "vkQueueSubmit") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&old_submit);
     if (std::strcmp(name, "vkWaitForFences") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&wait);
     return next_of_device(device, name);
 }

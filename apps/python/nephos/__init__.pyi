@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 import os
-from typing import Any, Literal
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, overload
 
 import numpy
 from numpy.typing import NDArray
@@ -51,8 +53,57 @@ class Simulation:
     def words(self, plane: Literal["hum", "act", "cld"], layer: int | str = 0) -> NDArray[numpy.uint64]: ...
     def statistics(self, layer: int | str | None = None, density: bool = False) -> dict[str, int | float | str | None]: ...
     def clouds(self, layer: int | str = 0, dimensions: Literal[2, 3] = 2, neighbours: Literal[0, 4, 6, 8] = 0) -> dict[str, NDArray[Any]]: ...
+    def organisation(self, layer: int | str = 0, draws: int = 20) -> dict[str, float]: ...
     def density(self, layer: int | str | None = None) -> Density: ...
     def picture(self) -> NDArray[numpy.uint8]: ...
 
+class Sweep:
+    folder: pathlib.Path
+    def __init__(self, folder: str | os.PathLike[str]) -> None: ...
+    def runs(self) -> dict[str, NDArray[Any]]: ...
+    def points(self) -> dict[str, NDArray[Any]]: ...
+    def failures(self) -> dict[str, NDArray[Any]]: ...
+    def report(self, path: str | os.PathLike[str] | None = None) -> pathlib.Path: ...
+    @property
+    def series_file(self) -> pathlib.Path: ...
+
+@overload
+def sweep(
+    scene: Scene | str | os.PathLike[str],
+    axes: Mapping[str | tuple[str, ...], Sequence[Any] | NDArray[Any] | dict[str, Any]],
+    out: str | os.PathLike[str],
+    *,
+    replicates: int = 5,
+    steps: tuple[int, int] = (300, 3000),
+    design: Literal["grid", "list", "random", "latin_hypercube", "sobol"] = "grid",
+    points: int | None = None,
+    seed: int = 1,
+    seeds: Literal["per_point", "common"] = "per_point",
+    clouds_every: int = 10,
+    layer: str | None = None,
+    until: tuple[str, float] | None = None,
+    workers: int | None = None,
+    shard: None = None,
+) -> Sweep: ...
+@overload
+def sweep(
+    scene: Scene | str | os.PathLike[str],
+    axes: Mapping[str | tuple[str, ...], Sequence[Any] | NDArray[Any] | dict[str, Any]],
+    out: str | os.PathLike[str],
+    *,
+    replicates: int = 5,
+    steps: tuple[int, int] = (300, 3000),
+    design: Literal["grid", "list", "random", "latin_hypercube", "sobol"] = "grid",
+    points: int | None = None,
+    seed: int = 1,
+    seeds: Literal["per_point", "common"] = "per_point",
+    clouds_every: int = 10,
+    layer: str | None = None,
+    until: tuple[str, float] | None = None,
+    workers: int | None = None,
+    shard: tuple[int, int],
+) -> None: ...
+def merge(folders: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], out: str | os.PathLike[str] | None = None) -> Sweep: ...
+def fit(path: str | os.PathLike[str], out: str | os.PathLike[str], *, workers: int | None = None) -> dict[str, Any]: ...
 def set_threads(count: int) -> None: ...
 def version() -> str: ...

@@ -76,6 +76,43 @@ class Export(Case):
         found = numpy.frombuffer(pixels, "u1")[:32 * 24].reshape(24, 32)
         self.assertLessEqual(abs(found / 255 - self.density[0]).max(), 1 / 14 + 2 / 255)
 
+    def test_osgconv_keeps_every_slice(self):
+        """OpenSceneGraph, FlightGear's loader: reads and writes volumes, upside down, and blocks of BC4."""
+        folder = self.export("dds-r8", "--to", "dds", "--type", "r8", "--legacy-dds")
+        self.tool("osgconv", folder / "placed_0003.dds", self.folder / "back.dds")
+        head = 128
+        given = numpy.frombuffer((folder / "placed_0003.dds").read_bytes()[head:], "u1").reshape(12, 24, 32)
+        back = numpy.frombuffer((self.folder / "back.dds").read_bytes()[head:], "u1").reshape(12, 24, 32)
+        self.assertLessEqual(abs(given / 255 - self.density).max(), 1 / 509)
+        self.assertTrue((back == given[:, ::-1]).all())
+        folder = self.export("dds-bc4", "--to", "dds", "--type", "bc4", "--legacy-dds")
+        self.tool("osgconv", folder / "placed_0003.dds", self.folder / "blocks.dds")
+        given, back = (folder / "placed_0003.dds").read_bytes(), (self.folder / "blocks.dds").read_bytes()
+        self.assertEqual(sorted(given[head:]), sorted(back[head:]))
+        self.assertEqual(back[84:88], b"ATI1")
+
+    def test_bricks(self):
+        """The table by NumPy: every voxel with density lies in a brick, and ranges are those of the voxels."""
+        folder = self.export("bricks", "--to", "bricks", "--bricks", "8", "--type", "r16", "--mips")
+        data = (folder / "placed_0003.bricks").read_bytes()
+        kind, edge, border, levels = numpy.frombuffer(data[8:24], "<u4")
+        self.assertEqual((data[:8], kind, edge, border), (b"NPHBRIC1", 1, 8, 1))
+        count = int(numpy.frombuffer(data[24:32], "<u8")[0])
+        entry = numpy.dtype([("at", "<u4", 4), ("offset", "<u8"), ("bytes", "<u8"), ("range", "<f4", 2)])
+        table = numpy.frombuffer(data, entry, count, 32 + 12 * int(levels))
+        found = numpy.zeros_like(self.density)
+        for brick in table[table["at"][:, 0] == 0]:
+            if not brick["bytes"]:
+                continue
+            voxels = numpy.frombuffer(data, "<u2", 1000, int(brick["offset"])).reshape(10, 10, 10) / 65535
+            self.assertAlmostEqual(voxels.max(), brick["range"][1], delta=1e-4)
+            i, j, k = 8 * brick["at"][1:]
+            part = found[k:k + 8, j:j + 8, i:i + 8]
+            part[:] = voxels[1:9, 1:9, 1:9][:part.shape[0], :part.shape[1], :part.shape[2]]
+        self.assertLessEqual(abs(found - self.density).max(), 1 / 131000)
+        sidecar = json.loads((folder / "placed.volume.json").read_text())
+        self.assertEqual(sidecar["formats"][0]["brick"], {"edge": 8, "border": 1})
+
     def test_pillow_reads_slices(self):
         import PIL.Image
         folder = self.export("slices", "--to", "slices")

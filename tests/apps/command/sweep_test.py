@@ -5,12 +5,15 @@ import csv
 import math
 import os
 import pathlib
+import re
 import resource
 import signal
 import subprocess
 import time
 import unittest
 from xml.etree import ElementTree
+
+import xxhash
 
 from case import Case, NEPHOS, SOURCE
 
@@ -123,6 +126,27 @@ class Sweep(Case):
                 file.write(b'{"run":"0123","status":"do')  # a torn record
         self.sweep("killed", "-j", "2")
         self.assertEqual(self.tables("killed"), self.tables("whole"))
+
+    def test_records_that_somebody_forged_are_refused(self):
+        """Their hash is right, but no run has such numbers: 7 (steps + 1) values would be one, modulo 2^64."""
+        self.sweep("forged", steps="20")
+        shard = self.folder / "forged/shards/0000-of-0001.jsonl"
+        lines = shard.read_text().splitlines()
+        series = shard.with_suffix(".series").read_bytes()
+
+        def forge(key, value):
+            text = re.sub(rf'"{key}":\d+', f'"{key}":{value}', lines[0].rsplit(',"xxh3":"', 1)[0])
+            sealed = f'{text},"xxh3":"{xxhash.xxh3_128(text.encode()).hexdigest()}"}}'
+            shard.write_text("\n".join([sealed, *lines[1:]]) + "\n")
+        for key, value, says in (("steps", pow(7, -1, 2**64) - 1, "impossible numbers"), ("steps", 10**12, "impossible numbers"),
+                                 ("steps", 10**9, "fewer than"), ("series_offset", 2**63, "impossible numbers"),
+                                 ("series_offset", 10**6, "fewer than")):
+            forge(key, value)
+            self.assertIn(says, self.call("merge", "forged", "--out", "merged", status=3).stderr, (key, value))
+            self.assertIn(says, self.sweep("forged", steps="20", status=3).stderr, (key, value))
+            self.assertEqual(shard.with_suffix(".series").read_bytes(), series)
+        forge("replicate", 0)  # the forger's hash is that of the program
+        self.sweep("forged", steps="20")
 
     def test_a_crash_costs_one_run(self):
         arguments = ["sweep", self.null, "--axis", "field.background.ext=0.05,0.1", "--replicates", "1", "--clouds-every", "0",

@@ -19,11 +19,11 @@ class Usage(Case):
     def test_help_goes_to_stdout(self):
         for arguments in (["--help"], ["run", "--help"], ["render", "-h"], ["validate", "--help"], ["info", "--help"],
                           ["hash", "--help"], ["state", "--help"], ["completion", "--help"], ["sweep", "--help"],
-                          ["merge", "--help"], ["fit", "--help"]):
+                          ["merge", "--help"], ["report", "--help"], ["fit", "--help"], ["stats", "--help"]):
             result = self.call(*arguments)
             self.assertIn("Usage: nephos", result.stdout)
             self.assertEqual(result.stderr, "")
-        for command in ("run", "sweep", "merge", "fit", "render", "validate", "info", "hash", "state", "completion"):
+        for command in ("run", "sweep", "merge", "report", "fit", "stats", "render", "validate", "info", "hash", "state", "completion"):
             self.assertIn(f"\n  {command}", self.call("--help").stdout)
 
     def test_version(self):

@@ -4,6 +4,7 @@
 scripts of clicks and keys. Environment: NEPHOS the command, SOURCE the source tree, NO_LOADER a library that hides the
 Vulkan loader."""
 
+import csv
 import os
 import pathlib
 import re
@@ -18,6 +19,49 @@ from PIL import Image, ImageStat
 
 NEPHOS = os.environ["NEPHOS"]
 SOURCE = pathlib.Path(os.environ["SOURCE"])
+
+
+# Two layers: clouds of an automaton, and above them clouds that are drawn directly, so that each kind of change shows.
+LIVE_SCENE = """
+name = "live"
+seed = 3
+[time]
+step_s = 10
+steps = 2000
+[[model]]
+name = "bank"
+light_distance_m = 900
+seeds = [{ size_m = [700, 600, 300], billboards = 6, billboard_width_m = [300, 500], billboard_height_m = [200, 300] }]
+[[sky]]
+name = "few"
+state = 0
+clouds = 5
+models = "bank"
+[[sky]]
+name = "many"
+state = 1
+clouds = 14
+models = "bank"
+[[wind]]
+levels = [{ height_m = 1000, from_deg = 270, speed_m_per_s = 4 }]
+[[layer]]
+name = "low"
+skies = ["few", "many"]
+base_height_m = 1000
+lattice = { cells = [48, 48, 12], cell_size_m = 80, origin_m = [-1920, -1000, 900] }
+[[layer]]
+name = "high"
+skies = ["few", "many"]
+automaton = false
+base_height_m = 2000
+lattice = { cells = [48, 48, 12], cell_size_m = 80, origin_m = [-1920, -1000, 1900] }
+[camera]
+position_m = [0, -3800, 500]
+target_m = [0, 400, 1400]
+[sun]
+elevation_deg = 30
+azimuth_deg = 240
+"""
 
 
 class Case(unittest.TestCase):
@@ -124,7 +168,8 @@ class Window(Case):
             click tab View
             wait-picture
             screenshot without.png
-            click Slice of the bits
+            click slice of
+            click choice bits
             wait 0.5
             screenshot slice.png
             """)
@@ -133,6 +178,114 @@ class Window(Case):
             reds = [sum(1 for red, green, blue in image.convert("RGB").crop(box).getdata() if red > blue + 60)
                     for image in (a, b)]
         self.assertGreater(reds[1], reds[0] + 200)
+
+    def test_handles_hodograph_and_key_frames(self):
+        """Drags what can be dragged: a seed along an axis, its root's direction and opening, a point of the hodograph, a
+        rain area's size, a key frame on the time line; the saved scene has what the mouse did, and nothing else."""
+        scene = self.folder / "drags.toml"
+        text = LIVE_SCENE.replace("billboards = 6,", "billboards = 6, roots = [{ open_yaw_deg = 60 }],")
+        scene.write_text(text + "[climate]\nschedule = [{ time_s = 0, state = 0 }, { time_s = 600, state = 1 }]\n",
+                         encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait-step 2
+            key SPACE
+            click model
+            click model[0]
+            click open model[0].seeds
+            click model[0].seeds[0]
+            wait 0.3
+            drag handle move up 0 -60
+            click open model[0].seeds[0].roots
+            click model[0].seeds[0].roots[0]
+            wait 0.3
+            drag handle root direction 0 -50
+            drag handle root opening sideways -30 -10
+            click wind
+            click wind[0]
+            wait 0.3
+            drag hodograph 0 0 -30
+            click layer
+            click layer[0]
+            click layer[0].rain
+            click new layer[0].rain.placed
+            wait 0.3
+            drag handle size x -40 0
+            drag "key frame climate.schedule[1]" -60 0
+            wait 0.3
+            screenshot drags.png
+            key CTRL+S
+            wait 0.5
+            """)
+        before, after = tomllib.loads(text), tomllib.loads(scene.read_text(encoding="utf-8"))
+        seed = after["model"][0]["seeds"][0]
+        self.assertGreater(seed["position_m"][2], 50)
+        self.assertEqual(seed["position_m"][:2], [0, 0])
+        self.assertGreater(seed["roots"][0]["pitch_deg"], 5)
+        self.assertNotEqual(seed["roots"][0]["open_yaw_deg"], 60)
+        level = after["wind"][0]["levels"][0]
+        self.assertNotEqual((level["from_deg"], level["speed_m_per_s"]), (270, 4))
+        self.assertNotEqual(after["layer"][0]["rain"]["placed"][0].get("semi_a_m", 1000), 1000)
+        self.assertLess(after["climate"]["schedule"][1]["time_s"], 600)
+        self.assertEqual(after["climate"]["schedule"][1]["time_s"] % 10, 0)
+        self.assertEqual(after["sun"], before["sun"])
+
+    def test_go_to_a_cloud(self):
+        """A double click on a cloud brings it nearer; beside clouds the view stays."""
+        self.edit(self.scene("cumulus-by-hand.toml"), "--validation", script="""
+            wait-step 60
+            key SPACE
+            wait-picture
+            picture far.png
+            double-click-at view 0.5 0.02
+            wait-picture
+            picture same.png
+            click tab View
+            click "Look at the clouds"
+            wait-picture
+            picture all.png
+            double-click-at view 0.5 0.5
+            wait-picture
+            picture near.png
+            """)
+        pictures = {name: self.image(name + ".png").tobytes() for name in ("far", "same", "all", "near")}
+        self.assertTrue(pictures["far"] == pictures["same"])
+        self.assertTrue(pictures["all"] != pictures["near"])
+
+    def test_cubes_wireframe_and_field(self):
+        """Cubes have the colours of the plots, a slab leaves some out, a wireframe has none; a probability is a slice."""
+        self.edit(self.scene("cumulus-by-hand.toml"), "--validation", script="""
+            wait-step 60
+            key SPACE
+            click tab View
+            key 6
+            wait 0.3
+            wait-picture
+            picture cubes.png
+            key 5
+            wait 0.3
+            wait-picture
+            picture wire.png
+            key 1
+            wait 0.3
+            wait-picture
+            screenshot plain.png
+            click slice of
+            click choice probability of hum
+            wait 0.5
+            screenshot field.png
+            """)
+
+        def count(name, wanted):
+            with Image.open(self.folder / name) as image:
+                return sum(1 for pixel in image.convert("RGB").getdata() if wanted(*pixel))
+
+        def is_red(red, green, blue):
+            return red > green + 60 and red > blue + 60
+
+        self.assertGreater(count("cubes.png", is_red), 500)
+        self.assertEqual(count("wire.png", is_red), 0)
+        self.assertGreater(count("wire.png", lambda red, green, blue: blue > 120 and blue > red + 20), 300)
+        self.assertGreater(count("field.png", is_red), count("plain.png", is_red) + 100)
 
     def test_slider_shows_in_the_picture(self):
         """A sun below the horizon darkens the picture, and undo brings the day back."""
@@ -218,6 +371,81 @@ class Story(Case):
                                 check=True).stdout.splitlines()
         self.assertEqual(replay, seen)
 
+    def replayed(self, scene, step, size):
+        """The picture of a step as `nephos run` draws it from the saved scene, of the size that the window showed."""
+        out = self.folder / f"replay-{step}"
+        number = f"{step + 1}..{step + 1}"  # frames count from 1, steps from 0
+        subprocess.run([NEPHOS, "run", str(scene), "--out", str(out), "--quiet", "--splatting", "cpu", "--frames", number,
+                        "--set", "frames.start_s=0", "--set", "frames.per_second=1", "--set", "frames.time_scale=10",
+                        "--set", f"camera.width={size[0]}", "--set", f"camera.height={size[1]}"], check=True)
+        (picture,) = out.glob("frames/*.png")
+        with Image.open(picture) as image:
+            return image.convert("RGB")
+
+    def test_live_changes_are_replayed(self):
+        """Wind, climate, lightning and the clouds that follow the light in a frame, all changed while the scene runs: the
+        saved scene has the window's state hashes at every step, and its pictures before, at and after the changes."""
+        scene = self.folder / "live.toml"
+        scene.write_text(LIVE_SCENE, encoding="utf-8")
+        self.edit(scene, "--validation", size="1100x760", script="""
+            wait-step 1
+            click tab View
+            click "Record as key frames"
+            click tab Properties
+            click wind
+            click wind[0]
+            click open wind[0].levels
+            wait 0.3
+            click wind[0].levels[0]
+            wait-step 6
+            set wind[0].levels[0].speed_m_per_s 15
+            wait-step 12
+            click tab View
+            set "final state" 1
+            click "Start the change now"
+            wait-step 20
+            key SPACE
+            click tab Properties
+            click light
+            set light.cfa_clouds_per_frame 2
+            click tab View
+            click "Lightning where I click"
+            click-at view 0.5 0.45
+            wait 0.3
+            wait-picture
+            picture shown-%.png
+            key SPACE
+            wait-step 36
+            key SPACE
+            wait-picture
+            picture shown-%.png
+            set time 3
+            wait-picture
+            picture shown-%.png
+            set time 15
+            wait-picture
+            picture shown-%.png
+            hashes seen.txt
+            key CTRL+S
+            wait 0.5
+            """)
+        saved = tomllib.loads(scene.read_text(encoding="utf-8"))
+        self.assertGreaterEqual(len(saved["wind"]), 3)
+        self.assertGreaterEqual(len(saved["climate"]["schedule"]), 2)
+        self.assertEqual(saved["light"]["cfa_clouds_per_frame"], 2)
+        flash = saved["lightning"][0]
+        seen = (self.folder / "seen.txt").read_text(encoding="utf-8").splitlines()
+        replay = subprocess.run([NEPHOS, "hash", str(scene), "--steps", str(len(seen) - 1)], capture_output=True, text=True,
+                                check=True).stdout.splitlines()
+        self.assertEqual(replay, seen)
+        shown = {int(path.stem.split("-")[1]): path for path in self.folder.glob("shown-*.png")}
+        self.assertEqual(len(shown), 4, shown)
+        self.assertIn(flash["time_s"] / 10, shown)  # the flash burns in one of them
+        for step, path in sorted(shown.items()):
+            with Image.open(path) as image:
+                window = image.convert("RGB")
+            self.assertTrue(self.replayed(scene, step, window.size).tobytes() == window.tobytes(), f"step {step}")
+
     def test_save_keeps_what_was_not_touched(self):
         """One slider and a save: one line of the file differs."""
         scene = self.scene("cumulus.toml")
@@ -250,6 +478,35 @@ class Story(Case):
             """)
 
 
+class Tutorial(Case):
+    def test_the_page_leads_from_nothing_to_rain(self):
+        """The walk of docs/editor.md, click by click: the page names every value of the script, each step has its picture, and
+        the saved scene has the window's state hashes and rains."""
+        script = (SOURCE / "tests/apps/editor/tutorial.txt").read_text(encoding="utf-8")
+        page = (SOURCE / "docs/editor.md").read_text(encoding="utf-8")
+        page = page[page.index("## From nothing to a sky of rain"):page.index("## Clouds from base models")]
+        words = set(re.findall(r"[-\w.]*\w", page))
+        for line in script.splitlines():
+            if line.startswith("set "):
+                self.assertIn(line.split()[-1], words, line)
+        self.edit("--validation", script=script)
+        for step in range(1, 10):
+            self.assertIn(f"pictures/tutorial-{step}.jpg", page)
+            self.assertGreater(ImageStat.Stat(self.image(f"tutorial-{step}.png", (300, 60, 850, 500))).stddev[0], 5, step)
+        scene = self.folder / "SKY.toml"
+        seen = (self.folder / "tutorial-hashes.txt").read_text(encoding="utf-8").splitlines()
+        self.assertGreater(len(seen), 200)
+        replay = subprocess.run([NEPHOS, "hash", str(scene), "--steps", str(len(seen) - 1)], capture_output=True, text=True,
+                                check=True).stdout.splitlines()
+        self.assertEqual(replay, seen)
+        subprocess.run([NEPHOS, "run", str(scene), "--quiet", "--statistics-only", "--out", str(self.folder / "out"),
+                        "--set", f"time.steps={len(seen) - 1}"], check=True)
+        with open(self.folder / "out/statistics/low.csv", encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(float(rows[50]["rain_mm_per_h"]), 0)
+        self.assertGreater(float(rows[-1]["rain_mm_per_h"]), 5)
+
+
 class Wild(Case):
     def test_two_thousand_random_inputs(self):
         """Clicks, drags and keys at random: no crash, no message of the validation layer, no frame of two seconds. Files
@@ -276,6 +533,31 @@ class Failures(Case):
                           '"1.3.0"}}', encoding="utf-8")
         output = self.edit("--screenshot", "x.png", status=4, environment={"VK_ICD_FILENAMES": str(broken)})
         self.assertIn("mesa-vulkan-drivers", output)
+
+    def test_lost_device(self):
+        """A graphics card that is lost after an edit (lost_device_layer.cpp): the program says so and ends, the edit is
+        kept beside the scene, the scene's own file stays as it was, and the next session offers the edit."""
+        scene = self.scene("cumulus-by-hand.toml")
+        before = scene.read_bytes()
+        lost = self.folder / "lost.txt"
+        output = self.edit(scene, status=4, script=f"""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            wait 0.3
+            hashes {lost}
+            wait 60
+            """, environment={"VK_LAYER_PATH": os.environ["LAYERS"],
+                              "VK_INSTANCE_LAYERS": "VK_LAYER_NEPHOS_lost_device",
+                              "NEPHOS_LOSE_DEVICE_WHEN": str(lost)})
+        self.assertIn("the graphics device was lost", output)
+        self.assertIn("unsaved edits are kept", output)
+        self.assertEqual(scene.read_bytes(), before)
+        kept = list(self.folder.glob(".*.autosave"))
+        self.assertEqual(len(kept), 1, list(self.folder.iterdir()))
+        self.assertIn("elevation_deg = 21", kept[0].read_text(encoding="utf-8"))
+        self.edit(scene, script="wait 0.5\nexpect-control Take them\nclick Take them\nwait 0.3\nkey CTRL+S\nwait 0.5\n")
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
 
     def test_scenes(self):
         self.assertIn("no/such.toml", self.edit("no/such.toml", status=3))

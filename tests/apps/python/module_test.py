@@ -3,6 +3,7 @@
 folder of the package `nephos`. The arguments are those of unittest."""
 
 import inspect
+import json
 import os
 import pathlib
 import re
@@ -216,6 +217,96 @@ class Results(Case):
                 simulation.clouds(**wrong)
 
 
+    def test_organisation_is_compared_with_chance(self):
+        simulation = nephos.Simulation(nephos.Scene(FAIR)).step(100)
+        found = simulation.organisation()
+        self.assertEqual(set(found), {f"{name}{end}" for name in ("iorg", "scai", "cop") for end in ("", "_random", "_random_sd")})
+        # A homogeneous field has clouds of neighbours that form together: more than chance, by many deviations.
+        self.assertGreater(abs(found["iorg"] - found["iorg_random"]), 5 * found["iorg_random_sd"])
+        # Where cells are independent and there is one level, the shadow is the null model itself.
+        chance = nephos.Scene(FAIR).set("field.background.hum", 0.0).set("lattice.cells", [256, 128, 1])
+        found = nephos.Simulation(chance.set("field.background.act", 0.02)).step(60).organisation(draws=40)
+        for name in ("iorg", "scai", "cop"):
+            self.assertLess(abs(found[name] - found[name + "_random"]), 4 * found[name + "_random_sd"], name)
+        self.assertTrue(numpy.isnan(nephos.Simulation(chance).organisation()["iorg"]))
+        with self.assertRaisesRegex(nephos.Error, "draws is 1"):
+            simulation.organisation(draws=1)
+
+
+class Studies(Case):
+    NULL = """\
+[lattice]
+cells = [64, 64, 10]
+boundaries = ["periodic", "periodic", "open"]
+initial = "empty"
+[field.background]
+hum = 0.0
+act = 0.002
+ext = 0.1
+"""
+
+    def test_a_sweep_has_the_bytes_of_the_command(self):
+        scene = nephos.Scene.from_text(self.NULL)
+        sweep = nephos.sweep(scene, {"field.background.ext": numpy.array([0.05, 0.1]),
+                                     ("field.background.act",): {"from": 0.001, "to": 0.004, "count": 2, "scale": "log"}},
+                             out=self.folder / "python", replicates=2, steps=(200, 400), workers=2)
+        self.call("sweep", self.write("null.toml", self.NULL), "--axis", "field.background.ext=0.05,0.1", "--axis",
+                  "field.background.act=log:0.001..0.004:2", "--replicates", "2", "--steps", "200..400", "--out", "command")
+        for name in ("runs.csv", "points.csv", "series.nc"):
+            self.assertEqual((sweep.folder / name).read_bytes(), (self.folder / "command" / name).read_bytes(), name)
+        runs, points = sweep.runs(), sweep.points()
+        self.assertEqual((len(runs["run"]), len(points["cover"])), (8, 4))
+        self.assertEqual((runs["seed"].dtype, runs["cover"].dtype, runs["steps"].dtype.kind, runs["state_hash"].dtype.kind),
+                         (numpy.uint64, numpy.float64, "i", "U"))
+        numpy.testing.assert_array_equal(runs["field.background.ext"], numpy.repeat([0.05, 0.1], 4))
+        self.assertEqual(len(sweep.failures()["message"]), 0)
+        self.assertTrue(sweep.report().read_text().startswith("<!DOCTYPE html>"))
+        # Another look at the folder, and the same call, compute nothing.
+        before = (sweep.folder / "shards/0000-of-0001.jsonl").stat().st_mtime_ns
+        numpy.testing.assert_array_equal(nephos.Sweep(sweep.folder).runs()["cover"], runs["cover"])
+        nephos.sweep(scene, {"field.background.ext": [0.05, 0.1], "field.background.act": [0.001, 0.004]},
+                     out=sweep.folder, replicates=2, steps=(200, 400))
+        self.assertEqual((sweep.folder / "shards/0000-of-0001.jsonl").stat().st_mtime_ns, before)
+
+    def test_a_fit_has_the_numbers_of_the_command(self):
+        self.write("null.toml", self.NULL)
+        path = self.write("fit.toml", """\
+scene = "null.toml"
+runs = 16
+proof = 2
+clouds_every = 0
+[steps]
+min = 400
+max = 1600
+[[parameter]]
+key = "field.background.ext"
+prior = { from = 0.05, to = 0.2 }
+[[target]]
+statistic = "cover"
+value = 0.2
+sd = 0.01
+""")
+        found = nephos.fit(path, self.folder / "fit")
+        posterior = found["posterior"]["field.background.ext"]
+        self.assertEqual(posterior.shape, (1000,))
+        self.assertAlmostEqual(posterior.mean(), found["parameters"][0]["mean"], delta=0.01)
+        self.assertLess(found["parameters"][0]["low"], found["parameters"][0]["high"])
+
+    def test_errors_are_those_of_the_command(self):
+        scene = nephos.Scene.from_text(self.NULL)
+        with self.assertRaisesRegex(nephos.Error, "a probability per step") as caught:
+            nephos.sweep(scene, {"field.background.ext": [0.1, 1.5]}, out=self.folder / "bad")
+        self.assertEqual(caught.exception.code, "usage")
+        with self.assertRaisesRegex(nephos.Error, "did you mean"):
+            nephos.sweep(scene, {"field.background.exd": [0.1]}, out=self.folder / "bad")
+        self.assertFalse((self.folder / "bad").exists())
+        with self.assertRaisesRegex(nephos.Error, "runs.csv"):
+            nephos.Sweep(self.folder)
+        with self.assertRaises(nephos.Error) as caught:
+            nephos.fit(self.folder / "none.toml", self.folder / "fit")
+        self.assertEqual(caught.exception.code, "io")
+
+
 class Threads(Case):
     def test_threads_do_not_change_a_bit(self):
         self.addCleanup(nephos.set_threads, 0)
@@ -292,13 +383,39 @@ class Documentation(Case):
         stub = pathlib.Path(nephos.__file__).with_name("__init__.pyi").read_text()
         compile(stub, "stub", "exec")
         self.assertTrue(pathlib.Path(nephos.__file__).with_name("py.typed").exists())
-        for owner in (nephos, nephos.Scene, nephos.Simulation, nephos.Density):
+        for owner in (nephos, nephos.Scene, nephos.Simulation, nephos.Density, nephos.Sweep):
             for name, member in vars(owner).items():
                 if name.startswith("_") or inspect.ismodule(member):
                     continue
                 self.assertRegex(stub, rf"(def|class) {name}\b")
                 if name not in ("name", "seed"):
                     self.assertTrue(member.__doc__, name)
+
+
+class Notebook(Case):
+    def test_the_notebook_runs_and_finds_the_answer(self):
+        folder = self.folder / "docs"
+        shutil.copytree(SOURCE / "docs/research", folder)
+        self.write("kernels/python3/kernel.json", json.dumps(
+            {"argv": [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"], "display_name": "Python 3",
+             "language": "python"}))
+        result = subprocess.run(
+            [sys.executable, "-m", "nbconvert", "--to", "notebook", "--execute", "--inplace", folder / "thirty-percent.ipynb"],
+            cwd=folder, capture_output=True, text=True, timeout=1100,
+            env={**os.environ, "JUPYTER_PATH": str(self.folder), "MPLBACKEND": "module://matplotlib_inline.backend_inline"})
+        self.assertEqual(result.returncode, 0, result.stderr)
+        cells = json.loads((folder / "thirty-percent.ipynb").read_text())["cells"]
+        outputs = [output for cell in cells if cell["cell_type"] == "code" for output in cell["outputs"]]
+        text = "".join("".join(output["text"]) for output in outputs if output["output_type"] == "stream")
+        self.assertEqual(sum("image/png" in output.get("data", {}) for output in outputs), 3)
+        mean, low, high = map(float, re.search(r"ext = ([\d.]+), 90 % of the posterior: ([\d.]+) to ([\d.]+)", text).groups())
+        self.assertAlmostEqual(mean, 0.118, delta=0.003)
+        self.assertTrue(0.10 < low < mean < high < 0.135)
+        self.assertRegex(text, r"fixed \[ ?0\.9")
+        self.assertRegex(text, r"free ")
+        self.assertEqual(text.count("'not_steady'"), 5)
+        # What the words of the notebook say is what it printed when it was last run.
+        self.assertIn(f"`ext` = {mean:.3f}, and {low:.3f} to {high:.3f}", (folder / "thirty-percent.ipynb").read_text())
 
 
 class Installation(Case):
@@ -308,7 +425,7 @@ class Installation(Case):
         subprocess.run(["cmake", f"-DCMAKE_INSTALL_PREFIX={self.folder}", "-P", script], check=True, capture_output=True)
         folder, = self.folder.glob("lib/python3*/dist-packages")
         names = {path.name.split(".cpython")[0] for path in (folder / "nephos").iterdir()}
-        self.assertEqual(names, {"__init__.py", "__init__.pyi", "py.typed", "_nephos"})
+        self.assertEqual(names, {"__init__.py", "__init__.pyi", "py.typed", "_nephos", "_studies.py"})
         program = "import nephos; print(nephos.__file__, nephos.Simulation(nephos.Scene('tiny.toml')).step(2).hash())"
         result = subprocess.run([sys.executable, "-c", program], cwd=self.folder, capture_output=True, text=True,
                                 check=True, env={**os.environ, "PYTHONPATH": str(folder)})

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/editor/value_controls.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include "apps/editor/schema_values.h"
+#include "apps/editor/state.h"
+#include "scenes/format/text.h"
+#include "scenes/format/writer.h"
+
+namespace nephos {
+namespace {
+
+double number_of(const Node& node) {
+    return node.kind == Node::Kind::integer ? double(node.integer) : node.number;
+}
+
+std::vector<double> numbers_of(const Node* node, std::size_t count) {
+    std::vector<double> out;
+    if (node != nullptr && node->kind == Node::Kind::array) {
+        for (const Node& item : node->items) out.push_back(number_of(item));
+    } else if (node != nullptr) {
+        out.push_back(number_of(*node));
+    }
+    while (out.size() < count) out.push_back(out.empty() ? 0 : out.back());  // one number stands for all
+    out.resize(count);
+    return out;
+}
+
+std::string number_list(const std::vector<double>& numbers, bool integers) {
+    std::string out = numbers.size() > 1 ? "[" : "";
+    for (std::size_t n = 0; n < numbers.size(); ++n) {
+        if (n > 0) out += ", ";
+        out += integers ? std::to_string(std::llround(numbers[n])) : number_text(numbers[n], 7);
+    }
+    return numbers.size() > 1 ? out + "]" : out;
+}
+
+// "%.6g m": a percent sign of a unit would be read as a format.
+std::string format_of(const Key& key, bool integers) {
+    std::string unit = key.unit == "per step" || key.unit == "cells" ? "" : unit_sign(key.unit);
+    std::erase(unit, '%');
+    return std::string(integers ? "%.0f" : "%.6g") + (unit.empty() || unit == "°" ? unit : " " + unit);
+}
+
+// How far a drag of one pixel goes: a five-hundredth of a small range, otherwise of the number's size.
+double drag_speed(const Key& key, double value, bool integers) {
+    const double range = key.limits.max - key.limits.min;
+    double speed = std::max(std::abs(value), 1.0) * 0.006;
+    if (std::isfinite(range) && range <= 1000) speed = std::min(speed, range / 300);
+    if (integers) speed = std::max(speed, 0.1);
+    return speed;
+}
+
+// Whether the whole range fits on a slider.
+bool is_slider(const Key& key) {
+    const double range = key.limits.max - key.limits.min;
+    return std::isfinite(range) && range <= 400 && range > 0 && key.unit != "per step";
+}
+
+void within_limits(const Key& key, std::vector<double>& numbers) {
+    for (double& number : numbers) {
+        if (std::isnan(number)) number = 0;
+        if (key.limits.infinite && std::isinf(number)) continue;
+        const double room =
+            std::min(1e-3, std::isfinite(key.limits.max) ? 1e-3 * (key.limits.max - key.limits.min) : 1e-3);
+        const double low = key.limits.above_min ? key.limits.min + room : key.limits.min;
+        const double high = key.limits.below_max ? key.limits.max - room : key.limits.max;
+        number = std::clamp(number, low, high);
+    }
+}
+
+// To a power of ten that is at most `step`.
+double rounded(double number, double step) {
+    if (!std::isfinite(number) || !(step > 0)) return number;
+    const double unit = std::pow(10.0, std::floor(std::log10(step)));
+    return std::round(number / unit) * unit;
+}
+
+// A field for each number, each with a name of its own: "size_m[2]".
+bool drag_numbers(Editor& editor, const ValueRow& row, std::vector<double>& numbers, const char* format,
+                  bool integers) {
+    const float gap = ImGui::GetStyle().ItemInnerSpacing.x, count = float(numbers.size());
+    const float width =
+        std::max(1.0f, std::floor((ImGui::GetContentRegionAvail().x - (count - 1) * gap) / count));
+    const float speed = float(drag_speed(row.key, numbers[0], integers));
+    bool changed = false;
+    ImGui::BeginGroup();
+    for (std::size_t n = 0; n < numbers.size(); ++n) {
+        if (n > 0) ImGui::SameLine(0, gap);
+        ImGui::PushID(int(n));
+        ImGui::SetNextItemWidth(width);
+        changed |= ImGui::DragScalar("##number", ImGuiDataType_Double, &numbers[n], speed, nullptr, nullptr, format);
+        if (numbers.size() > 1) editor.controls.note(path_text(row.path) + "[" + std::to_string(n) + "]");
+        ImGui::PopID();
+    }
+    ImGui::EndGroup();
+    return changed;
+}
+
+// Numbers side by side. Returns the new value as TOML.
+std::optional<std::string> edit_numbers(Editor& editor, const ValueRow& row, std::size_t count,
+                                        bool integers) {
+    std::vector<double> numbers = numbers_of(row.node, count);
+    const std::string format = format_of(row.key, integers);
+    bool changed = false;
+    if (count == 1 && row.key.limits.infinite) {
+        bool infinite = std::isinf(numbers[0]);
+        if (ImGui::Checkbox("\u221e##infinite", &infinite)) {
+            numbers[0] = infinite ? INFINITY : 1000;
+            changed = true;
+        }
+        ImGui::SameLine();
+        if (infinite) {
+            ImGui::TextDisabled("no end");
+            if (!changed) return std::nullopt;
+            return number_text(numbers[0], 7);
+        }
+    }
+    ImGui::SetNextItemWidth(-1);
+    if (count == 1 && is_slider(row.key)) {
+        const double low = row.key.limits.min, high = row.key.limits.max;
+        changed |=
+            ImGui::SliderScalar("##value", ImGuiDataType_Double, numbers.data(), &low, &high, format.c_str());
+    } else {
+        changed |= drag_numbers(editor, row, numbers, count > 2 ? (integers ? "%.0f" : "%.5g") : format.c_str(),
+                                integers);
+    }
+    if (!changed) return std::nullopt;
+    if (!ImGui::GetIO().WantTextInput && !integers) {  // by the mouse: no more digits than a pixel means
+        for (double& number : numbers) number = rounded(number, drag_speed(row.key, number, false));
+    }
+    within_limits(row.key, numbers);
+    const bool one_for_both =
+        count == 2 && row.node != nullptr && row.node->kind != Node::Kind::array && row.present;
+    if (one_for_both && numbers[0] == numbers[1]) numbers.resize(1);
+    return number_list(numbers, integers);
+}
+
+std::optional<std::string> edit_text(const ValueRow& row) {
+    std::string text = row.node != nullptr ? row.node->text : "";
+    if (row.node != nullptr && row.node->kind == Node::Kind::integer)
+        text = std::to_string(row.node->integer);
+    ImGui::SetNextItemWidth(-1);
+    ImGui::InputText("##value", &text);
+    if (!ImGui::IsItemDeactivatedAfterEdit()) return std::nullopt;
+    if (row.key.kind == KeyKind::seed) {
+        std::uint64_t seed = 0;
+        if (!parse_seed(text, seed)) return std::nullopt;
+        const bool plain = seed <= 0x7fffffffffffffff && !text.starts_with("0x");
+        return plain ? std::to_string(seed) : toml_string(text);
+    }
+    return toml_string(text);
+}
+
+std::optional<std::string> edit_word(Editor& editor, const ValueRow& row) {
+    const std::string now = row.node != nullptr ? row.node->text : "";
+    std::optional<std::string> chosen;
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::BeginCombo("##value", now.empty() ? "(none)" : now.c_str())) {
+        for (const std::string_view word : row.key.words) {
+            if (ImGui::Selectable(std::string(word).c_str(), word == now)) chosen = toml_string(word);
+            editor.controls.note("choice " + std::string(word));
+        }
+        ImGui::EndCombo();
+    }
+    return chosen;
+}
+
+std::optional<std::string> edit_boundaries(const ValueRow& row) {
+    std::vector<std::string> words(3, row.node != nullptr ? row.node->text : "open");
+    for (std::size_t n = 0; row.node != nullptr && n < row.node->items.size() && n < 3; ++n) {
+        words[n] = row.node->items[n].text;
+    }
+    bool changed = false;
+    constexpr const char* kAxes[] = {"east", "north", "up"};
+    for (std::size_t n = 0; n < 3; ++n) {
+        bool periodic = words[n] == "periodic";
+        if (n > 0) ImGui::SameLine();
+        if (ImGui::Checkbox(kAxes[n], &periodic)) {
+            words[n] = periodic ? "periodic" : "open";
+            changed = true;
+        }
+    }
+    if (!changed) return std::nullopt;
+    return "[\"" + words[0] + "\", \"" + words[1] + "\", \"" + words[2] + "\"]";
+}
+
+std::optional<std::string> edit_colour(const ValueRow& row) {
+    const std::vector<double> numbers = numbers_of(row.node, 3);
+    float colour[3] = {float(numbers[0]), float(numbers[1]), float(numbers[2])};
+    ImGui::SetNextItemWidth(-1);
+    if (!ImGui::ColorEdit3("##value", colour, ImGuiColorEditFlags_Float | ImGuiColorEditFlags_HDR))
+        return std::nullopt;
+    std::vector<double> out{colour[0], colour[1], colour[2]};
+    within_limits(row.key, out);
+    for (double& part : out) part = std::round(part * 1e4) / 1e4;
+    return number_list(out, false);
+}
+
+// Names that a list of texts may hold: those of models or skies.
+std::vector<std::string> candidates(const Editor& editor, const ValueRow& row) {
+    std::vector<std::string> names;
+    const std::optional<Scene>& scene = editor.document->scene();
+    const Node& values = editor.document->values();
+    if (row.path.size() < 2) return names;
+    if (row.key.name == "models") {
+        names = names_of(value_node(values, text_path("model")));
+        if (scene) {
+            for (const BaseModel& model : scene->models) names.push_back(model.name);
+        }
+    } else if (row.key.name == "skies") {
+        names = names_of(value_node(values, text_path("sky")));
+    }
+    std::ranges::sort(names);
+    names.erase(std::unique(names.begin(), names.end()), names.end());
+    return names;
+}
+
+std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
+    std::vector<std::string> texts;
+    if (row.node != nullptr && row.node->kind == Node::Kind::text) texts.push_back(row.node->text);
+    if (row.node != nullptr) {
+        for (const Node& item : row.node->items) texts.push_back(item.text);
+    }
+    const auto as_toml = [](const std::vector<std::string>& list) {
+        std::string out = "[";
+        for (const std::string& text : list) out += (out.size() > 1 ? ", " : "") + toml_string(text);
+        return out + "]";
+    };
+    std::string shown;
+    for (const std::string& text : texts) shown += (shown.empty() ? "" : ", ") + text;
+    ImGui::SetNextItemWidth(-1);
+    const std::vector<std::string> names = candidates(editor, row);
+    if (names.empty()) {
+        ImGui::InputText("##value", &shown);
+        if (!ImGui::IsItemDeactivatedAfterEdit()) return std::nullopt;
+        std::vector<std::string> parts;
+        for (std::size_t at = 0; at <= shown.size();) {
+            const std::size_t comma = std::min(shown.find(',', at), shown.size());
+            const std::size_t first = std::min(shown.find_first_not_of(' ', at), comma);
+            std::string part = shown.substr(first, comma - first);
+            while (!part.empty() && part.back() == ' ') part.pop_back();
+            if (!part.empty()) parts.push_back(std::move(part));
+            at = comma + 1;
+        }
+        return as_toml(parts);
+    }
+    std::optional<std::string> out;
+    if (ImGui::BeginCombo("##value", shown.empty() ? "(none)" : shown.c_str())) {
+        for (const std::string& name : names) {
+            bool on = std::ranges::find(texts, name) != texts.end();
+            const bool clicked = ImGui::Checkbox(name.c_str(), &on);
+            editor.controls.note("choice " + name);
+            if (clicked) {
+                if (on) {
+                    texts.push_back(name);
+                } else {
+                    std::erase(texts, name);
+                }
+                out = as_toml(texts);
+            }
+        }
+        ImGui::EndCombo();
+    }
+    return out;
+}
+
+}  // namespace
+
+std::optional<std::string> edit_value(Editor& editor, const ValueRow& row) {
+    switch (row.key.kind) {
+        case KeyKind::boolean: {
+            bool on = row.node != nullptr && row.node->boolean;
+            if (ImGui::Checkbox("##value", &on)) return on ? "true" : "false";
+            return std::nullopt;
+        }
+        case KeyKind::integer:
+        case KeyKind::count:
+            return edit_numbers(editor, row, 1, true);
+        case KeyKind::number:
+            return edit_numbers(editor, row, 1, false);
+        case KeyKind::extent:
+            return edit_numbers(editor, row, 3, true);
+        case KeyKind::vector:
+            return edit_numbers(editor, row, 3, false);
+        case KeyKind::range:
+            return edit_numbers(editor, row, 2, false);
+        case KeyKind::counts:
+            return edit_numbers(editor, row, 2, true);
+        case KeyKind::colour:
+            return edit_colour(row);
+        case KeyKind::word:
+            return edit_word(editor, row);
+        case KeyKind::boundaries:
+            return edit_boundaries(row);
+        case KeyKind::texts:
+            return edit_texts(editor, row);
+        case KeyKind::text:
+        case KeyKind::path:
+        case KeyKind::seed:
+            return edit_text(row);
+        case KeyKind::table:
+        case KeyKind::tables:
+            break;
+    }
+    return std::nullopt;
+}
+
+}  // namespace nephos

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A control for the value of a key, chosen by the key's kind: sliders, numbers side by side, words, colours, names.
+
+#include <optional>
+#include <string>
+
+#include "scenes/format/schema.h"
+#include "scenes/format/toml_edit.h"
+
+namespace nephos {
+
+struct Editor;
+
+// A key in the panel: its place, and its value in the text or else the default.
+struct ValueRow {
+    const Key& key;
+    TextPath path;
+    const Node* node;  // its value; null when it has none at all
+    bool present;      // in the text
+};
+
+// Draws the control; returns the new value as TOML when the user changed it.
+std::optional<std::string> edit_value(Editor& editor, const ValueRow& row);
+
+}  // namespace nephos

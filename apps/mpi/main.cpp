@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// nephos-mpi: steps one lattice that is too large for one process.
+//
+//     mpirun -n 4 nephos-mpi SCENE --steps 100 --hash --out big
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <mpi.h>
+#include <tbb/global_control.h>
+
+#include "apps/mpi/ranks.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "density/vdb/vdb_file.h"
+#include "scenes/format/reader.h"
+
+namespace nephos {
+namespace {
+
+struct Arguments {
+    std::string scene;
+    std::vector<std::string> settings;
+    std::optional<std::uint64_t> steps, seed;
+    std::string out;
+    int slab_levels = 8, threads = 1;
+    bool hash = false, write_state = false;
+};
+
+// The text of a number, nothing where there is none.
+std::string field(double value) { return std::isfinite(value) ? number_text(value) : std::string(); }
+
+// A row of statistics.csv, with the columns of the command that bits alone have.
+void write_row(std::ofstream& file, std::uint64_t step, double time_s, const CloudStatistics& s,
+               const std::string& hash) {
+    file << fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", step, number_text(time_s), s.hum, s.act,
+                        s.cld, field(s.cover), field(s.base_m), field(s.top_m), field(s.base_mean_m),
+                        field(s.top_mean_m), field(s.perimeter_m), hash);
+    if (!file.flush()) throw Error(ErrorCode::io, "statistics.csv: cannot write");
+}
+
+// Writes cld of the own levels, some at a time, as files that stand in their place in the world: a tree of OpenVDB is made of
+// these levels alone, and no dense copy of anything.
+void write_slabs(const SlabAutomaton& slab, int levels_each, const std::filesystem::path& folder) {
+    const BitPlaneView cld = slab.cld();
+    const std::size_t level_words = cld.words_per_row * std::size_t(cld.extent.y);
+    for (int k = 0; k < cld.extent.z; k += levels_each) {
+        const int levels = std::min(levels_each, cld.extent.z - k);
+        VdbContent content;
+        content.cld = BitPlaneView{{cld.extent.x, cld.extent.y, levels},
+                                   cld.words_per_row,
+                                   cld.words + std::size_t(k) * level_words};
+        content.cells = slab.options().placement;
+        content.cells.origin_m.z += (slab.first() + k) * content.cells.cell_size_m;
+        VdbMetadata metadata;
+        metadata.seed = slab.options().seed;
+        metadata.time_step_s = slab.options().time_step_s;
+        metadata.time_s = double(slab.steps()) * slab.options().time_step_s;
+        write_vdb(folder / fmt::format("levels_{:05}.vdb", slab.first() + k), content, metadata);
+    }
+}
+
+void simulate(const Arguments& a) {
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, std::size_t(a.threads));
+    const Scene scene = read_scene(a.scene, a.settings, SceneUse::without_frames);
+    if (!scene.layers.empty() || scene.initial_state_file)
+        throw Error(ErrorCode::usage,
+                    a.scene + ": one lattice without layers and without initial_state is expected");
+    AutomatonOptions options = scene.automaton;
+    if (a.seed) options.seed = *a.seed;
+    Ranks ranks(options);
+    std::ofstream table;
+    if (!a.out.empty() && ranks.rank() == 0) {
+        std::filesystem::create_directories(a.out);
+        table.open(std::filesystem::path(a.out) / "statistics.csv");
+        if (!table) throw Error(ErrorCode::io, a.out + "/statistics.csv: cannot write");
+        table << "step,time_s,hum,act,cld,cloud_cover,base_m,top_m,base_mean_m,top_mean_m,perimeter_m,hash\n";
+    }
+    const std::uint64_t steps = a.steps.value_or(scene.steps);
+    for (std::uint64_t step = 0;; ++step) {
+        std::string hash;
+        if (a.hash) hash = ranks.hash().hex();
+        if (!a.out.empty()) {
+            const CloudStatistics statistics = ranks.statistics();
+            if (ranks.rank() == 0)
+                write_row(table, step, double(step) * options.time_step_s, statistics, hash);
+        }
+        if (a.hash && ranks.rank() == 0) {
+            fmt::print("{} {}\n", step, hash);
+            std::fflush(stdout);
+        }
+        if (step == steps) break;
+        ranks.step();
+    }
+    if (a.write_state) {
+        MPI_Barrier(MPI_COMM_WORLD);  // rank 0 has made the folder
+        write_slabs(ranks.slab(), a.slab_levels, a.out);
+    }
+}
+
+int parse(CLI::App& app, int argc, char** argv, Arguments& a) {
+    app.add_option("SCENE", a.scene, "Scene of one lattice, without layers")->required();
+    app.add_option("--set", a.settings, "KEY=VALUE of the scene; may be repeated")
+        ->expected(1)
+        ->allow_extra_args(false)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    app.add_option("--seed", a.seed, "Seed instead of the scene's");
+    app.add_option("--steps", a.steps, "Steps instead of the scene's time.steps");
+    app.add_flag("--hash", a.hash, "Print the state hash after every step, as `nephos hash` does");
+    app.add_option("-o,--out", a.out, "Folder for statistics.csv, with a row a step");
+    app.add_flag("--write-state", a.write_state,
+                 "Write the last state's cld to --out, as VDB files of some levels each")
+        ->needs("--out");
+    app.add_option("--slab-levels", a.slab_levels, "Levels of such a file")
+        ->check(CLI::Range(1, 65536))
+        ->capture_default_str();
+    app.add_option("--threads", a.threads, "Threads of each process")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+    app.footer(
+        "Each process owns some levels, at least 8 of them; bits, hashes and statistics are those of one "
+        "process.\n"
+        "Example: mpirun -n 4 nephos-mpi large.toml --steps 100 --hash --out large");
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        int rank = 0;
+        MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+        if (rank > 0) return error.get_exit_code() == 0 ? 0 : int(ErrorCode::usage);
+        return app.exit(error) == 0 ? 0 : int(ErrorCode::usage);
+    }
+    return -1;
+}
+
+}  // namespace
+}  // namespace nephos
+
+int main(int argc, char** argv) {
+    MPI_Init(&argc, &argv);
+    int rank = 0;
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    nephos::Arguments arguments;
+    CLI::App app("Steps one lattice on several processes", "nephos-mpi");
+    int status = nephos::parse(app, argc, argv, arguments);
+    if (status < 0) {
+        status = 0;
+        try {
+            nephos::simulate(arguments);
+        } catch (const nephos::Error& error) {
+            std::fprintf(stderr, "error: process %d: %s\n", rank,
+                         nephos::escaped(error.what(), "\n").c_str());
+            status = int(error.code());
+        } catch (const std::exception& error) {
+            std::fprintf(stderr, "error: process %d: %s\n", rank,
+                         nephos::escaped(error.what(), "\n").c_str());
+            status = int(nephos::ErrorCode::io);
+        }
+        // The others may be waiting for this one.
+        if (status != 0) MPI_Abort(MPI_COMM_WORLD, status);
+    }
+    MPI_Finalize();
+    return status;
+}

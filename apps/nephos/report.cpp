@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// nephos report: a sweep as one page.
+
+#include "study/report.h"
+
+#include <memory>
+
+#include "study/sweep.h"
+#include <fmt/format.h>
+
+#include "apps/nephos/arguments.h"
+#include "apps/nephos/study_commands.h"
+#include "apps/nephos/terminal.h"
+#include "core/error.h"
+#include "simulation/layer_simulation.h"
+
+namespace nephos {
+namespace {
+
+struct ReportArguments {
+    std::vector<std::string> folders;
+    std::string out;
+    WorkArguments work;
+};
+
+int report(const ReportArguments& a) {
+    const ThreadLimit limit(1);
+    const SweepPlan plan = plan_of_folder(a.folders.front());
+    const Records records =
+        Records::read(std::vector<std::filesystem::path>(a.folders.begin(), a.folders.end()));
+    if (records.size() == 0)
+        throw Error(ErrorCode::usage, a.folders.front() + ": no run of this sweep is done yet");
+    const std::filesystem::path out = a.out.empty() ? std::filesystem::path(a.folders.front()) / "report.html"
+                                                    : std::filesystem::path(a.out);
+    write_report(plan, records, out);
+    if (!a.work.quiet)
+        Output().line(fmt::format("{}  one page, without network: open it in a browser", out.string()));
+    return 0;
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app, Action& action) {
+    CLI::App* command = app.add_subcommand("report", "Show a sweep as one HTML page");
+    const auto a = std::make_shared<ReportArguments>();
+    command
+        ->add_option("DIR", a->folders, "Folders of the sweep or its shards; the plan is that of the first")
+        ->required()
+        ->type_name("DIR");
+    command->add_option("-o,--out", a->out, "File to write (default: report.html in the first folder)")
+        ->type_name("FILE");
+    add_quiet(*command, a->work);
+    command->footer(
+        "What went wrong comes first, then regimes, statistics along each axis with 95 % intervals, "
+        "profiles,\n"
+        "sizes of clouds, cover over time, pictures, and the command that repeats each run. The page loads\n"
+        "nothing and works without scripts; with them the curves over time zoom. Runs that are missing or "
+        "not\n"
+        "steady are no obstacle: a sweep can be looked at while it goes on.\n"
+        "\n"
+        "Examples:\n"
+        "  nephos report sweep\n"
+        "  nephos report host-a/sweep host-b/sweep -o both.html");
+    command->callback([a, &action] { action = [a] { return report(*a); }; });
+}
+
+}  // namespace nephos

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sweeps and fits from Python: the `nephos` command does them, in processes of its own, so that tables have the same bytes
+however they were asked for."""
+
+import csv
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+
+import numpy
+
+from ._nephos import Error, Scene, _toml_text
+
+_WORDS = ("run", "status", "regime", "state_hash", "message", "command")
+
+
+def _command():
+    """The program that belongs to this package: $NEPHOS, that of the same build or prefix, or the one in the path."""
+    if os.environ.get("NEPHOS"):
+        return os.environ["NEPHOS"]
+    for folder in pathlib.Path(__file__).resolve().parents:
+        if (folder / "bin/nephos").is_file():
+            return str(folder / "bin/nephos")
+    found = shutil.which("nephos")
+    if not found:
+        raise _error("the command `nephos` is not found: put it into PATH, or its path into NEPHOS", "usage")
+    return found
+
+
+def _error(text, code):
+    error = Error(text)
+    error.code, error.file, error.line, error.column = code, None, None, None
+    return error
+
+
+def _call(arguments, allowed=(0,)):
+    process = subprocess.Popen([_command(), *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                               text=True, errors="backslashreplace")
+    try:
+        message = process.communicate()[1].strip()
+    except KeyboardInterrupt:
+        process.wait()  # Ctrl-C reached it too; it keeps what is done
+        raise
+    if process.returncode not in allowed:
+        codes = {1: "check", 2: "usage", 3: "io", 4: "gpu"}
+        raise _error(message or f"nephos ended with status {process.returncode}", codes.get(process.returncode, "io"))
+
+
+def _column(name, values):
+    if name in _WORDS:
+        return numpy.array(values)
+    if name == "seed":
+        return numpy.array([int(value) for value in values], dtype=numpy.uint64)
+    for kind in (int, float):
+        try:
+            return numpy.array([kind(value or "nan") for value in values])
+        except ValueError:
+            pass
+    return numpy.array(values)
+
+
+def _table(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = csv.reader(file)
+        names = next(rows)
+        columns = list(zip(*rows)) or [()] * len(names)
+    return {name: _column(name, values) for name, values in zip(names, columns)}
+
+
+class Sweep:
+    """The tables of a sweep in a folder, also of one that the command made or that is not complete. docs/research.md
+    defines every column; a mean is NaN where a point has none."""
+
+    def __init__(self, folder):
+        """Raises Error where the folder has no tables."""
+        self.folder = pathlib.Path(folder)
+        if not (self.folder / "runs.csv").is_file():
+            raise _error(f"{self.folder}: has no runs.csv; `nephos merge` makes it from shards", "io")
+
+    def runs(self):
+        """Returns runs.csv as a dict of NumPy arrays, a value a run, ready for pandas.DataFrame."""
+        return _table(self.folder / "runs.csv")
+
+    def points(self):
+        """Returns points.csv, a value a point: means over the replicates, with their 95 % intervals."""
+        return _table(self.folder / "points.csv")
+
+    def failures(self):
+        """Returns failures.csv: what failed, why, and the command that repeats it."""
+        return _table(self.folder / "failures.csv")
+
+    def report(self, path=None):
+        """Writes the sweep as one HTML page, and returns its path (report.html in the folder by default)."""
+        path = pathlib.Path(path) if path is not None else self.folder / "report.html"
+        _call(["report", self.folder, "--out", path, "--quiet"])
+        return path
+
+    @property
+    def series_file(self):
+        """Path of series.nc: every step of every run. xarray.open_dataset reads it."""
+        return self.folder / "series.nc"
+
+    def __repr__(self):
+        return f"<nephos.Sweep in {str(self.folder)!r}>"
+
+
+def _plan(axes, options):
+    lines = [f"{key} = {_toml_text(value)}" for key, value in options.items() if value is not None]
+    for key, values in axes.items():
+        keys = [key] if isinstance(key, str) else list(key)
+        name = "range" if isinstance(values, dict) else "values"
+        if isinstance(values, dict):
+            entries = ", ".join(f"{entry} = {_toml_text(value)}" for entry, value in values.items())
+            text = "{ " + entries + " }"
+        else:
+            text = _toml_text(list(values))
+        lines += ["", "[[axis]]", f"keys = {_toml_text(keys)}", f"{name} = {text}"]
+    return "\n".join(lines) + "\n"
+
+
+def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", points=None, seed=1, seeds="per_point",
+          clouds_every=10, layer=None, until=None, workers=None, shard=None):
+    """Runs a scene over values of its keys, as `nephos sweep` does, and returns the Sweep.
+
+    scene     a Scene, or the path of one
+    axes      {key: values}: a list of values; {"from": a, "to": b, "count": n, "scale": "log"} spread between two; without
+              "count" the range of a sampled design. A tuple of keys moves them together
+    out       folder of the sweep; the same call again, or one with longer axes, runs only what is missing
+    steps     (least, most): a run goes on, up to the most, until it is judged steady
+    design    "grid", "list", "random", "latin_hypercube" or "sobol"; the last three take `points`
+    until     (statistic, standard error): runs go on, up to the most steps, until the mean is that exact
+    workers   processes at a time; None: one a core
+    shard     (i, n): only the i-th of n parts of the runs, i from 0, for calls on several machines; then None is returned, and
+              merge() makes the tables
+
+    Raises Error before the first run where a value is out of range, with the text of the command. Runs that fail are in
+    failures(), and do not raise. Ctrl-C stops, and what is done stays."""
+    options = {"scene": "scene.toml", "design": design, "points": points, "replicates": replicates, "seed": seed,
+               "seeds": seeds, "clouds_every": clouds_every, "layer": layer}
+    rules = {"min": steps[0], "max": steps[1]}
+    if until is not None:
+        rules["until"] = {"statistic": until[0], "standard_error": until[1]}
+    options["steps"] = rules
+    with tempfile.TemporaryDirectory(prefix="nephos-") as folder:
+        if isinstance(scene, Scene):
+            pathlib.Path(folder, "scene.toml").write_text(scene.text(), encoding="utf-8")
+        else:
+            options["scene"] = os.path.abspath(scene)
+        plan = pathlib.Path(folder, "sweep.toml")
+        plan.write_text(_plan(axes, options), encoding="utf-8")
+        jobs = [] if workers is None else ["--workers", workers]
+        part = [] if shard is None else ["--shard", f"{shard[0]}/{shard[1]}"]
+        _call(["sweep", plan, "--out", out, "--quiet", *jobs, *part], allowed=(0, 1))
+    return Sweep(out) if shard is None else None
+
+
+def merge(folders, out=None):
+    """Makes the tables of a sweep from the shards in one or several folders, and returns the Sweep; `out` is the first
+    folder by default. Runs that are missing yet stand in runs.csv as missing."""
+    folders = [folders] if isinstance(folders, (str, os.PathLike)) else list(folders)
+    out = folders[0] if out is None else out
+    _call(["merge", *folders, "--out", out, "--quiet"])
+    return Sweep(out)
+
+
+def fit(path, out, *, workers=None):
+    """Finds the parameters that a fit file asks for, as `nephos fit` does, and returns fit.json as a dict with `posterior`
+    added: a dict of arrays, 1,000 equally likely values of each key. The same call again runs only what is missing. Raises
+    Error with the text of the command."""
+    jobs = [] if workers is None else ["--workers", workers]
+    _call(["fit", path, "--out", out, "--quiet", *jobs])
+    result = json.loads(pathlib.Path(out, "fit.json").read_text(encoding="utf-8"))
+    result["posterior"] = _table(pathlib.Path(out, "posterior.csv"))
+    return result

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "density/export/bricks.h"
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "core/atomic_file.h"
+#include "core/bytes.h"
+#include "core/error.h"
+#include "density/export/whole_file.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::uint64_t kMark = 0x314349524248504e;  // "NPHBRIC1"
+constexpr int kBorder = 1;
+constexpr std::uint64_t kHeadBytes = 32, kLevelBytes = 12, kEntryBytes = 40;
+
+struct Entry {
+    std::uint32_t level = 0, i = 0, j = 0, k = 0;
+    std::uint64_t offset = 0, bytes = 0;
+    float min = 0, max = 0;
+};
+
+int bricks_along(int voxels, int edge) { return (voxels + edge - 1) / edge; }
+
+// Places of the voxels of a brick along an axis of the level, -1 where there is none.
+std::vector<int> places(int first, int edge, int voxels, bool periodic) {
+    std::vector<int> result;
+    for (int n = first - kBorder; n < first + edge + kBorder; ++n) {
+        const int at = periodic ? (n + voxels) % voxels : n;
+        // Beyond the last voxel of a brick that is not full there is nothing but the border.
+        const bool there = n <= voxels && at >= 0 && at < voxels;
+        result.push_back(there ? at : -1);
+    }
+    return result;
+}
+
+Volume brick_of(const Volume& level, const std::array<int, 3>& first, const BrickOptions& options) {
+    const int side = options.edge + 2 * kBorder;
+    const std::vector<int> x = places(first[0], options.edge, level.nx, options.periodic[0]),
+                           y = places(first[1], options.edge, level.ny, options.periodic[1]),
+                           z = places(first[2], options.edge, level.nz, options.periodic[2]);
+    Volume brick{side, side, side,
+                 std::vector<float>(std::size_t(side) * std::size_t(side) * std::size_t(side), 0.0f)};
+    float* out = brick.values.data();
+    for (const int k : z) {
+        for (const int j : y) {
+            if (k >= 0 && j >= 0) {
+                const float* row =
+                    level.values.data() +
+                    (std::size_t(k) * std::size_t(level.ny) + std::size_t(j)) * std::size_t(level.nx);
+                for (std::size_t n = 0; n < x.size(); ++n) out[n] = x[n] >= 0 ? row[x[n]] : 0.0f;
+            }
+            out += side;
+        }
+    }
+    return brick;
+}
+
+}  // namespace
+
+std::uint64_t most_brick_bytes(const std::vector<std::array<int, 3>>& sizes, int edge, VoxelType type) {
+    const int side = edge + 2 * kBorder;
+    std::uint64_t bytes = kHeadBytes;
+    for (const std::array<int, 3>& size : sizes) {
+        std::uint64_t bricks = 1;
+        for (const int voxels : size) bricks *= std::uint64_t(bricks_along(voxels, edge));
+        bytes += kLevelBytes + bricks * (kEntryBytes + encoded_bytes(side, side, side, type));
+    }
+    return bytes;
+}
+
+void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& levels,
+                  const BrickOptions& options) {
+    if (options.type == VoxelType::bc4)
+        throw Error(ErrorCode::usage, "--type bc4: bricks with a border have r8, r16, r16f or r32f");
+    std::vector<Entry> entries;
+    std::vector<std::vector<std::byte>> data;
+    for (std::size_t n = 0; n < levels.size(); ++n) {
+        const Volume& level = levels[n];
+        for (int k = 0; k < bricks_along(level.nz, options.edge); ++k) {
+            for (int j = 0; j < bricks_along(level.ny, options.edge); ++j) {
+                for (int i = 0; i < bricks_along(level.nx, options.edge); ++i) {
+                    const Volume brick =
+                        brick_of(level, {i * options.edge, j * options.edge, k * options.edge}, options);
+                    const auto [min, max] = std::ranges::minmax_element(brick.values);
+                    Entry entry{std::uint32_t(n),
+                                std::uint32_t(i),
+                                std::uint32_t(j),
+                                std::uint32_t(k),
+                                0,
+                                0,
+                                *min,
+                                *max};
+                    data.push_back(*max > 0 ? encode(brick, options.type, options.scale)
+                                            : std::vector<std::byte>());
+                    entry.bytes = data.back().size();
+                    entries.push_back(entry);
+                }
+            }
+        }
+    }
+    ByteWriter head;
+    head.put(kMark);
+    for (const int number : {int(options.type), options.edge, kBorder, int(levels.size())})
+        head.put(std::uint32_t(number));
+    head.put(std::uint64_t(entries.size()));
+    for (const Volume& level : levels)
+        for (const int voxels : {level.nx, level.ny, level.nz}) head.put(std::uint32_t(voxels));
+    std::uint64_t offset = kHeadBytes + kLevelBytes * levels.size() + kEntryBytes * entries.size();
+    for (Entry& entry : entries) {
+        entry.offset = entry.bytes > 0 ? offset : 0;
+        offset += entry.bytes;
+        for (const std::uint32_t number : {entry.level, entry.i, entry.j, entry.k}) head.put(number);
+        head.put(entry.offset);
+        head.put(entry.bytes);
+        head.put(entry.min);
+        head.put(entry.max);
+    }
+    write_pieces_atomically(path, [&](const AppendPiece& append) {
+        const auto piece = [&](std::span<const std::byte> bytes) {
+            append({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+        };
+        piece(head.bytes());
+        for (const std::vector<std::byte>& brick : data) piece(brick);
+    });
+}
+
+namespace {
+
+[[noreturn]] void bad(const std::string& what) { throw Error(ErrorCode::io, what); }
+
+// The part of a file before its table.
+struct Head {
+    EncodedVolume volume;  // levels of zeros
+    int edge = 0;
+    std::uint64_t bricks = 0;
+};
+
+Head read_head(ByteReader& reader, std::size_t file_bytes) {
+    Head head;
+    if (reader.get<std::uint64_t>() != kMark) bad("is no file of bricks");
+    const auto type = reader.get<std::uint32_t>(), edge = reader.get<std::uint32_t>(),
+               border = reader.get<std::uint32_t>(), levels = reader.get<std::uint32_t>();
+    const auto count = reader.get<std::uint64_t>();
+    if (type > 3 || edge < 8 || edge > 256 || border != kBorder || levels == 0 || levels > 32)
+        bad("its head is impossible");
+    head.volume.type = VoxelType(type);
+    head.edge = int(edge);
+    for (std::uint32_t n = 0; n < levels; ++n) {
+        std::array<int, 3> size{};
+        std::uint64_t bricks = 1;
+        for (int& voxels : size) {
+            const auto stated = reader.get<std::uint32_t>();
+            if (stated == 0 || stated > 1u << 16) bad("its sizes are impossible");
+            voxels = int(stated);
+            bricks *= std::uint64_t(bricks_along(voxels, head.edge));
+        }
+        // Each brick has an entry, so a short file cannot ask for much memory.
+        if (bricks > file_bytes / kEntryBytes) bad("its sizes are impossible");
+        head.bricks += bricks;
+        head.volume.levels.push_back(
+            {size[0], size[1], size[2],
+             std::vector<std::byte>(encoded_bytes(size[0], size[1], size[2], head.volume.type))});
+    }
+    if (count != head.bricks) bad("its number of bricks does not fit its sizes");
+    return head;
+}
+
+Entry read_entry(ByteReader& reader) {
+    Entry entry;
+    for (std::uint32_t* number : {&entry.level, &entry.i, &entry.j, &entry.k})
+        *number = reader.get<std::uint32_t>();
+    entry.offset = reader.get<std::uint64_t>();
+    entry.bytes = reader.get<std::uint64_t>();
+    entry.min = reader.get<float>();
+    entry.max = reader.get<float>();
+    return entry;
+}
+
+// Copies the voxels of a brick without its border into its level.
+void place_brick(const Entry& entry, std::span<const std::byte> brick, int edge, VolumeLevel& level,
+                 std::size_t voxel) {
+    const auto range = [&](std::uint32_t index, int voxels) {
+        if (index >= std::uint32_t(bricks_along(voxels, edge))) bad("a brick lies beside its level");
+        const int first = int(index) * edge;
+        return std::pair{first, std::min(first + edge, voxels)};
+    };
+    const auto [x, x_end] = range(entry.i, level.nx);
+    const auto [y, y_end] = range(entry.j, level.ny);
+    const auto [z, z_end] = range(entry.k, level.nz);
+    const int side = edge + 2 * kBorder;
+    for (int k = z; k < z_end; ++k) {
+        for (int j = y; j < y_end; ++j) {
+            const std::size_t from =
+                                  linear_index({side, side, side}, kBorder, j - y + kBorder, k - z + kBorder),
+                              to = linear_index({level.nx, level.ny, level.nz}, x, j, k);
+            std::memcpy(level.bytes.data() + to * voxel, brick.data() + from * voxel,
+                        std::size_t(x_end - x) * voxel);
+        }
+    }
+}
+
+}  // namespace
+
+EncodedVolume read_bricks(const std::filesystem::path& path) {
+    return with_whole_file(path, [](ByteReader& reader) {
+        const std::span<const std::byte> file = reader.rest();
+        Head head = read_head(reader, file.size());
+        const std::size_t voxel = encoded_bytes(1, 1, 1, head.volume.type),
+                          side = std::size_t(head.edge) + 2 * kBorder;
+        for (std::uint64_t n = 0; n < head.bricks; ++n) {
+            const Entry entry = read_entry(reader);
+            if (entry.bytes == 0) continue;
+            if (entry.level >= head.volume.levels.size() || entry.bytes != side * side * side * voxel ||
+                entry.offset > file.size() || file.size() - entry.offset < entry.bytes)
+                bad("brick " + std::to_string(n) + " lies outside of it");
+            place_brick(entry, file.subspan(entry.offset, entry.bytes), head.edge,
+                        head.volume.levels[entry.level], voxel);
+        }
+        return std::move(head.volume);
+    });
+}
+
+}  // namespace nephos

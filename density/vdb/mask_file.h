@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Reads cloud masks of other programs: like densities (vdb_file.h), and bool and mask grids besides.
+
+#include "density/vdb/vdb_file.h"
+
+namespace nephos {
+
+// Returns a bool or mask grid as 1 where a voxel is active and true, and 0 elsewhere; a fog volume as it is. Without
+// options.grid it is `cld` if that is a mask, else `density`, else the first fog volume, else the first mask. All else is
+// that of load_density().
+LoadedDensity load_mask(const std::filesystem::path& path, const VdbReadOptions& options = {});
+
+}  // namespace nephos

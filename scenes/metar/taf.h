@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Aerodrome forecasts (WMO Manual on Codes, FM 51 TAF) as scenes whose weather changes: each period of the forecast is a
+// state of the climate, and layers come and go with it. All functions are pure and thread-safe.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "scenes/metar/metar.h"
+#include "scenes/metar/metar_scene.h"
+
+namespace nephos {
+
+// The weather from one change of the forecast to the next.
+struct TafPeriod {
+    std::string change;              // "BECMG 2115/2118", "FM211800"; empty: from the beginning
+    double from_s = 0, until_s = 0;  // of the change, after the beginning of validity
+    Metar weather;                   // all of it: what a change does not name goes on
+};
+
+struct Taf {
+    std::string text;  // as given, blanks joined
+    std::string station;
+    int day = 0, hour = 0;           // UTC, at which it becomes valid
+    double length_s = 0;             // of the validity
+    std::vector<TafPeriod> periods;  // by time, at least one
+    std::vector<std::string> notes;  // what is left out, a sentence each
+};
+
+// Returns whether a text begins as a forecast does.
+bool is_taf(std::string_view text);
+
+// Reads a forecast. Throws Error(usage) as parse_metar(), naming the change in which a group is wrong.
+Taf parse_taf(std::string_view text, bool lenient = false);
+
+// A layer of the scene, and the periods in which it is there.
+struct TafLayer {
+    MetarLayer layer;
+    std::vector<bool> present;  // of each period
+};
+
+// Returns the layers of all periods from below, each once: a group that goes on is one layer.
+std::vector<TafLayer> layers_of(const Taf& taf);
+
+// Returns the scene as TOML with comments, as metar_scene_text(); `coverage` has that of each of layers_of().
+std::string taf_scene_text(const Taf& taf, const MetarSceneOptions& options,
+                           const std::vector<double>& coverage);
+
+}  // namespace nephos

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/cloud_mask.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "statistics/clouds.h"
+#include "study/netcdf_file.h"
+#include "study/snapshot.h"
+#include <fmt/format.h>
+#include <png.h>
+
+#include "core/error.h"
+#include "density/vdb/mask_file.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kGreyThreshold = 127;
+constexpr int kNullDraws = 20;
+constexpr std::uint64_t kNullSeed = 1;
+
+[[noreturn]] void fail(ErrorCode code, const std::filesystem::path& path, const std::string& message) {
+    throw Error(code, path.string() + ": " + message);
+}
+
+double cell_size(const std::filesystem::path& path, const MaskOptions& options) {
+    if (!options.cell_size_m)
+        fail(ErrorCode::usage, path,
+             "does not say how large its cells are: give --cell-size METRES (cell_size_m of a target)");
+    return *options.cell_size_m;
+}
+
+// `value(i, j, k)` is cloud where it is above the threshold.
+template <typename Value>
+BitPlane plane_of(const Extent& extent, double threshold, Value&& value) {
+    BitPlane plane(extent);
+    for (int k = 0; k < extent.z; ++k)
+        for (int j = 0; j < extent.y; ++j)
+            for (int i = 0; i < extent.x; ++i)
+                if (value(i, j, k) > threshold) plane.set(i, j, k, true);
+    return plane;
+}
+
+CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& options) {
+    VdbReadOptions reading;
+    reading.grid = options.variable;
+    const DensityGrid grid = load_mask(path, reading).density;
+    const double size = grid.placement().cell_size_m;
+    if (options.cell_size_m || options.level_height_m)
+        fail(ErrorCode::usage, path,
+             fmt::format("has voxels of {} m itself: leave out the size of cells and levels", size));
+    const std::vector<float> values = grid.to_dense();
+    const Extent extent = grid.extent();
+    CloudMasks masks{{}, size, size, grid.placement().origin_m.z, options.boundaries};
+    masks.snapshots.push_back(plane_of(extent, options.threshold.value_or(0), [&](int i, int j, int k) {
+        return double(values[linear_index(extent, i, j, k)]);
+    }));
+    return masks;
+}
+
+CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions& options) {
+    const NetcdfData data = read_netcdf(path, options.variable);
+    std::vector<std::uint64_t> sizes = data.sizes;
+    if (sizes.size() < 2 || sizes.size() > 4)
+        fail(ErrorCode::usage, path,
+             fmt::format("the variable has {} dimensions; expected (y, x), (z, y, x) or (time, z, y, x)",
+                         sizes.size()));
+    // Of three dimensions the first is time where its name says so.
+    const std::string& first = data.dimensions.front();
+    const bool has_time = sizes.size() == 4 || (sizes.size() == 3 && (first == "time" || first == "t"));
+    const std::uint64_t times = has_time ? sizes.front() : 1;
+    if (has_time) sizes.erase(sizes.begin());
+    if (sizes.size() == 2) sizes.insert(sizes.begin(), 1);
+    for (const std::uint64_t size : sizes)
+        if (size > std::uint64_t(kMaxExtent))
+            fail(ErrorCode::usage, path,
+                 fmt::format("has {} cells along an axis; at most {} can be read", size, kMaxExtent));
+    const Extent extent{int(sizes[2]), int(sizes[1]), int(sizes[0])};
+    const double size = cell_size(path, options);
+    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries};
+    for (std::uint64_t time = 0; time < times; ++time)
+        masks.snapshots.push_back(plane_of(extent, options.threshold.value_or(0), [&](int i, int j, int k) {
+            return data.values[time * extent.cells() + linear_index(extent, i, j, k)];
+        }));
+    return masks;
+}
+
+CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& options) {
+    if (!options.variable.empty()) fail(ErrorCode::usage, path, "a picture has no variables");
+    const double size = cell_size(path, options);
+    png_image image{};
+    image.version = PNG_IMAGE_VERSION;
+    if (png_image_begin_read_from_file(&image, path.c_str()) == 0) fail(ErrorCode::io, path, image.message);
+    image.format = PNG_FORMAT_GRAY;
+    if (image.width > unsigned(kMaxExtent) || image.height > unsigned(kMaxExtent)) {
+        png_image_free(&image);
+        fail(ErrorCode::usage, path, fmt::format("has a side of more than {} pixels", kMaxExtent));
+    }
+    const Extent extent{int(image.width), int(image.height), 1};
+    std::vector<png_byte> pixels(extent.cells());
+    if (png_image_finish_read(&image, nullptr, pixels.data(), png_int_32(image.width), nullptr) == 0)
+        fail(ErrorCode::io, path, image.message);
+    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries};
+    masks.snapshots.push_back(plane_of(
+        extent, options.threshold.value_or(kGreyThreshold),
+        [&](int i, int j, int) { return double(pixels[linear_index(extent, i, extent.y - 1 - j, 0)]); }));
+    return masks;
+}
+
+CloudMasks read_mask(const std::filesystem::path& path, const MaskOptions& options) {
+    const std::string extension = path.extension().string();
+    if (extension == ".vdb") return read_vdb_mask(path, options);
+    if (extension == ".nc" || extension == ".nc3" || extension == ".cdf")
+        return read_netcdf_mask(path, options);
+    if (extension == ".png") return read_png_mask(path, options);
+    fail(ErrorCode::usage, path, "is no cloud mask by its name; expected .vdb, .nc or .png");
+}
+
+// The mean over snapshots that follow each other. They are not independent: rho, where there are enough to tell.
+SeriesMean mean_of(const std::vector<double>& values) {
+    constexpr std::size_t kEnough = 8;
+    if (std::ranges::any_of(values, [](double value) { return !std::isfinite(value); }))
+        return {kNaN, kNaN, kNaN, kNaN, kNaN};
+    const double n = double(values.size());
+    double sum = 0, squares = 0;
+    for (const double value : values) sum += value;
+    const double mean = sum / n;
+    if (values.size() < 2) return {mean, kNaN, kNaN, kNaN, n};
+    for (const double value : values) squares += (value - mean) * (value - mean);
+    const double deviation = std::sqrt(squares / (n - 1));
+    const double tau =
+        values.size() < kEnough ? 1 : integrated_time(autocorrelation(values, values.size() / 2));
+    return {mean, deviation * std::sqrt(tau / n), deviation, tau, n / tau};
+}
+
+struct OrganisationSums {
+    double iorg = 0, scai = 0, cop = 0;
+    void add(const Organisation& one) {
+        iorg += one.iorg;
+        scai += one.scai;
+        cop += one.cop;
+    }
+    Organisation mean(double n) const { return {iorg / n, scai / n, cop / n}; }
+};
+
+}  // namespace
+
+CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const MaskOptions& options) {
+    for (const auto& [value, name] : {std::pair(options.cell_size_m, "cell size"),
+                                      std::pair(options.level_height_m, "height of a level")})
+        if (value && !(*value > 0 && std::isfinite(*value)))
+            throw Error(ErrorCode::usage, fmt::format("a {} of {} m: must be above 0", name, *value));
+    CloudMasks all;
+    for (const std::filesystem::path& path : paths) {
+        CloudMasks one = read_mask(path, options);
+        if (all.snapshots.empty()) {
+            all = std::move(one);
+            continue;
+        }
+        if (one.snapshots.front().extent() != all.snapshots.front().extent() ||
+            one.cell_size_m != all.cell_size_m)
+            fail(ErrorCode::usage, path,
+                 "has another number of cells or another cell size than the masks before it");
+        std::ranges::move(one.snapshots, std::back_inserter(all.snapshots));
+    }
+    if (all.snapshots.empty()) throw Error(ErrorCode::usage, "no cloud mask is named");
+    return all;
+}
+
+MaskStatistics mask_statistics(const CloudMasks& masks) {
+    const Extent extent = masks.snapshots.front().extent();
+    const SizeRange range = default_size_range(extent);
+    const Placement levels{{0, 0, masks.base_m}, masks.level_height_m};
+    std::array<std::vector<double>, kStatistics.size()> series;
+    CloudSizes sizes(range);
+    OrganisationSums sums;
+    const auto put = [&](std::string_view name, double value) {
+        series[statistic_index(name)].push_back(value);
+    };
+    for (const BitPlane& plane : masks.snapshots) {
+        const CloudCounts counts = count_cloud(plane.view(), masks.boundaries);
+        const CloudStatistics s = cloud_statistics(counts, levels);
+        put("cover", s.cover);
+        put("cloud_fraction", s.mean_density);
+        put("base_mean_m", s.base_mean_m);
+        put("top_mean_m", s.top_mean_m);
+        put("edge_per_km", edge_per_km(double(counts.edges) * masks.cell_size_m, extent, masks.cell_size_m));
+        const Snapshot snapshot = take_snapshot(plane.view(), masks.boundaries, masks.cell_size_m, range);
+        put("clouds_per_km2", snapshot.values[0]);
+        put("cloud_area_m2", snapshot.values[1]);
+        put("correlation_length_m", snapshot.values[2]);
+        put("overlap", snapshot.values[3]);
+        sizes.add(snapshot.sizes);
+        sums.add(organisation(clouds_2d(plane.view(), masks.boundaries), extent, masks.boundaries));
+    }
+    MaskStatistics result;
+    for (std::size_t n = 0; n < kStatistics.size(); ++n)
+        result.statistics[n] =
+            series[n].empty() ? SeriesMean{kNaN, kNaN, kNaN, kNaN, kNaN} : mean_of(series[n]);
+    for (const std::string_view name : {"size_exponent", "size_exponent_line", "fractal_dimension"})
+        result.statistics[statistic_index(name)] = size_statistic(name, sizes);
+    result.organisation = sums.mean(double(masks.snapshots.size()));
+    result.random = null_organisation(
+        extent, masks.boundaries, result.statistics[statistic_index("cover")].mean, kNullDraws, kNullSeed);
+    return result;
+}
+
+}  // namespace nephos

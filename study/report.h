@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Shows a sweep as one HTML file that needs no network: what was run, what went wrong first, regimes, statistics along the
+// axes, profiles, sizes of clouds, parallel coordinates, series, pictures of the last states, and for every run the command
+// that repeats it. Figures are inline SVG and need no script; with scripts series zoom (uPlot, in the file). The policy in
+// its head forbids browsers to load anything.
+
+#include <filesystem>
+#include <string>
+
+#include "study/records.h"
+#include "study/sweep_plan.h"
+
+namespace nephos {
+
+// Returns the page: a function of its arguments and of the version of nephos, so equal sweeps have equal bytes, whoever ran
+// them, where and in which order. Large sweeps are drawn in part, and say so. Throws Error(io) when series cannot be read.
+std::string report_page(const SweepPlan& plan, const Records& records);
+
+// Writes report_page() atomically. Throws Error(io).
+void write_report(const SweepPlan& plan, const Records& records, const std::filesystem::path& path);
+
+}  // namespace nephos

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/report/report_data.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "core/text.h"
+
+namespace nephos::report {
+namespace {
+
+constexpr double kWideInterval = 0.1;  // of the mean
+constexpr double kLogRatio = 20;  // values above 0 that differ more than this are drawn on a logarithmic axis
+
+std::string unquoted(const std::string& value) {
+    const bool quoted = value.size() >= 2 && value.front() == '"' && value.back() == '"';
+    return quoted ? value.substr(1, value.size() - 2) : value;
+}
+
+bool number_of(const std::string& text, double& number) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace
+
+const PointMean& ReportPoint::mean(std::string_view statistic) const {
+    return summary.statistics[statistic_index(statistic)];
+}
+
+std::string ReportPoint::name(const SweepPlan& plan) const {
+    std::vector<std::string> parts;
+    for (std::size_t n = 0; n < summary.values.size(); ++n)
+        parts.push_back(
+            fmt::format("{}={}", fmt::join(plan.options().axes[n].keys, "+"), unquoted(summary.values[n])));
+    return parts.empty() ? "the scene" : fmt::format("{}", fmt::join(parts, ", "));
+}
+
+ReportData gather(const SweepPlan& plan, const Records& records) {
+    ReportData data{plan, records, automaton_options(plan.scene(), plan.measured_lattice()), {}};
+    const std::uint32_t replicates = plan.options().replicates;
+    for (std::uint64_t number = 0; number < plan.points(); ++number) {
+        ReportPoint point{summarise(plan, records, number), {}, {}};
+        for (std::uint32_t replicate = 0; replicate < replicates; ++replicate) {
+            point.runs.push_back(plan.run(number * replicates + replicate));
+            point.records.push_back(records.find(point.runs.back().id));
+        }
+        data.points.push_back(std::move(point));
+    }
+    return data;
+}
+
+SweepAxis sweep_axis(const ReportData& data, std::size_t axis) {
+    SweepAxis found;
+    const std::string label = fmt::format("{}", fmt::join(data.plan.options().axes[axis].keys, "+"));
+    bool numbers = true, positive = true;
+    for (const ReportPoint& point : data.points) {
+        double number = 0;
+        numbers = numbers && number_of(point.summary.values[axis], number);
+        positive = positive && number > 0;
+        found.values.push_back(number);
+    }
+    if (numbers) {
+        const auto [low, high] = std::ranges::minmax(found.values);
+        found.plot = axis_over(label, found.values, positive && high >= kLogRatio * low);
+        return found;
+    }
+    found.plot.label = label;
+    found.values.clear();
+    for (const ReportPoint& point : data.points) {
+        const std::string name = unquoted(point.summary.values[axis]);
+        const auto at = std::ranges::find(found.plot.names, name);
+        found.values.push_back(double(at - found.plot.names.begin()));
+        if (at == found.plot.names.end()) found.plot.names.push_back(name);
+    }
+    return found;
+}
+
+std::vector<std::size_t> grid_place(const SweepPlan& plan, std::uint64_t point) {
+    const std::vector<Axis>& axes = plan.options().axes;
+    std::vector<std::size_t> place(axes.size());
+    for (std::size_t n = axes.size(); n-- > 0;) {
+        place[n] = point % axes[n].values.size();
+        point /= axes[n].values.size();
+    }
+    return place;
+}
+
+std::vector<std::size_t> evenly(std::size_t count, std::size_t most) {
+    std::vector<std::size_t> chosen;
+    const std::size_t wanted = std::min(count, most);
+    for (std::size_t n = 0; n < wanted; ++n)
+        chosen.push_back(wanted == 1 ? 0 : n * (count - 1) / (wanted - 1));
+    return chosen;
+}
+
+std::string choice_text(std::size_t drawn, std::size_t of) {
+    return drawn < of ? fmt::format("{} of {} points, evenly apart. ", drawn, of) : std::string();
+}
+
+std::string value_text(const PointMean& mean) {
+    if (!std::isfinite(mean.mean)) return "&ndash;";
+    const double half = (mean.high - mean.low) / 2;
+    return std::isfinite(half)
+               ? fmt::format("{} &plusmn; {}", number_text(mean.mean, 4), number_text(half, 2))
+               : number_text(mean.mean, 4);
+}
+
+std::string_view colour_of(Regime regime) {
+    switch (regime) {
+        case Regime::dead:
+            return "#8c8c8c";
+        case Regime::sparse:
+            return "#7fc4ee";
+        case Regime::steady:
+            return "#2f9e77";
+        case Regime::pulsing:
+            return "#e69f00";
+        case Regime::overcast:
+            return "#2a5fa5";
+        case Regime::not_steady:
+            return "#d1495b";
+    }
+    return "#000000";
+}
+
+Regime main_regime(const PointSummary& summary) {
+    return Regime(std::ranges::max_element(summary.regimes) - summary.regimes.begin());
+}
+
+bool is_doubtful(const PointSummary& summary) {
+    const PointMean& cover = summary.statistics[statistic_index("cover")];
+    if (!std::isfinite(cover.mean) || cover.errors_differ) return true;
+    const double half = (cover.high - cover.low) / 2;
+    return !std::isfinite(half) || half > kWideInterval * cover.mean;
+}
+
+std::string figure(std::string_view drawing, std::string_view caption, std::string_view kind) {
+    return fmt::format("<figure{}>\n{}<figcaption>{}</figcaption>\n</figure>\n",
+                       kind.empty() ? "" : fmt::format(" class=\"{}\"", kind), drawing, caption);
+}
+
+}  // namespace nephos::report

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`nephos stats` of masks that others wrote, against NumPy and SciPy; and masks as targets of fits."""
+
+import json
+import math
+import unittest
+
+import numpy
+from PIL import Image
+from scipy import ndimage
+from scipy.io import netcdf_file
+
+from case import Case
+from fit_test import FIT, NULL
+from sweep_test import rows
+
+
+def random_mask(seed, shape, cover):
+    return numpy.random.default_rng(seed).random(shape) < cover
+
+
+class Stats(Case):
+    def stats(self, *arguments):
+        return json.loads(self.call("stats", *arguments, "--json").stdout)
+
+    def netcdf(self, name, values, dimensions, variable="ql"):
+        with netcdf_file(self.folder / name, "w") as file:
+            for dimension, size in zip(dimensions, values.shape):
+                file.createDimension(dimension, size)
+            file.createVariable(variable, "f4", dimensions)[:] = values
+        return name
+
+    def check(self, found, masks, size, height):
+        """Compares with the definitions, computed the slow way: masks (time, z, y, x), open sides."""
+        expected = {"cover": [], "cloud_fraction": [], "clouds_per_km2": [], "cloud_area_m2": [], "edge_per_km": [],
+                    "base_mean_m": [], "top_mean_m": []}
+        area_km2 = masks.shape[2] * masks.shape[3] * size * size / 1e6
+        for mask in masks:
+            shadow = mask.any(axis=0)
+            count = ndimage.label(shadow)[1]
+            edges = (shadow[1:] != shadow[:-1]).sum() + (shadow[:, 1:] != shadow[:, :-1]).sum()
+            lowest = mask.argmax(axis=0)[shadow]
+            highest = mask.shape[0] - mask[::-1].argmax(axis=0)[shadow]
+            for name, value in (("cover", shadow.mean()), ("cloud_fraction", mask.mean()),
+                                ("clouds_per_km2", count / area_km2), ("cloud_area_m2", shadow.sum() / count * size**2),
+                                ("edge_per_km", edges * size / 1000 / area_km2),
+                                ("base_mean_m", lowest.mean() * height), ("top_mean_m", highest.mean() * height)):
+                expected[name].append(value)
+        for name, values in expected.items():
+            got = found["statistics"][name]
+            self.assertTrue(math.isclose(got["mean"], numpy.mean(values), rel_tol=1e-9), name)
+            if 1 < len(values) < 8:
+                self.assertTrue(math.isclose(got["se"], numpy.std(values, ddof=1) / math.sqrt(len(values)), rel_tol=1e-6,
+                                             abs_tol=1e-9), name)
+
+    def test_netcdf_has_times_levels_and_sizes(self):
+        masks = random_mask(1, (5, 6, 40, 70), 0.03)
+        name = self.netcdf("les.nc", masks * 2e-5, ("time", "z", "y", "x"))
+        found = self.stats(name, "--threshold", "1e-5", "--cell-size", "100", "--level-height", "40")
+        self.assertEqual((found["snapshots"], found["cells"], found["cell_size_m"]), (5, [70, 40, 6], 100))
+        self.check(found, masks, 100, 40)
+        # Three dimensions are levels, unless the first is called time; two are a mask from above.
+        self.check(self.stats(self.netcdf("z.nc", masks[0] * 1.0, ("lev", "y", "x")), "--cell-size", "50"), masks[:1], 50, 50)
+        self.check(self.stats(self.netcdf("t.nc", masks[:, 0] * 1.0, ("time", "y", "x")), "--cell-size", "50"),
+                   masks[:, :1], 50, 50)
+        self.check(self.stats(self.netcdf("yx.nc", masks[0, 0] * 1.0, ("y", "x")), "--cell-size", "50"), masks[:1, :1], 50, 50)
+        text = self.call("stats", name, "--cell-size", "100").stdout
+        self.assertIn("5 snapshots of 70 x 40 x 6 cells of 100 m", text)
+        self.assertRegex(text, r"\niorg +\d")
+
+    def test_several_files_are_snapshots(self):
+        masks = random_mask(2, (3, 1, 30, 50), 0.2)
+        names = [self.netcdf(f"{n}.nc", mask[0] * 1.0, ("y", "x")) for n, mask in enumerate(masks)]
+        self.check(self.stats(*names, "--cell-size", "20"), masks, 20, 20)
+        other = self.netcdf("other.nc", masks[0, 0, 1:] * 1.0, ("y", "x"))
+        self.refused(2, "stats", names[0], other, "--cell-size", "20", says="other.nc: has another number of cells")
+
+    def test_pictures_are_seen_from_above_with_north_up(self):
+        mask = random_mask(3, (1, 1, 30, 50), 0.3)
+        Image.fromarray((mask[0, 0, ::-1] * 255).astype(numpy.uint8)).save(self.folder / "a.png")
+        self.check(self.stats("a.png", "--cell-size", "30"), mask, 30, 30)
+        # A cloud over the west side only: periodic sides join it with what is at the east.
+        strip = numpy.zeros((20, 20), dtype=numpy.uint8)
+        strip[5:9, :3] = strip[5:9, 17:] = 200
+        Image.fromarray(strip).save(self.folder / "b.png")
+        open_sides = self.stats("b.png", "--cell-size", "10")["statistics"]["clouds_per_km2"]["mean"]
+        periodic = self.stats("b.png", "--cell-size", "10", "--periodic", "x")["statistics"]["clouds_per_km2"]["mean"]
+        self.assertAlmostEqual(open_sides, 2 * periodic)
+        self.assertEqual(self.stats("b.png", "--cell-size", "10", "--threshold", "200")["statistics"]["cover"]["mean"], 0)
+
+    def test_grids_of_vdb_have_the_statistics_of_the_run(self):
+        self.call("state", self.scene, "--steps", "5", "--out", "state.vdb")
+        self.call("run", self.scene, "--statistics-only", "--set", "time.steps=5", "--out", "run")
+        row = rows(self.folder / "run/statistics.csv")[-1]
+        found = self.stats("state.vdb")["statistics"]
+        self.assertEqual(self.stats("state.vdb", "--variable", "cld")["statistics"], found)
+        self.assertEqual(found["cover"]["mean"], float(row["cloud_cover"]))
+        self.assertEqual(found["base_mean_m"]["mean"], float(row["base_mean_m"]))
+        self.assertAlmostEqual(found["cloud_fraction"]["mean"], float(row["cld"]) / (32 * 24 * 12))
+        hum = self.stats("state.vdb", "--variable", "hum")["statistics"]
+        self.assertAlmostEqual(hum["cloud_fraction"]["mean"], float(row["hum"]) / (32 * 24 * 12))
+        import pyopenvdb
+        grid = pyopenvdb.FloatGrid()
+        mask = random_mask(4, (12, 10, 8), 0.1)
+        mask[0, 0, 0] = mask[-1, -1, -1] = True  # the bounds of what is active are those of the box
+        grid.copyFromArray(numpy.ascontiguousarray(mask.transpose(2, 1, 0) * 0.7, dtype=numpy.float32))
+        grid.transform = pyopenvdb.createLinearTransform(25.0)
+        grid.name = "fog"
+        pyopenvdb.write(str(self.folder / "other.vdb"), [grid])
+        found = self.stats("other.vdb", "--threshold", "0.5")
+        self.assertEqual((found["cells"], found["cell_size_m"]), ([8, 10, 12], 25))
+        self.assertAlmostEqual(found["statistics"]["cover"]["mean"], mask.any(axis=0).mean())
+
+    def test_what_is_missing_or_wrong_is_said(self):
+        name = self.netcdf("a.nc", numpy.zeros((4, 5)), ("y", "x"))
+        self.refused(2, "stats", name, says="give --cell-size METRES")
+        self.refused(2, "stats", name, "--cell-size", "0", says="--cell-size")
+        self.refused(2, "stats", name, "--cell-size", "5", "--periodic", "z", says="'z' is not one of x, y and xy")
+        self.refused(2, "stats", self.scene, says="expected .vdb, .nc or .png")
+        self.refused(3, "stats", "none.png", "--cell-size", "5", says="none.png")
+        self.refused(3, "stats", name, "--cell-size", "5", "--variable", "qc", says="ql")
+        self.write("text.png", "not a picture")
+        self.refused(3, "stats", "text.png", "--cell-size", "5", says="text.png")
+        self.call("state", self.scene, "--steps", "1", "--out", "state.vdb")
+        self.refused(2, "stats", "state.vdb", "--cell-size", "5", says="leave out the size")
+        self.refused(3, "stats", "state.vdb", "--variable", "act2", says="act2")
+        flat = self.netcdf("flat.nc", numpy.zeros(4), ("x",))
+        self.refused(3, "stats", flat, "--cell-size", "5", says="two or more dimensions")
+
+    def test_a_mask_is_the_target_of_a_fit(self):
+        """Snapshots of a run far apart are the target: the fit finds the run's parameter."""
+        self.write("null.toml", NULL)
+        for n in range(4):
+            self.call("state", "null.toml", "--steps", 300 + 60 * n, "--set", "field.background.ext=0.08", "--out", f"{n}.vdb")
+        self.check_target("from = \"0.vdb\"\nsd = 0.004\nperiodic = [\"x\", \"y\"]")
+        self.refused_fit("from = \"0.vdb\"", "expected sd")
+        self.refused_fit("from = \"no.vdb\"\nsd = 0.1", "no.vdb")
+        self.refused_fit("from = \"0.vdb\"\nsd = 0.1\nvalue = 0.3", "both value and from")
+        self.refused_fit("from = \"0.vdb\"\nsd = 0.1\ntreshold = 0.3", "threshold")
+        self.refused_fit("from = \"0.vdb\"\nsd = 0.1\nperiodic = [\"z\"]", "'z' is no axis of a mask")
+
+    def with_target(self, text):
+        return self.write("fit.toml", FIT.replace("value = 0.3\nsd = 0.003\n", text + "\n"))
+
+    def refused_fit(self, text, says):
+        result = self.call("fit", self.with_target(text), status=2)
+        self.assertIn(says, result.stderr)
+        self.assertIn("fit.toml:", result.stderr)
+
+    def check_target(self, text):
+        self.call("fit", self.with_target(text), "--out", "fit", "-j", "2")
+        fit = json.loads((self.folder / "fit/fit.json").read_text())
+        cover = self.stats("0.vdb")["statistics"]["cover"]["mean"]
+        self.assertEqual(fit["targets"][0]["target"], cover)
+        self.assertEqual(fit["targets"][0]["sd"], 0.004)
+        estimate = fit["parameters"][0]
+        self.assertLess(estimate["low"], 0.08 * 1.02)
+        self.assertGreater(estimate["high"], 0.08 * 0.98)
+        self.assertAlmostEqual(estimate["mean"], 0.08, delta=0.006)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,47 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Makes the pictures of docs/editor.md anew: walks through tutorial.txt, and shows the modes of the picture. Look at what
+it made. Usage: draw_tutorial.py [NEPHOS], on a machine with xvfb-run."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+from PIL import Image
+
+HERE = pathlib.Path(__file__).resolve().parent
+SOURCE = HERE.parents[2]
+PICTURES = SOURCE / "docs/pictures"
+VOXELS = """
+click tab View
+wait-step 60
+key SPACE
+key 6
+wait 0.3
+wait-picture
+screenshot editor-voxels.png
+"""
+
+
+def walk(nephos, script, folder, *arguments):
+    subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24", nephos, "edit", *arguments, "--script", str(script),
+                    "--size", "1280x800", "--theme", "dark"],
+                   check=True, cwd=folder, env={**os.environ, "XDG_CONFIG_HOME": str(folder / "config")})
+
+
+def main():
+    nephos = str(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else SOURCE / "build/release/bin/nephos").resolve())
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        walk(nephos, HERE / "tutorial.txt", folder)
+        (folder / "voxels.txt").write_text(VOXELS, encoding="utf-8")
+        walk(nephos, folder / "voxels.txt", folder, str(SOURCE / "scenes/cumulus.toml"))
+        for picture in sorted(folder.glob("*.png")):
+            with Image.open(picture) as image:
+                image.convert("RGB").save(PICTURES / (picture.stem + ".jpg"), quality=88)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""nephos-mpi on 1 to 4 processes against `nephos`: the same hashes, statistics and bits. NEPHOS and NEPHOS_MPI name the
+binaries, SOURCE the source tree. Without mpirun these fail."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import unittest
+
+import numpy
+
+SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
+sys.path.insert(1, str(SOURCE / "tests/apps/command"))
+
+from case import Case, rows_of  # noqa: E402
+
+PROGRAM = os.environ["NEPHOS_MPI"]
+SCENE = """\
+seed = 5
+[lattice]
+cells = [96, 40, 32]
+boundaries = {boundaries}
+[time]
+steps = 100
+{wind}
+[field.background]
+hum = 0.05
+act = 0.005
+ext = 0.1
+[[field.ellipsoids]]
+centre_m = [2000, 900, 700]
+semi_axes_m = [900, 600, 500]
+"""
+WIND = """\
+[[wind]]
+levels = [{ height_m = 0, east_m_per_s = 6.3, north_m_per_s = -4.7 }, { height_m = 1500, east_m_per_s = -17.0, north_m_per_s = 9.1 }]
+"""
+
+
+class Mpi(Case):
+    def mpirun(self, processes, *arguments, status=0):
+        result = subprocess.run(
+            ["mpirun", "--allow-run-as-root", "--oversubscribe", "--mca", "btl_vader_single_copy_mechanism", "none",
+             "-n", str(processes), PROGRAM, *map(str, arguments)],
+            cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=280)
+        self.assertEqual(result.returncode, status, result.stdout + result.stderr)
+        return result
+
+
+class Ranks(Mpi):
+    def test_hashes_are_those_of_one_process(self):
+        """Each number of processes x open, periodic and mixed sides x calm and wind: a hundred steps."""
+        for sides in (["open"] * 3, ["periodic"] * 3, ["periodic", "periodic", "open"]):
+            for wind in ("", WIND):
+                scene = self.write("scene.toml", SCENE.format(boundaries=str(sides).replace("'", '"'), wind=wind))
+                expected = self.hashes(scene)
+                self.assertEqual(len(expected.splitlines()), 101)
+                for processes in (1, 2, 3, 4):
+                    self.assertEqual(self.mpirun(processes, scene, "--hash").stdout, expected, (sides, wind, processes))
+
+    def test_statistics_and_bits_are_those_of_one_process(self):
+        import pyopenvdb
+        scene = self.write("scene.toml", SCENE.format(boundaries='["periodic", "periodic", "open"]', wind=WIND))
+        self.call("run", scene, "--statistics-only", "--set", "time.steps=40", "--out", "run")
+        expected = rows_of(self.folder / "run/statistics.csv")
+        self.call("state", scene, "--steps", "40", "--out", "state.vdb")
+        whole = numpy.zeros((96, 40, 32), dtype=bool)
+        pyopenvdb.read(str(self.folder / "state.vdb"), "cld").copyToArray(whole)
+        self.assertGreater(whole.sum(), 1000)
+        for processes in (1, 3):
+            out = f"mpi{processes}"
+            self.mpirun(processes, scene, "--steps", "40", "--hash", "--out", out, "--write-state", "--slab-levels", "5")
+            rows = rows_of(self.folder / out / "statistics.csv")
+            self.assertEqual(len(rows), 41)
+            for got, row in zip(rows, expected):
+                self.assertEqual(got, {name: row[name] for name in got})
+            cells, files = numpy.zeros_like(whole), sorted((self.folder / out).glob("levels_*.vdb"))
+            self.assertGreaterEqual(len(files), 7)
+            for path in files:
+                grid = pyopenvdb.read(str(path), "cld")
+                part = numpy.zeros((96, 40, 32), dtype=bool)
+                grid.copyToArray(part)
+                level = round((grid.transform.indexToWorld((0, 0, 0))[2] - 25) / 50)
+                self.assertEqual(path.name, f"levels_{level:05}.vdb")
+                cells[:, :, level:] |= part[:, :, :32 - level]
+            numpy.testing.assert_array_equal(cells, whole)
+
+
+class Limits(Mpi):
+    def test_what_cannot_be_cut_is_refused(self):
+        scene = self.write("scene.toml", SCENE.format(boundaries='["open", "open", "open"]', wind=""))
+        said = self.mpirun(5, scene, status=2).stderr
+        self.assertIn("5 processes for 32 levels", said)
+        self.assertIn("at most 4 processes can help", said)
+        layers = self.mpirun(1, SOURCE / "scenes/climate.toml", status=2).stderr
+        self.assertIn("one lattice without layers", layers)
+        self.assertIn("none.toml", self.mpirun(1, "none.toml", status=3).stderr)
+        self.assertIn("a probability per step", self.mpirun(1, scene, "--set", "field.background.ext=2", status=2).stderr)
+        self.mpirun(1, scene, "--steps", "x", status=2)
+        self.assertIn("Example: mpirun", self.mpirun(2, "--help").stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scenes that repeat: every file of a run goes on across its sides, and scenes that cannot repeat say why.
+
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "density/vdb/vdb_file.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/writer.h"
+#include "simulation/scene_place.h"
+#include "simulation/simulation.h"
+#include "simulation/verify.h"
+#include "tests/simulation/small_run.h"
+
+namespace nephos {
+namespace {
+
+// A lattice of clouds that the wind carries across the sides, one of other cells, and two veils, one with an area.
+constexpr const char* kTile = R"(
+name = "tile"
+seed = 4
+tile = true
+[lattice]
+origin_m = [0, 0, 1000]
+[time]
+steps = 24
+[frames]
+start_s = 205
+time_scale = 240
+count = 2
+[density]
+refine = 2
+[[wind]]
+levels = [{ height_m = 0, east_m_per_s = 11, north_m_per_s = -6 }, { height_m = 9000, east_m_per_s = 30, north_m_per_s = 12 }]
+[[model]]
+name = "puff"
+seeds = [{ size_m = [500, 500, 300] }]
+[[sky]]
+name = "few"
+state = 0
+clouds = 9
+models = "puff"
+[[layer]]
+name = "low"
+skies = "few"
+base_height_m = 1200
+lattice = { cells = [48, 40, 12], cell_size_m = 50 }
+coupling = { centre = { hum = 0.2, act = 0.02, ext = 0.05 } }
+[[layer]]
+name = "middle"
+skies = "few"
+base_height_m = 2200
+lattice = { cells = [24, 20, 6], cell_size_m = 100, origin_m = [0, 0, 2000] }
+coupling = { centre = { hum = 0.2, act = 0.02, ext = 0.05 } }
+[[layer]]
+name = "high"
+opacity = 0.3
+lattice = { cells = [24, 20, 8], cell_size_m = 100, origin_m = [0, 0, 4000] }
+[layer.veil]
+form = "cirrus"
+octaves = 2
+wavelength_m = 700
+stretch = 1.5
+margin_m = 400
+[[layer]]
+name = "patch"
+opacity = 0.5
+lattice = { cells = [24, 20, 8], cell_size_m = 100, origin_m = [0, 0, 5000] }
+[layer.veil]
+form = "stratus"
+octaves = 2
+wavelength_m = 600
+coverage = 0.9
+area = { x_m = 100, y_m = 1900, semi_a_m = 900, semi_b_m = 700, softness = 1 }
+)";
+
+class TileRun : public test::SmallRun {};
+
+TEST_F(TileRun, EveryFileGoesOnAcrossItsSides) {
+    const Scene scene = read_scene_text(kTile, "tile.toml", ".", {});
+    EXPECT_EQ(scene, read_scene_text(to_toml(scene), "tile.toml", ".", {}));
+    EXPECT_EQ(period_m(scene, std::nullopt), Vec3(2400, 2000, 0));
+    RunSettings settings = settings_of(scene, "out");
+    settings.render = false;
+    ASSERT_TRUE(run_scene(settings, {}).complete);
+    int files = 0;
+    for (const char* const file :
+         {"density/tile_0002.vdb", "density/low/tile_0002.vdb", "density/middle/tile_0002.vdb",
+          "density/high/tile_0002.vdb", "density/patch/tile_0002.vdb"}) {
+        const DensityGrid grid = read_density(settings.folder / file);
+        const Extent e = grid.extent();
+        EXPECT_GT(grid.max_value(), 0.05f) << file;
+        const std::vector<float> density = grid.to_dense();
+        double at_sides = 0;
+        for (int k = 0; k < e.z; ++k)
+            for (int j = 0; j < e.y; ++j) at_sides += double(density[linear_index(e, 0, j, k)]);
+        EXPECT_GT(at_sides, 0) << file;  // there is something to cut
+        for (int axis = 0; axis < 2; ++axis) {
+            const Seam seam = seam_of(density, e.x, e.y, e.z, axis);
+            EXPECT_LE(seam.at_seam, seam.inside) << file << " " << axis;
+        }
+        ++files;
+    }
+    EXPECT_EQ(files, 5);
+}
+
+// Without `tile` the same layers end at their sides, so that the check above can fail.
+TEST_F(TileRun, WithoutTheKeyTheSeamShows) {
+    std::string text = kTile;
+    text.replace(text.find("tile = true"), 11, "");
+    RunSettings settings = settings_of(read_scene_text(text, "tile.toml", ".", {}), "out");
+    settings.render = false;
+    ASSERT_TRUE(run_scene(settings, {}).complete);
+    const DensityGrid grid = read_density(settings.folder / "density/patch/tile_0002.vdb");
+    const Extent e = grid.extent();
+    const Seam seam = seam_of(grid.to_dense(), e.x, e.y, e.z, 1);
+    EXPECT_GT(seam.at_seam, seam.inside);
+}
+
+std::string problem_of(std::string text, const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+    try {
+        read_scene_text(text, "tile.toml", ".", {});
+    } catch (const std::exception& error) {
+        return error.what();
+    }
+    return "none";
+}
+
+TEST(Tile, ScenesThatCannotRepeatAreRefused) {
+    EXPECT_NE(problem_of(kTile, "cells = [24, 20, 6]", "cells = [24, 21, 6]").find("share one period"),
+              std::string::npos);
+    EXPECT_NE(
+        problem_of(kTile, "origin_m = [0, 0, 4000]", "origin_m = [50, 0, 4000]").find("50 to 2450 m along x"),
+        std::string::npos);
+    EXPECT_NE(problem_of(kTile, "cell_size_m = 50 }", "cell_size_m = 50, boundaries = \"open\" }")
+                  .find("open in a tile"),
+              std::string::npos);
+    EXPECT_NE(problem_of(kTile, "base_height_m = 2200", "base_height_m = 2200\nautomaton = false")
+                  .find("has no density"),
+              std::string::npos);
+    EXPECT_NE(problem_of(kTile, "wavelength_m = 700", "wavelength_m = 6000").find("does not fit into a tile"),
+              std::string::npos);
+    EXPECT_NE(problem_of("name = \"x\"\ntile = true\n[lattice]\nboundaries = \"open\"\n", "\"x\"", "\"y\"")
+                  .find("open in a tile"),
+              std::string::npos);
+}
+
+}  // namespace
+}  // namespace nephos
