@@ -151,6 +151,8 @@ class LiveScene {
     bool ended_ = false, running_ = false, hold_ = false, is_held_ = false;
     std::optional<Scene> new_scene_;  // to simulate
     bool keeps_state_ = false;        // new_scene_ goes on from the present state
+    bool is_advancing_ = false;       // steps are under way
+    bool stops_here_ = false;         // their end is where the pause is
     Scene drawn_scene_;
     bool scene_to_draw_ = false, layers_changed_ = false;
     double steps_per_second_ = 6;

@@ -97,7 +97,7 @@ TEST(Description, EveryOptionHasAKey) {
     // The others of AutomatonOptions: time.step_s, seed, field, wind.
     EXPECT_EQ(member_count<AutomatonOptions>(), 8u);
     EXPECT_EQ(keys_at({"time"}), 2u);
-    EXPECT_EQ(member_count<Scene>(), 14u);
+    EXPECT_EQ(member_count<Scene>(), 15u);
 }
 
 TEST(Description, EveryOptionOfCloudsHasAKey) {
@@ -110,7 +110,7 @@ TEST(Description, EveryOptionOfCloudsHasAKey) {
     // [layer.lattice] holds extent, placement (two keys) and boundaries, [layer.climate] the schedule.
     // Whether it is a veil is said by the table of that name, as is whether it has detail of its own.
     EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 4);
-    EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 1);  // the seed is the layer's
+    EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 2);  // the seed is the layer's, the period the tile's
     EXPECT_EQ(keys_at({"layer", "veil", "area"}), member_count<VeilArea>());
     EXPECT_EQ(keys_at({"layer", "veil", "octave"}), member_count<VeilOctave>());
     EXPECT_EQ(keys_at({"layer", "lattice"}), 4u);
