@@ -164,7 +164,8 @@ class SlurmNode(Emitted):
         kept = (self.folder / "emitted/shards/0000-of-0001.jsonl").read_bytes()
         self.assertGreater(kept.count(b"\n"), 0)
         self.assertLess(kept.count(b"\n"), 24)
-        # A requeued job waits two minutes by default; its start may be moved.
+        # A requeued job waits two minutes by default; its start may be moved. The first process may still be ending.
+        time.sleep(5)
         self.slurm.call("scontrol", "update", f"JobId={job}", "StartTime=now")
         self.assertEqual(set(self.slurm.wait(job).values()), {"COMPLETED"})
         self.assertEqual({fields["Restarts"] for fields in self.slurm.tasks(job).values()}, {"1"})
