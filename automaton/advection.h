@@ -3,10 +3,13 @@
 
 // Advection (D): v'(i,j,k) = v(i - dx, j - dy, k) by whole cells, with one displacement (dx, dy) per layer k.
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "automaton/lattice.h"
+#include "automaton/options.h"
 
 namespace nephos {
 
@@ -15,5 +18,13 @@ namespace nephos {
 // threads.
 void shift_layer(BitPlane& plane, int k, std::int64_t dx, std::int64_t dy, const Boundaries& boundaries,
                  std::vector<std::uint64_t>& scratch);
+
+// Returns the displacement of layer k in the step that begins at `time_s`, by the wind in the middle of its height.
+Displacement displacement_of_layer(const AutomatonOptions& options, int k, double time_s);
+
+// Moves planes by the wind of the step that begins at `time_s`: their layer n is layer first + n of the lattice. `rest`, a
+// number for each of their layers, is how far the air is beyond the bits, below a cell, before and after.
+void advect(const AutomatonOptions& options, int first, double time_s, std::span<Displacement> rest,
+            const std::array<BitPlane*, 3>& planes);
 
 }  // namespace nephos

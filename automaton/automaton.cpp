@@ -5,7 +5,6 @@
 #include <memory>
 #include <utility>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
 
@@ -22,7 +21,6 @@ namespace nephos {
 namespace {
 
 constexpr std::uint32_t kSaveVersion = 1;
-constexpr std::int64_t kFractionMask = 0xFFFFFFFF;
 
 int blocks(int cells) { return (cells + kBlockEdge - 1) / kBlockEdge; }
 
@@ -74,8 +72,7 @@ struct Automaton::Impl {
     void for_parts(const Work& work);
     void draw_initial_state();
     void grow_and_draw();
-    Displacement displacement_of_layer(int k, double at_s) const;
-    void advect();
+    void advect() { nephos::advect(options, 0, time_s(), fraction, {&lattice.hum, &lattice.act, &lattice.cld}); }
 
     AutomatonOptions options;
     Lattice lattice;
@@ -126,31 +123,6 @@ void Automaton::Impl::grow_and_draw() {
     std::swap(lattice.act, act_next);
 }
 
-Displacement Automaton::Impl::displacement_of_layer(int k, double at_s) const {
-    const double height = options.placement.origin_m.z + (k + 0.5) * options.placement.cell_size_m;
-    return displacement_of_step(wind_at(options.wind, height, at_s), options.time_step_s,
-                                options.placement.cell_size_m);
-}
-
-void Automaton::Impl::advect() {
-    if (options.wind.keyframes.empty()) return;
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, options.extent.z), [&](const tbb::blocked_range<int>& layers) {
-            std::vector<std::uint64_t> scratch;
-            for (int k = layers.begin(); k != layers.end(); ++k) {
-                Displacement moved = displacement_of_layer(k, time_s());
-                Displacement& rest = fraction[std::size_t(k)];
-                moved.x += rest.x;
-                moved.y += rest.y;
-                rest = {moved.x & kFractionMask, moved.y & kFractionMask};
-                if (moved.whole_x() == 0 && moved.whole_y() == 0) continue;
-                for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) {
-                    shift_layer(*plane, k, moved.whole_x(), moved.whole_y(), options.boundaries, scratch);
-                }
-            }
-        });
-}
-
 Automaton::Automaton(const AutomatonOptions& options, std::vector<ActiveEllipsoid> external) {
     check(options);
     impl_ = std::make_unique<Impl>(options, empty_lattice(options.extent));
@@ -183,7 +155,7 @@ BitPlaneView Automaton::act() const { return impl_->lattice.act.view(); }
 BitPlaneView Automaton::cld() const { return impl_->lattice.cld.view(); }
 
 Displacement Automaton::displacement_of_layer(int k, std::uint64_t step) const {
-    return impl_->displacement_of_layer(k, double(step) * impl_->options.time_step_s);
+    return nephos::displacement_of_layer(impl_->options, k, double(step) * impl_->options.time_step_s);
 }
 
 std::span<const Displacement> Automaton::beyond_whole_cells() const { return impl_->fraction; }

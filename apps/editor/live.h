@@ -58,7 +58,7 @@ struct LiveFrame {
     std::uint64_t simulation_number = 0;  // rises with every scene that is simulated anew
 };
 
-// What pictures show, in the order of the keys 1 to 6.
+// Names what pictures show, in the order of the keys 1 to 6.
 inline constexpr const char* kViewModes[] = {"beauty",     "density",   "transmittance",
                                              "light only", "wireframe", "voxels"};
 enum ViewMode { kBeauty, kDensityMode, kTransmittanceMode, kLightOnly, kWireframe, kVoxels };

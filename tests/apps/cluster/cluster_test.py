@@ -15,26 +15,16 @@ import unittest
 SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
 sys.path.insert(1, str(SOURCE / "tests/apps/command"))
 
-from case import Case, NEPHOS  # noqa: E402
+from case import Case, NEPHOS, NULL_SCENE  # noqa: E402
 from one_node_slurm import Slurm  # noqa: E402
 
-SCENE = """\
-[lattice]
-cells = [64, 64, 10]
-boundaries = ["periodic", "periodic", "open"]
-initial = "empty"
-[field.background]
-hum = 0.0
-act = 0.002
-ext = 0.1
-"""
 TABLES = ("runs.csv", "points.csv", "failures.csv", "series.nc", "manifest.json")
 
 
 class Emitted(Case):
     def setUp(self):
         super().setUp()
-        self.write("null.toml", SCENE)
+        self.write("null.toml", NULL_SCENE)
         self.environment["NEPHOS"] = NEPHOS
 
     def sweep(self, out, *arguments, steps="200..400", replicates=4):
