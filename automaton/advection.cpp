@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <span>
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 namespace nephos {
 namespace {
 
@@ -85,6 +88,24 @@ void shift_layer(BitPlane& plane, int k, std::int64_t dx, std::int64_t dy, const
         row.store_shifted(out);
         out.back() &= last_word;
     }
+}
+
+void advect(const AutomatonOptions& options, int first, double time_s, std::span<Displacement> rest,
+            const std::array<BitPlane*, 3>& planes) {
+    constexpr std::int64_t kFractionMask = 0xFFFFFFFF;
+    if (is_calm(options.wind)) return;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rest.size()), [&](const tbb::blocked_range<std::size_t>& layers) {
+        std::vector<std::uint64_t> scratch;
+        for (std::size_t n = layers.begin(); n != layers.end(); ++n) {
+            Displacement moved = displacement_of_layer(options, first + int(n), time_s);
+            moved.x += rest[n].x;
+            moved.y += rest[n].y;
+            rest[n] = {moved.x & kFractionMask, moved.y & kFractionMask};
+            if (moved.whole_x() == 0 && moved.whole_y() == 0) continue;
+            for (BitPlane* const plane : planes)
+                shift_layer(*plane, int(n), moved.whole_x(), moved.whole_y(), options.boundaries, scratch);
+        }
+    });
 }
 
 }  // namespace nephos

@@ -5,7 +5,6 @@
 #include <memory>
 #include <utility>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
 
@@ -23,7 +22,6 @@ namespace nephos {
 namespace {
 
 constexpr std::uint32_t kSaveVersion = 1;
-constexpr std::int64_t kFractionMask = 0xFFFFFFFF;
 
 int blocks(int cells) { return (cells + kBlockEdge - 1) / kBlockEdge; }
 
@@ -78,7 +76,10 @@ struct Automaton::Impl {
     void for_parts(const Work& work);
     void draw_initial_state();
     void grow_and_draw();
-    void advect();
+    void advect() {
+        if (motion && !is_calm(options.wind)) return motion->step(lattice, options, time_s());
+        nephos::advect(options, 0, time_s(), fraction, {&lattice.hum, &lattice.act, &lattice.cld});
+    }
 
     AutomatonOptions options;
     Lattice lattice;
@@ -129,26 +130,6 @@ void Automaton::Impl::grow_and_draw() {
     const StepRandom random{options.seed, std::uint32_t(steps), &field, &ladder};
     for_parts([&](int bz, int begin, int end) { step_part(planes, random, bz, begin, end); });
     std::swap(lattice.act, act_next);
-}
-
-void Automaton::Impl::advect() {
-    if (is_calm(options.wind)) return;
-    if (motion) return motion->step(lattice, options, time_s());
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, options.extent.z), [&](const tbb::blocked_range<int>& layers) {
-            std::vector<std::uint64_t> scratch;
-            for (int k = layers.begin(); k != layers.end(); ++k) {
-                Displacement moved = displacement_of_layer(options, k, time_s());
-                Displacement& rest = fraction[std::size_t(k)];
-                moved.x += rest.x;
-                moved.y += rest.y;
-                rest = {moved.x & kFractionMask, moved.y & kFractionMask};
-                if (moved.whole_x() == 0 && moved.whole_y() == 0) continue;
-                for (BitPlane* plane : {&lattice.hum, &lattice.act, &lattice.cld}) {
-                    shift_layer(*plane, k, moved.whole_x(), moved.whole_y(), options.boundaries, scratch);
-                }
-            }
-        });
 }
 
 Automaton::Automaton(const AutomatonOptions& options, std::vector<ActiveEllipsoid> external) {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <sys/mman.h>
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #define XXH_STATIC_LINKING_ONLY  // XXH3_state_s, which is handed from process to process
 #include <xxhash.h>
@@ -21,7 +20,6 @@
 namespace nephos {
 namespace {
 
-constexpr std::int64_t kFractionMask = 0xFFFFFFFF;
 constexpr std::size_t kPadding_bytes =
     4096;  // before and after: kernels load vectors that begin just outside
 constexpr int kHaloBelow = 2, kHaloAbove = 1;
@@ -107,7 +105,7 @@ struct SlabAutomaton::Impl {
     }
     void draw_initial_state();
     void grow_and_draw();
-    void advect();
+    void advect() { nephos::advect(options, first, time_s(), fraction, {&hum, &act_next, &cld}); }
     // The own levels of act go where the next step reads them.
     void publish() { std::ranges::copy(act_next.words(), act_of(first)); }
 
@@ -139,23 +137,6 @@ void SlabAutomaton::Impl::grow_and_draw() {
     const StepRandom random{options.seed, std::uint32_t(steps), &field, &ladder};
     const StepPlanes p = planes();
     for_rows_of_blocks([&](int bz, int by) { step_part(p, random, bz, by, by + 1); });
-}
-
-void SlabAutomaton::Impl::advect() {
-    if (is_calm(options.wind)) return;
-    tbb::parallel_for(tbb::blocked_range<int>(0, own.z), [&](const tbb::blocked_range<int>& levels) {
-        std::vector<std::uint64_t> scratch;
-        for (int k = levels.begin(); k != levels.end(); ++k) {
-            Displacement moved = displacement_of_layer(options, first + k, time_s());
-            Displacement& rest = fraction[std::size_t(k)];
-            moved.x += rest.x;
-            moved.y += rest.y;
-            rest = {moved.x & kFractionMask, moved.y & kFractionMask};
-            if (moved.whole_x() == 0 && moved.whole_y() == 0) continue;
-            for (BitPlane* plane : {&hum, &act_next, &cld})
-                shift_layer(*plane, k, moved.whole_x(), moved.whole_y(), options.boundaries, scratch);
-        }
-    });
 }
 
 SlabAutomaton::SlabAutomaton(const AutomatonOptions& options, int first, int end) {

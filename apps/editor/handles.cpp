@@ -11,7 +11,7 @@
 namespace nephos {
 namespace {
 
-// What the mouse holds, and where that has got to.
+// Keeps what the mouse holds, and where that has got to.
 struct Grip {
     std::string name;  // empty: nothing
     double value = 0;
@@ -37,7 +37,7 @@ bool knob(Editor& editor, const std::string& name, const ImVec2& at, ImU32 colou
     return mine;
 }
 
-// How much of `unit`, which is `pixels` long in the picture, the mouse moved along it.
+// Returns how far the mouse moved along a line of length `unit` that is `pixels` long in the picture.
 double along(const ImVec2& pixels, double unit) {
     const double length2 = double(pixels.x) * pixels.x + double(pixels.y) * pixels.y;
     const ImVec2 by = ImGui::GetIO().MouseDelta;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where panels stand in the window, and the bars between them.
+// Places the panels in the window, and moves the bars between them.
 
 #include <algorithm>
 #include <cmath>

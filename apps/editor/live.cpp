@@ -140,7 +140,8 @@ void LiveScene::release() {
 void LiveScene::run(bool running) {
     const std::scoped_lock lock(mutex_);
     running_ = status_.running = running;
-    if (!running) goal_ = std::min(goal_, status_.step);
+    stops_here_ = !running && is_advancing_;
+    if (!running && !is_advancing_) goal_ = std::min(goal_, status_.step);
     simulation_due_.notify_all();
     drawing_due_.notify_all();
 }
@@ -154,6 +155,7 @@ void LiveScene::set_speed(double steps_per_second) {
 void LiveScene::seek(std::uint64_t step) {
     const std::scoped_lock lock(mutex_);
     goal_ = std::min<std::uint64_t>(step, kMaxFrames - 2);
+    stops_here_ = false;
     simulation_due_.notify_all();
 }
 
@@ -190,6 +192,7 @@ std::vector<LiveStep> LiveScene::steps(std::uint64_t from) const {
 
 // With the mutex held: forgets a simulation that failed, so that only another scene starts one.
 void LiveScene::fail(const std::string& what) {
+    is_advancing_ = stops_here_ = false;
     status_.failure = what;
     running_ = status_.running = false;
     goal_ = status_.step;
@@ -311,6 +314,7 @@ void LiveScene::go_back(std::uint64_t step) {
 void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) {
     const bool is_first = !frame_;
     const auto begin = Clock::now();
+    is_advancing_ = true;
     lock.unlock();
     const std::uint64_t next_frame = std::uint64_t(simulation_->next_frame() - 1);  // of step 0 is number 1
     std::uint64_t from = next_frame;
@@ -331,7 +335,7 @@ void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) 
             done = reached;
             lock.lock();
             keep_checkpoint();
-            const bool interrupted = ended_ || hold_ || new_scene_ || goal_ != goal;
+            const bool interrupted = ended_ || hold_ || new_scene_ || goal_ != goal || stops_here_;
             lock.unlock();
             if (interrupted || Clock::now() - begin > std::chrono::milliseconds(is_first ? 0 : 150)) break;
         }
@@ -349,6 +353,8 @@ void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) 
     frame->fields = std::move(fields);
     frame->simulation_number = simulation_number_;
     status_.step = frame->frame.step;
+    is_advancing_ = false;
+    if (std::exchange(stops_here_, false)) goal_ = status_.step;
     status_.steps_taken = simulation_->steps_taken();
     const double steps = double(std::max<std::uint64_t>(done - from, 1));
     status_.step_ms += 0.2 * (spent_ms / steps - status_.step_ms);

@@ -58,7 +58,7 @@ struct LiveFrame {
     std::uint64_t simulation_number = 0;  // rises with every scene that is simulated anew
 };
 
-// What pictures show, in the order of the keys 1 to 6.
+// Names what pictures show, in the order of the keys 1 to 6.
 inline constexpr const char* kViewModes[] = {"beauty",     "density",   "transmittance",
                                              "light only", "wireframe", "voxels"};
 enum ViewMode { kBeauty, kDensityMode, kTransmittanceMode, kLightOnly, kWireframe, kVoxels };
@@ -151,6 +151,8 @@ class LiveScene {
     bool ended_ = false, running_ = false, hold_ = false, is_held_ = false;
     std::optional<Scene> new_scene_;  // to simulate
     bool keeps_state_ = false;        // new_scene_ goes on from the present state
+    bool is_advancing_ = false;       // steps are under way
+    bool stops_here_ = false;         // their end is where the pause is
     Scene drawn_scene_;
     bool scene_to_draw_ = false, layers_changed_ = false;
     double steps_per_second_ = 6;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the picture shows under the mouse: the point of the nearest cloud, to go to or to let lightning strike.
+// Finds what the picture shows under the mouse: the point of the nearest cloud, to go to or to let lightning strike.
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@ struct Ray {
     Vec3 from{}, way{};  // way: unit length
 };
 
-// Where a ray enters and leaves a box; kNowhere for `enter` when it misses it.
+// Holds the distances at which a ray enters and leaves a box; `enter` is kNowhere when it misses the box.
 struct Crossing {
     double enter = kNowhere, leave = -kNowhere;
 };

@@ -47,7 +47,7 @@ std::string format_of(const Key& key, bool integers) {
     return std::string(integers ? "%.0f" : "%.6g") + (unit.empty() || unit == "°" ? unit : " " + unit);
 }
 
-// How far a drag of one pixel goes: a five-hundredth of a small range, otherwise of the number's size.
+// Returns how far a drag of one pixel goes: at most a 300th of a small range, otherwise 0.006 of the number's size.
 double drag_speed(const Key& key, double value, bool integers) {
     const double range = key.limits.max - key.limits.min;
     double speed = std::max(std::abs(value), 1.0) * 0.006;
@@ -56,7 +56,7 @@ double drag_speed(const Key& key, double value, bool integers) {
     return speed;
 }
 
-// Whether the whole range fits on a slider.
+// Returns whether the whole range fits on a slider.
 bool is_slider(const Key& key) {
     const double range = key.limits.max - key.limits.min;
     return std::isfinite(range) && range <= 400 && range > 0 && key.unit != "per step";

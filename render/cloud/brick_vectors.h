@@ -83,14 +83,23 @@ Cells outer(const std::array<std::int32_t, 6>& beside, const Load& of_brick) {
                                           of_brick(std::size_t(beside[2 * kAxis + 1]))));
 }
 
+// Calls what(axis) for the three axes.
+template <class What>
+void for_axes(const What& what) {
+    what(std::integral_constant<int, 0>());
+    what(std::integral_constant<int, 1>());
+    what(std::integral_constant<int, 2>());
+}
+
 // Calls what(axis, cells that are inner neighbours, those that are outer ones) for the three axes.
 template <class Load, class What>
 void for_neighbours(const DiffusionCells& cells, std::size_t brick, const Load& of_brick, const What& what) {
     const auto& beside = cells.beside[brick];
     const Cells own = of_brick(brick);
-    what(std::integral_constant<int, 0>(), exchanged<0>(own), outer<0>(beside, of_brick));
-    what(std::integral_constant<int, 1>(), exchanged<1>(own), outer<1>(beside, of_brick));
-    what(std::integral_constant<int, 2>(), exchanged<2>(own), outer<2>(beside, of_brick));
+    for_axes([&](auto axis) {
+        constexpr int kAxis = decltype(axis)::value;
+        what(axis, exchanged<kAxis>(own), outer<kAxis>(beside, of_brick));
+    });
 }
 
 }  // namespace nephos

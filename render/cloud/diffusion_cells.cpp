@@ -197,15 +197,12 @@ void find_shares(const DiffusionCells& cells, const std::vector<StartingLight>& 
             shared[face] = each(share, load(to[face]), open, resistance, towards);
             sum = plus(sum, shared[face]);
         };
-        const auto add_axis = [&](auto axis) {
+        for_axes([&](auto axis) {
             constexpr int kAxis = decltype(axis)::value;
             const Cells up = load(starting[brick].place[kAxis]), down = minus(same(0), up);
             add(2 * kAxis, halves<kAxis>(down, up));
             add(2 * kAxis + 1, halves<kAxis>(up, down));
-        };
-        add_axis(std::integral_constant<int, 0>());
-        add_axis(std::integral_constant<int, 1>());
-        add_axis(std::integral_constant<int, 2>());
+        });
         const auto part = [](Quad light, Quad all) { return light / (all > 1 ? all : number(1)); };
         const Cells light = each(part, load(starting[brick].light), sum);
         for (std::size_t face = 0; face < 6; ++face) store(times(light, shared[face]), shares[brick][face]);
@@ -217,16 +214,13 @@ void take_shares(const DiffusionCells& cells, const std::vector<StartingLight>& 
     for (const std::int32_t one : some) {
         const auto brick = std::size_t(one);
         Cells sum = load(starting[brick].light);
-        const auto take = [&](auto axis) {
+        for_axes([&](auto axis) {
             constexpr int kAxis = decltype(axis)::value;
             const Cells inner = load(shares[brick][2 * kAxis]), beyond = load(shares[brick][2 * kAxis + 1]);
             const auto of_neighbour = [&](std::size_t n) { return load(shares[n][2 * kAxis + 1]); };
             sum = plus(minus(sum, plus(inner, beyond)),
                        plus(exchanged<kAxis>(inner), outer<kAxis>(cells.beside[brick], of_neighbour)));
-        };
-        take(std::integral_constant<int, 0>());
-        take(std::integral_constant<int, 1>());
-        take(std::integral_constant<int, 2>());
+        });
         store(where_positive(load(cells.thickness[brick]), sum), source[brick]);
     }
 }

@@ -102,7 +102,7 @@ TEST(Description, EveryOptionHasAKey) {
     // The others of AutomatonOptions: time.step_s, seed, field, wind.
     EXPECT_EQ(member_count<AutomatonOptions>(), 8u);
     EXPECT_EQ(keys_at({"time"}), 2u);
-    EXPECT_EQ(member_count<Scene>(), 14u);
+    EXPECT_EQ(member_count<Scene>(), 15u);
 }
 
 TEST(Description, EveryOptionOfCloudsHasAKey) {
@@ -117,7 +117,7 @@ TEST(Description, EveryOptionOfCloudsHasAKey) {
     EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 5);
     EXPECT_EQ(keys_at({"layer", "metamorphoses"}), member_count<NamedMetamorphosis>());
     EXPECT_EQ(keys_at({"layer", "coupling", "genera"}), member_count<GenusCoupling>());
-    EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 1);  // the seed is the layer's
+    EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 2);  // the seed is the layer's, the period the tile's
     EXPECT_EQ(keys_at({"layer", "veil", "area"}), member_count<VeilArea>());
     EXPECT_EQ(keys_at({"layer", "veil", "octave"}), member_count<VeilOctave>());
     EXPECT_EQ(keys_at({"layer", "lattice"}), 5u);

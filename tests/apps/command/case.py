@@ -16,6 +16,18 @@ import unittest
 NEPHOS = os.path.abspath(os.environ["NEPHOS"])
 SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
 
+# Without growth: what is born dies again, so that statistics have closed forms.
+NULL_SCENE = """\
+[lattice]
+cells = [64, 64, 10]
+boundaries = ["periodic", "periodic", "open"]
+initial = "empty"
+[field.background]
+hum = 0.0
+act = 0.002
+ext = 0.1
+"""
+
 SCENE = """\
 seed = 3
 [lattice]

@@ -68,7 +68,7 @@ class Fit(Case):
         for old, new, says in (("statistic = \"cover\"", "statistic = \"cower\"", "did you mean \"cover\"?"),
                                ("[[parameter]]", "[[paramter]]", "did you mean `parameter`?"),
                                ("from = 0.02", "from = 0.4", "the prior is empty"),
-                               ("sd = 0.003", "", "needs statistic, value and sd"),
+                               ("sd = 0.003", "", "needs statistic, and value and sd or from"),
                                ("field.background.ext", "field.background.exd", "did you mean `ext`"),
                                ("to = 0.3", "to = 1.3", "field.background.ext"),
                                ("runs = 32", "runs = 3", "from 8")):

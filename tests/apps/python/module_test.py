@@ -22,7 +22,7 @@ SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
 sys.path.insert(1, str(SOURCE / "tests/apps/command"))
 
 import nephos  # noqa: E402
-from case import BAD, Case, rows_of  # noqa: E402
+from case import BAD, NULL_SCENE, Case, rows_of  # noqa: E402
 
 FAIR = SOURCE / "docs/research/fair.toml"
 
@@ -234,23 +234,12 @@ class Results(Case):
 
 
 class Studies(Case):
-    NULL = """\
-[lattice]
-cells = [64, 64, 10]
-boundaries = ["periodic", "periodic", "open"]
-initial = "empty"
-[field.background]
-hum = 0.0
-act = 0.002
-ext = 0.1
-"""
-
     def test_a_sweep_has_the_bytes_of_the_command(self):
-        scene = nephos.Scene.from_text(self.NULL)
+        scene = nephos.Scene.from_text(NULL_SCENE)
         sweep = nephos.sweep(scene, {"field.background.ext": numpy.array([0.05, 0.1]),
                                      ("field.background.act",): {"from": 0.001, "to": 0.004, "count": 2, "scale": "log"}},
                              out=self.folder / "python", replicates=2, steps=(200, 400), workers=2)
-        self.call("sweep", self.write("null.toml", self.NULL), "--axis", "field.background.ext=0.05,0.1", "--axis",
+        self.call("sweep", self.write("null.toml", NULL_SCENE), "--axis", "field.background.ext=0.05,0.1", "--axis",
                   "field.background.act=log:0.001..0.004:2", "--replicates", "2", "--steps", "200..400", "--out", "command")
         for name in ("runs.csv", "points.csv", "series.nc"):
             self.assertEqual((sweep.folder / name).read_bytes(), (self.folder / "command" / name).read_bytes(), name)
@@ -269,7 +258,7 @@ ext = 0.1
         self.assertEqual((sweep.folder / "shards/0000-of-0001.jsonl").stat().st_mtime_ns, before)
 
     def test_a_fit_has_the_numbers_of_the_command(self):
-        self.write("null.toml", self.NULL)
+        self.write("null.toml", NULL_SCENE)
         path = self.write("fit.toml", """\
 scene = "null.toml"
 runs = 16
@@ -293,7 +282,7 @@ sd = 0.01
         self.assertLess(found["parameters"][0]["low"], found["parameters"][0]["high"])
 
     def test_errors_are_those_of_the_command(self):
-        scene = nephos.Scene.from_text(self.NULL)
+        scene = nephos.Scene.from_text(NULL_SCENE)
         with self.assertRaisesRegex(nephos.Error, "a probability per step") as caught:
             nephos.sweep(scene, {"field.background.ext": [0.1, 1.5]}, out=self.folder / "bad")
         self.assertEqual(caught.exception.code, "usage")
