@@ -16,9 +16,9 @@
 namespace nephos {
 namespace {
 
-constexpr int kFractionBits = 12;
+constexpr int kFractionBits = 11;
 constexpr std::int32_t kCell = 1 << kFractionBits, kHalf = kCell / 2;
-constexpr int kReach = 6;  // cells; with half a cell more, an offset still fits 16 bits
+constexpr int kReach = 14;  // cells; with a cell more, an offset still fits 16 bits
 constexpr std::uint32_t kFree = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kNoCell = std::numeric_limits<std::size_t>::max();
 

@@ -2,11 +2,11 @@
 #pragma once
 
 // Advection by a wind that differs from place to place (docs/adr/0021): the content of a cell, its three bits, is a
-// parcel of air with a position of its own, exact to 2^-12 of a cell, that travels with it. A step
+// parcel of air with a position of its own, exact to 2^-11 of a cell, that travels with it. A step
 //
 //     1. moves each position along the wind (mean_wind() of core/wind.h)
 //     2. puts each content into the cell that holds its position; of several the one closest to the cell's centre
-//     3. puts each of the others into the free cell nearest to its position, at most 6 cells away
+//     3. puts each of the others into the free cell nearest to its position, at most 14 cells away
 //
 // The cell of step 3 does not change the position, so nothing drifts: where the wind brings air back, each content
 // returns to the cell that it came from. No content is lost or doubled but those that leave through an open side, and
@@ -42,10 +42,10 @@ class CellMotion {
     static std::size_t memory_bytes(const Extent& extent);
 
   private:
-    // A position relative to a cell's centre, in units of 2^-12 cell.
+    // A position relative to a cell's centre, in units of 2^-11 cell.
     using Offset = std::array<std::int16_t, 3>;
 
-    // A content on its way: its position in units of 2^-12 cell from the lattice's corner.
+    // A content on its way: its position in units of 2^-11 cell from the lattice's corner.
     struct Moving {
         std::array<std::int32_t, 3> at;
         std::uint8_t bits;  // hum, act and cld as bits 0, 1 and 2

@@ -288,7 +288,7 @@ TEST(CellMotion, IsTheNaiveTwin) {
             std::array<std::int64_t, 3> at;
             std::array<bool, 3> bits;
         };
-        const std::int64_t size[3] = {e.x * 4096, e.y * 4096, e.z * 4096};
+        const std::int64_t size[3] = {e.x * 2048, e.y * 2048, e.z * 2048};
         const Boundary sides[3] = {o.boundaries.x, o.boundaries.y, o.boundaries.z};
         std::vector<Content> contents;
         for (int k = 0; k < e.z; ++k)
@@ -300,7 +300,7 @@ TEST(CellMotion, IsTheNaiveTwin) {
                     const Vec3 way = mean_wind(o.wind, 20.0 * from, 0, 1) / 20.0;
                     bool stays = true;
                     for (int axis = 0; axis < 3; ++axis) {
-                        std::int64_t at = std::llround(from[axis] * 4096) + std::llround(way[axis] * 4096);
+                        std::int64_t at = std::llround(from[axis] * 2048) + std::llround(way[axis] * 2048);
                         if (sides[axis] == Boundary::periodic) at = ((at % size[axis]) + size[axis]) % size[axis];
                         stays = stays && at >= 0 && at < size[axis];
                         c.at[std::size_t(axis)] = at;
@@ -311,7 +311,7 @@ TEST(CellMotion, IsTheNaiveTwin) {
         const auto square = [](const Content& c, const Cell& cell) {
             double sum = 0;
             for (std::size_t axis = 0; axis < 3; ++axis) {
-                const double d = double(c.at[axis]) - (double(cell[axis]) * 4096 + 2048);
+                const double d = double(c.at[axis]) - (double(cell[axis]) * 2048 + 1024);
                 sum += d * d;
             }
             return sum;
@@ -319,7 +319,7 @@ TEST(CellMotion, IsTheNaiveTwin) {
         std::map<Cell, std::size_t> held;
         std::vector<std::size_t> waiting;
         const auto home = [&](std::size_t n) {
-            return Cell{contents[n].at[0] / 4096, contents[n].at[1] / 4096, contents[n].at[2] / 4096};
+            return Cell{contents[n].at[0] / 2048, contents[n].at[1] / 2048, contents[n].at[2] / 2048};
         };
         for (std::size_t n = 0; n < contents.size(); ++n) {
             const auto found = held.find(home(n));
@@ -331,15 +331,15 @@ TEST(CellMotion, IsTheNaiveTwin) {
         for (const std::size_t n : waiting) {
             double best = std::numeric_limits<double>::infinity();
             std::optional<Cell> chosen;
-            for (int dz = -6; dz <= 6; ++dz)
-                for (int dy = -6; dy <= 6; ++dy)
-                    for (int dx = -6; dx <= 6; ++dx) {
-                        if (dx * dx + dy * dy + dz * dz > 36) continue;
+            for (int dz = -14; dz <= 14; ++dz)
+                for (int dy = -14; dy <= 14; ++dy)
+                    for (int dx = -14; dx <= 14; ++dx) {
+                        if (dx * dx + dy * dy + dz * dz > 196) continue;
                         const Cell there{home(n)[0] + dx, home(n)[1] + dy, home(n)[2] + dz};
                         Cell folded = there;
                         bool inside = true;
                         for (std::size_t axis = 0; axis < 3; ++axis) {
-                            const std::int64_t cells = size[axis] / 4096;
+                            const std::int64_t cells = size[axis] / 2048;
                             if (sides[axis] == Boundary::periodic) folded[axis] = ((folded[axis] % cells) + cells) % cells;
                             inside = inside && folded[axis] >= 0 && folded[axis] < cells;
                         }
