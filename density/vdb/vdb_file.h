@@ -78,7 +78,7 @@ struct VdbMetadata {
     std::string nephos_version;
     int random_stream_version = 0;
     Georeference georeference;
-    Vec3 period_m{};  // 0 on an axis that does not repeat
+    Vec3 period_m{};              // 0 on an axis that does not repeat
     std::vector<WindLevel> wind;  // at the moment of the file; linear between levels, constant beyond
     bool operator==(const VdbMetadata&) const = default;
 };
@@ -88,7 +88,7 @@ struct VdbContent {
     const DensityGrid* density = nullptr;
     bool half = false;  // density as 16-bit floats
     std::optional<BitPlaneView> hum, act, cld;
-    Placement cells;             // of the bit planes; must agree with density's placement and extent / refine
+    Placement cells;  // of the bit planes; must agree with density's placement and extent / refine
     // Writes the wind by height, one velocity a level of voxels, as a grid of this name; needs density.
     std::vector<Velocity> wind;
     std::string wind_name = "vel";
@@ -120,40 +120,9 @@ struct VdbReadOptions {
     std::string grid;  // name of the grid; empty: `density`, else the first float grid
     UpAxis up_axis = UpAxis::automatic;
     double metres_per_unit = 1.0;  // world units of the file; > 0
+    bool list_grids = false;       // fills LoadedDensity::info
     VdbReadLimits limits;
 };
-
-// A density grid with the metadata of its file.
-struct LoadedDensity {
-    DensityGrid density;
-    std::string grid_name;
-    std::optional<VdbMetadata> metadata;  // when nephos wrote the file
-    int refine = 1;  // voxels per cell of the lattice and axis; 1 unless the file says more
-    // One sentence for each adaptation (negative values set to 0, resampling ...).
-    std::vector<std::string> notes;
-};
-
-// Reads any float, half or double fog volume. Bounds are nephos_bbox where present, else the active bounds,
-// moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and direction, are
-// permuted; rotated, sheared or non-cubic voxels are resampled, with a note. A child process with limits on
-// memory and time parses the file and sends the voxels (density/vdb/sandbox.h). Throws Error(io) naming the path and the
-// defect, Error(usage) on bad options. Thread-safe.
-LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
-DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
-
-// Reads files one after the other, as load_density(), and calls `each` with the index and the content of each; false stops.
-// One process reads up to 64 files ahead while `each` works, which takes a tenth of the time of a process for each small
-// file. Throws as load_density() and `each`; the files before the one that cannot be read were handed over.
-void load_densities(std::span<const std::filesystem::path> paths, const VdbReadOptions& options,
-                    const std::function<bool(std::size_t index, LoadedDensity&& loaded)>& each);
-
-// Reads the bool (or mask) grids hum, act and cld as a state of this extent and placement. Throws Error(io)
-// as above, and when a grid is missing, has another extent by its nephos_bbox_max or (without one) a voxel
-// outside the extent, or has another placement: by its transform a corner of the box is more than a hundredth
-// of a cell from that of the lattice. In files of other programs the identity transform, OpenVDB's default,
-// counts as unspecified and fits every placement.
-Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
-                   const VdbReadLimits& limits = {});
 
 // One value of the metadata of a file.
 struct VdbMetadataEntry {
@@ -180,6 +149,39 @@ struct VdbInfo {
     std::vector<VdbGridInfo> grids;  // in the file's order
     std::vector<VdbMetadataEntry> metadata;
 };
+
+// A density grid with the metadata of its file.
+struct LoadedDensity {
+    DensityGrid density;
+    std::string grid_name;
+    std::optional<VdbMetadata> metadata;  // when nephos wrote the file
+    VdbInfo info;                         // of all grids of the file, with VdbReadOptions::list_grids
+    int refine = 1;  // voxels per cell of the lattice and axis; 1 unless the file says more
+    // One sentence for each adaptation (negative values set to 0, resampling ...).
+    std::vector<std::string> notes;
+};
+
+// Reads any float, half or double fog volume. Bounds are nephos_bbox where present, else the active bounds,
+// moved so that voxel (0, 0, 0) is the lowest corner. Axes along the world's, in any order and direction, are
+// permuted; rotated, sheared or non-cubic voxels are resampled, with a note. A child process with limits on
+// memory and time parses the file and sends the voxels (density/vdb/sandbox.h). Throws Error(io) naming the path and the
+// defect, Error(usage) on bad options. Thread-safe.
+LoadedDensity load_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
+DensityGrid read_density(const std::filesystem::path& path, const VdbReadOptions& options = {});
+
+// Reads files one after the other, as load_density(), and calls `each` with the index and the content of each; false stops.
+// One process reads up to 64 files ahead while `each` works, which takes a tenth of the time of a process for each small
+// file. Throws as load_density() and `each`; the files before the one that cannot be read were handed over.
+void load_densities(std::span<const std::filesystem::path> paths, const VdbReadOptions& options,
+                    const std::function<bool(std::size_t index, LoadedDensity&& loaded)>& each);
+
+// Reads the bool (or mask) grids hum, act and cld as a state of this extent and placement. Throws Error(io)
+// as above, and when a grid is missing, has another extent by its nephos_bbox_max or (without one) a voxel
+// outside the extent, or has another placement: by its transform a corner of the box is more than a hundredth
+// of a cell from that of the lattice. In files of other programs the identity transform, OpenVDB's default,
+// counts as unspecified and fits every placement.
+Lattice read_state(const std::filesystem::path& path, Extent extent, const Placement& placement,
+                   const VdbReadLimits& limits = {});
 
 // Lists the grids and metadata of a file. Throws Error(io) as load_density().
 VdbInfo read_vdb_info(const std::filesystem::path& path, const VdbReadLimits& limits = {});
