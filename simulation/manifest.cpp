@@ -161,7 +161,7 @@ GridBox whole_box(const Scene& scene) {
         if (has_density(layer)) boxes.push_back({layer.extent, layer.placement});
     }
     if (boxes.empty()) boxes.push_back({scene.automaton.extent, scene.automaton.placement});
-    return common_box(boxes);
+    return boxes.size() == 1 ? boxes.front() : common_box(boxes);  // one alone needs no OpenVDB, which loads slowly
 }
 
 Json layers_json(const RunSettings& settings, const RunFolder& folder) {

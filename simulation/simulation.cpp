@@ -239,14 +239,6 @@ std::shared_ptr<const Lattice> Simulation::present_planes(std::size_t layer) con
 }
 
 StepResult Simulation::step_result(bool density) {
-    std::vector<DensityGrid> densities(layers_.size());
-    if (density) {
-        densities = densities_at_step(next_step_);
-    } else {
-        for (std::size_t n = 0; n < layers_.size(); ++n) {
-            if (layers_[n].is_veil() && makes_density(n)) densities[n] = density_of(n, next_step_);
-        }
-    }
     const Past& state = past(next_step_);
     StepResult result;
     result.step = state.step;
@@ -262,12 +254,15 @@ StepResult Simulation::step_result(bool density) {
         }
         if (layers_[n].has_density()) {
             const GridBox box = layers_[n].box();
-            if (layers_[n].is_veil() && makes_density(n)) layer.statistics = cloud_statistics(densities[n]);
-            const bool made = makes_density(n) && (density || layers_[n].is_veil());
-            layer.statistics.mean_density = made ? densities[n].sum() / double(box.extent.cells())
-                                                 : std::numeric_limits<double>::quiet_NaN();
-            layer.statistics.optical_cover = made ? optical_cover(densities[n], scene_.density.extinction_per_m)
-                                                  : std::numeric_limits<double>::quiet_NaN();
+            layer.statistics.mean_density = std::numeric_limits<double>::quiet_NaN();
+            layer.statistics.optical_cover = std::numeric_limits<double>::quiet_NaN();
+            // No grid is touched where none is made: not even an empty one, for which OpenVDB would be loaded.
+            if (makes_density(n) && (density || layers_[n].is_veil())) {
+                const DensityGrid grid = density ? densities_at_step(next_step_)[n] : density_of(n, next_step_);
+                if (layers_[n].is_veil()) layer.statistics = cloud_statistics(grid);
+                layer.statistics.mean_density = grid.sum() / double(box.extent.cells());
+                layer.statistics.optical_cover = optical_cover(grid, scene_.density.extinction_per_m);
+            }
             total.add(layer.statistics, volume_m3(box));
         }
         result.layers.push_back(std::move(layer));

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
+#include <span>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -73,22 +76,14 @@ Check check_numbers(const RunListing& run) {
         "frames", fmt::format("{} frames, {} to {}, no gap", numbers.size(), run.range.first_frame, last));
 }
 
-// The density of one file as a reader sees it; what is wrong with it goes into `problems`.
+// Judges the density of each file as a reader sees it.
 class Decoder {
   public:
     explicit Decoder(const RunListing& run) : run_(run) {}
 
-    std::optional<DensityGrid> read(const ListedFrame& frame, const FileRecord& file) {
-        const std::filesystem::path path = run_.folder / file.path;
-        LoadedDensity loaded;
-        VdbInfo info;
-        try {
-            loaded = load_density(path);
-            info = read_vdb_info(path);
-        } catch (const Error& error) {
-            voxels_.add(error.what());
-            return std::nullopt;
-        }
+    void unreadable(const Error& error) { voxels_.add(error.what()); }
+
+    void add(const ListedFrame& frame, const FileRecord& file, const LoadedDensity& loaded) {
         ++count_;
         for (const std::string& note : loaded.notes) values_.add(file.path + ": " + note);
         const float most = loaded.density.max_value();
@@ -97,8 +92,7 @@ class Decoder {
         if (!file.voxels.empty() && voxel_digest(loaded.density) != file.voxels)
             voxels_.add(file.path + ": its voxels are not those of the manifest");
         check_metadata(frame, file, loaded);
-        check_geometry(file, info);
-        return loaded.density;
+        check_geometry(file, loaded.info);
     }
 
     std::vector<Check> checks() const {
@@ -223,54 +217,109 @@ Check check_seams(const RunListing& run, const DensityGrid& grid, bool all) {
     return check;
 }
 
-// Decodes every density file.
-void check_content(const RunListing& run, const VerifyOptions& options, std::vector<Check>& checks) {
-    Decoder decoder(run);
-    Motion motion;
-    Problems sums;
-    double largest = 0;
-    std::size_t compared = 0;
-    std::optional<DensityGrid> last;
-    const RunFolder folder{run.folder, run.scene.name};
-    for (const ListedFrame& frame : run.frames) {
-        std::map<std::string, DensityGrid> grids;
-        for (const FileRecord& file : frame.files) {
-            if (!file.path.ends_with(".vdb")) continue;
-            if (std::optional<DensityGrid> grid = decoder.read(frame, file))
-                grids.emplace(file.path, std::move(*grid));
-        }
-        if (grids.empty()) continue;
-        const auto path_of = [&](const std::filesystem::path& path) {
-            return path.lexically_relative(run.folder).generic_string();
+// Compares the files of each frame with each other and with those of the frame before.
+class Frames {
+  public:
+    explicit Frames(const RunListing& run) : run_(run) {}
+
+    // `grids`: by their path in the folder, all that could be read of one frame; frames come in order.
+    void add(const ListedFrame& frame, std::map<std::string, DensityGrid> grids) {
+        if (grids.empty()) return;
+        const RunFolder folder{run_.folder, run_.scene.name};
+        const auto find = [&](const std::filesystem::path& path) {
+            return grids.find(path.lexically_relative(run_.folder).generic_string());
         };
-        const auto whole = grids.find(path_of(folder.density(frame.number)));
         std::vector<DensityGrid> layers;
         std::vector<Boundaries> boundaries;
-        for (const LayerOptions& layer : run.scene.layers) {
-            const auto found = grids.find(path_of(folder.density(frame.number, layer.name)));
+        for (const LayerOptions& layer : run_.scene.layers) {
+            const auto found = find(folder.density(frame.number, layer.name));
             if (found == grids.end()) continue;
             layers.push_back(found->second);
             boundaries.push_back(layer.boundaries);
         }
-        if (whole != grids.end() && !layers.empty() &&
-            layers.size() == std::size_t(std::ranges::count_if(
-                                 run.scene.layers, [](const auto& l) { return has_density(l); }))) {
-            compare_layers(frame, whole->second, layers, boundaries, largest, sums);
-            ++compared;
+        const auto whole = find(folder.density(frame.number));
+        const auto expected =
+            std::ranges::count_if(run_.scene.layers, [](const auto& layer) { return has_density(layer); });
+        if (whole != grids.end() && !layers.empty() && std::ssize(layers) == expected) {
+            compare_layers(frame, whole->second, layers, boundaries, largest_, sums_);
+            ++compared_;
         }
-        const DensityGrid& shown = whole != grids.end() ? whole->second : grids.begin()->second;
-        motion.add(shown);
-        last = shown;
+        last_ = whole != grids.end() ? whole->second : grids.begin()->second;
+        motion_.add(*last_);
+    }
+
+    void checks(const VerifyOptions& options, std::vector<Check>& checks) const {
+        if (compared_ > 0) {
+            checks.push_back(sums_.check(
+                "layers",
+                fmt::format("add up to the common grid within {:.2g} in {} frames", largest_, compared_)));
+        }
+        if (!last_) return;
+        checks.push_back(check_seams(run_, *last_, options.seam));
+        checks.push_back(motion_.check(options.max_change));
+    }
+
+  private:
+    const RunListing& run_;
+    Motion motion_;
+    Problems sums_;
+    double largest_ = 0;
+    std::size_t compared_ = 0;
+    std::optional<DensityGrid> last_;
+};
+
+// Decodes every density file. One process reads ahead; what it cannot read is tried once more alone, which tells whose
+// fault it is, and the rest goes on.
+void check_content(const RunListing& run, const VerifyOptions& options, std::vector<Check>& checks) {
+    struct Source {
+        const ListedFrame* frame;
+        const FileRecord* file;
+    };
+    std::vector<Source> sources;
+    std::vector<std::filesystem::path> paths;
+    for (const ListedFrame& frame : run.frames) {
+        for (const FileRecord& file : frame.files) {
+            if (!file.path.ends_with(".vdb")) continue;
+            sources.push_back({&frame, &file});
+            paths.push_back(run.folder / file.path);
+        }
+    }
+    VdbReadOptions reading;
+    reading.list_grids = true;
+    Decoder decoder(run);
+    Frames frames(run);
+    std::map<std::string, DensityGrid> grids;
+    std::size_t next = 0;
+    const auto finish_file = [&] {
+        const ListedFrame* frame = sources[next].frame;
+        if (++next == sources.size() || sources[next].frame != frame)
+            frames.add(*frame, std::exchange(grids, {}));
+    };
+    const auto take = [&](LoadedDensity&& loaded) {
+        const auto& [frame, file] = sources[next];
+        decoder.add(*frame, *file, loaded);
+        grids.emplace(file->path, std::move(loaded.density));
+        finish_file();
+    };
+    while (next < paths.size()) {
+        const std::size_t before = next;
+        try {
+            load_densities(std::span(paths).subspan(next), reading, [&](std::size_t, LoadedDensity&& loaded) {
+                take(std::move(loaded));
+                return true;
+            });
+        } catch (const Error& error) {
+            if (next > before) continue;
+            try {
+                take(load_density(paths[next], reading));
+            } catch (const Error& alone) {
+                decoder.unreadable(alone);
+                finish_file();
+            }
+        }
     }
     for (Check& check : decoder.checks()) checks.push_back(std::move(check));
-    if (compared > 0)
-        checks.push_back(sums.check(
-            "layers",
-            fmt::format("add up to the common grid within {:.2g} in {} frames", largest, compared)));
-    if (last) {
-        checks.push_back(check_seams(run, *last, options.seam));
-        checks.push_back(motion.check(options.max_change));
-    }
+    frames.checks(options, checks);
 }
 
 Check compare_runs(const RunListing& run, const std::filesystem::path& other_folder) {

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <exception>
 #include <fstream>
 #include <limits>
 #include <new>
 #include <sstream>
+#include <vector>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -133,16 +135,29 @@ class PipeReader final : public SandboxReader {
         most_ -= size;
         char* out = static_cast<char*>(data);
         while (size > 0) {
+            if (at_ == arrived_) refill();
+            const std::size_t part = std::min(size, arrived_ - at_);
+            std::memcpy(out, buffer_.data() + at_, part);
+            at_ += part;
+            out += part;
+            size -= part;
+        }
+    }
+
+    // Reads what has come: values of a few bytes one by one would cost two system calls each.
+    void refill() {
+        for (;;) {
             wait_for_data();
-            const ssize_t got = ::read(fd_, out, size);
+            const ssize_t got = ::read(fd_, buffer_.data(), buffer_.size());
             if (got < 0 && errno == EINTR) continue;
             if (got < 0)
                 throw std::runtime_error(std::string("cannot hear the reading process: ") +
                                          std::strerror(errno));
             if (got == 0) throw std::runtime_error("");  // the child is gone: its status says why
             watch_for_stall_ = false;
-            out += got;
-            size -= std::size_t(got);
+            at_ = 0;
+            arrived_ = std::size_t(got);
+            return;
         }
     }
 
@@ -177,6 +192,8 @@ class PipeReader final : public SandboxReader {
     Clock::time_point quiet_since_;
     long used_ = -1;
     std::size_t left_ = 0;  // bytes of the present chunk that were not yet taken
+    std::vector<char> buffer_ = std::vector<char>(kChunk);
+    std::size_t at_ = 0, arrived_ = 0;  // bytes of the buffer that were taken, and that are there
 };
 
 // Ends the child whatever happens, so that no process stays behind.

@@ -79,7 +79,7 @@ struct VdbMetadata {
     std::string nephos_version;
     int random_stream_version = 0;
     Georeference georeference;
-    Vec3 period_m{};  // 0 on an axis that does not repeat
+    Vec3 period_m{};              // 0 on an axis that does not repeat
     std::vector<WindLevel> wind;  // at the moment of the file; linear between levels, constant beyond
     bool operator==(const VdbMetadata&) const = default;
 };
@@ -89,7 +89,7 @@ struct VdbContent {
     const DensityGrid* density = nullptr;
     bool half = false;  // density as 16-bit floats
     std::optional<BitPlaneView> hum, act, cld;
-    Placement cells;             // of the bit planes; must agree with density's placement and extent / refine
+    Placement cells;  // of the bit planes; must agree with density's placement and extent / refine
     // Writes the wind by height, one velocity a level of voxels, as a grid of this name; needs density.
     std::vector<Velocity> wind;
     std::string wind_name = "vel";
@@ -123,7 +123,34 @@ struct VdbReadOptions {
     std::string grid;  // name of the grid; empty: `density`, else the first float grid
     UpAxis up_axis = UpAxis::automatic;
     double metres_per_unit = 1.0;  // world units of the file; > 0
+    bool list_grids = false;       // fills LoadedDensity::info
     VdbReadLimits limits;
+};
+
+// One value of the metadata of a file.
+struct VdbMetadataEntry {
+    std::string name;
+    std::string value;     // as text; numbers with all their digits
+    bool is_json = false;  // a number, a truth value, or a list of numbers, in the form of JSON
+    bool operator==(const VdbMetadataEntry&) const = default;
+};
+
+// One grid as `nephos info` lists it.
+struct VdbGridInfo {
+    std::string name;
+    std::string type;        // "float", "half", "bool", "vec3s" ...
+    std::string grid_class;  // "fog volume", "level set", "unknown" ...
+    Vec3 voxel_size{};       // world units
+    VoxelBox active_box;
+    std::uint64_t active_voxels = 0;
+    Matrix4 world_from_index{};              // by rows; an index is the centre of a voxel
+    std::vector<VdbMetadataEntry> metadata;  // by name
+};
+
+struct VdbInfo {
+    std::string file_version;        // "10.0/224": library and format
+    std::vector<VdbGridInfo> grids;  // in the file's order
+    std::vector<VdbMetadataEntry> metadata;
 };
 
 // A density grid with the metadata of its file.
@@ -131,6 +158,7 @@ struct LoadedDensity {
     DensityGrid density;
     std::string grid_name;
     std::optional<VdbMetadata> metadata;  // when nephos wrote the file
+    VdbInfo info;                         // of all grids of the file, with VdbReadOptions::list_grids
     int refine = 1;  // voxels per cell of the lattice and axis; 1 unless the file says more
     // One sentence for each adaptation (negative values set to 0, resampling ...).
     std::vector<std::string> notes;
@@ -163,32 +191,6 @@ Lattice read_state(const std::filesystem::path& path, Extent extent, const Place
 // type. Throws Error(io) as above, and when the grid's axes are not those of the world or a value is not finite.
 SampleGrid read_samples(const std::filesystem::path& path, const std::string& grid, int parts,
                         const VdbReadLimits& limits = {});
-
-// One value of the metadata of a file.
-struct VdbMetadataEntry {
-    std::string name;
-    std::string value;     // as text; numbers with all their digits
-    bool is_json = false;  // a number, a truth value, or a list of numbers, in the form of JSON
-    bool operator==(const VdbMetadataEntry&) const = default;
-};
-
-// One grid as `nephos info` lists it.
-struct VdbGridInfo {
-    std::string name;
-    std::string type;        // "float", "half", "bool", "vec3s" ...
-    std::string grid_class;  // "fog volume", "level set", "unknown" ...
-    Vec3 voxel_size{};       // world units
-    VoxelBox active_box;
-    std::uint64_t active_voxels = 0;
-    Matrix4 world_from_index{};              // by rows; an index is the centre of a voxel
-    std::vector<VdbMetadataEntry> metadata;  // by name
-};
-
-struct VdbInfo {
-    std::string file_version;        // "10.0/224": library and format
-    std::vector<VdbGridInfo> grids;  // in the file's order
-    std::vector<VdbMetadataEntry> metadata;
-};
 
 // Lists the grids and metadata of a file. Throws Error(io) as load_density().
 VdbInfo read_vdb_info(const std::filesystem::path& path, const VdbReadLimits& limits = {});

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lists grids and metadata of an OpenVDB file, for `nephos info`.
+// Lists grids and metadata of an OpenVDB file, for `nephos info` and `nephos verify`.
+
+#include "density/vdb/vdb_info.h"
 
 #include <charconv>
 #include <cmath>
@@ -124,6 +126,8 @@ Matrix4 world_from_index(const openvdb::math::Transform& transform) {
     return m;
 }
 
+}  // namespace
+
 void send_info(VdbArchive& archive, SandboxWriter& writer) {
     writer.text(archive.version());
     writer.value(std::uint32_t(archive.entries().size()));
@@ -161,8 +165,6 @@ VdbInfo receive_info(SandboxReader& reader) {
     info.metadata = receive_entries(reader);
     return info;
 }
-
-}  // namespace
 
 VdbInfo read_vdb_info(const std::filesystem::path& path, const VdbReadLimits& limits) {
     VdbInfo info;

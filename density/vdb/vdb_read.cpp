@@ -16,6 +16,7 @@
 #include "density/vdb/vdb_archive.h"
 #include "density/vdb/vdb_file.h"
 #include "density/vdb/vdb_foreign.h"
+#include "density/vdb/vdb_info.h"
 #include "density/vdb/vdb_metadata.h"
 #include "density/vdb/vdb_sandbox.h"
 
@@ -207,6 +208,7 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, bool masks
                                  ", not 0: it is no fog volume");
     }
     if (grid->activeVoxelCount() > memory_bytes / sizeof(float)) throw std::bad_alloc();
+    if (options.list_grids) send_info(archive, writer);
     writer.text(archive.entries()[n].descriptor.gridName());
     auto metadata = from_meta_map(header);
     send_metadata(writer, metadata ? metadata : from_meta_map(archive.metadata()));
@@ -229,8 +231,9 @@ void send_density(VdbArchive& archive, const VdbReadOptions& options, bool masks
 }
 
 // The parent's part: builds the grid from the child's stream.
-LoadedDensity receive_density(SandboxReader& reader) {
+LoadedDensity receive_density(SandboxReader& reader, bool list_grids) {
     LoadedDensity loaded;
+    if (list_grids) loaded.info = receive_info(reader);
     loaded.grid_name = clamp_message(reader.text(), kMaxMetadataText);
     loaded.metadata = receive_metadata(reader);
     loaded.refine = std::clamp(reader.value<int>(), 1, kMaxRefine);
@@ -405,7 +408,8 @@ void receive_plane(SandboxReader& reader, BitPlane& plane) {
 
 void check_options(const VdbReadOptions& options) {
     if (options.metres_per_unit > 0 && std::isfinite(options.metres_per_unit)) return;
-    throw Error(ErrorCode::usage, number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
+    throw Error(ErrorCode::usage,
+                number_text(options.metres_per_unit, 6) + " metres per unit: must be above 0");
 }
 
 LoadedDensity load(const std::filesystem::path& path, const VdbReadOptions& options, bool masks) {
@@ -417,7 +421,7 @@ LoadedDensity load(const std::filesystem::path& path, const VdbReadOptions& opti
         [&](VdbArchive& archive, SandboxWriter& writer) {
             send_density(archive, options, masks, memory_bytes, writer);
         },
-        [&](SandboxReader& reader) { loaded = receive_density(reader); });
+        [&](SandboxReader& reader) { loaded = receive_density(reader, options.list_grids); });
     return loaded;
 }
 
@@ -444,7 +448,7 @@ void load_densities(std::span<const std::filesystem::path> paths, const VdbReadO
                     send_density(archive, options, false, memory_bytes, writer);
                 },
                 [&](SandboxReader& reader, std::size_t n) {
-                    if (!each(first + n, receive_density(reader))) throw Stopped();
+                    if (!each(first + n, receive_density(reader, options.list_grids))) throw Stopped();
                 });
         }
     } catch (const Stopped&) {

@@ -79,7 +79,7 @@ class Packages(unittest.TestCase):
     def test_each_file_is_in_the_package_where_it_belongs(self):
         self.assertEqual(set(self.packages), NAMES)
         expected = {
-            "nephos": ("/usr/bin/nephos", "/usr/share/man/man1/nephos.1", "/usr/share/man/man1/nephos-run.1",
+            "nephos": ("/usr/bin/nephos", "/usr/lib/nephos/libnephos_volumes.so", "/usr/share/man/man1/nephos.1", "/usr/share/man/man1/nephos-run.1",
                        "/usr/share/nephos/scenes/cumulus.toml", "/usr/share/bash-completion/completions/nephos"),
             "nephos-editor": ("/usr/bin/nephos-editor",),
             "nephos-mpi": ("/usr/bin/nephos-mpi",),

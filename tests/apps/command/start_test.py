@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of the command that are loaded when they are needed (docs/adr/0033-start.md)."""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import unittest
+
+from case import NEPHOS, Case
+
+# Libraries whose symbols take most of the time of a short run.
+SLOW = ("libopenvdb", "libOpenEXR", "libblosc", "libboost_iostreams", "liblog4cplus")
+
+
+class Start(Case):
+    def loaded(self, *arguments, status=0):
+        """The slow libraries that a command loads, from the report of the dynamic linker."""
+        log = self.folder / "linker"
+        for old in self.folder.glob("linker.*"):
+            old.unlink()
+        environment = self.environment | {"LD_DEBUG": "files", "LD_DEBUG_OUTPUT": str(log)}
+        result = subprocess.run([NEPHOS, *map(str, arguments)], cwd=self.folder, env=environment, capture_output=True, text=True)
+        self.assertEqual(result.returncode, status, result.stdout + result.stderr)
+        text = "".join(path.read_text() for path in self.folder.glob("linker.*"))
+        self.assertIn("libstdc++", text)
+        return {name for name in SLOW if name in text}
+
+    def test_commands_of_bits_load_no_grid(self):
+        mean = self.write("mean.toml", 'scene = "tiny.toml"\nreplicates = 2\n[steps]\nmin = 20\nmax = 20\n'
+                          '[[axis]]\nkey = "field.background.ext"\nvalues = [0.05, 0.1]\n')
+        for arguments in (["--version"], ["--help"], ["hash", self.scene], ["validate", self.scene],
+                          ["run", self.scene, "--statistics-only", "--out", "bits"], ["sweep", mean, "--out", "swept"],
+                          ["merge", "swept"], ["report", "swept", "-o", "report.html"]):
+            with self.subTest(arguments[0]):
+                self.assertEqual(self.loaded(*arguments), set())
+
+    def test_a_run_with_grids_loads_them_all(self):
+        self.assertEqual(self.loaded("run", self.scene, "--out", "grids", "--splatting", "cpu"), set(SLOW))
+
+    def copied_program(self, library=None):
+        program = self.folder / "bin" / "nephos"
+        program.parent.mkdir()
+        shutil.copy2(NEPHOS, program)
+        original = next(pathlib.Path(NEPHOS).parent.parent.glob("lib*/**/libnephos_volumes.so"))
+        place = self.folder / original.relative_to(pathlib.Path(NEPHOS).parent.parent)
+        place.parent.mkdir(parents=True)
+        if library is not None:
+            place.write_bytes(library(original))
+        return program, place
+
+    def run_of(self, program):
+        result = subprocess.run([program, "run", self.scene, "--out", "copied", "--quiet", "--splatting", "cpu"],
+                                cwd=self.folder, env=self.environment, capture_output=True, text=True)
+        return result.returncode, result.stderr
+
+    def test_the_library_is_found_from_where_the_program_lies(self):
+        program, _ = self.copied_program(pathlib.Path.read_bytes)
+        self.assertEqual(self.run_of(program), (0, ""))
+        link = self.folder / "linked"
+        link.symlink_to(program)
+        shutil.rmtree(self.folder / "copied")
+        self.assertEqual(self.run_of(link), (0, ""))
+
+    def test_a_missing_or_damaged_library_is_named(self):
+        program, place = self.copied_program()
+        status, message = self.run_of(program)
+        self.assertEqual(status, 3)
+        self.assertIn(f"a part of nephos cannot be loaded: {place}", message.replace(f"{program.parent}/../", f"{self.folder}/"))
+        place.write_bytes(b"no library" * 1000)
+        status, message = self.run_of(program)
+        self.assertEqual(status, 3)
+        self.assertIn("invalid ELF header", message)
+        # Commands that need none of it go on.
+        self.assertEqual(subprocess.run([program, "hash", self.scene], capture_output=True).returncode, 0)
+
+    def test_a_library_without_the_functions_is_another_version(self):
+        program, place = self.copied_program()
+        source = self.write("empty.c", "int nephos_nothing;\n")
+        subprocess.run([os.environ.get("CC", "cc"), "-shared", "-o", place, source], check=True)
+        status, message = self.run_of(program)
+        self.assertEqual(status, 3)
+        self.assertIn("a part of nephos is of another version", message)
+
+
+if __name__ == "__main__":
+    unittest.main()
