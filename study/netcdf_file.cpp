@@ -119,7 +119,8 @@ class Reader {
     }
     template <typename T>
     T get(std::uint64_t at) const {
-        if (at + sizeof(T) > bytes_.size()) throw Error(ErrorCode::io, path_.string() + ": ends early");
+        if (at > bytes_.size() || bytes_.size() - at < sizeof(T))
+            throw Error(ErrorCode::io, path_.string() + ": ends early");
         char raw[sizeof(T)];
         std::memcpy(raw, bytes_.data() + at, sizeof(T));
         std::reverse(std::begin(raw), std::end(raw));
@@ -259,7 +260,7 @@ NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& nam
     skip_attributes(reader, path);
     reader.next<std::uint32_t>();
     std::vector<FoundVariable> variables;
-    std::uint64_t record_bytes = 0;
+    std::uint64_t record_bytes = 0, record_variables = 0;
     for (std::uint64_t left = reader.count(); left > 0; --left) {
         FoundVariable& variable = variables.emplace_back();
         variable.name = reader.name();
@@ -272,8 +273,10 @@ NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& nam
         variable.type = reader.next<std::uint32_t>();
         variable.bytes = reader.count();
         variable.begin = reader.offset();
-        if (!variable.dimensions.empty() && dimensions[variable.dimensions[0]].size == 0)
+        if (!variable.dimensions.empty() && dimensions[variable.dimensions[0]].size == 0) {
             record_bytes += variable.bytes;
+            ++record_variables;
+        }
     }
     std::vector<std::string> names;
     const FoundVariable* found = nullptr;
@@ -287,6 +290,9 @@ NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& nam
             ErrorCode::io,
             fmt::format("{}: name one of its variables with two or more dimensions, as in {}#NAME: {}",
                         path.string(), path.filename().string(), fmt::join(names, ", ")));
+    if (found->dimensions.empty())
+        throw Error(ErrorCode::io, fmt::format("{}: the variable {} is a single number without dimensions",
+                                               path.string(), found->name));
     NetcdfData data;
     std::uint64_t count = 1, in_record = 1;
     for (std::size_t n = 0; n < found->dimensions.size(); ++n) {
@@ -301,6 +307,8 @@ NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& nam
     }
     const bool is_record = dimensions[found->dimensions[0]].size == 0;
     const std::uint64_t bytes = size_of_type(found->type, path);
+    // Records of a file's only record variable follow each other without padding (NetCDF classic format, note on vsize).
+    if (record_variables == 1) record_bytes = in_record * bytes;
     for (std::uint64_t n = 0; n < count; ++n) {
         const std::uint64_t at = is_record
                                      ? found->begin + n / in_record * record_bytes + n % in_record * bytes

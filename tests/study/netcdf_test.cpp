@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
 #include "study/netcdf_file.h"
@@ -103,6 +104,42 @@ TEST_F(NetcdfTest, RefusesWhatItCannotRead) {
     } catch (const Error& error) {
         EXPECT_NE(std::string(error.what()).find("nccopy"), std::string::npos);
     }
+}
+
+std::string number(std::uint64_t value, int bytes) {
+    std::string out;
+    for (int n = bytes - 1; n >= 0; --n) out += char(value >> 8 * n & 0xff);
+    return out;
+}
+
+// Three records of three 16-bit numbers, 1 to 9, of the only variable; its values begin at `begin`, or after the header.
+std::string one_record_variable(std::optional<std::uint64_t> begin) {
+    const auto word = [](std::uint64_t value) { return number(value, 4); };
+    const auto name = [&](char letter) { return word(1) + letter + std::string(3, '\0'); };
+    std::string file = "CDF\x02" + word(3) + word(10) + word(2) + name('t') + word(0) + name('x') + word(3);
+    file += word(0) + word(0) + word(11) + word(1) + name('v') + word(2) + word(0) + word(1);
+    file += word(0) + word(0) + word(3) + word(8);
+    file += number(begin.value_or(file.size() + 8), 8);
+    for (std::uint64_t n = 1; n <= 9; ++n) file += number(n, 2);
+    return file;
+}
+
+TEST_F(NetcdfTest, RecordsOfTheOnlyRecordVariableAreNotPadded) {
+    const fs::path path = folder / "records.nc";
+    std::ofstream(path, std::ios::binary) << one_record_variable({});
+    EXPECT_EQ(read_netcdf(path, "v").values, (std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
+}
+
+TEST_F(NetcdfTest, RefusesAnOffsetThatWrapsAround) {
+    const fs::path path = folder / "wraps.nc";
+    std::ofstream(path, std::ios::binary) << one_record_variable(~std::uint64_t(0) - 1);
+    EXPECT_THROW(read_netcdf(path, "v"), Error);
+}
+
+TEST_F(NetcdfTest, RefusesANumberWithoutDimensions) {
+    const fs::path path = folder / "scalar.nc";
+    write_netcdf(path, {}, {}, {{"s", NetcdfType::float64, {}, {}, [](const auto& put) { put(1.0); }}});
+    EXPECT_THROW(read_netcdf(path, "s"), Error);
 }
 
 TEST_F(NetcdfTest, RefusesToWriteWhatDoesNotFit) {
