@@ -131,7 +131,7 @@ TEST_F(SceneFiles, BadFilesAreNamed) {
         }
     };
     const std::string wind = "[[wind_field]]\nkind = \"grid\"\nfiles = ", grids = "[[field.grids]]\nof = \"act\"\nfile = ";
-    EXPECT_NE(error_of(wind + "\"none.vdb\"\n").find("none.vdb: there is no such file"), std::string::npos);
+    EXPECT_NE(error_of(wind + "\"none.vdb\"\n").find("none.vdb: No such file or directory"), std::string::npos);
     EXPECT_NE(error_of(wind + "\"p.vdb\"\n").find("there is no vec3s grid in it; it has `p` (float)"), std::string::npos)
         << error_of(wind + "\"p.vdb\"\n");
     EXPECT_NE(error_of(wind + "\"v.vdb\"\ngrid = \"air\"\n").find("no vec3s grid `air`"), std::string::npos);
