@@ -117,15 +117,17 @@ bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, co
     } catch (const SceneErrors&) {
         return false;  // shown as any other problem
     }
+    // Clouds that enter at the end of the present step were placed with the wind that it has there: the change follows it.
+    const std::uint64_t from = held.step + 1;
     const std::size_t index = path[array.size()].index;
     const Wind& changed = wind_at_path(wanted, array);
     if (index >= changed.keyframes.size()) return false;
     const std::vector<WindKeyframe> keys =
-        changed_keys(wind_at_path(before, array), changed.keyframes[index].levels, held.step,
+        changed_keys(wind_at_path(before, array), changed.keyframes[index].levels, from,
                      before.automaton.time_step_s);
-    say(editor, "Wind recorded from step " + std::to_string(held.step) + " on");
+    say(editor, "Wind recorded from step " + std::to_string(from) + " on");
     const bool done =
-        apply(editor, with_keyframes(text, array, keys), "Wind from step " + std::to_string(held.step),
+        apply(editor, with_keyframes(text, array, keys), "Wind from step " + std::to_string(from),
               "live " + std::to_string(held.step));
     // What is shown of the list is now its newest key frame.
     if (editor.selected.size() > array.size() &&
