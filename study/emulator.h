@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A polynomial that stands for the simulation: least squares through noisy values at points of the unit cube, with the
-// variance of its own mean. Its degree, 1 to 5, is that which foretells each value best from all others (leave one out),
-// among those that leave at least twice as many values as terms.
+// A polynomial that stands for the simulation: least squares through noisy values at points, with the variance of its own
+// mean. Its degree, 1 to 5, is that which foretells each value best from all others (leave one out), among those that have
+// at least twice as many values as terms. Its terms are of coordinates that go from -1 to 1 over the box of the points: in
+// a small box those of the whole cube would be all but equal, and their normal equations could not be solved.
 
 #include <memory>
 #include <span>
@@ -22,9 +23,14 @@ class Emulator {
     struct Prediction {
         double mean, variance;  // of the mean, not of a run
     };
+    // Outside the box of the points the prediction is an extrapolation.
     Prediction at(std::span<const double> point) const;
-    double noise()
-        const;  // standard deviation of a value about the polynomial: of runs, and what the polynomial misses
+    // Returns the variance of the mean at a point over that of a value: small among the points, large in gaps and beyond them.
+    double leverage(std::span<const double> point) const;
+    // Returns the standard deviation of a value about the polynomial: of runs, and what the polynomial misses.
+    double noise() const;
+    // Returns what each value is off a polynomial of the same degree through all the others.
+    const std::vector<double>& left_out() const;
     int degree() const;
 
   private:

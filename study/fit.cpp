@@ -5,16 +5,15 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
-#include "study/cloud_mask.h"
+#include "study/design.h"
 #include "study/emulator.h"
-#include "study/run_statistics.h"
-#include "study/toml_table.h"
+#include "study/transform.h"
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
 #include "core/error.h"
-#include "simulation/layer_simulation.h"
 
 namespace nephos {
 namespace {
@@ -23,52 +22,24 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kImplausible = 3;
 constexpr std::uint64_t kCandidates = 4096;
 constexpr std::size_t kSamples = 1000;
+constexpr int kMostBatches = 16;
+constexpr double kEarned = 0.95;  // of the error: what a larger region must earn its place with
 constexpr double kPriorDeviation = 0.28867513459481287;  // of a uniform number
 
-enum class Transform { identity, log, logit };
-
-Transform transform_of(const std::string& statistic) {
-    if (statistic == "cover" || statistic.ends_with("_fraction")) return Transform::logit;
-    if (statistic.ends_with("_exponent") || statistic == "size_exponent_line" || statistic == "overlap" ||
-        statistic.ends_with("_dimension"))
-        return Transform::identity;
-    return Transform::log;
-}
-
-double forward(Transform transform, double x) {
-    if (transform == Transform::log) return x > 0 ? std::log(x) : kNaN;
-    if (transform == Transform::logit) return x > 0 && x < 1 ? std::log(x / (1 - x)) : kNaN;
-    return x;
-}
-
-double backward(Transform transform, double z) {
-    if (transform == Transform::log) return std::exp(z);
-    if (transform == Transform::logit) return 1 / (1 + std::exp(-z));
-    return z;
-}
-
-double slope(Transform transform, double x) {
-    if (transform == Transform::log) return 1 / x;
-    if (transform == Transform::logit) return 1 / (x * (1 - x));
-    return 1;
-}
+using Point = std::vector<double>;  // of the unit cube
 
 // A part of the unit cube.
 struct Box {
     std::vector<double> low, high;
     explicit Box(std::size_t d) : low(d, 0.0), high(d, 1.0) {}
-    bool holds(const std::vector<double>& point) const {
+    bool holds(const Point& point) const {
         for (std::size_t n = 0; n < point.size(); ++n)
             if (point[n] < low[n] || point[n] > high[n]) return false;
         return true;
     }
-    std::vector<std::vector<double>> points(std::uint64_t count) const {
-        const std::vector<double> unit = unit_points(Design::sobol, count, low.size(), 0);
-        std::vector<std::vector<double>> all(count, std::vector<double>(low.size()));
-        for (std::uint64_t n = 0; n < count; ++n)
-            for (std::size_t d = 0; d < low.size(); ++d)
-                all[n][d] = low[d] + unit[n * low.size() + d] * (high[d] - low[d]);
-        return all;
+    bool is_whole() const {
+        return std::ranges::all_of(low, [](double x) { return x == 0; }) &&
+               std::ranges::all_of(high, [](double x) { return x == 1; });
     }
     // Grows by a factor about its middle, within the cube.
     Box grown(double factor) const {
@@ -82,10 +53,38 @@ struct Box {
     }
 };
 
+// Whether points, one after the other, reach to all sides of a box.
+bool surround(const std::vector<double>& points, const Box& box) {
+    const std::size_t dimensions = box.low.size();
+    for (std::size_t d = 0; d < dimensions; ++d) {
+        double low = 1, high = 0;
+        for (std::size_t n = d; n < points.size(); n += dimensions) {
+            low = std::min(low, points[n]);
+            high = std::max(high, points[n]);
+        }
+        if (low > box.low[d] || high < box.high[d]) return false;
+    }
+    return true;
+}
+
+// The number of equally likely points that tell as much as points of these weights (Kong 1992).
+double effective_number(const std::vector<double>& weights) {
+    double sum = 0, squares = 0;
+    for (const double weight : weights) {
+        sum += weight;
+        squares += weight * weight;
+    }
+    return sum * sum / squares;
+}
+
 class Fitter {
   public:
     Fitter(const FitProblem& problem, const Simulate& simulate)
-        : problem_(problem), simulate_(simulate), dimensions_(problem.parameters.size()), box_(dimensions_) {
+        : problem_(problem),
+          simulate_(simulate),
+          dimensions_(problem.parameters.size()),
+          looked_at_(dimensions_),
+          box_(dimensions_) {
         if (problem.parameters.empty() || problem.targets.empty())
             throw Error(ErrorCode::usage, "a fit needs a parameter and a target");
         for (const FitTarget& target : problem.targets) {
@@ -100,15 +99,13 @@ class Fitter {
 
     FitResult result() {
         const std::uint64_t first = std::max<std::uint64_t>(problem_.runs / 2, dimensions_ + 4);
-        run_wave(1, box_.points(first));
+        run_wave(1, take(box_, first));
         for (int wave = 2; wave <= 3; ++wave) {
-            const std::uint64_t left =
-                problem_.runs > runs_.size() + lost_ ? problem_.runs - runs_.size() - lost_ : 0;
+            const std::uint64_t left = problem_.runs > tried_.size() ? problem_.runs - tried_.size() : 0;
             const std::uint64_t count = wave == 2 ? left / 2 : left;
-            narrow();
-            if (count > 0) run_wave(wave, box_.points(count));
+            const std::vector<Point> points = narrow(count);
+            if (!points.empty()) run_wave(wave, points);
         }
-        emulate();
         FitResult result = posterior();
         result.runs = runs_.size() + lost_;
         result.lost = lost_;
@@ -119,7 +116,24 @@ class Fitter {
     }
 
   private:
-    void run_wave(int wave, const std::vector<std::vector<double>>& points) {
+    // The next points of the one Sobol sequence of the fit, in a box: no two calls give the same ones.
+    std::vector<Point> take(const Box& box, std::uint64_t count) {
+        const std::vector<double> unit = sobol_points(taken_, count, dimensions_, problem_.seed);
+        taken_ += count;
+        return points_of(box, unit);
+    }
+
+    static std::vector<Point> points_of(const Box& box, const std::vector<double>& unit) {
+        const std::size_t dimensions = box.low.size();
+        std::vector<Point> points(unit.size() / dimensions, Point(dimensions));
+        for (std::size_t n = 0; n < points.size(); ++n)
+            for (std::size_t d = 0; d < dimensions; ++d)
+                points[n][d] = box.low[d] + unit[n * dimensions + d] * (box.high[d] - box.low[d]);
+        return points;
+    }
+
+    void run_wave(int wave, const std::vector<Point>& points) {
+        tried_.insert(tried_.end(), points.begin(), points.end());
         for (FitRun& run : simulate_(wave, points)) {
             bool whole = true;
             for (std::size_t n = 0; n < z_.size(); ++n) {
@@ -142,23 +156,45 @@ class Fitter {
         emulate();
     }
 
-    // From the runs in the region of the last wave, where they are enough, else from all.
     void emulate() {
-        std::vector<const FitRun*> used;
-        for (const FitRun& run : runs_)
-            if (box_.holds(run.unit)) used.push_back(&run);
-        if (used.size() < 3 * (1 + 2 * dimensions_)) {
-            used.clear();
-            for (const FitRun& run : runs_) used.push_back(&run);
-        }
         emulators_.clear();
-        for (std::size_t n = 0; n < z_.size(); ++n) {
+        for (std::size_t n = 0; n < z_.size(); ++n) emulators_.push_back(emulator_of(n));
+    }
+
+    // From the runs of the region, or of ever larger ones about it: more runs know the slope better, but one polynomial may not
+    // do for all of them. The one is taken that foretells best the runs of the region itself, and knows most about all of what
+    // is looked at. No emulator is asked beyond its runs, where a polynomial bends away.
+    Emulator emulator_of(std::size_t target) const {
+        const std::size_t enough = 3 * (1 + 2 * dimensions_);
+        const std::vector<Point> places =
+            points_of(looked_at_, sobol_points(0, 64, dimensions_, problem_.seed));
+        std::optional<Emulator> best;
+        double least = std::numeric_limits<double>::infinity();
+        const bool any_inside =
+            std::ranges::any_of(runs_, [&](const FitRun& r) { return box_.holds(r.unit); });
+        for (Box box = box_;; box = box.grown(2)) {
             std::vector<double> points, values;
-            for (const FitRun* run : used) {
-                points.insert(points.end(), run->unit.begin(), run->unit.end());
-                values.push_back(run->statistics[n]);
+            std::vector<bool> inside;
+            for (const FitRun& run : runs_) {
+                if (!box.holds(run.unit)) continue;
+                points.insert(points.end(), run.unit.begin(), run.unit.end());
+                values.push_back(run.statistics[target]);
+                inside.push_back(!any_inside || box_.holds(run.unit));
             }
-            emulators_.emplace_back(points, values, dimensions_);
+            if ((values.size() >= enough && surround(points, looked_at_)) || box.is_whole()) {
+                Emulator emulator(points, values, dimensions_);
+                double error = 0, leverage = 0;
+                for (std::size_t n = 0; n < values.size(); ++n)
+                    if (inside[n]) error += emulator.left_out()[n] * emulator.left_out()[n];
+                for (const Point& place : places)
+                    leverage += emulator.leverage(place) / double(places.size());
+                error *= 1 + leverage;
+                if (!best || error < kEarned * least) {
+                    least = error;
+                    best = std::move(emulator);
+                }
+            }
+            if (box.is_whole()) return std::move(*best);
         }
     }
 
@@ -181,12 +217,13 @@ class Fitter {
         return sum;
     }
 
-    // The box around the points that are kept, in a few rounds of ever finer Sobol points. Two more spacings on every side,
-    // so that nothing is cut off between points.
+    // The box around the points that are kept, in a few rounds of ever finer Sobol points. Two more spacings on every side, so
+    // that nothing is cut off between points.
     template <typename Keep>
-    Box zoomed(Box box, Keep&& keep) const {
+    Box zoomed(Keep&& keep) {
+        Box box = looked_at_;
         for (int round = 0; round < 8; ++round) {
-            const std::vector<std::vector<double>> points = box.points(kCandidates);
+            const std::vector<Point> points = take(box, kCandidates);
             const std::vector<bool> kept = keep(points);
             Box next(dimensions_);
             bool any = false;
@@ -213,38 +250,83 @@ class Fitter {
         return box;
     }
 
-    // Where the targets are possible, three times as wide: a slope needs a distance.
-    void narrow() {
-        const Box possible = zoomed(Box(dimensions_), [&](const std::vector<std::vector<double>>& points) {
+    // Looks only where the targets are possible from now on, and returns the points of the next wave, all of them possible.
+    // The emulators are of a region three times as wide: a slope needs a distance.
+    std::vector<Point> narrow(std::uint64_t count) {
+        double limit = kImplausible;
+        const Box possible = zoomed([&](const std::vector<Point>& points) {
             std::vector<double> values;
-            for (const std::vector<double>& point : points) values.push_back(implausibility(point));
+            for (const Point& point : points) values.push_back(implausibility(point));
             // Where nothing is possible, what comes closest is looked at.
-            const double limit = std::max(kImplausible, 1.5 * *std::ranges::min_element(values));
+            limit = std::max(kImplausible, 1.5 * *std::ranges::min_element(values));
             std::vector<bool> kept;
             for (const double value : values) kept.push_back(value <= limit);
             return kept;
         });
+        std::vector<Point> points = proposals(possible, limit, count);
+        looked_at_ = possible.grown(2);
         box_ = possible.grown(3);
+        return points;
+    }
+
+    // Up to `count` points of a box that were not run and are not implausible: Sobol points, and where few of them are, as on
+    // a ridge through a box of many dimensions, also points ever closer to those that were found.
+    std::vector<Point> proposals(const Box& box, double limit, std::uint64_t count) {
+        std::vector<Point> found;
+        const auto add = [&](const std::vector<Point>& points) {
+            for (const Point& point : points) {
+                if (found.size() == count) return;
+                if (implausibility(point) <= limit && std::ranges::count(tried_, point) == 0 &&
+                    std::ranges::count(found, point) == 0)
+                    found.push_back(point);
+            }
+        };
+        for (int batch = 0; batch < kMostBatches && found.size() < count; ++batch)
+            add(take(box, kCandidates));
+        const std::vector<Point> centres = found;
+        for (double share = 0.5; share > 1e-9 && found.size() < count && !centres.empty(); share /= 2) {
+            for (const Point& centre : centres) {
+                Box near(dimensions_);
+                for (std::size_t d = 0; d < dimensions_; ++d) {
+                    const double reach = share / 2 * (box.high[d] - box.low[d]);
+                    near.low[d] = std::max(0.0, centre[d] - reach);
+                    near.high[d] = std::min(1.0, centre[d] + reach);
+                }
+                add(take(near, 16));
+            }
+        }
+        return found;
     }
 
     FitResult posterior() {
-        const Box box = zoomed(Box(dimensions_), [&](const std::vector<std::vector<double>>& points) {
+        const Box box = zoomed([&](const std::vector<Point>& points) {
             std::vector<double> values;
-            for (const std::vector<double>& point : points) values.push_back(log_likelihood(point));
+            for (const Point& point : points) values.push_back(log_likelihood(point));
             const double limit = *std::ranges::max_element(values) - 12;
             std::vector<bool> kept;
             for (const double value : values) kept.push_back(value >= limit);
             return kept;
         });
-        const std::vector<std::vector<double>> points = box.points(8 * kCandidates);
-        std::vector<double> weights;
-        for (const std::vector<double>& point : points) weights.push_back(log_likelihood(point));
-        const std::size_t best = std::size_t(std::ranges::max_element(weights) - weights.begin());
-        const double largest = weights[best];
-        for (double& weight : weights) weight = std::exp(weight - largest);
+        // Points until those that count are as many as the samples, up to a limit.
+        std::vector<Point> points;
+        std::vector<double> logarithms, weights;
+        std::size_t best = 0;
+        double effective = 0;
+        for (int batch = 0; batch < kMostBatches && effective < double(kSamples); ++batch) {
+            for (Point& point : take(box, 8 * kCandidates)) {
+                logarithms.push_back(log_likelihood(point));
+                points.push_back(std::move(point));
+            }
+            best = std::size_t(std::ranges::max_element(logarithms) - logarithms.begin());
+            weights.clear();
+            for (const double logarithm : logarithms)
+                weights.push_back(std::exp(logarithm - logarithms[best]));
+            effective = effective_number(weights);
+        }
         FitResult result;
         result.best = points[best];
         result.implausibility = implausibility(points[best]);
+        result.effective_samples = effective;
         // Systematic resampling: sample n is where the sum of weights passes (n + 1/2) / kSamples.
         const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
         double sum = 0;
@@ -357,10 +439,14 @@ class Fitter {
     const FitProblem& problem_;
     const Simulate& simulate_;
     std::size_t dimensions_;
-    Box box_;
+    // Twice and three times as wide as where the targets are possible: what is looked at, for a wave knows its own errors only
+    // roughly, and the region of the emulators.
+    Box looked_at_, box_;
     std::vector<Transform> transforms_;
     std::vector<double> z_, sd_;  // targets and their sd, transformed
     std::vector<FitRun> runs_;    // statistics transformed
+    std::vector<Point> tried_;    // of all runs, those that were lost included
+    std::uint64_t taken_ = 0;     // points of the Sobol sequence
     std::uint64_t lost_ = 0;
     std::vector<Emulator> emulators_;
 };
@@ -374,112 +460,6 @@ double parameter_value(const FitParameter& parameter, double unit) {
 
 FitResult fit(const FitProblem& problem, const Simulate& simulate) {
     return Fitter(problem, simulate).result();
-}
-
-namespace {
-
-// A target that a cloud mask gives: its value, and the standard error of it where the file does not say another sd.
-void read_target_mask(TomlTable& target, const std::filesystem::path& folder, FitTarget& to) {
-    constexpr double kLargest = std::numeric_limits<double>::max(),
-                     kSmallest = std::numeric_limits<double>::min();
-    MaskOptions mask;
-    const std::string file = target.text("from").value_or("");
-    mask.variable = target.text("variable").value_or("");
-    mask.threshold = target.number("threshold", -kLargest, kLargest);
-    mask.cell_size_m = target.number("cell_size_m", kSmallest, kLargest);
-    mask.level_height_m = target.number("level_height_m", kSmallest, kLargest);
-    for (const std::string& axis : target.texts("periodic")) {
-        if (axis != "x" && axis != "y")
-            target.report("periodic", "'" + axis + "' is no axis of a mask",
-                          "expected periodic = [\"x\", \"y\"]");
-        (axis == "x" ? mask.boundaries.x : mask.boundaries.y) = Boundary::periodic;
-    }
-    const std::optional<double> sd = target.number("sd", kSmallest, kLargest);
-    if (target.has("value"))
-        target.report("value", "a target has both value and from", "expected one of them");
-    SeriesMean mean{};
-    try {
-        mean = mask_statistics(read_masks({folder / file}, mask)).statistics[statistic_index(to.statistic)];
-    } catch (const Error& error) {
-        target.report("from", error.what(), "expected a cloud mask: .vdb, .nc or .png");
-        return;
-    }
-    to.value = mean.mean;
-    to.sd = sd.value_or(mean.error);
-    if (!std::isfinite(to.value))
-        target.report("from", fmt::format("{} has no value of `{}`", file, to.statistic),
-                      "expected another statistic");
-    else if (!(to.sd > 0))
-        target.report("from", fmt::format("{} does not say how uncertain its `{}` is", file, to.statistic),
-                      "expected sd = ... beside it: a single snapshot has no standard error");
-}
-
-}  // namespace
-
-FitOptions read_fit_file(const std::filesystem::path& path) {
-    constexpr double kLargest = std::numeric_limits<double>::max();
-    FitOptions options;
-    options.base.replicates = 1;
-    read_toml_file(path, [&](TomlTable& table) {
-        if (!table.has("scene"))
-            table.report("scene", "the fit has no scene", "expected scene = \"FILE.toml\"");
-        options.base.scene_file = path.parent_path() / table.text("scene").value_or("");
-        options.base.overrides = table.texts("set");
-        options.base.layer = table.text("layer").value_or("");
-        options.base.clouds_every = int(
-            table.integer("clouds_every", 0, 1'000'000).value_or(std::uint64_t(options.base.clouds_every)));
-        options.problem.runs = table.integer("runs", 8, 1'000'000).value_or(options.problem.runs);
-        options.problem.proof = table.integer("proof", 0, 1'000'000).value_or(options.problem.proof);
-        options.problem.seed = table.integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1);
-        options.base.seed = options.problem.seed;
-        table.table("steps", [&](TomlTable& steps) {
-            StepRules& rules = options.base.steps;
-            rules.min = steps.integer("min", 20, kMaxSteps).value_or(rules.min);
-            rules.max = steps.integer("max", rules.min, kMaxSteps).value_or(std::max(rules.min, rules.max));
-        });
-        table.tables("parameter", [&](TomlTable& parameter) {
-            FitParameter& to = options.problem.parameters.emplace_back();
-            if (const auto key = parameter.text("key")) to.keys = {*key};
-            for (std::string& key : parameter.texts("keys")) to.keys.push_back(std::move(key));
-            if (to.keys.empty())
-                parameter.report("key", "a parameter has no key", "expected key = \"field.background.ext\"");
-            bool has_prior = false;
-            parameter.table("prior", [&](TomlTable& prior) {
-                has_prior = true;
-                to.from = prior.number("from", -kLargest, kLargest).value_or(0);
-                to.to = prior.number("to", -kLargest, kLargest).value_or(1);
-                to.scale =
-                    prior.word("scale", {"linear", "log"}).value_or(0) == 1 ? Scale::log : Scale::linear;
-                if (!(to.to > to.from) || (to.scale == Scale::log && !(to.from > 0)))
-                    prior.report("to", "the prior is empty",
-                                 "expected `to` above `from`, and both above 0 on a log scale");
-            });
-            if (!has_prior)
-                parameter.report("prior", "a parameter has no prior",
-                                 "expected prior = { from = 0.03, to = 0.4, scale = \"log\" }");
-        });
-        if (options.problem.parameters.empty())
-            table.report("parameter", "the fit has no parameter", "expected a table [[parameter]]");
-        table.tables("target", [&](TomlTable& target) {
-            FitTarget& to = options.problem.targets.emplace_back();
-            std::vector<std::string_view> names;
-            for (const StatisticInfo& info : kStatistics) names.push_back(info.name);
-            to.statistic = names[target.word("statistic", names).value_or(0)];
-            if (target.has("from")) {
-                read_target_mask(target, path.parent_path(), to);
-                return;
-            }
-            if (!target.has("statistic") || !target.has("value") || !target.has("sd"))
-                target.report(
-                    "statistic", "a target needs statistic, and value and sd or from",
-                    "expected statistic = \"cover\", value = 0.3, sd = 0.015, or from = \"observed.nc\"");
-            to.value = target.number("value", -kLargest, kLargest).value_or(0);
-            to.sd = target.number("sd", std::numeric_limits<double>::min(), kLargest).value_or(1);
-        });
-        if (options.problem.targets.empty())
-            table.report("target", "the fit has no target", "expected a table [[target]]");
-    });
-    return options;
 }
 
 }  // namespace nephos

@@ -3,11 +3,11 @@
 
 // Parameters found for targets, with their uncertainty and with what the targets leave free.
 //
-//     1. waves    half the runs at Sobol points of the prior, the others in two waves where the emulators hold the targets to be
-//                 possible: implausibility |target - emulator| / sqrt(sd^2 + emulator's variance) < 3 for every target
-//                 (history matching: Vernon, Goldstein and Bower 2010)
-//     2. emulator a polynomial for each target, of logit(x) for fractions and log(x) for sizes and times, from the runs in the
-//                 region of the last wave
+//     1. waves    half the runs at Sobol points of the prior, the others in two waves at points where the emulators hold the
+//                 targets to be possible: implausibility |target - emulator| / sqrt(sd^2 + emulator's variance) <= 3 for
+//                 every target (history matching: Vernon, Goldstein and Bower 2010). No point is run twice
+//     2. emulator a polynomial for each target, of logit(x) for fractions and log(x) for sizes and times, from the runs in and
+//                 about the region of the last wave
 //     3. posterior prior x normal likelihood of the targets, with the emulator's variance, by importance sampling
 //     4. proof    fresh runs at points of the posterior: what the emulator promised, and what the simulation gave
 //
@@ -75,6 +75,9 @@ struct FitResult {
     std::uint64_t runs = 0, lost = 0;            // lost: without a mean (not steady, or failed)
     std::vector<double> best;                    // the parameters of the highest posterior density
     double implausibility = 0;  // of the best point; above 3 the targets cannot be met in the prior
+    // Number of independent points that the weighted ones of the posterior are worth, (sum w)^2 / sum w^2; below 200 the
+    // quantiles are rough.
+    double effective_samples = 0;
 };
 
 // Throws Error(usage) when more than half the runs have no mean, or the problem has no parameter or target. Pure but for

@@ -16,6 +16,8 @@
 namespace nephos {
 namespace {
 
+constexpr double kFewSamples = 200;
+
 struct Stopped {};
 
 std::string name_of(const FitParameter& parameter) {
@@ -113,9 +115,13 @@ void write_results(const FitOptions& options, const FitResult& result, const std
     }
     for (const Direction& direction : result.directions)
         directions.push_back({{"weights", direction.weights}, {"strength", number(direction.strength)}});
-    const Json json = {{"format", "nephos fit"},   {"runs", result.runs},
-                       {"lost", result.lost},      {"implausibility", number(result.implausibility)},
-                       {"parameters", parameters}, {"targets", targets},
+    const Json json = {{"format", "nephos fit"},
+                       {"runs", result.runs},
+                       {"lost", result.lost},
+                       {"implausibility", number(result.implausibility)},
+                       {"effective_samples", number(result.effective_samples)},
+                       {"parameters", parameters},
+                       {"targets", targets},
                        {"directions", directions}};
     write_atomically(folder / "fit.json", json.dump(2) + "\n");
 }
@@ -178,6 +184,12 @@ std::string fit_text(const FitOptions& options, const FitResult& result) {
             "warning: the best point is {:.1f} standard deviations off a target: nothing in the prior meets "
             "them all\n",
             result.implausibility);
+    if (result.effective_samples < kFewSamples)
+        text += fmt::format(
+            "warning: the posterior rests on {:.0f} independent points: its quantiles are rough; give "
+            "narrower "
+            "priors, or leave out a parameter that the targets do not fix\n",
+            result.effective_samples);
     if (result.lost > 0)
         text +=
             fmt::format("warning: {} of {} runs had no mean (not steady, dead or failed) and told nothing\n",

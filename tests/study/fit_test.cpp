@@ -5,10 +5,15 @@
 #include "study/fit.h"
 
 #include <array>
+#include <bit>
 #include <cmath>
+#include <map>
 #include <random>
+#include <set>
 
 #include "study/emulator.h"
+#include "study/fit_folder.h"
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "core/error.h"
@@ -26,36 +31,79 @@ double null_cover(double act, double ext) {
 const FitParameter kExt{{"field.background.ext"}, 0.02, 0.3, Scale::log};
 const FitParameter kAct{{"field.background.act"}, 1e-4, 1e-2, Scale::log};
 
-// Cover and lifetime in steps, as a run gives them.
-Simulate toy(const FitProblem& problem, std::uint64_t seed, int* calls = nullptr) {
-    auto random = std::make_shared<std::mt19937_64>(seed);
-    return [=, &problem](int, const std::vector<std::vector<double>>& points) {
-        std::normal_distribution<double> noise(0, kNoise);
+// Cover and lifetime in steps, as a run gives them: the noise is a function of the point and the seed, so a point that is
+// run twice tells nothing new. `waves` takes the points of each wave.
+using Waves = std::map<int, std::vector<std::vector<double>>>;
+
+Simulate toy(const FitProblem& problem, std::uint64_t seed, Waves* waves = nullptr) {
+    return [=, &problem](int wave, const std::vector<std::vector<double>>& points) {
         std::vector<FitRun> runs;
         for (const std::vector<double>& unit : points) {
+            std::vector<std::uint32_t> words{std::uint32_t(seed)};
+            for (const double x : unit) {
+                const auto bits = std::bit_cast<std::uint64_t>(x);
+                words.insert(words.end(), {std::uint32_t(bits), std::uint32_t(bits >> 32)});
+            }
+            std::seed_seq mixed(words.begin(), words.end());
+            std::mt19937_64 random(mixed);
+            std::normal_distribution<double> noise(0, kNoise);
             const double ext = parameter_value(problem.parameters[0], unit[0]);
             const double act =
                 problem.parameters.size() > 1 ? parameter_value(problem.parameters[1], unit[1]) : 1e-3;
-            const double c = null_cover(act, ext), logit = std::log(c / (1 - c)) + noise(*random);
+            const double c = null_cover(act, ext), logit = std::log(c / (1 - c)) + noise(random);
             FitRun run{unit, {}, {}};
             for (const FitTarget& target : problem.targets) {
                 run.statistics.push_back(target.statistic == "cover" ? 1 / (1 + std::exp(-logit))
-                                                                     : std::exp(noise(*random)) * 10 / ext);
+                                                                     : std::exp(noise(random)) * 10 / ext);
                 run.errors.push_back(0);
             }
             runs.push_back(std::move(run));
-            if (calls) ++*calls;
         }
+        if (waves) (*waves)[wave] = points;
         return runs;
     };
+}
+
+// A target that excludes nothing keeps the whole prior in every wave: the waves must look at other points all the same.
+TEST(Fit, NoPointIsRunTwice) {
+    for (const double sd : {0.2, 0.01, 1e-4}) {
+        const FitProblem problem{{kExt, kAct}, {{"cover", 0.3, sd}}, 96, 0, 3};
+        Waves waves;
+        fit(problem, toy(problem, 4, &waves));
+        std::set<std::vector<double>> points;
+        std::size_t count = 0;
+        for (const auto& [wave, all] : waves) {
+            count += all.size();
+            points.insert(all.begin(), all.end());
+        }
+        EXPECT_EQ(waves.size(), 3u);
+        EXPECT_EQ(count, 96u) << sd;
+        EXPECT_EQ(points.size(), count) << sd;
+    }
+}
+
+// The box about a ridge holds mostly points beside it: none of them may be run once the ridge is known.
+TEST(Fit, LaterWavesLookOnlyWhereTheTargetsArePossible) {
+    const FitProblem problem{{kExt, kAct}, {{"cover", 0.3, 0.01}}, 96, 0, 1};
+    Waves waves;
+    fit(problem, toy(problem, 8, &waves));
+    for (const int wave : {2, 3}) {
+        EXPECT_EQ(waves[wave].size(), 24u);
+        for (const std::vector<double>& unit : waves[wave])
+            EXPECT_NEAR(null_cover(parameter_value(kAct, unit[1]), parameter_value(kExt, unit[0])), 0.3, 0.04)
+                << "3 sd of the target, and the emulator's error";
+    }
 }
 
 TEST(Fit, OneParameterIsFoundWithinHalfAPercentFrom64Runs) {
     const double truth = 0.05265;
     const FitProblem problem{{kExt}, {{"cover", null_cover(1e-3, truth), 1e-4}}, 64, 8, 1};
-    int calls = 0;
-    const FitResult result = fit(problem, toy(problem, 5, &calls));
-    EXPECT_EQ(calls, 64 + 8);
+    Waves waves;
+    const FitResult result = fit(problem, toy(problem, 5, &waves));
+    EXPECT_EQ(waves[1].size(), 32u);
+    EXPECT_EQ(waves[2].size(), 16u);
+    EXPECT_EQ(waves[3].size(), 16u);
+    EXPECT_EQ(waves[4].size(), 8u);
     EXPECT_EQ(result.runs, 64u);
     EXPECT_NEAR(result.parameters[0].mean, truth, 0.005 * truth);
     EXPECT_LT(result.parameters[0].sd, 0.005 * truth);
@@ -89,9 +137,12 @@ TEST(Fit, ARidgeIsFoundAndNamed) {
     const FitResult result = fit(problem, toy(problem, 7));
     EXPECT_GT(result.directions[0].strength, 1);
     EXPECT_LT(result.directions[1].strength, 0.01);
-    // Along the ridge log act rises with log ext: equal amounts, in units of ranges log(15) and log(100).
+    // Along the ridge log act rises with log ext, in units of ranges log(15) and log(100); how steeply is known at each point.
     const std::vector<double>& free = result.directions[1].weights;
-    EXPECT_NEAR(free[1] / free[0], std::log(15) / std::log(100), 0.1);
+    const double ext = result.best[0], act = result.best[1], h = 1e-4;
+    const double by_ext = null_cover(act, ext * (1 + h)) - null_cover(act, ext * (1 - h));
+    const double by_act = null_cover(act * (1 + h), ext) - null_cover(act * (1 - h), ext);
+    EXPECT_NEAR(free[1] / free[0], -by_ext / by_act * std::log(15) / std::log(100), 0.1);
     double low = 1, high = 0;
     for (const std::vector<double>& sample : result.posterior) {
         EXPECT_NEAR(null_cover(sample[1], sample[0]), 0.3, 0.05);
@@ -102,29 +153,88 @@ TEST(Fit, ARidgeIsFoundAndNamed) {
     EXPECT_GT(high, 0.2);
 }
 
-// 100 truths: the intervals of 90 % must hold about 90 of them, and the truth's rank among the samples be even.
-TEST(Fit, IntervalsHoldTheTruthAsOftenAsTheySay) {
-    std::mt19937_64 random(2);
+struct Coverage {
+    int inside = 0;
+    std::array<int, 5> ranks{};  // of the truth among the samples
+};
+
+// Fits of `truths` truths from `runs` runs; what is observed is off the truth by what the target's sd says.
+Coverage coverage(int truths, std::uint64_t runs, double relative_sd, std::uint64_t seed) {
+    std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(0.1, 0.9);
     std::normal_distribution<double> normal(0, 1);
-    int inside = 0;
-    std::array<int, 5> ranks{};
-    for (int n = 0; n < 100; ++n) {
+    Coverage found;
+    for (int n = 0; n < truths; ++n) {
         const double truth = parameter_value(kExt, uniform(random)), cover = null_cover(1e-3, truth);
-        // What is observed is off the truth by what the target's sd says.
-        const double sd = 0.02 * cover, seen = cover + sd * normal(random);
-        const FitProblem problem{{kExt}, {{"cover", seen, sd}}, 24, 0, 1};
-        const FitResult result = fit(problem, toy(problem, 100 + std::uint64_t(n)));
-        inside += truth > result.parameters[0].low && truth < result.parameters[0].high;
+        const double sd = relative_sd * cover, seen = cover + sd * normal(random);
+        const FitProblem problem{{kExt}, {{"cover", seen, sd}}, runs, 0, 1};
+        const FitResult result = fit(problem, toy(problem, 1000 * seed + std::uint64_t(n)));
+        found.inside += truth > result.parameters[0].low && truth < result.parameters[0].high;
         std::size_t below = 0;
         for (const std::vector<double>& sample : result.posterior) below += sample[0] < truth;
-        ++ranks[std::min<std::size_t>(4, below * 5 / result.posterior.size())];
+        ++found.ranks[std::min<std::size_t>(4, below * 5 / result.posterior.size())];
     }
-    EXPECT_GE(inside, 83);
-    EXPECT_LE(inside, 96);
-    double chi2 = 0;
-    for (const int count : ranks) chi2 += (count - 20.0) * (count - 20.0) / 20;
-    EXPECT_LT(chi2, 13.28) << "p = 0.01 at four degrees of freedom";
+    return found;
+}
+
+double chi_squared(const Coverage& found) {
+    double sum = 0, mean = 0;
+    for (const int count : found.ranks) mean += count / 5.0;
+    for (const int count : found.ranks) sum += (count - mean) * (count - mean) / mean;
+    return sum;
+}
+
+// 100 truths: the intervals of 90 % must hold about 90 of them, and the truth's rank among the samples be even; where the
+// target is what is uncertain, and where the runs are.
+TEST(Fit, IntervalsHoldTheTruthAsOftenAsTheySay) {
+    for (const double relative_sd : {0.02, 1e-5}) {
+        const Coverage found = coverage(100, 24, relative_sd, 2);
+        EXPECT_GE(found.inside, 83) << relative_sd;
+        EXPECT_LE(found.inside, 96) << relative_sd;
+        EXPECT_LT(chi_squared(found), 13.28) << relative_sd << ": p = 0.01 at four degrees of freedom";
+    }
+}
+
+// After three waves the runs stand within a few percent of the truth. A polynomial through them alone bends away beyond them:
+// there the posterior must have nothing.
+TEST(Fit, ThePosteriorEndsWhereTheRunsDo) {
+    for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+        const FitProblem problem{{kExt}, {{"cover", 0.3, 0.003}}, 32, 0, seed};
+        const FitResult result = fit(problem, toy(problem, seed));
+        // 0.003 of the cover are 1.5 % of the extinction, and the runs know it to 0.5 %.
+        EXPECT_LT(result.parameters[0].sd, 0.025 * result.parameters[0].mean) << seed;
+    }
+}
+
+// The figures of docs/research.md.
+TEST(Fit, CoverageOfManyTruths) {
+    if (std::getenv("NEPHOS_TEST_ALL") == nullptr) GTEST_SKIP() << "./test --all measures it";
+    for (const std::uint64_t runs : {24u, 64u}) {
+        for (const double relative_sd : {0.02, 0.002, 1e-5}) {
+            std::string line;
+            for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+                const Coverage found = coverage(100, runs, relative_sd, seed);
+                line += fmt::format(" {} ({:.1f})", found.inside, chi_squared(found));
+                EXPECT_GE(found.inside, 80);
+                EXPECT_LE(found.inside, 98);
+            }
+            std::puts(fmt::format("{} runs, sd {} of the target:{}", runs, relative_sd, line).c_str());
+        }
+    }
+}
+
+// A normal posterior over a box of some ten deviations: each point counts by its weight.
+TEST(Fit, TellsHowManyPointsThePosteriorRestsOn) {
+    const FitProblem problem{{kExt}, {{"cover", 0.3, 0.01}}, 32, 0, 1};
+    FitResult result = fit(problem, toy(problem, 9));
+    EXPECT_GT(result.effective_samples, 5000);
+    EXPECT_LT(result.effective_samples, 32768);
+    FitOptions options;
+    options.problem = problem;
+    EXPECT_EQ(fit_text(options, result).find("independent points"), std::string::npos);
+    result.effective_samples = 37.4;
+    EXPECT_NE(fit_text(options, result).find("warning: the posterior rests on 37 independent points"),
+              std::string::npos);
 }
 
 TEST(Fit, TargetsOutOfReachAreSaidSo) {
@@ -155,6 +265,27 @@ TEST(Emulator, GivesBackACubic) {
     EXPECT_NEAR(emulator.at(at).mean, 1 + 0.37 - 3 * 0.37 * 0.37 + 2 * 0.37 * 0.37 * 0.37, 1e-7);
     EXPECT_LT(emulator.noise(), 1e-6);
     EXPECT_THROW(Emulator(std::span(points).first(3), std::span(values).first(3), 1), Error);
+}
+
+// The same cubic within a thousandth of the cube: the terms are of the box of the points, so they stay apart.
+TEST(Emulator, IsAsExactInASmallBox) {
+    for (const double width : {1e-3, 1e-6}) {
+        const auto cubic = [&](double x) {
+            const double u = (x - 0.7) / width;
+            return 1 + u - 3 * u * u + 2 * u * u * u;
+        };
+        std::vector<double> points, values;
+        for (int n = 0; n < 30; ++n) {
+            points.push_back(0.7 + width * n / 29.0);
+            values.push_back(cubic(points.back()));
+        }
+        const Emulator emulator(points, values, 1);
+        for (const double u : {0.1, 0.37, 0.9}) {
+            const std::array<double, 1> at{0.7 + width * u};
+            EXPECT_NEAR(emulator.at(at).mean, cubic(at[0]), 1e-6) << width;
+        }
+        EXPECT_EQ(emulator.left_out().size(), 30u);
+    }
 }
 
 }  // namespace
