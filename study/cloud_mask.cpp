@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <png.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "density/vdb/mask_file.h"
 
@@ -54,7 +55,7 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
              fmt::format("has voxels of {} m itself: leave out the size of cells and levels", size));
     const std::vector<float> values = grid.to_dense();
     const Extent extent = grid.extent();
-    CloudMasks masks{{}, size, size, grid.placement().origin_m.z, options.boundaries};
+    CloudMasks masks{{}, size, size, grid.placement().origin_m.z, options.boundaries, 0};
     masks.snapshots.push_back(plane_of(extent, options.threshold.value_or(0), [&](int i, int j, int k) {
         return double(values[linear_index(extent, i, j, k)]);
     }));
@@ -80,7 +81,9 @@ CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions
                  fmt::format("has {} cells along an axis; at most {} can be read", size, kMaxExtent));
     const Extent extent{int(sizes[2]), int(sizes[1]), int(sizes[0])};
     const double size = cell_size(path, options);
-    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries};
+    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries, 0};
+    masks.missing =
+        std::uint64_t(std::ranges::count_if(data.values, [](double value) { return std::isnan(value); }));
     for (std::uint64_t time = 0; time < times; ++time)
         masks.snapshots.push_back(plane_of(extent, options.threshold.value_or(0), [&](int i, int j, int k) {
             return data.values[time * extent.cells() + linear_index(extent, i, j, k)];
@@ -91,19 +94,40 @@ CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions
 CloudMasks read_png_mask(const std::filesystem::path& path, const MaskOptions& options) {
     if (!options.variable.empty()) fail(ErrorCode::usage, path, "a picture has no variables");
     const double size = cell_size(path, options);
+    // Deflate makes at most 1,032 bytes of one, and a pixel has at least a bit: a header that claims more lies.
+    constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 30, kPixelsOfByte = 8 * 1040;
+    require_regular_file(path);
+    std::error_code error;
+    const std::uintmax_t size_of_file = std::filesystem::file_size(path, error);
+    if (error) fail(ErrorCode::io, path, error.message());
+    if (size_of_file > kMostPixels)
+        fail(ErrorCode::io, path,
+             fmt::format("has {} bytes; at most {} can be read", size_of_file, kMostPixels));
+    const std::string bytes = read_beginning(path, std::size_t(size_of_file));
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
-    if (png_image_begin_read_from_file(&image, path.c_str()) == 0) fail(ErrorCode::io, path, image.message);
+    if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
+        fail(ErrorCode::io, path, image.message);
     image.format = PNG_FORMAT_GRAY;
-    if (image.width > unsigned(kMaxExtent) || image.height > unsigned(kMaxExtent)) {
+    const std::uint64_t pixels_claimed = std::uint64_t(image.width) * image.height;
+    if (image.width > unsigned(kMaxExtent) || image.height > unsigned(kMaxExtent) ||
+        pixels_claimed > kMostPixels) {
         png_image_free(&image);
-        fail(ErrorCode::usage, path, fmt::format("has a side of more than {} pixels", kMaxExtent));
+        fail(ErrorCode::usage, path,
+             fmt::format("has {} x {} pixels; at most {} along a side and {} in all can be read", image.width,
+                         image.height, kMaxExtent, kMostPixels));
+    }
+    if (pixels_claimed > bytes.size() * kPixelsOfByte) {
+        png_image_free(&image);
+        fail(ErrorCode::io, path,
+             fmt::format("is damaged: its head claims {} x {} pixels, more than {} bytes can hold",
+                         image.width, image.height, bytes.size()));
     }
     const Extent extent{int(image.width), int(image.height), 1};
     std::vector<png_byte> pixels(extent.cells());
     if (png_image_finish_read(&image, nullptr, pixels.data(), png_int_32(image.width), nullptr) == 0)
         fail(ErrorCode::io, path, image.message);
-    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries};
+    CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries, 0};
     masks.snapshots.push_back(plane_of(
         extent, options.threshold.value_or(kGreyThreshold),
         [&](int i, int j, int) { return double(pixels[linear_index(extent, i, extent.y - 1 - j, 0)]); }));
@@ -164,6 +188,7 @@ CloudMasks read_masks(const std::vector<std::filesystem::path>& paths, const Mas
             one.cell_size_m != all.cell_size_m)
             fail(ErrorCode::usage, path,
                  "has another number of cells or another cell size than the masks before it");
+        all.missing += one.missing;
         std::ranges::move(one.snapshots, std::back_inserter(all.snapshots));
     }
     if (all.snapshots.empty()) throw Error(ErrorCode::usage, "no cloud mask is named");

@@ -6,8 +6,9 @@
 //
 //     .vdb    a float grid above the threshold, or a bool or mask grid; voxel size and heights are those of the file
 //     .nc     NetCDF classic (nccopy -k classic makes one of NetCDF-4): a variable over (time), (z,) y, x, the last
-//             fastest; z upwards, y north. Several times are several snapshots. Missing values (NaN, _FillValue) are clear
-//     .png    grey, seen from above, north up; one level
+//             fastest; z upwards, y north. Several times are several snapshots. Values are unpacked, and missing ones (NaN,
+//             _FillValue, missing_value, outside valid_range) are clear, and counted
+//     .png    grey, seen from above, north up; one level; at most 2^30 pixels
 
 #include <filesystem>
 #include <optional>
@@ -34,6 +35,7 @@ struct CloudMasks {
     std::vector<BitPlane> snapshots;                         // all of one extent, in the order of time
     double cell_size_m = 0, level_height_m = 0, base_m = 0;  // base_m: lower face of the lowest level
     Boundaries boundaries;
+    std::uint64_t missing = 0;  // values of all snapshots that are missing, and count as clear
 };
 
 // Reads the masks of one or several files, one after the other. Throws Error(usage) on options that contradict the file or

@@ -43,11 +43,14 @@ void write_netcdf(const std::filesystem::path& path, const std::vector<NetcdfDim
 struct NetcdfData {
     std::vector<std::string> dimensions;
     std::vector<std::uint64_t> sizes;
+    // Unpacked: times scale_factor plus add_offset. NaN: missing, that is _FillValue (or the usual one of the type where the
+    // file names none), one of missing_value, or outside valid_range, valid_min or valid_max.
     std::vector<double> values;
 };
 
 // Reads one variable: `name`, or the only one with two or more dimensions where it is empty. Throws Error(io) that says what
-// the file is instead (a NetCDF-4 file: `nccopy -k classic` converts it), or which variables it has.
+// the file is instead (a NetCDF-4 file: `nccopy -k classic` converts it), or which variables it has, or which of the
+// attributes above has no sense.
 NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& name);
 
 }  // namespace nephos

@@ -57,6 +57,7 @@ nlohmann::ordered_json json_of(const CloudMasks& masks, const MaskStatistics& fo
     return {{"snapshots", masks.snapshots.size()},
             {"cells", {extent.x, extent.y, extent.z}},
             {"cell_size_m", masks.cell_size_m},
+            {"missing_values", masks.missing},
             {"statistics", statistics},
             {"organisation", organisation(found.organisation)},
             {"organisation_random", organisation(found.random.mean)},
@@ -90,6 +91,10 @@ void print_table(const CloudMasks& masks, const MaskStatistics& found) {
 int stats(const StatsArguments& a) {
     const CloudMasks masks =
         read_masks(std::vector<std::filesystem::path>(a.files.begin(), a.files.end()), a.mask);
+    if (masks.missing > 0)
+        print_note(
+            fmt::format("{} of {} values are missing, and count as clear", human_count(masks.missing),
+                        human_count(masks.snapshots.size() * masks.snapshots.front().extent().cells())));
     const MaskStatistics found = mask_statistics(masks);
     if (a.work.json)
         Output().line(json_text(json_of(masks, found)));

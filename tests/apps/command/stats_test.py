@@ -3,7 +3,11 @@
 
 import json
 import math
+import os
+import resource
+import struct
 import unittest
+import zlib
 
 import numpy
 from PIL import Image
@@ -23,11 +27,14 @@ class Stats(Case):
     def stats(self, *arguments):
         return json.loads(self.call("stats", *arguments, "--json").stdout)
 
-    def netcdf(self, name, values, dimensions, variable="ql"):
+    def netcdf(self, name, values, dimensions, variable="ql", kind="f4", **attributes):
         with netcdf_file(self.folder / name, "w") as file:
             for dimension, size in zip(dimensions, values.shape):
                 file.createDimension(dimension, size)
-            file.createVariable(variable, "f4", dimensions)[:] = values
+            written = file.createVariable(variable, kind, dimensions)
+            written[:] = values
+            for attribute, value in attributes.items():
+                setattr(written, attribute, value)
         return name
 
     def check(self, found, masks, size, height):
@@ -67,6 +74,68 @@ class Stats(Case):
         text = self.call("stats", name, "--cell-size", "100").stdout
         self.assertIn("5 snapshots of 70 x 40 x 6 cells of 100 m", text)
         self.assertRegex(text, r"\niorg +\d")
+
+    def test_values_that_are_missing_are_no_cloud(self):
+        """Of 30 x 50 values every fifth is cloud, and 7 columns are missing, by each way to say so."""
+        mask = random_mask(5, (30, 50), 0.2)
+        gone = numpy.zeros((30, 50), dtype=bool)
+        gone[:, 11:18] = True
+        cover = (mask & ~gone).mean()
+        values = numpy.where(gone, 9e9, mask * 2e-5)
+        unwritten = numpy.where(gone, numpy.float32(9.96921e36), mask * 2e-5)
+        packed = numpy.where(gone, -32767, numpy.where(mask, 20, 0))
+        for number, (raw, kind, attributes) in enumerate((
+                (values, "f4", {"_FillValue": numpy.float32(9e9)}),
+                (values, "f4", {"missing_value": 9e9}),
+                (numpy.where(gone, numpy.where(numpy.arange(50) % 2, 7.0, 9e9), mask * 2e-5), "f4",
+                 {"missing_value": numpy.array([7.0, 9e9])}),
+                (values, "f4", {"valid_range": numpy.array([0, 1], dtype="f4")}),
+                (values, "f4", {"valid_max": numpy.float32(1)}),
+                (numpy.where(gone, -1, mask * -2e-5), "f4", {"valid_min": numpy.float32(-0.5), "scale_factor": numpy.float32(-1)}),
+                (unwritten, "f4", {}),
+                (packed, "i2", {"scale_factor": 1e-6}),
+                (numpy.where(gone, 99, packed), "i2", {"scale_factor": 1e-6, "_FillValue": numpy.int16(99)}),
+                # The range is of packed values where it has their type, and of unpacked ones where it has the type of the factor.
+                (numpy.where(gone, 99, packed), "i2", {"scale_factor": 1e-6, "valid_range": numpy.array([0, 50], dtype="i2")}),
+                (numpy.where(gone, 99, packed), "i2", {"scale_factor": 1e-6, "valid_range": numpy.array([0, 5e-5])}),
+                (numpy.where(gone, 99, packed + 5), "i2", {"scale_factor": 1e-6, "add_offset": -5e-6,
+                                                           "missing_value": numpy.int16(99)}))):
+            with self.subTest(kind=kind, **attributes):
+                name = self.netcdf(f"{number}.nc", raw, ("y", "x"), kind=kind, **attributes)
+                result = self.call("stats", name, "--cell-size", "50", "--threshold", "1e-5", "--json")
+                found = json.loads(result.stdout)
+                self.assertAlmostEqual(found["statistics"]["cover"]["mean"], cover, places=9)
+                self.assertEqual(found["missing_values"], 210)
+                self.assertIn("210 of 1500 values are missing", result.stderr.replace(",", ""))
+        for attributes, says in (({"valid_range": numpy.array([0.0])}, "valid_range of the variable ql has 1 values: expected 2"),
+                                 ({"valid_range": numpy.array([2.0, 1.0])}, "valid_range of the variable ql is empty"),
+                                 ({"scale_factor": "two"}, "scale_factor of the variable ql is a text: expected a number"),
+                                 ({"scale_factor": math.nan}, "scale_factor of the variable ql is not finite")):
+            name = self.netcdf("bad.nc", values, ("y", "x"), **attributes)
+            self.refused(3, "stats", name, "--cell-size", "50", says=says)
+
+    def test_pictures_whose_head_lies_cost_nothing(self):
+        def png(width, height, depth, data):
+            def piece(kind, content):
+                return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+            return (b"\x89PNG\r\n\x1a\n" + piece(b"IHDR", struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)) +
+                    piece(b"IDAT", data) + piece(b"IEND", b""))
+        limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
+        for width, height, status, says in ((65536, 65536, 2, "at most 65536 along a side and 1073741824 in all"),
+                                            (32768, 32768, 3, "its head claims 32768 x 32768 pixels, more than"),
+                                            (70000, 1, 2, "70000 x 1 pixels; at most")):
+            (self.folder / "small.png").write_bytes(png(width, height, 8, zlib.compress(b"\0" * 100)))
+            self.assertLess((self.folder / "small.png").stat().st_size, 100)
+            self.refused(status, "stats", "small.png", "--cell-size", "5", preexec_fn=limit, says=says)
+        # What is packed as tightly as deflate can is read.
+        (self.folder / "clear.png").write_bytes(png(8000, 8000, 1, zlib.compress(b"\0" * (1001 * 8000), 9)))
+        self.assertEqual(self.stats("clear.png", "--cell-size", "5")["statistics"]["cover"]["mean"], 0)
+
+    def test_pipes_are_refused(self):
+        for name in ("pipe.png", "pipe.nc", "pipe.vdb"):
+            os.mkfifo(self.folder / name)
+            self.refused(3, "stats", name, *(() if name.endswith("vdb") else ("--cell-size", "5")),
+                         says="is not a regular file")
 
     def test_several_files_are_snapshots(self):
         masks = random_mask(2, (3, 1, 30, 50), 0.2)

@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The reader of NetCDF classic files.
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include "study/netcdf_file.h"
+#include <fmt/format.h>
+
+#include "core/descriptor.h"
+#include "core/error.h"
+
+namespace nephos {
+namespace {
+
+// Types of values that are asked for by name.
+constexpr std::uint32_t kCharacters = 2, kFloats = 5, kDoubles = 6;
+
+// A cursor over a file's bytes, big-endian.
+class Reader {
+  public:
+    Reader(const std::filesystem::path& path, std::string bytes) : path_(path), bytes_(std::move(bytes)) {
+        if (bytes_.starts_with("\x89HDF"))
+            throw Error(ErrorCode::io, path_.string() +
+                                           ": is a NetCDF-4 (HDF5) file: expected a classic one, which "
+                                           "`nccopy -k 64-bit-offset IN OUT` makes of it");
+        if (bytes_.size() < 4 || !bytes_.starts_with("CDF") ||
+            (bytes_[3] != 1 && bytes_[3] != 2 && bytes_[3] != 5))
+            throw Error(ErrorCode::io, path_.string() + ": is not a NetCDF classic file");
+        version_ = bytes_[3];
+        at_ = 4;
+    }
+    template <typename T>
+    T get(std::uint64_t at) const {
+        if (at > bytes_.size() || bytes_.size() - at < sizeof(T))
+            throw Error(ErrorCode::io, path_.string() + ": ends early");
+        char raw[sizeof(T)];
+        std::memcpy(raw, bytes_.data() + at, sizeof(T));
+        std::reverse(std::begin(raw), std::end(raw));
+        T value;
+        std::memcpy(&value, raw, sizeof(T));
+        return value;
+    }
+    template <typename T>
+    T next() {
+        const T value = get<T>(at_);
+        at_ += sizeof(T);
+        return value;
+    }
+    std::uint64_t count() { return version_ == 5 ? next<std::uint64_t>() : next<std::uint32_t>(); }
+    std::uint64_t offset() { return version_ == 1 ? next<std::uint32_t>() : next<std::uint64_t>(); }
+    std::string name() {
+        const std::uint64_t size = count();
+        if (size > bytes_.size() - at_) throw Error(ErrorCode::io, path_.string() + ": ends early");
+        const std::string text = bytes_.substr(at_, size);
+        skip(size);
+        return text;
+    }
+    void skip(std::uint64_t bytes) {
+        const std::uint64_t padded = (bytes + 3) / 4 * 4;
+        if (bytes > bytes_.size() || padded > bytes_.size() - at_)
+            throw Error(ErrorCode::io, path_.string() + ": ends early");
+        at_ += padded;
+    }
+    std::uint64_t size() const { return bytes_.size(); }
+    std::uint64_t at() const { return at_; }
+
+  private:
+    std::filesystem::path path_;
+    std::string bytes_;
+    int version_ = 1;
+    std::uint64_t at_ = 0;
+};
+
+std::uint64_t size_of_type(std::uint32_t type, const std::filesystem::path& path) {
+    constexpr std::uint64_t kSizes[] = {0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};
+    if (type < 1 || type > 11)
+        throw Error(ErrorCode::io, path.string() + ": has a type of values that is not known");
+    return kSizes[type];
+}
+
+double value_at(const Reader& reader, std::uint64_t at, std::uint32_t type) {
+    switch (type) {
+        case 1:
+            return reader.get<std::int8_t>(at);
+        case 2:
+        case 7:
+            return reader.get<std::uint8_t>(at);
+        case 3:
+            return reader.get<std::int16_t>(at);
+        case 4:
+            return reader.get<std::int32_t>(at);
+        case 5:
+            return double(reader.get<float>(at));
+        case 6:
+            return reader.get<double>(at);
+        case 8:
+            return reader.get<std::uint16_t>(at);
+        case 9:
+            return reader.get<std::uint32_t>(at);
+        case 10:
+            return double(reader.get<std::int64_t>(at));
+        default:
+            return double(reader.get<std::uint64_t>(at));
+    }
+}
+
+// The values of an attribute as numbers; none of a text.
+struct Attribute {
+    std::uint32_t type = 0;
+    std::vector<double> values;
+};
+using Attributes = std::map<std::string, Attribute>;
+
+Attributes read_attributes(Reader& reader, const std::filesystem::path& path) {
+    Attributes attributes;
+    reader.next<std::uint32_t>();
+    for (std::uint64_t left = reader.count(); left > 0; --left) {
+        const std::string name = reader.name();
+        Attribute& attribute = attributes[name];
+        attribute.type = reader.next<std::uint32_t>();
+        const std::uint64_t count = reader.count(), bytes = size_of_type(attribute.type, path);
+        if (count > reader.size()) throw Error(ErrorCode::io, path.string() + ": ends early");
+        const std::uint64_t begin = reader.at();
+        reader.skip(count * bytes);
+        if (attribute.type == kCharacters) continue;
+        for (std::uint64_t n = 0; n < count; ++n)
+            attribute.values.push_back(value_at(reader, begin + n * bytes, attribute.type));
+    }
+    return attributes;
+}
+
+struct FoundVariable {
+    std::string name;
+    std::vector<std::uint64_t> dimensions;
+    std::uint32_t type = 0;
+    std::uint64_t begin = 0, bytes = 0;
+    Attributes attributes;
+};
+
+// The value that libnetcdf puts where nothing was written; types of one byte have none.
+std::optional<double> default_fill(std::uint32_t type) {
+    switch (type) {
+        case 3:
+            return -32767;
+        case 4:
+            return -2147483647;
+        case kFloats:
+        case kDoubles:
+            return 9.9692099683868690e+36;
+        case 8:
+            return 65535;
+        case 9:
+            return 4294967295;
+        case 10:
+            return -9223372036854775806.0;
+        case 11:
+            return 18446744073709551614.0;
+        default:
+            return {};
+    }
+}
+
+// What the attributes of a variable say of its values (NetCDF Users Guide, "Attribute Conventions"): which are missing, and
+// how the others were packed into small whole numbers: value = packed scale_factor + add_offset.
+class Packing {
+  public:
+    Packing(const FoundVariable& variable, const std::filesystem::path& path)
+        : variable_(variable), path_(path) {
+        if (const Attribute* fill = find("_FillValue", 1)) {
+            missing_.push_back(fill->values.front());
+        } else if (const std::optional<double> usual = default_fill(variable.type)) {
+            missing_.push_back(*usual);
+        }
+        if (const Attribute* missing = find("missing_value", 0))
+            missing_.insert(missing_.end(), missing->values.begin(), missing->values.end());
+        // As the variable holds them.
+        if (variable.type == kFloats)
+            for (double& value : missing_) value = double(float(value));
+        std::uint32_t unpacked_type = 0;
+        for (const auto& [name, to] :
+             {std::pair("scale_factor", &scale_), std::pair("add_offset", &offset_)}) {
+            const Attribute* number = find(name, 1);
+            if (number == nullptr) continue;
+            *to = number->values.front();
+            if (!std::isfinite(*to)) fail(name, "is not finite");
+            unpacked_type = std::max(unpacked_type, number->type);
+        }
+        range(unpacked_type);
+    }
+
+    // NaN where the value is missing, or outside the valid range.
+    double operator()(double packed) const {
+        if (std::ranges::count(missing_, packed) > 0) return std::nan("");
+        const double value = packed * scale_ + offset_, checked = range_is_unpacked_ ? value : packed;
+        return checked >= low_ && checked <= high_ ? value : std::nan("");
+    }
+
+  private:
+    [[noreturn]] void fail(const std::string& attribute, const std::string& message) const {
+        throw Error(ErrorCode::io, fmt::format("{}: the attribute {} of the variable {} {}", path_.string(),
+                                               attribute, variable_.name, message));
+    }
+
+    // An attribute with that many numbers, with any number of them if `count` is 0.
+    const Attribute* find(const std::string& name, std::size_t count) const {
+        const auto found = variable_.attributes.find(name);
+        if (found == variable_.attributes.end()) return nullptr;
+        const Attribute& attribute = found->second;
+        // The fill of characters is a character: it says nothing of numbers.
+        if (attribute.type == kCharacters && variable_.type == kCharacters) return nullptr;
+        if (attribute.type == kCharacters) fail(name, "is a text: expected a number");
+        if (count > 0 && attribute.values.size() != count)
+            fail(name, fmt::format("has {} values: expected {}", attribute.values.size(), count));
+        return &attribute;
+    }
+
+    // The range is of packed values, unless it has the type of the unpacked ones and that is the wider, or is of real numbers
+    // where the packed ones are whole.
+    void range(std::uint32_t unpacked_type) {
+        const auto is_unpacked = [&](const Attribute& attribute) {
+            const auto is_real = [](std::uint32_t type) { return type == kFloats || type == kDoubles; };
+            if (unpacked_type == 0) return false;
+            return (is_real(attribute.type) && !is_real(variable_.type)) ||
+                   (attribute.type == unpacked_type &&
+                    size_of_type(unpacked_type, path_) > size_of_type(variable_.type, path_));
+        };
+        if (const Attribute* both = find("valid_range", 2)) {
+            low_ = both->values[0];
+            high_ = both->values[1];
+            range_is_unpacked_ = is_unpacked(*both);
+            if (!(low_ <= high_)) fail("valid_range", fmt::format("is empty: {} to {}", low_, high_));
+            return;
+        }
+        if (const Attribute* least = find("valid_min", 1)) {
+            low_ = least->values.front();
+            range_is_unpacked_ = is_unpacked(*least);
+        }
+        if (const Attribute* most = find("valid_max", 1)) {
+            high_ = most->values.front();
+            range_is_unpacked_ = is_unpacked(*most);
+        }
+    }
+
+    const FoundVariable& variable_;
+    const std::filesystem::path& path_;
+    std::vector<double> missing_;  // packed
+    double scale_ = 1, offset_ = 0;
+    double low_ = -std::numeric_limits<double>::infinity(), high_ = std::numeric_limits<double>::infinity();
+    bool range_is_unpacked_ = false;
+};
+
+}  // namespace
+
+NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& name) {
+    constexpr std::size_t kLargestFile = std::size_t(1) << 32;
+    std::error_code error;
+    const std::uintmax_t file_bytes = std::filesystem::file_size(path, error);
+    if (!error && file_bytes > kLargestFile)
+        throw Error(ErrorCode::io, path.string() + ": is larger than 4 GiB");
+    Reader reader(path, read_beginning(path, error ? 4096 : std::size_t(file_bytes)));
+    const std::uint64_t records = reader.count();
+    std::vector<NetcdfDimension> dimensions;
+    reader.next<std::uint32_t>();
+    for (std::uint64_t left = reader.count(); left > 0; --left) {
+        std::string dimension = reader.name();
+        dimensions.push_back({std::move(dimension), reader.count()});
+    }
+    read_attributes(reader, path);
+    reader.next<std::uint32_t>();
+    std::vector<FoundVariable> variables;
+    std::uint64_t record_bytes = 0, record_variables = 0;
+    for (std::uint64_t left = reader.count(); left > 0; --left) {
+        FoundVariable& variable = variables.emplace_back();
+        variable.name = reader.name();
+        for (std::uint64_t rank = reader.count(); rank > 0; --rank) {
+            variable.dimensions.push_back(reader.count());
+            if (variable.dimensions.back() >= dimensions.size())
+                throw Error(ErrorCode::io, path.string() + ": is damaged");
+        }
+        variable.attributes = read_attributes(reader, path);
+        variable.type = reader.next<std::uint32_t>();
+        variable.bytes = reader.count();
+        variable.begin = reader.offset();
+        if (!variable.dimensions.empty() && dimensions[variable.dimensions[0]].size == 0) {
+            record_bytes += variable.bytes;
+            ++record_variables;
+        }
+    }
+    std::vector<std::string> names;
+    const FoundVariable* found = nullptr;
+    for (const FoundVariable& variable : variables) {
+        if (variable.dimensions.size() >= 2) names.push_back(variable.name);
+        if (name.empty() ? variable.dimensions.size() >= 2 && names.size() == 1 : variable.name == name)
+            found = &variable;
+    }
+    if (found == nullptr || (name.empty() && names.size() > 1))
+        throw Error(
+            ErrorCode::io,
+            fmt::format("{}: name one of its variables with two or more dimensions, as in {}#NAME: {}",
+                        path.string(), path.filename().string(), fmt::join(names, ", ")));
+    if (found->dimensions.empty())
+        throw Error(ErrorCode::io, fmt::format("{}: the variable {} is a single number without dimensions",
+                                               path.string(), found->name));
+    NetcdfData data;
+    std::uint64_t count = 1, in_record = 1;
+    for (std::size_t n = 0; n < found->dimensions.size(); ++n) {
+        const NetcdfDimension& dimension = dimensions[found->dimensions[n]];
+        const std::uint64_t size = dimension.size == 0 ? records : dimension.size;
+        data.dimensions.push_back(dimension.name);
+        data.sizes.push_back(size);
+        if (size == 0 || count > reader.size() / size)
+            throw Error(ErrorCode::io, path.string() + ": is damaged or empty");
+        count *= size;
+        if (n > 0) in_record *= size;
+    }
+    const bool is_record = dimensions[found->dimensions[0]].size == 0;
+    const std::uint64_t bytes = size_of_type(found->type, path);
+    // Records of a file's only record variable follow each other without padding (NetCDF classic format, note on vsize).
+    if (record_variables == 1) record_bytes = in_record * bytes;
+    const Packing packing(*found, path);
+    data.values.reserve(count);
+    for (std::uint64_t n = 0; n < count; ++n) {
+        const std::uint64_t at = is_record
+                                     ? found->begin + n / in_record * record_bytes + n % in_record * bytes
+                                     : found->begin + n * bytes;
+        data.values.push_back(packing(value_at(reader, at, found->type)));
+    }
+    return data;
+}
+
+}  // namespace nephos
