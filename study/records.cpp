@@ -120,6 +120,30 @@ void append(const std::filesystem::path& path, const Descriptor& file, std::span
     size += content.size();
 }
 
+std::vector<std::filesystem::path> files_of_shards(const std::filesystem::path& folder) {
+    std::vector<std::filesystem::path> files;
+    std::error_code error;
+    std::filesystem::directory_iterator at(folder / "shards", error), end;
+    if (error == std::errc::no_such_file_or_directory) return files;
+    for (; !error && at != end; at.increment(error))
+        if (at->path().extension() == ".jsonl") files.push_back(at->path());
+    if (error) throw Error(ErrorCode::io, (folder / "shards").string() + ": cannot read: " + error.message());
+    std::ranges::sort(files);
+    return files;
+}
+
+std::filesystem::path shard_path(const std::filesystem::path& folder, std::uint32_t number,
+                                 std::uint32_t of) {
+    return folder / "shards" / fmt::format("{:04}-of-{:04}.jsonl", number, of);
+}
+
+void lock(const std::filesystem::path& path, const Descriptor& file) {
+    if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        throw Error(ErrorCode::io, path.string() +
+                                       ": another sweep is writing this shard: wait for its end, or choose "
+                                       "another --out or --shard");
+}
+
 }  // namespace
 
 std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset) {
@@ -156,17 +180,22 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     std::ifstream stream(path, std::ios::binary);
     const auto shard = std::uint32_t(files_.size());
     files_.push_back(std::filesystem::path(path).replace_extension(".series"));
-    std::uint64_t bytes = 0, values = 0;
+    // Series are written before the records that name them: fewer are damage, and not to be filled with zeros.
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(files_.back(), error);
+    const std::uint64_t stored = error ? 0 : size / sizeof(float);
+    std::uint64_t at = 0, bytes = 0, values = 0;
+    std::string problem;
+    const auto note = [&](std::uint64_t place, std::string_view message) {
+        if (problem.empty())
+            problem = fmt::format("{}: the record at byte {} {}", path.string(), place, message);
+    };
     bool torn = false;
-    for (std::string line; std::getline(stream, line);) {
-        if (torn)
-            throw Error(ErrorCode::io,
-                        fmt::format("{}: the record at byte {} is damaged, but others follow it",
-                                    path.string(), bytes));
-        if (stream.eof() || !is_whole(line)) {
-            torn = true;
-            continue;
-        }
+    for (std::string line; std::getline(stream, line); at += line.size() + 1) {
+        if (torn) note(bytes, "is damaged, but others follow it");
+        torn = stream.eof() || !is_whole(line);
+        if (torn) continue;
+        bytes = at + line.size() + 1;
         try {
             const Json json = Json::parse(line);
             if (json.at("statistics_version") != NEPHOS_STATISTICS_VERSION ||
@@ -177,11 +206,19 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
                                 "choose another --out, or give --overwrite");
             RunRecord record = record_of(json);
             record.shard = shard;
-            if (record.result.steps > kMaxSteps || record.series_offset > kMostValues)
-                throw Error(ErrorCode::io, fmt::format("{}: the record at byte {} has impossible numbers",
-                                                       path.string(), bytes));
-            if (!record.failed)
-                values = std::max(values, record.series_offset + kSeries.size() * (record.result.steps + 1));
+            if (record.result.steps > kMaxSteps || record.series_offset > kMostValues) {
+                note(at, "has impossible numbers");
+                continue;
+            }
+            if (!record.failed) {
+                const std::uint64_t end = record.series_offset + kSeries.size() * (record.result.steps + 1);
+                if (end > stored) {
+                    note(at, fmt::format("names {} values of {}, which has fewer: {}", end,
+                                         files_.back().filename().string(), stored));
+                    continue;
+                }
+                values = std::max(values, end);
+            }
             const auto known = runs_.find(record.id);
             if (known == runs_.end()) {
                 runs_.emplace(record.id, std::move(record));
@@ -189,20 +226,11 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
                 known->second = std::move(record);
             }
         } catch (const nlohmann::json::exception&) {
-            throw Error(ErrorCode::io,
-                        fmt::format("{}: the record at byte {} is not of a run", path.string(), bytes));
+            note(at, "is not of a run");
         }
-        bytes += line.size() + 1;
     }
     check_reading(stream, path);
-    if (values == 0) return {bytes, values};
-    // Series are written before the records that name them: fewer are damage, and not to be filled with zeros.
-    std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(files_.back(), error);
-    if (error) throw Error(ErrorCode::io, files_.back().string() + ": " + error.message());
-    if (size < values * sizeof(float))
-        throw Error(ErrorCode::io, fmt::format("{}: has {} bytes, fewer than the {} that the records name",
-                                               files_.back().string(), size, values * sizeof(float)));
+    if (!problem.empty()) problems_.push_back(problem);
     return {bytes, values};
 }
 
@@ -210,12 +238,19 @@ Records Records::read(const std::vector<std::filesystem::path>& folders) {
     Records records;
     for (const std::filesystem::path& folder : folders) {
         std::vector<std::filesystem::path> files;
-        std::error_code error;
-        for (std::filesystem::directory_iterator at(folder / "shards", error), end; !error && at != end;
-             at.increment(error))
-            if (at->path().extension() == ".jsonl") files.push_back(at->path());
-        std::ranges::sort(files);
-        for (const std::filesystem::path& file : files) records.read_shard(file);
+        try {
+            files = files_of_shards(folder);
+        } catch (const Error& problem) {
+            records.problems_.emplace_back(problem.what());
+        }
+        for (const std::filesystem::path& file : files) {
+            try {
+                records.read_shard(file);
+            } catch (const Error& problem) {
+                if (problem.code() != ErrorCode::io) throw;
+                records.problems_.emplace_back(problem.what());
+            }
+        }
     }
     return records;
 }
@@ -244,12 +279,31 @@ std::vector<float> Records::series(const RunRecord& record) const {
     return values;
 }
 
+void remove_shards(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of) {
+    std::vector<std::filesystem::path> files = files_of_shards(folder);
+    if (of > 1)
+        std::erase_if(files, [&](const auto& path) { return path != shard_path(folder, number, of); });
+    std::vector<Descriptor> locks;
+    for (const std::filesystem::path& path : files) {
+        locks.push_back(open_regular_file(path, O_RDONLY));
+        lock(path, locks.back());
+    }
+    for (const std::filesystem::path& path : files) {
+        for (const std::filesystem::path& file :
+             {path, std::filesystem::path(path).replace_extension(".series")}) {
+            std::error_code error;
+            std::filesystem::remove(file, error);
+            if (error) throw Error(ErrorCode::io, file.string() + ": cannot remove: " + error.message());
+        }
+    }
+}
+
 struct Shard::Files {
     Descriptor records, series;
 };
 
 Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of)
-    : path_(folder / "shards" / fmt::format("{:04}-of-{:04}.jsonl", number, of)),
+    : path_(shard_path(folder, number, of)),
       series_path_(std::filesystem::path(path_).replace_extension(".series")),
       files_(std::make_unique<Files>()),
       flushed_(std::chrono::steady_clock::now()) {
@@ -260,11 +314,12 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
                     path_.parent_path().string() + ": cannot make the folder: " + error.message());
     files_->records = open_regular_file(path_, O_WRONLY | O_APPEND | O_CREAT);
     files_->series = open_regular_file(series_path_, O_WRONLY | O_APPEND | O_CREAT);
-    if (::flock(files_->records.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-        throw Error(ErrorCode::io, path_.string() +
-                                       ": another sweep is writing this shard: wait for its end, or choose "
-                                       "another --out or --shard");
-    const auto [bytes, values] = Records().read_shard(path_);
+    lock(path_, files_->records);
+    Records records;
+    const auto [bytes, values] = records.read_shard(path_);
+    if (!records.problems().empty())
+        throw Error(ErrorCode::io,
+                    records.problems().front() + "; --overwrite computes the runs of this shard again");
     bytes_ = bytes;
     values_ = values * sizeof(float);
     if (::ftruncate(files_->records.get(), off_t(bytes_)) != 0) fail(path_, errno);
@@ -296,6 +351,10 @@ void Shard::flush_if_due() {
 }
 
 void Shard::flush() {
+    for (const auto& [file, path] :
+         {std::pair(&files_->records, &path_), std::pair(&files_->series, &series_path_)})
+        if (!is_same_file(file->get(), *path))
+            throw Error(ErrorCode::io, path->string() + ": was removed or replaced while the sweep wrote it");
     if (lines_.empty()) return;
     const std::string lines = std::exchange(lines_, {});
     const std::vector<float> series = std::exchange(series_, {});

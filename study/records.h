@@ -40,9 +40,12 @@ std::string failure_line(const PlannedRun& run, std::string_view message);
 // All records of some shards, the last of each run; failed ones where there is no other.
 class Records {
   public:
-    // Reads every shard of the folders. Throws Error(io) when a file cannot be read, or a record before the last one
-    // is damaged; Error(usage) when records are of another version of the statistics or of the random stream.
+    // Reads every shard of the folders. What cannot be read, or is damaged, is left out, and stands in problems(). Throws
+    // Error(usage) when records are of another version of the statistics or of the random stream.
     static Records read(const std::vector<std::filesystem::path>& folders);
+
+    // "PATH: what is wrong", one a file; the torn last record of a shard is no problem.
+    const std::vector<std::string>& problems() const { return problems_; }
 
     const RunRecord* find(const std::string& id) const;
     std::size_t size() const { return runs_.size(); }
@@ -51,18 +54,24 @@ class Records {
 
   private:
     friend class Shard;
-    // Reads a shard, and gives back the bytes of its whole records and the values of series that they refer to.
+    // Reads a shard, and gives back the bytes of its records and the values of series that they refer to. Throws Error(io)
+    // when it cannot be opened.
     std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path);
 
     std::map<std::string, RunRecord, std::less<>> runs_;
+    std::vector<std::string> problems_;
     std::vector<std::filesystem::path> files_;  // of series, by RunRecord::shard
 };
+
+// Removes the shards of a folder, or only the one of a number where `of` is above 1. Throws Error(io), also when another
+// process writes one of them; then none is removed.
+void remove_shards(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of);
 
 // A shard while its process appends to it.
 class Shard {
   public:
     // Opens or creates the shard and takes away what is left of a torn record. Throws Error(io), also when another
-    // process holds it.
+    // process holds it, and when records before the last one are damaged.
     Shard(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of);
     ~Shard();
     Shard(const Shard&) = delete;
@@ -72,7 +81,7 @@ class Shard {
     void add(const PlannedRun& run, const RunResult& result);
     void add_failure(const PlannedRun& run, std::string_view message);
     // Writes what was kept; when it returns, it is on the device. On a full disk throws Error(io), and what is on disk is
-    // whole.
+    // whole; also when the file was removed or replaced, for then what is written is in no folder.
     void flush();
 
   private:

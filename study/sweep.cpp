@@ -91,6 +91,7 @@ SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records&
     report.progress.before = report.progress.done;
     report.complete = report.progress.done == report.progress.in_all;
     report.unused = records.size() - known;
+    report.problems = records.problems();
     return report;
 }
 
@@ -109,14 +110,9 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<void(const SweepProgress&)>& progress,
                       const std::function<bool()>& stop) {
     const Clock::time_point begin = Clock::now();
-    if (job.overwrite) {
-        std::error_code error;
-        std::filesystem::remove_all(job.folder / "shards", error);
-        if (error)
-            throw Error(ErrorCode::io,
-                        (job.folder / "shards").string() + ": cannot remove: " + error.message());
-    }
-    const Records records = Records::read({job.folder});
+    if (job.overwrite) remove_shards(job.folder, job.shard, job.shards);
+    // Whoever overwrites does not ask what other shards have done: they may be of another version.
+    const Records records = job.overwrite ? Records() : Records::read({job.folder});
     SweepReport report = status_of(plan, job, records);
     SweepProgress& count = report.progress;
     const auto is_wanted = [&](const PlannedRun& run) {

@@ -28,7 +28,7 @@ struct SweepJob {
     std::uint32_t shard = 0, shards = 1;  // this process takes the runs whose id modulo `shards` is `shard`
     bool retry_failed = false;
     bool fail_fast = false;  // end at the first failure
-    bool overwrite = false;  // throw the records of other plans away
+    bool overwrite = false;  // throw the records away, of a shard only its own, and compute all runs again
 };
 
 struct SweepProgress {
@@ -42,6 +42,7 @@ struct SweepReport {
     std::uint64_t unused = 0;  // records in the folder that are of no run of this plan
     double wall_s = 0;
     std::vector<std::string> failures;  // "point 3, replicate 1: message", at most five
+    std::vector<std::string> problems;  // of shards that could not be read as a whole (Records::problems)
 };
 
 // Writes the plan and the scene, as run_sweep() does, and runs nothing. Throws Error(io).
@@ -51,7 +52,8 @@ void write_plan(const SweepPlan& plan, const std::filesystem::path& folder);
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job);
 
 // Runs what is missing. Writes the plan, the scene and the shard; not the tables. Throws Error(io) on a full disk: what is on
-// disk is whole; Error(usage) when the folder's records are of another version. Precondition: the process has one thread.
+// disk is whole; also when the folder is removed meanwhile; Error(usage) when the folder's records are of another version.
+// Precondition: the process has one thread.
 SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<void(const SweepProgress&)>& progress,
                       const std::function<bool()>& stop);

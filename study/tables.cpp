@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
+#include <set>
 
 #include "study/netcdf_file.h"
 #include "study/student.h"
@@ -11,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/random.h"
 #include "scenes/format/writer.h"
@@ -341,6 +344,23 @@ PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint6
         to.errors_differ = results.size() >= 3 && larger > kErrorsDiffer * smaller;
     }
     return summary;
+}
+
+std::uint64_t runs_lost(const SweepPlan& plan, const Records& records, const std::filesystem::path& folder) {
+    const std::filesystem::path path = folder / "runs.csv";
+    if (!std::filesystem::exists(path)) return 0;
+    require_regular_file(path);
+    std::ifstream table(path);
+    std::set<std::string, std::less<>> ids;
+    for (std::string line; std::getline(table, line);) {
+        const std::string_view id = std::string_view(line).substr(0, line.find(','));
+        const RunRecord* record = records.find(std::string(id));
+        if (line.find(",done,") != line.npos && (record == nullptr || record->failed)) ids.emplace(id);
+    }
+    check_reading(table, path);
+    std::uint64_t lost = 0;
+    for (std::uint64_t n = 0; !ids.empty() && n < plan.runs(); ++n) lost += ids.contains(plan.run(n).id);
+    return lost;
 }
 
 std::uint64_t write_tables(const SweepPlan& plan, const Records& records,

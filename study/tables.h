@@ -34,6 +34,10 @@ struct PointSummary {
 // Returns the summary of a point. Of a point with a run that is missing, failed or not steady nothing is averaged.
 PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint64_t point);
 
+// Returns how many runs of the plan DIR/runs.csv has that are in no record: what writing the tables again would lose.
+// Throws Error(io) when the file is there and cannot be read.
+std::uint64_t runs_lost(const SweepPlan& plan, const Records& records, const std::filesystem::path& folder);
+
 // Writes DIR/runs.csv, points.csv, failures.csv, series.nc and manifest.json, each atomically. Returns how many runs of
 // the plan have no record. Throws Error(io).
 std::uint64_t write_tables(const SweepPlan& plan, const Records& records,

@@ -54,10 +54,14 @@ struct Worker {
 
 // The life of a worker; it ends when its parent does.
 [[noreturn]] void serve(int fd, const Task& task) {
-    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-    // Ctrl-C goes to the whole group; the parent decides what is kept.
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    // Ctrl-C goes to the whole group, and the SIGTERM of a batch system to every process of a job, in any order. The parent
+    // decides what is kept: a worker that ended before it had heard would count as a failed run.
     ::signal(SIGINT, SIG_IGN);
-    ::signal(SIGTERM, SIG_DFL);
+    ::signal(SIGTERM, SIG_IGN);
+    sigset_t none;
+    sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
     Head head;
     while (read_all(fd, &head, sizeof head)) {
         std::string result;
@@ -83,7 +87,14 @@ Worker start(const Task& task, const std::vector<Worker>& others) {
     Worker worker;
     worker.socket.reset(ends[0]);
     const Descriptor other(ends[1]);
+    // What comes before the worker ignores it waits, and is dropped then.
+    sigset_t ends_us, before;
+    sigemptyset(&ends_us);
+    sigaddset(&ends_us, SIGINT);
+    sigaddset(&ends_us, SIGTERM);
+    ::sigprocmask(SIG_BLOCK, &ends_us, &before);
     worker.process = ::fork();
+    if (worker.process != 0) ::sigprocmask(SIG_SETMASK, &before, nullptr);
     if (worker.process < 0)
         throw Error(ErrorCode::io, fmt::format("cannot start a worker: {}", std::strerror(errno)));
     if (worker.process == 0) {
@@ -120,7 +131,7 @@ class Pool {
     ~Pool() {
         for (Worker& worker : workers_) {
             if (worker.process < 0) continue;
-            if (worker.task) ::kill(worker.process, SIGTERM);
+            if (worker.task) ::kill(worker.process, SIGKILL);
             end_of(worker);
         }
     }

@@ -34,9 +34,10 @@ int report(const ReportArguments& a) {
     const std::filesystem::path out = a.out.empty() ? std::filesystem::path(a.folders.front()) / "report.html"
                                                     : std::filesystem::path(a.out);
     write_report(plan, records, out);
+    for (const std::string& problem : records.problems()) print_error(problem);
     if (!a.work.quiet)
         Output().line(fmt::format("{}  one page, without network: open it in a browser", out.string()));
-    return 0;
+    return records.problems().empty() ? 0 : int(ErrorCode::io);
 }
 
 }  // namespace

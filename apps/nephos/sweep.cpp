@@ -130,6 +130,11 @@ void print_failures(const SweepReport& report, const std::string& folder) {
                         report.progress.failed, report.progress.in_all, folder));
 }
 
+// What is wrong with shards that could not be read as a whole.
+void print_problems(const std::vector<std::string>& problems) {
+    for (const std::string& problem : problems) print_error(problem);
+}
+
 // Points that have no mean, and those whose errors disagree, are said and not left to the table.
 void print_warnings_of_points(const SweepPlan& plan, const Records& records) {
     std::uint64_t unsteady = 0, differ = 0;
@@ -187,6 +192,7 @@ int sweep(const SweepArguments& a) {
     Output output;
     if (a.dry_run || a.status) {
         const SweepReport report = sweep_status(plan, job);
+        print_problems(report.problems);
         if (a.work.json) {
             output.line(json_text(report_json(plan, report, folder)));
             return 0;
@@ -221,6 +227,7 @@ int sweep(const SweepArguments& a) {
         },
         [] { return pending_signal() != 0; });
     bar.reset();
+    print_problems(report.problems);
     if (report.unused > 0 && !a.work.quiet)
         print_note(fmt::format("{}: {} records are of other points or rules; they stay, and are in no table",
                                folder, report.unused));
@@ -244,6 +251,7 @@ int sweep(const SweepArguments& a) {
 struct MergeArguments {
     std::vector<std::string> folders;
     std::string out;
+    bool overwrite = false;
     WorkArguments work;
 };
 
@@ -253,8 +261,15 @@ int merge(const MergeArguments& a) {
     std::vector<std::filesystem::path> folders(a.folders.begin(), a.folders.end());
     const Records records = Records::read(folders);
     const std::string out = a.out.empty() ? a.folders.front() : a.out;
+    print_problems(records.problems());
+    const std::uint64_t lost = a.overwrite ? 0 : runs_lost(plan, records, out);
+    if (lost > 0)
+        throw Error(ErrorCode::io,
+                    fmt::format("{}/runs.csv has {} runs that are in no shard that can be read: the "
+                                "tables stay as they are; --overwrite replaces them",
+                                out, lost));
     write_and_print_tables(plan, records, out, a.work.quiet);
-    return 0;
+    return records.problems().empty() ? 0 : int(ErrorCode::io);
 }
 
 }  // namespace
@@ -312,7 +327,8 @@ void add_sweep_command(CLI::App& app, Action& action) {
     command->add_flag("--status", a->status, "Only print how many runs are done");
     command->add_flag("--retry-failed", a->retry_failed, "Run again what failed");
     command->add_flag("--fail-fast", a->fail_fast, "End at the first run that fails");
-    command->add_flag("--overwrite", a->overwrite, "Throw the records in the folder away first");
+    command->add_flag("--overwrite", a->overwrite,
+                      "Throw the records in the folder away first, with --shard those of the shard");
     add_json(*command, a->work);
     add_quiet(*command, a->work);
     command->footer(
@@ -340,9 +356,13 @@ void add_merge_command(CLI::App& app, Action& action) {
         ->required()
         ->type_name("DIR");
     command->add_option("-o,--out", a->out, "Folder for the tables (default: the first)")->type_name("DIR");
+    command->add_flag("--overwrite", a->overwrite, "Replace tables that have more runs than the shards");
     add_quiet(*command, a->work);
     command->footer(
-        "The tables have the same bytes for any number of shards, in any order.\n"
+        "The tables have the same bytes for any number of shards, in any order. A damaged shard is named, "
+        "and "
+        "the\n"
+        "tables are made of what can be read; exit status 3. Tables that have more runs stay as they are.\n"
         "\n"
         "Examples:\n"
         "  nephos merge sweep\n"

@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import resource
+import shutil
 import signal
 import subprocess
 import time
@@ -53,9 +54,9 @@ class Sweep(Case):
         return self.call("sweep", self.null, "--axis", axis, "--replicates", "3", "--steps", steps, "--out", out,
                          *arguments, status=status)
 
-    def start(self, *arguments):
-        return subprocess.Popen([NEPHOS, *map(str, arguments)], cwd=self.folder, env=self.environment,
-                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    def start(self, *arguments, stderr=subprocess.DEVNULL):
+        return subprocess.Popen([NEPHOS, *map(str, arguments)], cwd=self.folder, env=self.environment, text=True,
+                                stdout=subprocess.DEVNULL, stderr=stderr)
 
     def tables(self, folder):
         return {name: (self.folder / folder / name).read_bytes() for name in TABLES}
@@ -139,14 +140,105 @@ class Sweep(Case):
             sealed = f'{text},"xxh3":"{xxhash.xxh3_128(text.encode()).hexdigest()}"}}'
             shard.write_text("\n".join([sealed, *lines[1:]]) + "\n")
         for key, value, says in (("steps", pow(7, -1, 2**64) - 1, "impossible numbers"), ("steps", 10**12, "impossible numbers"),
-                                 ("steps", 10**9, "fewer than"), ("series_offset", 2**63, "impossible numbers"),
-                                 ("series_offset", 10**6, "fewer than")):
+                                 ("steps", 10**9, "which has fewer"), ("series_offset", 2**63, "impossible numbers"),
+                                 ("series_offset", 10**6, "which has fewer")):
             forge(key, value)
             self.assertIn(says, self.call("merge", "forged", "--out", "merged", status=3).stderr, (key, value))
             self.assertIn(says, self.sweep("forged", steps="20", status=3).stderr, (key, value))
             self.assertEqual(shard.with_suffix(".series").read_bytes(), series)
         forge("replicate", 0)  # the forger's hash is that of the program
         self.sweep("forged", steps="20")
+
+    def damage(self, path, line):
+        """Another byte in a line of a shard."""
+        lines = path.read_bytes().split(b"\n")
+        lines[line] = lines[line].replace(b"done", b"dome")
+        path.write_bytes(b"\n".join(lines))
+
+    def test_a_damaged_shard_is_named_and_the_others_are_merged(self):
+        self.sweep("one")
+        for shard in range(2):
+            self.sweep("two", "--shard", f"{shard}/2")
+        self.call("merge", "two")
+        self.assertEqual(self.tables("two"), self.tables("one"))
+        before = self.tables("two")
+        path = max((self.folder / "two/shards").glob("*.jsonl"), key=lambda p: p.stat().st_size)
+        self.damage(path, 0)
+        said = f"{path.name}: the record at byte 0 is damaged, but others follow it"
+        # Good tables are not replaced by such with fewer runs, unless one says so.
+        result = self.call("merge", "two", status=3)
+        self.assertIn(said, result.stderr)
+        self.assertIn("two/runs.csv has 1 runs that are in no shard that can be read", result.stderr)
+        self.assertEqual(self.tables("two"), before)
+        for arguments in (("--out", "new"), ("--overwrite",)):
+            self.assertIn(said, self.call("merge", "two", *arguments, status=3).stderr)
+            statuses = [run["status"] for run in rows(self.folder / ("new" if "--out" in arguments else "two") / "runs.csv")]
+            self.assertEqual((statuses.count("done"), statuses.count("missing")), (8, 1))
+        # The other shard is not stopped by it; its own sweep is, and says what to do.
+        number = int(path.name[:4])
+        self.assertIn(said, self.sweep("two", "--shard", f"{1 - number}/2").stderr)
+        self.assertIn("--overwrite", self.sweep("two", "--shard", f"{number}/2", status=3).stderr)
+        self.sweep("two", "--shard", f"{number}/2", "--overwrite")
+        self.call("merge", "two")
+        self.assertEqual(self.tables("two"), before)
+
+    def test_overwriting_a_shard_leaves_the_others(self):
+        for shard in range(3):
+            self.sweep("three", "--shard", f"{shard}/3")
+        kept = {path: path.read_bytes() for path in (self.folder / "three/shards").iterdir() if not path.name.startswith("0001")}
+        self.assertEqual(len(kept), 4)
+        said = self.sweep("three", "--shard", "1/3", "--overwrite", "--json").stdout
+        self.assertIn('"before": 0', said)
+        for path, content in kept.items():
+            self.assertEqual(path.read_bytes(), content)
+        self.call("merge", "three")
+        self.assertNotIn("missing", (self.folder / "three/runs.csv").read_text())
+        # Without a shard all are computed again.
+        self.sweep("three", "--overwrite")
+        self.assertEqual([path.name for path in sorted((self.folder / "three/shards").glob("*.jsonl"))], ["0000-of-0001.jsonl"])
+
+    def started(self, folder, *arguments):
+        """A sweep of long runs that has written its first record."""
+        process = self.start("sweep", self.null, "--axis", "field.background.ext=0.05,0.1", "--replicates", "40", "--clouds-every",
+                             "0", "--out", folder, "-j", "1", "--steps", "3000", *arguments, stderr=subprocess.PIPE)
+        self.addCleanup(process.stderr.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        shards = self.folder / folder / "shards"
+        for _ in range(600):
+            if any(path.stat().st_size > 0 for path in shards.glob("*.jsonl")):
+                return process
+            time.sleep(0.1)
+        self.fail("nothing was written")
+
+    def test_a_folder_that_is_removed_ends_the_sweep_with_an_error(self):
+        for damage in (lambda: shutil.rmtree(self.folder / "gone"),
+                       lambda: (self.folder / "gone").rename(self.folder / "elsewhere")):
+            process = self.started("gone")
+            damage()
+            process.wait(timeout=100)
+            self.assertEqual(process.returncode, 3)
+            self.assertIn("was removed or replaced while the sweep wrote it", process.stderr.read())
+
+    def test_a_shard_that_is_written_is_not_removed(self):
+        process = self.started("busy", "--shard", "0/2")
+        for arguments in (["--shard", "0/2"], []):
+            said = self.sweep("busy", "--overwrite", *arguments, status=3).stderr
+            self.assertIn("another sweep is writing this shard", said)
+        process.send_signal(signal.SIGTERM)
+        process.wait(timeout=60)
+        self.assertGreater((self.folder / "busy/shards/0000-of-0002.jsonl").stat().st_size, 0)
+
+    def test_a_worker_leaves_the_signal_to_its_parent(self):
+        """A batch system may tell a worker first that the job ends: its run is not recorded as failed."""
+        process = self.started("told")
+        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        for child in children:
+            os.kill(int(child), signal.SIGTERM)
+        time.sleep(1)
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(timeout=60), 128 + signal.SIGTERM)
+        self.assertNotIn('"failed"', (self.folder / "told/shards/0000-of-0001.jsonl").read_text())
 
     def test_a_crash_costs_one_run(self):
         arguments = ["sweep", self.null, "--axis", "field.background.ext=0.05,0.1", "--replicates", "1", "--clouds-every", "0",
@@ -194,11 +286,20 @@ class Sweep(Case):
         self.assertIn("plan.toml:7:7", message)
 
     def test_designs(self):
-        result = self.call("sweep", self.null, "--axis", "field.background.ext=log:0.01..0.4", "--axis",
-                           "field.background.act+field.background.hum=0.001..0.1", "--points", "4", "--dry-run", "--out", "x")
-        self.assertIn("4 points (sobol;", result.stdout)
-        self.assertIn("--set field.background.ext=0.063245553", result.stdout)
-        self.assertIn("--set field.background.act=0.0505 --set field.background.hum=0.0505", result.stdout)
+        sobol = ("sweep", self.null, "--axis", "field.background.ext=log:0.01..0.4", "--axis",
+                 "field.background.act+field.background.hum=0.001..0.1", "--points", "4", "--replicates", "1", "--dry-run",
+                 "--out", "x")
+        text = self.call(*sobol).stdout
+        self.assertIn("4 points (sobol;", text)
+        points = re.findall(r"--set field.background.ext=(\S+) --set field.background.act=(\S+) --set field.background.hum=(\S+)",
+                            text)
+        self.assertEqual(len(points), 4)
+        for ext, act, hum in points:
+            self.assertEqual(act, hum)
+            self.assertTrue(0.01 <= float(ext) <= 0.4 and 0.001 <= float(act) <= 0.1)
+        self.assertEqual(len({int(math.log(float(ext) / 0.01) / math.log(40) * 8) for ext, _, _ in points}), 4)
+        self.assertEqual(self.call(*sobol).stdout, text)
+        self.assertNotIn(points[0][0], self.call(*sobol, "--seed", "2").stdout)
         self.assertFalse((self.folder / "x").exists())
         for design in ("random", "latin_hypercube"):
             self.call("sweep", self.null, "--axis", "field.background.ext=0.05..0.4", "--points", "4", "--design", design,
