@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dialogs over the window: files, unsaved edits, recovery, a run, shortcuts.
+// Dialogs over the window: files and shortcuts; what waits for an answer.
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,6 @@
 #include "render/image/image_file.h"
 #include "scenes/format/writer.h"
 #include "simulation/frame_writer.h"
-#include "simulation/run_folder.h"
 
 namespace nephos {
 namespace {
@@ -67,6 +66,7 @@ bool accept(Editor& editor, const fs::path& path) {
             case FileDialog::save_as:
                 editor.document->save_as(path);
                 note_recent(editor.settings, path);
+                keep_settings(editor);
                 say(editor, "Saved " + path.string());
                 return true;
             case FileDialog::export_grid:
@@ -76,6 +76,7 @@ bool accept(Editor& editor, const fs::path& path) {
                 return true;
             case FileDialog::screenshot:
                 editor.capture_to = path;
+                editor.capture_by_user = true;
                 return true;
             case FileDialog::none:
                 return true;
@@ -107,6 +108,21 @@ std::vector<Listed> content_of(const fs::path& folder, const std::string& extens
         return a.is_folder != b.is_folder ? a.is_folder : a.name < b.name;
     });
     return out;
+}
+
+fs::path chosen_path(const Editor& editor) {
+    fs::path path = editor.dialog_folder / editor.dialog_name;  // an absolute name stays as it is
+    if (path.extension() != extension_of(editor.dialog)) path += extension_of(editor.dialog);
+    return path;
+}
+
+// Whether writing there would replace a file that is not the scene's own, or that another program has changed.
+bool is_asked_first(const Editor& editor, const fs::path& path) {
+    std::error_code error;
+    if (editor.dialog == FileDialog::open || !fs::exists(fs::symlink_status(path, error))) return false;
+    const bool own = editor.dialog == FileDialog::save_as && editor.document->has_file() &&
+                     fs::equivalent(path, editor.document->path(), error);
+    return !own || editor.document->is_changed_on_disk();
 }
 
 void file_dialog(Editor& editor) {
@@ -144,169 +160,35 @@ void file_dialog(Editor& editor) {
         accepted = true;
     }
     editor.controls.note("file name");
-    ImGui::TextWrapped("%s", editor.dialog_problem.c_str());
     const bool named = !editor.dialog_name.empty();
+    const fs::path path = named ? chosen_path(editor) : fs::path();
+    if (path != editor.replaced) editor.replaced.clear();  // another name: no question any more
+    ImGui::TextWrapped("%s", editor.dialog_problem.c_str());
     if (!named) ImGui::BeginDisabled();
-    accepted |= button(editor, editor.dialog == FileDialog::open ? "Open" : "Save");
+    bool replaces = false;
+    if (editor.dialog != FileDialog::open && !editor.replaced.empty()) {
+        replaces = button(editor, "Replace it");
+    } else {
+        accepted |= button(editor, editor.dialog == FileDialog::open ? "Open" : "Save");
+    }
     if (!named) ImGui::EndDisabled();
     ImGui::SameLine();
     if (button(editor, "Cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) open = false;
-    if (accepted && named) {
-        fs::path path = editor.dialog_folder / editor.dialog_name;
-        if (fs::path(editor.dialog_name).is_absolute()) path = editor.dialog_name;
-        if (path.extension() != extension_of(editor.dialog)) path += extension_of(editor.dialog);
-        if (accept(editor, path)) open = false;
+    if (accepted && named && is_asked_first(editor, path)) {
+        editor.replaced = path;
+        editor.dialog_problem = path.filename().string() + " is there already.";
+        accepted = false;
     }
+    if ((accepted || replaces) && named && accept(editor, path)) open = false;
     if (!open) {
         const bool before_pending = editor.dialog == FileDialog::save_as && !editor.document->is_modified();
         editor.dialog = FileDialog::none;
         editor.dialog_problem.clear();
+        editor.replaced.clear();
         ImGui::CloseCurrentPopup();
         if (before_pending && editor.pending != Pending::none) do_pending(editor);
     }
     ImGui::EndPopup();
-}
-
-void unsaved_dialog(Editor& editor) {
-    if (editor.pending == Pending::none || editor.dialog != FileDialog::none) return;
-    constexpr const char* kTitle = "Unsaved edits";
-    if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
-    if (!ImGui::BeginPopupModal(kTitle, nullptr,
-                                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
-        return;
-    ImGui::Text("%s has edits that are not saved.", editor.document->title().c_str());
-    ImGui::Spacing();
-    if (button(editor, "Save them")) {
-        if (!editor.document->has_file()) {
-            open_dialog(editor, FileDialog::save_as);
-            ImGui::CloseCurrentPopup();
-        } else if (save_document(editor)) {
-            do_pending(editor);
-            ImGui::CloseCurrentPopup();
-        }
-    }
-    ImGui::SameLine();
-    if (button(editor, "Discard them")) {
-        do_pending(editor);
-        ImGui::CloseCurrentPopup();
-    }
-    ImGui::SameLine();
-    if (button(editor, "Go on editing") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) {
-        editor.pending = Pending::none;
-        ImGui::CloseCurrentPopup();
-    }
-    ImGui::EndPopup();
-}
-
-void recovery_dialog(Editor& editor) {
-    if (!editor.show_recovery) return;
-    constexpr const char* kTitle = "Edits of an earlier session";
-    if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
-    if (!ImGui::BeginPopupModal(kTitle, nullptr,
-                                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
-        return;
-    ImGui::Text("An earlier session with %s ended before its edits were saved.",
-                editor.document->title().c_str());
-    ImGui::Spacing();
-    const auto path = editor.document->found_autosave(editor.folder);
-    const auto close = [&] {
-        editor.show_recovery = false;
-        ImGui::CloseCurrentPopup();
-    };
-    if (!path) close();
-    if (path && button(editor, "Take them")) {
-        try {
-            const SceneDocument saved(*path);
-            editor.document->edit(saved.text(), "Recover");
-            say(editor, "Edits recovered; save to keep them, undo to go back");
-        } catch (const Error& error) {
-            say(editor, error.what(), true);
-        }
-        close();
-    }
-    ImGui::SameLine();
-    if (path && button(editor, "Delete them")) {
-        std::error_code ignored;
-        fs::remove(*path, ignored);
-        close();
-    }
-    ImGui::SameLine();
-    if (button(editor, "Later")) close();
-    ImGui::EndPopup();
-}
-
-void start_run(Editor& editor) {
-    auto run = std::make_unique<BackgroundRun>();
-    BackgroundRun& state = *run;
-    state.folder = fs::path("out") / editor.shown_scene->name;
-    state.thread = std::thread([&state, scene = *editor.shown_scene,
-                                file = editor.document->path().string()] {
-        std::string result, failure;
-        try {
-            RunSettings settings = run_settings(scene, file);
-            settings.folder = state.folder;
-            settings.device.splatting = scene.frames.splatting;
-            settings.device.device = scene.frames.device;
-            RunObserver observer;
-            observer.stop = [&state] { return state.stop.load(); };
-            observer.progress = [&state](const RunProgress& progress) {
-                const std::scoped_lock lock(state.mutex);
-                state.fraction =
-                    progress.steps_in_all > 0 ? double(progress.steps) / double(progress.steps_in_all) : 0;
-                state.phase = std::string(progress.phase) + ": step " + std::to_string(progress.steps) + "/" +
-                              std::to_string(progress.steps_in_all) + ", frame " +
-                              std::to_string(progress.frames) + "/" + std::to_string(progress.frames_in_all);
-            };
-            const RunReport report = run_scene(std::move(settings), observer);
-            result = report.complete ? "complete: " + std::to_string(report.frames) + " frames in " +
-                                           report.folder.string()
-                                     : "stopped; `nephos run --resume` goes on";
-        } catch (const std::exception& error) {
-            failure = error.what();
-        }
-        const std::scoped_lock lock(state.mutex);
-        state.result = result;
-        state.failure = failure;
-        state.done = true;
-    });
-    editor.run = std::move(run);
-}
-
-void run_window(Editor& editor) {
-    if (!editor.show_run) return;
-    const float em = ImGui::GetFontSize();
-    ImGui::SetNextWindowSize(ImVec2(32 * em, 0), ImGuiCond_Appearing);
-    if (ImGui::Begin("Run the scene", &editor.show_run,
-                     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoCollapse)) {
-        ImGui::TextWrapped(
-            "Simulates the whole scene as it stands and writes density grids, pictures and statistics, "
-            "as `nephos run` does.");
-        ImGui::Spacing();
-        if (!editor.shown_scene) {
-            ImGui::TextWrapped("The scene has problems: they come first.");
-        } else if (!editor.run) {
-            ImGui::Text("into out/%s", editor.shown_scene->name.c_str());
-            if (button(editor, "Start the run")) start_run(editor);
-        } else {
-            const std::scoped_lock lock(editor.run->mutex);
-            ImGui::ProgressBar(
-                float(editor.run->done && editor.run->failure.empty() ? 1 : editor.run->fraction));
-            editor.controls.note("run progress");
-            const std::string text = !editor.run->failure.empty()  ? editor.run->failure
-                                     : !editor.run->result.empty() ? editor.run->result
-                                                                   : editor.run->phase;
-            ImGui::TextWrapped("%s", text.c_str());
-        }
-        if (editor.run && editor.run->done) {
-            if (button(editor, "Close the run")) {
-                editor.run.reset();
-                editor.show_run = false;
-            }
-        } else if (editor.run && button(editor, "Stop the run")) {
-            editor.run->stop = true;
-        }
-    }
-    ImGui::End();
 }
 
 void shortcuts_window(Editor& editor) {
@@ -363,6 +245,7 @@ void shortcuts_window(Editor& editor) {
 void open_dialog(Editor& editor, FileDialog dialog) {
     editor.dialog = dialog;
     editor.dialog_problem.clear();
+    editor.replaced.clear();
     std::error_code error;
     if (editor.dialog_folder.empty()) {
         const fs::path start = editor.document->has_file()
@@ -381,8 +264,19 @@ void ask_before(Editor& editor, Pending what, fs::path path) {
 }
 
 void do_pending(Editor& editor) {
+    if (editor.pending == Pending::close && editor.run && !editor.run->done) {
+        editor.question = {
+            "A run into files is under way: out/" + editor.run->folder.filename().string() + ".",
+            "Stop it and quit", [&editor] {
+                editor.run.reset();  // after the step that it is at; `nephos run --resume` goes on
+                editor.pending = Pending::close;
+                do_pending(editor);
+            }};
+        editor.pending = Pending::none;
+        return;
+    }
     const Pending what = std::exchange(editor.pending, Pending::none);
-    try {
+    attempt(editor, [&] {
         if (what == Pending::close) {
             editor.document->remove_autosave();
             editor.quit = true;
@@ -398,16 +292,16 @@ void do_pending(Editor& editor) {
         } else if (what == Pending::open) {
             open_document(editor, std::make_unique<SceneDocument>(editor.pending_path));
         }
-    } catch (const Error& error) {
-        say(editor, error.what(), true);
-    }
+    });
 }
 
 void dialogs(Editor& editor) {
     file_dialog(editor);
     unsaved_dialog(editor);
+    question_dialog(editor);
     recovery_dialog(editor);
     run_window(editor);
+    generation_window(editor);
     shortcuts_window(editor);
 }
 

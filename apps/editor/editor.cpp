@@ -10,6 +10,7 @@
 
 #include "apps/editor/script.h"
 #include "apps/editor/state.h"
+#include "apps/nephos/commands.h"
 #include "core/error.h"
 #include "render/image/image_file.h"
 
@@ -58,7 +59,9 @@ void take_new_results(Editor& editor) {
         ++editor.pictures;
     }
     const LiveStatus status = editor.live.status();
-    if (status.rows < editor.steps.size()) editor.steps.clear();
+    if (status.rows_version != editor.steps_version || status.rows < editor.steps.size())
+        editor.steps.clear();
+    editor.steps_version = status.rows_version;
     if (status.rows != editor.steps.size()) {
         const std::vector<LiveStep> more = editor.live.steps(editor.steps.size());
         editor.steps.insert(editor.steps.end(), more.begin(), more.end());
@@ -69,26 +72,25 @@ void look_after_files(Editor& editor) {
     const Clock::time_point now = Clock::now();
     if (now - editor.last_disk_look > std::chrono::milliseconds(700)) {
         editor.last_disk_look = now;
-        switch (editor.document->look_at_disk()) {
-            case SceneDocument::Disk::same:
-                break;
-            case SceneDocument::Disk::reloaded:
+        attempt(editor, [&] {
+            const SceneDocument::Disk disk = editor.document->look_at_disk();
+            if (disk == SceneDocument::Disk::reloaded)
                 say(editor, "Another program changed the file: it was read again");
-                break;
-            case SceneDocument::Disk::differs:
+            // Once: later messages are to be seen, too.
+            if (std::exchange(editor.disk, disk) == disk) return;
+            if (disk == SceneDocument::Disk::differs)
                 say(editor,
                     "Another program changed the file; saving overwrites that, File > Reload takes it", true);
-                break;
-            case SceneDocument::Disk::gone:
+            if (disk == SceneDocument::Disk::gone)
                 say(editor, "The file is gone from the disk; saving makes it anew", true);
-                break;
-        }
+        });
     }
-    if (now - editor.last_autosave > std::chrono::seconds(5)) {
+    // Edits of an earlier session stand where those of this one go: they wait for the answer.
+    if (now - editor.last_autosave > std::chrono::seconds(5) && !editor.show_recovery) {
         editor.last_autosave = now;
         try {
             editor.document->autosave(editor.folder);
-        } catch (const Error& error) {
+        } catch (const std::exception& error) {
             say(editor, std::string("Not autosaved: ") + error.what(), true);
         }
     }
@@ -146,7 +148,13 @@ void save_capture(Editor& editor) {
     if (editor.capture_to.empty()) return;
     const WindowImage& image = editor.window->captured();
     const std::filesystem::path path = std::exchange(editor.capture_to, {});
-    save_rgba(path, image.width, image.height, image.rgba);
+    const bool by_user = std::exchange(editor.capture_by_user, false);
+    try {
+        save_rgba(path, image.width, image.height, image.rgba);
+    } catch (const Error& error) {
+        if (!by_user) throw;
+        return say(editor, std::string("Not saved: ") + error.what(), true);
+    }
     say(editor, "Picture of the window: " + path.string());
 }
 
@@ -194,6 +202,7 @@ void update_title(Editor& editor, std::string& shown) {
     if (title != shown) editor.window->set_title(shown = title);
 }
 
+// Returns the exit status.
 int loop(Editor& editor, Report& report) {
     Script script = editor.options.script.empty() ? Script() : Script(editor.options.script);
     const bool scripted = script.is_active();
@@ -201,6 +210,14 @@ int loop(Editor& editor, Report& report) {
     Clock::time_point last_frame = Clock::now(), last_input = Clock::now();
     bool screenshot_due = !editor.options.screenshot.empty();
     while (!editor.quit) {
+        if (const int signal = pending_signal(); signal != 0) {
+            editor.document->autosave(editor.folder);
+            return 128 + signal;
+        }
+        if (!editor.window->is_minimised()) {
+            editor.settings.width = editor.window->width();
+            editor.settings.height = editor.window->height();
+        }
         const bool busy = editor.running || script.is_active() || seconds_since(last_input) < 1 ||
                           editor.live.status().goal != editor.live.status().step ||
                           editor.window->is_minimised();
@@ -264,6 +281,17 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
     return std::make_unique<SceneDocument>(editor.folder_scenes.front());
 }
 
+// Writes unsaved edits down before the program ends by an error; what to say about it.
+std::string kept_edits(Editor& editor) {
+    if (!editor.document->is_modified()) return {};
+    try {
+        editor.document->autosave(editor.folder);
+    } catch (const std::exception& error) {
+        return std::string("; unsaved edits could not be kept: ") + error.what();
+    }
+    return "; unsaved edits are kept, and are offered at the next start with this scene";
+}
+
 }  // namespace
 
 Editor::Editor(const EditorOptions& from)
@@ -272,6 +300,9 @@ Editor::Editor(const EditorOptions& from)
       settings(read_settings(folder)),
       live({.splatting = Splatting::cpu}) {
     if (!options.theme.empty()) settings.dark = options.theme != "light";
+    show_plots = settings.plots;
+    show_gizmos = settings.shapes;
+    wanted_tab = settings.tab;
     document = first_document(*this);
     WindowOptions of_window;
     of_window.width = options.width > 0 ? options.width : settings.width;
@@ -341,61 +372,9 @@ void save_rgba(const std::filesystem::path& path, int width, int height, std::sp
     write_png(path, out, RenderOptions{}, PictureMetadata{});
 }
 
-void change_text(Editor& editor, std::string text, const std::string& what, const std::string& merge) {
-    editor.document->edit(std::move(text), what, merge);
-}
-
-void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging) {
-    set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging);
-}
-
-void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging) {
-    TextPath path = table;
-    path.push_back({entries.front().first, 0});
-    const std::string name = path_text(path);
-    try {
-        std::string text = editor.document->text();
-        for (const auto& [key, value] : entries) {
-            path.back().name = key;
-            text = with_value(text, path, value);
-        }
-        if (editor.record && record_live(editor, path, text)) return;
-        change_text(editor, text, "Change " + name, dragging ? name : "");
-    } catch (const Error& error) {
-        say(editor, error.what(), true);
-    }
-}
-
-void open_document(Editor& editor, std::unique_ptr<SceneDocument> document) {
-    editor.document->remove_autosave();
-    editor.document = std::move(document);
-    editor.shown_version = 0;
-    editor.shown_scene.reset();
-    editor.selected.clear();
-    editor.steps.clear();
-    editor.checkpoints.clear();
-    editor.text_version = 0;
-    editor.defaults.clear();
-    editor.defaults_version = 0;
-    editor.live.run(editor.running = true);
-    if (editor.document->has_file()) note_recent(editor.settings, editor.document->path());
-    if (editor.document->found_autosave(editor.folder)) editor.show_recovery = true;
-}
-
-bool save_document(Editor& editor) {
-    try {
-        editor.document->save();
-        note_recent(editor.settings, editor.document->path());
-        say(editor, "Saved " + editor.document->path().string());
-        return true;
-    } catch (const Error& error) {
-        say(editor, std::string("Not saved: ") + error.what(), true);
-        return false;
-    }
-}
-
 int run_editor(const EditorOptions& options) {
     Report report;
+    defer_signals();
     Editor editor(options);
     if (editor.document->has_file()) note_recent(editor.settings, editor.document->path());
     if (editor.document->found_autosave(editor.folder) && options.screenshot.empty()) editor.show_recovery = true;
@@ -403,15 +382,16 @@ int run_editor(const EditorOptions& options) {
     try {
         status = loop(editor, report);
     } catch (const Error& error) {
-        if (error.code() != ErrorCode::gpu || !editor.document->is_modified()) throw;
-        editor.document->autosave(editor.folder);
-        throw Error(ErrorCode::gpu,
-                    std::string(error.what()) +
-                        "; unsaved edits are kept, and are offered at the next start with this scene");
+        const std::string kept = kept_edits(editor);
+        if (kept.empty()) throw;
+        throw Error(error.code(), error.what() + kept, error.where());
+    } catch (const std::exception& error) {
+        throw Error(ErrorCode::io, error.what() + kept_edits(editor));
     }
     if (options.report) report.print(editor);
+    if (status != 0) return status;  // by a signal: edits were kept
     editor.document->remove_autosave();
-    if (options.script.empty() && options.screenshot.empty()) write_settings(editor.folder, editor.settings);
+    keep_settings(editor);
     const std::vector<std::string> messages = editor.window->validation_messages();
     for (const std::string& message : messages) fmt::print(stderr, "validation: {}\n", message);
     return messages.empty() ? status : int(ErrorCode::gpu);

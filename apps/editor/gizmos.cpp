@@ -139,6 +139,13 @@ void model_gizmo(Editor& editor) {
     const std::size_t index = editor.selected[1].index + models_from_files(editor);
     if (index >= scene.models.size()) return;
     const Vec3 origin = editor.camera.camera.target_m;
+    if (const GeneratedCloud* made = generated_cloud(editor)) {
+        for (const SeedBox& box : made->cloud.boxes) {
+            if (box.level == 0) continue;  // a seed, below
+            const Vec3 centre = origin + box.centre_m, half = 0.5 * box.size_m;
+            box_lines(editor, centre - half, centre + half, IM_COL32(120, 190, 255, 110));
+        }
+    }
     for (std::size_t n = 0; n < scene.models[index].seeds.size(); ++n) {
         const Seed& seed = scene.models[index].seeds[n];
         TextPath path = with(model, "seeds");

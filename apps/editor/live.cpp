@@ -101,9 +101,11 @@ void LiveScene::start(const Scene& scene, std::uint64_t goal) {
     const std::scoped_lock lock(mutex_);
     new_scene_ = live_scene(scene);
     keeps_state_ = false;
-    drawn_scene_ = scene;
+    next_drawn_ = scene;
     goal_ = goal;
+    clear_ = false;
     status_.failure.clear();
+    draw_failure_.clear();
     simulation_due_.notify_all();
 }
 
@@ -112,15 +114,32 @@ void LiveScene::change(const Scene& scene) {
     const bool keeps = !new_scene_ || keeps_state_;
     new_scene_ = live_scene(scene);
     keeps_state_ = keeps;
-    drawn_scene_ = scene;
+    next_drawn_ = scene;
     simulation_due_.notify_all();
 }
 
 void LiveScene::redraw(const Scene& scene) {
     const std::scoped_lock lock(mutex_);
+    if (next_drawn_) {  // frames of its simulation are still to come
+        next_drawn_ = scene;
+        return;
+    }
     drawn_scene_ = scene;
     scene_to_draw_ = true;
     drawing_due_.notify_all();
+}
+
+void LiveScene::clear() {
+    const std::scoped_lock lock(mutex_);
+    new_scene_.reset();
+    next_drawn_.reset();
+    clear_ = true;
+    ++clears_;
+    frame_.reset();
+    picture_.reset();
+    status_.failure.clear();
+    draw_failure_.clear();
+    simulation_due_.notify_all();
 }
 
 std::uint64_t LiveScene::hold() {
@@ -181,6 +200,7 @@ LiveStatus LiveScene::status() const {
     LiveStatus status = status_;
     status.goal = goal_;
     status.rows = rows_.size();
+    if (status.failure.empty()) status.failure = draw_failure_;
     return status;
 }
 
@@ -194,11 +214,14 @@ std::vector<LiveStep> LiveScene::steps(std::uint64_t from) const {
 void LiveScene::fail(const std::string& what) {
     is_advancing_ = stops_here_ = false;
     status_.failure = what;
-    running_ = status_.running = false;
     goal_ = status_.step;
+    forget_simulation();
+}
+
+void LiveScene::forget_simulation() {
     simulation_.reset();
     checkpoints_.clear();
-    checkpoint_bytes_ = 0;
+    checkpoint_bytes_ = status_.checkpoint_bytes = status_.checkpoints = 0;
 }
 
 void LiveScene::simulate() {
@@ -206,11 +229,20 @@ void LiveScene::simulate() {
     Clock::time_point next_step = Clock::now();
     while (true) {
         const auto has_work = [this] {
-            return ended_ || hold_ || new_scene_ ||
+            return ended_ || hold_ || new_scene_ || clear_ ||
                    (simulation_ && (running_ || !frame_ || goal_ != status_.step));
         };
         simulation_due_.wait(lock, has_work);
         if (ended_) return;
+        if (std::exchange(clear_, false)) {
+            forget_simulation();
+            rows_.clear();
+            ++status_.rows_version;
+            status_.step = status_.steps_taken = goal_ = 0;
+            frame_.reset();  // a step was under way
+            picture_.reset();
+            continue;
+        }
         if (hold_) {
             is_held_ = true;
             held_.notify_all();
@@ -247,7 +279,6 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     const Scene scene = std::move(*new_scene_);
     const bool keeps_state = keeps_state_ && simulation_ != nullptr;
     new_scene_.reset();
-    const Scene drawn = drawn_scene_;
     lock.unlock();
     std::shared_ptr<Simulation> simulation;
     if (keeps_state) {
@@ -266,12 +297,16 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     if (keeps_state) {
         const auto later = checkpoints_.upper_bound(simulation_->next_step());
         checkpoints_.erase(later, checkpoints_.end());
-        rows_.resize(std::min<std::size_t>(rows_.size(), simulation_->next_step()));
+        if (rows_.size() > simulation_->next_step()) {
+            rows_.resize(simulation_->next_step());
+            ++status_.rows_version;
+        }
     } else {
         checkpoints_.clear();
         checkpoint_bytes_ = 0;
         checkpoint_every_ = 8;
         rows_.clear();
+        ++status_.rows_version;
         status_.step = 0;
         frame_.reset();
         const auto most = std::uint64_t(kMaxFrames - 2);
@@ -279,9 +314,11 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
         keep_checkpoint();
     }
     status_.steps_taken = simulation_->steps_taken();
-    if (!new_scene_) {
-        drawn_scene_ = drawn;
+    if (!new_scene_ && next_drawn_) {  // otherwise it belongs to a scene that is taken next
+        drawn_scene_ = std::move(*next_drawn_);
+        next_drawn_.reset();
         scene_to_draw_ = true;
+        drawing_due_.notify_all();
     }
 }
 
@@ -335,7 +372,7 @@ void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) 
             done = reached;
             lock.lock();
             keep_checkpoint();
-            const bool interrupted = ended_ || hold_ || new_scene_ || goal_ != goal || stops_here_;
+            const bool interrupted = ended_ || hold_ || new_scene_ || clear_ || goal_ != goal || stops_here_;
             lock.unlock();
             if (interrupted || Clock::now() - begin > std::chrono::milliseconds(is_first ? 0 : 150)) break;
         }
@@ -372,7 +409,10 @@ void LiveScene::draw() {
             return ended_ ||
                    (frame_ && (frame_ != maker.frame() || !(view_ == maker.view()) || scene_to_draw_));
         };
-        const auto rests = [&] { return maker.is_draft() && !running_ && goal_ == status_.step; };
+        const auto rests = [&] {
+            const bool stands = !running_ || !status_.failure.empty();
+            return frame_ && maker.is_draft() && stands && goal_ == status_.step;
+        };
         drawing_due_.wait(lock, [&] { return is_new() || rests(); });
         bool refine = false;
         if (!is_new()) {  // nothing moves: after a moment the picture gets its detail
@@ -384,6 +424,7 @@ void LiveScene::draw() {
         const std::shared_ptr<const LiveFrame> frame = frame_;
         const LiveView view = view_;
         const Scene scene = drawn_scene_;
+        const std::uint64_t clears = clears_;
         scene_to_draw_ = false;
         lock.unlock();
         std::shared_ptr<LivePicture> made;
@@ -400,12 +441,13 @@ void LiveScene::draw() {
             painter.reset();  // a device that failed is opened anew
         }
         lock.lock();
+        if (clears != clears_) continue;  // of a scene that is gone
         if (made) {
             made->number = ++pictures_;
             picture_ = std::move(made);
             status_.device = device;
         }
-        if (!failure.empty()) status_.failure = failure;
+        draw_failure_ = failure;
     }
 }
 

@@ -93,9 +93,10 @@ struct LiveStatus {
     std::uint64_t goal = 0;         // step that is being simulated to
     std::uint64_t steps_taken = 0;  // by the automata: a change of the scene acts from this step on
     std::uint64_t rows = 0;         // steps whose statistics are known, from 0 on
+    std::uint64_t rows_version = 0; // rises when rows that were known are not those of the scene any more
     double step_ms = 0;             // mean wall time of a step
     std::size_t checkpoints = 0, checkpoint_bytes = 0;
-    std::string failure;  // what ended the simulation or the drawing; empty: nothing
+    std::string failure;  // what ended the simulation, or the last picture; empty: nothing
     std::string device;   // that draws
 };
 
@@ -111,8 +112,10 @@ class LiveScene {
     // Goes on from the present state with another scene of the same layers and lattices: what a user changed while it
     // runs. Call it between hold() and release().
     void change(const Scene& scene);
-    // Draws with the options of another scene; its simulation is the same.
+    // Draws with the options of another scene; its simulation is that of the last start() or change().
     void redraw(const Scene& scene);
+    // Forgets scene, frame and picture: there is nothing to see until the next start().
+    void clear();
 
     // Waits until no step is under way (some milliseconds, a large scene's step at most), keeps it so, and returns the
     // number of steps that were taken: a change of the scene would act from that step on.
@@ -142,6 +145,7 @@ class LiveScene {
     void go_back(std::uint64_t step);
     void keep_checkpoint();
     void fail(const std::string& what);
+    void forget_simulation();
 
     const DeviceOptions device_;
     mutable std::mutex mutex_;
@@ -153,8 +157,11 @@ class LiveScene {
     bool keeps_state_ = false;        // new_scene_ goes on from the present state
     bool is_advancing_ = false;       // steps are under way
     bool stops_here_ = false;         // their end is where the pause is
-    Scene drawn_scene_;
-    bool scene_to_draw_ = false, layers_changed_ = false;
+    Scene drawn_scene_;                // of frame_: same layers, same lattices
+    std::optional<Scene> next_drawn_;  // takes its place with the simulation that is due; of one that failed never
+    bool scene_to_draw_ = false, clear_ = false;
+    std::uint64_t clears_ = 0;
+    std::string draw_failure_;
     double steps_per_second_ = 6;
     std::uint64_t goal_ = 0;
     LiveView view_;

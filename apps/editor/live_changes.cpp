@@ -76,13 +76,12 @@ std::vector<WindKeyframe> changed_keys(const Wind& before, const std::vector<Win
 }
 
 // Applies a text that goes on from the present state.
-bool apply(Editor& editor, const std::string& text, const std::string& what, const std::string& merge) {
+void apply(Editor& editor, const std::string& text, const std::string& what, const std::string& merge) {
     editor.document->edit(text, what, merge);
     editor.shown_version = editor.document->version();
-    if (!editor.document->problems().empty() || !editor.document->scene()) return true;
+    if (!editor.document->problems().empty() || !editor.document->scene()) return;
     editor.shown_scene = *editor.document->scene();
     editor.live.change(*editor.shown_scene);
-    return true;
 }
 
 struct Held {
@@ -126,15 +125,14 @@ bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, co
         changed_keys(wind_at_path(before, array), changed.keyframes[index].levels, from,
                      before.automaton.time_step_s);
     say(editor, "Wind recorded from step " + std::to_string(from) + " on");
-    const bool done =
-        apply(editor, with_keyframes(text, array, keys), "Wind from step " + std::to_string(from),
-              "live " + std::to_string(held.step));
+    apply(editor, with_keyframes(text, array, keys), "Wind from step " + std::to_string(from),
+          "live " + std::to_string(held.step));
     // What is shown of the list is now its newest key frame.
     if (editor.selected.size() > array.size() &&
         std::equal(array.begin(), array.end(), editor.selected.begin())) {
         editor.selected[array.size()].index = keys.size() - 1;
     }
-    return done;
+    return true;
 }
 
 }  // namespace
@@ -183,14 +181,16 @@ void record_climate(Editor& editor, double final_state, double duration_s) {
         schedule +=
             "{ time_s = " + number_text(point.time_s) + ", state = " + number_text(point.state) + " }";
     }
-    std::string text = editor.document->text();
-    for (const char* key :
-         {"climate.initial_state", "climate.final_state", "climate.duration_s", "climate.schedule"}) {
-        text = without(text, text_path(key));
-    }
-    text = with_value(text, text_path("climate.schedule"), schedule + "]");
-    apply(editor, text, "Climate from step " + std::to_string(held.step), "");
-    say(editor, "The climate changes from step " + std::to_string(held.step) + " on");
+    const bool done = attempt(editor, [&] {
+        std::string text = editor.document->text();
+        for (const char* key :
+             {"climate.initial_state", "climate.final_state", "climate.duration_s", "climate.schedule"}) {
+            text = without(text, text_path(key));
+        }
+        text = with_value(text, text_path("climate.schedule"), schedule + "]");
+        apply(editor, text, "Climate from step " + std::to_string(held.step), "");
+    });
+    if (done) say(editor, "The climate changes from step " + std::to_string(held.step) + " on");
 }
 
 void add_flash(Editor& editor, const Vec3& at) {
@@ -202,8 +202,10 @@ void add_flash(Editor& editor, const Vec3& at) {
         {"time_s", number_text(time_s)},
         {"duration_s", number_text(4 * editor.shown_scene->automaton.time_step_s)},
         {"intensity", "4"}};
-    change_text(editor, with_new_element(editor.document->text(), text_path("lightning"), entries),
-                "Lightning");
+    const auto added = [&](const std::string& text) {
+        return with_new_element(text, text_path("lightning"), entries);
+    };
+    change_text(editor, added, "Lightning");
 }
 
 void keep_camera(Editor& editor) {
@@ -212,12 +214,13 @@ void keep_camera(Editor& editor) {
                number_text(std::round(v.z), 7) + "]";
     };
     const Camera& camera = editor.camera.camera;
-    std::string text =
-        with_value(editor.document->text(), text_path("camera.position_m"), place(camera.position_m));
-    text = with_value(text, text_path("camera.target_m"), place(camera.target_m));
-    text = with_value(text, text_path("camera.vertical_fov_deg"), number_text(camera.vertical_fov_deg, 4));
-    change_text(editor, text, "Camera");
-    say(editor, "The scene has this camera now");
+    const auto kept = [&](std::string text) {
+        text = with_value(text, text_path("camera.position_m"), place(camera.position_m));
+        text = with_value(text, text_path("camera.target_m"), place(camera.target_m));
+        return with_value(text, text_path("camera.vertical_fov_deg"),
+                          number_text(camera.vertical_fov_deg, 4));
+    };
+    if (change_text(editor, kept, "Camera")) say(editor, "The scene has this camera now");
 }
 
 }  // namespace nephos

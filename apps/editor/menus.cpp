@@ -54,12 +54,8 @@ void file_menu(Editor& editor) {
     }
     if (item(editor, "Save as...", "Ctrl+Shift+S")) open_dialog(editor, FileDialog::save_as);
     if (item(editor, "Reload", nullptr, editor.document->has_file())) {
-        try {
-            editor.document->reload();
-            say(editor, "Read again");
-        } catch (const Error& error) {
-            say(editor, error.what(), true);
-        }
+        const bool reloaded = attempt(editor, [&] { editor.document->reload(); });
+        if (reloaded) say(editor, "Read again");
     }
     ImGui::Separator();
     if (item(editor, "Run into files...", "Ctrl+R")) editor.show_run = true;
@@ -318,7 +314,7 @@ void text_panel(Editor& editor) {
     if (ImGui::InputTextMultiline("##text", &editor.text_buffer,
                                   ImVec2(-1, ImGui::GetContentRegionAvail().y - below - (count > 0 ? 6 : 0)),
                                   ImGuiInputTextFlags_AllowTabInput)) {
-        change_text(editor, editor.text_buffer, "Type", "text");
+        attempt(editor, [&] { editor.document->edit(editor.text_buffer, "Type", "text"); });
         editor.text_version = editor.document->version();
     }
     editor.controls.note("text");

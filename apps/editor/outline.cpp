@@ -6,6 +6,7 @@
 
 #include "apps/editor/schema_values.h"
 #include "apps/editor/state.h"
+#include "scenes/format/text.h"
 
 namespace nephos {
 namespace {
@@ -63,33 +64,35 @@ void add_element(Editor& editor, const Key& list, const TextPath& path) {
     const Vec3 place = in_model ? Vec3{} : middle_of(editor);
     const Node* array = value_node(editor.document->values(), path);
     const std::size_t index = array != nullptr ? array->items.size() : 0;
-    change_text(editor,
-                with_new_element(
-                    editor.document->text(), path,
-                    new_element(list, editor.document->values(), path, scene ? &*scene : nullptr, place)),
-                "New " + path_text(element_path(path, index)));
+    const auto added = [&](const std::string& text) {
+        return with_new_element(
+            text, path, new_element(list, editor.document->values(), path, scene ? &*scene : nullptr, place));
+    };
+    if (!change_text(editor, added, "New " + path_text(element_path(path, index)))) return;
     editor.selected = element_path(path, index);
     editor.wanted_tab = 0;
 }
 
 void copy_element(Editor& editor, const TextPath& array, std::size_t index) {
-    std::string text = with_copied_element(editor.document->text(), array, index);
-    const Node* list = value_node(editor.document->values(), array);
-    const std::vector<std::string> names = names_of(list);
-    const Entry* name = list->items[index].find("name");
-    if (name != nullptr && name->value.kind == Node::Kind::text) {
-        TextPath at = element_path(array, index + 1);
-        at.push_back({"name", 0});
-        text = with_value(text, at, "\"" + unused_name(name->value.text, names) + "\"");
-    }
-    change_text(editor, text, "Copy " + path_text(element_path(array, index)));
+    const auto copied = [&](const std::string& before) {
+        std::string text = with_copied_element(before, array, index);
+        const Node* list = value_node(editor.document->values(), array);
+        const Entry* name = list != nullptr ? list->items.at(index).find("name") : nullptr;
+        if (name != nullptr && name->value.kind == Node::Kind::text) {
+            TextPath at = element_path(array, index + 1);
+            at.push_back({"name", 0});
+            text = with_value(text, at, toml_string(unused_name(name->value.text, names_of(list))));
+        }
+        return text;
+    };
+    if (!change_text(editor, copied, "Copy " + path_text(element_path(array, index)))) return;
     editor.selected = element_path(array, index + 1);
 }
 
 void delete_element(Editor& editor, const TextPath& array, std::size_t index) {
-    change_text(editor, without(editor.document->text(), element_path(array, index)),
-                "Delete " + path_text(element_path(array, index)));
-    editor.selected = array;
+    const auto deleted = [&](const std::string& text) { return without(text, element_path(array, index)); };
+    if (change_text(editor, deleted, "Delete " + path_text(element_path(array, index))))
+        editor.selected = array;
 }
 
 void outline_keys(Editor& editor, const Section& section, const TextPath& path, bool top);

@@ -68,10 +68,10 @@ void value_row(Editor& editor, const ValueRow& row) {
         const bool dragging = ImGui::IsItemActive() || ImGui::IsMouseDown(ImGuiMouseButton_Left);
         if (row.key.name == "name" && row.path.size() > 1 && value->starts_with('"')) {
             const Node typed = parsed_value(*value);
-            change_text(
-                editor,
-                with_new_name(editor.document->text(), editor.document->values(), row.path, typed.text),
-                "Rename to " + typed.text);
+            const auto renamed = [&](const std::string& text) {
+                return with_new_name(text, editor.document->values(), row.path, typed.text);
+            };
+            change_text(editor, renamed, "Rename to " + typed.text);
         } else {
             set_value(editor, row.path, *value, dragging);
         }
@@ -80,7 +80,8 @@ void value_row(Editor& editor, const ValueRow& row) {
     ImGui::TableNextColumn();
     if (row.present && !row.key.required) {
         if (ImGui::SmallButton("\u00d7")) {
-            change_text(editor, without(editor.document->text(), row.path), "Reset " + name);
+            change_text(
+                editor, [&](const std::string& text) { return without(text, row.path); }, "Reset " + name);
         }
         editor.controls.note("reset " + name);
         tooltip_of_last("Take it out of the scene: the default holds");
@@ -224,6 +225,7 @@ void properties_panel(Editor& editor) {
                 ImGui::TextWrapped("%s", effect.substr(0, 260).c_str());
                 ImGui::PopStyleColor();
             }
+            generation_row(editor);
             ImGui::Separator();
             if (is_list) {
                 ImGui::TextWrapped("Choose an element on the left, or make one with +.");

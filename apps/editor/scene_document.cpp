@@ -41,22 +41,25 @@ SceneDocument::SceneDocument(const fs::path& path) : path_(path), has_file_(true
 void SceneDocument::read() {
     ++version_;
     problems_.clear();
-    const fs::path folder = has_file_ ? fs::absolute(path_).parent_path() : fs::path();
-    Document document;
-    const int origin = document.add_origin(path_.filename().string(), text(), true);
-    std::optional<Node> parsed = document.parse(origin);
-    if (!parsed) {
-        problems_ = std::move(document.problems);
-        return;
-    }
-    values_ = std::move(*parsed);
-    tree_ = toml_tree(text());
+    syntax_error_ = true;
     try {
-        scene_ = read_scene_text(text(), path_.filename().string(), folder);
-        if (values_.find("name") == nullptr && has_file_) scene_->name = path_.stem().string();
+        const fs::path folder = has_file_ ? fs::absolute(path_).parent_path() : fs::path();
+        Document document;
+        const int origin = document.add_origin(path_.filename().string(), text(), true);
+        std::optional<Node> parsed = document.parse(origin);
+        if (!parsed) {
+            problems_ = std::move(document.problems);
+            return;
+        }
+        values_ = std::move(*parsed);
+        tree_ = toml_tree(text());
+        syntax_error_ = false;
+        Scene scene = read_scene_text(text(), path_.filename().string(), folder);
+        if (values_.find("name") == nullptr && has_file_) scene.name = path_.stem().string();
+        scene_ = std::move(scene);
     } catch (const SceneErrors& errors) {
         problems_ = errors.problems();
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {  // an edit is never lost to what it means
         Problem& problem = problems_.emplace_back();
         problem.where.file = path_.filename().string();
         problem.message = error.what();
@@ -119,6 +122,18 @@ void SceneDocument::save_as(const fs::path& path) {
     if (moved) read();  // names of files in it are relative to its folder
 }
 
+bool SceneDocument::is_changed_on_disk() const {
+    if (!has_file_) return false;
+    std::error_code error;
+    const auto time = fs::last_write_time(path_, error);
+    if (error || time == file_time_) return false;
+    try {
+        return read_file(path_) != saved_text_;
+    } catch (const Error&) {
+        return true;  // something is there that cannot be read
+    }
+}
+
 SceneDocument::Disk SceneDocument::look_at_disk() {
     if (!has_file_) return Disk::same;
     std::error_code error;
@@ -136,12 +151,14 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
         return Disk::same;
     }
     if (is_modified()) return Disk::differs;
-    reload();
+    take_from_disk(std::move(now));
     return Disk::reloaded;
 }
 
-void SceneDocument::reload() {
-    saved_text_ = read_file(path_);
+void SceneDocument::reload() { take_from_disk(read_file(path_)); }
+
+void SceneDocument::take_from_disk(std::string text) {
+    saved_text_ = std::move(text);
     note_file();
     edit(saved_text_, "Change on disk");
 }
@@ -168,11 +185,34 @@ void SceneDocument::remove_autosave() {
     autosaved_version_ = 0;
 }
 
-std::optional<fs::path> SceneDocument::found_autosave(const fs::path& folder) const {
-    const fs::path path = autosave_path(folder);
+std::optional<SceneDocument::Autosave> SceneDocument::found_autosave(const fs::path& folder) const {
+    Autosave found;
+    found.path = autosave_path(folder);
     std::error_code error;
-    if (!fs::is_regular_file(path, error)) return std::nullopt;
-    return path;
+    if (!fs::is_regular_file(found.path, error)) return std::nullopt;
+    found.time = fs::last_write_time(found.path, error);
+    if (error) return std::nullopt;
+    try {
+        if (read_file(found.path) == text()) return std::nullopt;  // they were saved after all
+    } catch (const Error&) {
+        return std::nullopt;
+    }
+    if (has_file_ && file_time_ && *file_time_ > found.time) found.file_is_newer = file_time_;
+    return found;
+}
+
+fs::path keep_autosave(const fs::path& autosave) {
+    const fs::path scene = autosave.stem().string().substr(1);  // ".sky.toml" without its point
+    for (int number = 1;; ++number) {
+        const std::string end = number == 1 ? "-recovered" : "-recovered-" + std::to_string(number);
+        const fs::path kept =
+            autosave.parent_path() / (scene.stem().string() + end + scene.extension().string());
+        std::error_code error;
+        if (fs::exists(fs::symlink_status(kept, error))) continue;
+        fs::rename(autosave, kept, error);
+        if (error) throw Error(ErrorCode::io, kept.string() + ": " + error.message());
+        return kept;
+    }
 }
 
 }  // namespace nephos

@@ -34,6 +34,8 @@ class SceneDocument {
     // The last text without problems as a scene; none when there was none.
     const std::optional<Scene>& scene() const { return scene_; }
     const std::vector<Problem>& problems() const { return problems_; }
+    // The text cannot be parsed: values() are those of an earlier one.
+    bool has_syntax_error() const { return syntax_error_; }
 
     // Replaces the text as one step of the history. Edits in a row with the same `merge`, if it is not empty, are one
     // step: those of one drag of a slider. Returns false when nothing changes.
@@ -54,6 +56,8 @@ class SceneDocument {
     bool has_file() const { return has_file_; }
     const std::filesystem::path& path() const { return path_; }
     std::string title() const { return path_.filename().string(); }
+    // Returns whether another program has written the file since it was read or saved.
+    bool is_changed_on_disk() const;
     // Throw Error(io) naming the file; the file then is as it was.
     void save();
     void save_as(const std::filesystem::path& path);
@@ -68,8 +72,14 @@ class SceneDocument {
     // there are none. Throws Error(io).
     void autosave(const std::filesystem::path& folder);
     void remove_autosave();
-    // The file of that kind that a crashed editor left for this scene; none when there is none newer.
-    std::optional<std::filesystem::path> found_autosave(const std::filesystem::path& folder) const;
+    // A file of that kind that a crashed editor left for this scene, with edits that the text does not have.
+    struct Autosave {
+        std::filesystem::path path;
+        std::filesystem::file_time_type time;
+        // When the scene's file was written after these edits: the time of that.
+        std::optional<std::filesystem::file_time_type> file_is_newer;
+    };
+    std::optional<Autosave> found_autosave(const std::filesystem::path& folder) const;
 
   private:
     struct Version {
@@ -77,6 +87,7 @@ class SceneDocument {
     };
     void read();
     void note_file();
+    void take_from_disk(std::string text);
     std::filesystem::path autosave_path(const std::filesystem::path& folder) const;
 
     std::vector<Version> history_;
@@ -92,6 +103,11 @@ class SceneDocument {
     Node values_;
     std::optional<Scene> scene_;
     std::vector<Problem> problems_;
+    bool syntax_error_ = false;
 };
+
+// Moves edits of an earlier session into a scene file of their own beside it, whose name no file has, and returns that
+// name: "sky-recovered.toml" for ".sky.toml.autosave". Throws Error(io).
+std::filesystem::path keep_autosave(const std::filesystem::path& autosave);
 
 }  // namespace nephos

@@ -43,6 +43,9 @@ Settings read_settings(const std::filesystem::path& folder) {
         if (key == "left") take(value, 0.0f, 4000.0f, settings.left);
         if (key == "right") take(value, 0.0f, 4000.0f, settings.right);
         if (key == "bottom") take(value, 0.0f, 4000.0f, settings.bottom);
+        if (key == "tab") take(value, 0, 2, settings.tab);
+        if (key == "plots") settings.plots = value != "off";
+        if (key == "shapes") settings.shapes = value != "off";
         if (key == "theme") settings.dark = value != "light";
         if (key == "scale") take(value, 0.0f, 4.0f, settings.scale);
         if (key == "recent" && settings.recent.size() < kMostRecent) settings.recent.push_back(value);
@@ -52,8 +55,10 @@ Settings read_settings(const std::filesystem::path& folder) {
 
 void write_settings(const std::filesystem::path& folder, const Settings& settings) {
     std::string text =
-        fmt::format("width = {}\nheight = {}\nleft = {}\nright = {}\nbottom = {}\ntheme = {}\nscale = {}\n",
-                    settings.width, settings.height, settings.left, settings.right, settings.bottom,
+        fmt::format("width = {}\nheight = {}\nleft = {}\nright = {}\nbottom = {}\n", settings.width,
+                    settings.height, settings.left, settings.right, settings.bottom) +
+        fmt::format("tab = {}\nplots = {}\nshapes = {}\ntheme = {}\nscale = {}\n", settings.tab,
+                    settings.plots ? "on" : "off", settings.shapes ? "on" : "off",
                     settings.dark ? "dark" : "light", settings.scale);
     for (const std::string& recent : settings.recent) {
         if (recent.find('\n') == std::string::npos) text += "recent = " + recent + "\n";

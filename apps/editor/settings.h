@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the editor remembers from one start to the next: the size of its window and panels, theme, recent files. A text
+// What the editor remembers from one start to the next: the size of its window and panels, which of them show, theme,
+// recent files. A text
 // file of `key = value` lines in the user's configuration folder.
 
 #include <filesystem>
@@ -13,6 +14,8 @@ namespace nephos {
 struct Settings {
     int width = 1360, height = 860;               // of the window
     float left = 250, right = 390, bottom = 190;  // of the panels, at scale 1
+    int tab = 0;                                  // 0 properties, 1 view, 2 text
+    bool plots = true, shapes = true;             // below the time line, over the picture
     bool dark = true;
     float scale = 0;                  // 0: that of the display
     std::vector<std::string> recent;  // newest first

@@ -23,6 +23,7 @@
 #include "apps/editor/settings.h"
 #include "apps/editor/window.h"
 #include "scenes/format/schema.h"
+#include "seeds/model.h"
 
 namespace nephos {
 
@@ -59,9 +60,38 @@ struct BackgroundRun {
     }
 };
 
+// A cloud that a base model makes.
+struct GeneratedCloud {
+    std::uint32_t number = 0;
+    Cloud cloud;
+    std::vector<Billboard> billboards;
+    std::vector<double> absorbed;  // of its boxes, of the light of sketches
+};
+
+// What is shown of the clouds that the selected base model makes.
+struct Generation {
+    std::optional<std::uint32_t> number;  // the one over the picture
+    bool shows_grid = false;
+    std::uint32_t first = 0;  // of the sketches
+    // Clouds that were made last: of a version of the text and a model, from a number on.
+    struct Made {
+        std::uint64_t version = 0;
+        std::size_t model = 0;
+        std::uint32_t from = 0;
+        std::vector<GeneratedCloud> clouds;
+    };
+    Made one, grid;
+};
+
 enum class SliceOf { nothing, bits, p_hum, p_act, p_ext };
 inline constexpr const char* kSliceNames[] = {"no slice", "bits", "probability of hum", "probability of act",
                                               "probability of ext"};
+
+// A question before something is overwritten or broken off.
+struct Question {
+    std::string text, yes;      // label of the button that lets `act` be done
+    std::function<void()> act;
+};
 
 enum class FileDialog { none, open, save_as, export_grid, screenshot };
 // What waits for an answer about unsaved edits.
@@ -89,6 +119,7 @@ struct Editor {
     ImVec2 view_min{}, view_max{};  // of the picture in the window
     std::shared_ptr<const LivePicture> picture;
     std::vector<LiveStep> steps;
+    std::uint64_t steps_version = 0;
     std::vector<std::uint64_t> checkpoints;  // steps that the user wants to come back to, rising
     bool record = false;  // edits of wind, climate and lights become key frames at the present step
     float final_state = 1, climate_minutes = 30;  // of a change of climate
@@ -106,6 +137,7 @@ struct Editor {
     SliceOf slice_of = SliceOf::nothing;  // what a slice over the picture shows
     int slice = 0;                        // its height, in cells
     double slice_most = 0;                // the largest probability in it
+    Generation generation;
     bool show_gizmos = true, show_plots = true;
     bool flash_on_click = false;  // the next click on the picture is lightning
 
@@ -113,15 +145,19 @@ struct Editor {
     FileDialog dialog = FileDialog::none;
     std::filesystem::path dialog_folder, pending_path;
     std::string dialog_name, dialog_problem;
+    std::filesystem::path replaced;  // an existing file that the dialog has asked about
+    std::optional<Question> question;
     Pending pending = Pending::none;
     bool show_shortcuts = false, show_about = false, show_run = false, show_recovery = false;
     std::vector<std::filesystem::path> folder_scenes;
     std::string message;  // in the status bar
     bool message_is_bad = false;
     std::chrono::steady_clock::time_point message_time, last_disk_look, last_autosave;
+    SceneDocument::Disk disk = SceneDocument::Disk::same;  // as it was last said
     std::unique_ptr<BackgroundRun> run;
     bool quit = false, theme_changed = false;
     std::filesystem::path capture_to;  // a picture of the window that is due
+    bool capture_by_user = false;      // who goes on without it; otherwise the program was started for it
 };
 
 // Writes pixels of 4 bytes, row 0 at the top, as PNG without the fourth. Throws Error(io).
@@ -130,8 +166,13 @@ void save_rgba(const std::filesystem::path& path, int width, int height, std::sp
 // Says something in the status bar.
 void say(Editor& editor, std::string message, bool is_bad = false);
 
-// editor.cpp: changes of the document reach the live scene; `what` names the step for undo.
-void change_text(Editor& editor, std::string text, const std::string& what, const std::string& merge = {});
+// edits.cpp: does something that may throw; what went wrong is said in the status bar. Returns whether it was done.
+bool attempt(Editor& editor, const std::function<void()>& act);
+
+// Changes of the document reach the live scene; `what` names the step for undo. `edit` returns the new text. A change
+// that fails, and one of a text with a syntax error, in which nothing has its place, is said and changes nothing.
+using TextEdit = std::function<std::string(const std::string& text)>;
+bool change_text(Editor& editor, const TextEdit& edit, const std::string& what, const std::string& merge = {});
 void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false);
 // Several keys of a table as one step of the history.
 void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging = false);
@@ -139,7 +180,10 @@ void open_document(Editor& editor, std::unique_ptr<SceneDocument> document);
 // Ends what waited for an answer about unsaved edits.
 void do_pending(Editor& editor);
 void ask_before(Editor& editor, Pending what, std::filesystem::path path = {});
+// Asks first when another program has written the file. Returns whether it was saved.
 bool save_document(Editor& editor);
+// Writes window, panels, theme and recent files down; what goes wrong is said.
+void keep_settings(Editor& editor);
 
 // layout.cpp: panels around the picture; those that find no room are left out. `scale` is that of text.
 void layout(Editor& editor, float scale);
@@ -157,6 +201,12 @@ void dialogs(Editor& editor);
 
 // dialogs.cpp
 void open_dialog(Editor& editor, FileDialog dialog);
+// questions.cpp: each shows while it waits for an answer.
+void unsaved_dialog(Editor& editor);
+void question_dialog(Editor& editor);
+void recovery_dialog(Editor& editor);
+// run_window.cpp
+void run_window(Editor& editor);
 
 // properties.cpp: how many base models of the scene come from other files; they stand before those of the text.
 std::size_t models_from_files(const Editor& editor);
@@ -186,6 +236,12 @@ void back_to_checkpoint(Editor& editor);  // the last before the present step
 
 // simulations.cpp: the layers that run.
 void simulations_list(Editor& editor);
+
+// generate.cpp: buttons of a base model that is selected; sketches of its clouds; and the one that is shown over the
+// picture, null when none is.
+void generation_row(Editor& editor);
+void generation_window(Editor& editor);
+const GeneratedCloud* generated_cloud(Editor& editor);
 
 // hodograph.cpp: of the wind that is selected.
 void hodograph(Editor& editor);

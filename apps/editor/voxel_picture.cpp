@@ -193,7 +193,8 @@ Picture voxel_picture(const Scene& scene, const FrameResult& frame, const Camera
     for (const LayerFrame& layer : frame.layers) {
         if (!layer.direct || layer.sky == nullptr) continue;
         DrawnClouds drawn;
-        SkyBillboards().append(*layer.sky, layer.clouds, options, std::nullopt, drawn);
+        SkyBillboards().append(*layer.sky, layer.clouds, options, std::nullopt, drawn, true, std::nullopt,
+                               std::nullopt, frame.time_s);
         draw_lines(picture, camera, billboard_lines(drawn, camera));
     }
     return picture;

@@ -108,6 +108,7 @@ struct PictureImage {
     explicit PictureImage(const Gpu& from) : gpu(from) {}
     // Takes a picture; the device must not be drawing with the last one.
     void set(int width, int height, const unsigned char* rgba);
+    void clear() { due_ = filled_ = false; }
     void upload(vk::CommandBuffer commands);
     // Fills an image of the window with a colour and puts the picture into a rectangle of it, scaled.
     void draw(vk::CommandBuffer commands, vk::Image to, vk::Extent2D extent, const vk::Rect2D& place);

@@ -8,11 +8,13 @@
 #include <cmath>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include <GLFW/glfw3.h>
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_vulkan.h>
+#include <dlfcn.h>
 
 #include "apps/editor/vulkan_parts.h"
 #include "core/error.h"
@@ -44,18 +46,49 @@ struct Glfw {
     Glfw& operator=(const Glfw&) = delete;
 };
 
+template <typename Function>
+Function* symbol(const char* name) {
+    return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
+}
+
+// Dots an inch of an X server over 96 where nobody has set Xft.dpi, which is all that GLFW asks for; 1 elsewhere. By
+// name, so that a GLFW for another window system does as well, and X11's headers are not needed.
+float x_server_scale() {
+    const auto display_of = symbol<void*()>("glfwGetX11Display");
+    const auto resources_of = symbol<char*(void*)>("XResourceManagerString");
+    const auto width_of = symbol<int(void*, int)>("XDisplayWidth"),
+               mm_of = symbol<int(void*, int)>("XDisplayWidthMM");
+    if (display_of == nullptr || resources_of == nullptr || width_of == nullptr || mm_of == nullptr) return 1;
+    void* const display = display_of();
+    if (display == nullptr) return 1;
+    const char* const resources = resources_of(display);
+    if (resources != nullptr && std::string(resources).find("Xft.dpi") != std::string::npos) return 1;
+    const int mm = mm_of(display, 0);
+    return mm > 0 ? 25.4f * float(width_of(display, 0)) / float(mm) / 96 : 1;
+}
+
+// In quarters, so that text is as sharp as its size allows.
+float display_scale() {
+    float x = 1, y = 1;
+    if (GLFWmonitor* const monitor = glfwGetPrimaryMonitor()) glfwGetMonitorContentScale(monitor, &x, &y);
+    if (x == 1) x = std::max(1.0f, x_server_scale());
+    return std::clamp(std::round(4 * x) / 4, 0.5f, 4.0f);
+}
+
 struct WindowHandle {
-    explicit WindowHandle(const WindowOptions& options) {
+    explicit WindowHandle(const WindowOptions& options) : scale(display_scale()) {
         glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
         glfwWindowHint(GLFW_VISIBLE, options.visible ? GLFW_TRUE : GLFW_FALSE);
-        glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
-        window = glfwCreateWindow(options.width, options.height, options.title.c_str(), nullptr, nullptr);
+        const auto scaled = [&](int size) { return int(std::lround(scale * float(size))); };
+        window = glfwCreateWindow(scaled(options.width), scaled(options.height), options.title.c_str(),
+                                  nullptr, nullptr);
         if (window == nullptr) throw Error(ErrorCode::gpu, "no window can be opened: " + glfw_problem);
         glfwSetWindowSizeLimits(window, 200, 150, GLFW_DONT_CARE, GLFW_DONT_CARE);
     }
     ~WindowHandle() { glfwDestroyWindow(window); }
     WindowHandle(const WindowHandle&) = delete;
     WindowHandle& operator=(const WindowHandle&) = delete;
+    float scale = 1;  // factor between 96 dots an inch and this display
     GLFWwindow* window = nullptr;
 };
 
@@ -120,6 +153,12 @@ struct Window::Impl {
         }
         ImGui_ImplVulkan_Shutdown();
         ImGui_ImplGlfw_Shutdown();
+    }
+
+    std::array<int, 2> size() const {
+        std::array<int, 2> out{};
+        glfwGetWindowSize(handle.window, &out[0], &out[1]);
+        return out;
     }
 
     vk::Extent2D framebuffer_size() const {
@@ -210,6 +249,8 @@ void Window::set_picture(int width, int height, const unsigned char* rgba) {
     });
 }
 
+void Window::clear_picture() { impl_->picture.clear(); }
+
 void Window::place_picture(const ImVec2& min, const ImVec2& max) {
     const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
     const auto pixel = [](float at) { return std::int32_t(std::lround(std::max(at, 0.0f))); };
@@ -225,6 +266,8 @@ void Window::rebuild_fonts() { impl_->fonts_loaded = false; }
 
 void Window::set_title(const std::string& title) { glfwSetWindowTitle(impl_->handle.window, title.c_str()); }
 void Window::set_size(int width, int height) { glfwSetWindowSize(impl_->handle.window, width, height); }
+int Window::width() const { return int(std::lround(float(impl_->size()[0]) / content_scale())); }
+int Window::height() const { return int(std::lround(float(impl_->size()[1]) / content_scale())); }
 void Window::minimise(bool minimised) {
     if (minimised) {
         glfwIconifyWindow(impl_->handle.window);
@@ -237,11 +280,7 @@ bool Window::is_minimised() const {
     return size.width == 0 || size.height == 0 ||
            glfwGetWindowAttrib(impl_->handle.window, GLFW_ICONIFIED) == GLFW_TRUE;
 }
-float Window::content_scale() const {
-    float x = 1, y = 1;
-    glfwGetWindowContentScale(impl_->handle.window, &x, &y);
-    return std::clamp(x, 0.5f, 4.0f);
-}
+float Window::content_scale() const { return impl_->handle.scale; }
 std::string Window::device_name() const { return impl_->gpu.name; }
 std::vector<std::filesystem::path> Window::take_dropped() { return std::exchange(impl_->dropped, {}); }
 std::vector<std::string> Window::validation_messages() const { return impl_->gpu.messages(); }

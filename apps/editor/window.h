@@ -52,6 +52,8 @@ class Window {
 
     // Takes the picture that is drawn below the interface: row 0 at the top, 4 bytes a pixel.
     void set_picture(int width, int height, const unsigned char* rgba);
+    // There is none until the next set_picture().
+    void clear_picture();
     // Where it shows, scaled, in this frame and later ones; ImGui's coordinates.
     void place_picture(const ImVec2& min, const ImVec2& max);
 
@@ -64,6 +66,9 @@ class Window {
 
     void set_title(const std::string& title);
     void set_size(int width, int height);
+    // Size that opens a window like this one: on a display with larger dots it gets larger again.
+    int width() const;
+    int height() const;
     void minimise(bool minimised);
     bool is_minimised() const;
     // Factor between 96 dots per inch and this display.

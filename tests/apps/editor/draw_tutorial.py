@@ -23,6 +23,16 @@ wait 0.3
 wait-picture
 screenshot editor-voxels.png
 """
+GRID = """
+wait-step 1
+key SPACE
+click model
+click model[0]
+click "20 at once"
+click "cloud 7"
+wait 0.7
+screenshot editor-generate.png
+"""
 
 
 def walk(nephos, script, folder, *arguments):
@@ -38,6 +48,8 @@ def main():
         walk(nephos, HERE / "tutorial.txt", folder)
         (folder / "voxels.txt").write_text(VOXELS, encoding="utf-8")
         walk(nephos, folder / "voxels.txt", folder, str(SOURCE / "scenes/cumulus.toml"))
+        (folder / "grid.txt").write_text(GRID, encoding="utf-8")
+        walk(nephos, folder / "grid.txt", folder, str(SOURCE / "scenes/torchelsen/cloud-4.toml"))
         for picture in sorted(folder.glob("*.png")):
             with Image.open(picture) as image:
                 image.convert("RGB").save(PICTURES / (picture.stem + ".jpg"), quality=88)

@@ -6,19 +6,15 @@ Vulkan loader."""
 
 import csv
 import os
-import pathlib
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 import tomllib
 import unittest
 
 from PIL import Image, ImageStat
 
-NEPHOS = os.environ["NEPHOS"]
-SOURCE = pathlib.Path(os.environ["SOURCE"])
+from case import NEPHOS, SOURCE, Case
 
 
 # Two layers: clouds of an automaton, and above them clouds that are drawn directly, so that each kind of change shows.
@@ -62,41 +58,6 @@ target_m = [0, 400, 1400]
 elevation_deg = 30
 azimuth_deg = 240
 """
-
-
-class Case(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="nephos-editor-"))
-        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
-        self.environment = {**os.environ, "XDG_CONFIG_HOME": str(self.folder / "config"), "VK_LOADER_LAYERS_ENABLE": ""}
-
-    def edit(self, *arguments, script=None, status=0, display=True, size="1280x800", environment=None):
-        """Runs the editor; returns what it printed. A hang ends it after four minutes."""
-        command = [NEPHOS, "edit", *map(str, arguments)]
-        if script is not None:
-            path = self.folder / "script.txt"
-            path.write_text(script, encoding="utf-8")
-            command += ["--script", str(path)]
-        if display:
-            command += ["--size", size]
-            command = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24", *command]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=240, cwd=self.folder,
-                              env={**self.environment, **(environment or {})}, check=False)
-        output = done.stdout + done.stderr
-        self.assertEqual(done.returncode, status, output)
-        return output
-
-    def image(self, name, box=None):
-        """A picture of the test's folder in grey, or a part of it."""
-        with Image.open(self.folder / name) as image:
-            return image.convert("L").crop(box or (0, 0, *image.size))
-
-    def scene(self, name):
-        """A copy of a shipped scene in the test's folder."""
-        text = (SOURCE / "scenes" / name).read_text(encoding="utf-8")
-        path = self.folder / pathlib.Path(name).name
-        path.write_text(text, encoding="utf-8")
-        return path
 
 
 class Window(Case):

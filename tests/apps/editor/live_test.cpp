@@ -147,6 +147,84 @@ TEST(LiveScene, FailuresAreSaidAndAnotherSceneGoesOn) {
     EXPECT_EQ(live.status().failure, "");
 }
 
+std::string layer_text(const std::string& name) {
+    return "[[layer]]\nname = \"" + name +
+           "\"\nskies = \"few\"\nautomaton = false\nbase_height_m = 1000\nlattice = { cells = [32, 32, 8], "
+           "cell_size_m = 80, origin_m = [-1280, -1280, 900] }\n";
+}
+
+Scene layered_scene(int layers, double sun_deg) {
+    std::string text =
+        "name = \"layers\"\n[[model]]\nname = \"bank\"\nseeds = [{ size_m = [700, 600, 300], billboards = 4, "
+        "billboard_width_m = [300, 500], billboard_height_m = [200, 300] }]\n[[sky]]\nname = \"few\"\nstate "
+        "= "
+        "0\nclouds = 5\nmodels = \"bank\"\n[sun]\nelevation_deg = " +
+        std::to_string(sun_deg) + "\n";
+    for (int n = 0; n < layers; ++n) text += layer_text("layer-" + std::to_string(n));
+    return read_scene_text(text, "layers.toml");
+}
+
+// The clouds of a scene are drawn with its own light and layers until those of the next one are there, which here
+// never come.
+TEST(LiveScene, FramesAreDrawnWithTheSceneThatTheyAreOf) {
+    LiveScene live({.splatting = Splatting::cpu});
+    LiveView view = small_view();
+    live.set_view(view);
+    live.start(layered_scene(3, 40), 2);
+    const auto rests = [&] {
+        return live.picture(0) && live.picture(0)->refined && live.picture(0)->step == 2;
+    };
+    ASSERT_TRUE(comes(rests)) << live.status().failure;
+    const std::vector<std::uint8_t> day = live.picture(0)->rgba;
+    Scene night = layered_scene(1, -15);
+    night.layers[0].automaton = true;
+    night.layers[0].extent = {65536, 65536, 512};  // no memory for it
+    live.start(night, 2);
+    ASSERT_TRUE(comes([&] { return !live.status().failure.empty(); }));
+    live.redraw(night);
+    view.detail = !view.detail;  // drawn anew
+    const std::uint64_t number = live.picture(0)->number;
+    live.set_view(view);
+    ASSERT_TRUE(comes([&] { return live.picture(number) && live.picture(number)->refined; }));
+    EXPECT_TRUE(live.picture(0)->rgba == day);
+    live.start(layered_scene(1, 40), 2);
+    ASSERT_TRUE(comes([&] { return live.frame() && live.frame()->frame.layers.size() == 1 && rests(); }));
+    EXPECT_EQ(live.status().failure, "");
+}
+
+// Scenes with more and with fewer layers in turn, while views change: under a sanitizer no index is out of bounds.
+TEST(LiveScene, NumberOfLayersChangesWhileItIsDrawn) {
+    LiveScene live({.splatting = Splatting::cpu});
+    LiveView view = small_view();
+    for (int n = 0; n < 60; ++n) {
+        live.start(layered_scene(1 + n * 2 % 5, 40), std::uint64_t(n % 3));
+        view.mode = n % 6;
+        view.hidden.assign(std::size_t(n % 4), n % 2 == 0);
+        live.set_view(view);
+        live.redraw(layered_scene(1 + n * 2 % 5, 20));
+        std::this_thread::sleep_for(std::chrono::milliseconds(n % 7));
+    }
+    ASSERT_TRUE(comes([&] { return live.frame() && live.frame()->frame.layers.size() == 1 + 59 * 2 % 5; }))
+        << live.status().failure;
+    EXPECT_EQ(live.status().failure, "");
+}
+
+TEST(LiveScene, AClearedOneShowsNothingUntilTheNext) {
+    LiveScene live({.splatting = Splatting::cpu});
+    live.set_view(small_view());
+    live.start(small_scene(), 20);
+    ASSERT_TRUE(comes([&] { return live.status().step == 20 && live.picture(0); }));
+    const std::uint64_t rows = live.status().rows_version;
+    live.clear();
+    ASSERT_TRUE(comes([&] { return live.status().rows == 0; }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));  // longer than a draft waits for its detail
+    EXPECT_EQ(live.picture(0), nullptr);
+    EXPECT_EQ(live.frame(), nullptr);
+    EXPECT_GT(live.status().rows_version, rows);
+    live.start(small_scene(), 3);
+    ASSERT_TRUE(comes([&] { return live.status().step == 3 && live.picture(0); }));
+}
+
 TEST(LiveScene, OnlySomeChangesNeedAnotherSimulation) {
     const Scene scene = small_scene();
     Scene other = scene;

@@ -192,15 +192,85 @@ TEST(SceneDocument, UnsavedEditsSurviveACrash) {
         document.edit("seed = 9\n", "edit");
         document.autosave(folder.path);
     }  // no orderly end
+    fs::last_write_time(path, fs::last_write_time(path) - std::chrono::seconds(60));
     SceneDocument next(path);
     const auto found = next.found_autosave(folder.path);
     ASSERT_TRUE(found);
-    EXPECT_EQ(content(*found), "seed = 9\n");
-    next.edit(content(*found), "Recover");
+    EXPECT_EQ(content(found->path), "seed = 9\n");
+    EXPECT_FALSE(found->file_is_newer);
+    next.edit(content(found->path), "Recover");
     next.autosave(folder.path);
     next.save();
     EXPECT_FALSE(next.found_autosave(folder.path));  // saved: there is nothing to recover
     EXPECT_EQ(content(path), "seed = 9\n");
+}
+
+// Edits of a crashed session, and a file that was written after them: the user has to know, and may keep both.
+TEST(SceneDocument, AutosaveOlderThanTheFileSaysSo) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    {
+        SceneDocument document(path);
+        document.edit("seed = 9\n", "edit");
+        document.autosave(folder.path);
+    }
+    write(path, "seed = 5\n");
+    const auto written =
+        std::filesystem::last_write_time(folder.path / ".a.toml.autosave") + std::chrono::seconds(9);
+    std::filesystem::last_write_time(path, written);
+    const SceneDocument next(path);
+    EXPECT_EQ(next.text(), "seed = 5\n");
+    const auto found = next.found_autosave(folder.path);
+    ASSERT_TRUE(found);
+    ASSERT_TRUE(found->file_is_newer);
+    EXPECT_EQ(*found->file_is_newer, written);
+    write(folder.path / "a-recovered.toml", "name = \"another\"\n");
+    const std::filesystem::path kept = keep_autosave(found->path);
+    EXPECT_EQ(kept.filename(), "a-recovered-2.toml");
+    EXPECT_EQ(content(kept), "seed = 9\n");
+    EXPECT_FALSE(next.found_autosave(folder.path));
+}
+
+// An autosave with what the file has is nothing to ask about.
+TEST(SceneDocument, AutosaveThatWasSavedIsNotOffered) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    {
+        SceneDocument document(path);
+        document.edit("seed = 9\n", "edit");
+        document.autosave(folder.path);
+    }
+    write(path, "seed = 9\n");
+    EXPECT_FALSE(SceneDocument(path).found_autosave(folder.path));
+}
+
+TEST(SceneDocument, KnowsWhatAnotherProgramWrote) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    SceneDocument document(path);
+    EXPECT_FALSE(document.is_changed_on_disk());
+    const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
+    write(path, "seed = 2\n");
+    std::filesystem::last_write_time(path, later);
+    EXPECT_TRUE(document.is_changed_on_disk());
+    document.save();
+    EXPECT_FALSE(document.is_changed_on_disk());
+    EXPECT_EQ(content(path), "seed = 1\n");
+}
+
+TEST(SceneDocument, SyntaxErrorsAreToldFromOtherProblems) {
+    SceneDocument document(std::string("seed = 1\n"));
+    EXPECT_FALSE(document.has_syntax_error());
+    document.edit("=", "type");
+    EXPECT_TRUE(document.has_syntax_error());
+    document.edit("sea = 1\n", "type");
+    EXPECT_FALSE(document.has_syntax_error());
+    EXPECT_FALSE(document.problems().empty());
+    ASSERT_TRUE(document.scene());  // the last good one
+    EXPECT_EQ(document.scene()->automaton.seed, 1u);
 }
 
 TEST(SceneDocument, SavingWhereItCannotKeepsTheEdits) {

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// Changes of the document, and the document itself: opened, saved. Nothing here lets an exception out: what goes wrong
+// is said, and the edits that were made stay.
+
+#include <exception>
+#include <utility>
+
+#include "apps/editor/state.h"
+
+namespace nephos {
+
+bool attempt(Editor& editor, const std::function<void()>& act) {
+    try {
+        act();
+        return true;
+    } catch (const std::exception& error) {
+        say(editor, error.what(), true);
+        return false;
+    }
+}
+
+bool change_text(Editor& editor, const TextEdit& edit, const std::string& what, const std::string& merge) {
+    if (editor.document->has_syntax_error()) {
+        say(editor, "Nothing is changed while the text has a syntax error: mend it in the tab Text, or undo",
+            true);
+        return false;
+    }
+    return attempt(editor, [&] { editor.document->edit(edit(editor.document->text()), what, merge); });
+}
+
+void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging) {
+    set_values(editor, TextPath(path.begin(), path.end() - 1), {{path.back().name, value}}, dragging);
+}
+
+void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging) {
+    TextPath path = table;
+    path.push_back({entries.front().first, 0});
+    const std::string name = path_text(path);
+    const auto changed = [&](std::string text) {
+        for (const auto& [key, value] : entries) {
+            path.back().name = key;
+            text = with_value(text, path, value);
+        }
+        return text;
+    };
+    bool recorded = false;
+    if (editor.record && !editor.document->has_syntax_error()) {
+        const bool tried =
+            attempt(editor, [&] { recorded = record_live(editor, path, changed(editor.document->text())); });
+        if (!tried) return;
+    }
+    if (!recorded) change_text(editor, changed, "Change " + name, dragging ? name : "");
+}
+
+void open_document(Editor& editor, std::unique_ptr<SceneDocument> document) {
+    editor.document->remove_autosave();
+    editor.document = std::move(document);
+    editor.live.clear();  // until the scene of the new one is there, which may have problems
+    editor.picture.reset();
+    editor.window->clear_picture();
+    editor.disk = SceneDocument::Disk::same;
+    editor.shown_version = 0;
+    editor.shown_scene.reset();
+    editor.selected.clear();
+    editor.steps.clear();
+    editor.checkpoints.clear();
+    editor.text_version = 0;
+    editor.defaults.clear();
+    editor.defaults_version = 0;
+    editor.live.run(editor.running = true);
+    if (editor.document->has_file()) {
+        note_recent(editor.settings, editor.document->path());
+        keep_settings(editor);
+    }
+    editor.show_recovery = editor.document->found_autosave(editor.folder).has_value();
+}
+
+bool save_document(Editor& editor) {
+    const auto save = [&editor] {
+        try {
+            editor.document->save();
+            note_recent(editor.settings, editor.document->path());
+            say(editor, "Saved " + editor.document->path().string());
+            return true;
+        } catch (const std::exception& error) {
+            say(editor, std::string("Not saved: ") + error.what(), true);
+            return false;
+        }
+    };
+    if (!editor.document->is_changed_on_disk()) return save();
+    editor.question = {editor.document->title() + " was changed by another program since it was read.",
+                       "Overwrite it", [&editor, save] {
+                           if (save() && editor.pending != Pending::none) do_pending(editor);
+                       }};
+    return false;
+}
+
+void keep_settings(Editor& editor) {
+    if (!editor.options.screenshot.empty()) return;  // nobody has set anything
+    editor.settings.plots = editor.show_plots;
+    editor.settings.shapes = editor.show_gizmos;
+    editor.settings.tab = editor.tab;
+    try {
+        write_settings(editor.folder, editor.settings);
+    } catch (const std::exception& error) {
+        say(editor, std::string("Settings are not kept: ") + error.what(), true);
+    }
+}
+
+}  // namespace nephos

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// Questions before something is lost: unsaved edits, those of an earlier session, what would be overwritten.
+
+#include <chrono>
+#include <ctime>
+#include <filesystem>
+
+#include <imgui.h>
+
+#include "apps/editor/state.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string time_text(fs::file_time_type time) {
+    const auto seconds =
+        std::chrono::time_point_cast<std::chrono::seconds>(std::chrono::file_clock::to_sys(time));
+    const std::time_t when = std::chrono::system_clock::to_time_t(seconds);
+    std::tm local{};
+    char text[64] = "";
+    if (localtime_r(&when, &local) != nullptr)
+        std::strftime(text, sizeof text, "%-d %B %Y, %H:%M:%S", &local);
+    return text;
+}
+
+}  // namespace
+
+void unsaved_dialog(Editor& editor) {
+    if (editor.pending == Pending::none || editor.dialog != FileDialog::none || editor.question) return;
+    constexpr const char* kTitle = "Unsaved edits";
+    if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
+    if (!ImGui::BeginPopupModal(kTitle, nullptr,
+                                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
+        return;
+    ImGui::Text("%s has edits that are not saved.", editor.document->title().c_str());
+    ImGui::Spacing();
+    if (button(editor, "Save them")) {
+        if (!editor.document->has_file()) {
+            open_dialog(editor, FileDialog::save_as);
+            ImGui::CloseCurrentPopup();
+        } else if (save_document(editor)) {
+            do_pending(editor);
+            ImGui::CloseCurrentPopup();
+        } else if (editor.question) {
+            ImGui::CloseCurrentPopup();
+        }
+    }
+    ImGui::SameLine();
+    if (button(editor, "Discard them")) {
+        do_pending(editor);
+        ImGui::CloseCurrentPopup();
+    }
+    ImGui::SameLine();
+    if (button(editor, "Go on editing") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) {
+        editor.pending = Pending::none;
+        ImGui::CloseCurrentPopup();
+    }
+    ImGui::EndPopup();
+}
+
+void recovery_dialog(Editor& editor) {
+    if (!editor.show_recovery) return;
+    constexpr const char* kTitle = "Edits of an earlier session";
+    if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
+    if (!ImGui::BeginPopupModal(kTitle, nullptr,
+                                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
+        return;
+    ImGui::Text("An earlier session with %s ended before its edits were saved.",
+                editor.document->title().c_str());
+    const auto found = editor.document->found_autosave(editor.folder);
+    const auto close = [&] {
+        editor.show_recovery = false;
+        ImGui::CloseCurrentPopup();
+    };
+    if (!found) {
+        close();
+        return ImGui::EndPopup();
+    }
+    ImGui::TextDisabled("The edits are of %s.", time_text(found->time).c_str());
+    if (found->file_is_newer) {
+        ImGui::Text("The file itself is newer: it was written on %s.",
+                    time_text(*found->file_is_newer).c_str());
+        editor.controls.note("the file is newer");
+    }
+    ImGui::Spacing();
+    if (button(editor, "Take them", "In place of what the file has; undo goes back to that")) {
+        const bool taken = attempt(editor, [&] {
+            const SceneDocument saved(found->path);
+            editor.document->edit(saved.text(), "Recover");
+        });
+        if (taken) say(editor, "Edits recovered; save to keep them, undo to go back");
+        close();
+    }
+    ImGui::SameLine();
+    if (button(editor, "Keep them in a file", "As a scene beside this one, to look at later")) {
+        attempt(editor, [&] { say(editor, "Kept as " + keep_autosave(found->path).string()); });
+        close();
+    }
+    ImGui::SameLine();
+    if (button(editor, "Delete them")) {
+        attempt(editor, [&] { fs::remove(found->path); });
+        close();
+    }
+    ImGui::EndPopup();
+}
+
+void question_dialog(Editor& editor) {
+    if (!editor.question) return;
+    constexpr const char* kTitle = "Are you sure?";
+    if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
+    if (!ImGui::BeginPopupModal(kTitle, nullptr,
+                                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
+        return;
+    ImGui::TextUnformatted(editor.question->text.c_str());
+    ImGui::Spacing();
+    const bool yes = button(editor, editor.question->yes);
+    ImGui::SameLine();
+    const bool no = button(editor, "Go back") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape));
+    if (yes || no) {
+        const Question question = std::move(*editor.question);
+        editor.question.reset();
+        ImGui::CloseCurrentPopup();
+        if (no) editor.pending = Pending::none;
+        if (yes) attempt(editor, question.act);
+    }
+    ImGui::EndPopup();
+}
+
+}  // namespace nephos

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The editor as a user has it, for the tests of this folder: the window under Xvfb with the software driver, moved by
+scripts of clicks and keys. Environment: NEPHOS the command, SOURCE the source tree."""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+from PIL import Image
+
+NEPHOS = os.environ["NEPHOS"]
+SOURCE = pathlib.Path(os.environ["SOURCE"])
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="nephos-editor-"))
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+        self.environment = {**os.environ, "XDG_CONFIG_HOME": str(self.folder / "config"), "VK_LOADER_LAYERS_ENABLE": ""}
+
+    def command(self, *arguments, script=None, display=True, size="1280x800", server=()):
+        """The words of a call of the editor. `server`: more arguments of the X server."""
+        command = [NEPHOS, "edit", *map(str, arguments)]
+        if script is not None:
+            path = self.folder / "script.txt"
+            path.write_text(script, encoding="utf-8")
+            command += ["--script", str(path)]
+        if display:
+            command += ["--size", size] if size else []
+            command = ["xvfb-run", "-a", "-s", " ".join(["-screen 0 1600x1000x24", *server]), *command]
+        return command
+
+    def edit(self, *arguments, status=0, environment=None, **call):
+        """Runs the editor; returns what it printed. A hang ends it after four minutes."""
+        done = subprocess.run(self.command(*arguments, **call), capture_output=True, text=True, timeout=240,
+                              cwd=self.folder, env={**self.environment, **(environment or {})}, check=False)
+        output = done.stdout + done.stderr
+        self.assertEqual(done.returncode, status, output)
+        return output
+
+    def image(self, name, box=None):
+        """A picture of the test's folder in grey, or a part of it."""
+        with Image.open(self.folder / name) as image:
+            return image.convert("L").crop(box or (0, 0, *image.size))
+
+    def scene(self, name):
+        """A copy of a shipped scene in the test's folder."""
+        text = (SOURCE / "scenes" / name).read_text(encoding="utf-8")
+        path = self.folder / pathlib.Path(name).name
+        path.write_text(text, encoding="utf-8")
+        return path

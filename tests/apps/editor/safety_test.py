@@ -1,0 +1,348 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""What a user must not lose: edits through errors, files that are there already, the window's layout. And the size of
+everything on a display with small dots. See case.py."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+import unittest
+
+from PIL import Image, ImageChops, ImageStat
+
+from case import NEPHOS, Case
+
+MODELS = """name = "models"
+seed = 4
+[[model]]
+name = "bank"
+light_distance_m = 900
+seeds = [{ size_m = [700, 600, 300], billboards = [4, 8], billboard_width_m = [200, 400], billboard_height_m = [150, 250], \
+texture = "dense", roots = [{ pitch_deg = 30, open_yaw_deg = 360, seeds_start = 3, seeds_end = 2, reproductions = [1, 2] }] }]
+[[sky]]
+name = "few"
+state = 0
+clouds = 3
+models = "bank"
+[[layer]]
+name = "low"
+skies = "few"
+automaton = false
+base_height_m = 1000
+lattice = { cells = [32, 32, 8], cell_size_m = 80, origin_m = [-1280, -1280, 900] }
+"""
+
+
+class Safety(Case):
+    def models(self):
+        path = self.folder / "models.toml"
+        path.write_text(MODELS, encoding="utf-8")
+        return path
+
+    def test_edits_of_a_text_that_is_no_toml(self):
+        """With `=` as the whole text the outline still shows the scene: copying, deleting, adding and renaming what it
+        shows are refused with a message, the program goes on, and undo brings the scene back."""
+        scene = self.models()
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            click model
+            click model[0]
+            click tab Text
+            click text
+            key CTRL+A
+            type =
+            wait 0.3
+            expect-control problems
+            click model[0]
+            key CTRL+D
+            wait 0.3
+            key DELETE
+            wait 0.3
+            click new model
+            wait 0.3
+            click tab View
+            click "Keep it in the scene"
+            click tab Text
+            click text
+            key CTRL+A
+            type @
+            wait 0.3
+            click scene
+            key CTRL+Z
+            key CTRL+Z
+            wait 0.3
+            click sun
+            click tab Properties
+            set sun.elevation_deg 21
+            key CTRL+S
+            wait 0.5
+            """)
+        saved = tomllib.loads(scene.read_text(encoding="utf-8"))
+        self.assertEqual(saved["sun"]["elevation_deg"], 21)
+        self.assertEqual(saved["model"], tomllib.loads(MODELS)["model"])
+
+    def test_saving_over_another_file_asks(self):
+        """Save as, onto a file that is there: the first press asks, another name takes the question back, and only
+        Replace it overwrites. The scene's own file is no question."""
+        scene = self.models()
+        other = self.folder / "other.toml"
+        other.write_text("seed = 99\n", encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            key CTRL+SHIFT+S
+            set "file name" other.toml
+            wait 0.3
+            expect-control "Replace it"
+            set "file name" third.toml
+            wait 0.5
+            key CTRL+SHIFT+S
+            set "file name" other.toml
+            click Cancel
+            wait 0.3
+            """)
+        self.assertEqual(other.read_text(encoding="utf-8"), "seed = 99\n")
+        self.assertEqual((self.folder / "third.toml").read_text(encoding="utf-8"), MODELS)
+        self.edit(scene, script="""
+            wait-step 1
+            key CTRL+SHIFT+S
+            set "file name" other.toml
+            click "Replace it"
+            wait 0.5
+            """)
+        self.assertEqual(other.read_text(encoding="utf-8"), MODELS)
+
+    def test_a_picture_that_cannot_be_saved(self):
+        """A picture of the window into a folder that cannot be made: said, and the program goes on."""
+        scene = self.models()
+        self.edit(scene, script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            key F12
+            set "file name" /proc/nowhere/window.png
+            wait 0.5
+            expect-control sun.elevation_deg
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+
+    def test_a_file_that_another_program_changed(self):
+        """Saving over what another program wrote meanwhile asks first; going back leaves the file as it is."""
+        scene = self.models()
+        script = """
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            wait 0.3
+            hashes ready.txt
+            wait 2
+            key CTRL+S
+            wait 0.5
+            expect-control "Overwrite it"
+            click "{}"
+            wait 0.5
+            quit
+            """
+        for answer, expected in (("Go back", "seed = 77\n"), ("Overwrite it", "elevation_deg = 21")):
+            scene.write_text(MODELS, encoding="utf-8")
+            ready = self.folder / "ready.txt"
+            ready.unlink(missing_ok=True)
+            program = subprocess.Popen(self.command(scene, script=script.format(answer)), cwd=self.folder,
+                                       env=self.environment, stderr=subprocess.PIPE, text=True)
+            self.wait_for(ready, program)
+            time.sleep(0.1)
+            scene.write_text("seed = 77\n", encoding="utf-8")
+            errors = program.communicate(timeout=120)[1]
+            self.assertEqual(program.returncode, 0, errors)
+            self.assertIn(expected, scene.read_text(encoding="utf-8"))
+
+    def wait_for(self, path, program):
+        for _ in range(1200):
+            if path.exists():
+                return
+            self.assertIsNone(program.poll(), "it ended")
+            time.sleep(0.1)
+        program.kill()
+        self.fail(f"no {path} after two minutes")
+
+    def test_an_older_autosave_is_not_taken_for_the_newer(self):
+        """Edits of a crashed session beside a file that was written later: the question says so, and they can be kept
+        as a scene of their own."""
+        scene = self.models()
+        autosave = self.folder / ".models.toml.autosave"
+        autosave.write_text("seed = 5\n", encoding="utf-8")
+        os.utime(autosave, (time.time() - 3600,) * 2)
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            expect-control "the file is newer"
+            click "Keep them in a file"
+            wait 0.3
+            click sun
+            set sun.elevation_deg 21
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertFalse(autosave.exists())
+        self.assertEqual((self.folder / "models-recovered.toml").read_text(encoding="utf-8"), "seed = 5\n")
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+
+    def test_a_signal_keeps_the_edits(self):
+        """An end of the session: the program ends by SIGTERM within a moment, and unsaved edits are beside the scene."""
+        scene = self.models()
+        ready = self.folder / "ready.txt"
+        program = subprocess.Popen(self.command(scene, script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            hashes ready.txt
+            wait 60
+            """), cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+        self.wait_for(ready, program)
+        (editor,) = [int(pid) for pid in os.listdir("/proc") if pid.isdigit() and self.is_our_editor(pid)]
+        os.kill(editor, signal.SIGTERM)
+        program.communicate(timeout=30)
+        self.assertEqual(program.returncode, 128 + signal.SIGTERM)
+        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
+        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+
+    def is_our_editor(self, pid):
+        try:
+            with open(f"/proc/{pid}/cmdline", "rb") as file:
+                words = file.read().split(b"\0")
+        except OSError:
+            return False
+        return words[0].endswith(b"nephos-editor") and str(self.folder / "script.txt").encode() in words
+
+    def test_a_scene_with_problems_shows_none_of_the_clouds_before(self):
+        """The clouds of one scene are not left under the title of the next, which cannot be simulated."""
+        self.models()
+        bad = self.folder / "other"
+        bad.mkdir()
+        (bad / "a.toml").write_text(MODELS, encoding="utf-8")
+        (bad / "b.toml").write_text("[sun]\nelevation_deg = 95\n", encoding="utf-8")
+        self.edit(bad, script="""
+            wait-step 1
+            key SPACE
+            wait-picture
+            screenshot clouds.png
+            click menu File
+            click "menu Scenes of the folder"
+            click "menu b.toml"
+            wait 1
+            expect-control problems
+            screenshot nothing.png
+            """)
+        box = (320, 80, 850, 550)
+        self.assertGreater(ImageStat.Stat(self.image("clouds.png", box)).stddev[0], 10)
+        self.assertLess(ImageStat.Stat(self.image("nothing.png", box)).stddev[0], 3)
+
+
+class Models(Case):
+    def test_clouds_of_a_model(self):
+        """Generate again counts up; twenty sketches show different clouds; the chosen one becomes a base model whose seeds
+        are its boxes, with what the model has besides."""
+        scene = self.folder / "models.toml"
+        scene.write_text(MODELS, encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            key SPACE
+            click model
+            click model[0]
+            click "Generate again"
+            expect-control "cloud number 0"
+            click "Generate again"
+            expect-control "cloud number 1"
+            click "20 at once"
+            wait 0.5
+            screenshot grid.png
+            click "The next 20"
+            click "cloud 27"
+            wait 0.3
+            expect-control "cloud number 27"
+            click "Make it a base model"
+            wait 0.5
+            key CTRL+S
+            wait 0.5
+            """)
+        before, model = tomllib.loads(MODELS)["model"][0], None
+        models = tomllib.loads(scene.read_text(encoding="utf-8"))["model"]
+        self.assertEqual(models[0], before)
+        self.assertEqual(len(models), 2)
+        model = models[1]
+        self.assertNotEqual(model["name"], "bank")
+        self.assertEqual(model["light_distance_m"], 900)
+        self.assertGreater(len(model["seeds"]), 3)
+        for seed in model["seeds"]:
+            self.assertEqual(seed["size_m"], [700, 600, 300])
+            self.assertEqual(seed["texture"], "dense")
+            self.assertEqual(seed["billboard_width_m"], [200, 400])
+            self.assertTrue(4 <= seed["billboards"] <= 8, seed)
+            self.assertNotIn("roots", seed)
+        self.assertEqual(len({tuple(seed["position_m"]) for seed in model["seeds"]}), len(model["seeds"]))
+        subprocess.run([NEPHOS, "validate", str(scene)], check=True, capture_output=True)
+        with Image.open(self.folder / "grid.png") as image:  # sketches: bright puffs on blue
+            pixels = list(image.convert("RGB").getdata())
+        puffs = sum(1 for red, green, blue in pixels if min(red, green, blue) > 200)
+        self.assertGreater(puffs, 5000)
+
+
+class Layout(Case):
+    def test_it_is_remembered(self):
+        """Size of the window, of panels, the tab, and recent files are those of the last session."""
+        scene = self.scene("cumulus-by-hand.toml")
+        self.edit(scene, script="""
+            wait-step 1
+            resize 1100 720
+            wait 0.5
+            drag "left bar" 70 0
+            drag "bottom bar" 0 -40
+            click menu View
+            click menu Plots
+            click tab View
+            wait 0.3
+            """)
+        kept = (self.folder / "config/nephos/editor.conf").read_text(encoding="utf-8")
+        values = dict(line.split(" = ", 1) for line in kept.splitlines())
+        self.assertEqual((values["width"], values["height"]), ("1100", "720"))
+        self.assertEqual((float(values["left"]), float(values["bottom"])), (320, 230))
+        self.assertEqual((values["tab"], values["plots"]), ("1", "off"))
+        self.assertEqual(values["recent"], str(scene))
+        self.edit(size=None, script="""
+            wait-step 1
+            expect-control "Record as key frames"
+            click menu File
+            click menu Recent
+            wait 0.3
+            screenshot again.png
+            """)
+        self.assertEqual(self.image("again.png").size, (1100, 720))
+
+    def test_small_dots(self):
+        """At 192 dots an inch window, text and panels are twice as large as at 96, and the picture has all the dots."""
+        scene = self.scene("cumulus-by-hand.toml")
+        for name, dots in (("normal", "96"), ("small", "192")):
+            self.edit(scene, "--validation", size="760x480", server=("-dpi", dots), script=f"""
+                wait-step 2
+                key SPACE
+                key HOME
+                wait-picture
+                screenshot {name}.png
+                picture {name}-clouds.png
+                """)
+        normal, small = self.image("normal.png"), self.image("small.png")
+        self.assertEqual(normal.size, (760, 480))
+        self.assertEqual(small.size, (1520, 960))
+        outline = (0, 25, 160, 440)
+        halved = small.resize(normal.size, Image.Resampling.BOX).crop(outline)
+        difference = ImageStat.Stat(ImageChops.difference(normal.crop(outline), halved)).mean[0]
+        self.assertLess(difference, 8)
+        clouds, many = self.image("normal-clouds.png"), self.image("small-clouds.png")
+        self.assertAlmostEqual(many.width / clouds.width, 2, delta=0.05)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[1:]], verbosity=2)
