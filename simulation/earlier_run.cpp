@@ -2,15 +2,11 @@
 #include "simulation/earlier_run.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <vector>
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 
 #include "automaton/checkpoint.h"
 #include "core/atomic_file.h"
@@ -155,37 +151,6 @@ SimulationRange range_before(const RunSettings& settings, const Scene& before) {
 }
 
 }  // namespace
-
-FolderLock::FolderLock(const std::filesystem::path& folder) : path_(folder) {
-    std::error_code failed;
-    std::filesystem::create_directories(folder, failed);
-    if (failed)
-        throw Error(ErrorCode::io, folder.string() + ": cannot create the folder: " + failed.message());
-    folder_.reset(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (folder_.get() < 0) {
-        const int error = errno;
-        throw Error(ErrorCode::io, folder.string() + ": cannot open the folder: " + std::strerror(error));
-    }
-    int result = 0;
-    do {
-        result = ::flock(folder_.get(), LOCK_EX | LOCK_NB);
-    } while (result != 0 && errno == EINTR);
-    if (result != 0 && errno == EWOULDBLOCK) {
-        throw Error(ErrorCode::io,
-                    folder.string() +
-                        ": another run is writing into this folder: wait for its end, or choose another "
-                        "--out");
-    }
-    held_ = result == 0;
-}
-
-bool FolderLock::in_place() const { return is_same_file(folder_.get(), path_); }
-
-void FolderLock::require_in_place() const {
-    if (in_place()) return;
-    throw Error(ErrorCode::io,
-                path_.string() + ": the folder was removed or renamed while the run was writing into it");
-}
 
 void remove_earlier_run(const RunFolder& folder) {
     for (const std::filesystem::path& path : earlier_files(folder)) remove_file(path);

@@ -7,34 +7,10 @@
 #include <filesystem>
 #include <string>
 
-#include "core/descriptor.h"
 #include "simulation/run_folder.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
-
-// Holds the folder itself by flock(2) while it lives: no file is left behind, and the lock ends with the
-// process however that ends. Programs that only read are not kept out.
-class FolderLock {
-  public:
-    // Makes the folder when it is not there. Throws Error(io) when another run holds it, or it cannot be made
-    // or opened.
-    explicit FolderLock(const std::filesystem::path& folder);
-
-    // Returns false on a file system that has no locks (some network ones): two runs are then not kept apart.
-    bool held() const { return held_; }
-
-    // Returns true while the folder's path leads to the folder that is held. Who removes or renames it takes the lock
-    // along, and another run may begin in a new one of that name.
-    bool in_place() const;
-    // Throws Error(io) unless in_place().
-    void require_in_place() const;
-
-  private:
-    std::filesystem::path path_;
-    Descriptor folder_;
-    bool held_ = false;
-};
 
 // Removes an earlier run's files of the same name, which must not stay between those of a new one; nothing else is
 // touched. Throws Error(io).

@@ -16,6 +16,7 @@
 #include "scenes/format/writer.h"
 #include "simulation/branch.h"
 #include "simulation/earlier_run.h"
+#include "simulation/folder_lock.h"
 #include "simulation/frame_output.h"
 #include "simulation/manifest.h"
 #include "simulation/statistics_file.h"
@@ -410,7 +411,7 @@ RunReport run_scene(RunSettings settings, const RunObserver& observer) {
     settings.resume = resumption == Resumption::go_on;
     Recorder recorder(settings);  // opens the device
 
-    const FolderLock lock(folder.folder);
+    const FolderLock lock(folder.folder, "run");
     if (resumption == Resumption::nothing_there && !settings.overwrite) refuse_to_lose(folder, settings);
     if (lock.held()) remove_leftovers(folder);
     Simulation simulation = settings.resume   ? resumed_simulation(settings, folder)

@@ -83,6 +83,7 @@ ExportOptions options_of(const ExportArguments& a) {
         }
         if (!found) throw Error(ErrorCode::usage, "--to '" + name + "' is none of " + names);
     }
+    const ExportOptions given = options;
     if (!a.target.empty()) {
         const ExportPreset* preset = nullptr;
         std::string names;
@@ -94,6 +95,7 @@ ExportOptions options_of(const ExportArguments& a) {
         options.target = preset->name;
         preset->apply(options);
     }
+    refuse_unused(given, options);
     options.folder = a.out.empty() ? std::filesystem::path("export") : std::filesystem::path(a.out);
     return options;
 }

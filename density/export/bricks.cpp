@@ -141,6 +141,13 @@ struct Head {
     std::uint64_t bricks = 0;
 };
 
+// Bricks without density take no bytes, so a file may be much smaller than its voxels; a few bytes must not ask for all
+// memory nevertheless.
+std::uint64_t most_voxel_bytes(std::size_t file_bytes) {
+    constexpr std::uint64_t kAlways = std::uint64_t(256) << 20, kRatio = 2000;
+    return kAlways + kRatio * file_bytes;
+}
+
 Head read_head(ByteReader& reader, std::size_t file_bytes) {
     Head head;
     if (reader.get<std::uint64_t>() != kMark) bad("is no file of bricks");
@@ -151,6 +158,7 @@ Head read_head(ByteReader& reader, std::size_t file_bytes) {
         bad("its head is impossible");
     head.volume.type = VoxelType(type);
     head.edge = int(edge);
+    std::uint64_t bytes = 0;
     for (std::uint32_t n = 0; n < levels; ++n) {
         std::array<int, 3> size{};
         std::uint64_t bricks = 1;
@@ -160,14 +168,17 @@ Head read_head(ByteReader& reader, std::size_t file_bytes) {
             voxels = int(stated);
             bricks *= std::uint64_t(bricks_along(voxels, head.edge));
         }
-        // Each brick has an entry, so a short file cannot ask for much memory.
         if (bricks > file_bytes / kEntryBytes) bad("its sizes are impossible");
         head.bricks += bricks;
-        head.volume.levels.push_back(
-            {size[0], size[1], size[2],
-             std::vector<std::byte>(encoded_bytes(size[0], size[1], size[2], head.volume.type))});
+        bytes += encoded_bytes(size[0], size[1], size[2], head.volume.type);
+        if (bytes > most_voxel_bytes(file_bytes))
+            bad("its sizes take " + std::to_string(bytes) + " bytes of memory, too many for a file of " +
+                std::to_string(file_bytes));
+        head.volume.levels.push_back({size[0], size[1], size[2], {}});
     }
     if (count != head.bricks) bad("its number of bricks does not fit its sizes");
+    for (VolumeLevel& level : head.volume.levels)
+        level.bytes.resize(encoded_bytes(level.nx, level.ny, level.nz, head.volume.type));
     return head;
 }
 

@@ -38,7 +38,8 @@ struct BrickOptions {
 void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& levels,
                   const BrickOptions& options);
 
-// Returns the levels put together from the bricks.
+// Returns the levels put together from the bricks. A file whose levels take more than 256 MiB and 2,000 times its own bytes
+// is refused before memory is taken.
 EncodedVolume read_bricks(const std::filesystem::path& path);
 
 // Returns the most bytes that a file of these levels takes.

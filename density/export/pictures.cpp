@@ -60,6 +60,9 @@ std::vector<std::byte> zipped(const std::vector<std::byte>& bytes) {
     return table.take();
 }
 
+// zlib's format packs at most 1,032 bytes into one: what states more is damaged, and needs no memory.
+std::uint64_t most_inflated(std::uint64_t packed) { return 1032 * packed + 1024; }
+
 std::vector<std::byte> unzipped(ByteReader& reader) {
     const auto count = reader.get<std::uint64_t>(), block = reader.get<std::uint64_t>(),
                last = reader.get<std::uint64_t>();
@@ -71,6 +74,8 @@ std::vector<std::byte> unzipped(ByteReader& reader) {
     for (std::size_t n = 0; n < sizes.size(); ++n) {
         const std::uint64_t size = n + 1 == sizes.size() && last != 0 ? last : block;
         if (sizes[n] > reader.rest().size()) throw Error(ErrorCode::io, "it ends inside of a block");
+        if (size > most_inflated(sizes[n]))
+            throw Error(ErrorCode::io, "a block states more bytes than it can hold");
         const std::size_t at = out.size();
         out.resize(at + std::size_t(size));
         uLongf length = uLongf(size);
@@ -148,8 +153,13 @@ EncodedVolume read_vti(const std::filesystem::path& path) {
             while (at < extent.data() + extent.size() && *at == ' ') ++at;
             at = std::from_chars(at, extent.data() + extent.size(), bound).ptr;
         }
+        const std::size_t points = xml.find("<PointData");
+        constexpr int kMostSide = 1 << 20;
+        if (points == xml.npos ||
+            std::ranges::any_of(bounds, [](int bound) { return bound < 0 || bound >= kMostSide; }))
+            throw Error(ErrorCode::io, "it is no VTI file of nephos");
         EncodedVolume volume{VoxelType::r32f, {}};
-        const std::string_view type = attribute(xml.substr(xml.find("<PointData")), "type");
+        const std::string_view type = attribute(xml.substr(points), "type");
         for (const VoxelType one : {VoxelType::r8, VoxelType::r16, VoxelType::r32f})
             if (vtk_type(one) == type) volume.type = one;
         VolumeLevel level{bounds[1] + 1, bounds[3] + 1, bounds[5] + 1, {}};
@@ -226,38 +236,91 @@ void write_slices(const std::filesystem::path& path, const EncodedVolume& volume
     write_atomically(path, std::string_view(writing.bytes));
 }
 
-EncodedVolume read_slices(const std::filesystem::path& path, int nx, int ny, int nz, int columns) {
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    const std::vector<std::byte> bytes = whole_file(path);
-    const auto fail = [&](const char* what) {
-        png_image_free(&image);
-        return Error(ErrorCode::io, path.string() + ": " + what);
-    };
-    if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
-        throw fail("it is no PNG file");
-    const bool wide = (image.format & PNG_FORMAT_FLAG_LINEAR) != 0;
-    const int rows = (nz + columns - 1) / columns;
-    if (int(image.width) != nx * columns || int(image.height) != ny * rows || wide)
-        throw fail("it is no picture of 8-bit slices of this size");
-    image.format = PNG_FORMAT_GRAY;
-    std::vector<std::byte> pixels(PNG_IMAGE_SIZE(image));
-    if (png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) == 0) throw fail("it is damaged");
-    VolumeLevel level{nx, ny, nz,
-                      std::vector<std::byte>(std::size_t(nx) * std::size_t(ny) * std::size_t(nz))};
-    for (int k = 0; k < nz; ++k) {
-        for (int y = 0; y < ny; ++y) {
-            const std::size_t from =
-                (std::size_t(k / columns) * std::size_t(ny) + std::size_t(y)) * image.width +
-                std::size_t(k % columns) * std::size_t(nx);
-            std::memcpy(
-                level.bytes.data() + (std::size_t(k) * std::size_t(ny) + std::size_t(y)) * std::size_t(nx),
-                pixels.data() + from, std::size_t(nx));
-        }
+namespace {
+
+// A grey picture while it is read; outlives the jumps of libpng.
+struct GreyPicture {
+    std::span<const std::byte> left;  // of the file
+    std::uint32_t width = 0, height = 0;
+    int depth = 0;                   // bits of a sample, 8 or 16
+    std::vector<std::byte> samples;  // as voxels have them
+    const char* problem = "it is no PNG file, or is damaged";
+};
+
+void take_png(png_structp png, png_bytep data, png_size_t size) {
+    auto* picture = static_cast<GreyPicture*>(png_get_io_ptr(png));
+    if (size > picture->left.size()) png_error(png, "ends early");
+    std::memcpy(data, picture->left.data(), size);
+    picture->left = picture->left.subspan(size);
+}
+
+// Reads what has been made sure of: `picture.problem` says what failed when libpng jumps.
+void read_rows(png_structp png, png_infop info, GreyPicture& picture) {
+    const std::size_t file_bytes = picture.left.size();
+    png_set_read_fn(png, &picture, take_png);
+    png_read_info(png, info);
+    picture.width = png_get_image_width(png, info);
+    picture.height = png_get_image_height(png, info);
+    picture.depth = png_get_bit_depth(png, info);
+    if (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || picture.depth < 8 ||
+        png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) {
+        picture.problem = "it is no grey picture of 8 or 16 bits";
+        png_error(png, picture.problem);
     }
-    EncodedVolume volume{VoxelType::r8, {}};
-    volume.levels.push_back(std::move(level));
-    return volume;
+    const std::size_t row_bytes = std::size_t(picture.width) * std::size_t(picture.depth / 8);
+    if (row_bytes * picture.height > most_inflated(file_bytes)) {
+        picture.problem = "it states more pixels than it can hold";
+        png_error(png, picture.problem);
+    }
+    if (picture.depth == 16) png_set_swap(png);  // PNG is big-endian
+    picture.samples.resize(row_bytes * picture.height);
+    for (std::uint32_t y = 0; y < picture.height; ++y)
+        png_read_row(png, reinterpret_cast<png_bytep>(picture.samples.data() + y * row_bytes), nullptr);
+    png_read_end(png, nullptr);
+}
+
+void read_grey(GreyPicture& picture) {
+    // Errors jump back; the library's warnings are not for the terminal.
+    png_structp png = png_create_read_struct(
+        PNG_LIBPNG_VER_STRING, nullptr, [](png_structp p, png_const_charp) { png_longjmp(p, 1); },
+        [](png_structp, png_const_charp) {});
+    png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+    if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {  // NOLINT: libpng reports by longjmp
+        png_destroy_read_struct(&png, &info, nullptr);
+        throw Error(ErrorCode::io, picture.problem);
+    }
+    read_rows(png, info, picture);
+    png_destroy_read_struct(&png, &info, nullptr);
+}
+
+}  // namespace
+
+EncodedVolume read_slices(const std::filesystem::path& path, int nx, int ny, int nz, int columns) {
+    return with_whole_file(path, [&](ByteReader& reader) {
+        GreyPicture picture;
+        picture.left = reader.rest();
+        read_grey(picture);
+        const int rows = (nz + columns - 1) / columns;
+        if (std::int64_t(picture.width) != std::int64_t(nx) * columns ||
+            std::int64_t(picture.height) != std::int64_t(ny) * rows)
+            throw Error(ErrorCode::io, "it is no picture of slices of this size");
+        const std::size_t voxel = std::size_t(picture.depth / 8), row_bytes = std::size_t(nx) * voxel;
+        EncodedVolume volume{voxel == 1 ? VoxelType::r8 : VoxelType::r16, {}};
+        VolumeLevel level{nx, ny, nz, std::vector<std::byte>(encoded_bytes(nx, ny, nz, volume.type))};
+        for (int k = 0; k < nz; ++k) {
+            for (int y = 0; y < ny; ++y) {
+                const std::size_t from =
+                    ((std::size_t(k / columns) * std::size_t(ny) + std::size_t(y)) * picture.width +
+                     std::size_t(k % columns) * std::size_t(nx)) *
+                    voxel;
+                std::memcpy(
+                    level.bytes.data() + (std::size_t(k) * std::size_t(ny) + std::size_t(y)) * row_bytes,
+                    picture.samples.data() + from, row_bytes);
+            }
+        }
+        volume.levels.push_back(std::move(level));
+        return volume;
+    });
 }
 
 }  // namespace nephos

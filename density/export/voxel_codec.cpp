@@ -30,7 +30,12 @@ void convert_all(const std::vector<float>& values, std::vector<std::byte>& out, 
     });
 }
 
-float half_value(std::uint16_t bits) { return std::bit_cast<float>(std::uint32_t(bits) << 13) * 0x1p112f; }
+float half_value(std::uint16_t bits) {
+    const std::uint32_t sign = std::uint32_t(bits & 0x8000) << 16, rest = std::uint32_t(bits & 0x7FFF) << 13;
+    // Infinities and what is no number have all bits of the exponent set in either width.
+    if ((bits & 0x7C00) == 0x7C00) return std::bit_cast<float>(sign | 0x7F800000 | rest);
+    return std::bit_cast<float>(sign | std::bit_cast<std::uint32_t>(std::bit_cast<float>(rest) * 0x1p112f));
+}
 
 // Four rows of four voxels as the eight bytes of a block: its largest and smallest value, and for each voxel how many
 // sevenths it lies below the largest.

@@ -19,6 +19,7 @@
 #include "simulation/export/export_list.h"
 #include "simulation/export/sequence.h"
 #include "simulation/export/weather.h"
+#include "simulation/folder_lock.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -186,12 +187,13 @@ class FrameExporter {
         if (!(loaded.density.extent() == s.extent) || !(loaded.density.placement() == s.placement))
             throw Error(ErrorCode::io,
                         frame.file.string() + ": has another box than the first file of its sequence");
+        const ExportSource source{frame.file, file_digest(frame.file)};
         std::map<VoxelType, EncodedVolume> encoded;
         std::vector<Volume> levels;
         for (const ExportFormat format : all_formats(options_)) {
             if (format == ExportFormat::usd) continue;
             const std::string name = frame_name(s, frame.number, format);
-            if (list_.keep(name)) continue;
+            if (list_.keep(name, source)) continue;
             const std::filesystem::path path = options_.folder / name;
             if (format == ExportFormat::vdb) {
                 write_vdb_file(path, options_, s, loaded);
@@ -210,7 +212,7 @@ class FrameExporter {
                     write_dense(path, format, s, frame, found->second);
                 }
             }
-            list_.add(name, frame.file, name_of(format));
+            list_.add(name, source, name_of(format));
         }
         return {loaded.density.sum(), double(loaded.density.max_value())};
     }
@@ -369,6 +371,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
         });
         if (most > 0) s.scale = most;
     }
+    const FolderLock lock(options.folder, "export");
     ExportList list(options, sequences);
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
@@ -379,6 +382,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
             if (all_formats(options).empty()) break;
             bool stopped = false;
             reader.read(s.frames, false, [&](std::size_t index, const LoadedDensity& loaded) {
+                lock.require_in_place();
                 SourceFrame& frame = s.frames[index];
                 if (loaded.metadata) {
                     frame.time_s = loaded.metadata->time_s;
@@ -396,6 +400,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 stopped = progress && !progress(done, frames);
                 return !stopped;
             });
+            lock.require_in_place();
             if (stopped) {
                 list.write(false);
                 report.notes = std::move(notes);
@@ -403,8 +408,11 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
             }
         }
         write_texts(options, sequences, figures, list);
+        lock.require_in_place();
         list.write(true);
     } catch (...) {
+        // What failed in a folder that is gone failed for that; and nothing may be listed in a new one of its name.
+        lock.require_in_place();
         list.write_quietly();
         throw;
     }

@@ -61,8 +61,9 @@ struct ExportOptions {
 struct ExportedFile {
     std::filesystem::path path;  // below the folder
     FileDigest digest;
-    // What it was made of, for verify: empty for lists and texts.
+    // What it was made of, for verify and for an export that goes on: empty for lists and texts.
     std::string source, format;
+    std::optional<FileDigest> source_digest{};
 };
 
 // One sequence of an export: a layer, or all together.
@@ -85,6 +86,10 @@ struct ExportReport {
 };
 
 using ExportProgress = std::function<bool(std::size_t frame, std::size_t frames)>;  // false: stop
+
+// Throws Error(usage) for an option that none of the formats takes: nothing that a user asks for is left out in silence.
+// `given`: what the user wrote; `options`: the same with what a preset added.
+void refuse_unused(const ExportOptions& given, const ExportOptions& options);
 
 // Returns what an export would write, and writes nothing. Throws Error(usage) when the options contradict each other,
 // the source or the target's limits; Error(io) as load_density() and read_run().

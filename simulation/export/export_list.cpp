@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/export/export_list.h"
 
-#include <fstream>
+#include <cstdint>
 #include <set>
 #include <system_error>
 #include <vector>
@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
-#include "core/descriptor.h"
 #include "core/error.h"
+#include "simulation/checked_json.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -26,15 +26,19 @@ Json layout_json(const VolumeLayout& layout) {
             {"multiple", layout.multiple},  {"power_of_two", layout.power_of_two}};
 }
 
-VolumeLayout layout_of(const Json& json) {
+// Limits of what an export makes: they keep sizes that a damaged list states from taking all memory.
+constexpr int kMostFactor = 1 << 20, kMostMultiple = 1 << 24, kMostLevels = 32;
+
+VolumeLayout layout_of(const CheckedJson& json) {
     VolumeLayout layout;
-    layout.factor = json.at("factor").get<int>();
-    layout.axes = AxisOrder(json.at("axes").get<int>());
-    layout.border = Border(json.at("border").get<int>());
-    layout.periodic = json.at("periodic").get<std::array<bool, 3>>();
-    layout.multiple = json.at("multiple").get<int>();
-    layout.power_of_two = json.at("power_of_two").get<bool>();
-    if (layout.factor < 1 || layout.multiple < 1) throw Error(ErrorCode::io, "its layout is impossible");
+    layout.factor = int(json.at("factor").integer(1, kMostFactor));
+    layout.axes = AxisOrder(json.at("axes").integer(0, int(AxisOrder::unreal)));
+    layout.border = Border(json.at("border").integer(0, int(Border::wrap)));
+    const std::vector<CheckedJson> periodic = json.at("periodic").items();
+    if (periodic.size() != layout.periodic.size()) json.at("periodic").fail("three of true or false");
+    for (std::size_t a = 0; a < periodic.size(); ++a) layout.periodic[a] = periodic[a].truth();
+    layout.multiple = int(json.at("multiple").integer(1, kMostMultiple));
+    layout.power_of_two = json.at("power_of_two").truth();
     return layout;
 }
 
@@ -70,25 +74,42 @@ Json head_json(const ExportOptions& o, const std::vector<ExportSequence>& sequen
             {"sequences", list}};
 }
 
-ExportedFile file_of(const Json& json) {
+constexpr std::int64_t kMostBytes = std::int64_t(1) << 60;
+
+std::string format_name_of(const CheckedJson& json) {
+    const std::string name = json.text();
+    std::string names;
+    for (const NamedFormat& named : export_formats()) {
+        if (named.name == name) return name;
+        names += (names.empty() ? "" : ", ") + std::string(named.name);
+    }
+    json.fail("one of " + names);
+}
+
+ExportedFile file_of(const CheckedJson& json) {
     ExportedFile file;
-    file.path = json.at("path").get<std::string>();
-    file.digest = {json.at("bytes").get<std::uint64_t>(), json.at("xxh3").get<std::string>()};
-    file.source = json.value("source", std::string());
-    file.format = json.value("format", std::string());
-    const bool inside =
-        file.path.is_relative() && file.path.lexically_normal() == file.path && *file.path.begin() != "..";
-    if (!inside) throw Error(ErrorCode::io, "it lists a file outside of its folder");
+    file.path = json.at("path").text();
+    file.digest = {std::uint64_t(json.at("bytes").integer(0, kMostBytes)), json.at("xxh3").text()};
+    const bool inside = !file.path.empty() && file.path.is_relative() &&
+                        file.path.lexically_normal() == file.path && *file.path.begin() != "..";
+    if (!inside) json.at("path").fail("a file of its folder");
+    if (!json.has("source")) return file;
+    file.source = json.at("source").text();
+    file.format = format_name_of(json.at("format"));
+    // Lists of earlier versions do not say what their sources were.
+    if (json.has("source_xxh3"))
+        file.source_digest = {std::uint64_t(json.at("source_bytes").integer(0, kMostBytes)),
+                              json.at("source_xxh3").text()};
     return file;
 }
 
 Json parsed_list(const std::filesystem::path& path) {
-    require_regular_file(path);
-    std::ifstream stream(path, std::ios::binary);
-    Json json = Json::parse(stream, nullptr, false);
-    if (json.is_discarded() || !json.is_object() || json.value("format", "") != "nephos export" ||
-        json.value("format_version", 0) != kFormatVersion)
-        throw Error(ErrorCode::io, path.string() + ": is no list of an export of this version of nephos");
+    Json json = parsed_json(path);
+    const CheckedJson list(json, path);
+    if (list.at("format").text() != "nephos export") list.at("format").fail("\"nephos export\"");
+    const CheckedJson version = list.at("format_version");
+    if (version.integer(0, INT32_MAX) != kFormatVersion)
+        version.fail(std::to_string(kFormatVersion) + ", the version of this nephos");
     return json;
 }
 
@@ -120,45 +141,47 @@ bool is_export_folder(const std::filesystem::path& folder) {
 ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences)
     : folder_(options.folder) {
     head_ = head_json(options, sequences).dump(2, ' ', false, Json::error_handler_t::replace);
-    std::error_code error;
-    std::filesystem::create_directories(folder_, error);
-    if (error) throw Error(ErrorCode::io, folder_.string() + ": cannot make the folder: " + error.message());
     claim(folder_);
     if (!is_export_folder(folder_)) return;
-    Json json = parsed_list(folder_ / "export.json");
-    const Json files = json.value("files", Json::array());
+    const std::filesystem::path path = folder_ / "export.json";
+    Json json = parsed_list(path);
+    std::vector<ExportedFile> files;
+    for (const CheckedJson& file : CheckedJson(json, path).at("files").items())
+        files.push_back(file_of(file));
     json.erase("files");
     json.erase("complete");
     if (json.dump(2, ' ', false, Json::error_handler_t::replace) != head_)
         throw Error(ErrorCode::usage,
                     folder_.string() +
                         ": holds an export with other options or of another scene: choose another folder");
-    try {
-        for (const Json& one : files) {
-            ExportedFile file = file_of(one);
-            earlier_.emplace(file.path.generic_string(), std::move(file));
-        }
-    } catch (const nlohmann::json::exception&) {
-        throw Error(ErrorCode::io, (folder_ / "export.json").string() + ": is damaged");
+    for (ExportedFile& file : files) {
+        std::string name = file.path.generic_string();
+        earlier_.emplace(std::move(name), std::move(file));
     }
 }
 
-bool ExportList::keep(const std::string& name) {
+bool ExportList::keep(const std::string& name, const ExportSource& source) {
     const auto found = earlier_.find(name);
     std::error_code error;
     if (found == earlier_.end() || !std::filesystem::is_regular_file(folder_ / name, error)) return false;
+    if (!(found->second.source_digest == source.digest)) return false;
     if (!(file_digest(folder_ / name) == found->second.digest)) return false;
     files_.push_back(found->second);
+    files_.back().source = below_folder(source.path);
     ++kept_;
     return true;
 }
 
-void ExportList::add(const std::string& name, const std::filesystem::path& source, std::string_view format) {
-    std::error_code error;
-    std::string from;
-    if (!source.empty()) from = std::filesystem::proximate(source, folder_, error).generic_string();
-    files_.push_back({name, file_digest(folder_ / name), from, std::string(format)});
+void ExportList::add(const std::string& name, const ExportSource& source, std::string_view format) {
+    files_.push_back(
+        {name, file_digest(folder_ / name), below_folder(source.path), std::string(format), source.digest});
     ++written_;
+}
+
+std::string ExportList::below_folder(const std::filesystem::path& source) const {
+    std::error_code error;
+    return source.empty() ? std::string()
+                          : std::filesystem::proximate(source, folder_, error).generic_string();
 }
 
 void ExportList::write(bool complete) const {
@@ -169,6 +192,9 @@ void ExportList::write(bool complete) const {
         Json entry = {
             {"path", file.path.generic_string()}, {"bytes", file.digest.bytes}, {"xxh3", file.digest.xxh3}};
         if (!file.source.empty()) entry.update(Json{{"format", file.format}, {"source", file.source}});
+        if (file.source_digest)
+            entry.update(
+                Json{{"source_bytes", file.source_digest->bytes}, {"source_xxh3", file.source_digest->xxh3}});
         files.push_back(std::move(entry));
     };
     std::set<std::string> listed;
@@ -195,25 +221,21 @@ void ExportList::write_quietly() const noexcept {
 ListedExport read_export(const std::filesystem::path& folder) {
     const std::filesystem::path path = folder / "export.json";
     const Json json = parsed_list(path);
-    try {
-        ListedExport list;
-        list.complete = json.at("complete").get<bool>();
-        for (const Json& file : json.at("files")) list.files.push_back(file_of(file));
-        for (const Json& s : json.at("sequences"))
-            list.sequences.push_back({s.at("name").get<std::string>(), layout_of(s.at("layout")),
-                                      s.at("levels").get<int>(), s.at("scale").get<float>()});
-        const Json& options = json.at("options");
-        for (const auto& [name, type] : options.at("types").items())
-            list.types[name] = VoxelType(type.get<int>());
-        list.half_voxel_shift = options.at("half_voxel_shift").get<bool>();
-        list.quantise = NanoQuantise(options.at("quantise").get<int>());
-        list.grid = options.at("grid").get<std::string>();
-        return list;
-    } catch (const nlohmann::json::exception&) {
-        throw Error(ErrorCode::io, path.string() + ": is no list of an export, or is damaged");
-    } catch (const Error& error) {
-        throw Error(ErrorCode::io, path.string() + ": " + error.what());
-    }
+    const CheckedJson root(json, path);
+    ListedExport list;
+    list.complete = root.at("complete").truth();
+    for (const CheckedJson& file : root.at("files").items()) list.files.push_back(file_of(file));
+    for (const CheckedJson& s : root.at("sequences").items())
+        list.sequences.push_back({s.at("name").text(), layout_of(s.at("layout")),
+                                  int(s.at("levels").integer(1, kMostLevels)),
+                                  float(s.at("scale").real(1e-30, 1e30))});
+    const CheckedJson options = root.at("options");
+    for (const auto& [name, type] : options.at("types").members())
+        list.types[name] = VoxelType(type.integer(0, int(VoxelType::bc4)));
+    list.half_voxel_shift = options.at("half_voxel_shift").truth();
+    list.quantise = NanoQuantise(options.at("quantise").integer(0, int(NanoQuantise::fp16)));
+    list.grid = options.at("grid").text();
+    return list;
 }
 
 }  // namespace nephos

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,16 +16,24 @@
 
 namespace nephos {
 
+// What a file of an export is made of: a density file, or nothing for texts.
+struct ExportSource {
+    std::filesystem::path path;
+    std::optional<FileDigest> digest;
+};
+
 class ExportList {
   public:
-    // Makes the folder, and takes over the list of an earlier export with the same options and sources. Throws
-    // Error(usage) when the folder holds an export with other options, or a file without a list.
+    // Takes over the list of an earlier export with the same options into the folder, which must be there, and removes the
+    // temporary files of one that was killed: for the holder of the folder's lock alone. Throws Error(usage) when the folder
+    // holds an export with other options, or a file without a list; Error(io) when the list is damaged.
     ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 
-    // Returns true when the file is there as it was listed: it need not be written again, and is listed.
-    bool keep(const std::string& name);
-    // Lists a file that was written; `source` is empty for texts.
-    void add(const std::string& name, const std::filesystem::path& source, std::string_view format);
+    // Returns true when the file is there as it was listed, and was made of this source: it need not be written again,
+    // and is listed.
+    bool keep(const std::string& name, const ExportSource& source);
+    // Lists a file that was written.
+    void add(const std::string& name, const ExportSource& source, std::string_view format);
     // Writes the list. Throws Error(io).
     void write(bool complete) const;
     void write_quietly() const noexcept;
@@ -34,6 +43,8 @@ class ExportList {
     std::size_t kept() const { return kept_; }
 
   private:
+    std::string below_folder(const std::filesystem::path& source) const;
+
     std::filesystem::path folder_;
     std::string head_;  // JSON of all but the files
     std::map<std::string, ExportedFile> earlier_;
@@ -58,7 +69,7 @@ struct ListedExport {
     std::string grid;
 };
 
-// Throws Error(io) naming the file when it cannot be read or is no list.
+// Throws Error(io) naming the file, and the value that is not what it must be.
 ListedExport read_export(const std::filesystem::path& folder);
 
 // Returns the grid half a voxel towards -x, -y and -z, sharing its voxels.

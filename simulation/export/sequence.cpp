@@ -98,25 +98,76 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
     return s;
 }
 
+std::array<int, 3> sides_of(const ExportSequence& s) { return {s.extent.x, s.extent.y, s.extent.z}; }
+
+// Voxels of so many of the grid's end where the box repeats.
+bool keeps_period(const ExportSequence& s, int factor) {
+    const std::array<int, 3> sides = sides_of(s);
+    for (std::size_t a = 0; a < 3; ++a)
+        if (s.layout.periodic[a] && sides[a] % factor != 0) return false;
+    return true;
+}
+
+// The nearest factor that keeps the period, from `factor` on upwards (`step` 1) or downwards (-1); 0: none.
+int factor_near(const ExportSequence& s, int factor, int step) {
+    const std::array<int, 3> sides = sides_of(s);
+    for (int f = factor; f >= 1 && f <= std::ranges::max(sides); f += step)
+        if (keeps_period(s, f)) return f;
+    return 0;
+}
+
+[[noreturn]] void refuse_period(const ExportSequence& s, const std::string& option, int factor) {
+    std::string period;
+    const std::array<int, 3> sides = sides_of(s);
+    for (std::size_t a = 0; a < 3; ++a)
+        if (s.layout.periodic[a])
+            period += fmt::format("{}{} voxels along {}", period.empty() ? "" : " and ", sides[a], "xyz"[a]);
+    const double edge = s.placement.cell_size_m;
+    const int below = factor_near(s, factor, -1), above = factor_near(s, factor, 1);
+    std::string cure;
+    for (const int f : {below, above})
+        if (f > 1) cure += (cure.empty() ? "--voxel " : " or --voxel ") + number_text(f * edge, 6);
+    throw Error(
+        ErrorCode::usage,
+        fmt::format(
+            "{}: {} repeats after {}, and {} of them to a voxel do not divide that, so that its tiles "
+            "would not fit: expected {}",
+            option, s.name, period, factor,
+            cure.empty() ? "a lattice whose periodic sides have a common divisor" : cure));
+}
+
+// Voxels of so many of the grid's as the options want, where the box repeats of a number that divides it.
+int factor_of(const ExportOptions& options, const ExportSequence& s) {
+    const double edge = s.placement.cell_size_m;
+    if (options.voxel_m) {
+        const double ratio = *options.voxel_m / edge;
+        if (ratio < 0.999 || std::abs(ratio - std::round(ratio)) > 1e-6 * ratio || ratio > 1 << 20) {
+            const double near =
+                std::clamp(std::round(ratio), 1.0, double(std::ranges::max(sides_of(s)))) * edge;
+            throw Error(ErrorCode::usage, fmt::format("--voxel {:g}: the grid's voxels are {:g} m, and only "
+                                                      "means of whole numbers of them keep the mass: "
+                                                      "expected a multiple such as {:g}",
+                                                      *options.voxel_m, edge, near));
+        }
+        const int factor = int(std::lround(ratio));
+        if (!keeps_period(s, factor)) refuse_period(s, fmt::format("--voxel {:g}", *options.voxel_m), factor);
+        return factor;
+    }
+    if (!options.largest_side) return 1;
+    const int longest = std::ranges::max(sides_of(s));
+    const int least = std::max(1, (longest + *options.largest_side - 1) / *options.largest_side);
+    const int factor = factor_near(s, least, 1);
+    if (factor == 0) refuse_period(s, fmt::format("--size {}", *options.largest_side), least);
+    return factor;
+}
+
 // Sizes, levels and padding of one sequence.
 void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<std::string>& notes) {
     s.layout = options.layout;
     for (int axis = 0; axis < 3; ++axis) s.layout.periodic[std::size_t(axis)] = s.metadata.period_m[axis] > 0;
     const double edge = s.placement.cell_size_m;
     const int longest = std::max({s.extent.x, s.extent.y, s.extent.z});
-    if (options.voxel_m) {
-        const double ratio = *options.voxel_m / edge;
-        if (ratio < 0.999 || std::abs(ratio - std::round(ratio)) > 1e-6 * ratio) {
-            const double near = std::max(1.0, std::round(ratio)) * edge;
-            throw Error(ErrorCode::usage, fmt::format("--voxel {:g}: the grid's voxels are {:g} m, and only "
-                                                      "means of whole numbers of them keep the mass: "
-                                                      "expected a multiple such as {:g}",
-                                                      *options.voxel_m, edge, near));
-        }
-        s.layout.factor = int(std::lround(ratio));
-    } else if (options.largest_side) {
-        s.layout.factor = std::max(1, (longest + *options.largest_side - 1) / *options.largest_side);
-    }
+    s.layout.factor = factor_of(options, s);
     const std::vector<ExportFormat> formats = all_formats(options);
     if (!options.weather.empty() && options.files.empty() && !is_run_folder(options.source))
         throw Error(
@@ -145,13 +196,16 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
     if (options.budget_bytes) {
         if (!dense)
             throw Error(ErrorCode::usage, "--budget counts dense formats: raw, vti, dds, ktx2 or slices");
-        while (frame_bytes() > *options.budget_bytes && s.layout.factor < longest) {
-            ++s.layout.factor;
+        while (frame_bytes() > *options.budget_bytes) {
+            const int next = factor_near(s, s.layout.factor + 1, 1);
+            if (next == 0) break;
+            s.layout.factor = next;
             fit();
         }
         if (frame_bytes() > *options.budget_bytes)
             throw Error(ErrorCode::usage, "--budget " + bytes_text(std::size_t(*options.budget_bytes)) +
-                                              " is less than the smallest frame takes");
+                                              " is less than the smallest frame takes" +
+                                              (keeps_period(s, longest) ? "" : " whose tiles fit"));
         if (s.layout.factor > 1)
             notes.push_back(
                 fmt::format("{}: voxels of {:g} m instead of {:g} m, so that a frame fits into {}", s.name,
@@ -160,11 +214,13 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
     const VolumeBox box = box_of(s.extent, s.placement, s.layout);
     const int side = std::max({box.size[0], box.size[1], box.size[2]});
     if (options.limit_side > 0 && dense && side > options.limit_side) {
-        const int factor = s.layout.factor * ((side + options.limit_side - 1) / options.limit_side);
-        throw Error(
-            ErrorCode::usage,
-            fmt::format("{}: {} voxels on a side, but {} takes at most {}: give --voxel {:g} or a --size",
-                        s.name, side, options.target, options.limit_side, factor * edge));
+        const int factor =
+            factor_near(s, s.layout.factor * ((side + options.limit_side - 1) / options.limit_side), 1);
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: {} voxels on a side, but {} takes at most {}: give {}", s.name, side,
+                                options.target, options.limit_side,
+                                factor > 0 ? fmt::format("--voxel {:g} or a --size", factor * edge)
+                                           : "a smaller lattice"));
     }
     if (dense && box.padding != std::array<int, 3>{}) {
         notes.push_back(fmt::format("{}: padded with 0 by {} x {} x {} voxels to {} x {} x {}", s.name,
@@ -258,7 +314,12 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
             throw Error(ErrorCode::usage, "--layer: layers are those of a run, not of a file");
         sequences.push_back(sequence_of_files(options));
     }
-    for (ExportSequence& s : sequences) choose_layout(options, s, notes);
+    for (ExportSequence& s : sequences) {
+        choose_layout(options, s, notes);
+        if (!options.velocity_name.empty() && s.metadata.wind.empty())
+            notes.push_back(s.name + ": the air is calm: its VDB files have no grid `" +
+                            options.velocity_name + "`");
+    }
     return sequences;
 }
 

@@ -130,6 +130,14 @@ TEST(Volume, HalvesAreRoundedToNearestEven) {
         ASSERT_EQ(bits_of(std::nextafter(middle, 0.0f)), half);
     }
     EXPECT_EQ(bits_of(1e9f), 0x7BFF);
+    const auto decoded = [](std::uint16_t half) {
+        std::byte bytes[2];
+        std::memcpy(bytes, &half, 2);
+        return decode(bytes, 2, 1, 1, 1, VoxelType::r16f, 1).values[0];
+    };
+    EXPECT_EQ(decoded(0xBC00), -1.0f);
+    EXPECT_EQ(decoded(0x7C00), INFINITY);
+    EXPECT_TRUE(std::isnan(decoded(0x7E00)));
 }
 
 TEST(Volume, Bc4IsOfLittleError) {
@@ -199,9 +207,12 @@ TEST(Containers, AreReadBackAndRefuseWhatIsCut) {
             std::filesystem::resize_file(folder / "v.vti", std::filesystem::file_size(folder / "v.vti") / 2);
             EXPECT_THROW(vti(), Error);
         }
-        if (type != VoxelType::r8) continue;
+        if (type != VoxelType::r8 && type != VoxelType::r16) continue;
         write_slices(folder / "v.png", volume, 3);
-        expect_same(read_slices(folder / "v.png", 32, 24, 16, 3), 1);
+        const auto slices = [&] { return read_slices(folder / "v.png", 32, 24, 16, 3); };
+        expect_same(slices(), 1);
+        EXPECT_THROW(read_slices(folder / "v.png", 32, 24, 15, 5), Error);
+        expect_cut_is_refused(folder / "v.png", slices);
     }
 }
 
@@ -260,8 +271,8 @@ TEST(Bricks, AreReadBackAndHaveTheirNeighbours) {
     std::size_t empty = 0, checked = 0;
     for (std::uint64_t n = 0; n < count; ++n) {
         const std::size_t entry = 32 + 2 * 12 + 40 * n;
-        const auto level = at(entry, std::uint32_t{}), i = at(entry + 4, std::uint32_t{}), j = at(entry + 8, std::uint32_t{}),
-                   k = at(entry + 12, std::uint32_t{});
+        const auto level = at(entry, std::uint32_t{}), i = at(entry + 4, std::uint32_t{}),
+                   j = at(entry + 8, std::uint32_t{}), k = at(entry + 12, std::uint32_t{});
         const auto offset = at(entry + 16, std::uint64_t{}), size = at(entry + 24, std::uint64_t{});
         const auto least = at(entry + 32, 0.0f), most = at(entry + 36, 0.0f);
         if (size == 0) {
@@ -275,10 +286,13 @@ TEST(Bricks, AreReadBackAndHaveTheirNeighbours) {
         for (int z = -1; z <= 8; ++z)
             for (int y = -1; y <= 8; ++y)
                 for (int x = -1; x <= 8; ++x) {
-                    const int sx = (int(8 * i) + x + v.nx) % v.nx, sy = (int(8 * j) + y + v.ny) % v.ny, sz = int(8 * k) + z;
-                    const bool there = int(8 * i) + x <= v.nx && int(8 * j) + y <= v.ny && sz >= 0 && sz < v.nz;
+                    const int sx = (int(8 * i) + x + v.nx) % v.nx, sy = (int(8 * j) + y + v.ny) % v.ny,
+                              sz = int(8 * k) + z;
+                    const bool there =
+                        int(8 * i) + x <= v.nx && int(8 * j) + y <= v.ny && sz >= 0 && sz < v.nz;
                     const float expected = there ? v.values[std::size_t((sz * v.ny + sy) * v.nx + sx)] : 0.0f;
-                    const float found = at(offset + 4 * std::size_t(((z + 1) * 10 + y + 1) * 10 + x + 1), 0.0f);
+                    const float found =
+                        at(offset + 4 * std::size_t(((z + 1) * 10 + y + 1) * 10 + x + 1), 0.0f);
                     ASSERT_EQ(found, expected) << n << ": " << x << " " << y << " " << z;
                     low = std::min(low, found);
                     high = std::max(high, found);
@@ -301,7 +315,8 @@ TEST(Bricks, DamagedFilesAreRefused) {
         std::ofstream(folder / "bad.bricks", std::ios::binary) << bytes;
         EXPECT_THROW(read_bricks(folder / "bad.bricks"), Error);
     };
-    for (const std::size_t length : {0ul, 7ul, 40ul, 100ul, whole.size() - 1}) refused(whole.substr(0, length));
+    for (const std::size_t length : {0ul, 7ul, 40ul, 100ul, whole.size() - 1})
+        refused(whole.substr(0, length));
     std::mt19937 random(1);
     for (const std::size_t at : {0ul, 8ul, 12ul, 16ul, 20ul, 24ul, 32ul, 44ul, 68ul}) {
         std::string bytes = whole;

@@ -18,6 +18,7 @@
 #include "density/vdb/vdb_file.h"
 #include "scenes/format/writer.h"
 #include "simulation/earlier_run.h"
+#include "simulation/folder_lock.h"
 #include "simulation/statistics_file.h"
 #include "tests/simulation/file_content.h"
 #include "tests/simulation/small_run.h"
@@ -287,13 +288,13 @@ TEST_F(RunFolderTest, AFileThatReplacedARunsOwnIsNotReplacedUnasked) {
 TEST_F(RunFolderTest, TwoRunsCannotWriteIntoOneFolder) {
     RunSettings s = settings("out");
     {
-        const FolderLock other(s.folder);
+        const FolderLock other(s.folder, "run");
         ASSERT_TRUE(other.held());
         EXPECT_NE(error_of(s, ErrorCode::io).find("another run"), std::string::npos);
         EXPECT_TRUE(fs::is_empty(s.folder)) << "nothing was written";
     }
     EXPECT_TRUE(run_scene(s, {}).complete);
-    const FolderLock other(s.folder);
+    const FolderLock other(s.folder, "run");
     s.resume = true;
     EXPECT_NE(error_of(s, ErrorCode::io).find("another run"), std::string::npos);
 }
@@ -311,7 +312,7 @@ TEST_F(RunFolderTest, TemporaryFilesOfAKilledRunAreRemoved) {
     for (const char* name : ours) std::ofstream(s.folder / name) << "part";
     for (const char* name : others) std::ofstream(s.folder / name) << "mine";
     {
-        const FolderLock other(s.folder);
+        const FolderLock other(s.folder, "run");
         error_of(s, ErrorCode::io);
         for (const char* name : ours) EXPECT_TRUE(fs::exists(s.folder / name)) << name;
     }

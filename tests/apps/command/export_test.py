@@ -2,13 +2,17 @@
 """`nephos export`, and its files in programs of others: OpenVDB, VTK, NanoVDB's tools, ffmpeg, xmllint, Pillow."""
 
 import json
+import os
+import resource
+import shutil
 import subprocess
 import sys
+import time
 import unittest
 
 import numpy
 
-from case import Case, SCENE, SOURCE, voxels
+from case import NEPHOS, Case, SCENE, SOURCE, voxels
 from verify_test import LAYERED, PLACED
 
 
@@ -118,6 +122,9 @@ class Export(Case):
         folder = self.export("slices", "--to", "slices")
         sidecar = json.loads((folder / "placed.volume.json").read_text())
         columns = sidecar["formats"][0]["columns"]
+        wide = self.export("slices16", "--to", "slices", "--type", "r16")
+        picture = numpy.array(PIL.Image.open(wide / "placed_0003.png"))
+        self.assertLessEqual(abs(picture[:24, :32] / 65535 - self.density[0]).max(), 1 / 131000)
         picture = numpy.array(PIL.Image.open(folder / "placed_0003.png"))
         for k in range(12):
             y, x = k // columns * 24, k % columns * 32
@@ -183,6 +190,163 @@ class Export(Case):
         self.refused(2, "export", "run", "--to", "raw", "--type", "r8", "-o", "out", says="other options")
         self.refused(2, "export", "run", "--to", "raw", "-o", "run", says="not empty")
 
+    def test_a_changed_source_is_exported_anew(self):
+        """Files of an export know their source: what another run of the same scene left is not taken over."""
+        folder = self.export("out", "--to", "raw")
+        first = (folder / "placed_0002.raw").read_bytes()
+        shutil.copy(self.folder / "run/density/placed_0005.vdb", self.folder / "run/density/placed_0002.vdb")
+        checks = json.loads(self.call("verify", "out", "--json", status=1).stdout)["checks"]
+        self.assertIn("have changed since", next(c["detail"] for c in checks if c["name"] == "sources"))
+        report = json.loads(self.call("export", "run", "--to", "raw", "-o", "out", "--json").stdout)
+        self.assertEqual((report["kept"], report["written"]), (4, 3))
+        self.assertNotEqual((folder / "placed_0002.raw").read_bytes(), first)
+        self.assertEqual((folder / "placed_0002.raw").read_bytes(), (folder / "placed_0005.raw").read_bytes())
+        self.call("verify", "out")
+
+    def test_one_export_at_a_time(self):
+        import fcntl
+        folder = self.export("out", "--to", "raw")
+        (folder / ".placed_0001.part1-2.raw").write_bytes(b"of the other one")
+        held = os.open(folder, os.O_RDONLY)
+        self.addCleanup(os.close, held)
+        fcntl.flock(held, fcntl.LOCK_EX)
+        self.refused(3, "export", "run", "--to", "raw", "-o", "out", says="another run or export is writing")
+        self.assertTrue((folder / ".placed_0001.part1-2.raw").exists())
+        fcntl.flock(held, fcntl.LOCK_UN)
+        self.call("export", "run", "--to", "raw", "-o", "out")
+        self.assertFalse((folder / ".placed_0001.part1-2.raw").exists())
+
+    def test_a_folder_that_is_removed_meanwhile(self):
+        """Not a success: nothing of the export is left."""
+        self.call("run", self.scene, "--no-render", "--out", "long", "--set", "time.steps=600")
+        process = subprocess.Popen([NEPHOS, "export", "long", "--to", "vti", "--zip", "-o", "gone"], cwd=self.folder,
+                                   env=self.environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        out = self.folder / "gone"
+        while process.poll() is None and not (out / "tiny_0003.vti").exists():
+            time.sleep(0.001)
+        out.rename(self.folder / "elsewhere")
+        _, error = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 3, error)
+        self.assertIn("was removed or renamed while the export was writing", error)
+        self.assertFalse((out / "export.json").exists())
+
+    def test_lists_that_were_tampered_with(self):
+        """Each wrong value of export.json is named with its file, its place and what was expected; nothing crashes."""
+        folder = self.export("out", "--to", "raw", "--to", "bricks", "--to", "slices")
+        whole = json.loads((folder / "export.json").read_text())
+        def tampered(place, value):
+            listing = json.loads(json.dumps(whole))
+            at = listing
+            for key in place[:-1]:
+                at = at[key]
+            at[place[-1]] = value
+            (folder / "export.json").write_text(json.dumps(listing))
+        layout = ["sequences", 0, "layout"]
+        for place, value, says in (
+                (["sequences", 0, "levels"], 0, "`sequences[0].levels` is 0: expected a whole number from 1 to 32"),
+                (["sequences", 0, "levels"], 2 ** 40, "`sequences[0].levels`"), (["sequences", 0, "scale"], "one", "`sequences[0].scale` is \"one\""),
+                (["sequences", 0, "scale"], 0, "`sequences[0].scale`"), ([*layout, "factor"], 2 ** 31 - 1, "`sequences[0].layout.factor`"),
+                ([*layout, "factor"], -1, "`sequences[0].layout.factor`"), ([*layout, "multiple"], 2 ** 31 - 1, "`sequences[0].layout.multiple`"),
+                ([*layout, "axes"], 9, "`sequences[0].layout.axes`"), ([*layout, "border"], 7, "`sequences[0].layout.border`"),
+                ([*layout, "periodic"], [True], "three of true or false"), (["format_version"], "1", "`format_version` is \"1\""),
+                (["format"], 1, "`format` is 1: expected a text"), (["options", "types"], 5, "`options.types` is 5: expected an object"),
+                (["options", "types", "raw"], 77, "`options.types.raw`"), (["options", "grid"], 1, "`options.grid`"),
+                (["files"], {}, "`files` is an object: expected a list"), (["files", 0, "bytes"], "12", "`files[0].bytes`"),
+                (["files", 0, "bytes"], -1, "`files[0].bytes`"), (["files", 0, "path"], "../run/manifest.json", "`files[0].path`"),
+                (["files", 0, "format"], "obj", "expected one of raw, vti")):
+            with self.subTest(place=place, value=value):
+                tampered(place, value)
+                self.refused(3, "verify", "out", says=says)
+                self.assertIn("out/export.json: ", self.call("verify", "out", status=3).stderr)
+                if place[0] in ("files", "format", "format_version"):
+                    self.refused(3, "export", "run", "--to", "raw", "--to", "bricks", "--to", "slices", "-o", "out", says=says)
+        # What is possible and wrong fails without taking the memory that it states.
+        for place, value in (([*layout, "factor"], 2 ** 20), ([*layout, "multiple"], 2 ** 24), (["sequences", 0, "levels"], 32),
+                             ([*layout, "power_of_two"], True)):
+            with self.subTest(place=place, value=value):
+                tampered(place, value)
+                limited = lambda: resource.setrlimit(resource.RLIMIT_AS, (6 << 30, 6 << 30))
+                self.assertIn("FAIL  voxels", self.call("verify", "out", status=1, preexec_fn=limited).stdout)
+        (folder / "export.json").write_text("{\n\"format\": ")
+        self.refused(3, "verify", "out", says="line 2 cannot be read")
+        listing = dict(whole)
+        del listing["options"]
+        (folder / "export.json").write_text(json.dumps(listing))
+        self.refused(3, "verify", "out", says="`options` is missing")
+
+    def relisted(self, folder, name):
+        """Makes the list agree with the bytes of a file, as somebody would who wants it to pass."""
+        import xxhash
+        listing = json.loads((folder / "export.json").read_text())
+        content = (folder / name).read_bytes()
+        for file in listing["files"]:
+            if file["path"] == name:
+                file.update(bytes=len(content), xxh3=xxhash.xxh3_128_hexdigest(content))
+        (folder / "export.json").write_text(json.dumps(listing))
+
+    def test_voxels_that_are_no_numbers(self):
+        """NaN in a file whose checksum agrees: compared with its source, it is none of its values."""
+        for format, type, code in (("raw", "r32f", "<f4"), ("raw", "r16f", "<f2"), ("bricks", "r32f", "<f4")):
+            with self.subTest(format=format, type=type):
+                folder = self.export(format + type, "--to", format, "--type", type)
+                file = folder / f"placed_0003.{format}"
+                content = bytearray(file.read_bytes())
+                size = numpy.dtype(code).itemsize
+                at = len(content) - 5 * size
+                if format == "bricks":  # the fifth voxel along each axis of the first brick, behind its border
+                    at = int(numpy.frombuffer(content, "<u8", 1, 60)[0]) + size * (34 * 34 * 5 + 34 * 5 + 5)
+                content[at:at + size] = numpy.array([numpy.nan], code).tobytes()
+                file.write_bytes(content)
+                self.relisted(folder, file.name)
+                self.assertIn("no finite number", self.call("verify", folder, status=1).stdout)
+
+    def test_sizes_that_a_small_file_states(self):
+        """Files of some kilobytes that state gigabytes are refused before memory is taken."""
+        limited = lambda: resource.setrlimit(resource.RLIMIT_AS, (6 << 30, 6 << 30))
+        folder = self.export("bricks", "--to", "bricks", "--type", "r32f")
+        head = numpy.array([3, 256, 1, 1], "<u4").tobytes() + numpy.array([100], "<u8").tobytes() + numpy.array([2560, 2560, 256], "<u4").tobytes()
+        table = b"".join(numpy.array([0, n % 10, n // 10, 0], "<u4").tobytes() + bytes(24) for n in range(100))
+        (folder / "placed_0003.bricks").write_bytes(b"NPHBRIC1" + head + table)
+        self.relisted(folder, "placed_0003.bricks")
+        self.assertIn("bytes of memory, too many for a file of", self.call("verify", folder, status=1, preexec_fn=limited).stdout)
+        folder = self.export("vti", "--to", "vti", "--zip")
+        content = (folder / "placed_0003.vti").read_bytes()
+        at = content.index(b'raw">\n_') + 7
+        content = content[:at + 8] + numpy.array([1 << 30], "<u8").tobytes() + bytes(8) + content[at + 24:]
+        (folder / "placed_0003.vti").write_bytes(content)
+        self.relisted(folder, "placed_0003.vti")
+        self.assertIn("more bytes than it can hold", self.call("verify", folder, status=1, preexec_fn=limited).stdout)
+
+    def test_options_without_effect_are_refused(self):
+        for arguments, says in (
+                (["--to", "vti", "--mips"], "--mips: is for raw, dds, ktx2 and bricks, and of no effect in vti"),
+                (["--to", "raw", "--zip"], "--zip: is for vti and nvdb"), (["--to", "raw", "--quantise", "fp8"], "--quantise: is for nvdb"),
+                (["--to", "ktx2", "--legacy-dds"], "--legacy-dds: is for dds"), (["--to", "raw", "--velocity", "vel"], "--velocity: is for usd and vdb"),
+                (["--to", "nvdb", "--type", "r8"], "--type r8: is for raw"), (["--to", "vdb", "--axes", "unity"], "--axes: is for raw"),
+                (["--to", "vdb", "--border", "zero"], "--border"), (["--to", "nvdb", "--pad", "8"], "--pad"), (["--to", "nvdb", "--range", "auto"], "--range auto"),
+                (["--to", "raw", "--bricks", "16"], "--bricks: is for bricks"), (["--for", "xplane", "--voxel", "100"], "--voxel"),
+                (["--for", "cigi", "--layer", "all"], "--layer"), (["--for", "unreal", "--type", "r8"], "--type r8")):
+            with self.subTest(arguments=arguments):
+                self.refused(2, "export", "run", *arguments, "-o", "bad", says=says)
+                self.assertFalse((self.folder / "bad").exists())
+        # One of several formats takes it; a preset's own options are not the user's.
+        self.export("both", "--to", "raw", "--to", "vti", "--type", "r8", "--mips")
+        self.assertIn("calm", self.call("export", "run", "--for", "blender", "-o", "calm").stderr)
+
+    def test_coarse_voxels_keep_the_period(self):
+        scene = self.write("periodic.toml", SCENE.replace("cells = [32, 24, 12]", 'cells = [32, 24, 12]\nboundaries = ["periodic", "periodic", "open"]'))
+        self.call("run", scene, "--no-render", "--out", "periodic")
+        cell = json.loads(self.call("export", "periodic", "--to", "raw", "--plan", "--json").stdout)["sequences"][0]["voxel_size_m"][0]
+        error = self.refused(2, "export", "periodic", "--to", "raw", "--voxel", 5 * cell, "-o", "bad",
+                             says="32 voxels along x and 24 voxels along y").stderr
+        self.assertIn(f"expected --voxel {4 * cell:g} or --voxel {8 * cell:g}", error)
+        plan = lambda *arguments: json.loads(self.call("export", "periodic", "--to", "raw", *arguments, "--plan", "--json").stdout)["sequences"][0]
+        self.assertEqual(plan("--voxel", 4 * cell)["size"][:2], [8, 6])
+        self.assertEqual(plan("--size", 7)["size"][:2], [4, 3])  # 5 voxels would do, and do not divide
+        for budget in (1000, 3000, 9000):
+            size = plan("--budget", budget)["size"]
+            self.assertEqual((32 % size[0], 24 % size[1], 32 // size[0]), (0, 0, 24 // size[1]))
+
     def test_damage_is_found(self):
         folder = self.export("out", "--to", "ktx2")
         content = bytearray((folder / "placed_0003.ktx2").read_bytes())
@@ -208,7 +372,7 @@ class Export(Case):
         for arguments, says in ((["--to", "obj"], "raw, vti"), ([], "neither --to nor --for"), (["--for", "doom"], "blender, unreal"),
                                 (["--to", "vti", "--type", "bc4"], "r8, r16 and r32f"), (["--to", "raw", "--voxel", "70"], "a multiple such as"),
                                 (["--to", "raw", "--layer", "low"], "has no layers"), (["--to", "raw", "--frames", "90..99"], "no frame of this range"),
-                                (["--to", "nvdb", "--budget", "1MiB"], "--budget counts"), (["--to", "raw", "--budget", "1"], "less than the smallest"),
+                                (["--to", "nvdb", "--budget", "1MiB"], "--budget: is for raw"), (["--to", "raw", "--budget", "1"], "less than the smallest"),
                                 (["--to", "dds", "--legacy-dds", "--type", "r16f"], "old header"), (["--to", "raw", "--type", "r9"], "r8, r16")):
             with self.subTest(arguments=arguments):
                 self.refused(2, "export", "run", *arguments, "-o", "bad", says=says)

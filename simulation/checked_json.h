@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// JSON that somebody may have edited or damaged: every value is read with its bounds, and an error names the file, the
+// place of the value, what stands there and what was expected (not installed):
+//
+//     cloud/export.json: `sequences[0].layout.factor` is "two": expected a whole number from 1 to 1048576
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace nephos {
+
+// One value of a file. Refers to the file's JSON and path, which must outlive it. Every function throws Error(io) as
+// above when the value is not what is asked for.
+class CheckedJson {
+  public:
+    using Json = nlohmann::ordered_json;
+
+    CheckedJson(const Json& value, const std::filesystem::path& file, std::string place = {})
+        : value_(&value), file_(&file), place_(std::move(place)) {}
+
+    // The member of an object, which must be there.
+    CheckedJson at(std::string_view key) const;
+    bool has(std::string_view key) const;
+    std::vector<CheckedJson> items() const;                            // of a list
+    std::vector<std::pair<std::string, CheckedJson>> members() const;  // of an object, in the file's order
+
+    std::string text() const;
+    bool truth() const;
+    std::int64_t integer(std::int64_t min, std::int64_t max) const;
+    double real(double min, double max) const;  // finite
+
+    // Throws the error of this value: "`place` is VALUE: expected ...".
+    [[noreturn]] void fail(const std::string& expected) const;
+
+  private:
+    const Json* value_;
+    const std::filesystem::path* file_;
+    std::string place_;  // "sequences[0].layout"; empty: all of the file
+};
+
+// Parses a file. Throws Error(io) naming it, with the line where it is no JSON.
+nlohmann::ordered_json parsed_json(const std::filesystem::path& file);
+
+}  // namespace nephos
