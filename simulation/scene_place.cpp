@@ -81,6 +81,11 @@ std::vector<WindLevel> wind_levels(const Scene& scene, std::optional<std::size_t
 }
 
 // Bowring's formula of one step, exact to 1e-9 degrees near the surface: Survey Review 23 (1976), p. 323.
+double msl_height_m(const Georeference& place) {
+    if (!place.given) return 0;
+    return place.height_m - (place.height_datum == HeightDatum::ellipsoid ? place.geoid_height_m : 0.0);
+}
+
 GeodeticPlace geodetic_place(const Georeference& place, const Vec3& world_m) {
     constexpr double kA = 6378137.0, kF = 1 / 298.257223563, kB = kA * (1 - kF), kE2 = kF * (2 - kF),
                      kSecond = kE2 / (1 - kE2), kDegrees = 180 / std::numbers::pi;

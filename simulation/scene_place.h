@@ -27,6 +27,10 @@ std::vector<Velocity> wind_of_levels(const Scene& scene, std::optional<std::size
 // does not. Of several layers an axis repeats if it does so in all of them, over the same stretch of the world.
 Vec3 period_m(const Scene& scene, std::optional<std::size_t> layer);
 
+// Returns the height of the world's origin above mean sea level: over an ellipsoid as far as the place says how high mean sea
+// level stands there (geoid_height_m). 0 without a place. Pure.
+double msl_height_m(const Georeference& place);
+
 // Latitude and longitude on WGS 84, in degrees.
 struct GeodeticPlace {
     double latitude_deg = 0, longitude_deg = 0;

@@ -27,12 +27,6 @@ void finish_georeference(const SectionReader& reader, void* owner) {
                       "expected a moment from 1900 to 2100 such as \"2024-06-21T13:50:00Z\"");
         place.start_utc.clear();
     }
-    if (place.height_datum == HeightDatum::ellipsoid && place.geoid_height_m != 0) {
-        reader.report(
-            "geoid_height_m",
-            "`height_m` is above the ellipsoid, so " + reader.quoted("geoid_height_m") + " has no meaning",
-            "expected no `geoid_height_m`, or `height_datum` = \"msl\"");
-    }
 }
 
 }  // namespace
@@ -54,11 +48,14 @@ const Section& georeference_section() {
              "Height of the origin, z = 0: of an aerodrome, if heights of the scene are above it."),
          word<&Scene::georeference, &Georeference::height_datum>(
              "height_datum", {"msl", "ellipsoid"},
-             "What that height is above: mean sea level, or the ellipsoid."),
+             "What that height is above: mean sea level, or the ellipsoid. Weather reports and simulators "
+             "count from mean "
+             "sea level: `geoid_height_m` says where that is."),
          key<&Scene::georeference, &Georeference::geoid_height_m>(
              "geoid_height_m", "m", between(-200, 200),
-             "Height of mean sea level above the ellipsoid there (undulation), for ECEF: 45 m in London, -32 "
-             "m in Miami."),
+             "Height of mean sea level above the ellipsoid there (undulation), by which heights are told to "
+             "ECEF and, "
+             "from the ellipsoid, to simulators: 45 m in London, -32 m in Miami."),
          key<&Scene::georeference, &Georeference::heading_deg>(
              "heading_deg", "deg", between(-360, 360),
              "True bearing of the y axis, clockwise: 0 makes x east and y north. All directions of the "

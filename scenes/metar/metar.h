@@ -67,6 +67,9 @@ Metar parse_metar(std::string_view text, bool lenient = false);
 // Returns the report of these values: station, time, wind, visibility, weather, clouds.
 std::string metar_text(const Metar& metar);
 
+// Returns true for what falls as reports write it, without intensity, SH and TS: "RA", "FZDZ", "RASN" ...
+bool is_precipitation(std::string_view code);
+
 // The amount of a cover 0..1 of optical depth above 1: FEW up to 2 oktas, SCT 4, BKN 7, OVC 8; nullopt below half an
 // okta.
 std::optional<CloudAmount> amount_of(double cover);

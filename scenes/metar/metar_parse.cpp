@@ -424,6 +424,15 @@ class Reader {
 
 Metar parse_metar(std::string_view text, bool lenient) { return Reader(text, lenient).read(); }
 
+bool is_precipitation(std::string_view code) {
+    constexpr std::string_view kFalling[] = {"DZ", "RA", "SN", "SG", "PL", "GR", "GS", "UP"};
+    if (code.starts_with("FZ")) code.remove_prefix(2);
+    if (code.empty() || code.size() > 6 || code.size() % 2 != 0) return false;
+    for (; !code.empty(); code.remove_prefix(2))
+        if (std::ranges::find(kFalling, code.substr(0, 2)) == std::end(kFalling)) return false;
+    return true;
+}
+
 std::optional<CloudAmount> amount_of(double cover) {
     const double oktas = 8 * cover;
     if (oktas < 0.5) return {};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scenes/metar/metar_scene.h"
-#include "scenes/metar/taf.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include "core/error.h"
 #include "core/place.h"
 #include "core/text.h"
+#include "scenes/metar/taf.h"
 
 namespace nephos {
 namespace {
@@ -15,7 +15,6 @@ namespace {
 constexpr double kFoot_m = 0.3048;
 // Of the clouds' box, which stands around the aerodrome.
 constexpr double kSide_m = 20'000;
-constexpr double kDeep_m = 2000;        // deeper layers have coarser cells
 constexpr double kKoschmieder = 3.912;  // -ln 0.02: contrast that an eye still sees
 
 std::string text_of(double value) { return number_text(std::round(value * 1000) / 1000); }
@@ -31,27 +30,41 @@ bool has_descriptor(const Metar& m, std::string_view descriptor) {
         m.weather, [&](const MetarWeather& w) { return !w.vicinity && w.descriptor == descriptor; });
 }
 
-// Rain, drizzle or snow, the strongest of the groups.
+// What falls, the strongest of the groups.
 struct Precipitation {
     bool any = false, snow = false, showers = false;
     double mm_per_h = 0;
+    std::string code;  // as reports write it, without intensity
 };
+
+// What falls of a group, without intensity, SH and TS; "" of the others, blowing snow too.
+std::string falling(const MetarWeather& w) {
+    if (w.vicinity || w.descriptor == "BL" || w.descriptor == "DR") return {};
+    std::string code;
+    for (const std::string& phenomenon : w.phenomena)
+        if (is_precipitation(phenomenon)) code += phenomenon;
+    return code.empty() || w.descriptor != "FZ" ? code : "FZ" + code;
+}
 
 Precipitation precipitation_of(const Metar& m) {
     Precipitation p;
     for (const MetarWeather& w : m.weather) {
-        if (w.vicinity) continue;
-        for (const std::string& phenomenon : w.phenomena) {
-            const bool drizzle = phenomenon == "DZ", snow = phenomenon == "SN" || phenomenon == "SG";
-            if (!drizzle && !snow && phenomenon != "RA" && phenomenon != "PL" && phenomenon != "GR" &&
-                phenomenon != "GS" && phenomenon != "UP")
-                continue;
-            const double rate = drizzle ? 0.3 : w.intensity == '-' ? 1 : w.intensity == '+' ? 15 : 5;
-            p.any = true;
-            p.snow = p.snow || snow;
-            p.showers = p.showers || w.descriptor == "SH" || w.descriptor == "TS";
-            p.mm_per_h = std::max(p.mm_per_h, rate);
-        }
+        const std::string code = falling(w);
+        if (code.empty()) continue;
+        // In the middle of the classes of FM 15: drizzle below 0.1 and above 0.5, others below 2.5 and above 10 mm/h.
+        const bool drizzle = code.ends_with("DZ") && code.find("RA") == code.npos;
+        const double rate = drizzle ? (w.intensity == '-'   ? 0.05
+                                       : w.intensity == '+' ? 0.8
+                                                            : 0.3)
+                                    : (w.intensity == '-'   ? 1
+                                       : w.intensity == '+' ? 15
+                                                            : 5);
+        p.any = true;
+        p.snow = p.snow || code.find("SN") != code.npos || code.find("SG") != code.npos;
+        p.showers = p.showers || w.descriptor == "SH" || w.descriptor == "TS";
+        if (!(rate > p.mm_per_h)) continue;
+        p.mm_per_h = rate;
+        p.code = code;
     }
     return p;
 }
@@ -83,9 +96,15 @@ struct Look {
 };
 
 Look look_of(const std::string& genus, bool deep) {
-    if (deep && (genus == "Cu" || genus == "Cb"))
+    // Towers go through the whole layer: noise that changed within its depth would lift the base of half of the columns.
+    if (deep && genus == "Cb")
         return {
-            "form = \"cumulus\"\noctaves = 3\nwavelength_m = 5000\nstretch_up = 1.6\nsoftness = "
+            "form = \"cumulus\"\noctaves = 3\nwavelength_m = 5000\nstretch_up = 20\nsoftness = "
+            "0.5\nevolution_m_per_s = 1\n",
+            "strength = 1\nsize_m = 400\n", 1, 160};
+    if (deep && genus == "Cu")
+        return {
+            "form = \"cumulus\"\noctaves = 3\nwavelength_m = 5000\nstretch_up = 8\nsoftness = "
             "0.5\nevolution_m_per_s = 1\n",
             "strength = 1\nsize_m = 400\n", 1, 160};
     if (genus == "Cu" || genus == "Cb")
@@ -119,7 +138,7 @@ Look look_of(const std::string& genus, bool deep) {
             "form = \"cirrostratus\"\noctaves = 3\nwavelength_m = 9000\nstretch = 4\ndisplacement = "
             "0.6\nsoftness = 0.5\n",
             "strength = 0.3\nsize_m = 900\nstretch = 20\nthermals = 0.3\nwisps = 0\n", 0.2, 100};
-    // St, Ns, As
+    // St, Ns, As, VV
     return {
         "form = \"stratus\"\noctaves = 3\nwavelength_m = 3600\nstretch = 1.8\nstretch_up = 0.6\nsoftness = "
         "0.6\n",
@@ -129,8 +148,8 @@ Look look_of(const std::string& genus, bool deep) {
 // `keys` are further ones of the layer, a line each.
 std::string layer_text(const MetarLayer& layer, double coverage, const std::string& keys = {}) {
     const double depth = layer.top_m - layer.base_m;
-    const Look look = look_of(layer.genus, depth > kDeep_m);
-    const double cell = depth > kDeep_m ? 160 : look.cell_m;
+    const Look look = look_of(layer.genus, depth > kTowering_m);
+    const double cell = depth > kTowering_m ? 160 : look.cell_m;
     const int across = int(std::lround(kSide_m / cell)), levels = std::max(3, int(std::ceil(depth / cell)));
     std::string text = "\n# " + layer.group + "\n[[layer]]\nname = \"" + layer.name + "\"\n";
     if (look.opacity != 1) text += "opacity = " + text_of(look.opacity) + "\n";
@@ -189,21 +208,25 @@ std::string rain_areas(const Precipitation& p, const std::string& times) {
            "    { x_m = 4600, y_m = 5600, semi_a_m = 1500, semi_b_m = 1400" + rate;
 }
 
-std::string rain_text(const Precipitation& p, bool thunder, double base_m, const std::string& areas) {
+std::string lightning_text(double base_m) {
+    return "\n[[lightning]]\nposition_m = [1500, 2500, " + text_of(base_m + 800) +
+           "]\ntime_s = 600\nduration_s = 0.4\nintensity = 3\n";
+}
+
+// `name` is that of the layer.
+std::string rain_text(const Precipitation& p, const std::string& name, double base_m,
+                      const std::string& areas) {
     std::string text =
         "\n# The area that it falls in; its clouds are those of the other layers.\n[[sky]]\nname = "
-        "\"none\"\nstate = 0\nclouds = 0\n\n[[layer]]\nname = \"precipitation\"\nskies = "
-        "\"none\"\nbase_height_m = " +
-        text_of(std::max(100.0, base_m)) +
+        "\"none\"\nstate = 0\nclouds = 0\n\n[[layer]]\nname = \"" +
+        name + "\"\nskies = \"none\"\nbase_height_m = " + text_of(std::max(100.0, base_m)) +
         "\nlattice = { cells = [20, 20, 3], cell_size_m = 1000, origin_m = [-10000, -10000, " +
-        text_of(base_m) + "] }\nbackground = { hum = 0, act = 0, ext = 1 }\n[layer.rain]\nplaced = [\n" + areas;
+        text_of(base_m) + "] }\nbackground = { hum = 0, act = 0, ext = 1 }\n[layer.rain]\nplaced = [\n" +
+        areas;
     text += "]\n\n[precipitation]\nenabled = true\n";
     if (p.snow) text += "kind = \"snow\"\n";
     text += "\n[wet_ground]\nenabled = true\n";
     text += p.snow ? "initial_snow_mm = 2\n" : "initial_water_mm = 1\n";
-    if (thunder)
-        text += "\n[[lightning]]\nposition_m = [1500, 2500, " + text_of(base_m + 800) +
-                "]\ntime_s = 600\nduration_s = 0.4\nintensity = 3\n";
     return text;
 }
 
@@ -231,16 +254,28 @@ constexpr const char* kClearLayer =
     "lattice = { cells = [20, 20, 3], cell_size_m = 1000, origin_m = [-10000, -10000, 1000] "
     "}\nbackground = { hum = 0, act = 0, ext = 1 }\n";
 
+// What floats in the air and takes the view, but for fog and mist.
+bool has_haze(const Metar& m) {
+    constexpr std::string_view kDry[] = {"HZ", "FU", "DU", "SA", "VA"};
+    return std::ranges::any_of(kDry,
+                               [&](std::string_view phenomenon) { return has_phenomenon(m, phenomenon); });
+}
+
 std::string fog_text(const Metar& m) {
     int visibility = m.visibility_m.value_or(9999);
-    double depth = has_phenomenon(m, "FG") ? 150 : 1000;
+    double depth = has_phenomenon(m, "FG")   ? FogDepth::fog
+                   : has_phenomenon(m, "BR") ? FogDepth::mist
+                   : has_haze(m)             ? FogDepth::haze
+                                             : FogDepth::other;
     for (const MetarCloud& c : m.clouds) {
         if (c.amount != CloudAmount::obscured) continue;
-        if (c.height_ft) depth = std::max(20.0, 1.5 * *c.height_ft * kFoot_m);
+        if (c.height_ft && has_phenomenon(m, "FG"))
+            depth = std::clamp(1.5 * *c.height_ft * kFoot_m, 20.0, FogDepth::mist);
         if (!m.visibility_m) visibility = 500;
     }
     if (visibility >= 9999) return {};
-    return "\n# " + std::to_string(visibility) + " m of visibility: 3.912 / visibility\n[fog]\nextinction_per_m = " +
+    return "\n# " + std::to_string(visibility) +
+           " m of visibility: 3.912 / visibility\n[fog]\nextinction_per_m = " +
            number_text(kKoschmieder / std::max(visibility, 20), 6) + "\nheight_m = " + text_of(depth) + "\n";
 }
 
@@ -269,15 +304,16 @@ std::vector<MetarLayer> layers_of(const Metar& m) {
     std::vector<MetarCloud> clouds = m.clouds;
     std::ranges::stable_sort(clouds, {}, [](const MetarCloud& c) { return c.height_ft.value_or(0); });
     for (const MetarCloud& c : clouds) {
-        if (c.amount == CloudAmount::obscured || c.amount == CloudAmount::unknown || !c.height_ft) continue;
-        const Genus genus = genus_of(c, rain);
+        if (c.amount == CloudAmount::unknown || !c.height_ft) continue;
+        const bool obscured = c.amount == CloudAmount::obscured;
+        const Genus genus = obscured ? Genus{"VV", 300} : genus_of(c, rain);
         MetarLayer layer;
         layer.genus = genus.name;
         layer.name = layer.genus + std::to_string(layers.size() + 1);
         layer.base_m = std::max(30.0, *c.height_ft * kFoot_m);
         layer.top_m = layer.base_m + genus.depth_m;
-        layer.cover = cover_of(c.amount);
-        layer.sheet = c.amount == CloudAmount::overcast;
+        layer.cover = obscured ? 1 : cover_of(c.amount);
+        layer.sheet = obscured || c.amount == CloudAmount::overcast;
         const std::string height = std::to_string(*c.height_ft / 100);
         layer.group = std::string(amount_text(c.amount)) +
                       std::string(3 - std::min<std::size_t>(3, height.size()), '0') + height + c.type;
@@ -290,15 +326,16 @@ std::string metar_scene_text(const Metar& m, const MetarSceneOptions& o,
                              const std::vector<double>& coverage) {
     const std::vector<MetarLayer> layers = layers_of(m);
     const Precipitation p = precipitation_of(m);
-    std::string text =
-        head_text(m.text, m.station, m.day, m.hour, m.minute, o, "step_s = 10\nsteps = 90\n") + wind_text(m, o);
+    std::string text = head_text(m.text, m.station, m.day, m.hour, m.minute, o, "step_s = 10\nsteps = 90\n") +
+                       wind_text(m, o);
     double lowest = 1000;
     for (std::size_t n = 0; n < layers.size(); ++n) {
         text += layer_text(layers[n], coverage.at(n));
         lowest = std::min(lowest, layers[n].base_m);
     }
     if (layers.empty()) text += kClearLayer;
-    if (p.any) text += rain_text(p, has_descriptor(m, "TS"), lowest, rain_areas(p, {}));
+    if (p.any) text += rain_text(p, p.code, lowest, rain_areas(p, {}));
+    if (has_descriptor(m, "TS")) text += lightning_text(lowest);
     text += "\n[density]\nextinction_per_m = 0.05\n" + fog_text(m);
     return text + picture_text("start_s = 600\ntime_scale = 60\nper_second = 12\ncount = 12\n", lowest);
 }
@@ -336,8 +373,8 @@ std::string schedule_text(const Taf& taf) {
     for (std::size_t n = 1; n < taf.periods.size(); ++n) {
         const TafPeriod& period = taf.periods[n];
         text += "    { time_s = " + text_of(period.from_s) + ", state = " + state_text(taf, n - 1) +
-                " },\n    { time_s = " + text_of(period.until_s) + ", state = " + state_text(taf, n) + " },  # " +
-                period.change + "\n";
+                " },\n    { time_s = " + text_of(period.until_s) + ", state = " + state_text(taf, n) +
+                " },  # " + period.change + "\n";
     }
     return text + "]\n";
 }
@@ -372,16 +409,20 @@ std::string rain_of_periods(const Taf& taf, double base_m, double step_s) {
     for (std::size_t n = 0; n < taf.periods.size(); ++n) {
         const TafPeriod& period = taf.periods[n];
         const Precipitation p = precipitation_of(period.weather);
+        thunder = thunder || has_descriptor(period.weather, "TS");
         if (!p.any) continue;
         all.any = true;
         all.snow = all.snow || p.snow;
-        thunder = thunder || has_descriptor(period.weather, "TS");
         const double end_s = n + 1 < taf.periods.size() ? taf.periods[n + 1].until_s : taf.length_s + step_s;
-        const double fade_s = std::min(std::max(step_s, period.until_s - period.from_s), (end_s - period.from_s) / 2);
+        const double fade_s =
+            std::min(std::max(step_s, period.until_s - period.from_s), (end_s - period.from_s) / 2);
         areas += rain_areas(p, ", start_s = " + text_of(period.from_s) + ", end_s = " + text_of(end_s) +
                                    ", fade_s = " + text_of(fade_s));
     }
-    return all.any ? rain_text(all, thunder, base_m, areas) : std::string();
+    std::string text;
+    if (all.any) text += rain_text(all, "precipitation", base_m, areas);
+    if (thunder) text += lightning_text(base_m);
+    return text;
 }
 
 }  // namespace
@@ -390,8 +431,8 @@ std::string taf_scene_text(const Taf& taf, const MetarSceneOptions& o, const std
     constexpr double kStep_s = 300;
     const std::vector<TafLayer> layers = layers_of(taf);
     std::string text = head_text(taf.text, taf.station, taf.day, taf.hour, 0, o,
-                                 "step_s = " + text_of(kStep_s) +
-                                     "\nsteps = " + std::to_string(int(std::ceil(taf.length_s / kStep_s))) + "\n");
+                                 "step_s = " + text_of(kStep_s) + "\nsteps = " +
+                                     std::to_string(int(std::ceil(taf.length_s / kStep_s))) + "\n");
     text += schedule_text(taf) + winds_text(taf, o);
     double lowest = 1000;
     for (std::size_t n = 0; n < layers.size(); ++n) {
@@ -401,7 +442,8 @@ std::string taf_scene_text(const Taf& taf, const MetarSceneOptions& o, const std
     if (layers.empty()) text += kClearLayer;
     text += rain_of_periods(taf, lowest, kStep_s);
     text += "\n[density]\nextinction_per_m = 0.05\n" + fog_text(taf.periods.front().weather);
-    return text + picture_text("time_scale = 3600\nper_second = 12\n", lowest);  // an hour is a second of film
+    return text +
+           picture_text("time_scale = 3600\nper_second = 12\n", lowest);  // an hour is a second of film
 }
 
 std::vector<std::string> metar_notes(const Metar& m, const MetarSceneOptions& o) {
@@ -413,6 +455,25 @@ std::vector<std::string> metar_notes(const Metar& m, const MetarSceneOptions& o)
     if (m.wind.known && m.wind.variable && m.wind.speed_m_per_s > 0)
         notes.push_back("the wind's direction follows from the seed");
     if (m.wind.gust_m_per_s) notes.push_back("gusts are not simulated");
+    const std::string strongest = precipitation_of(m).code;
+    for (const MetarWeather& w : m.weather) {
+        if (w.vicinity) continue;
+        const std::string code = falling(w);
+        if (!code.empty() && code != strongest)
+            notes.push_back("of what falls " + strongest + " alone is in the scene, not " + code);
+        for (const std::string& phenomenon : w.phenomena) {
+            if (code.find(phenomenon) != code.npos) continue;
+            const bool plain = w.descriptor.empty();
+            if (plain && (phenomenon == "FG" || phenomenon == "BR" || phenomenon == "HZ")) continue;
+            if (phenomenon == "FG")
+                notes.push_back(w.descriptor + "FG is in the scene as fog everywhere");
+            else if (plain &&
+                     (phenomenon == "FU" || phenomenon == "DU" || phenomenon == "SA" || phenomenon == "VA"))
+                notes.push_back(phenomenon + " is in the scene as haze");
+            else
+                notes.push_back(w.descriptor + phenomenon + " is not in the scene");
+        }
+    }
     if (m.temperature_c && m.dew_point_c) {
         const double expected = 125.0 * (*m.temperature_c - *m.dew_point_c);
         for (const MetarLayer& layer : layers_of(m)) {

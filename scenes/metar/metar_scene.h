@@ -3,6 +3,10 @@
 
 // A scene from a report: a layer for each cloud group with the genus that its amount and height stand for, wind, fog,
 // rain or snow, and the sun. Functions are pure and thread-safe.
+//
+// Names of layers say what densities do not, and reports of a run (simulation/export/weather.h) take them from there:
+// "Cb1", "Sc2" are genera; "VV1" is a sky that cannot be seen; a layer of rain is named by what falls, "FZRA", "RASN".
+// The depth of the fog tells its kind (FogDepth).
 
 #include <optional>
 #include <string>
@@ -24,10 +28,20 @@ struct MetarSceneOptions {
     int seed = 1;
 };
 
+// Scale heights of what lessens the visibility, m: limits of its kinds, and what a scene gets. Fog and mist are shallow, haze
+// fills the mixed layer; between them nothing is reported but what falls.
+struct FogDepth {
+    static constexpr double fog = 150, mist = 500, mist_limit = 750, other = 1000, haze_limit = 1500,
+                            haze = 2000;
+};
+
+// Cumulus in a lattice deeper than this is towering (TCU).
+inline constexpr double kTowering_m = 2000;
+
 // A layer of clouds that a group becomes.
 struct MetarLayer {
-    std::string name;              // "Sc1": genus and number, from below
-    std::string genus;             // WMO abbreviation
+    std::string name;              // "Sc1": genus and number, from below; "VV1" where the sky is obscured
+    std::string genus;             // WMO abbreviation; "VV": an obscured sky
     double base_m = 0, top_m = 0;  // above the aerodrome, which is z = 0
     double cover = 0;              // of optical depth above 1, to be met; 1: no gap
     bool sheet = false;            // without gaps: nothing to fit

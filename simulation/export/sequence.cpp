@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "density/export/bricks.h"
+#include "simulation/export/weather.h"
 #include "simulation/run_listing.h"
 #include "simulation/scene_place.h"
 
@@ -299,6 +300,8 @@ std::vector<ExportSequence> list_sequences(const ExportOptions& options, std::ve
         if (!run.complete)
             notes.push_back(run.folder.string() +
                             ": the run is not complete; its frames so far are exported");
+        if (const std::string note = datum_note(run.scene); !options.weather.empty() && !note.empty())
+            notes.push_back(note);
         std::vector<std::optional<std::string>> layers{options.layer};
         if (options.layer == "each") {
             layers.clear();

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "density/vdb/vdb_file.h"
 #include "scenes/metar/metar.h"
+#include "scenes/metar/metar_scene.h"
 #include "simulation/scene_place.h"
 
 namespace nephos {
@@ -24,7 +25,8 @@ double speed_of(const Velocity& v) { return std::hypot(v.east_m_per_s, v.north_m
 
 // "Sc1" of a scene that was made of a report, or a model's genus.
 std::string genus_of(const Scene& scene, const LayerOptions& layer) {
-    static constexpr const char* kGenera[] = {"Ci", "Cc", "Cs", "Ac", "As", "Ns", "Sc", "St", "Cu", "Cb"};
+    static constexpr const char* kGenera[] = {"Ci", "Cc", "Cs", "Ac", "As", "Ns",
+                                              "Sc", "St", "Cu", "Cb", "VV"};
     for (const char* genus : kGenera) {
         const std::string rest = layer.name.starts_with(genus) ? layer.name.substr(2) : "x";
         if (rest.find_first_not_of("0123456789") == rest.npos) return genus;
@@ -79,7 +81,7 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
     w.number = frame.number;
     w.time_s = frame.time_s;
     w.utc = utc_at(scene.georeference, frame.time_s);
-    w.elevation_m = scene.georeference.given ? scene.georeference.height_m : 0;
+    w.elevation_m = msl_height_m(scene.georeference);
     const double heading = scene.georeference.given ? scene.georeference.heading_deg : 0;
     w.heading_deg = heading;
     if (scene.georeference.given) w.region = region_of(scene);
@@ -94,7 +96,9 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
         LayerSummary s = summary_of(run, scene.layers[n].name,
                                     read_density(density_file(run, frame, scene.layers[n].name)),
                                     layer_wind(scene, n), frame.time_s);
-        s.genus = genus_of(scene, scene.layers[n]);
+        const LayerOptions& layer = scene.layers[n];
+        s.genus = genus_of(scene, layer);
+        s.towering = s.genus == "Cu" && layer.extent.z * layer.placement.cell_size_m > kTowering_m;
         for (const RainRecord& area : frame.rain)
             if (area.layer == s.name) s.rain_mm_per_h = std::max(s.rain_mm_per_h, area.intensity_mm_per_h);
         w.layers.push_back(std::move(s));
@@ -111,13 +115,66 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
     w.surface_m_per_s = speed_of(surface);
     w.surface_from_deg = bearing_from(surface, heading);
     const Fog& fog = scene.render.fog;
-    if (fog.extinction_per_m > 0) w.visibility_m = std::min(9999.0, kKoschmieder / fog.extinction_per_m);
-    for (const RainRecord& area : frame.rain)
-        w.rain_mm_per_h = std::max(w.rain_mm_per_h, area.intensity_mm_per_h);
+    if (fog.extinction_per_m > 0) {
+        w.visibility_m = std::min(9999.0, kKoschmieder / fog.extinction_per_m);
+        w.fog_depth_m = fog.height_m;
+    }
+    for (const RainRecord& area : frame.rain) {
+        if (!(area.intensity_mm_per_h > w.rain_mm_per_h)) continue;
+        w.rain_mm_per_h = area.intensity_mm_per_h;
+        w.precipitation = is_precipitation(area.layer) ? area.layer : "";
+    }
     w.showers = frame.rain.size() > 1;
     w.snow = scene.render.precipitation.kind == PrecipitationKind::snow;
     w.thunder = !scene.render.lightning.empty();
     return w;
+}
+
+namespace {
+
+// Rounded down as reports are (FM 15): to 50 m below 800 m, to 100 m below 5 km, to 1 km above; 9999 from 10 km on.
+int reported_visibility(double metres) {
+    if (metres >= 9999) return 9999;
+    const double step = metres < 800 ? 50 : metres < 5000 ? 100 : 1000;
+    return int(std::floor(metres / step + 1e-3) *
+               step);  // a report's own figure comes back from its extinction
+}
+
+// What falls, and thunder.
+std::optional<MetarWeather> falling_of(const WeatherSummary& weather) {
+    MetarWeather w;
+    w.descriptor = weather.thunder ? "TS" : weather.rain_mm_per_h > 0 && weather.showers ? "SH" : "";
+    if (weather.rain_mm_per_h > 0) {
+        const double rate = weather.rain_mm_per_h;
+        std::string code = weather.precipitation;
+        if (code.empty()) code = weather.snow ? "SN" : rate <= 0.5 ? "DZ" : "RA";
+        const bool drizzle = code.ends_with("DZ") && code.find("RA") == code.npos;
+        w.intensity = rate < (drizzle ? 0.1 : 2.5) ? '-' : rate > (drizzle ? 0.5 : 10) ? '+' : char(0);
+        if (code.starts_with("FZ") && w.descriptor.empty()) w.descriptor = "FZ";
+        if (code.starts_with("FZ")) code.erase(0, 2);
+        for (std::size_t n = 0; n < code.size(); n += 2) w.phenomena.push_back(code.substr(n, 2));
+    }
+    if (w.descriptor.empty() && w.phenomena.empty()) return {};
+    return w;
+}
+
+// What floats: fog, mist or haze by its depth, and by the visibility where nothing falls that could be the reason.
+std::string floating_of(const WeatherSummary& weather, int visibility_m, bool falls) {
+    if (visibility_m >= 9999) return {};
+    const std::string mist = visibility_m < 1000 ? "FG" : "BR";
+    if (weather.fog_depth_m < FogDepth::mist_limit) return mist;
+    if (weather.fog_depth_m >= FogDepth::haze_limit) return "HZ";
+    return visibility_m <= 5000 && !falls ? mist : "";
+}
+
+}  // namespace
+
+std::string datum_note(const Scene& scene) {
+    const Georeference& place = scene.georeference;
+    if (!place.given || place.height_datum == HeightDatum::msl || place.geoid_height_m != 0) return {};
+    return "heights are above the ellipsoid: the scene has no `georeference.geoid_height_m`, from which "
+           "those above "
+           "mean sea level follow";
 }
 
 std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
@@ -135,24 +192,12 @@ std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
     m.wind.known = true;
     m.wind.speed_m_per_s = weather.surface_m_per_s;
     m.wind.from_deg = int(std::lround(weather.surface_from_deg)) % 360;
-    // Rounded as reports are: to 50 m below 800 m, to 100 m below 5 km, to 1 km above.
-    const double v = weather.visibility_m;
-    const double step = v < 800 ? 50 : v < 5000 ? 100 : 1000;
-    m.visibility_m = v >= 9999 ? 9999 : int(std::lround(v / step) * step);
-    if (weather.rain_mm_per_h > 0) {
-        MetarWeather w;
-        const double rate = weather.rain_mm_per_h;
-        const bool drizzle = !weather.snow && rate <= 0.5;
-        w.intensity = drizzle || rate < 2.5 ? '-' : rate > 10 ? '+' : char(0);
-        if (drizzle) w.intensity = 0;
-        w.descriptor = weather.thunder ? "TS" : weather.showers ? "SH" : "";
-        w.phenomena = {drizzle ? "DZ" : weather.snow ? "SN" : "RA"};
-        m.weather.push_back(w);
-    }
-    if (*m.visibility_m < 1000)
-        m.weather.push_back({0, false, "", {"FG"}});
-    else if (*m.visibility_m <= 5000 && m.weather.empty())
-        m.weather.push_back({0, false, "", {"BR"}});
+    m.visibility_m = reported_visibility(weather.visibility_m);
+    const std::optional<MetarWeather> falling = falling_of(weather);
+    if (falling) m.weather.push_back(*falling);
+    if (const std::string floating = floating_of(weather, *m.visibility_m, weather.rain_mm_per_h > 0);
+        !floating.empty())
+        m.weather.push_back({0, false, "", {floating}});
     for (const LayerSummary& layer : weather.layers) {
         const std::optional<CloudAmount> amount = amount_of(layer.columns.cover);
         if (!amount) continue;
@@ -160,6 +205,8 @@ std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
         c.amount = *amount;
         c.height_ft = int(std::lround(layer.columns.cloud_base_m / kFoot_m / 100)) * 100;
         if (layer.genus == "Cb") c.type = "CB";
+        if (layer.towering) c.type = "TCU";
+        if (layer.genus == "VV") c.amount = CloudAmount::obscured;
         m.clouds.push_back(c);
     }
     return metar_text(m);
@@ -199,7 +246,8 @@ std::string layers_json_text(const RunListing& run, const std::vector<WeatherSum
     const Json json = {{"format", "nephos layers"},
                        {"format_version", 1},
                        {"scene_hash", run.scene_hash},
-                       {"heights", "metres above mean sea level"},
+                       {"heights", datum_note(run.scene).empty() ? "metres above mean sea level"
+                                                                 : "metres above the ellipsoid"},
                        {"frames", list}};
     return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -13,7 +13,9 @@
 namespace nephos {
 
 struct LayerSummary {
-    std::string name, genus;  // genus: WMO abbreviation, "" where the scene names none
+    std::string name,
+        genus;              // genus: WMO abbreviation, "" where the scene names none, "VV" of an obscured sky
+    bool towering = false;  // cumulus that is a TCU
     OpticalColumns columns;
     double oktas = 0;         // 8 times the cover
     double transition_m = 0;  // from the base to where the layer has half of its mean density
@@ -36,8 +38,11 @@ struct WeatherSummary {
     double visibility_m = 9999;                        // of the fog; 9999: none
     double rain_mm_per_h = 0;
     bool snow = false, showers = false, thunder = false;
-    double elevation_m = 0;  // of z = 0 above mean sea level
-    double heading_deg = 0;  // true bearing of the y axis
+    std::string
+        precipitation;  // what falls as reports write it, such as "FZRA"; empty: the scene does not name it
+    double fog_depth_m = 0;               // scale height; 0: none
+    double elevation_m = 0;               // of z = 0 above mean sea level
+    double heading_deg = 0;               // true bearing of the y axis
     std::optional<WeatherRegion> region;  // of a scene with a place on Earth
     double snow_depth_m = 0;              // on the ground
 };
@@ -52,12 +57,17 @@ std::string layers_json_text(const RunListing& run, const std::vector<WeatherSum
 std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>& frames);
 std::string wpr_text(const RunListing& run, const WeatherSummary& weather);
 
+// Returns a sentence where the scene does not say how high its origin is above mean sea level, else "": heights of all
+// formats are then above the ellipsoid.
+std::string datum_note(const Scene& scene);
+
 // Returns the true bearing that a velocity of the world comes from, 0..360.
 double bearing_from(const Velocity& velocity, double heading_deg);
 
-// Returns CIGI 3.3 packets, big-endian: IG Control, of a scene with a place Environmental Region Control, then Weather
-// Control of the (up to three) layers, of that region or global; and all frames as
-// a capture of UDP datagrams to port 8005 (pcap, Ethernet).
+// Returns CIGI 3.3 packets, big-endian; and all frames as a capture of UDP datagrams to port 8005 (pcap, Ethernet). Every
+// frame has all that this program ever sends, so that nothing of a frame before stays: IG Control; Environmental Region
+// Control, which makes the region of a scene with a place and destroys it without one; Weather Control of the ground fog
+// and of three layers of clouds, of that region or global, switched off where there is none.
 std::vector<std::byte> cigi_packets(const WeatherSummary& weather);
 std::vector<std::byte> cigi_capture(const std::vector<WeatherSummary>& frames);
 

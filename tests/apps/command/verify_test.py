@@ -202,7 +202,7 @@ class Place(Case):
     def test_mistakes_are_named(self):
         for keys, says in (("latitude_deg = 51", "longitude_deg"), ("latitude_deg = 91\nlongitude_deg = 0", "-90 to 90"),
                            ('latitude_deg = 1\nlongitude_deg = 2\nstart_utc = "yesterday"', "2024-06-21T13:50:00Z"),
-                           ('latitude_deg = 1\nlongitude_deg = 2\nheight_datum = "ellipsoid"\ngeoid_height_m = 3', "geoid_height_m")):
+                           ('latitude_deg = 1\nlongitude_deg = 2\nheight_datum = "sea"', "ellipsoid")):
             scene = self.write("bad.toml", f"{SCENE}[georeference]\n{keys}\n")
             self.assertIn(says, self.call("validate", scene, status=2).stderr)
 
