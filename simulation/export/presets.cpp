@@ -70,12 +70,16 @@ constexpr const char* kMsfs =
 
 constexpr const char* kCigi =
     "CIGI 3.3 (packets decoded by Wireshark's dissector)\n\n"
-    "{NAME}.pcap has a datagram a frame: IG Control, then a Weather Control for each of up to three layers, "
-    "big-endian: of "
-    "a\n"
-    "region around the scene's place (Environmental Region Control) where it has a [georeference], else "
-    "global. Play it with\n"
-    "tcpreplay, or take the payloads as they are.\n";
+    "{NAME}.pcap has a datagram a frame: IG Control, then Weather Control of the ground fog (layer 0) and of "
+    "three "
+    "layers of\n"
+    "clouds (1 to 3), big-endian; what is not there is switched off. They are of region 1 around the scene's "
+    "place "
+    "(Environmental\n"
+    "Region Control) where it has a [georeference], else global, and region 1 is destroyed. Heights are "
+    "above mean sea "
+    "level if\n"
+    "the scene says where that is. Play it with tcpreplay, or take the payloads as they are.\n";
 
 constexpr const char* kFlightgear =
     "FlightGear 2020.3 (not tried on its screen; its METAR syntax is that of FM 15)\n\n"

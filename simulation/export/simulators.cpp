@@ -33,7 +33,7 @@ int cigi_type(const std::string& genus) {
     constexpr const char* kTypes[] = {"", "Ac", "As", "Cc", "Cs", "Ci", "Cb", "Cu", "Ns", "Sc", "St"};
     for (int n = 1; n <= 10; ++n)
         if (genus == kTypes[n]) return n;
-    return 0;
+    return genus == "VV" ? 10 : 0;  // an obscured sky: stratus
 }
 
 template <class T>
@@ -53,14 +53,16 @@ std::uint16_t checksum(std::span<const std::byte> header) {
     return std::uint16_t(~sum);
 }
 
+enum class RegionState : std::uint8_t { active = 1, destroyed = 2 };
+
 // Environmental Region Control (section 4.1.11): the rectangle of the clouds around their place on Earth, with the weather
 // of its own; turned by the heading of the world's y axis. In a region of no transition clouds would end like a wall.
-void put_region(ByteWriter& w, const WeatherRegion& region) {
+void put_region(ByteWriter& w, const WeatherRegion& region, RegionState state) {
     w.put(std::uint8_t{11});
     w.put(std::uint8_t{48});
     put_big(w, kCigiRegion);
-    w.put(std::uint8_t{
-        1});  // active; its weather, aerosol, sea and land are not merged with those of other regions
+    w.put(std::uint8_t(
+        state));  // its weather, aerosol, sea and land are not merged with those of other regions
     for (int n = 0; n < 3; ++n) w.put(std::uint8_t{0});
     put_big(w, region.latitude_deg);
     put_big(w, region.longitude_deg);
@@ -98,7 +100,7 @@ std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>
         if (place.given)
             entry.update(Json{{"latitude", place.latitude_deg},
                               {"longitude", place.longitude_deg},
-                              {"ground_altitude_msl", place.height_m}});
+                              {"ground_altitude_msl", w.elevation_m}});
         list.push_back(std::move(entry));
     }
     return Json{{"structure", "XPLMWeatherInfo_t"}, {"frames", list}}.dump(2, ' ', false,
@@ -142,6 +144,79 @@ std::string wpr_text(const RunListing& run, const WeatherSummary& w) {
     return text + "  </WeatherPreset.Preset>\n</SimBase.Document>\n";
 }
 
+namespace {
+
+// Layers of Weather Control: 0 is ground fog, 1 to 3 are clouds.
+constexpr int kFogLayer = 0, kCloudLayers = 3;
+
+// Weather Control (section 4.1.12) of one layer; all zero but for its number where it is switched off.
+struct WeatherLayer {
+    int id = 0;
+    bool enabled = false, lightning = false;
+    int type = 0;       // of cloud
+    int humidity = 95;  // per cent
+    double visibility_m = 100, coverage = 0, base_m = 0, thickness_m = 0,
+           transition_m = 0;  // heights above sea level
+    double wind_m_per_s = 0, wind_from_deg = 0;
+};
+
+void put_layer(ByteWriter& w, const WeatherLayer& layer, bool regional) {
+    w.put(std::uint8_t{12});
+    w.put(std::uint8_t{56});
+    put_big(w, regional ? kCigiRegion : std::uint16_t{0});
+    w.put(std::uint8_t(layer.id));
+    w.put(std::uint8_t(layer.enabled ? layer.humidity : 0));
+    w.put(std::uint8_t((layer.enabled ? 1 : 0) | (layer.lightning ? 8 : 0) | layer.type << 4));
+    w.put(std::uint8_t(regional ? 1 : 0));  // scope: regional or global; no severity
+    const double from = layer.wind_from_deg > 180 ? layer.wind_from_deg - 360 : layer.wind_from_deg;
+    // Temperature and pressure are those of the standard atmosphere.
+    const double on[] = {15.0 - 0.0065 * layer.base_m,
+                         layer.visibility_m,
+                         0.0,
+                         100 * layer.coverage,
+                         layer.base_m,
+                         layer.thickness_m,
+                         layer.transition_m,
+                         layer.wind_m_per_s,
+                         0.0,
+                         from,
+                         1013.25 * std::pow(1 - 2.25577e-5 * layer.base_m, 5.25588),
+                         0.0};
+    for (const double value : on) put_big(w, float(layer.enabled ? value : 0.0));
+}
+
+WeatherLayer fog_layer(const WeatherSummary& weather) {
+    WeatherLayer fog;
+    fog.id = kFogLayer;
+    fog.enabled = weather.visibility_m < 9999;
+    fog.humidity = 100;
+    fog.visibility_m = weather.visibility_m;
+    fog.coverage = 1;
+    fog.base_m = weather.elevation_m;
+    fog.thickness_m = weather.fog_depth_m;
+    fog.transition_m = 0.5 * weather.fog_depth_m;
+    fog.wind_m_per_s = weather.surface_m_per_s;
+    fog.wind_from_deg = weather.surface_from_deg;
+    return fog;
+}
+
+WeatherLayer cloud_layer(const WeatherSummary& weather, const LayerSummary& s, int id) {
+    WeatherLayer cloud;
+    cloud.id = id;
+    cloud.enabled = true;
+    cloud.lightning = weather.thunder && id == 1;
+    cloud.type = cigi_type(s.genus);
+    cloud.coverage = s.columns.cover;
+    cloud.base_m = s.columns.cloud_base_m + weather.elevation_m;
+    cloud.thickness_m = std::max(0.0, s.columns.top_m + weather.elevation_m - cloud.base_m);
+    cloud.transition_m = s.transition_m;
+    cloud.wind_m_per_s = s.wind_m_per_s;
+    cloud.wind_from_deg = s.wind_from_deg;
+    return cloud;
+}
+
+}  // namespace
+
 std::vector<std::byte> cigi_packets(const WeatherSummary& weather) {
     ByteWriter w;
     // IG Control: version 3.3, operate, byte swap magic number, frame.
@@ -150,24 +225,17 @@ std::vector<std::byte> cigi_packets(const WeatherSummary& weather) {
     put_big(w, std::uint32_t(weather.number));
     for (int n = 0; n < 3; ++n) put_big(w, std::uint32_t{0});
     const bool regional = weather.region.has_value();
-    if (regional) put_region(w, *weather.region);
-    int id = 0;
-    for (const LayerSummary& s : three_layers(weather.layers)) {
-        ++id;
-        w.put(std::uint8_t{12});
-        w.put(std::uint8_t{56});
-        put_big(w, regional ? kCigiRegion : std::uint16_t{0});
-        w.put(std::uint8_t(id));  // cloud layer 1 to 3
-        w.put(std::uint8_t{95});  // humidity in it, per cent
-        w.put(std::uint8_t(1 | (weather.thunder && id == 1 ? 8 : 0) | cigi_type(s.genus) << 4));
-        w.put(std::uint8_t(regional ? 1 : 0));  // scope: regional or global; no severity
-        const double direction = s.wind_from_deg > 180 ? s.wind_from_deg - 360 : s.wind_from_deg;
-        const double base = s.columns.cloud_base_m + weather.elevation_m;
-        for (const double value :
-             {15.0 - 0.0065 * base, 100.0, 0.0, 100 * s.columns.cover, base,
-              std::max(0.0, s.columns.top_m + weather.elevation_m - base), s.transition_m, s.wind_m_per_s,
-              0.0, direction, 1013.25 * std::pow(1 - 2.25577e-5 * base, 5.25588), 0.0})
-            put_big(w, float(value));
+    put_region(w, weather.region.value_or(WeatherRegion{}),
+               regional ? RegionState::active : RegionState::destroyed);
+    put_layer(w, fog_layer(weather), regional);
+    const std::vector<LayerSummary> clouds = three_layers(weather.layers);
+    for (int id = 1; id <= kCloudLayers; ++id) {
+        WeatherLayer none;
+        none.id = id;
+        put_layer(
+            w,
+            std::size_t(id) <= clouds.size() ? cloud_layer(weather, clouds[std::size_t(id) - 1], id) : none,
+            regional);
     }
     return w.take();
 }

@@ -4,6 +4,7 @@
 import json
 import random
 import re
+import shutil
 import subprocess
 import unittest
 
@@ -100,33 +101,51 @@ class Metar(Case):
             self.assertEqual((int(temperature), int(dew)), (int(degrees[1]), int(degrees[2])), report)
 
     def groups_of(self, metar):
-        clouds = re.findall(r"\b(FEW|SCT|BKN|OVC)(\d{3})(CB)?", metar)
-        wind = re.search(r"(\d{3})(\d\d)KT", metar)
-        weather = re.findall(r" ([-+]?(?:SH|TS)?(?:RA|SN|DZ))\b", metar)
-        return clouds, (int(wind[1]), int(wind[2])), weather
+        """Clouds, wind, visibility in metres and weather of a report."""
+        clouds, weather, visibility = [], [], 9999
+        for word in metar.split()[2:]:
+            if match := re.fullmatch(r"(FEW|SCT|BKN|OVC|VV)(\d{3})(CB|TCU)?", word):
+                clouds.append((match[1], int(match[2]), match[3] or ""))
+            elif match := re.fullmatch(r"(\d{3})(\d\d)KT", word):
+                wind = (int(match[1]), int(match[2]))
+            elif match := re.fullmatch(r"(\d+)SM", word):
+                visibility = 9999 if int(match[1]) >= 7 else int(int(match[1]) * 1609.344 // 1000 * 1000)
+            elif re.fullmatch(r"\d{4}", word):
+                visibility = int(word)
+            elif re.fullmatch(r"[-+]?([A-Z]{2}){1,3}", word) and word not in ("AUTO", "NOSIG"):
+                weather.append(word)
+        return clouds, wind, visibility, weather
 
     def test_there_and_back(self):
-        """Report -> scene -> run -> report: amounts, bases within 100 ft, weather, wind within 10 degrees and 2 kt."""
+        """Report -> scene -> run -> report: amounts and types, bases within 100 ft, visibility, weather, wind within 10 degrees
+        and 2 kt."""
         reports = ["EGLL 211350Z 24012KT 9999 FEW020 14/08 Q1017", "LFPG 210800Z 09008KT 9999 SCT035 18/10 Q1015",
                    "EDDM 211200Z 31015KT 9999 BKN040 12/04 Q1018", "EHAM 210600Z 20020KT 8000 -RA OVC008 09/08 Q0999",
                    "ENGM 211200Z 35005KT 1500 SN OVC012 M03/M04 Q1002", "LIMC 211500Z 18010KT 9999 SHRA FEW025 BKN060 20/16 Q1010",
-                   "YSSY 210000Z 16012KT CAVOK 22/12 Q1020"]
+                   "YSSY 210000Z 16012KT CAVOK 22/12 Q1020", "KORD 211351Z 22015KT 6SM -TSRA BR FEW018 BKN045CB 22/20 A2975",
+                   "LSZH 210920Z 18006KT 9999 FEW030TCU SCT060 19/12 Q1014", "WSSS 210700Z 20006KT 9999 TS FEW016CB BKN140 31/25 Q1008",
+                   "EFHK 210450Z 12009KT 4000 FZRA BR OVC006 M01/M01 Q1003", "UUEE 211330Z 05010KT 2500 -RASN BR BKN009 OVC020 01/01 Q0998",
+                   "EIDW 210330Z 24018KT 3000 DZ BR OVC004 11/11 Q1009", "EGPD 210520Z 15016KT 7000 -DZ BKN005 09/09 Q1013",
+                   "OMDB 210900Z 32010KT 4500 HZ NSC 36/18 Q1002", "LOWI 210620Z 00000KT 0350 FG VV002 02/02 Q1021",
+                   "ESSA 210850Z 18012KT 1200 +SN VV008 M02/M02 Q0991", "EGCC 211150Z 29022KT 9999 FEW012 SCT025 BKN070 OVC120 13/09 Q1005",
+                   "KJFK 211251Z 18014KT 10SM SCT010 BKN250 20/17 A2999", "CYUL 210400Z 03011KT 3000 FZDZ OVC003 M02/M02 Q1010"]
         for report in reports:
             with self.subTest(report=report):
-                self.call("metar", report, "-o", "sky.toml", "--run", "--no-render", "--out", "run", "--date", "2024-06", "--at", "51.5,-0.5,0", "-q")
-                self.call("export", "run", "--to", "metar", "--frames", "1", "-o", "back")
+                for folder in ("run", "back"):
+                    shutil.rmtree(self.folder / folder, ignore_errors=True)
+                self.call("metar", report, "-o", "sky.toml", "--date", "2024-06", "--at", "51.5,-0.5,0", "-q")
+                self.call("run", "sky.toml", "--no-render", "--frames", "1", "--out", "run", "-q")
+                self.call("export", "run", "--to", "metar", "-o", "back")
                 back = next((self.folder / "back").glob("*.metar.txt")).read_text().strip()
-                clouds, wind, weather = self.groups_of(report)
-                found_clouds, found_wind, found_weather = self.groups_of(back)
-                self.assertEqual([c[0] for c in clouds], [c[0] for c in found_clouds], back)
+                clouds, wind, visibility, weather = self.groups_of(report)
+                found_clouds, found_wind, found_visibility, found_weather = self.groups_of(back)
+                self.assertEqual([(c[0], c[2]) for c in clouds], [(c[0], c[2]) for c in found_clouds], back)
                 for wanted, found in zip(clouds, found_clouds):
-                    self.assertLessEqual(abs(int(wanted[1]) - int(found[1])), 1, back)
-                self.assertEqual(weather, found_weather, back)
+                    self.assertLessEqual(abs(wanted[1] - found[1]), 1, back)
+                self.assertEqual((weather, visibility), (found_weather, found_visibility), back)
                 self.assertLessEqual(abs((wind[0] - found_wind[0] + 180) % 360 - 180), 10, back)
                 self.assertLessEqual(abs(wind[1] - found_wind[1]), 2, back)
                 self.assertEqual(report[:4], back[:4])
-                for folder in ("run", "back"):
-                    subprocess.run(["rm", "-r", self.folder / folder], check=True)
 
     def test_the_same_report_is_the_same_scene(self):
         first = self.call("metar", REAL[0], "-q").stdout
@@ -152,18 +171,59 @@ class Weather(Case):
         self.assertEqual([cloud["cloud_type"] for cloud in xplane["cloud_layers"]], [2, 2, 0])
         subprocess.run(["xmllint", "--noout", self.folder / "weather/EGLL.wpr"], check=True)
 
+    def cigi(self, run, folder):
+        """The Weather Controls of the first frame by their layer, as Wireshark names their fields; and all that it says."""
+        self.call("export", run, "--for", "cigi", "--frames", "1", "-o", folder)
+        said = subprocess.run(["tshark", "-r", next((self.folder / folder).glob("*.pcap")), "-d", "udp.port==8005,cigi", "-V"],
+                              capture_output=True, text=True, check=True).stdout
+        packets = {}
+        for text in re.split(r"CIGI 3 *, Weather Control|Weather Control \(56 bytes\)", said)[1:]:
+            fields = {name.strip(): value.strip() for name, value in re.findall(r"^ +(?:[.01 ]+= )?([^:\n]+): ([^\n]*)$", text, re.M)}
+            packets[fields["Layer ID"]] = fields
+        return packets, said
+
+    def number(self, fields, name):
+        return float(re.match(r"-?[\d.]+", next(value for key, value in fields.items() if key.startswith(name)))[0])
+
     def test_wireshark_decodes_cigi(self):
-        self.call("export", "run", "--for", "cigi", "--frames", "1..2", "-o", "cigi")
-        layers = self.call("export", "run", "--to", "layers", "--frames", "1..2", "-o", "layers") and json.loads(
-            (self.folder / "layers/EGLL.layers.json").read_text())["frames"][0]["layers"]
-        said = subprocess.run(["tshark", "-r", self.folder / "cigi/EGLL.pcap", "-d", "udp.port==8005,cigi", "-V"], capture_output=True, text=True, check=True).stdout
-        self.assertEqual(len(re.findall(r"Weather Control \(56 bytes\)", said)), 2 * len(layers), said[:3000])
-        coverage = [float(value) for value in re.findall(r"Cloud Coverage[^:]*: ([\d.]+)", said)]
-        for expected, found in zip(layers, coverage):
-            self.assertAlmostEqual(100 * expected["coverage"], found, delta=0.01)
-        bases = [float(value) for value in re.findall(r"Base Elevation[^:]*: ([\d.]+)", said)]
-        for expected, found in zip(layers, bases):
-            self.assertAlmostEqual(expected["cloud_base_m"], found, delta=0.1)
+        self.call("export", "run", "--to", "layers", "--frames", "1", "-o", "layers")
+        layers = json.loads((self.folder / "layers/EGLL.layers.json").read_text())["frames"][0]["layers"]
+        packets, said = self.cigi("run", "cigi")
+        self.assertEqual(len(packets), 4, said[:6000])
+        clouds = [fields for name, fields in packets.items() if "Cloud" in name]
+        self.assertEqual((len(clouds), len(layers)), (3, 3), list(packets))
+        for expected, found in zip(layers, clouds):
+            self.assertIn("Enable", found["Weather Enable"])
+            self.assertAlmostEqual(100 * expected["coverage"], self.number(found, "Coverage"), delta=0.01)
+            self.assertAlmostEqual(expected["cloud_base_m"], self.number(found, "Base Elevation"), delta=0.1)
+        fog = next(fields for name, fields in packets.items() if "Fog" in name)
+        self.assertNotIn("Enable", fog["Weather Enable"])
+        self.assertIn("Active", re.search(r"Region State: ([^\n]*)", said)[1])
+
+    def test_cigi_switches_off_what_is_not_there(self):
+        """Fog is a layer of its own; clouds that are not there any more, and the region of an earlier sky, do not stay."""
+        self.call("metar", "LOWI 210620Z 00000KT 0350 FG VV002 02/02 Q1021", "-o", "fog.toml", "-q")
+        self.call("run", "fog.toml", "--no-render", "--frames", "1", "--out", "fog", "-q")
+        packets, said = self.cigi("fog", "fogged")
+        self.assertEqual(["Enable" in fields["Weather Enable"] for fields in packets.values()], [True, True, False, False], said[:6000])
+        fog = next(fields for name, fields in packets.items() if "Fog" in name)
+        self.assertAlmostEqual(self.number(fog, "Visibility"), 350, delta=1)
+        self.assertIn("Destroyed", re.search(r"Region State: ([^\n]*)", said)[1])
+
+    def test_heights_above_the_ellipsoid(self):
+        """Simulators count from mean sea level: 45 m above the ellipsoid here."""
+        heights = {}
+        for geoid in ("", "geoid_height_m = 45\n"):
+            text = (self.folder / "sky.toml").read_text().replace("height_m = 25\n", f'height_m = 70\nheight_datum = "ellipsoid"\n{geoid}')
+            self.call("run", self.write("high.toml", text), "--no-render", "--frames", "1", "--out", "high", "--overwrite", "-q")
+            said = self.call("export", "high", "--to", "layers", "--to", "xplane", "-o", "told" + geoid[:5]).stderr
+            self.assertEqual("geoid_height_m" in said, not geoid)
+            layers = json.loads(next((self.folder / ("told" + geoid[:5])).glob("*.layers.json")).read_text())
+            self.assertEqual(layers["heights"], "metres above mean sea level" if geoid else "metres above the ellipsoid")
+            xplane = json.loads(next((self.folder / ("told" + geoid[:5])).glob("*.xplane.json")).read_text())
+            heights[geoid] = (layers["frames"][0]["layers"][0]["cloud_base_m"], xplane["frames"][0]["ground_altitude_msl"])
+        self.assertAlmostEqual(heights[""][0] - 45, heights["geoid_height_m = 45\n"][0])
+        self.assertEqual((heights[""][1], heights["geoid_height_m = 45\n"][1]), (70, 25))
 
 
 if __name__ == "__main__":
