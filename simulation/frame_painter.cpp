@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/frame_painter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -37,6 +39,27 @@ void lean(RainCurtain& curtain, const Wind& wind, const PrecipitationOptions& p,
     if (most <= 1) return;
     curtain.lean_x /= most;
     curtain.lean_y /= most;
+}
+
+constexpr double kLeastWater = 0.05;  // of columns in an area that rain
+
+// Lets rain begin where the cloud is: at the highest base within the area, or not at all.
+void fall_from(const std::shared_ptr<const CloudBases>& cloud, RainCurtain& curtain) {
+    double highest_m = curtain.ground_m;
+    const Ellipse area = ellipse_at(curtain, curtain.ground_m);
+    for (int j = 0; j < cloud->rows; ++j) {
+        for (int i = 0; i < cloud->columns; ++i) {
+            const std::size_t n = std::size_t(j) * std::size_t(cloud->columns) + std::size_t(i);
+            const double water = double(cloud->water[n]);
+            if (water < kLeastWater) continue;
+            const double x = cloud->x_m + (i + 0.5) * cloud->texel_m,
+                         y = cloud->y_m + (j + 0.5) * cloud->texel_m;
+            if (ellipse_value(area, x, y) < 1)
+                highest_m = std::max(highest_m, double(cloud->water_base_m[n]) / water);
+        }
+    }
+    curtain.base_m = highest_m;
+    curtain.cloud = cloud;
 }
 
 }  // namespace
@@ -128,6 +151,10 @@ Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, doubl
     weather.carried_y_m = p.wind_drift * path.y;
     for (std::size_t n = 0; n < layers.size(); ++n) {
         const Range& base = scene.layers[n].base_height_m;
+        std::shared_ptr<const CloudBases> cloud;
+        if (!layers[n].rain.empty() && layers[n].density.active_voxels() > 0)
+            cloud =
+                std::make_shared<CloudBases>(cloud_bases(layers[n].density, scene.density.extinction_per_m));
         for (const RainArea& area : layers[n].rain) {
             RainCurtain curtain;
             curtain.id = area.id;
@@ -139,6 +166,8 @@ Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, doubl
             curtain.axis_y = area.axis_y;
             curtain.ground_m = ground_m;
             curtain.base_m = 0.5 * (base.min + base.max);
+            if (cloud) fall_from(cloud, curtain);
+            if (curtain.base_m <= ground_m) continue;  // no cloud above
             curtain.rate_mm_per_h = area.intensity_mm_per_h;
             lean(curtain, layer_wind(scene, n), p, time_s);
             weather.curtains.push_back(curtain);

@@ -37,6 +37,7 @@ struct Pass {
     double size = 1;      // s0
     double sunlight = 1;  // transmitted fraction of sunlight at the container
     bool snow = false;
+    Vec2 ahead{1, 0};  // far: from the eye to the container, unit
 };
 
 // Simple, and the same everywhere: where a flake sways. Angles by index and time.
@@ -64,7 +65,10 @@ double real_particles(const ParticlePass& pass, const PrecipitationOptions& p, c
             const RainCurtain& c = *term.curtain;
             const double height = (place.z - c.ground_m) / (c.base_m - c.ground_m);
             if (height < 0 || height > 1) continue;
-            const double fraction = rain_fraction(ellipse_at(c, place.z), place.x, place.y, p.edge);
+            const CloudBases::Column cloud = cloud_above(c, place);
+            if (place.z > cloud.base_m) continue;
+            const double fraction =
+                cloud.water * rain_fraction(ellipse_at(c, place.z), place.x, place.y, p.edge);
             if (fraction <= 0) continue;
             most = std::max(most,
                             fraction * left_of_rain(height, p.evaporation) * real_per_drawn(term.law, d_mm));
@@ -127,14 +131,23 @@ Vec3 velocity_of(const Pass& p, std::size_t i, const Sway& sway, double width_m)
     return std::min(1.0, longest / length(v)) * v;
 }
 
+// Returns the place of a particle in the container: 0 at its point, 1 at the rim of its base, which is a circle for near
+// rain and an ellipse across the way to it for far rain.
+double within_container(const Pass& p, const Vec3& place) {
+    const RainContainer& container = p.pass.container;
+    const double x = place.x - container.nearest.x, y = place.y - container.nearest.y;
+    if (!p.pass.far) return flat_length(x, y) / p.pass.boxes.depth_m;
+    return flat_length((x * p.ahead.x + y * p.ahead.y) / p.pass.ahead_m,
+                       (x * p.ahead.y - y * p.ahead.x) / p.pass.boxes.depth_m);
+}
+
 // Adds the streak of particle i, which is at (x, y, z) from the centre of the container.
 void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<Streak>& out) {
     const ParticleBoxes& boxes = p.pass.boxes;
     const RainContainer& container = p.pass.container;
     const Vec3& eye = p.view.camera.position_m;
     Vec3 place{boxes.centre_x_m + double(x), boxes.centre_y_m + double(y), boxes.centre_z_m + double(z)};
-    const double d =
-        flat_length(place.x - container.nearest.x, place.y - container.nearest.y) / boxes.depth_m;
+    const double d = within_container(p, place);
     if (d >= double(p.particles.reach[i])) return;
     const Vec3 way = place - eye;
     if (!container.whole && way.x * container.axis.x + way.y * container.axis.y < 0) return;
@@ -216,6 +229,12 @@ std::vector<Streak> streaks_of(const Particles& particles, const ParticlePass& p
                 1,
                 1,
                 particles.kind == PrecipitationKind::snow};
+    if (pass.far) {
+        const Vec2 way{pass.container.nearest.x - view.camera.position_m.x,
+                       pass.container.nearest.y - view.camera.position_m.y};
+        const double length = flat_length(way.x, way.y);
+        if (length > 0) shared.ahead = way / length;
+    }
     shared.size = size_at_eye(particles, pass, view);
     shared.sunlight = double(
         sunlight_at(picture, {pass.container.nearest.x, pass.container.nearest.y, pass.boxes.centre_z_m}));

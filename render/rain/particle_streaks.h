@@ -13,6 +13,7 @@
 // the eye is at most about one half. Particles of a far container represent whole swarms and are larger, but
 // at most two pixels wide.
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -47,10 +48,20 @@ struct ParticlePass {
     RainContainer container;
     ParticleBoxes boxes;
     bool far = false;
+    double ahead_m = 0;  // far: semi-axis of its elliptic base away from the eye; across it has boxes.depth_m
     double fraction = 1;                  // factor of their opacity
     double number = 1;                    // fraction of the particles that exist
     std::vector<CurtainTerm> rain, less;  // the rain in it; the part of it that another pass draws
 };
+
+// A far container is as wide as what is seen of its area (P), rounded up and down to powers of two: boxes of particles have
+// these widths, so that no particle moves, and the two fade into each other while the width changes.
+struct FarWidth {
+    double scale = 1;   // semi-axis across, in those away from the eye: 1, 2, 4 ...
+    double weight = 1;  // of its particles; the sum over both is 1
+};
+// Returns the widths for a seen half width of `wide_m` and a depth; the second has no weight where the first fits.
+std::array<FarWidth, 2> far_widths(double wide_m, double ahead_m);
 
 // Returns one pass of near rain for all areas that contain the eye, and passes of near and far rain for each
 // other area in view.

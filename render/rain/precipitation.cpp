@@ -36,6 +36,13 @@ RainFractions rain_fractions(const PrecipitationOptions& p, double outside_m) {
     return fractions;
 }
 
+std::array<FarWidth, 2> far_widths(double wide_m, double ahead_m) {
+    constexpr double kWidest = 64;
+    const double level = std::log2(std::clamp(wide_m / ahead_m, 1.0, kWidest)), below = std::floor(level);
+    const double scale = std::exp2(below), rest = level - below;
+    return {FarWidth{scale, 1 - rest}, FarWidth{2 * scale, rest}};
+}
+
 std::vector<ParticlePass> particle_passes(const RenderOptions& options, const CameraFrame& camera,
                                           const Weather& weather, double time_s) {
     const PrecipitationOptions& p = options.precipitation;
@@ -75,16 +82,22 @@ std::vector<ParticlePass> particle_passes(const RenderOptions& options, const Ca
         for (const bool is_far : {false, true}) {
             const double fraction = is_far ? fractions.far : fractions.near;
             if (fraction <= 0) continue;
-            ParticlePass pass = pass_of(outside[i], is_far ? far_depth : p.depth_m, fraction);
-            pass.far = is_far;
-            pass.number = is_far ? fractions.far_number : 1;
-            if (is_far) {
-                pass.boxes.height_m = curtain.base_m - curtain.ground_m;
-                pass.boxes.centre_z_m = 0.5 * (curtain.base_m + curtain.ground_m);
+            const double wide_m = is_far ? std::max(outside[i].width.left_m, outside[i].width.right_m) : 0;
+            for (const FarWidth& width : far_widths(wide_m, far_depth)) {
+                if (width.weight <= 0) continue;
+                ParticlePass pass = pass_of(outside[i], is_far ? width.scale * far_depth : p.depth_m,
+                                            width.weight * fraction);
+                pass.far = is_far;
+                pass.number = is_far ? fractions.far_number : 1;
+                if (is_far) {
+                    pass.ahead_m = far_depth;
+                    pass.boxes.height_m = curtain.base_m - curtain.ground_m;
+                    pass.boxes.centre_z_m = 0.5 * (curtain.base_m + curtain.ground_m);
+                }
+                pass.rain = {far[i]};
+                pass.less = before;
+                passes.push_back(std::move(pass));
             }
-            pass.rain = {far[i]};
-            pass.less = before;
-            passes.push_back(std::move(pass));
         }
         before.push_back(far[i]);
     }

@@ -2,6 +2,7 @@
 #include "render/rain/precipitation_light.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -9,17 +10,28 @@
 #include "core/vec.h"
 #include "render/frame/frame_data.h"
 #include "render/options/phase_function.h"
+#include "render/rain/rainbow.h"
 
 namespace nephos {
 namespace {
 
-// Times pi: radiance per radiance of a white surface that faces the light.
-double particle_phase(PrecipitationKind kind, double cosine) {
+// Times pi: radiance per radiance of a white surface that faces the light; without the bows.
+double lobe_phase(PrecipitationKind kind, double cosine) {
     return kForwardFraction * std::numbers::pi * henyey_greenstein(cosine, forward_g(kind)) +
            (1 - kForwardFraction) * 0.25;
 }
 
 constexpr double kSkyFraction[2] = {0.68, 0.8};  // of a drop's and a flake's light, the rest is the ground's
+
+// The same with the bows of drops.
+Rgb particle_phase(PrecipitationKind kind, double cosine) {
+    const double lobe = lobe_phase(kind, cosine);
+    if (kind == PrecipitationKind::snow) return {lobe, lobe, lobe};
+    const Rainbow& bow = rainbow();
+    const std::array<double, 3> at = bow.at(cosine);
+    const double rest = (1 - bow.share) * lobe;
+    return {rest + at[0], rest + at[1], rest + at[2]};
+}
 
 }  // namespace
 
@@ -81,18 +93,18 @@ float sunlight_at(const Picture& picture, const Vec3& place_m) {
 
 Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Vec3& place_m,
                       double sunlight) {
-    const double sun = sunlight * particle_phase(light.kind, dot(ray, light.to_sun));
+    const Rgb sun = particle_phase(light.kind, dot(ray, light.to_sun));
     const GroundLight::Fractions below = light.ground != nullptr ? light.ground->at(Vec2(place_m)) : GroundLight::Fractions{};
     double flash = 0;
     if (light.flash[0] + light.flash[1] + light.flash[2] > 0) {
         const Vec3 way = light.flash_m - place_m;
         const double squared = std::max(dot(way, way), 1e4);
-        flash = 1e6 / squared * particle_phase(light.kind, dot(ray, (1 / std::sqrt(squared)) * way));
+        flash = 1e6 / squared * lobe_phase(light.kind, dot(ray, (1 / std::sqrt(squared)) * way));
     }
     Rgb radiance;
     for (std::size_t c = 0; c < 3; ++c)
         radiance[c] = below.sky * light.by_sky[c] + below.sun * light.by_scattered_sun[c] +
-                      sunlight * light.by_sunlit_ground[c] + sun * light.sun[c] + flash * light.flash[c];
+                      sunlight * (light.by_sunlit_ground[c] + sun[c] * light.sun[c]) + flash * light.flash[c];
     return radiance;
 }
 

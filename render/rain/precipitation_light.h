@@ -38,7 +38,7 @@ PictureAir air_of(const Picture& picture, const RenderOptions& options);
 float sunlight_at(const Picture& picture, const Vec3& place_m);
 
 // Phase function of particles: the fraction kForwardFraction is Henyey-Greenstein with g = 0.85 for drops and
-// 0.6 for flakes, the rest isotropic.
+// 0.6 for flakes, the rest isotropic. Drops have their bows beside it (rainbow.h).
 inline constexpr double kForwardFraction = 0.8;
 double forward_g(PrecipitationKind kind);
 

@@ -58,6 +58,13 @@ double reach_beyond(const Ellipse& e, const Vec2& from, const Vec2& direction) {
     return std::max(0.0, centre + std::hypot(e.semi_a_m * along, e.semi_b_m * across));
 }
 
+// Returns the point of the perimeter that lies farthest in a direction, a unit vector.
+Vec2 farthest_towards(const Ellipse& e, const Vec2& direction) {
+    const Vec2 d = own(e, e.x_m + direction.x, e.y_m + direction.y);
+    const double a = e.semi_a_m * d.x, b = e.semi_b_m * d.y, length = std::hypot(a, b);
+    return world(e, {e.semi_a_m * a / length, e.semi_b_m * b / length});
+}
+
 Vec2 quarter_turn_nearest(double x, double y) {
     if (std::abs(x) >= std::abs(y)) return {x < 0 ? -1.0 : 1.0, 0};
     return {0, y < 0 ? -1.0 : 1.0};
@@ -81,6 +88,12 @@ bool sees_behind(const CameraFrame& f, const Vec2& axis) {
 Ellipse ellipse_at(const RainCurtain& c, double z_m) {
     const double up = z_m - c.ground_m;
     return {c.x_m + c.lean_x * up, c.y_m + c.lean_y * up, c.semi_a_m, c.semi_b_m, c.axis_x, c.axis_y};
+}
+
+CloudBases::Column cloud_above(const RainCurtain& c, const Vec3& place_m) {
+    if (!c.cloud) return {1, c.base_m};
+    const double up = c.base_m - place_m.z;
+    return c.cloud->at(place_m.x + c.lean_x * up, place_m.y + c.lean_y * up);
 }
 
 double ellipse_value(const Ellipse& e, double x_m, double y_m) {
@@ -160,12 +173,15 @@ VisibleWidth visible_width(const Ellipse& e, const CameraFrame& frame, const Vec
     const SideLines lines = side_lines(frame);
     if (lines.all) return width;
     const auto limited = [&](double most, const Vec2& line, const Vec2& side) {
-        const Crossing meets = crossing(e, eye, line);
-        if (meets.first > meets.last) return dot(line, side) > 0 ? most : 0.0;
-        const double forward = dot(line, ahead);
-        const double deep = forward > 0 ? (outside + depth_m) / forward : meets.last;
-        const double end = std::max(meets.first, std::min(meets.last, deep));
-        return std::clamp(end * dot(line, side), 0.0, most);
+        const double forward = dot(line, ahead), across = dot(line, side);
+        const double at_depth = forward > 0 ? (outside + depth_m) * across / forward : most;
+        double end = most;
+        if (dot(farthest_towards(e, side) - eye, side - across * line) >
+            0) {  // the area's end lies beyond the side
+            const Crossing meets = crossing(e, eye, line);
+            end = meets.first <= meets.last ? meets.last * across : 0.0;
+        }
+        return std::clamp(std::min(end, at_depth), 0.0, most);
     };
     width.left_m = limited(width.left_m, lines.left, left);
     width.right_m = limited(width.right_m, lines.right, right);
@@ -183,7 +199,8 @@ RainContainer rain_container(const RainCurtain& curtain, const CameraFrame& fram
         container.nearest = nearest_on_perimeter(ellipse, eye.x, eye.y);
         container.outside_m = std::hypot(container.nearest.x - eye.x, container.nearest.y - eye.y);
         container.width = visible_width(ellipse, frame, container.nearest, radius_m);
-        container.seen = between_sides(frame, side_lines(frame), container.nearest, radius_m);
+        const double reach_m = std::max({radius_m, container.width.left_m, container.width.right_m});
+        container.seen = between_sides(frame, side_lines(frame), container.nearest, reach_m);
     }
     container.centre = {on_grid(container.nearest.x, margin_m), on_grid(container.nearest.y, margin_m)};
     container.axis = quarter_turn_nearest(frame.forward.x, frame.forward.y);

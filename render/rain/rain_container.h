@@ -10,10 +10,12 @@
 // (particles.h), a turn of the container moves no visible particle.
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "core/vec.h"
+#include "density/cloud_bases.h"
 #include "render/options/camera.h"
 
 namespace nephos {
@@ -30,7 +32,14 @@ struct RainCurtain {
     double rate_mm_per_h = 0;  // in the middle, >= 0
     // Inclination: metres east and north per metre of height.
     double lean_x = 0, lean_y = 0;
+    // The cloud that it falls from: in each column of air, along the lean, rain begins at that column's base and has its
+    // part of the rate. `base_m` is then the highest of these bases. Null: a level cloud at base_m that is everywhere.
+    std::shared_ptr<const CloudBases> cloud{};
 };
+
+// Returns the cloud from which the rain at a place fell: its water (0..1) and its base. Without RainCurtain::cloud all the
+// water at base_m.
+CloudBases::Column cloud_above(const RainCurtain& curtain, const Vec3& place_m);
 
 // The cross-section of a curtain at one height.
 struct Ellipse {
@@ -65,8 +74,8 @@ struct Crossing {
 Crossing crossing(const Ellipse& ellipse, const Vec2& from, const Vec2& direction);
 
 // The visible width of an area, across the line from the eye to its nearest point, down to `depth_m` behind
-// that point: to the points where the frustum's sides leave the ellipse or that depth, or for a side that
-// misses the ellipse to its end. It decreases as the eye approaches.
+// that point: to the points where the frustum's sides leave the ellipse or that depth, or where its end is in view to that.
+// It decreases as the eye approaches and is continuous in the camera's pose.
 struct VisibleWidth {
     double left_m = 0, right_m = 0;  // from the nearest point, both >= 0
 };

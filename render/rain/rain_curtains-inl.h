@@ -107,6 +107,37 @@ HWY_INLINE Floats falls_at(const ShaftPass& p, const SeenCurtain& c, const Way& 
     return fast_exp(hn::MulAdd(set(1.5f / 255 * p.contrast), falls, set(-0.75f * p.contrast)));
 }
 
+// Returns the rain of the cloud above points of rays: its part of the rate, fading in below the base of each column.
+HWY_INLINE Floats rain_of_cloud(const SeenCurtain& c, const Way& way, Floats t, Floats height_m) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    const CloudBases& cloud = *c.cloud;
+    const Floats zero = hn::Zero(d), along = hn::Mul(t, set(c.per_texel));
+    const Floats u = clamped(hn::MulAdd(along, way.level_x, set(c.cloud_x)), -2, float(cloud.columns) + 1),
+                 v = clamped(hn::MulAdd(along, way.level_y, set(c.cloud_y)), -2, float(cloud.rows) + 1);
+    const Floats i = hn::Floor(u), j = hn::Floor(v), part_x = hn::Sub(u, i), part_y = hn::Sub(v, j);
+    Floats water = zero, base = zero;
+    const auto add_texel = [&](Floats column, Floats row, Floats weight) {
+        const Floats x = clamped(column, 0, float(cloud.columns - 1)),
+                     y = clamped(row, 0, float(cloud.rows - 1));
+        const Mask inside = hn::And(hn::Eq(x, column), hn::Eq(y, row));
+        const auto at =
+            hn::Add(hn::Mul(hn::ConvertTo(di, y), hn::Set(di, cloud.columns)), hn::ConvertTo(di, x));
+        const Floats counts = hn::IfThenElseZero(inside, weight);
+        water = hn::MulAdd(counts, hn::GatherIndex(d, cloud.water.data(), at), water);
+        base = hn::MulAdd(counts, hn::GatherIndex(d, cloud.water_base_m.data(), at), base);
+    };
+    const Floats one = set(1), i1 = hn::Add(i, one), j1 = hn::Add(j, one);
+    const Floats west = hn::Sub(one, part_x), south = hn::Sub(one, part_y);
+    add_texel(i, j, hn::Mul(west, south));
+    add_texel(i1, j, hn::Mul(part_x, south));
+    add_texel(i, j1, hn::Mul(west, part_y));
+    add_texel(i1, j1, hn::Mul(part_x, part_y));
+    const Floats top = hn::Sub(hn::Div(base, hn::Max(water, set(1e-6f))), set(c.ground_m));
+    const Floats below = hn::Div(hn::Sub(top, height_m), hn::Max(top, one));
+    return hn::Mul(water, clamped(hn::Mul(below, set(1 / kShaftCloudFade)), 0, 1));
+}
+
 // Returns the extinction of one curtain at distances along its rays, without the factor of f.
 HWY_INLINE Floats extinction(const ShaftPass& p, const SeenCurtain& c, const Way& way, Floats rise,
                              Floats t) {
@@ -115,7 +146,9 @@ HWY_INLINE Floats extinction(const ShaftPass& p, const SeenCurtain& c, const Way
     const Floats x = hn::MulAdd(t, way.x, set(c.eye_x)), y = hn::MulAdd(t, way.y, set(c.eye_y));
     const Floats radius2 = hn::MulAdd(x, x, hn::Mul(y, y)), height_m = hn::MulAdd(t, rise, set(c.eye_z)),
                  h = hn::Mul(height_m, set(c.per_height));
-    Floats most = hn::Mul(set(c.per_m), clamped(hn::Mul(hn::Sub(one, h), set(1 / kShaftTopFade)), 0, 1));
+    const Floats part = c.cloud != nullptr ? rain_of_cloud(c, way, t, height_m)
+                                           : clamped(hn::Mul(hn::Sub(one, h), set(1 / kShaftTopFade)), 0, 1);
+    Floats most = hn::Mul(set(c.per_m), part);
     if (p.evaporation > 0) {
         const Floats left = clamped(
             hn::Mul(hn::Sub(h, set(p.evaporation)), set(1 / std::max(1 - p.evaporation, 1e-3f))), 0, 1);

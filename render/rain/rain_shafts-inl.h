@@ -29,6 +29,26 @@ HWY_INLINE Floats drop_phase(float g, Floats cosine) {
     return hn::MulAdd(set(float(kForwardFraction)), forward, set(0.25f * float(1 - kForwardFraction)));
 }
 
+// What drops scatter of the sun along rays, with their bows.
+HWY_INLINE Floats3 sun_of_drops(const ShaftPass& p, Floats cosine) {
+    const Lanes d;
+    const Floats lobe = drop_phase(p.forward_g, cosine);
+    if (p.bow == nullptr) return times(lobe, set3(p.sun));
+    const hn::RebindToSigned<Lanes> di;
+    const Floats half = hn::Sqrt(clamped(hn::MulAdd(set(0.5f), cosine, set(0.5f)), 0, 1));
+    const Floats place = hn::Mul(half, set(float(Rainbow::kCells)));
+    const auto below = hn::Min(hn::ConvertTo(di, place), hn::Set(di, Rainbow::kCells - 1));
+    const Floats part = hn::Sub(place, hn::ConvertTo(d, below)),
+                 rest = hn::Mul(set(1 - float(p.bow->share)), lobe);
+    const auto channel = [&](const std::vector<float>& nodes, float sun) {
+        const Floats a = hn::GatherIndex(d, nodes.data(), below),
+                     b = hn::GatherIndex(d, nodes.data() + 1, below);
+        return hn::Mul(set(sun), hn::Add(rest, hn::MulAdd(part, hn::Sub(b, a), a)));
+    };
+    return {channel(p.bow->nodes[0], p.sun.x), channel(p.bow->nodes[1], p.sun.y),
+            channel(p.bow->nodes[2], p.sun.z)};
+}
+
 // shadow_at() of background-inl.h, faster where no texel lies beyond the map.
 HWY_INLINE Floats shadow_between(const ShaftPass& p, Floats u, Floats v) {
     const Lanes d;
@@ -178,7 +198,7 @@ void draw_pixels(const ShaftPass& p, MetCurtains& met, std::size_t x, std::size_
 
     const Floats cloud_m = hn::LoadU(d, pixels.depth_m);
     Floats3 sun = set3(p.sun);
-    if (p.has_sun) sun = times(drop_phase(p.forward_g, dot(ray, set3(p.to_sun))), sun);
+    if (p.has_sun) sun = sun_of_drops(p, dot(ray, set3(p.to_sun)));
     const Floats3 horizon = horizon_at(p, ray);
     const Floats zero = hn::Zero(d), one = set(1), offset = shaft_offsets(x, y);
     Through before{one, {zero, zero, zero}}, behind = before;

@@ -89,6 +89,13 @@ SeenCurtain seen_curtain(const RainCurtain& c, const PrecipitationOptions& p, co
     out.grain_x = within_noise(x / grain_m);
     out.grain_y = within_noise(y / grain_m);
     out.per_grain = float(1 / grain_m);
+    if (c.cloud) {
+        out.cloud = c.cloud.get();
+        out.per_texel = float(1 / c.cloud->texel_m);
+        out.cloud_x = float((eye.x + c.lean_x * (c.base_m - eye.z) - c.cloud->x_m) / c.cloud->texel_m - 0.5);
+        out.cloud_y = float((eye.y + c.lean_y * (c.base_m - eye.z) - c.cloud->y_m) / c.cloud->texel_m - 0.5);
+        out.ground_m = float(c.ground_m);
+    }
     out.own = float(c.id % kShaftsOwn);
     out.fall = within_noise(kShaftFall_m_per_s * time_s / kShaftFallCell_m + double(c.id % kShaftsOwn));
     return out;
@@ -121,6 +128,7 @@ void set_light(ShaftPass& pass, const Picture& picture, const PrecipitationLight
     pass.flash = floats(light.flash);
     pass.flash_m = floats(light.flash_m - eye);
     pass.has_sun = any(light.sun);
+    if (pass.has_sun && light.kind == PrecipitationKind::rain) pass.bow = &rainbow();
     pass.has_flash = any(light.flash);
     pass.forward_g = float(forward_g(light.kind));
     for (std::size_t c = 0; c < 3; ++c)

@@ -11,6 +11,8 @@
 //     min(1, (1 - h) / kShaftTopFade)  left_of_rain(h)  smooth((1 - r - kShaftFray c s r) / softness)
 //     exp(c (4.5 (s - 1/2) + 1.5 (f - 1/2)) - c^2 / 4)
 //
+// where the first factor is w min(1, (1 - H) / kShaftCloudFade) below a cloud that is known (RainCurtain::cloud): w is its
+// water and H the height between ground and base, both of the column from which the drops at that place fell;
 // with smooth(x) = 3 x^2 - 2 x^3 in 0..1 and softness = `edge`, at least kShaftSoftest unless 0: the outline
 // is frayed inwards by the strands. Where curtains overlap, the densest counts. Noise N is bilinear between
 // random bytes on a lattice, with weights smooth(). In cells of grain_m, from the area's centre along the
@@ -40,6 +42,7 @@ inline constexpr float kShaftLeastSeen = 1.0f / 4096;
 inline constexpr int kShaftStepsPerLight =
     3;  // three steps have light and falls (f) of the one in their middle
 inline constexpr float kShaftTopFade = 0.15f;    // fraction of the height over which a curtain fades in
+inline constexpr float kShaftCloudFade = 0.04f;  // likewise below the base of a cloud that is known
 inline constexpr double kShaftSoftest = 0.6;     // least softness of a curtain with an edge
 inline constexpr double kShaftFray = 0.4;        // fraction of the radius by which its outline varies
 inline constexpr double kShaftFall_m_per_s = 6;  // of the texture

@@ -11,6 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "render/rain/rain_shafts.h"
+#include "render/rain/rainbow.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
@@ -26,6 +27,11 @@ struct SeenCurtain {
     float grain_x = 0, grain_y = 0, per_grain = 0;    // the eye in cells of the texture, from metres to cells
     float own = 0;                                    // its part of the noise
     float fall = 0, per_fall = 1 / kShaftFallCell_m;  // of the texture, likewise
+    // The cloud above (RainCurtain::cloud); null: level. The eye, carried along the lean to base_m, in its texels; texels
+    // per metre.
+    const CloudBases* cloud = nullptr;
+    float cloud_x = 0, cloud_y = 0, per_texel = 0;
+    float ground_m = 0;
 };
 
 // The parameters shared by all rays of a frame.
@@ -40,6 +46,7 @@ struct ShaftPass {
     glm::vec3 by_sky{}, by_sunlit_ground{}, by_scattered_sun{}, sun{}, to_sun{}, flash{}, flash_m{}, air_per_m{};
     float horizon[3][PictureAir::kHorizons] = {};  // PictureAir::horizon
     float forward_g = 0;
+    const Rainbow* bow = nullptr;  // null: flakes
     bool has_sun = false, has_flash = false;
     const GroundLight* ground = nullptr;  // null: no cloud
     shader::vec4 ground_place{};          // of a point relative to the eye (PictureFrame::ground_light_place)

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <random>
 
@@ -335,6 +336,91 @@ TEST(Precipitation, IsDeterministic) {
         kept.draw(off, options, weather, 7);
         EXPECT_EQ(off.beauty, test::grey(options.camera).beauty);
     }
+}
+
+// P's width: of an area of 4 km far rain fills what the frustum shows, not a circle about the nearest point.
+TEST(Precipitation, FarRainFillsTheVisibleWidth) {
+    RainCurtain curtain = area();
+    curtain.x_m = 0;
+    curtain.y_m = 1400;
+    curtain.semi_a_m = 2000;
+    curtain.semi_b_m = 1000;
+    curtain.axis_x = 1;
+    curtain.axis_y = 0;
+    RenderOptions options = options_at({0, 100, 2}, {0, 1100, 150});
+    options.precipitation.edge = 0.05;
+    options.precipitation.visibility = 50;
+    const CameraFrame camera = camera_frame(options.camera);
+    const Particles particles = make_particles(kRain, 3, 50'000);
+    const Picture picture = test::grey(options.camera);
+    const PrecipitationLight light = precipitation_light(picture, options, 5);
+    const StreakView view{options, camera, camera, camera, light, 0, 0, 5};
+    const Weather weather = weather_of(curtain);
+    std::size_t thirds[3] = {};
+    for (const ParticlePass& pass : particle_passes(options, camera, weather, 5)) {
+        if (!pass.far) continue;
+        for (const Streak& s : streaks_of(particles, pass, view, picture))
+            ++thirds[std::clamp(int(3 * s.x0 / float(options.camera.width)), 0, 2)];
+    }
+    EXPECT_GT(thirds[1], 100u);
+    EXPECT_GT(thirds[0], thirds[1] / 8);
+    EXPECT_GT(thirds[2], thirds[1] / 8);
+}
+
+// Weights of widths are continuous and sum to one.
+TEST(Precipitation, FarWidthsFadeIntoEachOther) {
+    EXPECT_EQ(far_widths(10, 160)[0].scale, 1);
+    EXPECT_EQ(far_widths(10, 160)[1].weight, 0);
+    double before[8] = {1};
+    for (double wide = 160; wide < 160 * 63; wide *= 1.01) {
+        double now[8] = {};
+        for (const FarWidth& width : far_widths(wide, 160)) now[int(std::log2(width.scale))] += width.weight;
+        double sum = 0;
+        for (int level = 0; level < 8; ++level) {
+            EXPECT_NEAR(now[level], before[level], 0.02) << wide;
+            before[level] = now[level];
+            sum += now[level];
+        }
+        EXPECT_NEAR(sum, 1, 1e-12);
+    }
+}
+
+// Turning the camera changes the width that is seen, and nothing jumps.
+TEST(Precipitation, IsContinuousWhileTheCameraTurns) {
+    RainCurtain curtain = area();
+    curtain.semi_a_m = 1500;
+    const Weather weather = weather_of(curtain);
+    double before = -1;
+    for (double angle = -0.5; angle <= 0.5; angle += 0.01) {
+        const Vec3 eye{100, 100, 2};
+        const RenderOptions options =
+            options_at(eye, eye + Vec3{100 * std::sin(angle), 100 * std::cos(angle), 12});
+        const double now = energy(options, weather, 5);
+        if (before >= 0) {
+            EXPECT_NEAR(now, before, 0.15 * std::max(now, before)) << angle;
+        }
+        before = now;
+    }
+    EXPECT_GT(before, 0);
+}
+
+// Drops are there below the cloud alone, and as many as it has water.
+TEST(Precipitation, FallsFromTheCloudAbove) {
+    RainCurtain curtain = area();
+    const Vec3 eye{100, 900, 2};
+    const RenderOptions options = options_at(eye, eye + Vec3{0, 100, 10});
+    const double everywhere = energy(options, weather_of(curtain), 3);
+    const auto below = [&](float water, float base_m) {
+        CloudBases cloud{-2000, -2000, 1000, 6, 6, {}, {}};
+        cloud.water.assign(36, water);
+        cloud.water_base_m.assign(36, water * base_m);
+        curtain.cloud = std::make_shared<CloudBases>(cloud);
+        return energy(options, weather_of(curtain), 3);
+    };
+    EXPECT_NEAR(below(1, 800), everywhere, 1e-6 * everywhere);
+    EXPECT_NEAR(below(0.5f, 800) / everywhere, 0.5, 0.1);  // opacities end at 0.85
+    EXPECT_EQ(below(0, 800), 0);
+    EXPECT_LT(below(1, 4), 0.9 * everywhere);
 }
 
 // A cloud that hides everything hides far rain, too, and not the drops before it.

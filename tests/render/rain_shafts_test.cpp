@@ -4,6 +4,7 @@
 #include "render/rain/rain_shafts.h"
 
 #include <cmath>
+#include <memory>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -139,6 +140,72 @@ TEST(RainShafts, AreThoseOfTheTwin) {
         options.precipitation.edge = 0;
         EXPECT_LT(draw(picture, options, curtains, 0).apart, 20) << n;
     }
+}
+
+// A cloud over the whole of the areas, with holes and a base that rises from 500 to 1100 m.
+std::shared_ptr<const CloudBases> uneven_cloud() {
+    CloudBases cloud{-2000, -1000, 150, 40, 36, {}, {}};
+    for (int j = 0; j < cloud.rows; ++j) {
+        for (int i = 0; i < cloud.columns; ++i) {
+            const float water = (i / 5 + j / 4) % 3 == 0 ? 0.0f : 0.25f * float(1 + (i + 2 * j) % 4);
+            cloud.water.push_back(water);
+            cloud.water_base_m.push_back(water * (500 + 15 * float(i)));
+        }
+    }
+    return std::make_shared<CloudBases>(cloud);
+}
+
+TEST(RainShafts, FallFromTheCloudAsThoseOfTheTwin) {
+    std::vector<RainCurtain> curtains(2, area());
+    curtains[0].lean_x = 0.3;
+    curtains[0].lean_y = -0.2;
+    curtains[1].id = 62;
+    curtains[1].x_m = 600;
+    curtains[1].semi_b_m = 650;
+    for (RainCurtain& curtain : curtains) {
+        curtain.base_m = 1100;
+        curtain.cloud = uneven_cloud();
+    }
+    std::mt19937 random(17);
+    const Vec3 eyes[] = {{-400, -1900, 20}, {300, 300, 2600}, {-9000, -4000, 500}};
+    for (const Vec3& eye : eyes) {
+        const RenderOptions options = options_at(eye, {150, 900, 300});
+        const Picture picture = cloudy(options.camera, random);
+        const Drawn drawn = draw(picture, options, curtains, 100);
+        EXPECT_LE(drawn.apart, 2) << eye.x;
+        EXPECT_NE(drawn.picture.beauty, picture.beauty);
+    }
+}
+
+// Beside the cloud there is no rain; above its base neither.
+TEST(RainShafts, FallOnlyBelowTheCloud) {
+    RainCurtain curtain = area();
+    curtain.x_m = 0;
+    curtain.axis_x = 1;
+    curtain.axis_y = 0;
+    curtain.semi_a_m = 2000;
+    curtain.base_m = 900;
+    CloudBases half{-3000, -1000, 500, 12, 8, {}, {}};  // to the east of x = 0, its base at 600 m
+    for (int n = 0; n < 12 * 8; ++n) {
+        half.water.push_back(n % 12 >= 6 ? 1.0f : 0.0f);
+        half.water_base_m.push_back(n % 12 >= 6 ? 600.0f : 0.0f);
+    }
+    curtain.cloud = std::make_shared<CloudBases>(half);
+    RenderOptions options = options_at({0, -3000, 300}, {0, 900, 300});
+    options.camera.vertical_fov_deg = 30;
+    const CameraFrame camera = camera_frame(options.camera);
+    Picture picture = test::grey(options.camera, 0.9f);
+    const Picture before = picture;
+    draw_shafts(picture, options, camera, {&curtain, 1}, precipitation_light(picture, options, 0), 0, 5);
+    const auto changed = [&](const Vec3& place) {
+        const PixelPosition at = project(camera, options.camera, place);
+        const std::size_t n = 3 * (std::size_t(at.y) * std::size_t(picture.width) + std::size_t(at.x));
+        return std::abs(picture.beauty[n] - before.beauty[n]) > 0.004f;
+    };
+    EXPECT_TRUE(changed({900, 900, 300}));
+    EXPECT_FALSE(changed({-900, 900, 300}));
+    EXPECT_FALSE(changed({900, 900, 850}));
+    EXPECT_FALSE(changed({-900, 900, 850}));
 }
 
 // What stands in the middle of a curtain, a wall of fog here, has steps of its own before it and behind:

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "density/cloud_bases.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "density/openvdb_access.h"
+
+namespace nephos {
+namespace {
+
+constexpr double kDepthOfRain = 10;  // optical depth at which a cloud has 1 - 1/e of its rain
+constexpr float kBaseFraction = 0.1f;
+
+// Calls `visit(column, level, value)` for the voxels above 0.
+template <class Visit>
+void for_voxels(const DensityGrid& density, Visit&& visit) {
+    const Extent extent = density.extent();
+    for (const Block& block : blocks_of(density)) {
+        const int x = block.origin.x(), y = block.origin.y(), z = block.origin.z();
+        for (int i = 0; i < std::min(kBlock, extent.x - x); ++i)
+            for (int j = 0; j < std::min(kBlock, extent.y - y); ++j)
+                for (int k = 0; k < std::min(kBlock, extent.z - z); ++k)
+                    if (const float value = block.value(leaf_offset(i, j, k)); value > 0)
+                        visit(std::size_t(y + j) * std::size_t(extent.x) + std::size_t(x + i), z + k, value);
+    }
+}
+
+}  // namespace
+
+CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m) {
+    const Extent extent = density.extent();
+    const Placement& at = density.placement();
+    CloudBases bases;
+    if (extent.cells() == 0) return bases;
+    const std::size_t count = std::size_t(extent.x) * std::size_t(extent.y);
+    std::vector<double> sum(count, 0.0);
+    std::vector<float> largest(count, 0.0f);
+    for_voxels(density, [&](std::size_t column, int, float value) {
+        sum[column] += double(value);
+        largest[column] = std::max(largest[column], value);
+    });
+    std::vector<int> lowest(count, extent.z);
+    for_voxels(density, [&](std::size_t column, int k, float value) {
+        if (value > kBaseFraction * largest[column]) lowest[column] = std::min(lowest[column], k);
+    });
+    const int step = (std::max(extent.x, extent.y) + CloudBases::kMostTexels - 1) / CloudBases::kMostTexels;
+    bases.x_m = at.origin_m.x;
+    bases.y_m = at.origin_m.y;
+    bases.texel_m = step * at.cell_size_m;
+    bases.columns = (extent.x + step - 1) / step;
+    bases.rows = (extent.y + step - 1) / step;
+    bases.water.assign(std::size_t(bases.columns) * std::size_t(bases.rows), 0.0f);
+    bases.water_base_m.assign(bases.water.size(), 0.0f);
+    const double to_depth = extinction_per_m * at.cell_size_m;
+    for (int y = 0; y < extent.y; ++y) {
+        for (int x = 0; x < extent.x; ++x) {
+            const std::size_t column = std::size_t(y) * std::size_t(extent.x) + std::size_t(x);
+            if (largest[column] <= 0) continue;
+            const std::size_t texel =
+                std::size_t(y / step) * std::size_t(bases.columns) + std::size_t(x / step);
+            const double water = (1 - std::exp(-sum[column] * to_depth / kDepthOfRain)) / (step * step);
+            const double base_m = at.origin_m.z + (lowest[column] + 0.5) * at.cell_size_m;
+            bases.water[texel] += float(water);
+            bases.water_base_m[texel] += float(water * base_m);
+        }
+    }
+    return bases;
+}
+
+CloudBases::Column CloudBases::at(double place_x_m, double place_y_m) const {
+    const double u = (place_x_m - x_m) / texel_m - 0.5, v = (place_y_m - y_m) / texel_m - 0.5;
+    if (!(u > -1 && u < columns && v > -1 && v < rows)) return {};
+    const int i = int(std::floor(u)), j = int(std::floor(v));
+    double of_water = 0, of_base = 0;
+    for (int dy = 0; dy < 2; ++dy) {
+        for (int dx = 0; dx < 2; ++dx) {
+            if (i + dx < 0 || j + dy < 0 || i + dx >= columns || j + dy >= rows) continue;
+            const double weight = (dx == 1 ? u - i : 1 - (u - i)) * (dy == 1 ? v - j : 1 - (v - j));
+            const std::size_t n = std::size_t(j + dy) * std::size_t(columns) + std::size_t(i + dx);
+            of_water += weight * double(water[n]);
+            of_base += weight * double(water_base_m[n]);
+        }
+    }
+    return of_water > 0 ? Column{of_water, of_base / of_water} : Column{};
+}
+
+}  // namespace nephos

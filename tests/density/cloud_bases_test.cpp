@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The lowest cloud of each column, as rain falls from it.
+
+#include "density/cloud_bases.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace nephos {
+namespace {
+
+constexpr Extent kExtent{6, 4, 10};
+const Placement kPlacement{{1000, -500, 700}, 100};
+
+DensityGrid grid_of(const std::vector<float>& values) {
+    return DensityGrid::from_dense(values, kExtent, kPlacement);
+}
+
+std::size_t at(int i, int j, int k) { return std::size_t((k * kExtent.y + j) * kExtent.x + i); }
+
+TEST(CloudBases, AreTheLowestLevelsOfTheColumns) {
+    std::vector<float> values(kExtent.cells(), 0.0f);
+    for (int k = 3; k < 8; ++k) values[at(2, 1, k)] = 0.8f;
+    values[at(2, 1, 1)] = 0.05f;  // haze below the cloud, less than a tenth of it
+    for (int k = 6; k < 7; ++k) values[at(4, 2, k)] = 0.2f;
+    const CloudBases bases = cloud_bases(grid_of(values), 0.02);
+    EXPECT_EQ(bases.columns, 6);
+    EXPECT_EQ(bases.rows, 4);
+    const CloudBases::Column thick = bases.at(1250, -350), thin = bases.at(1450, -250),
+                             none = bases.at(1050, -450);
+    EXPECT_NEAR(thick.base_m, 1050, 0.01);  // the middle of level 3
+    EXPECT_NEAR(thick.water, 1 - std::exp(-(5 * 0.8 + 0.05) * 2 / 10), 1e-5);
+    EXPECT_NEAR(thin.base_m, 1350, 0.01);
+    EXPECT_NEAR(thin.water, 1 - std::exp(-0.2 * 2 / 10), 1e-5);
+    EXPECT_EQ(none.water, 0);
+    EXPECT_EQ(bases.at(0, 0).water, 0) << "beyond the grid";
+    // Between cloud and none the base is that of the cloud, with less water.
+    const CloudBases::Column edge = bases.at(1300, -350);
+    EXPECT_NEAR(edge.base_m, thick.base_m, 0.01);
+    EXPECT_NEAR(edge.water, 0.5 * thick.water, 1e-5);
+}
+
+TEST(CloudBases, OfLargeGridsHaveFewerTexels) {
+    const Extent wide{400, 30, 4};
+    std::vector<float> values(wide.cells(), 0.0f);
+    for (int j = 0; j < wide.y; ++j)
+        for (int i = 0; i < wide.x; ++i) values[std::size_t((2 * wide.y + j) * wide.x + i)] = 1.0f;
+    const CloudBases bases = cloud_bases(DensityGrid::from_dense(values, wide, kPlacement), 0.05);
+    EXPECT_LE(bases.columns, CloudBases::kMostTexels);
+    EXPECT_NEAR(bases.texel_m, 300, 1e-9);
+    const CloudBases::Column middle = bases.at(1000 + 15'000, -500 + 1500);
+    EXPECT_NEAR(middle.base_m, 950, 0.05);
+    EXPECT_NEAR(middle.water, 1 - std::exp(-0.5), 1e-4);
+}
+
+TEST(CloudBases, OfNothingAreDry) {
+    EXPECT_EQ(cloud_bases(DensityGrid(), 0.05).columns, 0);
+    EXPECT_EQ(cloud_bases(grid_of(std::vector<float>(kExtent.cells(), 0.0f)), 0.05).at(1250, -350).water, 0);
+    EXPECT_EQ(CloudBases().at(0, 0).water, 0);
+}
+
+}  // namespace
+}  // namespace nephos
