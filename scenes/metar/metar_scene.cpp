@@ -15,6 +15,7 @@ namespace {
 constexpr double kFoot_m = 0.3048;
 // Of the clouds' box, which stands around the aerodrome.
 constexpr double kSide_m = 20'000;
+constexpr double kDeep_m = 2000;        // deeper layers have coarser cells
 constexpr double kKoschmieder = 3.912;  // -ln 0.02: contrast that an eye still sees
 
 std::string text_of(double value) { return number_text(std::round(value * 1000) / 1000); }
@@ -148,8 +149,8 @@ Look look_of(const std::string& genus, bool deep) {
 // `keys` are further ones of the layer, a line each.
 std::string layer_text(const MetarLayer& layer, double coverage, const std::string& keys = {}) {
     const double depth = layer.top_m - layer.base_m;
-    const Look look = look_of(layer.genus, depth > kTowering_m);
-    const double cell = depth > kTowering_m ? 160 : look.cell_m;
+    const Look look = look_of(layer.genus, depth > kDeep_m);
+    const double cell = depth > kDeep_m ? 160 : look.cell_m;
     const int across = int(std::lround(kSide_m / cell)), levels = std::max(3, int(std::ceil(depth / cell)));
     std::string text = "\n# " + layer.group + "\n[[layer]]\nname = \"" + layer.name + "\"\n";
     if (look.opacity != 1) text += "opacity = " + text_of(look.opacity) + "\n";

@@ -35,9 +35,6 @@ struct FogDepth {
                             haze = 2000;
 };
 
-// Cumulus in a lattice deeper than this is towering (TCU).
-inline constexpr double kTowering_m = 2000;
-
 // A layer of clouds that a group becomes.
 struct MetarLayer {
     std::string name;              // "Sc1": genus and number, from below; "VV1" where the sky is obscured

@@ -72,6 +72,9 @@ struct ListedExport {
 // Throws Error(io) naming the file, and the value that is not what it must be.
 ListedExport read_export(const std::filesystem::path& folder);
 
+// Compares the sidecars with the list; none where there is no sidecar.
+std::optional<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list);
+
 // Returns the grid half a voxel towards -x, -y and -z, sharing its voxels.
 DensityGrid shifted_by_half_a_voxel(const DensityGrid& density);
 

@@ -180,6 +180,8 @@ Verification verify_export(const std::filesystem::path& folder, const VerifyOpti
         if (!names.contains(entry.path().filename())) extra.push_back(entry.path().filename());
     for (Check& check : check_files(folder, files, extra)) result.checks.push_back(std::move(check));
     if (!options.hashes_only) {
+        if (std::optional<Check> check = check_sidecars(folder, list))
+            result.checks.push_back(std::move(*check));
         for (Check& check : check_voxels(folder, list)) result.checks.push_back(std::move(check));
     }
     return result;

@@ -20,6 +20,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kFoot_m = 0.3048, kKoschmieder = 3.912, kSurface_m = 10;
+// Cumulus is towering (TCU) from this depth on, the uppermost 5 % of its mass left out.
+constexpr double kTowering_m = 1200;
 
 double speed_of(const Velocity& v) { return std::hypot(v.east_m_per_s, v.north_m_per_s); }
 
@@ -96,9 +98,8 @@ WeatherSummary summarise(const RunListing& run, const ListedFrame& frame) {
         LayerSummary s = summary_of(run, scene.layers[n].name,
                                     read_density(density_file(run, frame, scene.layers[n].name)),
                                     layer_wind(scene, n), frame.time_s);
-        const LayerOptions& layer = scene.layers[n];
-        s.genus = genus_of(scene, layer);
-        s.towering = s.genus == "Cu" && layer.extent.z * layer.placement.cell_size_m > kTowering_m;
+        s.genus = genus_of(scene, scene.layers[n]);
+        s.towering = s.genus == "Cu" && s.columns.top_m - s.columns.cloud_base_m > kTowering_m;
         for (const RainRecord& area : frame.rain)
             if (area.layer == s.name) s.rain_mm_per_h = std::max(s.rain_mm_per_h, area.intensity_mm_per_h);
         w.layers.push_back(std::move(s));

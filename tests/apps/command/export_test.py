@@ -284,6 +284,23 @@ class Export(Case):
                 file.update(bytes=len(content), xxh3=xxhash.xxh3_128_hexdigest(content))
         (folder / "export.json").write_text(json.dumps(listing))
 
+    def test_sidecars_that_lie(self):
+        folder = self.export("out", "--to", "raw", "--type", "r8")
+        whole = json.loads((folder / "placed.volume.json").read_text())
+        def without(key):
+            return {name: value for name, value in whole.items() if name != key}
+        for sidecar, says in ((without("scale"), "`scale` is missing"), (dict(whole, scale="1"), '`scale` is "1": expected a number'),
+                              (dict(whole, scale=0.5), "expected 1, as in export.json"), (dict(whole, count=6), "`count` is 6: expected 5"),
+                              (dict(whole, name="other"), 'expected "placed"'), (dict(whole, frames=3), "`frames` is 3: expected a list"),
+                              (dict(whole, formats=[dict(whole["formats"][0], type="r16")]), '`formats[0].type` is "r16": expected "r8"'),
+                              (dict(whole, frames=[dict(whole["frames"][0], number=9)] * 5), "there is no placed_0009.raw")):
+            with self.subTest(says=says):
+                (folder / "placed.volume.json").write_text(json.dumps(sidecar))
+                self.relisted(folder, "placed.volume.json")
+                said = self.call("verify", "out", status=1).stdout
+                self.assertIn("FAIL  sidecars  out/placed.volume.json: ", said)
+                self.assertIn(says, said)
+
     def test_voxels_that_are_no_numbers(self):
         """NaN in a file whose checksum agrees: compared with its source, it is none of its values."""
         for format, type, code in (("raw", "r32f", "<f4"), ("raw", "r16f", "<f2"), ("bricks", "r32f", "<f4")):
