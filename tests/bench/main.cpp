@@ -21,6 +21,7 @@
 #include "tests/bench/density_bench.h"
 #include "tests/bench/detail_bench.h"
 #include "tests/bench/export_bench.h"
+#include "tests/bench/files_bench.h"
 #include "tests/bench/ground_bench.h"
 #include "tests/bench/memory_bench.h"
 #include "tests/bench/rain_bench.h"
@@ -68,6 +69,7 @@ int main(int argc, char** argv) {
         {"density", [] { return density_bench_rows(); }},
         {"memory", [&] { return memory_rows(source, programs / "../../bin/nephos"); }},
         {"export", [] { return export_bench_rows(); }},
+        {"files", [&] { return files_rows(source); }},
         {"veil", [] { return veil_bench_rows(); }},
         {"seeds", [] { return seeds_rows(); }},
         {"study", [] { return study_rows(); }},
