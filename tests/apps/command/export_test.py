@@ -303,9 +303,10 @@ class Export(Case):
 
     def test_voxels_that_are_no_numbers(self):
         """NaN in a file whose checksum agrees: compared with its source, it is none of its values."""
-        for format, type, code in (("raw", "r32f", "<f4"), ("raw", "r16f", "<f2"), ("bricks", "r32f", "<f4")):
-            with self.subTest(format=format, type=type):
-                folder = self.export(format + type, "--to", format, "--type", type)
+        for format, type, code, more in (("raw", "r32f", "<f4", []), ("raw", "r16f", "<f2", []), ("bricks", "r32f", "<f4", []),
+                                         ("raw", "r32f", "<f4", ["--pad", "64", "--mips"])):  # the last in its second level
+            with self.subTest(format=format, type=type, more=more):
+                folder = self.export(format + type + "".join(more), "--to", format, "--type", type, *more)
                 file = folder / f"placed_0003.{format}"
                 content = bytearray(file.read_bytes())
                 size = numpy.dtype(code).itemsize
