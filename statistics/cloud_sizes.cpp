@@ -98,9 +98,9 @@ Estimate CloudSizes::line_exponent() const {
     double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
     for (int bin = 0; bin + 1 < kSizeBins; ++bin) {
         const std::uint64_t begin = size_bin_begin(bin), end = size_bin_begin(bin + 1),
-                            count = counts_[std::size_t(bin)];
+                            all = this->count(bin), cut = count_cut(bin), count = all - cut;
         if (begin < range_.first || end > range_.last + 1 || begin == end || count < kLeastInBin) continue;
-        if (2 * cut_[std::size_t(bin)] > count) continue;
+        if (2 * cut > all) continue;
         const double u = (std::log(double(begin)) + std::log(double(end))) / 2;
         const double v = std::log(double(count) / double(end - begin));
         n += 1;

@@ -7,8 +7,8 @@
 // 256 x 128 columns gives 1.94 +- 0.03, one of 1024 x 1024 about 2.00: the finite grid shifts both by 0.05 to 0.1, more
 // than any error bar says.
 //
-//     line        least squares through log(n / width) of half-octave bins that hold at least 24 clouds, of which
-//                 at most half are cut by an open side (DeWitt and Garrett, Atmos. Chem. Phys. 24, 2024)
+//     line        least squares through log(n / width) of half-octave bins that hold at least 24 whole clouds, and no more
+//                 that are cut by an open side (DeWitt and Garrett, Atmos. Chem. Phys. 24, 2024)
 //     likelihood  maximum likelihood of a^-t / sum of a^-t over a1 <= a <= a2, whole numbers of columns
 //                 (Clauset, Shalizi and Newman, SIAM Review 51, 2009, eq. B.8 with an upper end)
 //
@@ -51,6 +51,7 @@ class CloudSizes {
     std::uint64_t clouds() const { return clouds_; }
     std::uint64_t area() const { return area_; }  // of all clouds, in columns
     const SizeRange& range() const { return range_; }
+    // Number of clouds of a bin, and how many of them are cut: those count with the area that is inside.
     std::uint64_t count(int bin) const { return counts_[std::size_t(bin)]; }
     std::uint64_t count_cut(int bin) const { return cut_[std::size_t(bin)]; }
 

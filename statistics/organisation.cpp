@@ -19,14 +19,18 @@ double axis_distance(double a, double b, int cells, bool periodic) {
     return periodic ? std::min(d, cells - d) : d;
 }
 
+// Of the draws that have a value: shadows of hardly any cover may have fewer than two clouds.
 struct Moments {
     double sum = 0, squares = 0;
+    int n = 0;
     void add(double value) {
+        if (std::isnan(value)) return;
+        ++n;
         sum += value;
         squares += value * value;
     }
-    double mean(int n) const { return sum / n; }
-    double deviation(int n) const {
+    double mean() const { return n > 0 ? sum / n : kNaN; }
+    double deviation() const {
         return n > 1 ? std::sqrt(std::max(0.0, (squares - sum * sum / n) / (n - 1))) : kNaN;
     }
 };
@@ -94,8 +98,7 @@ NullOrganisation null_organisation(const Extent& extent, const Boundaries& bound
         scai.add(one.scai);
         cop.add(one.cop);
     }
-    return {{iorg.mean(draws), scai.mean(draws), cop.mean(draws)},
-            {iorg.deviation(draws), scai.deviation(draws), cop.deviation(draws)}};
+    return {{iorg.mean(), scai.mean(), cop.mean()}, {iorg.deviation(), scai.deviation(), cop.deviation()}};
 }
 
 }  // namespace nephos

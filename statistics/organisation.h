@@ -32,7 +32,8 @@ Organisation organisation(std::span<const ConnectedCloud> clouds, const Extent& 
 // Equal arguments give equal bits.
 BitPlane random_shadow(const Extent& extent, double cover, std::uint64_t seed, std::uint32_t number);
 
-// The mean and the standard deviation of each index over `draws` random shadows of that cover.
+// The mean and the standard deviation of each index over those of `draws` random shadows of that cover that have two clouds
+// or more; NaN where none has.
 struct NullOrganisation {
     Organisation mean, deviation;
 };

@@ -37,6 +37,20 @@ std::vector<double> batch_means(std::span<const double> values, std::size_t batc
     return means;
 }
 
+// Means over one period after the other of the values at the steps first, first + stride, ... of a series that begins at
+// `begin`: where the period is no multiple of the stride, some have a value more than others.
+std::vector<double> period_means(std::span<const double> values, std::size_t first, std::size_t begin,
+                                 std::size_t period, std::size_t stride) {
+    std::vector<double> means;
+    std::size_t at = 0;
+    for (std::size_t end = begin + period; at < values.size(); end += period) {
+        const std::size_t start = at;
+        while (at < values.size() && first + at * stride < end) ++at;
+        if (at > start) means.push_back(mean_of(values.subspan(start, at - start)));
+    }
+    return means;
+}
+
 // The first maximum of rho that rises far enough above the lowest value before it: lag and height; lag 0 if none.
 struct Pulse {
     std::size_t lag = 0;
@@ -114,16 +128,14 @@ std::vector<double> autocorrelation(std::span<const double> series, std::size_t 
 }
 
 double integrated_time(std::span<const double> rho) {
+    // The first pair is rho(0) + rho(1); the sum over all lags of both signs is twice that of the pairs, less rho(0).
     double sum = 0;
-    for (std::size_t lag = 1; lag + 1 < rho.size(); lag += 2) {
+    for (std::size_t lag = 0; lag + 1 < rho.size(); lag += 2) {
         const double pair = rho[lag] + rho[lag + 1];
-        if (pair <= 0) {
-            sum += std::max(0.0, rho[lag]);
-            break;
-        }
+        if (pair <= 0) break;
         sum += pair;
     }
-    return 1 + 2 * sum;
+    return std::max(1.0, 2 * sum - 1);
 }
 
 std::size_t mser_5(std::span<const double> series) {
@@ -201,9 +213,11 @@ SeriesMean mean_over(std::span<const double> series, const Judgement& judgement,
     const std::span<const double> values = series.subspan(first, last - first);
     if (std::ranges::any_of(values, [](double value) { return std::isnan(value); })) return none;
     SeriesMean result{mean_of(values), 0, std::sqrt(variance_of(values)), 1, double(values.size())};
-    const std::size_t batch = judgement.period / stride;
-    if (judgement.regime == Regime::pulsing && batch > 1 && values.size() >= 2 * batch) {
-        const std::vector<double> means = batch_means(values, batch);
+    // Batches are whole periods, for within one the values follow the pulse.
+    if (judgement.regime == Regime::pulsing && judgement.period >= 2 * stride &&
+        judgement.used >= 2 * judgement.period) {
+        const std::vector<double> means =
+            period_means(values, first * stride, judgement.warm_up, judgement.period, stride);
         result.error = std::sqrt(variance_of(means) * tau_of(means) / double(means.size()));
         if (result.error > 0) {
             result.effective = result.deviation * result.deviation / (result.error * result.error);

@@ -42,7 +42,8 @@ std::string_view regime_name(Regime regime);
 // length of the series (the biased estimate, which is always a correlation function). All 0 but rho(0) for a constant.
 std::vector<double> autocorrelation(std::span<const double> series, std::size_t lags);
 
-// Returns tau >= 1 in steps from rho: the sum up to where the sum of two neighbours is no longer positive (Geyer 1992).
+// Returns tau >= 1 in steps from rho: the sum of the pairs rho(2 n) + rho(2 n + 1), which decrease and are positive for a
+// reversible process, up to the first that is not positive (initial positive sequence: Geyer, Stat. Sci. 7, 1992).
 double integrated_time(std::span<const double> rho);
 
 // Returns the length of the warm-up by MSER-5, a multiple of 5, at most half the series.

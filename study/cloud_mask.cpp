@@ -160,14 +160,17 @@ SeriesMean mean_of(const std::vector<double>& values) {
     return {mean, deviation * std::sqrt(tau / n), deviation, tau, n / tau};
 }
 
+// The mean over the snapshots that have two clouds or more.
 struct OrganisationSums {
-    double iorg = 0, scai = 0, cop = 0;
+    double iorg = 0, scai = 0, cop = 0, n = 0;
     void add(const Organisation& one) {
+        if (std::isnan(one.iorg)) return;
+        ++n;
         iorg += one.iorg;
         scai += one.scai;
         cop += one.cop;
     }
-    Organisation mean(double n) const { return {iorg / n, scai / n, cop / n}; }
+    Organisation mean() const { return {iorg / n, scai / n, cop / n}; }  // NaN of none
 };
 
 }  // namespace
@@ -227,7 +230,7 @@ MaskStatistics mask_statistics(const CloudMasks& masks) {
             series[n].empty() ? SeriesMean{kNaN, kNaN, kNaN, kNaN, kNaN} : mean_of(series[n]);
     for (const std::string_view name : {"size_exponent", "size_exponent_line", "fractal_dimension"})
         result.statistics[statistic_index(name)] = size_statistic(name, sizes);
-    result.organisation = sums.mean(double(masks.snapshots.size()));
+    result.organisation = sums.mean();
     result.random = null_organisation(
         extent, masks.boundaries, result.statistics[statistic_index("cover")].mean, kNullDraws, kNullSeed);
     return result;

@@ -46,7 +46,7 @@ struct MaskStatistics {
     // In the order of kStatistics; NaN where a mask has none (act, hum, lifetime, period). Errors: of the mean over
     // the snapshots, sd sqrt(tau / n); NaN of a single one. Of exponents and dimension: of the fit.
     std::array<SeriesMean, kStatistics.size()> statistics;
-    Organisation organisation;  // mean over the snapshots
+    Organisation organisation;  // mean over the snapshots with two clouds or more
     NullOrganisation random;    // the same of random shadows of the same cover
 };
 

@@ -158,6 +158,26 @@ TEST(CloudSizes, FindAKnownExponent) {
     EXPECT_TRUE(std::isnan(few.likelihood_exponent().value) && std::isnan(few.line_exponent().value));
 }
 
+// Clouds that an open side cuts have lost an unknown part: neither estimate may see them.
+TEST(CloudSizes, CutCloudsAreLeftOut) {
+    const SizeRange range{36, 4000};
+    std::vector<ConnectedCloud> whole, cut;
+    for (std::uint64_t a = 36; a <= 4000; ++a)
+        for (int n = 0; n < int(4e6 / std::pow(double(a), 2.5)); ++n) {
+            whole.push_back({.cells = a, .edges = a});
+            // A third more in small bins, none in large ones.
+            if (a < 300 && n % 3 == 0) cut.push_back({.cells = a, .edges = a, .cut = true});
+        }
+    CloudSizes clean(range), both(range);
+    clean.add(whole);
+    both.add(whole);
+    both.add(cut);
+    EXPECT_EQ(both.line_exponent().value, clean.line_exponent().value);
+    EXPECT_EQ(both.likelihood_exponent().value, clean.likelihood_exponent().value);
+    EXPECT_EQ(both.clouds(), whole.size() + cut.size());
+    EXPECT_EQ(both.count(size_bin(100)) - both.count_cut(size_bin(100)), clean.count(size_bin(100)));
+}
+
 TEST(CloudSizes, BinsHoldHalfOctaves) {
     EXPECT_EQ(size_bin(1), 0);
     EXPECT_EQ(size_bin(2), 2);
@@ -211,6 +231,16 @@ TEST(Organisation, TheNullOfACoverIsNotAHalf) {
     EXPECT_NEAR(null.mean.iorg, 0.24, 0.02);
     EXPECT_LT(null.deviation.iorg, 0.02);
     EXPECT_EQ(null_organisation(extent, periodic, 0.3, 4, 1).mean.cop, null.mean.cop);
+}
+
+// With 0.7 % of 20 x 10 columns covered many draws have no two clouds; the others still have a mean.
+TEST(Organisation, DrawsWithoutTwoCloudsAreLeftOut) {
+    const Extent extent{20, 10, 1};
+    const NullOrganisation null = null_organisation(extent, {}, 0.007, 40, 1);
+    EXPECT_GT(null.mean.iorg, 0);
+    EXPECT_GT(null.deviation.scai, 0);
+    const NullOrganisation none = null_organisation(extent, {}, 0, 4, 1);
+    EXPECT_TRUE(std::isnan(none.mean.iorg) && std::isnan(none.deviation.iorg));
 }
 
 }  // namespace

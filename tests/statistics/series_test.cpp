@@ -36,6 +36,28 @@ TEST(Series, IntegratedTimeOfAnAutoregressiveProcess) {
     EXPECT_EQ(integrated_time(autocorrelation(constant, 50)), 1);
 }
 
+// Pairs begin at lag 0: (1 + 0.5) + (-0.2 + 0.1), of which the second ends the sum.
+TEST(Series, IntegratedTimeSumsPairsFromLagZero) {
+    EXPECT_DOUBLE_EQ(integrated_time(std::vector<double>{1, 0.5, -0.2, 0.1, 0.05, -0.4}), 2);
+    EXPECT_DOUBLE_EQ(integrated_time(std::vector<double>{1, 0.5, 0.2, -0.1, 0.1, -0.2}), 2 * (1.5 + 0.1) - 1);
+    EXPECT_DOUBLE_EQ(integrated_time(std::vector<double>{1, -0.9, 0.8, -0.7, 0.6, -0.5}), 1);
+}
+
+// Every tenth step of a pulse of 84 steps: batches of eight values would walk through the pulse and call the beat an error.
+TEST(Series, BatchesOfAPulseAreWholePeriods) {
+    std::vector<double> sampled;
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> noise(0, 0.002);
+    const std::size_t period = 84, periods = 24;
+    for (std::size_t step = 0; step < (periods + 2) * period; step += 10)
+        sampled.push_back(0.2 + 0.15 * std::sin(2 * std::numbers::pi * double(step) / 84) + noise(random));
+    const Judgement judgement{Regime::pulsing, 2 * period, periods * period, period, 0.9};
+    const SeriesMean mean = mean_over(sampled, judgement, 10);
+    EXPECT_NEAR(mean.mean, 0.2, 0.002);
+    EXPECT_LT(mean.error, 0.001) << "0.0027 in batches of eight values";
+    EXPECT_GT(mean.error, 1e-5);
+}
+
 // The error bar must mean what it says: of 400 series, 95 % lie within two errors, give or take.
 TEST(Series, ErrorsCoverTheTruth) {
     int judged = 0, inside = 0;
