@@ -146,6 +146,20 @@ class Labelling {
     }
 
     std::vector<ConnectedCloud> clouds() {
+        join();
+        return collected(nullptr);
+    }
+    LabelledClouds labelled() {
+        join();
+        LabelledClouds labelled;
+        labelled.clouds = collected(&labelled.runs);
+        for (int row = 0; row < plane_.extent.y; ++row) labelled.rows.push_back(runs_.first(row));
+        labelled.rows.push_back(runs_.count());
+        return labelled;
+    }
+
+  private:
+    void join() {
         const Extent& e = plane_.extent;
         for (int k = 0; k < e.z; ++k) {
             for (int j = 0; j < e.y; ++j) {
@@ -155,10 +169,8 @@ class Labelling {
                     join_rows(k * e.y + j, (k + 1) % e.z * e.y + j, 0);
             }
         }
-        return collected();
     }
 
-  private:
     // The two ends of the runs of a row, and the run that goes on around a periodic axis.
     void join_in_row(int row) {
         const int nx = plane_.extent.x;
@@ -198,7 +210,16 @@ class Labelling {
         return std::uint64_t(runs_.run(run).end - runs_.run(run).begin);
     }
 
-    std::vector<ConnectedCloud> collected() {
+    void mark_sides(ConnectedCloud& cloud, const Sums& sum) const {
+        const Extent& e = plane_.extent;
+        cloud.cut = (!periodic_x_ && (sum.low_x || sum.high_x)) ||
+                    (!periodic_y_ && (sum.low_y || sum.high_y)) ||
+                    (e.z > 1 && !periodic_z_ && (sum.low_z || sum.high_z));
+        cloud.spans = (!periodic_x_ && sum.low_x && sum.high_x) || (!periodic_y_ && sum.low_y && sum.high_y);
+    }
+
+    // With the runs in their order, and without centroids, where `labels` is given.
+    std::vector<ConnectedCloud> collected(std::vector<LabelledRun>* labels) {
         const Extent& e = plane_.extent;
         const Centre x(e.x, periodic_x_), y(e.y, periodic_y_), z(e.z, periodic_z_);
         constexpr std::uint32_t kNone = ~std::uint32_t(0);
@@ -215,6 +236,7 @@ class Labelling {
                     clouds.back().lowest = k;
                     sums.emplace_back();
                 }
+                if (labels) labels->push_back({runs_.run(n).begin, runs_.run(n).end, number[root]});
                 ConnectedCloud& cloud = clouds[number[root]];
                 Sums& sum = sums[number[root]];
                 const Run run = runs_.run(n);
@@ -223,9 +245,11 @@ class Labelling {
                 cloud.edges += open_edges_[n];
                 cloud.lowest = std::min(cloud.lowest, k);
                 cloud.highest = std::max(cloud.highest, k);
-                x.add(sum.x, run.begin, run.end, 1);
-                y.add(sum.y, j, j + 1, cells);
-                z.add(sum.z, k, k + 1, cells);
+                if (!labels) {
+                    x.add(sum.x, run.begin, run.end, 1);
+                    y.add(sum.y, j, j + 1, cells);
+                    z.add(sum.z, k, k + 1, cells);
+                }
                 sum.low_x |= run.begin == 0;
                 sum.high_x |= run.end == e.x;
                 sum.low_y |= j == 0;
@@ -237,14 +261,11 @@ class Labelling {
         for (std::size_t n = 0; n < clouds.size(); ++n) {
             ConnectedCloud& cloud = clouds[n];
             const Sums& sum = sums[n];
+            mark_sides(cloud, sum);
+            if (labels) continue;
             cloud.x = x.mean(sum.x, double(cloud.cells));
             cloud.y = y.mean(sum.y, double(cloud.cells));
             if (e.z > 1) cloud.z = z.mean(sum.z, double(cloud.cells));
-            cloud.cut = (!periodic_x_ && (sum.low_x || sum.high_x)) ||
-                        (!periodic_y_ && (sum.low_y || sum.high_y)) ||
-                        (e.z > 1 && !periodic_z_ && (sum.low_z || sum.high_z));
-            cloud.spans =
-                (!periodic_x_ && sum.low_x && sum.high_x) || (!periodic_y_ && sum.low_y && sum.high_y);
         }
         return clouds;
     }
@@ -268,6 +289,12 @@ std::vector<ConnectedCloud> clouds_2d(const BitPlaneView& cld, const Boundaries&
 
 std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries) {
     return Labelling(cld, boundaries, 0).clouds();
+}
+
+LabelledClouds labelled_clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries) {
+    const BitPlane shadow = shadow_of(cld);
+    Labelling labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, 0);
+    return labelling.labelled();
 }
 
 }  // namespace nephos

@@ -37,4 +37,18 @@ std::vector<ConnectedCloud> clouds_2d(const BitPlaneView& cld, const Boundaries&
                                       Neighbours neighbours = Neighbours::four);
 std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries);
 
+// Cells [begin, end) of a row of the shadow, with the number of the cloud that they belong to.
+struct LabelledRun {
+    int begin, end;
+    std::uint32_t cloud;
+};
+
+// The clouds of clouds_2d() with four neighbours, but for their centroids, and where each is: row j has the runs rows[j] .. rows[j + 1] - 1.
+struct LabelledClouds {
+    std::vector<ConnectedCloud> clouds;
+    std::vector<LabelledRun> runs;
+    std::vector<std::size_t> rows;
+};
+LabelledClouds labelled_clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries);
+
 }  // namespace nephos

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <span>
 
+#include "study/packed_series.h"
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -27,7 +28,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::string_view kHashField = ",\"xxh3\":\"";
 constexpr double kFlushAfter_s = 1;
 constexpr int kFlushAfter = 64;
-constexpr std::uint64_t kMostValues = std::uint64_t(1) << 48;  // of a file of series: no disk holds more
+constexpr std::uint64_t kMostBytes = std::uint64_t(1) << 50;  // of a file of series: no disk holds more
 
 std::string hash_text(std::string_view text) { return hash_of_bytes(std::as_bytes(std::span(text))).hex(); }
 
@@ -96,8 +97,12 @@ RunRecord record_of(const Json& json) {
     result.profile = json.at("profile").get<std::vector<double>>();
     result.sizes = json.at("sizes").get<std::vector<std::uint64_t>>();
     result.snapshots = json.at("snapshots").get<std::uint64_t>();
+    if (const auto tracks = json.find("tracks"); tracks != json.end())
+        for (std::size_t n = 0; n < kTrackColumns.size(); ++n)
+            result.tracks.push_back(number_of(tracks->at(n)));
     result.state_hash = json.at("state_hash").get<std::string>();
     record.series_offset = json.at("series_offset").get<std::uint64_t>();
+    record.series_bytes = json.at("series_bytes").get<std::uint64_t>();
     if (const auto thumbnail = json.find("thumbnail"); thumbnail != json.end())
         result.thumbnail = base64_only(thumbnail->get<std::string>());
     return record;
@@ -146,7 +151,8 @@ void lock(const std::filesystem::path& path, const Descriptor& file) {
 
 }  // namespace
 
-std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset) {
+std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset,
+                        std::uint64_t series_bytes) {
     Json json = head(run, "done");
     json["regime"] = regime_name(result.regime);
     json["steps"] = result.steps;
@@ -163,8 +169,14 @@ std::string record_line(const PlannedRun& run, const RunResult& result, std::uin
     json["profile"] = result.profile;
     json["sizes"] = result.sizes;
     json["snapshots"] = result.snapshots;
+    if (!result.tracks.empty()) {
+        Json tracks = Json::array();
+        for (const double value : result.tracks) tracks.push_back(number(value));
+        json["tracks"] = std::move(tracks);
+    }
     json["state_hash"] = result.state_hash;
     json["series_offset"] = series_offset;
+    json["series_bytes"] = series_bytes;
     if (!result.thumbnail.empty()) json["thumbnail"] = result.thumbnail;
     return sealed(json);
 }
@@ -183,8 +195,8 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     // Series are written before the records that name them: fewer are damage, and not to be filled with zeros.
     std::error_code error;
     const std::uintmax_t size = std::filesystem::file_size(files_.back(), error);
-    const std::uint64_t stored = error ? 0 : size / sizeof(float);
-    std::uint64_t at = 0, bytes = 0, values = 0;
+    const std::uint64_t stored = error ? 0 : size;
+    std::uint64_t at = 0, bytes = 0, series = 0;
     std::string problem;
     const auto note = [&](std::uint64_t place, std::string_view message) {
         if (problem.empty())
@@ -206,18 +218,21 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
                                 "choose another --out, or give --overwrite");
             RunRecord record = record_of(json);
             record.shard = shard;
-            if (record.result.steps > kMaxSteps || record.series_offset > kMostValues) {
+            const std::uint64_t values = kSeries.size() * (std::min(record.result.steps, kMaxSteps) + 1);
+            if (record.result.steps > kMaxSteps || record.series_offset > kMostBytes ||
+                record.series_bytes > kMostBytes ||
+                (!record.failed && values * sizeof(float) > kMostUnpacked * record.series_bytes + 64)) {
                 note(at, "has impossible numbers");
                 continue;
             }
             if (!record.failed) {
-                const std::uint64_t end = record.series_offset + kSeries.size() * (record.result.steps + 1);
+                const std::uint64_t end = record.series_offset + record.series_bytes;
                 if (end > stored) {
-                    note(at, fmt::format("names {} values of {}, which has fewer: {}", end,
+                    note(at, fmt::format("names {} bytes of {}, which has fewer: {}", end,
                                          files_.back().filename().string(), stored));
                     continue;
                 }
-                values = std::max(values, end);
+                series = std::max(series, end);
             }
             const auto known = runs_.find(record.id);
             if (known == runs_.end()) {
@@ -231,7 +246,7 @@ std::pair<std::uint64_t, std::uint64_t> Records::read_shard(const std::filesyste
     }
     check_reading(stream, path);
     if (!problem.empty()) problems_.push_back(problem);
-    return {bytes, values};
+    return {bytes, series};
 }
 
 Records Records::read(const std::vector<std::filesystem::path>& folders) {
@@ -261,22 +276,23 @@ const RunRecord* Records::find(const std::string& id) const {
 }
 
 std::vector<float> Records::series(const RunRecord& record) const {
-    std::vector<float> values(kSeries.size() * (record.result.steps + 1));
     const std::filesystem::path& path = files_[record.shard];
     const Descriptor file = open_regular_file(path, O_RDONLY);
-    char* to = static_cast<char*>(static_cast<void*>(values.data()));
-    std::size_t left = values.size() * sizeof(float);
-    off_t at = off_t(record.series_offset * sizeof(float));
-    while (left > 0) {
-        const ssize_t got = ::pread(file.get(), to, left, at);
+    std::string packed(record.series_bytes, '\0');
+    for (std::size_t had = 0; had < packed.size();) {
+        const ssize_t got =
+            ::pread(file.get(), packed.data() + had, packed.size() - had, off_t(record.series_offset + had));
         if (got < 0 && errno == EINTR) continue;
         if (got <= 0)
             throw Error(ErrorCode::io, path.string() + ": does not hold the series that the records name");
-        to += got;
-        at += got;
-        left -= std::size_t(got);
+        had += std::size_t(got);
     }
-    return values;
+    try {
+        return unpack_series(packed, kSeries.size() * (record.result.steps + 1));
+    } catch (const Error& error) {
+        throw Error(ErrorCode::io,
+                    fmt::format("{}: at byte {}: {}", path.string(), record.series_offset, error.what()));
+    }
 }
 
 void remove_shards(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of) {
@@ -316,14 +332,14 @@ Shard::Shard(const std::filesystem::path& folder, std::uint32_t number, std::uin
     files_->series = open_regular_file(series_path_, O_WRONLY | O_APPEND | O_CREAT);
     lock(path_, files_->records);
     Records records;
-    const auto [bytes, values] = records.read_shard(path_);
+    const auto [bytes, series] = records.read_shard(path_);
     if (!records.problems().empty())
         throw Error(ErrorCode::io,
                     records.problems().front() + "; --overwrite computes the runs of this shard again");
     bytes_ = bytes;
-    values_ = values * sizeof(float);
+    series_bytes_ = series;
     if (::ftruncate(files_->records.get(), off_t(bytes_)) != 0) fail(path_, errno);
-    if (::ftruncate(files_->series.get(), off_t(values_)) != 0) fail(series_path_, errno);
+    if (::ftruncate(files_->series.get(), off_t(series_bytes_)) != 0) fail(series_path_, errno);
 }
 
 Shard::~Shard() {
@@ -335,8 +351,9 @@ Shard::~Shard() {
 }
 
 void Shard::add(const PlannedRun& run, const RunResult& result) {
-    lines_ += record_line(run, result, values_ / sizeof(float) + series_.size());
-    series_.insert(series_.end(), result.series.begin(), result.series.end());
+    const std::string packed = pack_series(result.series);
+    lines_ += record_line(run, result, series_bytes_ + series_.size(), packed.size());
+    series_ += packed;
     flush_if_due();
 }
 
@@ -357,11 +374,11 @@ void Shard::flush() {
             throw Error(ErrorCode::io, path->string() + ": was removed or replaced while the sweep wrote it");
     if (lines_.empty()) return;
     const std::string lines = std::exchange(lines_, {});
-    const std::vector<float> series = std::exchange(series_, {});
+    const std::string series = std::exchange(series_, {});
     waiting_ = 0;
     flushed_ = std::chrono::steady_clock::now();
     // The series first: a record never refers to what is not there.
-    append(series_path_, files_->series, std::as_bytes(std::span(series)), values_);
+    append(series_path_, files_->series, std::as_bytes(std::span(series)), series_bytes_);
     append(path_, files_->records, std::as_bytes(std::span(lines)), bytes_);
 }
 

@@ -4,7 +4,7 @@
 // The results of a sweep on disk while it goes on, in files to which whole records are appended:
 //
 //     DIR/shards/0000-of-0001.jsonl   a line of JSON a run, at whose end its XXH3-128 stands
-//     DIR/shards/0000-of-0001.series  the series of the runs one after the other, 32-bit floats, little-endian
+//     DIR/shards/0000-of-0001.series  the series of the runs one after the other, packed (packed_series.h)
 //
 // A shard belongs to one process; several processes share no file. What a kill or a full disk leaves of a last record is
 // recognised by its hash and dropped. The order of records means nothing.
@@ -27,14 +27,15 @@ namespace nephos {
 struct RunRecord {
     std::string id;
     bool failed = false;
-    std::string message;              // of a failed run
-    RunResult result;                 // without its series
-    std::uint32_t shard = 0;          // place in the list of files that were read
-    std::uint64_t series_offset = 0;  // in values
+    std::string message;      // of a failed run
+    RunResult result;         // without its series
+    std::uint32_t shard = 0;  // place in the list of files that were read
+    std::uint64_t series_offset = 0, series_bytes = 0;
 };
 
-// Returns a record as its line, with the newline; `series_offset` in values.
-std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset);
+// Returns a record as its line, with the newline; its packed series stand at a place of the shard's file of series.
+std::string record_line(const PlannedRun& run, const RunResult& result, std::uint64_t series_offset,
+                        std::uint64_t series_bytes);
 std::string failure_line(const PlannedRun& run, std::string_view message);
 
 // All records of some shards, the last of each run; failed ones where there is no other.
@@ -54,7 +55,7 @@ class Records {
 
   private:
     friend class Shard;
-    // Reads a shard, and gives back the bytes of its records and the values of series that they refer to. Throws Error(io)
+    // Reads a shard, and gives back the bytes of its records and those of the series that they refer to. Throws Error(io)
     // when it cannot be opened.
     std::pair<std::uint64_t, std::uint64_t> read_shard(const std::filesystem::path& path);
 
@@ -89,10 +90,9 @@ class Shard {
 
     std::filesystem::path path_, series_path_;
     struct Files;
-    std::unique_ptr<Files> files_;          // open while this object lives
-    std::uint64_t bytes_ = 0, values_ = 0;  // that are written
-    std::string lines_;
-    std::vector<float> series_;
+    std::unique_ptr<Files> files_;                // open while this object lives
+    std::uint64_t bytes_ = 0, series_bytes_ = 0;  // that are written
+    std::string lines_, series_;                  // that wait
     int waiting_ = 0;
     std::chrono::steady_clock::time_point flushed_;
 };

@@ -6,11 +6,13 @@
 #include <limits>
 
 #include "statistics/cloud_statistics.h"
+#include "statistics/tracks.h"
 #include "study/snapshot.h"
 #include "study/thumbnail.h"
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/wind_field.h"
 #include "scenes/format/errors.h"
 #include "simulation/layer_simulation.h"
 
@@ -24,7 +26,7 @@ bool has_wind(const Wind& wind) {
     for (const WindKeyframe& keyframe : wind.keyframes)
         for (const WindLevel& level : keyframe.levels)
             if (!(level.velocity == Velocity{})) return true;
-    return false;
+    return !wind.fields.empty();
 }
 
 // The sizes of clouds at a step.
@@ -45,11 +47,15 @@ class Measurement {
         const Wind& wind = scene.layers.empty() ? scene.automaton.wind : layer_wind(scene, measured_);
         // Cells that the wind carries away, or in across an open side, would count as deaths and births.
         counts_deaths_ = !has_wind(wind);
+        tracker_ = Tracker(lattice_.boundaries);
+        if (options.tracks && !is_profile(lattice_.wind.fields))
+            throw Error(ErrorCode::usage, "clouds cannot be followed in a wind that differs within a level");
         size_range_ = default_size_range(lattice_.extent);
         observe();
     }
 
     void step() {
+        if (options_.tracks) note_shifts();
         if (counts_deaths_) {
             const BitPlaneView before = automaton().cld();
             before_.assign(before.words, before.words + before.word_count());
@@ -64,6 +70,17 @@ class Measurement {
     RunResult result(const Judgement& judgement) const;
 
   private:
+    // How far the step that follows moves the bits of each level: they lie at the floor of the way of the air.
+    void note_shifts() {
+        const std::span<const Displacement> rest = automaton().beyond_whole_cells();
+        shifts_.clear();
+        for (int k = 0; k < lattice_.extent.z; ++k) {
+            const Displacement by = automaton().displacement_of_layer(k, steps());
+            const Displacement way{rest[std::size_t(k)].x + by.x, rest[std::size_t(k)].y + by.y};
+            shifts_.push_back({way.whole_x(), way.whole_y()});
+        }
+    }
+    std::vector<double> tracks(const Judgement& judgement) const;
     static std::size_t index_of(const Scene& scene, const std::string& name) {
         for (std::size_t n = 0; n < scene.layers.size(); ++n)
             if (scene.layers[n].name == name) return n;
@@ -79,6 +96,8 @@ class Measurement {
     }
 
     const SweepOptions& options_;
+    Tracker tracker_;
+    std::vector<CellShift> shifts_;
     std::vector<LayerSimulation> layers_;
     std::size_t measured_;
     AutomatonOptions lattice_;
@@ -115,6 +134,7 @@ void Measurement::observe() {
         cells_.push_back(0);
         deaths_.push_back(0);
     }
+    if (options_.tracks) tracker_.add(cld, shifts_);
     if (options_.clouds_every > 0 && steps() % std::uint64_t(options_.clouds_every) == 0)
         observe_clouds(cld, steps());
 }
@@ -164,6 +184,25 @@ SeriesMean Measurement::mean(std::size_t statistic, const Judgement& judgement) 
     return size_statistic(name, sizes_used(judgement));
 }
 
+std::vector<double> Measurement::tracks(const Judgement& judgement) const {
+    if (judgement.regime == Regime::not_steady || judgement.used == 0)
+        return std::vector<double>(kTrackColumns.size(), kNaN);
+    const TrackStatistics s =
+        track_statistics(tracker_.tracks(), judgement.warm_up, judgement.warm_up + judgement.used - 1);
+    const double step_s = lattice_.time_step_s;
+    return {double(s.births),
+            double(s.splits),
+            double(s.deaths),
+            double(s.mergers),
+            double(s.entered),
+            double(s.tracks),
+            double(s.censored),
+            s.mean * step_s,
+            s.mean_error * step_s,
+            s.median * step_s,
+            s.tracks > 0 ? double(s.longest) * step_s : kNaN};
+}
+
 RunResult Measurement::result(const Judgement& judgement) const {
     RunResult result;
     result.regime = judgement.regime;
@@ -185,6 +224,7 @@ RunResult Measurement::result(const Judgement& judgement) const {
     while (last > 0 && sizes.count(last - 1) == 0) --last;
     for (int bin = 0; bin < last; ++bin) result.sizes.push_back(sizes.count(bin));
     for (const StepSizes& snapshot : snapshots_) result.snapshots += is_used(snapshot.step, judgement);
+    if (options_.tracks) result.tracks = tracks(judgement);
     result.state_hash = combined_hash(layers_).hex();
     for (const std::vector<double>& series : series_)
         for (const double value : series) result.series.push_back(float(value));

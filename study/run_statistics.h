@@ -59,6 +59,21 @@ inline constexpr std::array<SeriesInfo, 7> kSeries{{
     {"edge_per_km", "", "km-1", "length of the cloud edge per area"},
 }};
 
+// What is known of the tracks of a run, in the order of tracks.csv; NaN without value. Of the steps that the means are over.
+inline constexpr std::array<StatisticInfo, 11> kTrackColumns{{
+    {"births", "1", "clouds that share no column with those of the step before"},
+    {"splits", "1", "clouds that share some, and go on from none"},
+    {"deaths", "1", "clouds that share no column with those of the next step"},
+    {"mergers", "1", "clouds that share some, and do not go on"},
+    {"entered", "1", "clouds that come in at an open side"},
+    {"tracks", "1", "births and splits whose lifetimes are taken"},
+    {"censored", "1", "those of them that were not seen to die"},
+    {"track_lifetime_mean_s", "s", "mean lifetime (Kaplan and Meier 1958)"},
+    {"track_lifetime_mean_s_se", "s", "its standard error (Greenwood)"},
+    {"track_lifetime_median_s", "s", "median lifetime"},
+    {"track_age_longest_s", "s", "greatest age that was seen"},
+}};
+
 // What a finished run leaves.
 struct RunResult {
     Regime regime = Regime::not_steady;
@@ -67,9 +82,10 @@ struct RunResult {
     std::vector<double> profile;       // mean cloud fraction of each level; empty where not steady
     std::vector<std::uint64_t> sizes;  // clouds of each size bin over the snapshots that were used
     std::uint64_t snapshots = 0;
-    std::string state_hash;     // after the last step
-    std::vector<float> series;  // kSeries one after the other, steps + 1 values each
-    std::string thumbnail;      // of the last state, thumbnail.h; a sweep keeps that of the first replicate
+    std::vector<double> tracks;  // kTrackColumns; empty where clouds were not followed
+    std::string state_hash;      // after the last step
+    std::vector<float> series;   // kSeries one after the other, steps + 1 values each
+    std::string thumbnail;       // of the last state, thumbnail.h; a sweep keeps that of the first replicate
 };
 
 // Runs the scene from its start by the rules of `options`, which has its `layer` set where the scene has layers. Throws as

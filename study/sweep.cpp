@@ -31,9 +31,10 @@ std::string packed(const RunResult& result) {
     writer.put(result.regime);
     writer.put(std::array{result.steps, result.warm_up, result.used, result.period, result.snapshots});
     writer.put(result.statistics);
-    writer.put(std::array{std::uint64_t(result.profile.size()), std::uint64_t(result.sizes.size()),
-                          std::uint64_t(result.series.size()), std::uint64_t(result.state_hash.size()),
-                          std::uint64_t(result.thumbnail.size())});
+    writer.put(std::array{std::uint64_t(result.tracks.size()), std::uint64_t(result.profile.size()),
+                          std::uint64_t(result.sizes.size()), std::uint64_t(result.series.size()),
+                          std::uint64_t(result.state_hash.size()), std::uint64_t(result.thumbnail.size())});
+    writer.put_bytes(std::as_bytes(std::span(result.tracks)));
     writer.put_bytes(std::as_bytes(std::span(result.profile)));
     writer.put_bytes(std::as_bytes(std::span(result.sizes)));
     writer.put_bytes(std::as_bytes(std::span(result.series)));
@@ -56,12 +57,14 @@ RunResult unpacked(const std::string& text) {
     result.period = counts[3];
     result.snapshots = counts[4];
     result.statistics = reader.get<decltype(result.statistics)>();
-    const auto sizes = reader.get<std::array<std::uint64_t, 5>>();
-    result.profile.resize(sizes[0]);
-    result.sizes.resize(sizes[1]);
-    result.series.resize(sizes[2]);
-    result.state_hash.resize(sizes[3]);
-    result.thumbnail.resize(sizes[4]);
+    const auto sizes = reader.get<std::array<std::uint64_t, 6>>();
+    result.tracks.resize(sizes[0]);
+    result.profile.resize(sizes[1]);
+    result.sizes.resize(sizes[2]);
+    result.series.resize(sizes[3]);
+    result.state_hash.resize(sizes[4]);
+    result.thumbnail.resize(sizes[5]);
+    reader.get_bytes(std::as_writable_bytes(std::span(result.tracks)));
     reader.get_bytes(std::as_writable_bytes(std::span(result.profile)));
     reader.get_bytes(std::as_writable_bytes(std::span(result.sizes)));
     reader.get_bytes(std::as_writable_bytes(std::span(result.series)));

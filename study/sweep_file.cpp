@@ -182,6 +182,7 @@ SweepOptions read_sweep_file(const std::filesystem::path& path) {
         options.common_seeds = table.word("seeds", {"per_point", "common"}).value_or(0) == 1;
         options.clouds_every =
             int(table.integer("clouds_every", 0, 1'000'000).value_or(std::uint64_t(options.clouds_every)));
+        options.tracks = table.flag("tracks").value_or(false);
         options.layer = table.text("layer").value_or("");
         table.table("steps", [&](TomlTable& steps) { read_steps(steps, options.steps); });
         table.tables("axis", [&](TomlTable& axis) { read_axis(axis, options); });

@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "core/text.h"
+#include "core/wind_field.h"
 #include "scenes/format/reader.h"
 #include "scenes/format/writer.h"
 #include "simulation/layer_simulation.h"
@@ -137,6 +138,11 @@ SweepPlan::SweepPlan(SweepOptions options) : options_(std::move(options)) {
                                   fmt::join(lattices, ", "))));
     }
     if (!scene_.layers.empty() && options_.layer.empty()) options_.layer = lattices.front();
+    if (options_.tracks && !is_profile(automaton_options(scene_, measured_lattice()).wind.fields))
+        throw Error(ErrorCode::usage,
+                    options_.scene_file.string() +
+                        ": has a wind that differs within a level, and clouds are followed only in one "
+                        "that is the same all over each level: leave out --tracks");
     points_ = point_count(options_);
     if (is_sampled(options_.design))
         unit_points_ = unit_points(options_.design, points_, options_.axes.size(), options_.seed);
@@ -206,11 +212,13 @@ PlannedRun SweepPlan::run(std::uint64_t number) const {
     // 63 bits: every seed is an integer of TOML.
     run.seed = (std::uint64_t(words[0]) << 32 | words[1]) >> 1;
     const StepRules& steps = options_.steps;
-    run.id = hash_of_text(fmt::format("{}\n{}{}\n{}..{} {} {}\n{} {} {}\n", simulation_hash_, point, run.seed,
-                                      steps.min, steps.max, steps.until ? steps.until->statistic : "",
-                                      steps.until ? number_text(steps.until->standard_error) : "",
-                                      options_.clouds_every, options_.layer, NEPHOS_STATISTICS_VERSION))
-                 .hex();
+    run.id =
+        hash_of_text(fmt::format("{}\n{}{}\n{}..{} {} {}\n{} {} {}{}\n", simulation_hash_, point, run.seed,
+                                 steps.min, steps.max, steps.until ? steps.until->statistic : "",
+                                 steps.until ? number_text(steps.until->standard_error) : "",
+                                 options_.clouds_every, options_.layer, NEPHOS_STATISTICS_VERSION,
+                                 options_.tracks ? " tracks" : ""))
+            .hex();
     return run;
 }
 
@@ -238,6 +246,7 @@ std::string SweepPlan::to_toml() const {
     text += fmt::format("replicates = {}\nseed = {}\nseeds = \"{}\"\n", o.replicates, o.seed,
                         o.common_seeds ? "common" : "per_point");
     if (!o.layer.empty()) text += fmt::format("layer = \"{}\"\n", o.layer);
+    if (o.tracks) text += "tracks = true\n";
     text += fmt::format("clouds_every = {}\n\n[steps]\nmin = {}\nmax = {}\n", o.clouds_every, o.steps.min,
                         o.steps.max);
     if (o.steps.until)

@@ -62,6 +62,7 @@ struct SweepOptions {
     bool common_seeds = false;
     StepRules steps;
     int clouds_every = 10;  // steps between the snapshots whose clouds are labelled; 0: none
+    bool tracks = false;    // clouds are followed from step to step (statistics/tracks.h)
     std::string layer;      // whose statistics are taken; empty: the only lattice of the scene
 };
 

@@ -25,6 +25,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kErrorsDiffer = 3;
+constexpr double kChance = 0.01;
 
 std::string field(double value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string(); }
 
@@ -122,6 +123,28 @@ std::uint64_t write_failures(const SweepPlan& plan, const Records& records,
         }
     });
     return missing;
+}
+
+void write_tracks(const SweepPlan& plan, const Records& records, const std::filesystem::path& path) {
+    write_pieces_atomically(path, [&](const AppendPiece& append) {
+        std::string line = "run,point,replicate" + axis_columns(plan) + ",seed,status,regime,used_steps";
+        for (const StatisticInfo& column : kTrackColumns) line += fmt::format(",{}", column.name);
+        append(line + "\n");
+        for (std::uint64_t n = 0; n < plan.runs(); ++n) {
+            const PlannedRun run = plan.run(n);
+            const RunRecord* record = records.find(run.id);
+            line = fmt::format("{},{},{}{},{},", run.id, run.point, run.replicate,
+                               axis_fields(plan, run.values), run.seed);
+            if (record == nullptr || record->failed) {
+                line += record == nullptr ? "missing" : "failed";
+                line += std::string(2 + kTrackColumns.size(), ',');
+            } else {
+                line += fmt::format("done,{},{}", regime_name(record->result.regime), record->result.used);
+                for (const double value : record->result.tracks) line += "," + field(value);
+            }
+            append(line + "\n");
+        }
+    });
 }
 
 // The runs that are done, in the order of the plan.
@@ -300,6 +323,15 @@ void write_manifest(const SweepPlan& plan, const Records& records, const std::fi
 
 }  // namespace
 
+bool errors_differ(double between, double within, int replicates) {
+    if (replicates < 3 || std::max(between, within) <= kErrorsDiffer * std::min(between, within))
+        return false;
+    if (!(within > 0)) return true;
+    const double ratio = between / within;
+    const double below = chi_squared_probability(replicates - 1, (replicates - 1) * ratio * ratio);
+    return std::min(below, 1 - below) < kChance / 2;
+}
+
 PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint64_t point) {
     PointSummary summary;
     summary.point = point;
@@ -339,9 +371,7 @@ PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint6
         const double half = student_quantile(int(results.size()) - 1, 0.95) * to.error;
         to.low = to.mean - half;
         to.high = to.mean + half;
-        const double larger = std::max(to.error, to.error_within),
-                     smaller = std::min(to.error, to.error_within);
-        to.errors_differ = results.size() >= 3 && larger > kErrorsDiffer * smaller;
+        to.errors_differ = errors_differ(to.error, to.error_within, int(results.size()));
     }
     return summary;
 }
@@ -368,6 +398,7 @@ std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
     write_runs(plan, records, folder / "runs.csv");
     write_points(plan, records, folder / "points.csv");
     const std::uint64_t missing = write_failures(plan, records, folder / "failures.csv");
+    if (plan.options().tracks) write_tracks(plan, records, folder / "tracks.csv");
     write_series(plan, records, folder / "series.nc");
     write_manifest(plan, records, folder / "manifest.json");
     return missing;

@@ -20,8 +20,13 @@ struct PointMean {
     double error;                // between replicates: deviation / sqrt(n); NaN of one
     double low, high;            // 95 % interval by Student's t
     double error_within;         // what the errors within the runs make of the mean: sqrt(sum of squares) / n
-    bool errors_differ = false;  // 3-fold: replicates in phase, or runs too short
+    bool errors_differ = false;  // replicates in phase, or runs too short
 };
+
+// Returns whether the two errors of a mean differ 3-fold, and by more than the scatter of so few replicates explains: if the
+// errors within the runs are right, (n - 1) (between / within)^2 is a chi-squared number of n - 1 degrees, and a value as
+// far off has a probability below 1 %. Of three replicates alone, one in ten is 3-fold too small by chance.
+bool errors_differ(double between, double within, int replicates);
 
 struct PointSummary {
     std::uint64_t point = 0;
@@ -38,8 +43,8 @@ PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint6
 // Throws Error(io) when the file is there and cannot be read.
 std::uint64_t runs_lost(const SweepPlan& plan, const Records& records, const std::filesystem::path& folder);
 
-// Writes DIR/runs.csv, points.csv, failures.csv, series.nc and manifest.json, each atomically. Returns how many runs of
-// the plan have no record. Throws Error(io).
+// Writes DIR/runs.csv, points.csv, failures.csv, series.nc and manifest.json, of a plan with tracks also tracks.csv, each
+// atomically. Returns how many runs of the plan have no record. Throws Error(io).
 std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
                            const std::filesystem::path& folder);
 

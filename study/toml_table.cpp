@@ -117,6 +117,14 @@ std::optional<std::uint64_t> TomlTable::integer(const std::string& key, std::uin
     return std::nullopt;
 }
 
+std::optional<bool> TomlTable::flag(const std::string& key) {
+    const Entry* entry = find(key);
+    if (entry == nullptr) return std::nullopt;
+    if (entry->value.kind == Node::Kind::boolean) return entry->value.boolean;
+    wrong_kind(*entry, "true or false");
+    return std::nullopt;
+}
+
 std::optional<std::size_t> TomlTable::word(const std::string& key,
                                            const std::vector<std::string_view>& words) {
     const std::optional<std::string> value = text(key);

@@ -28,6 +28,7 @@ class TomlTable {
     std::optional<std::string> text(const std::string& key);
     std::optional<double> number(const std::string& key, double min, double max);
     std::optional<std::uint64_t> integer(const std::string& key, std::uint64_t min, std::uint64_t max);
+    std::optional<bool> flag(const std::string& key);
     std::optional<std::size_t> word(const std::string& key, const std::vector<std::string_view>& words);
     std::vector<std::string> texts(const std::string& key);
     std::vector<std::string> values(const std::string& key);  // as TOML, one each

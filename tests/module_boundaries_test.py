@@ -52,7 +52,7 @@ LEAF = "render/shared/"
 LIBRARIES = {
     "openvdb/": {"density"},
     "nanovdb/": {"density"},
-    "zlib.h": {"density"},
+    "zlib.h": {"density", "study"},
     "vulkan/": {"render", "apps/editor"},
     "GLFW/": {"apps/editor"},
     "imgui": {"apps/editor"},

@@ -32,7 +32,7 @@ struct SweepArguments {
     std::optional<Design> design;
     std::optional<std::uint64_t> points, replicates, seed;
     bool common_seeds = false, dry_run = false, status = false, retry_failed = false, fail_fast = false,
-         overwrite = false;
+         overwrite = false, tracks = false;
     std::optional<std::pair<std::uint64_t, std::uint64_t>> steps;
     std::optional<StopAt> until;
     std::optional<std::uint64_t> clouds_every;
@@ -89,6 +89,7 @@ SweepOptions options_of(const SweepArguments& a) {
     if (a.steps) options.steps = {a.steps->first, a.steps->second, options.steps.until};
     if (a.until) options.steps.until = a.until;
     if (a.clouds_every) options.clouds_every = int(*a.clouds_every);
+    if (a.tracks) options.tracks = true;
     if (!a.layer.empty()) options.layer = a.layer;
     return options;
 }
@@ -309,6 +310,9 @@ void add_sweep_command(CLI::App& app, Action& action) {
     add_value(*command, "--clouds-every", "N",
               "Steps between snapshots whose clouds are measured (default: 10; 0: none)",
               [a](const std::string& text) { a->clouds_every = parse_unsigned(text, 0, 1'000'000); });
+    command->add_flag(
+        "--tracks", a->tracks,
+        "Follow clouds from step to step: births, deaths, splits, mergers, lifetimes (tracks.csv)");
     command->add_option("--layer", a->layer, "Layer whose lattice is measured, in a scene with several")
         ->type_name("NAME");
     add_value(*command, "-j,--workers", "N",

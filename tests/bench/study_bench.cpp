@@ -4,7 +4,10 @@
 #include "statistics/cloud_statistics.h"
 #include "statistics/clouds.h"
 #include "statistics/structure.h"
+#include "study/packed_series.h"
+#include "study/records.h"
 #include "study/run_statistics.h"
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include "automaton/automaton.h"
@@ -31,15 +34,66 @@ void step_alone(const Scene& scene) {
     for (int n = 0; n < kSteps; ++n) automaton.step();
 }
 
-BenchRow sweep_row(int clouds_every, const std::string& what, const std::string& target) {
+BenchRow sweep_row(int clouds_every, const std::string& what, const std::string& target,
+                   bool tracks = false) {
     const Scene scene = fair_scene();
     SweepOptions options;
     options.steps = {kSteps, kSteps, {}};
     options.clouds_every = clouds_every;
+    options.tracks = tracks;
     const auto [ours, other] = interleave(
         kRounds, [&] { run_for_statistics(scene, options); }, [&] { step_alone(scene); });
     return {"a run of a sweep, 256x128x20 x 300 steps, " + what + ", against its steps alone", ours, other,
             target, ""};
+}
+
+// What `run --statistics-only` does at every step against what `hash` does.
+BenchRow statistics_only_row() {
+    const Scene scene = fair_scene();
+    std::uint64_t kept = 0;
+    const auto each_step = [&](auto&& look) {
+        Automaton automaton(scene.automaton);
+        for (int n = 0; n < kSteps; ++n) {
+            automaton.step();
+            look(automaton);
+        }
+    };
+    const auto [ours, other] = interleave(
+        kRounds,
+        [&] {
+            each_step([&](const Automaton& a) {
+                kept += cloud_statistics(count_cloud(a.cld(), scene.automaton.boundaries),
+                                         scene.automaton.placement)
+                            .cld;
+                kept += a.hash().low;
+            });
+        },
+        [&] { each_step([&](const Automaton& a) { kept += a.hash().low; }); });
+    return {"statistics of every step and its hash, 256x128x20 x 300 steps, against the hash alone", ours,
+            other, "<= 1.1x", kept == 0 ? "nothing was measured" : ""};
+}
+
+// Series of a run as a sweep stores them, against its steps; the note has their bytes.
+BenchRow series_row() {
+    const Scene scene = fair_scene();
+    SweepOptions options;
+    options.steps = {kSteps, kSteps, {}};
+    RunResult run = run_for_statistics(scene, options);
+    run.thumbnail.clear();  // of a point one run keeps it
+    const PlannedRun planned{std::string(32, '0'), 0, 0, 0, 1, {"0.12"}};
+    std::size_t series = 0, record = 0;
+    const auto [ours, other] = interleave(
+        kRounds,
+        [&] {
+            series = pack_series(run.series).size();
+            record = record_line(planned, run, 0, series).size();
+        },
+        [&] { step_alone(scene); });
+    // The tables keep the series once more, as they are.
+    const std::size_t all = series + record + run.series.size() * sizeof(float);
+    return {"storing a run of 300 steps, against its steps alone", ours, other, "<= 0.05x",
+            fmt::format("{} bytes of series, {} of the record; {} with series.nc (target <= 15,000)", series,
+                        record, all)};
 }
 
 // One statistic, on the last of the states, against a step.
@@ -70,6 +124,9 @@ std::vector<BenchRow> study_rows() {
     std::vector<BenchRow> rows;
     rows.push_back(sweep_row(0, "statistics of every step", "<= 1.05x"));
     rows.push_back(sweep_row(10, "and clouds, correlation and overlap of every tenth", "<= 1.10x"));
+    rows.push_back(sweep_row(10, "and tracks of clouds", "<= 1.50x", true));
+    rows.push_back(statistics_only_row());
+    rows.push_back(series_row());
     rows.push_back(state_row("cover, profile, base, top and edge", "<= 0.1x",
                              [&](const Automaton& a) { kept += count_cloud(a.cld(), boundaries).edges; }));
     rows.push_back(state_row("2-D clouds", "<= 1x",

@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <set>
 
 #include "study/student.h"
 #include "study/sweep_file.h"
+#include "study/tables.h"
 #include <gtest/gtest.h>
 
 #include "core/error.h"
@@ -71,6 +73,38 @@ TEST(Student, QuantilesAreThoseOfTheTables) {
     EXPECT_NEAR(student_quantile(4, 0.95), 2.776, 1e-3);
     EXPECT_NEAR(student_quantile(10, 0.90), 1.812, 1e-3);
     EXPECT_NEAR(student_quantile(1000, 0.95), 1.962, 1e-3);
+}
+
+TEST(Student, ChiSquaredIsThatOfTheTables) {
+    EXPECT_NEAR(chi_squared_probability(2, 5.991), 0.95, 1e-4);
+    EXPECT_NEAR(chi_squared_probability(4, 0.207), 0.005, 1e-4);
+}
+
+// Three replicates whose errors within are right: chance alone must not raise the alarm more often than one in a hundred.
+TEST(Tables, ErrorsOfFewReplicatesDifferOnlyBeyondChance) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal(0, 1);
+    for (const int replicates : {3, 5, 10}) {
+        int alarms = 0;
+        for (int trial = 0; trial < 4000; ++trial) {
+            double sum = 0, squares = 0;
+            for (int n = 0; n < replicates; ++n) {
+                const double x = normal(random);
+                sum += x;
+                squares += x * x;
+            }
+            const double variance = (squares - sum * sum / replicates) / (replicates - 1);
+            alarms += errors_differ(std::sqrt(variance / replicates), 1 / std::sqrt(double(replicates)),
+                                    replicates);
+        }
+        EXPECT_LE(alarms, 60) << replicates;
+    }
+    EXPECT_TRUE(errors_differ(0.05, 0.003, 3));
+    EXPECT_TRUE(errors_differ(0.0001, 0.003, 5));
+    EXPECT_FALSE(errors_differ(0.002, 0.001, 100)) << "twice is not three times";
+    EXPECT_FALSE(errors_differ(0.05, 0.003, 2));
+    EXPECT_TRUE(errors_differ(0.05, 0, 3));
+    EXPECT_FALSE(errors_differ(0, 0, 3));
 }
 
 TEST(Axis, IsReadFromTheCommandLine) {

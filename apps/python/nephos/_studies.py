@@ -122,7 +122,7 @@ def _plan(axes, options):
 
 
 def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", points=None, seed=1, seeds="per_point",
-          clouds_every=10, layer=None, until=None, workers=None, shard=None):
+          clouds_every=10, tracks=False, layer=None, until=None, workers=None, shard=None):
     """Runs a scene over values of its keys, as `nephos sweep` does, and returns the Sweep.
 
     scene     a Scene, or the path of one
@@ -131,6 +131,7 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
     out       folder of the sweep; the same call again, or one with longer axes, runs only what is missing
     steps     (least, most): a run goes on, up to the most, until it is judged steady
     design    "grid", "list", "random", "latin_hypercube" or "sobol"; the last three take `points`
+    tracks    True: clouds are followed from step to step, and tracks.csv has their births, deaths and lifetimes
     until     (statistic, standard error): runs go on, up to the most steps, until the mean is that exact
     workers   processes at a time; None: one a core
     shard     (i, n): only the i-th of n parts of the runs, i from 0, for calls on several machines; then None is returned, and
@@ -139,7 +140,7 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
     Raises Error before the first run where a value is out of range, with the text of the command. Runs that fail are in
     failures(), and do not raise. Ctrl-C stops, and what is done stays."""
     options = {"scene": "scene.toml", "design": design, "points": points, "replicates": replicates, "seed": seed,
-               "seeds": seeds, "clouds_every": clouds_every, "layer": layer}
+               "seeds": seeds, "clouds_every": clouds_every, "tracks": tracks or None, "layer": layer}
     rules = {"min": steps[0], "max": steps[1]}
     if until is not None:
         rules["until"] = {"statistic": until[0], "standard_error": until[1]}

@@ -76,6 +76,47 @@ class Sweep(Case):
             self.assertEqual((run["status"], run["regime"]), ("done", "steady"))
             self.assertGreater(int(run["used_steps"]), 100)
 
+    def test_tracks_follow_clouds(self):
+        """Cells that are far apart are clouds of their own, and live for 1 / ext steps; the wind changes nothing."""
+        sparse = ("--set", "field.background.act=1e-5", "--tracks", "--replicates", "1", "--axis", "field.background.ext=0.05,0.1",
+                  "--steps", "1500..6000")
+        windy = self.write("windy.toml", NULL + "[[wind]]\nlevels = [{ height_m = 0, east_m_per_s = 7, north_m_per_s = -3 }]\n")
+        for folder, scene in (("calm", self.null), ("windy", windy)):
+            self.call("sweep", scene, *sparse, "--out", folder, "-j", "2")
+            table = rows(self.folder / folder / "tracks.csv")
+            for run, point in zip(table, rows(self.folder / folder / "runs.csv")):
+                self.assertEqual((run["run"], run["status"]), (point["run"], "done"))
+                number = {key: float(value) for key, value in run.items() if key[0] in "bdsmect" and key != "status"}
+                ext = float(run["field.background.ext"])
+                self.assertGreater(number["births"], 300)
+                self.assertLess(abs(number["births"] - number["deaths"]), 0.1 * number["births"])
+                self.assertLess(abs(number["track_lifetime_mean_s"] - 10 / ext),
+                                4 * number["track_lifetime_mean_s_se"] + 0.03 * 10 / ext)
+                self.assertEqual(number["entered"], 0)
+                self.assertGreaterEqual(float(run["track_age_longest_s"]), number["track_lifetime_mean_s"])
+        # Shards merge to the same bytes; without --tracks nothing changes and there is no table.
+        for shard in range(2):
+            self.call("sweep", self.null, *sparse, "--out", "parts", "--shard", f"{shard}/2")
+        self.call("merge", "parts")
+        self.assertEqual((self.folder / "parts/tracks.csv").read_bytes(), (self.folder / "calm/tracks.csv").read_bytes())
+        self.assertIn("tracks = true", (self.folder / "parts/sweep.toml").read_text())
+        self.sweep("plain", steps="50")
+        self.assertFalse((self.folder / "plain/tracks.csv").exists())
+        plan = self.write("bad.toml", 'scene = "null.toml"\ntracks = "yes"\n')
+        self.assertIn("expected true or false", self.call("sweep", plan, "--out", "bad", status=2).stderr)
+        rolls = self.write("rolls.toml", NULL + """\
+[[wind_field]]
+kind = "roll"
+x_m = 0
+y_m = 600
+radius_m = 1200
+speed_m_per_s = 1.8
+direction_deg = 90
+""")
+        said = self.call("sweep", rolls, "--tracks", "--out", "bad", status=2).stderr
+        self.assertIn("has a wind that differs within a level", said)
+        self.assertFalse((self.folder / "bad").exists())
+
     def test_a_run_of_the_table_can_be_repeated(self):
         self.sweep("a", "-j", "2")
         run = rows(self.folder / "a/runs.csv")[4]
@@ -140,7 +181,9 @@ class Sweep(Case):
             sealed = f'{text},"xxh3":"{xxhash.xxh3_128(text.encode()).hexdigest()}"}}'
             shard.write_text("\n".join([sealed, *lines[1:]]) + "\n")
         for key, value, says in (("steps", pow(7, -1, 2**64) - 1, "impossible numbers"), ("steps", 10**12, "impossible numbers"),
-                                 ("steps", 10**9, "which has fewer"), ("series_offset", 2**63, "impossible numbers"),
+                                 ("steps", 10**9, "impossible numbers"), ("series_offset", 2**63, "impossible numbers"),
+                                 ("series_bytes", 2**63, "impossible numbers"), ("series_bytes", 2**64 - 1, "impossible numbers"),
+                                 ("series_bytes", 1, "packed series are damaged"), ("series_bytes", 10**6, "which has fewer"),
                                  ("series_offset", 10**6, "which has fewer")):
             forge(key, value)
             self.assertIn(says, self.call("merge", "forged", "--out", "merged", status=3).stderr, (key, value))
