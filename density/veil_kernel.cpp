@@ -109,7 +109,7 @@ HWY_INLINE Floats repeating_noise(const VeilOctavePlan& octave, const LocalOctav
     return noise(columns, axes[0], axes[1], z);
 }
 
-constexpr std::size_t kMostOctaves = 12;
+constexpr std::size_t kMostOctaves = 12, kMostResolvedOctaves = 24;
 
 // q of one vector of points.
 template <bool kRidged, bool kDisplaced, bool kRepeats>
@@ -168,7 +168,66 @@ void sums_of_form(const VeilPlan& plan, const VeilPoints& points, float threshol
     }
 }
 
+// N of one vector of points, by an octave of either kind.
+HWY_INLINE Floats octave_value(const VeilPlan& plan, const VeilOctavePlan& octave, const LocalOctave& local,
+                               const Floats (&point)[3]) {
+    const NoiseFloats d;
+    const auto axis_at = [&](std::size_t axis) HWY_ATTR {
+        const Floats at =
+            hn::Add(hn::Mul(point[axis], hn::Set(d, local.per_m[axis])), hn::Set(d, local.within[axis]));
+        return axis_point<false>(at, local.cell[axis], octave.seeds[axis], 0);
+    };
+    const Floats n = plan.repeats ? repeating_noise(octave, local, point, axis_at(2))
+                                  : noise(axis_at(0), axis_at(1), axis_at(2));
+    const Floats value = hn::Add(hn::Mul(n, hn::Set(d, octave.gain)), hn::Set(d, octave.offset));
+    if (!plan.ridged) return value;
+    return hn::Sub(hn::Set(d, octave.ridge), hn::Abs(hn::Sub(hn::Set(d, octave.crest), value)));
+}
+
+// The fraction of an octave that points of these footprints resolve.
+HWY_INLINE Floats resolved_part(const VeilOctavePlan& octave, Floats footprint_m) {
+    const NoiseFloats d;
+    const Floats one = hn::Set(d, 1.0f);
+    const Floats t = hn::Sub(hn::Set(d, 1.5f), hn::Mul(footprint_m, hn::Set(d, 2 / octave.shortest_m)));
+    const Floats inside = hn::Max(hn::Min(t, one), hn::Zero(d));
+    return hn::Mul(hn::Mul(inside, inside), hn::Sub(hn::Set(d, 3.0f), hn::Add(inside, inside)));
+}
+
 }  // namespace
+
+void resolved_sums(const VeilPlan& plan, const VeilPoints& points, const float* footprint_m, float* sum,
+                   float* variance) {
+    const NoiseFloats d;
+    const Floats one = hn::Set(d, 1.0f), zero = hn::Zero(d);
+    LocalOctave local[kMostResolvedOctaves];
+    for (std::size_t k = 0; k < plan.octaves.size(); ++k)
+        local[k] = local_octave(plan.octaves[k], points.base_m);
+    for (std::size_t n = 0; n < points.count; n += hn::Lanes(d)) {
+        Floats point[3] = {hn::LoadU(d, points.from_base_m[0] + n), hn::LoadU(d, points.from_base_m[1] + n),
+                           hn::LoadU(d, points.from_base_m[2] + n)};
+        const Floats footprint = hn::LoadU(d, footprint_m + n);
+        Floats total = zero, left_out = zero, value = zero;
+        for (std::size_t k = 0; k < plan.octaves.size(); ++k) {
+            const VeilOctavePlan& octave = plan.octaves[k];
+            if (plan.displaced && k > 0) {
+                for (std::size_t axis = 0; axis < 3; ++axis)
+                    point[axis] =
+                        hn::Add(point[axis], hn::Mul(value, hn::Set(d, octave.displacement_m[axis])));
+            }
+            const Floats part = resolved_part(octave, footprint), mean = hn::Set(d, octave.mean);
+            value = mean;
+            if (!hn::AllTrue(d, hn::Le(part, zero)))
+                value =
+                    hn::Add(mean, hn::Mul(part, hn::Sub(octave_value(plan, octave, local[k], point), mean)));
+            total = hn::Add(total, hn::Mul(value, hn::Set(d, octave.weight)));
+            const Floats lost = hn::Sub(one, hn::Mul(part, part));
+            left_out =
+                hn::Add(left_out, hn::Mul(lost, hn::Set(d, octave.weight * octave.weight * octave.variance)));
+        }
+        hn::StoreU(total, d, sum + n);
+        hn::StoreU(left_out, d, variance + n);
+    }
+}
 
 void sums_of_points(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out) {
     (plan.repeats ? sums_of_form<true> : sums_of_form<false>)(plan, points, threshold, out);
@@ -182,9 +241,15 @@ HWY_AFTER_NAMESPACE();
 namespace nephos {
 
 HWY_EXPORT(sums_of_points);
+HWY_EXPORT(resolved_sums);
 
 void veil_sums(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out) {
     HWY_DYNAMIC_DISPATCH(sums_of_points)(plan, points, threshold, out);
+}
+
+void resolved_veil_sums(const VeilPlan& plan, const VeilPoints& points, const float* footprint_m, float* sum,
+                        float* variance) {
+    HWY_DYNAMIC_DISPATCH(resolved_sums)(plan, points, footprint_m, sum, variance);
 }
 
 }  // namespace nephos

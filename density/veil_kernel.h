@@ -21,6 +21,8 @@ struct VeilOctavePlan {
     std::array<float, 3> displacement_m{};
     float weight = 1, gain = 1, offset = 0, ridge = 0, crest = 0;
     float most_after = 0;  // upper bound of the summed octaves after this one, for early termination
+    // For sums at the resolution of a picture: mean and variance of N, and its shortest wavelength.
+    float mean = 0, variance = 0, shortest_m = 1;
 };
 
 struct VeilPlan {
@@ -42,5 +44,11 @@ struct VeilPoints {
 // Computes out[n] = q of point n. Where q is below `threshold`, out[n] is any value below it: octaves that
 // cannot reach it any more are skipped.
 void veil_sums(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out);
+
+// Computes sum[n] = q of point n, without what is finer than footprint_m[n]: octaves fade into their mean while the
+// footprint grows from a quarter to three quarters of their shortest wavelength. variance[n] is the variance of what is
+// left out.
+void resolved_veil_sums(const VeilPlan& plan, const VeilPoints& points, const float* footprint_m, float* sum,
+                        float* variance);
 
 }  // namespace nephos

@@ -18,6 +18,7 @@
 #include "render/frame/scattering_table.h"
 #include "render/ground/wet_ground.h"
 #include "render/renderer_impl.h"
+#include "render/veil/veil_pass.h"
 #include "render/vulkan/vulkan_backend.h"
 
 namespace nephos {
@@ -62,12 +63,17 @@ decltype(auto) with_drawing_errors(Work&& work) {
     }
 }
 
-CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats) {
+CloudHeights heights_of(const PreparedCloud& cloud, const Splats& splats, std::span<const DrawnVeil> veils) {
     CloudHeights heights{cloud.base_m, cloud.top_m};
     bool some = !cloud.visible.empty();
     for (const BillboardCloud& each : splats.clouds) {
         heights.base_m = some ? std::min(heights.base_m, each.base_m) : each.base_m;
         heights.top_m = some ? std::max(heights.top_m, each.top_m) : each.top_m;
+        some = true;
+    }
+    for (const DrawnVeil& veil : veils) {
+        heights.base_m = some ? std::min(heights.base_m, veil.slab->base_m()) : veil.slab->base_m();
+        heights.top_m = some ? std::max(heights.top_m, veil.slab->top_m()) : veil.slab->top_m();
         some = true;
     }
     return heights;
@@ -207,12 +213,20 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
     }
 }
 
-Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptions& options) {
+Picture Renderer::Impl::draw_in_passes(const Splats& splats, const RenderOptions& options) {
     const CameraFrame camera = camera_frame(options.camera);
     const DetailView detail{camera.position_m, pixels_per_unit(options.camera, camera)};
     Picture picture = draw(splats, options, detail);
     static const GroundCoverView kDry;
     const GroundCoverView& cover = splats.ground_cover ? *splats.ground_cover : kDry;
+    if (shows_wet_ground(options, cover) || shows_country(options))
+        draw_ground(splats, options, cover, detail, picture);
+    if (!veils.empty()) draw_veils_of(splats, options, detail, picture);
+    return picture;
+}
+
+void Renderer::Impl::draw_ground(const Splats& splats, const RenderOptions& options,
+                                 const GroundCoverView& cover, const DetailView& detail, Picture& picture) {
     WetGround ground{options, cover, splats.flash ? &*splats.flash : nullptr, splats.time_s};
     std::optional<MirrorView> mirror;
     if (shows_reflections(options, cover)) {
@@ -220,26 +234,47 @@ Picture Renderer::Impl::draw_with_ground(const Splats& splats, const RenderOptio
         below.camera =
             mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
         Splats mirrored = splats;
-        mirrored.depth = mirrored.light = false;
+        mirrored.depth = !veils.empty();
+        mirrored.light = false;
         // The merged metaballs are reused, and with them the light.
-        mirror = mirror_view(draw(mirrored, below, detail), below.camera);
+        Picture view = draw(mirrored, below, detail);
+        if (!veils.empty()) draw_veils_of(splats, below, detail, view);
+        mirror = mirror_view(std::move(view), below.camera);
         ground.mirror = &*mirror;
     }
     backend->fetch_light(lit);
     ground.shadow = lit.shadow.data();  // the mirrored view may have completed it
     ground.shadow_size = lit.shadow_size;
     ground.sky = sky_of(splats, options);  // the mirrored view has another
-    const MarchedScene marched(lit.volumes, camera, detail.pixels_per_unit, options.light, earth_bend(ground.sky));
+    const MarchedScene marched(lit.volumes, camera_frame(options.camera), detail.pixels_per_unit,
+                               options.light, earth_bend(ground.sky));
     if (marched.repeats) ground.endless = &marched;
     if (!lit.volumes.empty()) ground.light = &lit.ground_light;
     draw_wet_ground(ground, picture);
-    return picture;
+}
+
+void Renderer::Impl::draw_veils_of(const Splats& splats, const RenderOptions& options,
+                                   const DetailView& detail, Picture& picture) {
+    backend->fetch_light(lit);
+    const CameraFrame camera = camera_frame(options.camera);
+    const SkyLight* const sky = sky_of(splats, options);
+    const PicturePart whole{0, 0, picture.width, picture.height};
+    VeilPass pass{veils,
+                  frame_data(options, camera, lit.frame, splats.flash ? &*splats.flash : nullptr, whole, sky),
+                  camera.position_m,
+                  options.ground.albedo,
+                  lit.shadow.data(),
+                  lit.shadow_size};
+    const MarchedScene marched(lit.volumes, camera, detail.pixels_per_unit, options.light, earth_bend(sky));
+    if (marched.repeats) pass.frame.endless = &marched;
+    if (!lit.volumes.empty()) use_ground_light(lit.ground_light, camera.position_m, pass.frame);
+    draw_veils(pass, picture);
 }
 
 // Null: gradient. Until the next call.
 const SkyLight* Renderer::Impl::sky_of(const Splats& splats, const RenderOptions& options) {
     if (options.atmosphere.model == AirModel::gradient) return nullptr;
-    return &sky_lights.at(options, heights_of(lit.cloud, splats));
+    return &sky_lights.at(options, heights_of(lit.cloud, splats, veils));
 }
 
 Renderer::Renderer(const DeviceOptions& options) {
@@ -258,11 +293,13 @@ Picture Renderer::draw(const MetaballCloud& cloud, const RenderOptions& options)
     return draw_splats(splats, options);
 }
 
-Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options) {
-    return finish(begin(splats, options));
+Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options,
+                              std::span<const DrawnVeil> veils) {
+    return finish(begin(splats, options, veils));
 }
 
-PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& options) {
+PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& options,
+                               std::span<const DrawnVeil> veils) {
     check(options);
     const int limit = impl_->backend->largest_shadow_map();
     if (options.shadow_map_size > limit)
@@ -272,9 +309,10 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
     const auto work = [&] {
         auto state = std::make_unique<PendingPicture::State>(splats, options);
         impl_->times = {};
+        impl_->veils = veils;
         const bool wet = splats.ground_cover && shows_wet_ground(options, *splats.ground_cover);
-        if (wet || shows_country(options)) {
-            state->picture = impl_->draw_with_ground(splats, options);
+        if (wet || shows_country(options) || !veils.empty()) {
+            state->picture = impl_->draw_in_passes(splats, options);
         } else {
             const CameraFrame camera = camera_frame(options.camera);
             state->detail = {camera.position_m, pixels_per_unit(options.camera, camera)};

@@ -19,6 +19,7 @@
 // number of threads.
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,7 @@
 #include "render/image/picture.h"
 #include "render/options/device_options.h"
 #include "render/options/options.h"
+#include "render/veil/drawn_veil.h"
 
 namespace nephos {
 
@@ -68,7 +70,9 @@ class Renderer {
     //
     // View-independent results (light, shadow map) are cached and reused while metaballs, extinction, sun and
     // size of the shadow map are the same, by their content.
-    Picture draw_splats(const Splats& splats, const RenderOptions& options);
+    // `veils` are drawn per pixel over the rest; with them Splats::depth is needed.
+    Picture draw_splats(const Splats& splats, const RenderOptions& options,
+                        std::span<const DrawnVeil> veils = {});
     Picture draw(const MetaballCloud& cloud, const RenderOptions& options);
 
     // Draw in two steps, so that a graphics card draws one frame while the next is prepared:
@@ -79,10 +83,11 @@ class Renderer {
     // The memory behind the spans of `splats` must not change until the frame is finished. Pictures have the
     // same bits as those of draw_splats(), in whatever order they are finished. At most two frames are in
     // flight: begin() of a third waits for the first, and of one with another cloud or sky for both. The
-    // back-ends cpu and blended draw in begin(), as do all back-ends with wet ground. Both functions throw
+    // back-ends cpu and blended draw in begin(), as do all back-ends with wet ground or veils. Both functions throw
     // as draw_splats(); an error of a frame in flight is thrown by its own finish(). Only the Renderer that
     // began a frame may finish it, and only once.
-    PendingPicture begin(const Splats& splats, const RenderOptions& options);
+    PendingPicture begin(const Splats& splats, const RenderOptions& options,
+                         std::span<const DrawnVeil> veils = {});
     Picture finish(PendingPicture&& pending);
 
     std::string backend_name() const;  // "cpu", "vulkan" or "blended"

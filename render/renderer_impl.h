@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "render/atmosphere/sky_light.h"
@@ -39,8 +40,13 @@ struct Renderer::Impl {
     void finish(Drawing& drawing);
     // Begins and finishes a frame.
     Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail);
-    // Draws a frame with wet or snowy ground.
-    Picture draw_with_ground(const Splats& splats, const RenderOptions& options);
+    // Draws a frame over which the processor draws: ground that is not plain, veils per pixel.
+    Picture draw_in_passes(const Splats& splats, const RenderOptions& options);
+    // The passes: wet, snowy or farmed ground; veils. They change `picture`, which was drawn with `detail`.
+    void draw_ground(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
+                     const DetailView& detail, Picture& picture);
+    void draw_veils_of(const Splats& splats, const RenderOptions& options, const DetailView& detail,
+                       Picture& picture);
     // Computes light by T's absorption factor instead of the light pass.
     void absorb_sunlight(LitCloud& cloud, const DensityBlocks& blocks, const RenderOptions& options);
     // Absorbs the sunlight where the options say so, and returns the fraction of the lightning at each
@@ -58,6 +64,7 @@ struct Renderer::Impl {
     CloudLight scattering_light;
     AirCache air;
     SkyLights sky_lights;
+    std::span<const DrawnVeil> veils;  // of the picture that is being drawn
 };
 
 }  // namespace nephos

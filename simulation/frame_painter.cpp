@@ -99,7 +99,7 @@ std::vector<Metaball> FramePainter::metaballs_of(const FrameResult& frame,
     std::vector<Metaball> balls;
     for (std::size_t n = 0; n < frame.layers.size(); ++n) {
         const LayerFrame& layer = frame.layers[n];
-        if (layer.direct) continue;
+        if (layer.direct || scene_.layers[n].is_slab) continue;
         const std::vector<Metaball> more = metaballs(layer.density, radius);
         add_detail(layer.density, layer.moisture, n, frame.time_s, balls.size(), more.size(), detailed);
         balls.insert(balls.end(), more.begin(), more.end());
@@ -107,11 +107,34 @@ std::vector<Metaball> FramePainter::metaballs_of(const FrameResult& frame,
     return balls;
 }
 
+std::vector<DrawnVeil> FramePainter::veils_of(const FrameResult& frame) const {
+    std::vector<DrawnVeil> veils;
+    for (std::size_t n = 0; n < frame.layers.size(); ++n) {
+        const LayerOptions& layer = scene_.layers[n];
+        if (!layer.is_slab || frame.layers[n].density.active_voxels() == 0) continue;
+        const double opacity = opacity_at(layer, scene_.climate, frame.time_s);
+        if (opacity <= 0) continue;
+        std::optional<VeilSides> sides;
+        if (!layer.slab.to_horizon && !scene_.tile) {
+            const Vec3& low = layer.placement.origin_m;
+            const double cell = layer.placement.cell_size_m;
+            sides = VeilSides{{low.x, low.y},
+                              {low.x + layer.extent.x * cell, low.y + layer.extent.y * cell},
+                              layer.veil.margin_m};
+        }
+        veils.push_back({std::make_shared<VeilSlab>(veil_options(scene_, n), layer_wind(scene_, n),
+                                                    frame.time_s, layer.slab.finer_octaves, sides),
+                         opacity * scene_.density.extinction_per_m, layer.slab});
+    }
+    return veils;
+}
+
 PendingFrame FramePainter::begin(FrameResult frame) {
     std::vector<DetailedVoxels> detailed;
     std::vector<Metaball> balls = metaballs_of(frame, detailed);
     const double radius = scene_.density.metaball_radius_cells;
     const MetaballCloud cloud{balls, scene_.density.extinction_per_m, metaball_normalisation(radius), detailed};
+    std::vector<DrawnVeil> veils = veils_of(frame);
     std::vector<SkyLayer> layers;
     for (const LayerFrame& layer : frame.layers) {
         if (layer.sky != nullptr) layers.push_back({layer.sky, layer.clouds, layer.direct});
@@ -126,8 +149,8 @@ PendingFrame FramePainter::begin(FrameResult frame) {
                                                     place.given ? place.heading_deg : 0};
     PendingSkyPicture picture =
         painter_.begin(renderer_, cloud, layers, options, frame.time_s, scene_.frames.exr, ground,
-                       weather_of(scene_, frame.layers, frame.time_s), film);
-    return {std::move(frame), std::move(balls), std::move(detailed), std::move(picture)};
+                       weather_of(scene_, frame.layers, frame.time_s), film, veils);
+    return {std::move(frame), std::move(balls), std::move(detailed), std::move(veils), std::move(picture)};
 }
 
 Picture FramePainter::finish(PendingFrame&& pending) {

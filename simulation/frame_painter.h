@@ -30,6 +30,7 @@ struct PendingFrame {
     FrameResult frame;
     std::vector<Metaball> balls;
     std::vector<DetailedVoxels> detailed;  // of these
+    std::vector<DrawnVeil> veils;
     PendingSkyPicture picture;
 
     // Returns true while a device is drawing it, as far as is known.
@@ -66,6 +67,8 @@ class FramePainter {
 
   private:
     std::vector<Metaball> metaballs_of(const FrameResult& frame, std::vector<DetailedVoxels>& detailed) const;
+    // Veils that are drawn per pixel: not those of a frame without densities of its layers, which hold them.
+    std::vector<DrawnVeil> veils_of(const FrameResult& frame) const;
     // Adds the voxels of metaballs from `first` on.
     void add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
                     std::optional<std::size_t> layer, double time_s, std::size_t first, std::size_t count,

@@ -54,6 +54,7 @@ std::string text_of_veil(const Scene& scene, std::size_t layer) {
     alone.layers = {scene.layers[layer]};
     alone.layers.front().wind = {};
     alone.layers.front().own_detail = false;
+    alone.layers.front().is_slab = false;
     return to_toml(alone);
 }
 

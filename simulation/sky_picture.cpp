@@ -163,7 +163,8 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
                                     std::span<const SkyLayer> layers, const RenderOptions& moving,
                                     double time_s, bool depth,
                                     const std::optional<GroundCoverView>& ground_cover,
-                                    const Weather& weather, const std::optional<FilmFrame>& film) {
+                                    const Weather& weather, const std::optional<FilmFrame>& film,
+                                    std::span<const DrawnVeil> veils) {
     check(moving);
     RenderOptions options = moving;
     options.camera = camera_at(moving.camera, time_s);
@@ -185,10 +186,11 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     std::vector<std::vector<WorldLine>> lines;
     for (const SkyLayer& layer : layers)
         lines.push_back(debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun)));
-    // Rain wants the depth of the clouds and their shadow.
+    // Rain wants the depth of the clouds and their shadow, veils the depth.
     const bool all = depth || rain;
     PendingPicture picture = renderer.begin(
-        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all, all, ground_cover}, options);
+        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all, ground_cover},
+        options, veils);
     RenderOptions raining = moving;  // knows the camera's path itself
     raining.sun = options.sun;
     return {std::move(picture), std::move(options), std::move(raining), weather, time_s,

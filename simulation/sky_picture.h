@@ -118,12 +118,13 @@ class SkyPainter {
                  const std::optional<GroundCoverView>& ground_cover = {}, const Weather& weather = {},
                  const std::optional<FilmFrame>& film = {});
 
-    // Draw in two steps, as Renderer::begin() and finish(): voxels and ground cover must stay as they are
-    // until the second. Pictures are finished in the order in which they were begun.
+    // Draw in two steps, as Renderer::begin() and finish(): voxels, ground cover and veils, which are drawn per pixel,
+    // must stay as they are until the second. Pictures are finished in the order in which they were begun.
     PendingSkyPicture begin(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                             const RenderOptions& options, double time_s, bool depth = true,
                             const std::optional<GroundCoverView>& ground_cover = {},
-                            const Weather& weather = {}, const std::optional<FilmFrame>& film = {});
+                            const Weather& weather = {}, const std::optional<FilmFrame>& film = {},
+                            std::span<const DrawnVeil> veils = {});
     Picture finish(Renderer& renderer, PendingSkyPicture&& pending);
 
   private:

@@ -12,6 +12,7 @@
 #include "render/options/camera.h"
 #include "render/options/device_options.h"
 #include "render/options/sun_position.h"
+#include "render/options/veil_view.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
@@ -86,6 +87,23 @@ void check(const PrecipitationOptions& p) {
     require(within(p.shafts, 0, 100), "precipitation.shafts", "0..100");
     require(within(p.shaft_texture, 0, 1), "precipitation.shaft_texture", "0..1");
     require(within(p.evaporation, 0, 1), "precipitation.evaporation", "0..1");
+}
+
+void check(const VeilView& view) {
+    const TwoSampleLight& s = view.two_samples;
+    require(within(view.samples, 4, 256), "slab.samples", "4..256");
+    require(within(view.finer_octaves, 0, 12), "slab.finer_octaves", "0..12");
+    require(within(view.height_slope, -100, 100), "slab.height_slope", "-100..100");
+    require(within(view.height_offset, -100, 100), "slab.height_offset", "-100..100");
+    require(within(view.g, -0.99, 0.99), "slab.g", "-0.99..0.99");
+    require(within(view.halo, 0, 1), "slab.halo", "0..1");
+    require(within(s.sun_step_m, 0.1, 1e5), "slab.two_samples.sun_step_m", "0.1..100,000 metres");
+    require(within(s.shade_gain, -100, 100), "slab.two_samples.shade_gain", "-100..100");
+    require(within(s.shade_offset, -100, 100), "slab.two_samples.shade_offset", "-100..100");
+    require(within(s.shade_power, 0, 100), "slab.two_samples.shade_power", "0..100");
+    require(within(s.glow_gain, 0, 100), "slab.two_samples.glow_gain", "0..100");
+    require(within(s.glow_power, 0, 100), "slab.two_samples.glow_power", "0..100");
+    require(within(s.bounce_power, 0, 100), "slab.two_samples.bounce_power", "0..100");
 }
 
 void check(const Shells& shells) {

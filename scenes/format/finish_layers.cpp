@@ -258,6 +258,12 @@ void check_rain(const SectionReader& reader, const LayerOptions& layer) {
     }
 }
 
+void check_slab(const SectionReader& reader, const LayerOptions& layer) {
+    if (!layer.is_slab || layer.is_veil) return;
+    reader.report("slab", reader.quoted("slab") + " stands in a layer without `veil`",
+                  "expected none: only veils are drawn per pixel");
+}
+
 // Presence is that of veils, at states that rise.
 void check_presence(const SectionReader& reader, const LayerOptions& layer) {
     if (!layer.presence.empty() && !layer.is_veil) {
@@ -277,10 +283,10 @@ void check_presence(const SectionReader& reader, const LayerOptions& layer) {
 void finish_veil_layer(const SectionReader& reader, const Scene& scene, LayerOptions& layer) {
     for (const std::string_view key : keys_of_clouds()) {
         if (reader.find(key) == nullptr) continue;
-        reader.report(
-            key, reader.quoted(key) + " stands beside `veil`",
-            "expected `name`, `opacity`, `lattice`, `wind`, `presence`, `veil` and `detail` alone: a veil has no "
-            "clouds and no automaton");
+        reader.report(key, reader.quoted(key) + " stands beside `veil`",
+                      "expected `name`, `opacity`, `lattice`, `wind`, `presence`, `veil`, `slab` and "
+                      "`detail` alone: a veil has no "
+                      "clouds and no automaton");
     }
     const SectionReader lattice = below(reader, "lattice"), veil = below(reader, "veil");
     if (lattice.find("boundaries") != nullptr) {
@@ -459,6 +465,7 @@ void finish_layers(const SectionReader& reader, Scene& scene) {
         LayerOptions& layer = scene.layers[n];
         check_layer_name(item, layer.name);
         check_presence(item, layer);
+        check_slab(item, layer);
         check_wind_times(item, layer.wind);
         check_profile_times(item, layer.profile);
         if (layer.is_veil) {

@@ -19,6 +19,7 @@
 #include "automaton/options.h"
 #include "density/options.h"
 #include "density/veil.h"
+#include "render/options/veil_view.h"
 #include "seeds/coupling.h"
 #include "seeds/genera.h"
 #include "seeds/rain_area.h"
@@ -86,9 +87,11 @@ struct NamedMetamorphosis {
 struct LayerOptions {
     std::string name;  // letters, digits, '-' and '_': part of file names; no two layers share one
     // True: the density is that of `veil`, a function of position and time, without skies, clouds and
-    // automaton. Of the fields below such a layer uses lattice, opacity, wind and detail alone.
+    // automaton. Of the fields below such a layer uses lattice, opacity, wind, slab and detail alone.
     bool is_veil = false;
     VeilOptions veil;                // its seed is that of veil_options()
+    bool is_slab = false;            // true: pictures show the veil as `slab` says, instead of its lattice
+    VeilView slab;
     std::vector<VeilPresence> presence;  // of a veil; states rise strictly; without any it is always there, whole
     std::vector<std::string> skies;  // names, at least one
     bool automaton = true;           // false: clouds are drawn directly as billboards, without density

@@ -350,6 +350,7 @@ void finish_layer(const SectionReader& reader, void* owner) {
     layer.is_veil = reader.find("veil") != nullptr;
     if (layer.is_veil) layer.automaton = false;
     layer.own_detail = reader.find("detail") != nullptr;
+    layer.is_slab = reader.find("slab") != nullptr;
 }
 
 }  // namespace
@@ -431,19 +432,25 @@ const Section& layer_section() {
                  "air nothing changes.",
                  "T, 3.4"),
              tables<&LayerOptions::metamorphoses>("metamorphoses", metamorphosis_section(), 0, 1000),
-             key<&LayerOptions::shear_s>(
-                 "shear_s", "s", between(0, 1e6),
-                 "Time over which billboards of clouds that are drawn directly lean with the wind's shear: at another "
-                 "height than the cloud's centre by the difference of the winds times this. Clouds of an automaton are "
-                 "sheared by its wind.",
-                 "T, 5"),
+             key<&LayerOptions::shear_s>("shear_s", "s", between(0, 1e6),
+                                         "Time over which billboards of clouds that are drawn directly lean "
+                                         "with the wind's shear: at another "
+                                         "height than the cloud's centre by the difference of the winds "
+                                         "times this. Clouds of an automaton are "
+                                         "sheared by its wind.",
+                                         "T, 5"),
              table<&LayerOptions::coupling>("coupling", coupling_section(), coupling_section().effect),
              table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect),
              default_is(table<&LayerOptions::detail>("detail", detail_section(), detail_section().effect),
                         "that of `[detail]`; a veil has none"),
-             written_if(&of_veils, tables<&LayerOptions::presence>("presence", presence_section(), 0, 10'000)),
              written_if(&of_veils,
-                        table<&LayerOptions::veil>("veil", veil_section(), veil_section().effect))},
+                        tables<&LayerOptions::presence>("presence", presence_section(), 0, 10'000)),
+             written_if(&of_veils, table<&LayerOptions::veil>("veil", veil_section(), veil_section().effect)),
+             default_is(
+                 written_if(
+                     [](const void* owner) { return static_cast<const LayerOptions*>(owner)->is_slab; },
+                     table<&LayerOptions::slab>("slab", slab_section(), slab_section().effect)),
+                 "none: the lattice is drawn")},
             &finish_layer};
         for (Key& key : layers.keys) {
             if (std::ranges::find(keys_of_clouds(), key.name) != keys_of_clouds().end()) {

@@ -54,6 +54,7 @@ const Section& climate_section();
 const Section& layer_section();
 // Owner: VeilOptions.
 const Section& veil_section();
+const Section& slab_section();
 
 // Returns the keys of a layer that have no effect beside `veil`.
 std::span<const std::string_view> keys_of_clouds();

@@ -249,8 +249,10 @@ std::string simulation_hash(const Scene& scene, std::string_view initial_state_h
     }
     simulation.steps = 0;
     if (scene.initial_state_file) simulation.initial_state_file = "state";
-    for (LayerOptions& layer : simulation.layers)
+    for (LayerOptions& layer : simulation.layers) {
         if (layer.initial_state_file) layer.initial_state_file = "state";
+        layer.is_slab = false;  // only how it is drawn
+    }
     for (ProbabilityGrid& grid : simulation.automaton.field.grids) grid.file = "probabilities";
     for (WindField& field : simulation.automaton.wind.fields)
         for (std::string& file : field.files) file = "wind";

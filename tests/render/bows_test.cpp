@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The bows of raindrops: where they are, in which order their colours stand, and how much light they have.
+// The bows of raindrops and the halo of ice: where they are, in which order their colours stand, and how much light they have.
 
 #include <array>
 #include <cmath>
@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "render/options/halo_phase.h"
 #include "render/rain/rainbow.h"
 
 namespace nephos {
@@ -54,6 +55,34 @@ TEST(Rainbow, HasItsShareOfTheLight) {
     for (int i = 0; i < steps; ++i) sum += rainbow().at(-1 + 2 * (i + 0.5) / steps)[1];
     EXPECT_NEAR(sum * 2 / steps * 2, rainbow().share,
                 0.1 * rainbow().share);  // 2 pi d(cos), of pi times the phase
+}
+
+std::array<double, 3> halo_at(double degrees) {
+    static const HaloPhase phase;
+    return phase.at(std::cos(degrees * kDegree));
+}
+
+TEST(Halo, BeginsAtTwentyTwoDegreesWithRed) {
+    EXPECT_EQ(halo_at(20.5)[1], 0);
+    const double red = brightest(0, 20, 30, halo_at), blue = brightest(2, 20, 30, halo_at);
+    EXPECT_NEAR(red, 21.9, 0.4);
+    EXPECT_GT(blue, red + 0.3);
+    EXPECT_GT(halo_at(21.6)[0], 1);
+    EXPECT_EQ(halo_at(21.6)[2], 0);
+    EXPECT_LT(halo_at(30)[1], 0.4 * halo_at(22.5)[1]);
+}
+
+TEST(Halo, IntegratesToOne) {
+    for (std::size_t c = 0; c < 3; ++c) {
+        double sum = 0;
+        const int steps = 20'000;
+        for (int i = 0; i < steps; ++i) {
+            const double angle = 20 + 30 * (i + 0.5) / steps;
+            sum +=
+                halo_at(angle)[c] * 2 * std::numbers::pi * std::sin(angle * kDegree) * 30 * kDegree / steps;
+        }
+        EXPECT_NEAR(sum, 1, 0.01);
+    }
 }
 
 }  // namespace

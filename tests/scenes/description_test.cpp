@@ -113,8 +113,10 @@ TEST(Description, EveryOptionOfCloudsHasAKey) {
     EXPECT_EQ(keys_at({"climate"}), member_count<ClimateOptions>());
     EXPECT_EQ(keys_at({"climate", "schedule"}), member_count<StatePoint>());
     // [layer.lattice] holds extent, placement (two keys), boundaries and initial state, [layer.climate] the schedule.
-    // Whether it is a veil is said by the table of that name, as is whether it has detail of its own.
-    EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 5);
+    // Whether it is a veil is said by the table of that name, as is whether it is a slab or has detail of its own.
+    EXPECT_EQ(keys_at({"layer"}), member_count<LayerOptions>() - 6);
+    EXPECT_EQ(keys_at({"layer", "slab"}), member_count<VeilView>());
+    EXPECT_EQ(keys_at({"layer", "slab", "two_samples"}), member_count<TwoSampleLight>());
     EXPECT_EQ(keys_at({"layer", "metamorphoses"}), member_count<NamedMetamorphosis>());
     EXPECT_EQ(keys_at({"layer", "coupling", "genera"}), member_count<GenusCoupling>());
     EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 2);  // the seed is the layer's, the period the tile's

@@ -152,6 +152,16 @@ TEST(VeilLayer, HasDetailByATableOfItsOwn) {
               memory_estimate(turned, RunParts::pictures).pictures);
 }
 
+// A slab is only another way of drawing the same state: runs go on with it, and files are the same.
+TEST(VeilLayer, IsTheSameStateWhenItIsDrawnPerPixel) {
+    const Scene lattice = scene_of(), slab = scene_of({"layer[0].slab.samples=24"});
+    EXPECT_FALSE(lattice.layers[0].is_slab);
+    ASSERT_TRUE(slab.layers[0].is_slab);
+    EXPECT_EQ(LayerSimulation(lattice, 0).hash(), LayerSimulation(slab, 0).hash());
+    EXPECT_EQ(simulation_hash(lattice, ""), simulation_hash(slab, ""));
+    EXPECT_EQ(read_scene_text(to_toml(slab), "again.toml"), slab);
+}
+
 TEST(VeilLayer, StepsHaveItsStatisticsAndAHashOfTheirOwn) {
     const Scene scene = scene_of();
     const Listing listing = listing_of(scene, full_range(scene));

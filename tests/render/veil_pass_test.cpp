@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Veils per pixel: where rays are in a slab over the round Earth, the light of a level sheet, and pictures of sheets whose
+// transmittance is known.
+
+#include "render/veil/veil_pass.h"
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/random.h"
+#include "render/renderer.h"
+#include "render/veil/sheet_light.h"
+#include "render/veil/slab_path.h"
+
+namespace nephos {
+namespace {
+
+// Against the height of the ray at many points.
+TEST(SlabPath, IsWhereTheHeightLiesBetweenBaseAndTop) {
+    const std::uint64_t seed = 12;
+    for (std::uint32_t n = 0; n < 2000; ++n) {
+        const PhiloxWords w = philox(seed, item_counter(Domain::particles, 7, n, 0, 0));
+        const double rise = std::pow(unit_interval(w[0]), 3) * ((w[1] & 1) != 0 ? 1 : -1);
+        const double bend = (w[1] & 2) != 0 ? 0 : 0.5 / 6.36e6;
+        const double base = 12'000 * (unit_interval(w[2]) - 0.6),
+                     top = base + 50 + 2000 * unit_interval(w[3]);
+        const double limit = 300'000;
+        const auto parts = parts_in_slab(rise, bend, base, top, limit);
+        double before = -1;
+        for (const RayPart& part : parts) {
+            if (!part.any()) continue;
+            EXPECT_GE(part.begin, before);
+            EXPECT_LE(part.end, limit);
+            before = part.end;
+        }
+        for (int i = 0; i < 300; ++i) {
+            const double t = limit * std::pow((i + 0.5) / 300, 2);
+            const double height = rise * t + bend * (1 - rise * rise) * t * t;
+            if (std::abs(height - base) < 0.01 || std::abs(height - top) < 0.01) continue;
+            bool inside = false;
+            for (const RayPart& part : parts)
+                inside = inside || (part.any() && t >= part.begin && t <= part.end);
+            EXPECT_EQ(inside, height > base && height < top)
+                << rise << " " << bend << " " << base << " " << top << " " << t;
+        }
+    }
+}
+
+// What comes in goes out of the top or into the ground; without a sheet the ground has all of it.
+TEST(SheetLight, LosesNothing) {
+    for (const double depth : {0.0, 0.1, 1.0, 5.0, 40.0}) {
+        for (const double sun : {0.05, 0.4, 1.0}) {
+            for (const double albedo : {0.0, 0.2, 0.8}) {
+                const SheetLight light(depth, sun, albedo);
+                // The upward flux at the top, by the boundary there: pi (2 J - B).
+                EXPECT_NEAR(2 * light.by_sun(0) + (1 - albedo) * light.below_by_sun(), sun, 1e-12);
+                EXPECT_NEAR(2 * light.by_sky(0) - 1 + (1 - albedo) * light.below_by_sky(), 1, 1e-12);
+                if (depth == 0) {
+                    EXPECT_NEAR(light.below_by_sun(), sun, 1e-12);
+                    EXPECT_NEAR(light.below_by_sky(), 1, 1e-12);
+                }
+            }
+        }
+    }
+}
+
+// 2 / (2 + T) of diffuse light passes a thick sheet in Schuster's two streams, 1 / (1 + 3/4 T) in Eddington's.
+TEST(SheetLight, OfThickSheetsIsDimBelowAndBrightAbove) {
+    const SheetLight thin(0.2, 0.7, 0.1), thick(10, 0.7, 0.1);
+    EXPECT_LT(thick.below_by_sun(), 0.25 * thin.below_by_sun());
+    EXPECT_GT(thick.by_sun(0), 2 * thin.by_sun(0));
+    EXPECT_GT(thick.by_sun(1), thick.by_sun(9));
+}
+
+// An even sheet between two heights.
+DrawnVeil even_sheet(double base_m, double top_m, double extinction_per_m, VeilLighting lighting) {
+    VeilOptions options;
+    options.form = VeilForm::stratus;
+    options.sheet = 1;
+    options.coverage = 1;
+    options.base_m = base_m;
+    options.top_m = top_m;
+    options.soft_base_m = options.soft_top_m = 0;
+    VeilView view;
+    view.light = lighting;
+    return {std::make_shared<VeilSlab>(options, Wind{}, 0, 0, std::nullopt), extinction_per_m, view};
+}
+
+Picture picture_of(const std::vector<DrawnVeil>& veils, const RenderOptions& options) {
+    return Renderer({.splatting = Splatting::cpu}).draw_splats({}, options, veils);
+}
+
+RenderOptions looking(const Vec3& from, const Vec3& to) {
+    RenderOptions options;
+    options.camera.position_m = from;
+    options.camera.target_m = to;
+    options.camera.width = 33;
+    options.camera.height = 25;
+    options.camera.vertical_fov_deg = 40;
+    options.shadow_map_size = 64;
+    options.atmosphere.model = AirModel::physical;
+    return options;
+}
+
+constexpr std::size_t kMiddle = 12 * 33 + 16;
+
+TEST(VeilPass, ObeysBeerAndLambert) {
+    const double extinction = 0.0007, thickness = 900;
+    const RenderOptions up = looking({0, 0, 2}, {0, 1000, 1002}),
+                        down = looking({0, 0, 9000}, {0, 1000, 8000});
+    for (const RenderOptions& options : {up, down}) {
+        const Picture picture =
+            picture_of({even_sheet(4000, 4000 + thickness, extinction, VeilLighting::physical)}, options);
+        EXPECT_NEAR(picture.transmittance[kMiddle], std::exp(-extinction * thickness * std::sqrt(2.0)), 2e-3);
+        const double height = std::abs(4450 - options.camera.position_m.z);
+        EXPECT_NEAR(picture.depth_m[kMiddle], height * std::sqrt(2.0), 0.05 * height);
+    }
+}
+
+TEST(VeilPass, LeavesThePictureAloneWhereThereIsNone) {
+    const RenderOptions up = looking({0, 0, 2}, {0, 1000, 1002});
+    Splats nothing;
+    const Picture clear = Renderer({.splatting = Splatting::cpu}).draw_splats(nothing, up);
+    DrawnVeil veil = even_sheet(4000, 4500, 0.001, VeilLighting::physical);
+    VeilOptions far;
+    far.base_m = 4000;
+    far.top_m = 4500;
+    far.area = {500'000, 0, 1000, 1000, 0, 1, false};
+    veil.slab = std::make_shared<VeilSlab>(far, Wind{}, 0, 2, std::nullopt);
+    const Picture picture = picture_of({veil}, up);
+    // The heights of clouds choose the air's ambient light, which nothing shows here.
+    EXPECT_EQ(picture.beauty, clear.beauty);
+    EXPECT_EQ(picture.transmittance, clear.transmittance);
+}
+
+// A thick sheet is grey from below and darkens the ground; from above it is bright. Both kinds of light agree on that.
+TEST(VeilPass, ThickSheetsAreBrightAboveAndDarkBelow) {
+    for (const VeilLighting lighting : {VeilLighting::physical, VeilLighting::two_samples}) {
+        const std::vector<DrawnVeil> veils{even_sheet(800, 1600, 0.03, lighting)};
+        const RenderOptions up = looking({0, 0, 2}, {0, 1000, 1002}),
+                            down = looking({0, 0, 5000}, {0, 1000, 4000}),
+                            ground = looking({0, 0, 100}, {0, 100, 0});
+        const Picture below = picture_of(veils, up), above = picture_of(veils, down);
+        EXPECT_LT(below.transmittance[kMiddle], 1e-3f);
+        EXPECT_GT(above.beauty[3 * kMiddle + 1], 1.5f * below.beauty[3 * kMiddle + 1]) << int(lighting);
+        const Picture dark = picture_of(veils, ground), lit = picture_of({}, ground);
+        EXPECT_LT(dark.beauty[3 * kMiddle + 1], 0.6f * lit.beauty[3 * kMiddle + 1]) << int(lighting);
+        EXPECT_GT(dark.beauty[3 * kMiddle + 1], 0.05f * lit.beauty[3 * kMiddle + 1]) << int(lighting);
+    }
+}
+
+// In 40 km the round Earth hides a veil at 8 km less than a plane would: it meets the ground at 320 km.
+TEST(VeilPass, GoesToTheHorizon) {
+    const RenderOptions options = looking({0, 0, 2}, {0, 1000, 30});
+    const Picture picture = picture_of({even_sheet(8000, 8600, 0.0003, VeilLighting::physical)}, options);
+    EXPECT_LT(picture.transmittance[kMiddle], 0.2f);
+    EXPECT_GT(picture.depth_m[kMiddle], 100'000);
+    EXPECT_LT(picture.depth_m[kMiddle], 330'000);
+}
+
+TEST(VeilPass, TheFartherSheetIsBehindTheNearer) {
+    const RenderOptions options = looking({0, 0, 2}, {0, 1000, 1002});
+    const std::vector<DrawnVeil> low_first{even_sheet(800, 1600, 0.05, VeilLighting::physical),
+                                           even_sheet(8000, 9000, 0.05, VeilLighting::two_samples)};
+    const std::vector<DrawnVeil> high_first{low_first[1], low_first[0]};
+    const Picture a = picture_of(low_first, options), b = picture_of(high_first, options);
+    EXPECT_EQ(a.beauty, b.beauty);
+    EXPECT_LT(a.depth_m[kMiddle], 3000);
+}
+
+}  // namespace
+}  // namespace nephos
