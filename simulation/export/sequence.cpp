@@ -224,9 +224,15 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
                                            : "a smaller lattice"));
     }
     if (dense && box.padding != std::array<int, 3>{}) {
-        notes.push_back(fmt::format("{}: padded with 0 by {} x {} x {} voxels to {} x {} x {}", s.name,
-                                    box.padding[0], box.padding[1], box.padding[2], box.size[0], box.size[1],
-                                    box.size[2]));
+        bool repeats = false;
+        for (std::size_t a = 0; a < 3; ++a)
+            repeats = repeats || (box.padding[a] > 0 && s.layout.periodic[std::size_t(box.axis[a])]);
+        notes.push_back(
+            fmt::format("{}: padded with 0 by {} x {} x {} voxels to {} x {} x {}{}", s.name, box.padding[0],
+                        box.padding[1], box.padding[2], box.size[0], box.size[1], box.size[2],
+                        repeats ? "; it repeats after `period_m`, not after its size: do not let a "
+                                  "sampler wrap around"
+                                : ""));
     }
 }
 

@@ -361,6 +361,9 @@ class Export(Case):
         plan = lambda *arguments: json.loads(self.call("export", "periodic", "--to", "raw", *arguments, "--plan", "--json").stdout)["sequences"][0]
         self.assertEqual(plan("--voxel", 4 * cell)["size"][:2], [8, 6])
         self.assertEqual(plan("--size", 7)["size"][:2], [4, 3])  # 5 voxels would do, and do not divide
+        said = self.call("export", "periodic", "--to", "raw", "--pad", "64", "--plan").stderr
+        self.assertIn("not after its size", said)
+        self.assertNotIn("not after its size", self.call("export", "run", "--to", "raw", "--pad", "64", "--plan").stderr)
         for budget in (1000, 3000, 9000):
             size = plan("--budget", budget)["size"]
             self.assertEqual((32 % size[0], 24 % size[1], 32 // size[0]), (0, 0, 24 // size[1]))
