@@ -44,7 +44,7 @@ RENDER_LAYERS = (
     {"backend"},
     {"gpu"},
     {"vulkan", "cpu", "blended"},
-    {"rain", "ground"},
+    {"rain", "ground", "veil"},
 )
 # render/shared/ is a leaf of plain structs that C++ and GLSL both read.
 LEAF = "render/shared/"
