@@ -27,13 +27,11 @@ class TreeBuilder {
         while (true) {
             skip_space_and_comments();
             if (at_ >= text_.size()) break;
-            const std::size_t before = at_;
             if (text_[at_] == '[') {
                 table = &open_section();
-            } else {
-                add_statement(*table);
+            } else if (!add_statement(*table)) {
+                break;  // not TOML
             }
-            if (at_ == before) break;  // not TOML
         }
         return std::move(root_);
     }
@@ -166,13 +164,11 @@ class TreeBuilder {
         ++at_;
     }
 
-    void add_statement(TomlNode& table) {
+    // Returns false where there is none.
+    bool add_statement(TomlNode& table) {
         const std::size_t begin = line_begin(at_);
         const Names names = key();
-        if (peek() != '=') {
-            at_ = begin;  // ends the reading
-            return;
-        }
+        if (peek() != '=') return false;
         ++at_;
         skip_blanks();
         TomlNode node = parsed_value();
@@ -182,6 +178,7 @@ class TreeBuilder {
         if (!table.places.empty()) table.places.back().end = at_;
         if (!table.headers.empty()) table.headers.back().end = at_;
         place(table, names, std::move(node), at_, false);
+        return true;
     }
 
     // Puts a value at a dotted key of a table and notes its place in the tables on the way.
@@ -192,7 +189,7 @@ class TreeBuilder {
             prefix += names[n] + ".";
             TomlNode* next = to->find(names[n]);
             if (next == nullptr) {
-                next = &to->entries.emplace_back(names[n], TomlNode{}).second;
+                next = &to->entries.emplace_back(TomlEntry{names[n], {}}).value;
                 next->form = TomlNode::Form::dotted;
                 next->prefix = prefix;
                 next->in_braces = in_braces;
@@ -201,7 +198,7 @@ class TreeBuilder {
             next->insert_at = after;
             to = next;
         }
-        to->entries.emplace_back(names.back(), std::move(node));
+        to->entries.push_back({names.back(), std::move(node)});
     }
 
     // Where the comment directly above a header begins; one at the start of the file is the file's own.
@@ -228,7 +225,7 @@ class TreeBuilder {
             const bool last = n + 1 == names.size();
             TomlNode* next = to->find(names[n]);
             if (next == nullptr) {
-                next = &to->entries.emplace_back(names[n], TomlNode{}).second;
+                next = &to->entries.emplace_back(TomlEntry{names[n], {}}).value;
                 next->form = last && element ? TomlNode::Form::sections : TomlNode::Form::section;
             }
             if (next->form == TomlNode::Form::sections || next->form == TomlNode::Form::array) {
@@ -254,9 +251,8 @@ class TreeBuilder {
 }  // namespace
 
 const TomlNode* TomlNode::find(std::string_view name) const {
-    const auto found =
-        std::ranges::find(entries, name, [](const auto& entry) { return std::string_view(entry.first); });
-    return found == entries.end() ? nullptr : &found->second;
+    const auto found = std::ranges::find(entries, name, &TomlEntry::name);
+    return found == entries.end() ? nullptr : &found->value;
 }
 
 TomlNode* TomlNode::find(std::string_view name) {

@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 namespace nephos {
@@ -18,6 +17,8 @@ struct TextRegion {
     std::size_t begin = 0, end = 0;
     bool operator==(const TextRegion&) const = default;
 };
+
+struct TomlEntry;
 
 struct TomlNode {
     enum class Form {
@@ -43,12 +44,18 @@ struct TomlNode {
     std::string prefix;
     bool in_braces = false;  // dotted: within an inlined table
 
-    std::vector<std::pair<std::string, TomlNode>> entries;  // tables, in the order of the text
-    std::vector<TomlNode> items;                            // array, sections
+    std::vector<TomlEntry> entries;  // tables, in the order of the text
+    std::vector<TomlNode> items;     // array, sections
 
     bool is_table() const { return form == Form::dotted || form == Form::inlined || form == Form::section; }
     const TomlNode* find(std::string_view name) const;
     TomlNode* find(std::string_view name);
+};
+
+// One key of a table.
+struct TomlEntry {
+    std::string name;
+    TomlNode value;
 };
 
 // Returns the tree of a text without syntax errors; its root is a section whose header is the start of the text. Of

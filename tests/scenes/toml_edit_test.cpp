@@ -128,6 +128,15 @@ TEST(TomlEdit, TreeAgreesWithTheParser) {
     }
 }
 
+// A tree of text that is no TOML ends where that does; indented lines once went on for ever.
+TEST(TomlEdit, TreeOfOtherTextEndsAtTheError) {
+    for (const char* rest : {" b", "  b c = 1\n", "\t[", "b", "= 1", " \"x", "[[", "c = [1, 2", "d = { e"}) {
+        const TomlNode root = toml_tree(std::string("a = 1\n") + rest);
+        ASSERT_NE(root.find("a"), nullptr) << rest;
+        EXPECT_EQ(root.find("b"), nullptr) << rest;
+    }
+}
+
 TEST(TomlEdit, OneValueChangesAlone) {
     const std::string text = "# top\n\n[sun]   # the sun\nelevation_deg = 40.0 # degrees\nazimuth_deg=1\n";
     EXPECT_EQ(with_value(text, text_path("sun.elevation_deg"), "12"),

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Records of a sweep: lines as they are, and with the hash at the end of each made right.
+
+#include <fstream>
+
+#include "automaton/checkpoint.h"
+#include "study/records.h"
+#include "tests/fuzz/target.h"
+
+namespace {
+
+using namespace nephos;
+
+constexpr std::string_view kHashField = ",\"xxh3\":\"";
+
+// Each line that has a hash, with the hash of what stands before it.
+std::string sealed(std::string_view text) {
+    std::string out;
+    while (!text.empty()) {
+        const std::size_t end = std::min(text.find('\n'), text.size());
+        const std::string_view line = text.substr(0, end);
+        if (const std::size_t field = line.rfind(kHashField); field != line.npos) {
+            const std::string_view body = line.substr(0, field);
+            out += std::string(body) + std::string(kHashField) + hash_of_bytes(std::as_bytes(std::span(body))).hex() + "\"}";
+        } else {
+            out += line;
+        }
+        out += '\n';
+        text.remove_prefix(std::min(end + 1, text.size()));
+    }
+    return out;
+}
+
+// A folder with one shard: its lines, and a series of some values.
+class Study {
+  public:
+    Study() {
+        std::string name = (std::filesystem::temp_directory_path() / "nephos-fuzz-XXXXXX").string();
+        fuzz::require(mkdtemp(name.data()) != nullptr, "mkdtemp");
+        folder_ = name;
+        std::filesystem::create_directory(folder_ / "shards");
+        std::ofstream(folder_ / "shards/0000-of-0001.series") << std::string(4096, '\0');
+    }
+    ~Study() {
+        std::error_code ignored;
+        std::filesystem::remove_all(folder_, ignored);
+    }
+    void read(std::string_view lines) const {
+        std::ofstream(folder_ / "shards/0000-of-0001.jsonl", std::ios::binary) << lines;
+        fuzz::accepts([&] { Records::read({folder_}); });
+    }
+
+  private:
+    std::filesystem::path folder_;
+};
+
+}  // namespace
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    static const Study study;
+    const std::string_view text = fuzz::as_text(data, size);
+    study.read(text);
+    study.read(sealed(text));
+    return 0;
+}
