@@ -219,7 +219,7 @@ Picture Renderer::Impl::draw_in_passes(const Splats& splats, const RenderOptions
     Picture picture = draw(splats, options, detail);
     static const GroundCoverView kDry;
     const GroundCoverView& cover = splats.ground_cover ? *splats.ground_cover : kDry;
-    if (shows_wet_ground(options, cover) || shows_country(options))
+    if (shows_wet_ground(options, cover) || shows_pattern(options))
         draw_ground(splats, options, cover, detail, picture);
     if (!veils.empty()) draw_veils_of(splats, options, detail, picture);
     return picture;
@@ -231,8 +231,9 @@ void Renderer::Impl::draw_ground(const Splats& splats, const RenderOptions& opti
     std::optional<MirrorView> mirror;
     if (shows_reflections(options, cover)) {
         RenderOptions below = options;
-        below.camera =
-            mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
+        below.camera = mirrored_camera(options);
+        // Waves make a glint of the sun.
+        if (options.ground.pattern == GroundPattern::water) below.atmosphere.sun_disc = false;
         Splats mirrored = splats;
         mirrored.depth = !veils.empty();
         mirrored.light = false;
@@ -311,7 +312,7 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
         impl_->times = {};
         impl_->veils = veils;
         const bool wet = splats.ground_cover && shows_wet_ground(options, *splats.ground_cover);
-        if (wet || shows_country(options) || !veils.empty()) {
+        if (wet || shows_pattern(options) || !veils.empty()) {
             state->picture = impl_->draw_in_passes(splats, options);
         } else {
             const CameraFrame camera = camera_frame(options.camera);

@@ -160,7 +160,8 @@ double ground_bytes(const Scene& scene, double under_way) {
 
 // The mirrored view and its levels.
 double mirror_bytes(const Scene& scene, double pixels) {
-    if (!scene.ground_cover.enabled || scene.render.wet_ground.reflection == 0) return 0;
+    const bool mirrors = scene.ground_cover.enabled || scene.render.ground.pattern == GroundPattern::water;
+    if (!mirrors || scene.render.wet_ground.reflection == 0) return 0;
     const double scale = 1.15 * scene.render.wet_ground.reflection_scale;
     return pixels * scale * scale * (kBytesPerPixel + 4 * sizeof(float) * 4 / 3);
 }

@@ -174,10 +174,7 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     DrawnClouds drawn;
     const std::optional<Flash> flash = flash_at(options.lightning, time_s);
     std::optional<Camera> mirrored;
-    if (ground_cover && shows_reflections(options, *ground_cover)) {
-        mirrored =
-            mirrored_camera(options.camera, options.ground.height_m, options.wet_ground.reflection_scale);
-    }
+    if (shows_reflections(options, ground_cover.value_or(GroundCoverView{}))) mirrored = mirrored_camera(options);
     for (std::size_t i = 0; i < layers.size(); ++i) {
         const SkyLayer& layer = layers[i];
         if (layer.direct)

@@ -6,11 +6,13 @@
 #include <numbers>
 
 #include "render/frame/frame_data.h"
+#include "render/ground/water.h"
 
 namespace nephos {
 namespace {
 
 constexpr double kMargin = 1.15;  // of the mirrored view's edges, as a multiple of the camera's
+constexpr double kMostReach = 0.6;  // tangent: waves show what stands four times their slope higher, up to this
 
 // The mean of up to four texels of the level before; at odd sizes the last row and column count twice.
 void append_level(MirrorView& view) {
@@ -36,17 +38,23 @@ void append_level(MirrorView& view) {
 
 }  // namespace
 
-Camera mirrored_camera(const Camera& camera, double ground_m, double scale) {
+Camera mirrored_camera(const RenderOptions& options) {
     constexpr double kHalfDegree = std::numbers::pi / 360;
+    const Camera& camera = options.camera;
     Camera mirrored = camera;
-    mirrored.position_m.z = 2 * ground_m - camera.position_m.z;
-    mirrored.target_m.z = 2 * ground_m - camera.target_m.z;
-    const double edge = kMargin * std::tan(camera.vertical_fov_deg * kHalfDegree);
-    mirrored.vertical_fov_deg = std::min(170.0, std::atan(edge) / kHalfDegree);
-    const auto pixels = [&](int size) {
-        return std::clamp(int(std::lround(size * scale * kMargin)), 1, 16384);
+    mirrored.position_m.z = 2 * options.ground.height_m - camera.position_m.z;
+    mirrored.target_m.z = 2 * options.ground.height_m - camera.target_m.z;
+    const double height = kMargin * std::tan(camera.vertical_fov_deg * kHalfDegree);
+    const double width = height * camera.width / camera.height;
+    const bool waves = options.ground.pattern == GroundPattern::water;
+    const double slope = waves ? std::sqrt(slope_variance_of_sea(options.water.wind_m_per_s)) : 0;
+    const double reach = std::min(4 * slope, kMostReach);
+    mirrored.vertical_fov_deg = std::min(170.0, std::atan(height + reach) / kHalfDegree);
+    const double shape = (width + 0.5 * reach) / width / ((height + reach) / height);
+    const auto pixels = [&](double size) {
+        return std::clamp(int(std::lround(size * options.wet_ground.reflection_scale * kMargin)), 1, 16384);
     };
-    mirrored.width = pixels(camera.width);
+    mirrored.width = pixels(camera.width * shape);
     mirrored.height = pixels(camera.height);
     return mirrored;
 }

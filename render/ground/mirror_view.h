@@ -10,11 +10,13 @@
 
 #include "render/image/picture.h"
 #include "render/options/camera.h"
+#include "render/options/options.h"
 
 namespace nephos {
 
-// Returns the mirrored camera, with `scale` of the resolution and a margin for perturbed rays.
-Camera mirrored_camera(const Camera& camera, double ground_m, double scale);
+// Returns the mirrored camera, with `wet_ground.reflection_scale` of the resolution and a margin for perturbed rays, the
+// wider the higher the waves of a ground of water.
+Camera mirrored_camera(const RenderOptions& options);
 
 // A mip pyramid of its picture for blurred reflections, each level half of the one before: radiance and the
 // clouds' transmittance, four floats a texel.

@@ -10,9 +10,7 @@
 
 #include "core/error.h"
 #include "render/frame/frame_data.h"
-#include "render/ground/country.h"
-#include "render/ground/ground_noise.h"
-#include "render/ground/ripples.h"
+#include "render/ground/ground_pass.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/ground/wet_ground.cpp"
@@ -22,35 +20,9 @@
 
 #include "render/ground/country-inl.h"
 #include "render/ground/ground_look-inl.h"
+#include "render/ground/ground_pass-inl.h"
 #include "render/ground/ripples-inl.h"
-
-#ifndef NEPHOS_RENDER_WET_GROUND_TYPES_
-#define NEPHOS_RENDER_WET_GROUND_TYPES_
-namespace nephos {
-
-// The map's texels from points relative to the eye: column = from_x + per_x x - 1/2.
-struct CoverTexels {
-    const GroundCoverView* map = nullptr;
-    float from_x = 0, from_y = 0, per_x = 0, per_y = 0;
-};
-
-// The state shared by all pixels.
-struct GroundPass {
-    const WetGroundOptions* look = nullptr;
-    PictureFrame white;  // of ground with an albedo of 1
-    shader::vec4 dry;    // its albedo where it is plain
-    Country country;
-    const float* shadow = nullptr;
-    int shadow_size = 0;
-    CoverTexels cover;
-    std::vector<NoiseOctave> hollows, tufts;
-    RippleGrid ripples;
-    const MirrorView* mirror = nullptr;
-    float reflection = 0;
-};
-
-}  // namespace nephos
-#endif
+#include "render/ground/water-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
@@ -94,47 +66,6 @@ HWY_INLINE Lying lying_at(const CoverTexels& texels, const Floats3& point) {
     return {value(map.water_mm, outside.water_mm), value(map.snow_mm, outside.snow_mm),
             value(map.rain_mm_per_h, outside.rain_mm_per_h)};
 }
-
-// A pixel's ray and the ground that it meets.
-struct Seen {
-    Floats3 ray, point, beta;
-    Floats3 veil;    // light of the air up to the ground; where there is a mirror
-    Floats pixel_m;                  // size of the pixel there, the geometric mean of both directions
-    Floats3 dry;                     // albedo
-};
-
-// Returns the light that a surface of this roughness reflects to the eye. Light of the sky is attenuated by
-// the air in front of the ground; light of clouds in the mirrored view has passed that air, whose own light
-// is subtracted.
-HWY_INLINE Floats3 reflected(const GroundPass& pass, const Seen& seen, const Floats3& direction,
-                             Floats blur) {
-    const Mirrored view = mirrored(*pass.mirror, direction, blur);
-    const Floats zero = hn::Zero(Lanes()), sky = view.transmittance, cloud = hn::Sub(set(1.0f), sky);
-    const auto of = [&](Floats light, Floats beta, Floats veil) {
-        const Floats beyond = hn::Max(hn::Sub(light, veil), zero);
-        return hn::MulAdd(hn::Mul(light, beta), sky, hn::Mul(beyond, cloud));
-    };
-    return {of(view.light.x, seen.beta.x, seen.veil.x), of(view.light.y, seen.beta.y, seen.veil.y),
-            of(view.light.z, seen.beta.z, seen.veil.z)};
-}
-
-// The mirrored direction of a ray that meets water with these slopes; never below the horizon.
-HWY_INLINE Floats3 mirrored_ray(const Floats3& ray, Floats slope_x, Floats slope_y) {
-    const Lanes d;
-    const Floats per_length =
-        hn::Div(set(1.0f), hn::Sqrt(hn::MulAdd(slope_x, slope_x, hn::MulAdd(slope_y, slope_y, set(1.0f)))));
-    const Floats3 normal{hn::Mul(hn::Neg(slope_x), per_length), hn::Mul(hn::Neg(slope_y), per_length),
-                         per_length};
-    const Floats along = hn::Mul(set(-2.0f), dot(ray, normal));
-    Floats3 out = times_add(along, normal, ray);
-    out.z = hn::Max(out.z, hn::Min(hn::Neg(ray.z), set(1.0e-3f)));
-    return hn::AllTrue(d, hn::Gt(out.z, hn::Zero(d))) ? out : Floats3{ray.x, ray.y, hn::Abs(ray.z)};
-}
-
-struct Surface {
-    Floats3 albedo;     // of what scatters below the surface
-    Floats3 reflected;  // light, behind the air
-};
 
 // Computes the surface of wet soil and puddles.
 HWY_INLINE Surface wet_surface(const GroundPass& pass, const Seen& seen, const Lying& lying,
@@ -200,8 +131,9 @@ HWY_INLINE Floats3 changed(const GroundPass& pass, const Floats3& direction) {
     const Floats near = hn::IfThenElse(meets, distance, set(1.0f));
     seen.point = times(near, seen.ray);
     const Lying lying = lying_at(pass.cover, seen.point);
-    const auto covers = hn::And(meets, hn::Gt(hn::Max(lying.water_mm, lying.snow_mm), hn::Zero(d)));
-    const auto some = pass.country.enabled ? meets : covers;
+    const Floats least = pass.water.enabled ? set(kNowhere) : hn::Zero(d);  // nothing lies on water
+    const auto covers = hn::And(meets, hn::Gt(hn::Max(lying.water_mm, lying.snow_mm), least));
+    const auto some = pass.country.enabled || pass.water.enabled ? meets : covers;
     if (hn::AllFalse(d, some)) return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     seen.beta = air_transmittance(pass.white, seen.ray, near);
     const Floats slant = hn::Sqrt(hn::Max(hn::Neg(seen.ray.z), set(1.0e-6f)));
@@ -211,13 +143,16 @@ HWY_INLINE Floats3 changed(const GroundPass& pass, const Floats3& direction) {
         seen.dry = each_times(seen.dry, country_albedo(pass.country, seen.point,
                                                        footprint(seen.ray, near, pass.white.up.w)));
     Surface surface{seen.dry, {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
-    if (!hn::AllFalse(d, covers)) {
+    const ShadowTexels shadow{pass.shadow, pass.shadow_size};
+    if (pass.water.enabled) {
+        if (pass.mirror != nullptr) seen.veil = air_light(pass.white, seen.ray, near, seen.beta);
+        surface = water_surface(pass, seen, near, sun_share(pass.white, shadow, seen.point));
+    } else if (!hn::AllFalse(d, covers)) {
         if (pass.mirror != nullptr) seen.veil = air_light(pass.white, seen.ray, near, seen.beta);
         const ResolvedNoise hollows = resolved_noise(pass.hollows, seen.point, seen.pixel_m);
         surface = wet_surface(pass, seen, lying, hollows);
         lay_snow(pass, seen, lying, surface);
     }
-    const ShadowTexels shadow{pass.shadow, pass.shadow_size};
     const Floats3 light = each_times(seen.beta, ground_light(pass.white, shadow, seen.point));
     const Floats3 more = add(each_times(light, subtract(surface.albedo, set3(pass.dry))), surface.reflected);
     return {hn::IfThenElseZero(some, more.x), hn::IfThenElseZero(some, more.y),
@@ -298,8 +233,8 @@ double soaked_albedo(double dry_albedo) {
     return (1 - back) * dry_albedo / (1 - back * dry_albedo);
 }
 
-bool shows_country(const RenderOptions& options) {
-    return options.ground.pattern == GroundPattern::country && ground_in_view(options);
+bool shows_pattern(const RenderOptions& options) {
+    return options.ground.pattern != GroundPattern::plain && ground_in_view(options);
 }
 
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover) {
@@ -307,7 +242,8 @@ bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover
 }
 
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover) {
-    return options.wet_ground.reflection > 0 && any_water(cover) && ground_in_view(options);
+    const bool water = options.ground.pattern == GroundPattern::water || any_water(cover);
+    return options.wet_ground.reflection > 0 && water && ground_in_view(options);
 }
 
 void check(const GroundCoverView& cover) {
@@ -342,6 +278,7 @@ void draw_wet_ground(const WetGround& ground, Picture& picture) {
     const Rgb& albedo = options.ground.albedo;
     pass.dry = {float(albedo[0]), float(albedo[1]), float(albedo[2]), 0};
     pass.country = country_of(options.ground, eye);
+    pass.water = water_of(options, eye, ground.time_s);
     pass.shadow = ground.shadow;
     pass.shadow_size = ground.shadow_size;
     pass.cover = texels_of(ground.cover, eye);

@@ -46,8 +46,8 @@ double water_reflectance(double cosine, double slope_variance);
 double soaked_albedo(double dry_albedo);
 double soaked_back_reflectance();  // p
 
-// Returns true when ground is in view and is country (country.h), which draw_wet_ground() draws, too.
-bool shows_country(const RenderOptions& options);
+// Returns true when ground is in view and is country (country.h) or water (water.h), which draw_wet_ground() draws, too.
+bool shows_pattern(const RenderOptions& options);
 // Returns true when water or snow and ground are in view.
 bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover);
 // Returns true when reflections need a mirrored view.

@@ -60,6 +60,12 @@ void check(const LevelOfDetailOptions& options) {
     require(within(options.pixels, 0, 1000), "level_of_detail.pixels", "0..1000 pixels");
 }
 
+void check(const WaterOptions& options) {
+    require(within(options.wind_m_per_s, 0, 25), "water.wind_m_per_s", "0..25 m/s");
+    require(within(options.from_deg, 0, 360), "water.from_deg", "0..360 degrees");
+    require(within(options.whitecaps, 0, 10), "water.whitecaps", "0..10");
+}
+
 void check(const WetGroundOptions& options) {
     require(within(options.soaking_mm, 1e-3, 100), "wet_ground.soaking_mm", "0.001..100 mm");
     require(within(options.puddle_film_mm, 1e-3, 100), "wet_ground.puddle_film_mm", "0.001..100 mm");
@@ -171,6 +177,7 @@ void check(const RenderOptions& options) {
     require(std::isfinite(options.ground.height_m), "ground.height_m", "finite metres");
     require(within(options.ground.field_m, 20, 5000), "ground.field_m", "20..5000 metres");
     require(within(options.ground.albedo, 0, 1), "ground.albedo", "three numbers from 0 to 1");
+    check(options.water);
     check(options.wet_ground);
     require(within(options.shadow_map_size, 16, 8192), "shadow_map_size", "16..8192 texels");
     check(options.shells);

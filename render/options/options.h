@@ -146,6 +146,7 @@ struct Air {
 enum class GroundPattern {
     plain,    // one albedo
     country,  // fields, hedges and woods of noise, with that albedo in the mean (render/ground/country.h)
+    water,    // a sea with waves, which mirrors the sky (render/ground/water.h); the albedo is that below its surface
 };
 
 struct Ground {
@@ -154,6 +155,14 @@ struct Ground {
     GroundPattern pattern = GroundPattern::plain;
     double field_m = 260;  // size of a field of the country, 20..5000 m
     bool operator==(const Ground&) const = default;
+};
+
+// Waves of a ground of water.
+struct WaterOptions {
+    double wind_m_per_s = 6;    // 10 m above it, 0..25; 0: a still mirror
+    double from_deg = 270;      // whence it blows, clockwise from north, 0..360
+    double whitecaps = 1;       // cover of foam as a multiple of that which belongs to the wind, 0..10
+    bool operator==(const WaterOptions&) const = default;
 };
 
 // Options of the appearance of wet and snowy ground; a GroundCoverView has the amounts
@@ -224,6 +233,7 @@ struct RenderOptions {
     Air air;
     AtmosphereOptions atmosphere;
     Ground ground;
+    WaterOptions water;           // where the ground is water
     WetGroundOptions wet_ground;  // appearance of wet and snowy ground
     Shells shells;
     LightShafts light_shafts;

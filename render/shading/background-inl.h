@@ -136,16 +136,21 @@ HWY_INLINE LightBelow light_below(const GroundLight& light, const shader::vec4& 
     return {hn::Mul(of.sun, set(1.0f / 65535)), hn::Mul(of.sky, set(1.0f / 65535))};
 }
 
-// Returns the radiance of the ground at a point relative to the eye, without the air in front of it.
-HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& map, const Floats3& point) {
+// Returns the fraction of direct sunlight that arrives on the ground at a point relative to the eye.
+HWY_INLINE Floats sun_share(const PictureFrame& frame, const ShadowTexels& map, const Floats3& point) {
     const Floats u = hn::Add(dot(set3(frame.shadow_u), point), set(frame.shadow_u.w)),
                  v = hn::Add(dot(set3(frame.shadow_v), point), set(frame.shadow_v.w));
-    Floats shadow = shadow_at(map, u, v);
-    if (frame.endless != nullptr) {
-        const auto inside = [](Floats at) { return hn::And(hn::Gt(at, set(0.01f)), hn::Lt(at, set(0.99f))); };
-        const auto known = hn::And(hn::And(inside(u), inside(v)), sees_first_period(*frame.endless, point));
-        if (!hn::AllTrue(Lanes(), known)) shadow = hn::IfThenElse(known, shadow, sunlight_beyond(*frame.endless, point));
-    }
+    const Floats shadow = shadow_at(map, u, v);
+    if (frame.endless == nullptr) return shadow;
+    const auto inside = [](Floats at) { return hn::And(hn::Gt(at, set(0.01f)), hn::Lt(at, set(0.99f))); };
+    const auto known = hn::And(hn::And(inside(u), inside(v)), sees_first_period(*frame.endless, point));
+    if (hn::AllTrue(Lanes(), known)) return shadow;
+    return hn::IfThenElse(known, shadow, sunlight_beyond(*frame.endless, point));
+}
+
+// Returns the radiance of the ground at a point relative to the eye, without the air in front of it.
+HWY_INLINE Floats3 ground_light(const PictureFrame& frame, const ShadowTexels& map, const Floats3& point) {
+    const Floats shadow = sun_share(frame, map, point);
     Floats3 colour = times_add(shadow, set3(frame.ground_sun), set3(frame.ground));
     if (frame.ground_light != nullptr) {
         const LightBelow below = light_below(*frame.ground_light, frame.ground_light_place, point);

@@ -161,6 +161,10 @@ const Section& scene_section() {
         climate.written = [](const void* scene) {
             return !(static_cast<const Scene*>(scene)->climate == ClimateOptions{});
         };
+        Key water = group("water", water_section());
+        water.written = [](const void* owner) {
+            return !(static_cast<const Scene*>(owner)->render.water == WaterOptions{});
+        };
         Key wet_ground = group("wet_ground", wet_ground_section());
         wet_ground.written = [](const void* owner) {
             const auto& scene = *static_cast<const Scene*>(owner);
@@ -218,6 +222,7 @@ const Section& scene_section() {
              group("air", air_section()),
              group("atmosphere", atmosphere_section()),
              group("ground", ground_section()),
+             std::move(water),
              std::move(wet_ground),
              std::move(precipitation),
              group("shells", shells_section()),

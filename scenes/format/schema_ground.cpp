@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The section of wet and snowy ground: how much lies there over time, and how it looks.
+// The sections of water, and of wet and snowy ground: how much lies there over time, and how it looks.
 
 #include "scenes/format/schema_build.h"
 #include "scenes/format/schema_sections.h"
@@ -86,6 +86,24 @@ std::vector<Key> look_keys() {
 }
 
 }  // namespace
+
+const Section& water_section() {
+    static const Section section{
+        "Water",
+        "Waves of a ground of water (`ground.pattern = \"water\"`): they tilt what it mirrors and draw the sun's glint "
+        "out. `wet_ground.reflection` and `reflection_scale` are those of the mirrored sky and clouds.",
+        {key<&Scene::render, &RenderOptions::water, &WaterOptions::wind_m_per_s>(
+             "wind_m_per_s", "m/s", between(0, 25),
+             "Wind 10 m above the water, for so long that waves have grown as far as they do; 0: a still mirror.",
+             "Cox and Munk 1954; Pierson and Moskowitz 1964"),
+         key<&Scene::render, &RenderOptions::water, &WaterOptions::from_deg>(
+             "from_deg", "deg", between(0, 360), "Whence it blows, clockwise from north."),
+         key<&Scene::render, &RenderOptions::water, &WaterOptions::whitecaps>(
+             "whitecaps", "", between(0, 10), "Foam, as a multiple of what belongs to the wind; 0: none.",
+             "Monahan and O'Muircheartaigh 1980; Koepke 1984")},
+        nullptr};
+    return section;
+}
 
 const Section& wet_ground_section() {
     static const Section section = [] {

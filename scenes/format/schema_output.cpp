@@ -301,8 +301,9 @@ const Section& ground_section() {
              "albedo", "", between(0, 1), "Fraction of the light that it reflects: red, green, blue.",
              "D, step 2"),
          word<&Scene::render, &RenderOptions::ground, &Ground::pattern>(
-             "pattern", {"plain", "country"},
+             "pattern", {"plain", "country", "water"},
              "`plain`: `albedo` everywhere. `country`: fields, hedges and woods of noise, whose mean is `albedo`. "
+             "`water`: a sea with waves (`water`), `albedo` being that below its surface, such as 0.02, 0.05, 0.06. "
              "See docs/ground.md."),
          render_key<&RenderOptions::ground, &Ground::field_m>("field_m", "m", between(20, 5000),
                                                               "Size of a field of the country.")},

@@ -28,6 +28,7 @@ const Section& ground_section();
 const Section& shells_section();
 const Section& light_shafts_section();
 const Section& fog_section();
+const Section& water_section();
 const Section& wet_ground_section();
 const Section& precipitation_section();
 const Section& detail_section();

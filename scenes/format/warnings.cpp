@@ -92,6 +92,11 @@ std::vector<std::string> warnings(const Scene& scene) {
 
 std::vector<std::string> keys_without_effect(const Scene& scene) {
     std::vector<std::string> result;
+    const bool sea = scene.render.ground.pattern == GroundPattern::water;
+    if (!sea && !(scene.render.water == WaterOptions{}))
+        result.emplace_back("[water] has no effect: `ground.pattern` is not \"water\"");
+    if (sea && scene.ground_cover.enabled)
+        result.emplace_back("[wet_ground] has no effect but for its reflection: rain and snow vanish in a ground of water");
     std::set<std::string> drawn, grown;  // base models of layers without and with an automaton
     for (const LayerOptions& layer : scene.layers) {
         if (layer.is_veil) continue;

@@ -77,7 +77,7 @@ BenchRow overlay_row() {
     GroundCoverView cover;
     cover.outside.water_mm = 2;
     cover.outside_rain_mm_per_h = 10;
-    const Camera below = mirrored_camera(options.camera, 0, 0.5);
+    const Camera below = mirrored_camera(options);
     RenderOptions mirrored_options = options;
     mirrored_options.camera = below;
     Picture sky = blank_picture(mirrored_options);
