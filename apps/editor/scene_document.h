@@ -107,7 +107,7 @@ class SceneDocument {
 };
 
 // Moves edits of an earlier session into a scene file of their own beside it, whose name no file has, and returns that
-// name: "sky-recovered.toml" for ".sky.toml.autosave". Throws Error(io).
+// name: "sky-recovered" with its ending for ".sky.toml.autosave". Throws Error(io).
 std::filesystem::path keep_autosave(const std::filesystem::path& autosave);
 
 }  // namespace nephos
