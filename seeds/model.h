@@ -71,6 +71,8 @@ struct BaseModel {
     std::string name;
     std::optional<Genus> genus;  // of its clouds; rain areas may be attached by genus
     std::vector<Seed> seeds;     // at least one
+    // PNG files with alpha, of which each billboard has one, in place of its seed's texture; none: of that texture.
+    std::vector<std::string> textures;
     // Path length in the cloud after which light is absorbed, > 0.
     double light_distance_m = std::numeric_limits<double>::infinity();
     // Of the ellipsoids of its boxes, instead of CouplingOptions::centre and rim where they are its own.

@@ -65,11 +65,20 @@ void fall_from(const std::shared_ptr<const CloudBases>& cloud, RainCurtain& curt
 }  // namespace
 
 FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
-    : scene_(scene), renderer_(device) {}
+    : scene_(scene), renderer_(device) {
+    painter_.use_textures(read_textures(scene.models));
+}
 
 void FramePainter::set_scene(const Scene& scene, bool same_layers) {
+    const bool same_textures = texture_files(scene.models) == texture_files(scene_.models);
+    if (same_layers && same_textures) {
+        scene_ = scene;
+        return;
+    }
+    std::shared_ptr<const ModelTextures> textures = read_textures(scene.models);
     scene_ = scene;
     if (!same_layers) painter_ = SkyPainter();
+    painter_.use_textures(std::move(textures));
 }
 
 void FramePainter::add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,

@@ -40,7 +40,7 @@ struct PendingFrame {
 // Keeps what pictures have in common. Not thread-safe; different painters may work in different threads.
 class FramePainter {
   public:
-    // Opens the back-end. Throws as Renderer.
+    // Opens the back-end and reads the textures of base models. Throws as Renderer and read_textures().
     explicit FramePainter(const Scene& scene, const DeviceOptions& device = {});
 
     // Draws a frame. One without a density in its layers is drawn from FrameResult::density. Pictures have depth
@@ -54,8 +54,8 @@ class FramePainter {
     Picture finish(PendingFrame&& pending);
 
     // Draws later frames as another scene asks for, with the same back-end and what it has cached. `same_layers`: frames
-    // are still those of the simulation that drawn ones came from; false: of another one. Precondition: no frame is
-    // begun and not finished.
+    // are still those of the simulation that drawn ones came from; false: of another one, and textures are read again.
+    // Throws as read_textures(), and then draws as before. Precondition: no frame is begun and not finished.
     void set_scene(const Scene& scene, bool same_layers);
 
     const Renderer& renderer() const { return renderer_; }

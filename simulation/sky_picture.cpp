@@ -114,6 +114,7 @@ void SkyBillboards::list(const SkySimulation& sky, const FormedCloud& formed, bo
         drawn.opacity = float(weight);
         drawn.texture = billboard.texture;
         drawn.variant = billboard.variant;
+        if (out.textures) drawn.picture = out.textures->picture_of(sky.model(form), billboard.variant);
         drawn.cloud = index;
     }
 }
@@ -172,6 +173,7 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     const bool rain = options.precipitation.enabled && !weather.curtains.empty();
     layers_.resize(layers.size());
     DrawnClouds drawn;
+    drawn.textures = textures_;
     const std::optional<Flash> flash = flash_at(options.lightning, time_s);
     std::optional<Camera> mirrored;
     if (shows_reflections(options, ground_cover.value_or(GroundCoverView{}))) mirrored = mirrored_camera(options);
@@ -186,7 +188,8 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     // Rain wants the depth of the clouds and their shadow, veils the depth.
     const bool all = depth || rain;
     PendingPicture picture = renderer.begin(
-        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all, ground_cover},
+        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all, ground_cover,
+         textures_ ? textures_->pictures : nullptr},
         options, veils);
     RenderOptions raining = moving;  // knows the camera's path itself
     raining.sun = options.sun;

@@ -9,6 +9,7 @@
 //     const SkyLayer layer{&sky, sky.clouds()};
 //     const Picture picture = painter.draw(renderer, {}, {&layer, 1}, options, sky.time_s());
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -23,6 +24,7 @@
 #include "seeds/light_absorption.h"
 #include "seeds/model.h"
 #include "seeds/sky_simulation.h"
+#include "simulation/billboard_files.h"
 
 namespace nephos {
 
@@ -30,6 +32,7 @@ namespace nephos {
 struct DrawnClouds {
     std::vector<BillboardCloud> clouds;
     std::vector<CloudBillboard> billboards;
+    std::shared_ptr<const ModelTextures> textures;  // of the base models; null: none comes from a file
 };
 
 // A frame of a film. With options.light.cfa_clouds_per_frame, clouds keep the sun of earlier frames in turn
@@ -127,8 +130,12 @@ class SkyPainter {
                             std::span<const DrawnVeil> veils = {});
     Picture finish(Renderer& renderer, PendingSkyPicture&& pending);
 
+    // Sets the textures of later pictures: those of all base models of the layers, or null when none has any.
+    void use_textures(std::shared_ptr<const ModelTextures> textures) { textures_ = std::move(textures); }
+
   private:
     std::vector<SkyBillboards> layers_;
+    std::shared_ptr<const ModelTextures> textures_;
     PrecipitationPainter precipitation_;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/blended/billboard_pass.h"
 
+#include "render/frame/billboard_textures.h"
 #include "render/gpu/frame_uploads.h"
 
 namespace nephos {
@@ -17,8 +18,13 @@ void BillboardPass::use_clouds(const GpuDevice& gpu, std::span<const shader::Vie
     upload(gpu, clouds_, std::as_bytes(clouds));
 }
 
-void BillboardPass::use_billboards(const GpuDevice& gpu, std::span<const shader::ViewBillboard> billboards) {
-    if (!billboards.empty() && textures_.width == 0) textures_ = upload_billboard_textures(gpu);
+void BillboardPass::use_billboards(const GpuDevice& gpu, std::span<const shader::ViewBillboard> billboards,
+                                   const BillboardPictures* pictures) {
+    const std::uint64_t wanted = pictures != nullptr ? pictures->serial : 0;
+    if (!billboards.empty() && (textures_.width == 0 || wanted != pictures_)) {
+        textures_ = upload_billboard_textures(gpu, pictures);
+        pictures_ = wanted;
+    }
     upload(gpu, billboards_, std::as_bytes(billboards));
 }
 

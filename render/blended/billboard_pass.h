@@ -20,8 +20,10 @@ class BillboardPass {
 
     // Sets the clouds of later draws.
     void use_clouds(const GpuDevice& gpu, std::span<const shader::ViewCloud> clouds);
-    // Sets the billboards of later draws. Textures are generated with the first billboard.
-    void use_billboards(const GpuDevice& gpu, std::span<const shader::ViewBillboard> billboards);
+    // Sets the billboards of later draws, and the pictures that they may have, or null. Textures are generated with the
+    // first billboard. Precondition: the device draws nothing of this pass.
+    void use_billboards(const GpuDevice& gpu, std::span<const shader::ViewBillboard> billboards,
+                        const BillboardPictures* pictures);
 
     // Returns the pipeline that draws 6 vertices for each billboard. Without `depth` only the first attachment is
     // drawn to.
@@ -34,6 +36,7 @@ class BillboardPass {
     vk::raii::Sampler sampler_;
     GpuBuffer billboards_, clouds_;
     GpuImage textures_;
+    std::uint64_t pictures_ = 0;  // BillboardPictures::serial of these; 0: none
 };
 
 }  // namespace nephos

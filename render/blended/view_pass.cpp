@@ -114,7 +114,7 @@ void ViewPass::draw_batch(const GpuDevice& gpu, vk::Extent2D area, const ViewSor
               std::as_bytes(std::span(order.balls)).subspan(balls.begin * sizeof(shader::ViewBall), bytes));
     }
     billboards_.use_billboards(
-        gpu, std::span(order.billboards).subspan(billboards.begin, billboards.end - billboards.begin));
+        gpu, std::span(order.billboards).subspan(billboards.begin, billboards.end - billboards.begin), order.pictures);
     submit_and_wait(gpu, [&](const vk::raii::CommandBuffer& commands) {
         image_barrier(commands, radiance_, access::draw, access::draw);
         image_barrier(commands, depth_, access::draw, access::draw);

@@ -6,6 +6,7 @@
 // spans must not change until the frame is finished (Renderer::finish(); draw_splats() finishes it itself).
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -13,6 +14,7 @@
 #include "density/density_grid.h"
 #include "density/detail.h"
 #include "density/metaballs.h"
+#include "render/image/alpha_image.h"
 #include "render/options/options.h"
 
 namespace nephos {
@@ -60,6 +62,7 @@ struct CloudBillboard {
     float opacity = 1;                // 0..1; below 1 while its cloud forms or dissolves
     BillboardTexture texture = BillboardTexture::soft;
     std::uint32_t variant = 0;  // any number; selects the texture's variant and orientation
+    std::int32_t picture = -1;  // index in Splats::pictures, instead of a texture: upright; -1: none
     std::uint32_t cloud = 0;    // index in Splats::clouds
 };
 
@@ -68,6 +71,15 @@ struct BillboardCloud {
     Vec3 centre_m{};               // world
     double base_m = 0, top_m = 1;  // world z; base_m < top_m
 };
+
+// Pictures that billboards can have instead of the renderer's own textures, in the form that back-ends draw. Immutable.
+struct BillboardPictures;
+inline constexpr std::size_t kMostBillboardPictures = 200;
+
+// Each picture fills the rectangle of its billboard, but for a rim of 1/128 of its sides that is clear. It is resampled to
+// 126 x 126 texels: its alpha is their opacity, its luminance scales the light. Throws Error(usage) when there are more
+// than kMostBillboardPictures, or one has no pixels or values that its size does not state.
+std::shared_ptr<const BillboardPictures> billboard_pictures(std::span<const AlphaImage> images);
 
 struct Splats {
     std::span<const BillboardCloud> clouds;
@@ -81,6 +93,7 @@ struct Splats {
     // computes light for visible metaballs and texels alone; the pixels are the same.
     bool light = true;
     std::optional<GroundCoverView> ground_cover{};  // none: the ground is dry
+    std::shared_ptr<const BillboardPictures> pictures{};  // of billboards; null: none has one
 };
 
 }  // namespace nephos

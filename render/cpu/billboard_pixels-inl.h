@@ -55,8 +55,7 @@ struct BillboardSampler {
     BillboardSampler(const BillboardTexels& all, std::uint32_t bits) {
         const std::uint32_t layer = bits & 255u, turn = bits >> 8 & 15u, level = bits >> 12;
         const int side = kBillboardTexels >> level;
-        const std::uint32_t exchanged =
-            (turn & 4u) != 0 ? std::uint32_t(kBillboardKinds * kBillboardVariants) : 0;
+        const std::uint32_t exchanged = (turn & 4u) != 0 ? all.layers : 0;
         stride = side + 2;
         texels = reinterpret_cast<const std::int32_t*>(all.texels.data()) + all.first[level] +
                  (layer + exchanged) * std::uint32_t(stride * stride);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/cpu/billboard_texels.h"
 
-#include "render/frame/billboard_textures.h"
-
 namespace nephos {
 namespace {
 
@@ -26,17 +24,21 @@ void append_level(const BillboardLevel& level, BillboardTexels& out) {
     }
 }
 
-BillboardTexels make_texels() {
+BillboardTexels make_texels(const std::vector<BillboardLevel>& levels) {
     BillboardTexels texels;
-    for (const BillboardLevel& level : billboard_textures()) append_level(level, texels);
+    const std::size_t side = std::size_t(levels.front().side);
+    texels.layers = std::uint32_t(levels.front().texels.size() / (2 * side * side));
+    for (const BillboardLevel& level : levels) append_level(level, texels);
     return texels;
 }
 
 }  // namespace
 
 const BillboardTexels& billboard_texels() {
-    static const BillboardTexels texels = make_texels();
+    static const BillboardTexels texels = make_texels(billboard_textures());
     return texels;
 }
+
+BillboardTexels billboard_texels(const BillboardPictures& pictures) { return make_texels(pictures.levels); }
 
 }  // namespace nephos

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/frame/billboard_textures.h"
+
 namespace nephos {
 
 // Each layer of each level has side + 2 rows of side + 2 texels: a rim without opacity around the picture. A
@@ -15,7 +17,9 @@ namespace nephos {
 struct BillboardTexels {
     std::vector<std::uint32_t> texels;
     std::vector<std::uint32_t> first;  // of each level; a layer has (side + 2)^2
+    std::uint32_t layers = 0;          // before those with columns and rows exchanged
 };
 const BillboardTexels& billboard_texels();  // made at the first call; thread-safe
+BillboardTexels billboard_texels(const BillboardPictures& pictures);
 
 }  // namespace nephos

@@ -78,8 +78,8 @@ void store(const TileSums& sums, const ViewTile& tile, const PicturePart& part, 
 
 ProcessorView::ProcessorView(const RenderOptions& options, const CameraFrame& camera,
                              const PictureFrame& frame, const PicturePart& part, const ViewSortedSplats& order,
-                             const BatchLimits& limits, StageTimes* times)
-    : order_(&order), frame_(frame), part_(part), limits_(limits), times_(times) {
+                             const BatchLimits& limits, StageTimes* times, const BillboardTexels* pictures)
+    : order_(&order), frame_(frame), part_(part), limits_(limits), times_(times), pictures_(pictures) {
     const StageTimer timer(times_, DrawStage::eye_bins);
     if (!order.billboards.empty()) source_ = splats_near_to_far(order);
     boxes_ = screen_boxes(order, camera, options.camera, part, source_);
@@ -147,7 +147,8 @@ ProcessorView::Batch ProcessorView::prepare_batch(std::size_t begin, std::size_t
 
 // Returns the billboards' texels; null without billboards, so that they are not generated.
 const BillboardTexels* ProcessorView::texels() const {
-    return source_.empty() ? nullptr : &billboard_texels();
+    if (source_.empty()) return nullptr;
+    return pictures_ != nullptr ? pictures_ : &billboard_texels();
 }
 
 void ProcessorView::light(Batch& batch, const VisibleSet* seen) const {

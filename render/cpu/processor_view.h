@@ -38,10 +38,11 @@ struct VisibleSet {
 // live until the last; only the light of its metaballs may change meanwhile.
 class ProcessorView {
   public:
-    // `frame` is that of the part.
+    // `frame` is that of the part; `pictures`: the texels of ViewSortedSplats::pictures where there are any, which live as
+    // long as this.
     ProcessorView(const RenderOptions& options, const CameraFrame& camera, const PictureFrame& frame,
                   const PicturePart& part, const ViewSortedSplats& order, const BatchLimits& limits = {},
-                  StageTimes* times = nullptr);
+                  StageTimes* times = nullptr, const BillboardTexels* pictures = nullptr);
 
     // Adds what the part shows.
     void find_visible(int shadow_size, VisibleSet& seen);
@@ -73,6 +74,7 @@ class ProcessorView {
     PicturePart part_;
     BatchLimits limits_;
     StageTimes* times_;
+    const BillboardTexels* pictures_;
     std::vector<std::uint32_t> source_;  // splats_near_to_far(); empty without billboards
     std::vector<PixelBox> boxes_;        // of the splats, nearest first
     std::vector<Batch> kept_;            // one, if find_visible() has made it

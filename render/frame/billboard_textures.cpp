@@ -2,8 +2,11 @@
 #include "render/frame/billboard_textures.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <string>
 
+#include "core/error.h"
 #include "core/math.h"
 #include "core/noise_hash.h"
 
@@ -148,9 +151,11 @@ BillboardLevel coarser(const BillboardLevel& fine) {
     return level;
 }
 
-// Clears the outermost texels of each layer and scales the others such that the layer hides as much as
-// before.
-void clear_rim(BillboardLevel& level) {
+constexpr int kExactSide = 32;  // pictures from elsewhere keep their opacity on levels at least as fine
+
+// Clears the outermost texels of each layer and, unless they are `exact`, scales the others such that the layer hides
+// as much as before.
+void clear_rim(BillboardLevel& level, bool exact) {
     const std::size_t side = std::size_t(level.side), layer_bytes = 2 * side * side;
     for (std::size_t begin = 0; begin < level.texels.size(); begin += layer_bytes) {
         std::uint64_t all = 0, rim = 0;
@@ -162,7 +167,7 @@ void clear_rim(BillboardLevel& level) {
             all += level.texels[begin + at];
             if (is_rim(at)) rim += level.texels[begin + at];
         }
-        const double scale = all > rim ? double(all) / double(all - rim) : 1.0;
+        const double scale = !exact && all > rim ? double(all) / double(all - rim) : 1.0;
         for (std::size_t at = 0; at < layer_bytes; ++at) {
             std::uint8_t& texel = level.texels[begin + at];
             texel = is_rim(at) ? 0 : to_byte(scale * texel / 255);
@@ -170,18 +175,75 @@ void clear_rim(BillboardLevel& level) {
     }
 }
 
-std::vector<BillboardLevel> make_levels() {
-    std::vector<BillboardLevel> levels{finest_level()};
+// `own`: of pictures from elsewhere.
+std::vector<BillboardLevel> levels_from(BillboardLevel finest, bool own) {
+    std::vector<BillboardLevel> levels{std::move(finest)};
     while (int(levels.size()) < kBillboardLevels) levels.push_back(coarser(levels.back()));
-    for (BillboardLevel& level : levels) clear_rim(level);
+    for (BillboardLevel& level : levels) clear_rim(level, own && level.side >= kExactSide);
     return levels;
+}
+
+// Mean of an image's values over the rectangle from (left, top) to (right, bottom), pixels.
+float mean_over(const AlphaImage& image, const std::vector<float>& values, double left, double top, double right,
+                double bottom) {
+    double sum = 0, area = 0;
+    for (int y = int(top); y < std::min(image.height, int(std::ceil(bottom))); ++y) {
+        const double high = std::min(bottom, y + 1.0) - std::max(top, double(y));
+        for (int x = int(left); x < std::min(image.width, int(std::ceil(right))); ++x) {
+            const double part = high * (std::min(right, x + 1.0) - std::max(left, double(x)));
+            sum += part * double(values[std::size_t(y) * std::size_t(image.width) + std::size_t(x)]);
+            area += part;
+        }
+    }
+    return area > 0 ? float(sum / area) : 0;
+}
+
+// A layer of the finest level: the image within the rim that is clear.
+void append_image(const AlphaImage& image, std::vector<std::uint8_t>& texels) {
+    constexpr int kInside = kBillboardTexels - 2;
+    for (int j = -1; j <= kInside; ++j) {
+        for (int i = -1; i <= kInside; ++i) {
+            if (i < 0 || j < 0 || i == kInside || j == kInside) {
+                texels.insert(texels.end(), 2, 0);
+                continue;
+            }
+            const double across = double(image.width) / kInside, down = double(image.height) / kInside;
+            for (const std::vector<float>* values : {&image.opacity, &image.bright})
+                texels.push_back(to_byte(double(
+                    mean_over(image, *values, i * across, j * down, (i + 1) * across, (j + 1) * down))));
+        }
+    }
 }
 
 }  // namespace
 
 const std::vector<BillboardLevel>& billboard_textures() {
-    static const std::vector<BillboardLevel> levels = make_levels();
+    static const std::vector<BillboardLevel> levels = levels_from(finest_level(), false);
     return levels;
+}
+
+std::shared_ptr<const BillboardPictures> billboard_pictures(std::span<const AlphaImage> images) {
+    if (images.size() > kMostBillboardPictures) {
+        throw Error(ErrorCode::usage, std::to_string(images.size()) + " pictures of billboards; expected at most " +
+                                          std::to_string(kMostBillboardPictures));
+    }
+    static std::atomic<std::uint64_t> last_serial{0};
+    BillboardLevel finest{kBillboardTexels, {}};
+    for (const AlphaImage& image : images) {
+        const std::size_t pixels = std::size_t(std::max(image.width, 0)) * std::size_t(std::max(image.height, 0));
+        if (pixels == 0 || image.opacity.size() != pixels || image.bright.size() != pixels)
+            throw Error(ErrorCode::usage, "a picture of billboards: its values do not have the size that it states");
+        append_image(image, finest.texels);
+    }
+    auto made = std::make_shared<BillboardPictures>();
+    made->serial = ++last_serial;
+    made->count = int(images.size());
+    made->levels = billboard_textures();
+    if (images.empty()) return made;
+    const std::vector<BillboardLevel> own = levels_from(std::move(finest), true);
+    for (std::size_t n = 0; n < own.size(); ++n)
+        made->levels[n].texels.insert(made->levels[n].texels.end(), own[n].texels.begin(), own[n].texels.end());
+    return made;
 }
 
 BillboardPicture billboard_picture(BillboardTexture kind, std::uint32_t variant) {

@@ -15,6 +15,7 @@ namespace nephos {
 inline constexpr int kBillboardKinds = 3;
 inline constexpr int kBillboardVariants = 4;  // layers of a kind; layer = kind * kBillboardVariants + variant
 inline constexpr int kBillboardTexels = int(shader::kBillboardTexels);
+inline constexpr int kBillboardLayers = kBillboardKinds * kBillboardVariants;  // of the textures made from noise
 inline constexpr int kBillboardLevels = 5;  // 128 .. 8 texels: a coarser one would consist of its rim
 
 // One mip level of all layers: texel (i, j) of layer l is the pair at 2 * ((l * side + j) * side + i), row 0
@@ -30,11 +31,25 @@ struct BillboardLevel {
 // second. Thread-safe.
 const std::vector<BillboardLevel>& billboard_textures();
 
+// Textures from noise, and behind their layers one for each picture of billboard_pictures().
+struct BillboardPictures {
+    std::uint64_t serial = 0;  // unlike that of all others; above 0
+    int count = 0;             // of pictures
+    std::vector<BillboardLevel> levels;
+};
+
+// Returns the levels with the pictures, or those of billboard_textures() for null.
+inline const std::vector<BillboardLevel>& billboard_levels(const BillboardPictures* pictures) {
+    return pictures != nullptr ? pictures->levels : billboard_textures();
+}
+
 // The texture of a billboard: a layer, and in `turn` the flags mirrored left-right (1), top-bottom (2) and
 // axes exchanged (4), applied in that order; fibres remain horizontal.
 struct BillboardPicture {
     int layer = 0, turn = 0;
 };
 BillboardPicture billboard_picture(BillboardTexture kind, std::uint32_t variant);
+// The same of one with a picture of its own: upright and not mirrored.
+inline BillboardPicture own_picture(int index) { return {kBillboardLayers + index, 0}; }
 
 }  // namespace nephos

@@ -33,7 +33,7 @@ bool within(float value, float min, float max) { return value >= min && value <=
 
 // Returns the first field of a billboard that is out of the range in splats.h, with that range; null if none
 // is.
-const char* expected(const CloudBillboard& billboard, std::size_t clouds) {
+const char* expected(const CloudBillboard& billboard, std::size_t clouds, int pictures) {
     if (!finite(billboard.centre_m)) return "a finite centre";
     if (!(billboard.width_m > 0 && billboard.height_m > 0 && billboard.width_m <= kLargestBillboard_m &&
           billboard.height_m <= kLargestBillboard_m))
@@ -42,6 +42,7 @@ const char* expected(const CloudBillboard& billboard, std::size_t clouds) {
         return "absorbed light from 0 to 1";
     if (!within(billboard.opacity, 0, 1)) return "an opacity from 0 to 1";
     if (std::size_t(billboard.texture) >= kBillboardKinds) return "a texture of BillboardTexture";
+    if (billboard.picture < -1 || billboard.picture >= pictures) return "the index of a picture, or -1";
     return billboard.cloud < clouds ? nullptr : "the index of a cloud";
 }
 
@@ -93,7 +94,7 @@ class Collector {
         by_distance_.add_all(
             first, splats_.billboards.size(), [this, first, &first_bad](std::uint32_t i, float& distance) {
                 const CloudBillboard& billboard = splats_.billboards[i - first];
-                if (expected(billboard, splats_.clouds.size()) != nullptr) {
+                if (expected(billboard, splats_.clouds.size(), pictures()) != nullptr) {
                     std::size_t known = first_bad;
                     while (i - first < known && !first_bad.compare_exchange_weak(known, i - first)) {
                     }
@@ -105,13 +106,14 @@ class Collector {
                             double(shader::kMinBillboardPixels), distance);
             });
         if (first_bad < splats_.billboards.size())
-            fail("billboard", first_bad, expected(splats_.billboards[first_bad], splats_.clouds.size()));
+            fail("billboard", first_bad, expected(splats_.billboards[first_bad], splats_.clouds.size(), pictures()));
     }
 
     ViewSortedSplats order() {
         by_distance_.sort();
         ViewSortedSplats order;
         order.depth = splats_.depth;
+        order.pictures = splats_.pictures.get();
         place_splats(order);
         const std::size_t parts = first_ball_.size() - 1;
         std::vector<std::uint8_t> kinds(by_distance_.size()), fitted(parts, 1);
@@ -271,10 +273,14 @@ class Collector {
                 flags};
     }
 
+    int pictures() const { return splats_.pictures ? splats_.pictures->count : 0; }
+
     shader::ViewBillboard view_billboard(const CloudBillboard& billboard) const {
         const Vec3 offset = billboard.centre_m - eye_;
         const Drawn what = drawn(billboard);
-        const BillboardPicture picture = billboard_picture(billboard.texture, billboard.variant);
+        const BillboardPicture picture = billboard.picture >= 0
+                                             ? own_picture(billboard.picture)
+                                             : billboard_picture(billboard.texture, billboard.variant);
         return {float(offset.x),
                 float(offset.y),
                 float(offset.z),

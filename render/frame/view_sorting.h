@@ -38,6 +38,7 @@ struct ViewSortedSplats {
     std::vector<shader::ViewBillboard> billboards;  // farthest first
     std::vector<Run> runs;                  // non-empty, farthest first; together all of balls and billboards
     std::vector<shader::ViewCloud> clouds;  // one for each of Splats::clouds
+    const BillboardPictures* pictures = nullptr;  // as Splats::pictures, which keeps them
     bool depth = true;                      // as Splats::depth
     bool all_fitted = true;                 // no ball has shader::kNotFitted
 };

@@ -28,10 +28,10 @@ void SkyImage::use(const GpuDevice& gpu, const SkyLight& light) {
 
 // As 16-bit floats: software devices filter bytes to bytes, which adds up where many billboards lie behind
 // each other.
-GpuImage upload_billboard_textures(const GpuDevice& gpu) {
-    const std::vector<BillboardLevel>& levels = billboard_textures();
-    constexpr std::uint32_t kLayers = kBillboardKinds * kBillboardVariants;
-    GpuImage image = create_image(gpu, kBillboardTexels, kBillboardTexels, kLayers, vk::Format::eR16G16Sfloat,
+GpuImage upload_billboard_textures(const GpuDevice& gpu, const BillboardPictures* pictures) {
+    const std::vector<BillboardLevel>& levels = billboard_levels(pictures);
+    const auto layers = std::uint32_t(kBillboardLayers + (pictures != nullptr ? pictures->count : 0));
+    GpuImage image = create_image(gpu, kBillboardTexels, kBillboardTexels, layers, vk::Format::eR16G16Sfloat,
                                   vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst,
                                   std::uint32_t(levels.size()));
     std::vector<shader::uint> texels;

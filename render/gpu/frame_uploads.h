@@ -27,8 +27,8 @@ class SkyImage {
     std::uint64_t serial_ = 0;
 };
 
-// Uploads the textures of billboard_textures.h with all levels, readable by shaders.
-GpuImage upload_billboard_textures(const GpuDevice& gpu);
+// Uploads the textures of billboard_textures.h with all levels, readable by shaders; `pictures`: with those, or null.
+GpuImage upload_billboard_textures(const GpuDevice& gpu, const BillboardPictures* pictures);
 
 // The shells of air: bindings 13 and 14 of shells.glsl.
 class ShellBuffers {

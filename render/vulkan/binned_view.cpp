@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "render/frame/billboard_textures.h"
 #include "render/frame/frame_data.h"
 
 namespace nephos {
@@ -390,8 +391,12 @@ void BinnedView::begin_part(const ViewInputs& what, const shader::FrameUniforms&
     slot.billboard_count = what.billboards.size();
     reserve(part, slot);
     pipelines_for(what.variant).prepare(gpu_, what.depth);
-    if (what.variant.billboards && billboard_textures_.width == 0)
-        billboard_textures_ = upload_billboard_textures(gpu_);
+    const std::uint64_t pictures = what.pictures != nullptr ? what.pictures->serial : 0;
+    if (what.variant.billboards && (billboard_textures_.width == 0 || pictures != pictures_)) {
+        flush();  // what is in flight reads those that there were
+        billboard_textures_ = upload_billboard_textures(gpu_, what.pictures);
+        pictures_ = pictures;
+    }
     slot.part = part;
     write(gpu_, slot.frame, frame);
     write(gpu_, slot.order_frame, what.order);

@@ -38,6 +38,7 @@ struct ViewInputs {
     // What the camera sees of T's billboards, nearest first, and their clouds: until begin_part() returns.
     std::span<const shader::SeenBillboard> billboards;
     std::span<const shader::ViewCloud> clouds;
+    const BillboardPictures* pictures = nullptr;  // of the billboards; until begin_part() returns
     const shader::March* march = nullptr;  // clouds with detail, see variant.march; until begin_part() returns
     MarchVolumes* volumes = nullptr;        // of these
     bool depth = true;
@@ -117,6 +118,7 @@ class BinnedView {
     DeviceShade shade_;
     GpuBuffer radiance_, depth_;
     GpuImage billboard_textures_;  // created with the first billboard
+    std::uint64_t pictures_ = 0;   // BillboardPictures::serial of these; 0: none
     std::vector<std::unique_ptr<Pipelines>> pipelines_;
     std::vector<std::unique_ptr<Slot>> slots_;
     std::size_t next_ = 0;

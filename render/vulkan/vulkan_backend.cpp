@@ -148,6 +148,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                           .shell_count = shells.count(),
                           .billboards = seen,
                           .clouds = billboards.clouds,
+                          .pictures = frame.splats.pictures.get(),
                           .march = march.count > 0 ? &march : nullptr,
                           .volumes = march.count > 0 ? &*volumes_ : nullptr,
                           .depth = frame.splats.depth};

@@ -204,6 +204,17 @@ void resolve_files(Scene& scene, const Document& document, const std::filesystem
         if (entry != nullptr && file && document.origin(entry->value.place.origin).is_file)
             file = (folder / *file).lexically_normal();
     }
+    // Textures of a base model from another file are relative to that file.
+    const Entry* models = document.root.find("model");
+    for (std::size_t n = 0; models != nullptr && n < scene.models.size(); ++n) {
+        const Entry* textures = models->value.items[n].find("textures");
+        if (textures == nullptr) continue;
+        const Origin& origin = document.origin(textures->value.place.origin);
+        if (!origin.is_file) continue;
+        const bool of_scene = textures->value.place.origin == 0;
+        const std::filesystem::path from = of_scene ? folder : std::filesystem::path(origin.label).parent_path();
+        for (std::string& file : scene.models[n].textures) file = (from / file).lexically_normal().string();
+    }
     const Entry* layers = document.root.find("layer");
     for (std::size_t n = 0; layers != nullptr && n < scene.layers.size(); ++n)
         resolve(layers->value.items[n], scene.layers[n].initial_state_file);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sections of T's clouds: base models with their seeds and roots, and skies.
 
+#include <algorithm>
+
 #include "scenes/format/schema_build.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
@@ -13,6 +15,7 @@ namespace {
 
 constexpr double kLargest_m = 1e6;
 constexpr Limits kCount = between(0, 10'000);
+constexpr std::size_t kMostTextures = 100;  // of a base model
 
 const Section& root_section() {
     constexpr Limits kAngle = between(-360, 360);
@@ -68,6 +71,12 @@ void finish_model(const SectionReader& reader, void* owner) {
     auto& model = *static_cast<BaseModel*>(owner);
     model.own_centre = reader.find("centre") != nullptr;
     model.own_rim = reader.find("rim") != nullptr;
+    if (model.textures.size() > kMostTextures) {
+        reader.report("textures", reader.quoted("textures") + " has " + std::to_string(model.textures.size()) + " files",
+                      "expected at most " + std::to_string(kMostTextures));
+    }
+    if (std::ranges::count(model.textures, std::string()) > 0)
+        reader.report("textures", reader.quoted("textures") + " has an empty name", "expected names of PNG files");
     try {
         check(model);
     } catch (const Error& error) {
@@ -91,6 +100,14 @@ const Section& model_section() {
          key<&BaseModel::light_distance_m>(
              "light_distance_m", "m", or_infinite(above(0, 0)),
              "Way of light in the cloud after which it is absorbed, for billboards.", "T, CFA"),
+         default_is(written_if(key<&BaseModel::textures>(
+                                   "textures", "", kAny,
+                                   "PNG files with transparency, relative to the scene's folder: each billboard is one of "
+                                   "them, upright, in place of its seed's `texture`. Alpha is opacity, luminance scales "
+                                   "the light.",
+                                   "T, 3.1"),
+                               [](const void* model) { return !static_cast<const BaseModel*>(model)->textures.empty(); }),
+                    "those of the seeds' `texture`"),
          default_is(written_if(table<&BaseModel::centre>(
                                    "centre", probabilities_section(),
                                    "Probabilities at the centre of its boxes' ellipsoids, in every layer's automaton."),

@@ -118,7 +118,8 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
         if (!grown.contains(model.name) || drawn.contains(model.name)) continue;
         const bool given = std::ranges::any_of(model.seeds, [&](const Seed& seed) {
             return std::isfinite(model.light_distance_m) || !(seed.billboards == plain.billboards && seed.billboard_width_m == plain.billboard_width_m &&
-                     seed.billboard_height_m == plain.billboard_height_m && seed.texture == plain.texture);
+                     seed.billboard_height_m == plain.billboard_height_m && seed.texture == plain.texture &&
+                     model.textures.empty());
         });
         if (given)
             result.push_back(fmt::format("base model '{}': `light_distance_m` and the numbers, sizes and textures of billboards "

@@ -231,6 +231,8 @@ std::string scene_hash(const Scene& scene) {
     for (ProbabilityGrid& grid : named.automaton.field.grids) shorten(grid.file);
     for (WindField& field : named.automaton.wind.fields)
         for (std::string& file : field.files) file = std::filesystem::path(file).filename().string();
+    for (BaseModel& model : named.models)
+        for (std::string& file : model.textures) file = std::filesystem::path(file).filename().string();
     return hash_of(to_toml(named));
 }
 
@@ -256,6 +258,7 @@ std::string simulation_hash(const Scene& scene, std::string_view initial_state_h
     for (ProbabilityGrid& grid : simulation.automaton.field.grids) grid.file = "probabilities";
     for (WindField& field : simulation.automaton.wind.fields)
         for (std::string& file : field.files) file = "wind";
+    for (BaseModel& model : simulation.models) model.textures.clear();  // pictures alone have them
     std::string text = to_toml(simulation);
     text += initial_state_hash;
     return hash_of(text);

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+// Clouds of textures from files: what a file is taken for, that alpha is opacity and the picture stands upright in all
+// back-ends, and how a scene names such files.
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "render/image/image_file.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/writer.h"
+#include "simulation/billboard_files.h"
+#include "simulation/frame_painter.h"
+#include "tests/render/picture_checks.h"
+#include "tests/render/temporary_folder.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kTextures = fs::path(NEPHOS_SOURCE_DIR) / "scenes/torchelsen/textures";
+
+std::string message_of(const fs::path& path) {
+    try {
+        read_alpha_image(path);
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::io);
+        return error.what();
+    }
+    return {};
+}
+
+TEST(AlphaImages, AreReadWithTheirOpacity) {
+    const AlphaImage image = read_alpha_image(kTextures / "heap-1.png");
+    ASSERT_EQ(image.width, 256);
+    ASSERT_EQ(image.height, 256);
+    ASSERT_EQ(image.opacity.size(), 256u * 256u);
+    ASSERT_EQ(image.bright.size(), image.opacity.size());
+    const auto at = [&](int x, int y) { return std::size_t(y) * 256 + std::size_t(x); };
+    EXPECT_GT(image.opacity[at(128, 140)], 0.9f);
+    EXPECT_EQ(image.opacity[at(2, 2)], 0);
+    EXPECT_EQ(image.opacity[at(128, 250)], 0);  // below the heap's flat base: row 0 is at the top
+    EXPECT_GT(image.opacity[at(128, 170)], 0.9f);
+    for (std::size_t n = 0; n < image.opacity.size(); ++n) ASSERT_LE(image.bright[n], image.opacity[n]);
+}
+
+TEST(AlphaImages, OthersAreRefusedByName) {
+    const TemporaryFolder folder;
+    const fs::path text = folder.path() / "text.png", opaque = folder.path() / "opaque.png";
+    std::ofstream(text) << "no picture";
+    write_png(opaque, Rgb8Image{2, 2, std::vector<std::uint8_t>(12, 200)}, {}, {});
+    EXPECT_NE(message_of(text).find("text.png: cannot be read as PNG"), std::string::npos) << message_of(text);
+    EXPECT_NE(message_of(opaque).find("opaque.png: has no alpha channel"), std::string::npos) << message_of(opaque);
+    EXPECT_NE(message_of(folder.path() / "none.png").find("none.png"), std::string::npos);
+    std::string cut;
+    {
+        std::ifstream whole(kTextures / "heap-1.png", std::ios::binary);
+        cut.assign(std::istreambuf_iterator<char>(whole), {});
+    }
+    const fs::path half = folder.path() / "half.png";
+    std::ofstream(half, std::ios::binary) << cut.substr(0, cut.size() / 2);
+    EXPECT_NE(message_of(half).find("half.png: cannot be read as PNG"), std::string::npos) << message_of(half);
+}
+
+// Quarters of an image by their opacity, all of one brightness.
+AlphaImage quarters(float upper_left, float upper_right, float lower_left, float lower_right, float brightness) {
+    AlphaImage image{2, 2, {upper_left, upper_right, lower_left, lower_right}, {}};
+    for (const float opacity : image.opacity) image.bright.push_back(brightness * opacity);
+    return image;
+}
+
+class PicturesOfBillboards : public test::AllBackends {
+  protected:
+    Picture drawn(const AlphaImage& image, std::uint32_t variant) {
+        const std::vector<AlphaImage> images{quarters(1, 1, 1, 1, 1), image};
+        CloudBillboard billboard;
+        billboard.centre_m = {0, 0, 1000};
+        billboard.width_m = billboard.height_m = 400;
+        billboard.variant = variant;
+        billboard.picture = 1;
+        const std::vector<BillboardCloud> clouds{{{0, 0, 1000}, 800, 1200}};
+        const std::vector<CloudBillboard> billboards{billboard};
+        Splats splats;
+        splats.clouds = clouds;
+        splats.billboards = billboards;
+        splats.pictures = billboard_pictures(images);
+        return renderer_.draw_splats(splats, test::view({0, -1000, 1000}, {0, 0, 1000}, 23, 64, 64));
+    }
+};
+
+// Whatever its random word says, each quarter lets through what its alpha leaves.
+TEST_P(PicturesOfBillboards, AlphaIsOpacityAndThePictureIsUpright) {
+    for (const std::uint32_t variant : {0u, 5u, 12u, 31u}) {
+        const Picture picture = drawn(quarters(1, 0.25f, 0.5f, 0, 1), variant);
+        const auto at = [&](int x, int y) { return picture.transmittance[std::size_t(y) * 64 + std::size_t(x)]; };
+        EXPECT_NEAR(at(16, 16), 0, 0.01) << variant;
+        EXPECT_NEAR(at(47, 16), 0.75, 0.01) << variant;
+        EXPECT_NEAR(at(16, 47), 0.5, 0.01) << variant;
+        EXPECT_NEAR(at(47, 47), 1, 0.01) << variant;
+    }
+}
+
+TEST_P(PicturesOfBillboards, LuminanceScalesTheLight) {
+    const Picture black = drawn(quarters(1, 1, 1, 1, 0), 0), grey = drawn(quarters(1, 1, 1, 1, 0.5f), 0),
+                  white = drawn(quarters(1, 1, 1, 1, 1), 0);
+    const std::size_t middle = 3 * (32 * 64 + 20);
+    for (std::size_t c = 0; c < 3; ++c) {
+        const float all = white.beauty[middle + c] - black.beauty[middle + c];
+        EXPECT_GT(all, 0.01f);
+        EXPECT_NEAR(grey.beauty[middle + c] - black.beauty[middle + c], 0.5f * all, 0.01f * all);
+    }
+}
+
+TEST_P(PicturesOfBillboards, IndicesAreChecked) {
+    const std::vector<BillboardCloud> clouds{{{0, 0, 1000}, 800, 1200}};
+    CloudBillboard billboard;
+    billboard.centre_m = {0, 0, 1000};
+    billboard.width_m = billboard.height_m = 400;
+    for (const int index : {0, 2, -2}) {
+        billboard.picture = index;
+        const std::vector<CloudBillboard> billboards{billboard};
+        Splats splats;
+        splats.clouds = clouds;
+        splats.billboards = billboards;
+        if (index == 2) splats.pictures = billboard_pictures(std::vector<AlphaImage>{quarters(1, 1, 1, 1, 1)});
+        EXPECT_THROW(renderer_.draw_splats(splats, test::view({0, -1000, 1000}, {0, 0, 1000})), Error) << index;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, PicturesOfBillboards,
+                         ::testing::Values(Splatting::cpu, Splatting::vulkan, Splatting::blended), test::way_name);
+
+TEST(BillboardPictures, ValuesMustHaveTheSizeThatIsStated) {
+    AlphaImage image = quarters(1, 1, 1, 1, 1);
+    image.bright.pop_back();
+    EXPECT_THROW(billboard_pictures(std::vector<AlphaImage>{image}), Error);
+    EXPECT_THROW(billboard_pictures(std::vector<AlphaImage>{AlphaImage{}}), Error);
+    EXPECT_THROW(billboard_pictures(std::vector<AlphaImage>(kMostBillboardPictures + 1, quarters(1, 1, 1, 1, 1))), Error);
+}
+
+Scene painted() { return read_scene(fs::path(NEPHOS_SOURCE_DIR) / "scenes/torchelsen/painted.toml"); }
+
+// Each billboard of a model with textures has one of them, the others none.
+TEST(ModelTextures, EachBillboardHasOneOfItsModels) {
+    const Scene scene = painted();
+    const std::shared_ptr<const ModelTextures> textures = read_textures(scene.models);
+    ASSERT_TRUE(textures);
+    EXPECT_EQ(textures->index.size(), 4u);
+    std::vector<int> count(4, 0);
+    for (std::uint32_t word = 0; word < 1000; ++word) ++count.at(std::size_t(textures->picture_of(scene.models[0], word)));
+    EXPECT_GT(*std::ranges::min_element(count), 200);
+    EXPECT_EQ(textures->picture_of(BaseModel{}, 7), -1);
+    EXPECT_FALSE(read_textures(std::vector<BaseModel>{BaseModel{}}));
+}
+
+TEST(ModelTextures, AreRelativeToTheFileThatNamesThem) {
+    const std::string model =
+        "[[model]]\nname = \"a\"\ntextures = [\"t/a.png\", \"../b.png\"]\nseeds = [{}]\n";
+    const Scene own = read_scene_text(model, "scene.toml", "/here/scenes");
+    EXPECT_EQ(own.models.at(0).textures, (std::vector<std::string>{"/here/scenes/t/a.png", "/here/b.png"}));
+    const TemporaryFolder folder;
+    fs::create_directory(folder.path() / "models");
+    std::ofstream(folder.path() / "models/a.toml") << model;
+    const Scene other = read_scene_text("models = \"models/a.toml\"\n", "scene.toml", folder.path());
+    EXPECT_EQ(other.models.at(0).textures.at(0), (folder.path() / "models/t/a.png").string());
+}
+
+// The simulation is the same with and without; the scene is not, wherever its files are.
+TEST(ModelTextures, ArePartOfTheSceneAndNotOfItsSimulation) {
+    const Scene scene = painted();
+    Scene plain = scene, moved = scene;
+    plain.models[0].textures.clear();
+    for (std::string& file : moved.models[0].textures) file = "/elsewhere/" + fs::path(file).filename().string();
+    EXPECT_EQ(simulation_hash(scene, ""), simulation_hash(plain, ""));
+    EXPECT_NE(scene_hash(scene), scene_hash(plain));
+    EXPECT_EQ(scene_hash(scene), scene_hash(moved));
+    EXPECT_EQ(to_toml(plain).find("textures ="), std::string::npos);
+}
+
+TEST(ModelTextures, BadOnesAreSaidWithTheirPlace) {
+    const auto problem = [](const std::string& textures) {
+        try {
+            read_scene_text("[[model]]\nname = \"a\"\ntextures = " + textures + "\nseeds = [{}]\n", "scene.toml");
+        } catch (const Error& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_NE(problem("[\"\"]").find("scene.toml:3:12: error: `model[0].textures` has an empty name"), std::string::npos)
+        << problem("[\"\"]");
+    EXPECT_NE(problem("3").find("scene.toml:3:12"), std::string::npos) << problem("3");
+    Scene scene = painted();
+    scene.models[0].textures[2] = "/nowhere/c.png";
+    try {
+        FramePainter(scene, {.splatting = Splatting::cpu});
+        FAIL() << "no error";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::io);
+        EXPECT_NE(std::string(error.what()).find("/nowhere/c.png"), std::string::npos) << error.what();
+    }
+}
+
+// The shipped scene in each back-end: the pictures agree, and differ from those of the textures from noise.
+TEST(ModelTextures, TheShippedSceneIsDrawnAlikeByAllBackEnds) {
+    Scene scene = painted();
+    scene.render.camera.width = 192;
+    scene.render.camera.height = 108;
+    Simulation simulation(scene);
+    struct First : SimulationSink {
+        void step(const StepResult&) override {}
+        void frame(const FrameResult& result) override {
+            if (!kept) kept = result;
+        }
+        std::optional<FrameResult> kept;
+    } first;
+    while (!first.kept) simulation.advance(first);
+    FramePainter painter(scene, test::validated(Splatting::cpu));
+    const Picture cpu = painter.draw(*first.kept);
+    for (const Splatting way : {Splatting::vulkan, Splatting::blended}) {
+        FramePainter other(scene, test::validated(way));
+        const Picture picture = other.draw(*first.kept);
+        EXPECT_LE(test::largest_difference(picture.transmittance, cpu.transmittance), 2.0f / 255.0f);
+        test::expect_no_messages(other.renderer());
+    }
+    EXPECT_LT(*std::ranges::min_element(cpu.transmittance), 0.1f);
+    Scene plain = scene;
+    plain.models[0].textures.clear();
+    painter.set_scene(plain, true);
+    const Picture noise = painter.draw(*first.kept);
+    EXPECT_GT(test::largest_difference(noise.transmittance, cpu.transmittance), 0.3f);
+    painter.set_scene(scene, true);
+    EXPECT_TRUE(painter.draw(*first.kept).beauty == cpu.beauty);
+}
+
+}  // namespace
+}  // namespace nephos
