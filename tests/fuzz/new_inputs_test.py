@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """libFuzzer looks for inputs that break a reader: a minute for each target, in ./test --all (docs/reliability.md).
 
-Environment: SOURCE, the repository; TARGETS, the names of the targets, separated by semicolons; NEPHOS_TEST_ALL=1 for all
+Environment: SOURCE, the repository; TARGETS, the names of the targets, separated by commas; NEPHOS_TEST_ALL=1 for all
 of it, else only that the seeds of every target are there; FUZZ_SECONDS, seconds for each target (60).
 """
 import os
@@ -13,7 +13,7 @@ import unittest
 from pathlib import Path
 
 SOURCE = Path(os.environ["SOURCE"])
-TARGETS = os.environ["TARGETS"].split(";")
+TARGETS = os.environ["TARGETS"].split(",")
 BUILD = SOURCE / "build" / "fuzz"
 SECONDS = int(os.environ.get("FUZZ_SECONDS", "60"))
 SEEDS = SOURCE / "tests" / "fuzz" / "inputs"
