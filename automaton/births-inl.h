@@ -30,6 +30,15 @@ namespace hn = hwy::HWY_NAMESPACE;
 inline void find_cloudy(const Segment& g, std::uint64_t* any) {
     const int words = (g.blocks + 7) / 8;
     const std::uint64_t* cld = g.planes.cld + g.bx0 / 8;
+#if HWY_TARGET <= HWY_AVX3
+    const hn::CappedTag<std::uint64_t, kSegmentWords> d;
+    const auto of_segment = hn::FirstN(d, std::size_t(words));
+    auto seen = hn::Zero(d);
+    for (std::ptrdiff_t at : g.row_word) {
+        if (at >= 0) seen = hn::Or(seen, hn::MaskedLoad(of_segment, d, cld + at));
+    }
+    hn::StoreU(seen, d, any);
+#else
     std::fill_n(any, kSegmentWords, std::uint64_t{0});
     for (std::ptrdiff_t at : g.row_word) {
         if (at < 0) continue;
@@ -39,33 +48,7 @@ inline void find_cloudy(const Segment& g, std::uint64_t* any) {
             for (int w = 0; w < words; ++w) any[w] |= cld[at + w];
         }
     }
-}
-
-// Applies the events of the segment to the planes and clears them.
-inline void merge_events(const Segment& g, BirthScratch& s) {
-    const int words = (g.blocks + 7) / 8;
-    const int cells_left = g.planes.extent.x - g.bx0 * kBlockEdge;
-    const std::uint64_t last =
-        cells_left >= words * 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << (cells_left % 64)) - 1;
-    std::uint64_t* const planes[3] = {g.planes.hum, g.planes.act_next, g.planes.cld};
-    for (int draw = 0; draw < 3; ++draw) {
-        if (!s.dirty[draw]) continue;
-        s.dirty[draw] = false;
-        move_dense_events(draw, s);
-        for (std::size_t row = 0; row < 64; ++row) {
-            std::uint64_t* events = s.events[draw][row];
-            if (g.row_word[row] >= 0) {
-                std::uint64_t* out = planes[draw] + g.row_word[row] + g.bx0 / 8;
-                events[words - 1] &= last;
-                if (draw == kExt) {
-                    for (int w = 0; w < words; ++w) out[w] &= ~events[w];
-                } else {
-                    for (int w = 0; w < words; ++w) out[w] |= events[w];
-                }
-            }
-            std::fill_n(events, kSegmentWords, std::uint64_t{0});
-        }
-    }
+#endif
 }
 
 inline void draw_segment(const Segment& g, BirthScratch& s) {
@@ -77,6 +60,7 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
     philox_counters(g.batch(), counters, g.blocks, s.counts);
 
     field.plan_blocks(g.bx0, g.by, g.bz, s.row, std::span(s.plans).first(std::size_t(g.blocks)));
+    bound_rates(g, s);
     for (int b = 0; b < g.blocks; ++b) {
         const BlockPlan& plan = s.plans[std::size_t(b)];
         unsigned sparse = 0;
@@ -94,7 +78,34 @@ inline void draw_segment(const Segment& g, BirthScratch& s) {
     }
     run_queue(g, s);
     run_ties(g, s);
-    merge_events(g, s);
+    apply_dense_events(g, s);
+}
+
+// Finds the rows of cells of a row of blocks in the planes.
+inline void find_rows(const StepPlanes& planes, int by, int bz, Segment& segment, BirthScratch& s) {
+    s.outside.resize(planes.words_per_row);
+    auto* const outside = reinterpret_cast<std::uint8_t*>(s.outside.data());
+    std::uint64_t* const of_draw[3] = {planes.hum, planes.act_next, planes.cld};
+    for (std::size_t i = 0; i < 64; ++i) {
+        const int j = by * kBlockEdge + int(i % 8), k = bz * kBlockEdge + int(i / 8);
+        const bool inside = j < planes.extent.y && k < planes.extent.z;
+        const std::ptrdiff_t word =
+            inside ? (std::ptrdiff_t(k) * planes.extent.y + j) * std::ptrdiff_t(planes.words_per_row) : -1;
+        segment.row_word[i] = word;
+        for (int draw = 0; draw < 3; ++draw)
+            s.rows[draw][i] = inside ? reinterpret_cast<std::uint8_t*>(of_draw[draw] + word) : outside;
+    }
+}
+
+// Returns the memory of this thread, for any number of parts: a part of a small lattice takes less time than making it.
+// Parts that a thread begins while it waits within another part would share it; nothing in a part waits.
+inline BirthScratch& scratch_of_thread() {
+    static thread_local const std::unique_ptr<BirthScratch> scratch = std::make_unique<BirthScratch>();
+    // Tables are those of a ladder, a seed and a slab.
+    for (UniformDraws& draws : scratch->uniform) draws.table = nullptr;
+    for (auto& table : scratch->dense_tables) table.reset();
+    scratch->initial_table.reset();
+    return *scratch;
 }
 
 // Calls `draw` with every segment of the rows of blocks by_begin..by_end of slab bz.
@@ -102,21 +113,15 @@ template <class DrawSegment>
 inline void draw_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end,
                       const DrawSegment& draw) {
     const PhiloxKeys keys(random.seed);
-    const auto scratch = std::make_unique<BirthScratch>();
+    BirthScratch& scratch = scratch_of_thread();
     const int all_blocks = (planes.extent.x + kBlockEdge - 1) / kBlockEdge;
     for (int by = by_begin; by < by_end; ++by) {
         Segment segment{planes, random, keys, by, bz};
-        for (int i = 0; i < 64; ++i) {
-            const int j = by * kBlockEdge + i % 8, k = bz * kBlockEdge + i / 8;
-            const bool inside = j < planes.extent.y && k < planes.extent.z;
-            segment.row_word[std::size_t(i)] =
-                inside ? (std::ptrdiff_t(k) * planes.extent.y + j) * std::ptrdiff_t(planes.words_per_row)
-                       : -1;
-        }
-        random.field->collect(by, bz, scratch->row);
+        find_rows(planes, by, bz, segment, scratch);
+        random.field->collect(by, bz, scratch.row);
         for (segment.bx0 = 0; segment.bx0 < all_blocks; segment.bx0 += kSegmentBlocks) {
             segment.blocks = std::min(kSegmentBlocks, all_blocks - segment.bx0);
-            draw(segment, *scratch);
+            draw(segment, scratch);
         }
     }
 }

@@ -60,15 +60,27 @@ inline const CellBits& cloud_of_block(const Segment& g, int block, BirthScratch&
     return s.cloud[block];
 }
 
-// Moves the segment's events of one dense draw to the rows.
-inline void move_dense_events(int draw, BirthScratch& s) {
-    for (; s.dense_words[draw] != 0; s.dense_words[draw] &= s.dense_words[draw] - 1) {
-        const int word = std::countr_zero(s.dense_words[draw]);
-        CellBits* blocks = s.dense_events[draw] + 8 * word;
-        alignas(64) CellBits rows[8];
-        mirror_bytes(blocks, rows);
-        for (std::size_t row = 0; row < 64; ++row) s.events[draw][row][word] |= rows[row % 8][row / 8];
-        std::fill_n(&blocks[0][0], 64, std::uint64_t{0});
+// Applies the segment's events of the dense draws to the planes and clears them.
+inline void apply_dense_events(const Segment& g, BirthScratch& s) {
+    const int last_word = (g.blocks + 7) / 8 - 1;
+    const int cells_left = g.planes.extent.x - (g.bx0 + 8 * last_word) * kBlockEdge;
+    const std::uint64_t last = cells_left >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << cells_left) - 1;
+    std::uint64_t* const planes[3] = {g.planes.hum, g.planes.act_next, g.planes.cld};
+    for (int draw = 0; draw < 3; ++draw) {
+        for (; s.dense_words[draw] != 0; s.dense_words[draw] &= s.dense_words[draw] - 1) {
+            const int word = std::countr_zero(s.dense_words[draw]);
+            const std::uint64_t valid = word == last_word ? last : ~std::uint64_t{0};
+            CellBits* blocks = s.dense_events[draw] + 8 * word;
+            alignas(64) CellBits rows[8];
+            mirror_bytes(blocks, rows);
+            for (std::size_t row = 0; row < 64; ++row) {
+                if (g.row_word[row] < 0) continue;
+                std::uint64_t& cells = planes[draw][g.row_word[row] + g.bx0 / 8 + word];
+                const std::uint64_t events = rows[row % 8][row / 8] & valid;
+                cells = (cells | events) ^ (draw == kExt ? events : 0);
+            }
+            std::fill_n(&blocks[0][0], 64, std::uint64_t{0});
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 #include "automaton/block_field.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <tuple>
 #include <utility>
@@ -55,6 +56,22 @@ DrawPlan plan_of_background(const BlockBackground& background, std::size_t draw)
     if (!(high > 0)) return {};
     if (low < high) return {DrawPlan::Kind::varying, high};
     return {high < 1 ? DrawPlan::Kind::uniform : DrawPlan::Kind::certain, high};
+}
+
+// Takes an ellipsoid with p <= bound into the plan of a draw. The smallest ext wins, from the background down: everywhere only
+// if the block lies inside.
+void widen(std::size_t d, float bound, bool covered, BlockPlan& plan) {
+    DrawPlan& draw = plan.draws[d];
+    if (d == kExt) {
+        if (draw.kind == DrawPlan::Kind::none) return;
+        draw.kind = DrawPlan::Kind::varying;
+        if (covered) draw.p_max = std::min(draw.p_max, bound);
+        if (draw.p_max <= 0) draw.kind = DrawPlan::Kind::none;
+    } else if (bound > draw.p_max) {
+        draw = {DrawPlan::Kind::varying, bound};
+    } else if (draw.kind != DrawPlan::Kind::none && bound > plan.background.low[d]) {
+        draw.kind = DrawPlan::Kind::varying;
+    }
 }
 
 }  // namespace
@@ -156,55 +173,29 @@ void BlockField::plan_blocks(int bx0, int by, int bz, std::span<const FieldEllip
                             .yy = float(e->yy),
                             .zz = float(e->zz),
                             .source = e};
-        for (int bx = std::max(bx0, e->bx0); bx < std::min(bx1, e->bx1); ++bx) {
-            const double dx = bx * kBlockEdge + 0.5 - e->centre_x;
-            seen.base_a = float(e->xx * dx + e->xy * dy);
-            seen.base_b = float(e->yx * dx + e->yy * dy);
-            add_to_plan(seen, plans[std::size_t(bx - bx0)]);
-        }
-    }
-}
-
-// Takes an ellipsoid into a block's plan unless the block lies outside it, and widens the bounds.
-void BlockField::add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const {
-    const FieldEllipsoid& e = *seen.source;
-    // Distance of the block's centre, and so of its nearest and farthest cell at most.
-    const float a = seen.base_a + 3.5f * (seen.xx + seen.xy);
-    const float b = seen.base_b + 3.5f * (seen.yx + seen.yy);
-    const float c = seen.base_c + 3.5f * seen.zz;
-    const float square = a * a + b * b + c * c;
-    const float outside = (1 + e.block_reach) * (1 + e.block_reach);
-    if (square > outside * 1.0001f) return;  // most of the box around an ellipsoid; spares the root
-    const float distance = std::sqrt(square);
-    const float nearest = std::max(0.0f, distance - e.block_reach);
-    const float farthest = distance + e.block_reach;
-    if (nearest >= 1) return;
-    plan.ellipsoids.push_back(seen);
-
-    const float inner = (1 - nearest * nearest) * (1 - nearest * nearest);
-    const float outer = farthest < 1 ? (1 - farthest * farthest) * (1 - farthest * farthest) : 0;
-    for (std::size_t d = 0; d < 3; ++d) {
-        // Rounding in the evaluation per cell can exceed the bound by a few units in the last place.
-        const float highest = std::max(e.rim[d] + e.span[d] * inner, e.rim[d] + e.span[d] * outer) * 1.00001f;
-        const float bound = std::clamp(highest, 0.0f, 1.0f);
-        DrawPlan& draw = plan.draws[d];
-        if (d ==
-            kExt) {  // the smallest wins: from the background down, everywhere only if the block lies inside
-            if (draw.kind == DrawPlan::Kind::none) continue;
-            draw.kind = DrawPlan::Kind::varying;
-            if (farthest < 1) draw.p_max = std::min(draw.p_max, bound);
-            if (draw.p_max <= 0) draw.kind = DrawPlan::Kind::none;
-        } else if (bound > draw.p_max) {
-            draw = {DrawPlan::Kind::varying, bound};
-        } else if (draw.kind != DrawPlan::Kind::none && bound > plan.background.low[d]) {
-            draw.kind = DrawPlan::Kind::varying;
+        const int end = std::min(bx1, e->bx1);
+        for (int bx = std::max(bx0, e->bx0); bx < end; bx += EllipsoidInRow::kBlocks) {
+            EllipsoidInRow in_row;
+            find_in_row(*e, seen, dy, bx, in_row);
+            std::uint32_t touched = in_row.touched;
+            if (end - bx < EllipsoidInRow::kBlocks) touched &= (1u << (end - bx)) - 1;
+            for (; touched != 0; touched &= touched - 1) {
+                const auto n = std::size_t(std::countr_zero(touched));
+                seen.base_a = in_row.base_a[n];
+                seen.base_b = in_row.base_b[n];
+                BlockPlan& plan = plans[std::size_t(bx - bx0) + n];
+                plan.ellipsoids.push_back(seen);
+                for (std::size_t d = 0; d < 3; ++d)
+                    widen(d, in_row.bound[d][n], (in_row.covered >> n & 1) != 0, plan);
+            }
         }
     }
 }
 
 float probability_at(const BlockPlan& plan, int draw, int dx, int dy, int dz) {
     const float* background = plan.background.values[std::size_t(draw)];
-    float p = background != nullptr ? background[dx + 8 * dy + 64 * dz] : plan.background.low[std::size_t(draw)];
+    float p =
+        background != nullptr ? background[dx + 8 * dy + 64 * dz] : plan.background.low[std::size_t(draw)];
     for (const BlockEllipsoid& e : plan.ellipsoids) {
         const float inside = ellipsoid_probability(e, draw, float(dx), float(dy), float(dz));
         if (inside < 0) continue;

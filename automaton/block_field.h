@@ -54,6 +54,19 @@ struct DrawPlan {
     float p_max = 0;
 };
 
+// An ellipsoid in 16 neighbouring blocks along x: a lane each.
+struct EllipsoidInRow {
+    static constexpr int kBlocks = 16;
+    float base_a[kBlocks], base_b[kBlocks];  // of block_field.h
+    float bound[3][kBlocks];                 // on p of each draw inside the ellipsoid, 0..1
+    std::uint32_t touched = 0;               // blocks that are not outside, a bit each
+    std::uint32_t covered = 0;               // blocks that lie inside altogether
+};
+
+// Computes it for the blocks bx, bx + 1, ...; `seen` has the row's terms. Vectorised (kernels.h): every instruction set gives
+// the same bits.
+void find_in_row(const FieldEllipsoid& e, const BlockEllipsoid& seen, double dy, int bx, EllipsoidInRow& out);
+
 struct BlockPlan {
     std::array<DrawPlan, 3> draws;
     BlockBackground background;
@@ -78,10 +91,9 @@ class BlockField {
 
   private:
     void add_with_images(const AutomatonOptions& options, const ActiveEllipsoid& active);
-    void add_to_plan(const BlockEllipsoid& seen, BlockPlan& plan) const;
 
     const Background* background_;
-    BlockBackground uniform_;                  // where the background does not vary, with its plan
+    BlockBackground uniform_;  // where the background does not vary, with its plan
     std::array<DrawPlan, 3> uniform_plan_;
     bool anything_ = false, any_extinction_ = false;
     std::vector<FieldEllipsoid> ellipsoids_;

@@ -114,6 +114,11 @@ HWY_INLINE LayerBits compare_bytes(const std::uint8_t* random, const Top& top) {
         bits.less |= std::uint64_t{random[c] < threshold} << c;
         bits.tie |= std::uint64_t{random[c] == threshold} << c;
     }
+#elif HWY_TARGET <= HWY_AVX3
+    const hn::CappedTag<std::uint8_t, 64> d;
+    const auto value = hn::LoadU(d, random), threshold = top(d, 0);
+    bits.less = hn::Lt(value, threshold).raw;
+    bits.tie = hn::Eq(value, threshold).raw;
 #else
     const hn::CappedTag<std::uint8_t, 64> d;
     HWY_ALIGN std::uint8_t less[16], tie[16];  // StoreMaskBits may write 8 bytes from where it starts
@@ -161,16 +166,23 @@ inline void run_ties(const Segment& g, BirthScratch& s) {
 inline std::uint32_t tie_threshold(std::uint32_t t) { return t == kCertain ? 0x1000000u : t & 0xFFFFFFu; }
 
 // Queues the tied cells of a layer that share a threshold. Branchless: about half of all layers have one.
-HWY_INLINE void queue_ties(int block, int draw, int layer, std::uint64_t cells, std::uint32_t below,
-                           BirthScratch& s) {
-    s.ties[s.tie_count] = {cells, block, draw, std::uint32_t(layer), below};
-    s.tie_count += int{cells != 0};
+HWY_INLINE LayerTies* queue_ties(LayerTies* to, int block, int draw, int layer, std::uint64_t cells,
+                                 std::uint32_t below) {
+    *to = {cells, below, std::uint8_t(block), std::uint8_t(draw), std::uint8_t(layer)};
+    return to + int{cells != 0};
 }
 
 // Generates the random bytes of the layers in `layers` (a bit each): 4 counters a layer, 16 bytes a counter.
-inline void random_bytes(const Segment& g, int block, int draw, unsigned layers, std::uint32_t* out) {
-    HWY_ALIGN std::uint64_t counters[32 + kMaxLanes64] = {};
+inline void random_bytes(const Segment& g, int block, int draw, unsigned layers, BirthScratch& s,
+                         std::uint32_t* out) {
     const std::uint64_t first = g.counter(draw_of(draw), block, 0);
+    if (layers == 0xFF) {
+        std::optional<PhiloxTable<32>>& table = s.dense_tables[draw];
+        if (!table) table.emplace(g.batch(), std::uint32_t(draw_of(draw)));
+        philox_counters(g.batch(), *table, PhiloxBlock(g.batch(), std::uint32_t(first >> 32)), 32, out);
+        return;
+    }
+    HWY_ALIGN std::uint64_t counters[32 + kMaxLanes64] = {};
     int count = 0;
     for (; layers != 0; layers &= layers - 1) {
         const auto sub = std::uint64_t(4 * std::countr_zero(layers));
@@ -179,8 +191,26 @@ inline void random_bytes(const Segment& g, int block, int draw, unsigned layers,
     philox_counters(g.batch(), counters, count, out);
 }
 
+// Compares the random bytes of the layers in `layers` (a bit each) with one threshold.
+inline void compare_uniform(const Segment& g, int block, int draw, std::uint32_t threshold,
+                            const CellBits& requested, unsigned layers, const std::uint8_t* bytes,
+                            BirthScratch& s) {
+    if (s.tie_count + 8 > kMaxTies) run_ties(g, s);
+    const std::uint32_t below = tie_threshold(threshold);
+    const auto top = [threshold](auto d, std::size_t)
+                         HWY_ATTR { return hn::Set(d, std::uint8_t(threshold >> 24)); };
+    CellBits& events = s.dense_events[draw][block];
+    LayerTies* ties = s.ties + s.tie_count;
+    for (; layers != 0; layers &= layers - 1, bytes += 64) {
+        const int layer = std::countr_zero(layers);
+        const LayerBits bits = compare_bytes(bytes, top);
+        ties = queue_ties(ties, block, draw, layer, bits.tie & requested[layer], below);
+        events[layer] = bits.less & requested[layer];
+    }
+    s.tie_count = int(ties - s.ties);
+}
+
 inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& plan, BirthScratch& s) {
-    s.dirty[draw] = true;
     s.dense_words[draw] |= 1u << (block / 8);
     CellBits& events = s.dense_events[draw][block];
     CellBits requested;
@@ -197,30 +227,27 @@ inline void run_dense(const Segment& g, int block, int draw, const BlockPlan& pl
     unsigned layers = 0;
     for (int layer = 0; layer < 8; ++layer) layers |= unsigned{requested[layer] != 0} << layer;
     HWY_ALIGN std::uint32_t random[4 * (32 + kMaxLanes64)];
-    random_bytes(g, block, draw, layers, random);
+    random_bytes(g, block, draw, layers, s, random);
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(random);
-    const bool uniform = draw_plan.kind == DrawPlan::Kind::uniform;
-    if (!uniform) locate_columns(plan, s.columns);
-    const std::uint32_t same = probability_threshold(draw_plan.p_max);
+    if (draw_plan.kind == DrawPlan::Kind::uniform) {
+        compare_uniform(g, block, draw, probability_threshold(draw_plan.p_max), requested, layers, bytes, s);
+        return;
+    }
+    locate_columns(plan, s.columns);
     LayerThresholds t{};
     for (; layers != 0; layers &= layers - 1, bytes += 64) {
         const int layer = std::countr_zero(layers);
-        LayerBits bits;
         if (s.tie_count + 64 > kMaxTies) run_ties(g, s);
-        if (uniform) {
-            bits = compare_bytes(
-                bytes, [same](auto d, std::size_t) HWY_ATTR { return hn::Set(d, std::uint8_t(same >> 24)); });
-            queue_ties(block, draw, layer, bits.tie & requested[layer], tie_threshold(same), s);
-        } else {
-            find_in_layer(plan, draw, layer, s);
-            make_thresholds(plan, draw, layer, requested[layer], s.layer, t);
-            bits = compare_bytes(
-                bytes, [&t](auto d, std::size_t c) HWY_ATTR { return hn::LoadU(d, t.top.data() + c); });
-            for (std::uint64_t cells = bits.tie & requested[layer]; cells != 0; cells &= cells - 1) {
-                const std::uint32_t full = t.full[std::size_t(std::countr_zero(cells))];
-                queue_ties(block, draw, layer, cells & (~cells + 1), tie_threshold(full), s);
-            }
+        find_in_layer(plan, draw, layer, s);
+        make_thresholds(plan, draw, layer, requested[layer], s.layer, t);
+        const LayerBits bits = compare_bytes(
+            bytes, [&t](auto d, std::size_t c) HWY_ATTR { return hn::LoadU(d, t.top.data() + c); });
+        LayerTies* ties = s.ties + s.tie_count;
+        for (std::uint64_t cells = bits.tie & requested[layer]; cells != 0; cells &= cells - 1) {
+            const std::uint32_t full = t.full[std::size_t(std::countr_zero(cells))];
+            ties = queue_ties(ties, block, draw, layer, cells & (~cells + 1), tie_threshold(full));
         }
+        s.tie_count = int(ties - s.ties);
         events[layer] = bits.less & requested[layer];
     }
 }

@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include "automaton/births-inl.h"
+#include "automaton/ellipsoid_row-inl.h"
 #include "automaton/growth-inl.h"
 #include "automaton/initial-inl.h"
 
@@ -48,6 +49,7 @@ namespace nephos {
 
 HWY_EXPORT(step_part_target);
 HWY_EXPORT(draw_initial_part_target);
+HWY_EXPORT(find_in_row_target);
 HWY_EXPORT(target_name);
 
 float sparse_rate_bound(const BlockPlan& plan, unsigned draws) {
@@ -66,6 +68,11 @@ void step_part(const StepPlanes& planes, const StepRandom& random, int bz, int b
 
 void draw_initial_part(const StepPlanes& planes, const StepRandom& random, int bz, int by_begin, int by_end) {
     HWY_DYNAMIC_DISPATCH(draw_initial_part_target)(planes, random, bz, by_begin, by_end);
+}
+
+void find_in_row(const FieldEllipsoid& e, const BlockEllipsoid& seen, double dy, int bx,
+                 EllipsoidInRow& out) {
+    HWY_DYNAMIC_DISPATCH(find_in_row_target)(e, seen, dy, bx, out);
 }
 
 const char* kernel_target() { return HWY_DYNAMIC_DISPATCH(target_name)(); }

@@ -3,6 +3,10 @@
 // Philox4x32-10 on vectors: one counter per 64-bit lane, its four words in four vectors whose upper lane
 // halves are never read. A round is then two widening multiplications, two shifts and four exclusive ors,
 // without shuffles.
+//
+// Counters of one block that differ only in their sub-index share most of the first two rounds: what depends on the
+// sub-index alone is in a table (PhiloxTable), what depends on the block alone is computed once (PhiloxBlock), and each
+// counter begins with the third round.
 
 #if defined(NEPHOS_PHILOX_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHOS_PHILOX_INL_H_
@@ -22,6 +26,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephos::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
+inline constexpr std::uint32_t kPhiloxM0 = 0xD2511F53u, kPhiloxM1 = 0xCD9E8D57u;  // as the paper
 
 // The key of each round, in the low half of every lane of the widest vector.
 struct PhiloxKeys {
@@ -50,80 +56,259 @@ struct PhiloxState {
     hn::Vec<D> w0, w1, w2, w3;
 };
 
+#if HWY_TARGET != HWY_SCALAR  // one lane there: no 32-bit halves to multiply
+template <class D>
+HWY_INLINE hn::Vec<D> times(D d, hn::Vec<D> word, std::uint32_t factor) {
+    const hn::Repartition<std::uint32_t, D> d32;
+    return hn::MulEven(hn::BitCast(d32, word), hn::BitCast(d32, hn::Set(d, std::uint64_t{factor})));
+}
+
+// One round. The key meets the older word first: the chain from round to round is multiply, shift, exclusive or.
+template <class D>
+HWY_INLINE void philox_round(D d, const PhiloxKeys& keys, std::size_t round, PhiloxState<D>& x) {
+    const auto product0 = times(d, x.w0, kPhiloxM0), product1 = times(d, x.w2, kPhiloxM1);
+    x.w0 = hn::Xor3(hn::ShiftRight<32>(product1), x.w1, hn::Load(d, keys.key0[round]));
+    x.w2 = hn::Xor3(hn::ShiftRight<32>(product0), x.w3, hn::Load(d, keys.key1[round]));
+    x.w1 = product1;
+    x.w3 = product0;
+}
+
+// The last round where words 0 and 1 alone are wanted.
+template <class D>
+HWY_INLINE void philox_last_round_of_01(D d, const PhiloxKeys& keys, PhiloxState<D>& x) {
+    const auto product1 = times(d, x.w2, kPhiloxM1);
+    x.w0 = hn::Xor3(hn::ShiftRight<32>(product1), x.w1, hn::Load(d, keys.key0[9]));
+    x.w1 = product1;
+}
+#endif
+
 // Words 0 and 2 of a counter in one 64-bit number.
 inline std::uint64_t pack_counter(std::uint32_t word0, std::uint32_t word2) {
     return word0 | std::uint64_t{word2} << 32;
 }
 
-// out[4*i .. 4*i+3] = Philox of the counter with packed[i]. Both arrays must reach up to the next multiple of
-// the vector's lanes.
-HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* HWY_RESTRICT packed, int count,
-                                std::uint32_t* HWY_RESTRICT out) {
-#if HWY_TARGET == HWY_SCALAR  // one lane: no 32-bit halves to multiply
+// Returns the words of one packed counter.
+inline PhiloxWords philox_of(const PhiloxBatch& batch, std::uint64_t packed) {
     const std::uint64_t seed = batch.keys.key0[0][0] | batch.keys.key1[0][0] << 32;
-    for (int i = 0; i < count; ++i) {
-        const auto words = philox(
-            seed, {std::uint32_t(packed[i]), batch.word1, std::uint32_t(packed[i] >> 32), batch.word3});
-        std::copy(words.begin(), words.end(), out + 4 * i);
-    }
-#else
-    const hn::ScalableTag<std::uint64_t> d;
-    const hn::Repartition<std::uint32_t, decltype(d)> d32;
-    const auto m0 = hn::BitCast(d32, hn::Set(d, 0xD2511F53u));
-    const auto m1 = hn::BitCast(d32, hn::Set(d, 0xCD9E8D57u));
-    const auto low = hn::Set(d, 0xFFFFFFFFu);
-    const auto start = [&](const std::uint64_t* at) HWY_ATTR {
-        const auto both = hn::LoadU(d, at);
-        return PhiloxState<decltype(d)>{both, hn::Set(d, std::uint64_t{batch.word1}),
-                                        hn::ShiftRight<32>(both), hn::Set(d, std::uint64_t{batch.word3})};
-    };
-    const auto advance = [&](PhiloxState<decltype(d)>& x, std::size_t round) HWY_ATTR {
-        const auto product0 = hn::MulEven(hn::BitCast(d32, x.w0), m0);
-        const auto product1 = hn::MulEven(hn::BitCast(d32, x.w2), m1);
-        // The key meets the older word first: the chain from round to round is multiply, shift, exclusive or.
-        x.w0 = hn::Xor3(hn::ShiftRight<32>(product1), x.w1, hn::Load(d, batch.keys.key0[round]));
-        x.w2 = hn::Xor3(hn::ShiftRight<32>(product0), x.w3, hn::Load(d, batch.keys.key1[round]));
-        x.w1 = product1;
-        x.w3 = product0;
-    };
-    const auto finish = [&](const PhiloxState<decltype(d)>& x, std::uint32_t* to) HWY_ATTR {
-        const auto words01 = hn::Or(hn::And(x.w0, low), hn::ShiftLeft<32>(x.w1));
-        const auto words23 = hn::Or(hn::And(x.w2, low), hn::ShiftLeft<32>(x.w3));
-        hn::StoreInterleaved2(words01, words23, d, reinterpret_cast<std::uint64_t*>(to));
+    return philox(seed, {std::uint32_t(packed), batch.word1, std::uint32_t(packed >> 32), batch.word3});
+}
+
+// Calls finish(state, i) with the words of the counters i, i + 1, ... of `packed`, a vector at a time. The array must
+// reach up to the next multiple of the vector's lanes.
+#if HWY_TARGET != HWY_SCALAR
+template <class Finish>
+HWY_INLINE void philox_vectors(const PhiloxBatch& batch, const std::uint64_t* HWY_RESTRICT packed, int count,
+                               const Finish& finish) {
+    using D = hn::ScalableTag<std::uint64_t>;
+    const D d;
+    const auto start = [&](int at) HWY_ATTR {
+        const auto both = hn::LoadU(d, packed + at);
+        return PhiloxState<D>{both, hn::Set(d, std::uint64_t{batch.word1}), hn::ShiftRight<32>(both),
+                              hn::Set(d, std::uint64_t{batch.word3})};
     };
     const int lanes = int(hn::Lanes(d));
     int i = 0;
     // Several vectors at a time hide each other's latency: as many as the registers hold.
 #if HWY_TARGET <= HWY_AVX3
     for (; i + 3 * lanes < count; i += 4 * lanes) {
-        auto x = start(packed + i), y = start(packed + i + lanes), z = start(packed + i + 2 * lanes),
-             w = start(packed + i + 3 * lanes);
+        auto x = start(i), y = start(i + lanes), z = start(i + 2 * lanes), w = start(i + 3 * lanes);
         for (std::size_t round = 0; round < 10; ++round) {
-            advance(x, round);
-            advance(y, round);
-            advance(z, round);
-            advance(w, round);
+            philox_round(d, batch.keys, round, x);
+            philox_round(d, batch.keys, round, y);
+            philox_round(d, batch.keys, round, z);
+            philox_round(d, batch.keys, round, w);
         }
-        finish(x, out + 4 * i);
-        finish(y, out + 4 * (i + lanes));
-        finish(z, out + 4 * (i + 2 * lanes));
-        finish(w, out + 4 * (i + 3 * lanes));
+        finish(x, i);
+        finish(y, i + lanes);
+        finish(z, i + 2 * lanes);
+        finish(w, i + 3 * lanes);
     }
 #endif
     for (; i + lanes < count; i += 2 * lanes) {
-        auto x = start(packed + i), y = start(packed + i + lanes);
+        auto x = start(i), y = start(i + lanes);
         for (std::size_t round = 0; round < 10; ++round) {
-            advance(x, round);
-            advance(y, round);
+            philox_round(d, batch.keys, round, x);
+            philox_round(d, batch.keys, round, y);
         }
-        finish(x, out + 4 * i);
-        finish(y, out + 4 * (i + lanes));
+        finish(x, i);
+        finish(y, i + lanes);
     }
     if (i < count) {
-        auto x = start(packed + i);
-        for (std::size_t round = 0; round < 10; ++round) advance(x, round);
-        finish(x, out + 4 * i);
+        auto x = start(i);
+        for (std::size_t round = 0; round < 10; ++round) philox_round(d, batch.keys, round, x);
+        finish(x, i);
     }
+}
+
+// Stores the four words of each counter one after the other.
+template <class D>
+HWY_INLINE void store_words(D d, const PhiloxState<D>& x, std::uint32_t* to) {
+    const auto low = hn::Set(d, 0xFFFFFFFFu);
+    const auto words01 = hn::Or(hn::And(x.w0, low), hn::ShiftLeft<32>(x.w1));
+    const auto words23 = hn::Or(hn::And(x.w2, low), hn::ShiftLeft<32>(x.w3));
+    hn::StoreInterleaved2(words01, words23, d, reinterpret_cast<std::uint64_t*>(to));
+}
+#endif
+
+// out[4*i .. 4*i+3] = Philox of the counter with packed[i]. Both arrays must reach up to the next multiple of
+// the vector's lanes.
+HWY_INLINE void philox_counters(const PhiloxBatch& batch, const std::uint64_t* HWY_RESTRICT packed, int count,
+                                std::uint32_t* HWY_RESTRICT out) {
+#if HWY_TARGET == HWY_SCALAR
+    for (int i = 0; i < count; ++i) {
+        const PhiloxWords words = philox_of(batch, packed[i]);
+        std::copy(words.begin(), words.end(), out + 4 * i);
+    }
+#else
+    const hn::ScalableTag<std::uint64_t> d;
+    philox_vectors(batch, packed, count,
+                   [&](const auto& x, int i) HWY_ATTR { store_words(d, x, out + 4 * i); });
+#endif
+}
+
+// The events of a sparse draw, two a counter: words 0 and 2 to first[2*i], first[2*i+1], words 1 and 3 to second. All
+// arrays must reach up to the next multiple of the vector's lanes.
+HWY_INLINE void philox_events(const PhiloxBatch& batch, const std::uint64_t* HWY_RESTRICT packed, int count,
+                              std::uint32_t* HWY_RESTRICT first, std::uint32_t* HWY_RESTRICT second) {
+#if HWY_TARGET == HWY_SCALAR
+    for (int i = 0; i < count; ++i) {
+        const PhiloxWords words = philox_of(batch, packed[i]);
+        first[2 * i] = words[0], second[2 * i] = words[1];
+        first[2 * i + 1] = words[2], second[2 * i + 1] = words[3];
+    }
+#else
+    const hn::ScalableTag<std::uint64_t> d;
+    const auto low = hn::Set(d, 0xFFFFFFFFu);
+    philox_vectors(batch, packed, count, [&](const auto& x, int i) HWY_ATTR {
+        const auto both = [&](auto a, auto b)
+                              HWY_ATTR { return hn::Or(hn::And(a, low), hn::ShiftLeft<32>(b)); };
+        hn::StoreU(both(x.w0, x.w2), d, reinterpret_cast<std::uint64_t*>(first + 2 * i));
+        hn::StoreU(both(x.w1, x.w3), d, reinterpret_cast<std::uint64_t*>(second + 2 * i));
+    });
+#endif
+}
+
+// What the first two rounds make of the sub-indices 0 .. kMax - 1 of one draw in one slab: with the words (s, step, b, z) of a
+// counter, and the keys k of each round,
+//
+//     round 1   w0 = hi(M1 b) ^ step ^ k0   w1 = lo(M1 b)                 of the block
+//               w2 = hi(M0 s) ^ z ^ k1      w3 = lo(M0 s)                 of the sub-index
+//     round 2   w0 = hi(M1 w2) ^ w1 ^ k0    w1 = lo(M1 w2)                table ^ block, table
+//               w2 = hi(M0 w0) ^ w3 ^ k1    w3 = lo(M0 w0)                block ^ table, block
+template <int kMax>
+struct PhiloxTable {
+    PhiloxTable(const PhiloxBatch& batch, std::uint32_t draw_number) : draw(draw_number) {
+        const auto k = [](const std::uint64_t(&keys)[8]) { return std::uint32_t(keys[0]); };
+        for (std::uint32_t sub = 0; sub < std::uint32_t(kMax); ++sub) {
+            const std::uint64_t product0 = std::uint64_t{kPhiloxM0} * counter_word_0(draw, sub);
+            const std::uint64_t word = std::uint32_t(product0 >> 32) ^ batch.word3 ^ k(batch.keys.key1[0]);
+            const std::uint64_t product1 = kPhiloxM1 * word;
+            w0[sub] = (product1 >> 32) ^ k(batch.keys.key0[1]);
+            w1[sub] = product1;
+            w2[sub] = std::uint32_t(product0) ^ k(batch.keys.key1[1]);
+        }
+    }
+    std::uint32_t draw;
+    alignas(64) std::uint64_t w0[kMax], w1[kMax], w2[kMax];
+};
+
+// What the first two rounds make of the block and the step.
+struct PhiloxBlock {
+    PhiloxBlock(const PhiloxBatch& batch, std::uint32_t block) : word2(block) {
+        const std::uint64_t product1 = std::uint64_t{kPhiloxM1} * word2;
+        const std::uint64_t first = (product1 >> 32) ^ batch.word1 ^ batch.keys.key0[0][0];
+        const std::uint64_t product0 = kPhiloxM0 * first;
+        w0 = std::uint32_t(product1);
+        w2 = product0 >> 32;
+        w3 = product0;
+    }
+    std::uint32_t word2;  // of the counters
+    std::uint64_t w0, w2, w3;
+};
+
+#if HWY_TARGET != HWY_SCALAR
+// Calls finish(state, i) with the words of the counters with sub-index first + i, i = 0 .. count - 1; `first` and `count` are
+// multiples of 8.
+template <bool kWords01Only, int kMax, class Finish>
+HWY_INLINE void philox_by_table(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
+                                const PhiloxBlock& block, int first, int count, const Finish& finish) {
+    using D = hn::CappedTag<std::uint64_t, 8>;
+    const D d;
+    const auto b0 = hn::Set(d, block.w0), b2 = hn::Set(d, block.w2), b3 = hn::Set(d, block.w3);
+    const auto start = [&](int at) HWY_ATTR {
+        const int sub = first + at;
+        return PhiloxState<D>{hn::Xor(hn::Load(d, table.w0 + sub), b0), hn::Load(d, table.w1 + sub),
+                              hn::Xor(hn::Load(d, table.w2 + sub), b2), b3};
+    };
+    constexpr std::size_t kWhole = kWords01Only ? 9 : 10;
+    const int lanes = int(hn::Lanes(d));
+    int i = 0;
+#if HWY_TARGET <= HWY_AVX3
+    for (; i + 4 * lanes <= count; i += 4 * lanes) {
+        auto x = start(i), y = start(i + lanes), z = start(i + 2 * lanes), w = start(i + 3 * lanes);
+        for (std::size_t round = 2; round < kWhole; ++round) {
+            philox_round(d, batch.keys, round, x);
+            philox_round(d, batch.keys, round, y);
+            philox_round(d, batch.keys, round, z);
+            philox_round(d, batch.keys, round, w);
+        }
+        if (kWords01Only) {
+            philox_last_round_of_01(d, batch.keys, x);
+            philox_last_round_of_01(d, batch.keys, y);
+            philox_last_round_of_01(d, batch.keys, z);
+            philox_last_round_of_01(d, batch.keys, w);
+        }
+        finish(x, i);
+        finish(y, i + lanes);
+        finish(z, i + 2 * lanes);
+        finish(w, i + 3 * lanes);
+    }
+#endif
+    for (; i < count; i += lanes) {
+        auto x = start(i);
+        for (std::size_t round = 2; round < kWhole; ++round) philox_round(d, batch.keys, round, x);
+        if (kWords01Only) philox_last_round_of_01(d, batch.keys, x);
+        finish(x, i);
+    }
+}
+#endif
+
+// out[4*i .. 4*i+3] = Philox of the counter with sub-index i, i = 0 .. count - 1, a multiple of 8.
+template <int kMax>
+HWY_INLINE void philox_counters(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
+                                const PhiloxBlock& block, int count, std::uint32_t* HWY_RESTRICT out) {
+#if HWY_TARGET == HWY_SCALAR
+    for (int i = 0; i < count; ++i) {
+        const PhiloxWords words =
+            philox_of(batch, pack_counter(counter_word_0(table.draw, std::uint32_t(i)), block.word2));
+        std::copy(words.begin(), words.end(), out + 4 * i);
+    }
+#else
+    const hn::CappedTag<std::uint64_t, 8> d;
+    philox_by_table<false>(batch, table, block, 0, count,
+                           [&](const auto& x, int i) HWY_ATTR { store_words(d, x, out + 4 * i); });
+#endif
+}
+
+// The lower halves of word0[i] and word1[i] = words 0 and 1 of the counter with sub-index first + i, i = 0 .. count - 1;
+// `first` and `count` are multiples of 8. The upper halves are anything.
+template <int kMax>
+HWY_INLINE void philox_words_01(const PhiloxBatch& batch, const PhiloxTable<kMax>& table,
+                                const PhiloxBlock& block, int first, int count,
+                                std::uint64_t* HWY_RESTRICT word0, std::uint64_t* HWY_RESTRICT word1) {
+#if HWY_TARGET == HWY_SCALAR
+    for (int i = 0; i < count; ++i) {
+        const auto sub = std::uint32_t(first + i);
+        const PhiloxWords words =
+            philox_of(batch, pack_counter(counter_word_0(table.draw, sub), block.word2));
+        word0[i] = words[0], word1[i] = words[1];
+    }
+#else
+    const hn::CappedTag<std::uint64_t, 8> d;
+    philox_by_table<true>(batch, table, block, first, count, [&](const auto& x, int i) HWY_ATTR {
+        hn::StoreU(x.w0, d, word0 + i);
+        hn::StoreU(x.w1, d, word1 + i);
+    });
 #endif
 }
 

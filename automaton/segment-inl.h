@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <hwy/highway.h>
@@ -26,8 +27,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 inline constexpr int kMaxLanes64 = 8;  // of 64 bits, in the widest vector
 
-// Blocks are taken in segments of 64 along x: their events fill 4 KiB a draw, which stay in the first-level
-// cache, and everything below has a fixed size.
+// Blocks are taken in segments of 64 along x, so that everything below has a fixed size.
 inline constexpr int kSegmentBlocks = 64;
 inline constexpr int kSegmentWords = kSegmentBlocks * kBlockEdge / 64;
 inline constexpr int kMaxCounters = 512;  // queued before the sparse draws are run
@@ -41,13 +41,28 @@ struct LayerEllipsoid {
     bool bounded;  // outside, where its value is the rim, it must be left out
 };
 
+// The rate of a level of the ladder, and rates of cells in the order in which an event is compared with them: hum, hum + act,
+// hum + act + ext; 0 for draws that are not made.
+struct SparseRates {
+    float unit;  // rate of the level * 2^-31
+    float hum, act, ext, two, three;
+};
+
+// The sparse draws of the blocks without ellipsoids whose background is the same in all cells.
+struct UniformDraws {
+    const PoissonTable* table = nullptr;  // null: not known yet
+    std::array<float, 3> p{};             // of the background
+    SparseRates rates{};
+};
+
 // The sparse draws of one block.
 struct SparseJob {
     int block;       // in the segment
     unsigned draws;  // a bit each
     int events;
-    int first;        // its first counter in the queue; two events a counter
-    float rate_unit;  // rate of the level * 2^-31
+    int first;     // its first counter in the queue; two events a counter
+    bool uniform;  // `rates` are those of all cells; else only the unit is known
+    SparseRates rates;
 };
 
 // A bit for each cell of a block: bit c % 64 of word c / 64 is the cell c = x + 8 y + 64 z.
@@ -56,9 +71,8 @@ using CellBits = std::uint64_t[8];
 // Cells of a layer whose random byte equals the top byte of their threshold: 24 more bits decide.
 struct LayerTies {
     std::uint64_t cells;
-    int block, draw;
-    std::uint32_t layer;
     std::uint32_t below;  // an event if the 24 bits are less than this
+    std::uint8_t block, draw, layer;
 };
 
 // One of them.
@@ -70,22 +84,28 @@ struct Tie {
 
 // Memory of one thread.
 struct BirthScratch {
-    // Cells that have an event: bit i of byte `block` of row y + 8 z is the cell i of that block. 0 between
-    // segments.
-    std::uint64_t events[3][64][kSegmentWords] = {};
     alignas(64) CellBits
         dense_events[3][kSegmentBlocks] = {};            // those of the dense draws; 0 between segments
     alignas(64) CellBits cloud[kSegmentBlocks];          // cells that are cld, see cloud_of_block()
     std::uint64_t counters[kMaxCounters + kMaxLanes64];  // packed, see philox-inl.h
-    std::uint32_t
-        words[4 * (kMaxCounters + kMaxLanes64) + 32];  // 32 more: the last vector of events reads beyond
+    // The two words of each event; 16 more, as the last vector of events reads beyond.
+    std::uint32_t first[2 * (kMaxCounters + kMaxLanes64) + 16], second[2 * (kMaxCounters + kMaxLanes64) + 16];
+    std::uint32_t accepted[2 * (kMaxCounters + kMaxLanes64) + 16];  // see pack_event()
+    int accepted_count = 0;
     std::uint32_t counts[4 * (kSegmentBlocks + kMaxLanes64)];
     std::uint64_t cloudy[kSegmentWords];  // a byte a block: not 0 when it holds any cld
+    // Where each plane keeps the 64 rows of cells y + 8 z of the row of blocks: byte bx holds the 8 cells of block bx. Rows
+    // beyond the lattice lead to `outside`.
+    std::uint8_t* rows[3][64];
+    std::vector<std::uint64_t> outside;
+    float rate_bounds[3][kSegmentBlocks];                   // of each draw: its share of sparse_rate_bound()
+    UniformDraws uniform[8];                                // by the draws, a bit each
+    std::optional<PhiloxTable<32>> dense_tables[3];         // of the random bytes of each draw
+    std::optional<PhiloxTable<kBlockCells>> initial_table;  // of the first state
     SparseJob jobs[kSegmentBlocks];
     int job_count = 0, counter_count = 0;
     LayerTies ties[kMaxTies];
     int tie_count = 0;
-    bool dirty[3] = {};            // draws with events in this segment
     unsigned dense_words[3] = {};  // words of its rows, a bit each, that have events of the dense draw
     unsigned known_cloud = 0;      // words of the segment's rows, a bit each, whose 8 blocks are in `cloud`
     std::vector<float> columns;    // see locate_columns()
@@ -113,16 +133,6 @@ struct Segment {
 };
 
 inline Draw draw_of(int draw) { return Draw(std::uint32_t(draw) + std::uint32_t(Draw::hum)); }
-
-inline std::uint8_t* event_bytes(BirthScratch& s, int draw, int block) {
-    return reinterpret_cast<std::uint8_t*>(s.events[draw]) + block;
-}
-
-// Marks a cell (x + 8 y + 64 z in its block); `bytes` comes from event_bytes().
-HWY_INLINE void mark(std::uint8_t* bytes, std::uint32_t cell) {
-    std::uint8_t& byte = bytes[(cell >> 3) * kSegmentBlocks];
-    byte = std::uint8_t(byte | 1u << (cell & 7));
-}
 
 // The place of a vector of cells in one ellipsoid; the operations and their order are those of block_field.h.
 template <class V>

@@ -16,6 +16,7 @@
 
 #include <hwy/highway.h>
 
+#include "automaton/block_bits-inl.h"
 #include "automaton/segment-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -33,109 +34,211 @@ HWY_INLINE V rate_of(DF d, V p) {
     return hn::Mul(hn::Add(z, z), series);
 }
 
-// A bit for each lane of a mask of floats.
-template <class DF, class M>
-HWY_INLINE std::uint32_t bits_of(DF d, M mask) {
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(d, mask, bytes);
-    return std::uint32_t(bytes[0]) | std::uint32_t(bytes[1]) << 8;
+// An event that takes place: the cell (9 bits), the draw (2), the block in the segment.
+HWY_INLINE std::uint32_t pack_event(int block, int draw, std::uint32_t cell) {
+    return cell | std::uint32_t(draw) << 9 | std::uint32_t(block) << 11;
 }
 
-// Marks the events of the lanes in `close`, whose v is too near a threshold for float32: sparse_draw()
-// decides. `words` are those of lane 0; rates are 0 for draws that the job does not make.
+// Applies the events that were accepted: each sets hum or act, or clears cld. In a loop of their own, as a few of many are
+// accepted and no processor foretells which.
+inline void apply_events(const Segment& g, BirthScratch& s) {
+    const int last_block = g.blocks - 1;
+    const int cells_left = g.planes.extent.x - (g.bx0 + last_block) * kBlockEdge;
+    const std::uint32_t last = cells_left >= kBlockEdge ? 0xFFu : (1u << cells_left) - 1;
+    for (int n = 0; n < s.accepted_count; ++n) {
+        const std::uint32_t event = s.accepted[n];
+        const int block = int(event >> 11);
+        const std::uint32_t bit = 1u << (event & 7) & (block == last_block ? last : 0xFFu);
+        std::uint8_t& byte = s.rows[event >> 9 & 3][event >> 3 & 63][g.bx0 + block];
+        byte = std::uint8_t((byte | bit) ^ ((event >> 9 & 3) == kExt ? bit : 0u));
+    }
+    s.accepted_count = 0;
+}
+
+// Decides the events of the lanes in `close`, whose v is too near a threshold for float32, by sparse_draw(). `at` is the
+// place of lane 0 in the queue.
 template <class DF, class V = hn::Vec<DF>>
-HWY_NOINLINE void run_close(DF d, const SparseJob& job, std::uint32_t close, const std::uint32_t* words,
-                            const V& hum, const V& act, const V& ext, BirthScratch& s) {
+HWY_NOINLINE void run_close(DF d, const SparseJob& job, hn::Mask<DF> close, int at, const V& hum,
+                            const V& act, const V& ext, BirthScratch& s) {
     HWY_ALIGN float rates[3][hn::MaxLanes(d)];
     hn::Store(hum, d, rates[kHum]);
     hn::Store(act, d, rates[kAct]);
     hn::Store(ext, d, rates[kExt]);
-    for (; close != 0; close &= close - 1) {
-        const int lane = std::countr_zero(close);
-        const std::uint32_t first = words[2 * lane], second = words[2 * lane + 1];
-        const int draw = sparse_draw(first, second, double(job.rate_unit) * 0x1p31,
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, close, bytes);
+    for (int lane = 0; lane < int(hn::Lanes(d)); ++lane) {
+        if ((bytes[lane / 8] >> (lane % 8) & 1) == 0) continue;
+        const std::uint32_t first = s.first[at + lane], second = s.second[at + lane];
+        const int draw = sparse_draw(first, second, double(job.rates.unit) * 0x1p31,
                                      {rates[kHum][lane], rates[kAct][lane], rates[kExt][lane]});
-        if (draw <= kExt) mark(event_bytes(s, draw, job.block), first & 511u);
+        if (draw <= kExt) s.accepted[s.accepted_count++] = pack_event(job.block, draw, first & 511u);
     }
+}
+
+// Rates of the cells of a vector of events.
+template <class V>
+struct EventRates {
+    V hum, act, ext, two, three;
+};
+
+// Evaluates the field at a vector of cells.
+template <class DF, class VU, class V = hn::Vec<DF>>
+HWY_INLINE EventRates<V> rates_at(DF d, const SparseJob& job, const BlockPlan& plan, VU first) {
+    const hn::RebindToUnsigned<DF> du;
+    const hn::RebindToSigned<DF> di;
+    const auto seven = hn::Set(du, 7);
+    const auto to_float = [&](auto v) HWY_ATTR { return hn::ConvertTo(d, hn::BitCast(di, v)); };
+    const auto dx = to_float(hn::And(first, seven));
+    const auto dy = to_float(hn::And(hn::ShiftRight<3>(first), seven));
+    const auto dz = to_float(hn::And(hn::ShiftRight<6>(first), seven));
+    const auto of = [&](int draw) HWY_ATTR {
+        const float* values = plan.background.values[std::size_t(draw)];
+        if (values == nullptr) return hn::Set(d, plan.background.low[std::size_t(draw)]);
+        return hn::GatherIndex(d, values, hn::BitCast(di, hn::And(first, hn::Set(du, 511))));
+    };
+    auto hum = of(kHum), act = of(kAct), ext = of(kExt);
+    for (const BlockEllipsoid& ellipsoid : plan.ellipsoids) {
+        const auto at = locate(d, ellipsoid, dx, dy, dz);
+        hum = combine(d, ellipsoid, kHum, at, hum);
+        act = combine(d, ellipsoid, kAct, at, act);
+        ext = combine(d, ellipsoid, kExt, at, ext);
+    }
+    const auto zero = hn::Zero(d);
+    hum = (job.draws & 1u << kHum) != 0 ? rate_of(d, hum) : zero;
+    act = (job.draws & 1u << kAct) != 0 ? rate_of(d, act) : zero;
+    ext = (job.draws & 1u << kExt) != 0 ? rate_of(d, ext) : zero;
+    const auto two = hn::Add(hum, act);
+    return {hum, act, ext, two, hn::Add(two, ext)};
 }
 
 // Runs one sparse job whose words are ready. Makes the choice of sparse_draw() in float32, whose v and sums
 // of rates are right to 2^-22 of the level's rate, and leaves events to run_close() whose v lies within
-// 2^-21 of a sum: three in a million.
-inline void run_sparse(const SparseJob& job, BirthScratch& s) {
+// 2^-21 of a sum: three in a million. Extinctions where there is no cloud are left out, as nothing would happen.
+template <bool kUniform>
+HWY_INLINE void run_sparse([[maybe_unused]] const Segment& g, const SparseJob& job, BirthScratch& s) {
     const hn::ScalableTag<float> d;
     const hn::RebindToUnsigned<decltype(d)> du;
     const hn::RebindToSigned<decltype(d)> di;
+    using V = hn::Vec<decltype(d)>;
     const int lanes = int(hn::Lanes(d));
-    const std::uint32_t* words = s.words + 4 * job.first;
     const BlockPlan& plan = s.plans[std::size_t(job.block)];
-    const BlockBackground& background = plan.background;
-    const auto seven = hn::Set(du, 7);
-    const auto slack = hn::Set(d, job.rate_unit * 0x1p10f);
-    const auto to_float = [&](auto v) HWY_ATTR { return hn::ConvertTo(d, hn::BitCast(di, v)); };
+    const auto unit = hn::Set(d, job.rates.unit), slack = hn::Set(d, job.rates.unit * 0x1p10f);
+    EventRates<V> rates{hn::Set(d, job.rates.hum), hn::Set(d, job.rates.act), hn::Set(d, job.rates.ext),
+                        hn::Set(d, job.rates.two), hn::Set(d, job.rates.three)};
+    const auto of_hum = hn::Set(du, pack_event(job.block, kHum, 0)),
+               of_act = hn::Set(du, pack_event(job.block, kAct, 0)),
+               of_ext = hn::Set(du, pack_event(job.block, kExt, 0));
+#if HWY_TARGET <= HWY_AVX3
+    const bool extinguishes = (job.draws & 1u << kExt) != 0;
+    const CellBits& cloud = extinguishes ? cloud_of_block(g, job.block, s) : s.cloud[0];
+    const auto cloud_words = hn::LoadU(du, reinterpret_cast<const std::uint32_t*>(&cloud[0]));
+#endif
     for (int e = 0; e < job.events; e += lanes) {
-        hn::Vec<decltype(du)> cell, second;
-        hn::LoadInterleaved2(du, words + 2 * e, cell, second);
-        const auto dx = to_float(hn::And(cell, seven));
-        const auto dy = to_float(hn::And(hn::ShiftRight<3>(cell), seven));
-        const auto dz = to_float(hn::And(hn::ShiftRight<6>(cell), seven));
-        const auto of = [&](int draw) HWY_ATTR {
-            const float* values = background.values[std::size_t(draw)];
-            if (values == nullptr) return hn::Set(d, background.low[std::size_t(draw)]);
-            return hn::GatherIndex(d, values, hn::BitCast(di, hn::And(cell, hn::Set(du, 511))));
-        };
-        auto hum = of(kHum), act = of(kAct), ext = of(kExt);
-        for (const BlockEllipsoid& ellipsoid : plan.ellipsoids) {
-            const auto at = locate(d, ellipsoid, dx, dy, dz);
-            hum = combine(d, ellipsoid, kHum, at, hum);
-            act = combine(d, ellipsoid, kAct, at, act);
-            ext = combine(d, ellipsoid, kExt, at, ext);
+        const int at = 2 * job.first + e;
+        const auto first = hn::LoadU(du, s.first + at);
+        if constexpr (!kUniform) rates = rates_at(d, job, plan, first);
+        const auto v =
+            hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<1>(hn::LoadU(du, s.second + at)))), unit);
+        const auto distance = hn::Min(hn::AbsDiff(v, rates.hum),
+                                      hn::Min(hn::AbsDiff(v, rates.two), hn::AbsDiff(v, rates.three)));
+        const auto used = hn::FirstN(d, std::size_t(job.events - e));
+        const auto up_to_act = hn::Lt(v, rates.two);
+        auto accepted = hn::And(used, hn::Lt(v, rates.three));
+#if HWY_TARGET <= HWY_AVX3
+        if (extinguishes) {
+            // The cell's bit of `cloud`, moved to the sign.
+            const auto word = hn::TableLookupLanes(
+                cloud_words, hn::IndicesFromVec(du, hn::And(hn::ShiftRight<5>(first), hn::Set(du, 15))));
+            const auto bit = hn::Shl(word, hn::AndNot(first, hn::Set(du, 31)));
+            accepted = hn::And(accepted, hn::Or(up_to_act, hn::MaskFromVec(hn::BitCast(d, bit))));
         }
-        const auto zero = hn::Zero(d);
-        hum = (job.draws & 1u << kHum) != 0 ? rate_of(d, hum) : zero;
-        act = (job.draws & 1u << kAct) != 0 ? rate_of(d, act) : zero;
-        ext = (job.draws & 1u << kExt) != 0 ? rate_of(d, ext) : zero;
-        const auto v = hn::Mul(to_float(hn::ShiftRight<1>(second)), hn::Set(d, job.rate_unit));
-        const auto two = hn::Add(hum, act), three = hn::Add(two, ext);
-        const auto distance =
-            hn::Min(hn::AbsDiff(v, hum), hn::Min(hn::AbsDiff(v, two), hn::AbsDiff(v, three)));
-        const std::uint32_t used = job.events - e < lanes ? (1u << (job.events - e)) - 1 : 0xFFFFFFFFu;
-        const std::uint32_t up_to_hum = bits_of(d, hn::Lt(v, hum)), up_to_act = bits_of(d, hn::Lt(v, two));
-        std::uint32_t accepted = bits_of(d, hn::Lt(v, three)) & used;
-        const auto close = hn::Lt(distance, slack);
+#endif
+        const auto close = hn::And(used, hn::Lt(distance, slack));
         if (HWY_UNLIKELY(!hn::AllFalse(d, close))) {
-            const std::uint32_t lanes_close = bits_of(d, close);
-            run_close(d, job, lanes_close & used, words + 2 * e, hum, act, ext, s);
-            accepted &= ~lanes_close;
+            run_close(d, job, close, at, rates.hum, rates.act, rates.ext, s);
+            accepted = hn::AndNot(close, accepted);
         }
-        for (; accepted != 0; accepted &= accepted - 1) {
-            const int lane = std::countr_zero(accepted);
-            const int draw = 2 - int(up_to_hum >> lane & 1) - int(up_to_act >> lane & 1);
-            mark(event_bytes(s, draw, job.block), words[2 * (e + lane)] & 511u);
-        }
+        const auto accepted_u = hn::RebindMask(du, accepted);
+        const auto of_draw = hn::IfThenElse(hn::RebindMask(du, hn::Lt(v, rates.hum)), of_hum,
+                                            hn::IfThenElse(hn::RebindMask(du, up_to_act), of_act, of_ext));
+        const auto event = hn::Or(hn::And(first, hn::Set(du, 511)), of_draw);
+        hn::StoreU(hn::Compress(event, accepted_u), du, s.accepted + s.accepted_count);
+        s.accepted_count += int(hn::CountTrue(du, accepted_u));
     }
 }
 
 // Makes the words of all queued sparse draws and runs them.
 inline void run_queue(const Segment& g, BirthScratch& s) {
-    philox_counters(g.batch(), s.counters, s.counter_count, s.words);
-    for (int j = 0; j < s.job_count; ++j) run_sparse(s.jobs[j], s);
+    philox_events(g.batch(), s.counters, s.counter_count, s.first, s.second);
+    for (int j = 0; j < s.job_count; ++j) {
+        if (s.jobs[j].uniform) {
+            run_sparse<true>(g, s.jobs[j], s);
+        } else {
+            run_sparse<false>(g, s.jobs[j], s);
+        }
+    }
+    apply_events(g, s);
     s.job_count = 0;
     s.counter_count = 0;
 }
 
+// Returns the draws of a block of nothing but a background that is the same in all cells. Most blocks of a step have the
+// same, so the last one is kept.
+inline const UniformDraws& uniform_draws(const Segment& g, const BlockPlan& plan, unsigned draws,
+                                         BirthScratch& s) {
+    UniformDraws& known = s.uniform[draws];
+    if (known.table != nullptr && known.p == plan.background.low) return known;
+    const auto rate = [&](int draw) {
+        return (draws >> draw & 1) != 0 ? sparse_rate(plan.background.low[std::size_t(draw)]) : 0.0f;
+    };
+    known.table = &g.random.ladder->level(sparse_rate_bound(plan, draws));
+    known.p = plan.background.low;
+    const float hum = rate(kHum), act = rate(kAct), ext = rate(kExt), two = hum + act;
+    known.rates = {float(known.table->rate) * 0x1p-31f, hum, act, ext, two, two + ext};
+    return known;
+}
+
+// Computes the terms of sparse_rate_bound() of all blocks of the segment.
+inline void bound_rates(const Segment& g, BirthScratch& s) {
+    const hn::CappedTag<float, 16> d;
+    for (std::size_t draw = 0; draw < 3; ++draw) {
+        float* bounds = s.rate_bounds[draw];
+        for (std::size_t b = 0; b < std::size_t(g.blocks); ++b) bounds[b] = s.plans[b].draws[draw].p_max;
+        for (std::size_t b = 0; b < std::size_t(g.blocks); b += hn::Lanes(d)) {
+            const auto p = hn::Min(hn::LoadU(d, bounds + b), hn::Set(d, kVaryingSparseLimit));
+            hn::StoreU(hn::Mul(rate_of(d, p), hn::Set(d, 1.00001f)), d, bounds + b);
+        }
+    }
+}
+
 // Queues the sparse draws of a block with their counters.
 inline void queue_sparse(const Segment& g, int block, unsigned draws, BirthScratch& s) {
-    const PoissonTable& table = g.random.ladder->level(sparse_rate_bound(s.plans[std::size_t(block)], draws));
-    const int events = table.events(s.counts[4 * block]);
+    const BlockPlan& plan = s.plans[std::size_t(block)];
+    const auto& values = plan.background.values;
+    const bool uniform = plan.ellipsoids.empty() && values[kHum] == nullptr && values[kAct] == nullptr &&
+                         values[kExt] == nullptr;
+    SparseRates rates{};
+    const PoissonTable* table = nullptr;
+    if (uniform) {
+        const UniformDraws& known = uniform_draws(g, plan, draws, s);
+        table = known.table;
+        rates = known.rates;
+    } else {
+        float bound = 0;
+        for (std::size_t draw = 0; draw < 3; ++draw) {
+            if ((draws >> draw & 1) != 0) bound += s.rate_bounds[draw][block];
+        }
+        table = &g.random.ladder->level(bound);
+        rates.unit = float(table->rate) * 0x1p-31f;
+    }
+    const int events = table->events(s.counts[4 * block]);
     if (events == 0) return;
     const int counters = (events + 1) / 2;
     if (s.counter_count + counters > kMaxCounters) run_queue(g, s);
-    s.jobs[s.job_count++] = {block, draws, events, s.counter_count, float(table.rate) * 0x1p-31f};
+    s.jobs[s.job_count++] = {block, draws, events, s.counter_count, uniform, rates};
     const std::uint64_t first = g.counter(Draw::sparse, block, 0);
     for (int c = 0; c < counters; ++c) s.counters[s.counter_count + c] = first + std::uint64_t(c);
     s.counter_count += counters;
-    for (int draw = 0; draw < 3; ++draw) s.dirty[draw] = s.dirty[draw] || (draws >> draw & 1) != 0;
 }
 
 }  // namespace nephos::HWY_NAMESPACE

@@ -10,6 +10,7 @@
 
 #include "automaton/automaton.h"
 #include "automaton/kernels.h"
+#include "tests/automaton/each_target.h"
 #include "tests/reference/reference_automaton.h"
 #include "tests/reference/with_threads.h"
 
@@ -182,23 +183,6 @@ TEST(Determinism, ThreadsDoNotChangeTheBits) {
     }
 }
 
-// Calls check() with each instruction set that the kernels are compiled for and this processor has, the
-// baseline among them.
-template <class Check>
-void with_each_target(const Check& check) {
-    const std::int64_t targets = HWY_TARGETS & (hwy::SupportedTargets() | HWY_STATIC_TARGET);
-    for (std::int64_t rest = targets; rest != 0; rest &= rest - 1) {
-        const std::int64_t target = rest & -rest;
-        SCOPED_TRACE(hwy::TargetName(target));
-        hwy::SetSupportedTargetsForTest(target);
-        hwy::GetChosenTarget().Update(target);
-        EXPECT_STREQ(kernel_target(), hwy::TargetName(target));
-        check();
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().DeInit();
-}
-
 #if HWY_ARCH_X86 && !defined(__SSSE3__)
 // A build for any x86-64 processor has kernels for those without AVX2, too.
 TEST(Determinism, KernelsHaveTheTargetsBelowAvx2) {
@@ -213,7 +197,7 @@ TEST(Determinism, InstructionSetsDoNotChangeTheBits) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         const AutomatonOptions options = busy_options(seed);
         const auto expected = hashes_of(options, 4);
-        with_each_target([&] { EXPECT_EQ(hashes_of(options, 4), expected); });
+        test::with_each_target([&] { EXPECT_EQ(hashes_of(options, 4), expected); });
     }
 }
 
@@ -226,7 +210,7 @@ TEST(Determinism, InstructionSetsDecideCloseEventsAsDoublesDo) {
     for (std::uint64_t& word : start.cld.words()) word = ~std::uint64_t{0};
     reference::Cells twin = reference::to_cells(start.hum.view(), start.act.view(), start.cld.view());
     reference::extinguish_and_bear(twin, o, 0, {});
-    with_each_target([&] {
+    test::with_each_target([&] {
         Automaton automaton(o, start);
         automaton.step();
         EXPECT_TRUE(reference::to_cells(automaton.hum(), automaton.act(), automaton.cld()) == twin);
@@ -251,7 +235,7 @@ TEST(Determinism, InstructionSetsDrawRowsOfAnyLength) {
             const std::vector<ActiveEllipsoid> ellipsoids = Automaton(o, start).ellipsoids();
             twin = reference::grow(twin, o.boundaries);
             reference::extinguish_and_bear(twin, o, 0, ellipsoids);
-            with_each_target([&] {
+            test::with_each_target([&] {
                 Automaton automaton(o, start);
                 automaton.step();
                 EXPECT_EQ(reference::to_cells(automaton.hum(), automaton.act(), automaton.cld()), twin);

@@ -34,8 +34,8 @@ inline std::uint64_t pack_counter(std::uint32_t word0, std::uint32_t word2) {
     return word0 | std::uint64_t{word2} << 32;
 }
 
-HWY_INLINE void philox_counters(const PhiloxBatch&, const std::uint64_t*, int count,
-                                std::uint32_t* HWY_RESTRICT out) {
+// Writes as many words as 4 * count, in 64-bit numbers, up to the next whole vector.
+HWY_INLINE void uncounted_words(int count, std::uint64_t* HWY_RESTRICT words) {
     alignas(64) static thread_local std::uint64_t states[2][8] = {
         {0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB, 0x2545F4914F6CDD1D, 0x1D872B41,
          0x5851F42D4C957F2D, 0x14057B7EF767814F, 0x369DEA0F31A53F85},
@@ -43,7 +43,6 @@ HWY_INLINE void philox_counters(const PhiloxBatch&, const std::uint64_t*, int co
     const hn::ScalableTag<std::uint64_t> d;
     const int lanes = int(hn::Lanes(d));
     auto s1 = hn::Load(d, states[0]), s0 = hn::Load(d, states[1]);
-    auto* words = reinterpret_cast<std::uint64_t*>(out);
     for (int i = 0; i < 2 * count; i += lanes) {
         auto x = s1;
         const auto y = s0;
@@ -54,6 +53,40 @@ HWY_INLINE void philox_counters(const PhiloxBatch&, const std::uint64_t*, int co
     }
     hn::Store(s1, d, states[0]);
     hn::Store(s0, d, states[1]);
+}
+
+HWY_INLINE void philox_counters(const PhiloxBatch&, const std::uint64_t*, int count,
+                                std::uint32_t* HWY_RESTRICT out) {
+    uncounted_words(count, reinterpret_cast<std::uint64_t*>(out));
+}
+
+HWY_INLINE void philox_events(const PhiloxBatch&, const std::uint64_t*, int count,
+                              std::uint32_t* HWY_RESTRICT first, std::uint32_t* HWY_RESTRICT second) {
+    uncounted_words((count + 1) / 2, reinterpret_cast<std::uint64_t*>(first));
+    uncounted_words((count + 1) / 2, reinterpret_cast<std::uint64_t*>(second));
+}
+
+template <int kMax>
+struct PhiloxTable {
+    PhiloxTable(const PhiloxBatch&, std::uint32_t) {}
+};
+
+struct PhiloxBlock {
+    PhiloxBlock(const PhiloxBatch&, std::uint32_t) {}
+};
+
+template <int kMax>
+HWY_INLINE void philox_counters(const PhiloxBatch&, const PhiloxTable<kMax>&, const PhiloxBlock&, int count,
+                                std::uint32_t* HWY_RESTRICT out) {
+    uncounted_words(count, reinterpret_cast<std::uint64_t*>(out));
+}
+
+template <int kMax>
+HWY_INLINE void philox_words_01(const PhiloxBatch&, const PhiloxTable<kMax>&, const PhiloxBlock&, int,
+                                int count, std::uint64_t* HWY_RESTRICT word0,
+                                std::uint64_t* HWY_RESTRICT word1) {
+    uncounted_words(count / 2, word0);
+    uncounted_words(count / 2, word1);
 }
 
 }  // namespace nephos::HWY_NAMESPACE
