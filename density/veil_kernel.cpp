@@ -23,9 +23,9 @@ namespace {
 
 // An octave seen from the base of the points: the lattice cell that the base lies in, and where in it.
 struct LocalOctave {
-    std::uint32_t cell[3];
-    float within[3], per_m[3];
-    float turned[2][2];  // VeilLattice::per_m
+    std::uint32_t cell[3] = {};
+    float within[3] = {}, per_m[3] = {};
+    float turned[2][2] = {};  // VeilLattice::per_m
 };
 
 LocalOctave local_octave(const VeilOctavePlan& octave, const std::array<double, 3>& base_m) {
@@ -109,8 +109,6 @@ HWY_INLINE Floats repeating_noise(const VeilOctavePlan& octave, const LocalOctav
     return noise(columns, axes[0], axes[1], z);
 }
 
-constexpr std::size_t kMostOctaves = 12, kMostResolvedOctaves = 24;
-
 // q of one vector of points.
 template <bool kRidged, bool kDisplaced, bool kRepeats>
 HWY_INLINE Floats sum_of_octaves(const VeilPlan& plan, const LocalOctave* local, Floats (&point)[3],
@@ -148,7 +146,7 @@ HWY_INLINE Floats sum_of_octaves(const VeilPlan& plan, const LocalOctave* local,
 template <bool kRidged, bool kDisplaced, bool kRepeats>
 void sums(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out) {
     const NoiseFloats d;
-    LocalOctave local[kMostOctaves];
+    LocalOctave local[kMostVeilOctaves];
     for (std::size_t k = 0; k < plan.octaves.size(); ++k) {
         local[k] = local_octave(plan.octaves[k], points.base_m);
     }
@@ -199,7 +197,7 @@ void resolved_sums(const VeilPlan& plan, const VeilPoints& points, const float* 
                    float* variance) {
     const NoiseFloats d;
     const Floats one = hn::Set(d, 1.0f), zero = hn::Zero(d);
-    LocalOctave local[kMostResolvedOctaves];
+    LocalOctave local[kMostVeilOctaves];
     for (std::size_t k = 0; k < plan.octaves.size(); ++k)
         local[k] = local_octave(plan.octaves[k], points.base_m);
     for (std::size_t n = 0; n < points.count; n += hn::Lanes(d)) {

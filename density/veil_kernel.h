@@ -31,6 +31,7 @@ struct VeilPlan {
     float low = 0, high = 1;  // q at density 0 and 1
 };
 
+inline constexpr std::size_t kMostVeilOctaves = 24;  // of a plan: those of the options, and finer ones
 inline constexpr std::size_t kVeilLanes = 64;  // points are padded to a multiple of this
 
 // Points in the frame of the noise, in metres, as float offsets from a double base, so that precision does
@@ -42,12 +43,12 @@ struct VeilPoints {
 };
 
 // Computes out[n] = q of point n. Where q is below `threshold`, out[n] is any value below it: octaves that
-// cannot reach it any more are skipped.
+// cannot reach it any more are skipped. Precondition: at most kMostVeilOctaves octaves.
 void veil_sums(const VeilPlan& plan, const VeilPoints& points, float threshold, float* out);
 
 // Computes sum[n] = q of point n, without what is finer than footprint_m[n]: octaves fade into their mean while the
 // footprint grows from a quarter to three quarters of their shortest wavelength. variance[n] is the variance of what is
-// left out.
+// left out. Precondition: as above.
 void resolved_veil_sums(const VeilPlan& plan, const VeilPoints& points, const float* footprint_m, float* sum,
                         float* variance);
 

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/math.h"
+#include "density/veil_lattice.h"
 #include "density/veil_plan.h"
 
 namespace nephos {
@@ -24,7 +25,19 @@ double shortest(const VeilOctave& octave) {
     return std::min({octave.wavelength_m.x, octave.wavelength_m.y, octave.wavelength_m.z});
 }
 
-// The options with finer octaves after theirs.
+// Whether an octave of a veil that repeats has a lattice; of one that does not, always.
+bool fits_the_tile(const VeilOctave& octave, const VeilOptions& options) {
+    if (!(options.period_m.x > 0)) return true;
+    const Rotation fibres = rotation_of_degrees(options.direction_deg);
+    return veil_lattice({octave.wavelength_m.x, octave.wavelength_m.y}, fibres, options.period_m).wide > 0;
+}
+
+// The image of an offset that is nearest to the base: the integers of a lattice that repeats do not reach far.
+float nearest(float offset_m, double period_m) {
+    return period_m > 0 ? float(std::remainder(double(offset_m), period_m)) : offset_m;
+}
+
+// The options with finer octaves after theirs, as many as fit.
 VeilOptions refined(const VeilOptions& options, int finer_octaves) {
     VeilOptions finer = options;
     finer.octaves = veil_octaves(options);
@@ -34,6 +47,7 @@ VeilOptions refined(const VeilOptions& options, int finer_octaves) {
         octave.displacement_m = octave.displacement_m / options.lacunarity;
         octave.velocity_m_per_s = 0.8 * octave.velocity_m_per_s;
         octave.weight *= options.persistence;
+        if (!fits_the_tile(octave, options)) break;
         finer.octaves.push_back(octave);
     }
     return finer;
@@ -96,6 +110,7 @@ void VeilSlab::densities(const Points& points, float* out) const {
     const double depth = options_.top_m - options_.base_m;
     const bool limited = std::isfinite(options_.area.semi_a_m) || std::isfinite(options_.area.semi_b_m);
     const VeilArea& area = options_.area;
+    const Vec2& period = options_.period_m;
     const double area_x = area.x_m + (area.carried ? carried_m_.x : 0),
                  area_y = area.y_m + (area.carried ? carried_m_.y : 0);
 
@@ -129,7 +144,8 @@ void VeilSlab::densities(const Points& points, float* out) const {
         for (std::size_t n = 0; n < count; ++n) {
             weight[n] = weight_of(first + n);
             any = any || weight[n] >= kLeastDensity;
-            const float x = points.x[first + n], y = points.y[first + n];
+            const float x = nearest(points.x[first + n], period.x),
+                        y = nearest(points.y[first + n], period.y);
             up[n] = base_z + points.z[first + n];
             const float fallen = std::max(0.0f, 1 - up[n] / float(depth));
             along[n] = x * cos + y * sin + float(options_.fallstreak_m) * fallen * fallen;

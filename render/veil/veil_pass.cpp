@@ -20,7 +20,7 @@
 namespace nephos {
 namespace {
 
-constexpr double kFarthest_m = 400'000;   // a veil at 12 km sets below the horizon before
+constexpr double kFarthest_m = 400'000;   // a veil at 12 km sets below the horizon before, seen from below
 constexpr double kLeastSunCosine = 0.02;  // of the way out of the sheet towards the sun
 constexpr double kMostSunPath_m = 20'000;
 constexpr double kStepPerFinest = 0.5, kStepPixels = 1.5;  // of samples along a ray
@@ -48,16 +48,23 @@ struct Sheet {
     double bend = 0;        // earth_bend()
     double per_pixel = 0;   // footprint of a pixel at distance 1
     double ground_albedo = 0;
+    double mean_factor = 1;  // of height_factor()
+    double farthest_m = kFarthest_m;
     Rgb sun{}, sky{}, ground{};  // light of a white surface in the sun, below the sky, of the ground
     double thickness_m() const { return top_m - base_m; }
     // From a height out of the top, towards the sun.
     double sun_path_m(double height_m) const {
         return std::min((top_m - height_m) / sun_cosine, kMostSunPath_m);
     }
+    // S's g: of the density at a height.
+    double height_factor(double height_m) const {
+        const double at = (height_m - 0.5 * (base_m + top_m)) / thickness_m();
+        return std::max(0.0, veil->view.height_slope * at + veil->view.height_offset);
+    }
     // The optical depth of a column of a density, reduced by the asymmetry.
     double reduced_depth(double density) const {
         const double edges = 0.8;  // what the soft ends leave of a column, about
-        return (1 - veil->view.g) * veil->extinction_per_m * density * edges * thickness_m();
+        return (1 - veil->view.g) * veil->extinction_per_m * density * mean_factor * edges * thickness_m();
     }
 };
 
@@ -166,12 +173,6 @@ class SampleGroup {
         sun_.evaluate(*sheet_.veil->slab, eye_m_);
     }
 
-    double height_factor(double height_m) const {
-        const VeilView& view = sheet_.veil->view;
-        const double at = (height_m - 0.5 * (sheet_.base_m + sheet_.top_m)) / sheet_.thickness_m();
-        return std::max(0.0, view.height_slope * at + view.height_offset);
-    }
-
     void shade(const Samples& run, double column, std::size_t& next_sun, SeenVeil& seen) const {
         const VeilView& view = sheet_.veil->view;
         const double cosine =
@@ -186,10 +187,13 @@ class SampleGroup {
                      twice = std::numbers::pi * henyey_greenstein(cosine, view.g * view.g);
         for (int i = 0; i < run.count; ++i) {
             const std::size_t n = run.first + std::size_t(i);
-            const double density = double(points_.density[n]);
-            if (density <= 0) continue;
-            const double towards = double(sun_.density[next_sun++]), z = double(points_.z[n]);
-            const double optical = sheet_.veil->extinction_per_m * density * height_factor(z) * run.step_m;
+            if (points_.density[n] <= 0) continue;
+            const double z = double(points_.z[n]),
+                         density = sheet_.height_factor(z) * double(points_.density[n]);
+            const double sun_z = double(sun_.z[next_sun]),
+                         towards = sheet_.height_factor(sun_z) * double(sun_.density[next_sun]);
+            ++next_sun;
+            const double optical = sheet_.veil->extinction_per_m * density * run.step_m;
             const double covers =
                 seen.transmittance * (by_samples ? std::min(optical, 1.0) : 1 - std::exp(-optical));
             Rgb light;
@@ -221,7 +225,7 @@ class SampleGroup {
             std::pow(std::max(0.0, s.shade_gain * (here - towards) + s.shade_offset), s.shade_power), 0.0,
             1.0);
         // v = -ray; h . v = sqrt((1 + l . v) / 2).
-        const double half = std::sqrt(std::max(0.0, 0.5 * (1 - cosine)));
+        const double half = std::sqrt(std::clamp(0.5 * (1 - cosine), 0.0, 1.0));
         const double glow = s.glow_gain * std::pow(1 - half, s.glow_power),
                      bounce = std::pow(1 - gr, s.bounce_power);
         Rgb light;
@@ -249,6 +253,13 @@ Sheet sheet_of(const VeilPass& pass, const DrawnVeil& veil) {
     sheet.sun_cosine = std::clamp(sheet.to_sun.z, kLeastSunCosine, 1.0);
     sheet.bend = double(pass.frame.earth.z);
     sheet.per_pixel = 1 / double(pass.frame.up.w);
+    if (const double above = std::max(0.0, -sheet.top_m); above > 0)  // to its horizon
+        sheet.farthest_m += sheet.bend > 0 ? std::sqrt(above / sheet.bend) : 100 * above;
+    constexpr int kHeights = 64;
+    sheet.mean_factor = 0;
+    for (int i = 0; i < kHeights; ++i)
+        sheet.mean_factor +=
+            sheet.height_factor(sheet.base_m + (i + 0.5) / kHeights * sheet.thickness_m()) / kHeights;
     sheet.sun = sunlight_at_height(pass.frame, 0.5 * (sheet.base_m + sheet.top_m));
     sheet.sky = rgb(pass.frame.ambient_top);
     for (std::size_t c = 0; c < 3; ++c) {
@@ -267,7 +278,7 @@ struct Row {
     std::size_t first, width;
 
     Ray ray(std::size_t x) const { return {double(rays.x[x]), double(rays.y[x]), double(rays.z[x])}; }
-    bool has_ground(std::size_t x) const { return rays.ground_m[x] < float(kFarthest_m); }
+    bool has_ground(std::size_t x) const { return rays.ground_m[x] < float(sheet.farthest_m); }
 
     // Darkens the ground by what the sheet keeps of the light.
     void shade_ground() {
@@ -292,15 +303,16 @@ struct Row {
         columns.evaluate(*sheet.veil->slab, pass.eye_m);
         const RowAir air = row_air(pass.frame, rays, rays.ground_m);
         const RowColours behind = row_background(pass.frame, rays, pass.shadow, pass.shadow_size);
+        const Rgb sunlit = rgb(pass.frame.ground_sun), skylit = rgb(pass.frame.ground);
         for (std::size_t n = 0; n < pixels.size(); ++n) {
             const SheetLight light(sheet.reduced_depth(double(columns.density[n])), sheet.sun_cosine,
                                    sheet.ground_albedo);
             const std::size_t x = pixels[n];
             const float left = picture.transmittance[first + x];
             for (std::size_t c = 0; c < 3; ++c) {
-                const double open = sheet.sun[c] * sheet.sun_cosine + sheet.sky[c],
-                             below =
-                                 sheet.sun[c] * light.below_by_sun() + sheet.sky[c] * light.below_by_sky();
+                const double open = sunlit[c] + skylit[c],
+                             below = sunlit[c] * light.below_by_sun() / sheet.sun_cosine +
+                                     skylit[c] * light.below_by_sky();
                 float& beauty = picture.beauty[3 * (first + x) + c];
                 // Where no cloud is before it, the ground as it was drawn; else the plain one.
                 const float ground = left * (left * (beauty - air.light[c][x]) +
@@ -355,7 +367,7 @@ void draw_row(const VeilPass& pass, const Sheet& sheet, std::size_t y, Picture& 
     SampleGroup samples(sheet, pass.eye_m, seen);
     for (std::size_t x = 0; x < width; ++x) {
         const Ray ray = row.ray(x);
-        const double limit = std::min(double(row.rays.ground_m[x]), kFarthest_m);
+        const double limit = std::min(double(row.rays.ground_m[x]), sheet.farthest_m);
         const auto parts = parts_in_slab(ray.z, sheet.bend, sheet.base_m, sheet.top_m, limit);
         const bool hidden = picture.transmittance[row.first + x] <= 0 &&
                             double(picture.depth_m[row.first + x]) < parts.front().begin;

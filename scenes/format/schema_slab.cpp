@@ -62,7 +62,7 @@ const Section& slab_section() {
          key<&VeilView::finer_octaves>(
              "finer_octaves", "", between(0, 12),
              "Octaves after those of the veil, by its `lacunarity` and `persistence`: they "
-             "may be finer than cells.",
+             "may be finer than cells. In a tile those with more than 1048576 cells of noise in it are left out.",
              "S, eq. 4"),
          key<&VeilView::to_horizon>(
              "to_horizon", "", kAny,

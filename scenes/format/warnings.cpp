@@ -19,19 +19,22 @@ struct Box {
     bool has_apron = true;
 };
 
-Box box_of(const Extent& extent, const Placement& placement, const Boundaries& boundaries, const DetailOptions& detail) {
+Box box_of(const Extent& extent, const Placement& placement, const Boundaries& boundaries,
+           const DetailOptions& detail) {
     const Vec3 edges = placement.cell_size_m * Vec3(extent.x, extent.y, extent.z);
-    return {placement.origin_m, placement.origin_m + edges, boundaries, detail.enabled && detail.apron_cells > 0};
+    return {placement.origin_m, placement.origin_m + edges, boundaries,
+            detail.enabled && detail.apron_cells > 0};
 }
 
 // Adds what a parcel whose centre lies between `low_m` and `high_m` has beyond the box.
-void add_cuts(const std::string& key, const Vec3& low_m, const Vec3& high_m, const Vec3& reach_m, const Box& box,
-              std::vector<std::string>& to) {
+void add_cuts(const std::string& key, const Vec3& low_m, const Vec3& high_m, const Vec3& reach_m,
+              const Box& box, std::vector<std::string>& to) {
     const double above = high_m.z + reach_m.z - box.high_m.z;
     if (box.boundaries.z == Boundary::open && above > 0)
-        to.push_back(fmt::format("{} reaches up to {:.0f} m above the lattice's top at {:.0f} m, which cuts its clouds "
-                                 "flat: raise the third number of `cells`, or lower the parcels",
-                                 key, std::ceil(above), box.high_m.z));
+        to.push_back(fmt::format(
+            "{} reaches up to {:.0f} m above the lattice's top at {:.0f} m, which cuts its clouds "
+            "flat: raise the third number of `cells`, or lower the parcels",
+            key, std::ceil(above), box.high_m.z));
     if (box.has_apron) return;
     const char* const names[] = {"west", "east", "south", "north"};
     for (int axis = 0; axis < 2; ++axis) {
@@ -40,9 +43,10 @@ void add_cuts(const std::string& key, const Vec3& low_m, const Vec3& high_m, con
                                  high_m[axis] + reach_m[axis] - box.high_m[axis]};
         for (int side = 0; side < 2; ++side)
             if (beyond[side] > 0)
-                to.push_back(fmt::format("{} reaches up to {:.0f} m beyond the lattice's {} side, which cuts its clouds "
-                                         "straight: set detail.apron_cells, or move the parcels",
-                                         key, std::ceil(beyond[side]), names[2 * axis + side]));
+                to.push_back(fmt::format(
+                    "{} reaches up to {:.0f} m beyond the lattice's {} side, which cuts its clouds "
+                    "straight: set detail.apron_cells, or move the parcels",
+                    key, std::ceil(beyond[side]), names[2 * axis + side]));
     }
 }
 
@@ -60,7 +64,8 @@ void add_scatters(const std::vector<EllipsoidScatter>& scatters, const std::stri
     for (std::size_t n = 0; n < scatters.size(); ++n) {
         const EllipsoidScatter& s = scatters[n];
         const double rise = is_plume(s) ? s.thermals.rise_m.max : 0;
-        const double wander_m = is_plume(s) ? s.thermals.wander * std::max(s.semi_axis_x_m.max, s.semi_axis_y_m.max) : 0;
+        const double wander_m =
+            is_plume(s) ? s.thermals.wander * std::max(s.semi_axis_x_m.max, s.semi_axis_y_m.max) : 0;
         const Vec3 around(wander_m, wander_m, 0);
         add_cuts(fmt::format("{} number {}", table, n + 1), Vec3(s.x_m.min, s.y_m.min, s.z_m.min) - around,
                  Vec3(s.x_m.max, s.y_m.max, s.z_m.max + rise) + around, reach_m(s), box, to);
@@ -72,8 +77,9 @@ void add_scatters(const std::vector<EllipsoidScatter>& scatters, const std::stri
 std::vector<std::string> warnings(const Scene& scene) {
     std::vector<std::string> result;
     if (!scene.models.empty() && scene.layers.empty())
-        result.emplace_back("the scene has base models but no [[layer]] whose skies use them: nothing of them is "
-                            "simulated (scenes/genera/Cu.toml shows a sky and a layer)");
+        result.emplace_back(
+            "the scene has base models but no [[layer]] whose skies use them: nothing of them is "
+            "simulated (scenes/genera/Cu.toml shows a sky and a layer)");
     if (scene.layers.empty()) {
         const AutomatonOptions& a = scene.automaton;
         const Box box = box_of(a.extent, a.placement, a.boundaries, scene.density.detail);
@@ -84,11 +90,33 @@ std::vector<std::string> warnings(const Scene& scene) {
         const LayerOptions& layer = scene.layers[n];
         if (layer.is_veil || !layer.automaton) continue;
         const Box box = box_of(layer.extent, layer.placement, layer.boundaries, layer_detail(scene, n));
-        add_ellipsoids(layer.ellipsoids, fmt::format("[[layer.ellipsoids]] of layer '{}',", layer.name), box, result);
-        add_scatters(layer.scatters, fmt::format("[[layer.scatters]] of layer '{}',", layer.name), box, result);
+        add_ellipsoids(layer.ellipsoids, fmt::format("[[layer.ellipsoids]] of layer '{}',", layer.name), box,
+                       result);
+        add_scatters(layer.scatters, fmt::format("[[layer.scatters]] of layer '{}',", layer.name), box,
+                     result);
     }
     return result;
 }
+
+namespace {
+
+// Keys of [layer.slab] and beside it that its kind of light, or the slab itself, does not read.
+void add_slab_keys(const LayerOptions& layer, std::vector<std::string>& to) {
+    const VeilView& slab = layer.slab;
+    const VeilView plain;
+    if (slab.light == VeilLighting::two_samples && !(slab.g == plain.g && slab.halo == plain.halo))
+        to.push_back(fmt::format(
+            "layer '{}': `g` and `halo` of [layer.slab] have no effect: its light is \"two_samples\"",
+            layer.name));
+    if (slab.light == VeilLighting::physical && !(slab.two_samples == plain.two_samples))
+        to.push_back(fmt::format(
+            "layer '{}': [layer.slab.two_samples] has no effect: its light is \"physical\"", layer.name));
+    if (layer.own_detail && layer.detail.enabled)
+        to.push_back(fmt::format("layer '{}': [layer.detail] has no effect on pictures beside [layer.slab]",
+                                 layer.name));
+}
+
+}  // namespace
 
 std::vector<std::string> keys_without_effect(const Scene& scene) {
     std::vector<std::string> result;
@@ -96,34 +124,45 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
     if (!sea && !(scene.render.water == WaterOptions{}))
         result.emplace_back("[water] has no effect: `ground.pattern` is not \"water\"");
     if (sea && scene.ground_cover.enabled)
-        result.emplace_back("[wet_ground] has no effect but for its reflection: rain and snow vanish in a ground of water");
+        result.emplace_back(
+            "[wet_ground] has no effect but for its reflection: rain and snow vanish in a ground of water");
     std::set<std::string> drawn, grown;  // base models of layers without and with an automaton
     for (const LayerOptions& layer : scene.layers) {
+        if (layer.is_slab) add_slab_keys(layer, result);
         if (layer.is_veil) continue;
         std::set<std::string>& used = layer.automaton ? grown : drawn;
         for (const NamedSky& sky : scene.skies)
-            if (std::ranges::count(layer.skies, sky.name) > 0) used.insert(sky.models.begin(), sky.models.end());
+            if (std::ranges::count(layer.skies, sky.name) > 0)
+                used.insert(sky.models.begin(), sky.models.end());
         for (const NamedMetamorphosis& change : layer.metamorphoses) used.insert(change.to);
         const bool field = !layer.scatters.empty() || !layer.ellipsoids.empty() || !layer.profile.empty() ||
                            !layer.coupling.genera.empty();
         if (!layer.automaton && field)
-            result.push_back(fmt::format("layer '{}' is drawn directly: its ellipsoids, scatters, profile and coupling have no "
-                                         "effect without `automaton`", layer.name));
+            result.push_back(fmt::format(
+                "layer '{}' is drawn directly: its ellipsoids, scatters, profile and coupling have no "
+                "effect without `automaton`",
+                layer.name));
         if (layer.automaton && layer.shear_s > 0)
-            result.push_back(fmt::format("layer '{}': `shear_s` has no effect on the clouds of an automaton, which the wind "
-                                         "shears itself", layer.name));
+            result.push_back(fmt::format(
+                "layer '{}': `shear_s` has no effect on the clouds of an automaton, which the wind "
+                "shears itself",
+                layer.name));
     }
     const Seed plain;
     for (const BaseModel& model : scene.models) {
         if (!grown.contains(model.name) || drawn.contains(model.name)) continue;
         const bool given = std::ranges::any_of(model.seeds, [&](const Seed& seed) {
-            return std::isfinite(model.light_distance_m) || !(seed.billboards == plain.billboards && seed.billboard_width_m == plain.billboard_width_m &&
+            return std::isfinite(model.light_distance_m) ||
+                   !(seed.billboards == plain.billboards &&
+                     seed.billboard_width_m == plain.billboard_width_m &&
                      seed.billboard_height_m == plain.billboard_height_m && seed.texture == plain.texture &&
                      model.textures.empty());
         });
         if (given)
-            result.push_back(fmt::format("base model '{}': `light_distance_m` and the numbers, sizes and textures of billboards "
-                                         "have no effect: all layers that use it have an automaton", model.name));
+            result.push_back(fmt::format(
+                "base model '{}': `light_distance_m` and the numbers, sizes and textures of billboards "
+                "have no effect: all layers that use it have an automaton",
+                model.name));
     }
     return result;
 }

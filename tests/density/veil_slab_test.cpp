@@ -147,6 +147,44 @@ TEST(VeilSlab, EndsAtItsSides) {
     EXPECT_EQ(found[4], 0);
 }
 
+// As many octaves as there can be.
+TEST(VeilSlab, HasRoomForAllOctaves) {
+    for (const VeilForm form : {VeilForm::cumulus, VeilForm::cirrus}) {
+        VeilOptions options = veil_of(form);
+        options.octave_count = 12;
+        const VeilSlab slab(options, steady_wind(), 0, VeilSlab::kMostFinerOctaves, {});
+        EXPECT_NEAR(slab.finest_m(), options.wavelength_m / std::pow(options.lacunarity, 23),
+                    1e-6 * slab.finest_m());
+        const std::vector<float> found = level_of_points(0).densities(slab, {});
+        for (const float value : found) ASSERT_TRUE(value >= 0 && value <= 1) << value;
+        EXPECT_EQ(found, level_of_points(0).densities(
+                             VeilSlab(options, steady_wind(), 0, VeilSlab::kMostFinerOctaves, {}), {}));
+    }
+}
+
+// In a tile: finer octaves as far as they fit, and the same everywhere a period on, however far that is.
+TEST(VeilSlab, RepeatsWithTheTile) {
+    VeilOptions options = veil_of(VeilForm::cirrus);
+    options.period_m = {30'000, 20'000};
+    options.displacement = 0.1;
+    const VeilSlab slab(options, steady_wind(), 50, VeilSlab::kMostFinerOctaves, {});
+    EXPECT_GT(slab.finest_m(), 10) << "octaves with more cells are left out";
+    Places here, there, far;
+    for (int n = 0; n < 1024; ++n) {
+        const double x = 29.0 * n, y = 7000 + 11.0 * n;
+        here.add(x, y, 5600, 5);
+        there.add(x + 30'000, y - 20'000, 5600, 5);
+        far.add(x - 300'000, y + 380'000, 5600, 5);
+    }
+    const std::vector<float> expected = here.densities(slab, {});
+    EXPECT_GT(mean_of(expected), 0.01);
+    const std::vector<float> next = there.densities(slab, {}), last = far.densities(slab, {});
+    for (std::size_t n = 0; n < expected.size(); ++n) {
+        EXPECT_NEAR(next[n], expected[n], 0.01f) << n;
+        EXPECT_NEAR(last[n], expected[n], 0.1f) << n;  // offsets are rounded to 0.03 m there
+    }
+}
+
 TEST(VeilSlab, RefusesWhatIsOutOfRange) {
     const auto text = [](int finer, double time_s) -> std::string {
         try {

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -151,6 +152,54 @@ TEST(VeilPass, ThickSheetsAreBrightAboveAndDarkBelow) {
         EXPECT_LT(dark.beauty[3 * kMiddle + 1], 0.6f * lit.beauty[3 * kMiddle + 1]) << int(lighting);
         EXPECT_GT(dark.beauty[3 * kMiddle + 1], 0.05f * lit.beauty[3 * kMiddle + 1]) << int(lighting);
     }
+}
+
+// Where the density is scaled by height, light and shadow are those of the scaled one.
+TEST(VeilPass, ScaledDensityIsDensity) {
+    for (const VeilLighting lighting : {VeilLighting::physical, VeilLighting::two_samples}) {
+        const std::vector<DrawnVeil> plain{even_sheet(800, 1600, 0.004, lighting)};
+        std::vector<DrawnVeil> scaled{even_sheet(800, 1600, 0.0004, lighting)};
+        scaled[0].view.height_offset = 10;
+        for (const RenderOptions& options :
+             {looking({0, 0, 2}, {0, 1000, 1002}), looking({0, 0, 5000}, {0, 1000, 4000}),
+              looking({0, 0, 100}, {0, 100, 0})}) {
+            const Picture expected = picture_of(plain, options), found = picture_of(scaled, options);
+            EXPECT_NEAR(found.transmittance[kMiddle], expected.transmittance[kMiddle], 1e-4f);
+            if (lighting == VeilLighting::two_samples) continue;  // S's light reads the densities themselves
+            for (std::size_t c = 0; c < 3; ++c)
+                EXPECT_NEAR(found.beauty[3 * kMiddle + c], expected.beauty[3 * kMiddle + c],
+                            1e-4f * expected.beauty[3 * kMiddle + c]);
+        }
+    }
+}
+
+// Towards the shadow of the eye, where roundings make the cosine less than -1.
+TEST(VeilPass, IsFiniteOppositeTheSun) {
+    for (int n = 0; n < 24; ++n) {
+        RenderOptions options = looking({0, 0, 5000}, {0, 1000, 4000});
+        options.sun.azimuth_deg = 15.3 * n;
+        options.sun.elevation_deg = 20 + 2.7 * n;
+        const double azimuth = options.sun.azimuth_deg * std::numbers::pi / 180,
+                     elevation = options.sun.elevation_deg * std::numbers::pi / 180;
+        options.camera.target_m = options.camera.position_m -
+                                  1000.0 * Vec3(std::sin(azimuth) * std::cos(elevation),
+                                              std::cos(azimuth) * std::cos(elevation), std::sin(elevation));
+        const Picture picture = picture_of({even_sheet(800, 1600, 0.03, VeilLighting::two_samples)}, options);
+        for (const float value : picture.beauty) ASSERT_TRUE(std::isfinite(value)) << n;
+    }
+}
+
+// A veil high above is lit when the sun has set on the ground: the ground has only the sky to lose.
+TEST(VeilPass, DarkensTheGroundOfTwilightByItsSky) {
+    RenderOptions ground = looking({0, 0, 100}, {0, 100, 0});
+    ground.sun.elevation_deg = -2;
+    const double depth = 0.3;
+    const Picture lit = picture_of({}, ground),
+                  below =
+                      picture_of({even_sheet(9000, 10'000, depth / 1000, VeilLighting::physical)}, ground);
+    ASSERT_GT(lit.beauty[3 * kMiddle + 1], 0);
+    const double kept = SheetLight((1 - VeilView().g) * depth * 0.8, 0.02, 0.1).below_by_sky();
+    EXPECT_NEAR(below.beauty[3 * kMiddle + 1] / lit.beauty[3 * kMiddle + 1], kept, 0.03);
 }
 
 // In 40 km the round Earth hides a veil at 8 km less than a plane would: it meets the ground at 320 km.
