@@ -27,9 +27,20 @@ void for_voxels(const DensityGrid& density, Visit&& visit) {
     }
 }
 
+// The columns along the edge of a texel: the least that keep to kMostTexels and divide what repeats, if that is at most four
+// times as coarse as it has to be; otherwise 1.
+int texel_columns(const Extent& extent, bool repeats_x, bool repeats_y) {
+    const int least = (std::max(extent.x, extent.y) + CloudBases::kMostTexels - 1) / CloudBases::kMostTexels;
+    for (int step = least; step <= 4 * least; ++step)
+        if ((!repeats_x || extent.x % step == 0) && (!repeats_y || extent.y % step == 0)) return step;
+    return 1;
+}
+
+int modulo(int n, int count) { return (n % count + count) % count; }
+
 }  // namespace
 
-CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m) {
+CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m, const Boundaries& boundaries) {
     const Extent extent = density.extent();
     const Placement& at = density.placement();
     CloudBases bases;
@@ -45,7 +56,9 @@ CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m) {
     for_voxels(density, [&](std::size_t column, int k, float value) {
         if (value > kBaseFraction * largest[column]) lowest[column] = std::min(lowest[column], k);
     });
-    const int step = (std::max(extent.x, extent.y) + CloudBases::kMostTexels - 1) / CloudBases::kMostTexels;
+    bases.repeats_x = boundaries.x == Boundary::periodic;
+    bases.repeats_y = boundaries.y == Boundary::periodic;
+    const int step = texel_columns(extent, bases.repeats_x, bases.repeats_y);
     bases.x_m = at.origin_m.x;
     bases.y_m = at.origin_m.y;
     bases.texel_m = step * at.cell_size_m;
@@ -70,15 +83,20 @@ CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m) {
 }
 
 CloudBases::Column CloudBases::at(double place_x_m, double place_y_m) const {
-    const double u = (place_x_m - x_m) / texel_m - 0.5, v = (place_y_m - y_m) / texel_m - 0.5;
-    if (!(u > -1 && u < columns && v > -1 && v < rows)) return {};
+    if (columns == 0) return {};
+    double u = (place_x_m - x_m) / texel_m - 0.5, v = (place_y_m - y_m) / texel_m - 0.5;
+    if (repeats_x) u -= columns * std::floor(u / columns);
+    if (repeats_y) v -= rows * std::floor(v / rows);
+    if (!(u > -1 && u <= columns && v > -1 && v <= rows)) return {};
     const int i = int(std::floor(u)), j = int(std::floor(v));
     double of_water = 0, of_base = 0;
     for (int dy = 0; dy < 2; ++dy) {
         for (int dx = 0; dx < 2; ++dx) {
-            if (i + dx < 0 || j + dy < 0 || i + dx >= columns || j + dy >= rows) continue;
+            const int column = repeats_x ? modulo(i + dx, columns) : i + dx,
+                      row = repeats_y ? modulo(j + dy, rows) : j + dy;
+            if (column < 0 || row < 0 || column >= columns || row >= rows) continue;
             const double weight = (dx == 1 ? u - i : 1 - (u - i)) * (dy == 1 ? v - j : 1 - (v - j));
-            const std::size_t n = std::size_t(j + dy) * std::size_t(columns) + std::size_t(i + dx);
+            const std::size_t n = std::size_t(row) * std::size_t(columns) + std::size_t(column);
             of_water += weight * double(water[n]);
             of_base += weight * double(water_base_m[n]);
         }

@@ -6,12 +6,14 @@
 
 #include <vector>
 
+#include "automaton/lattice.h"
 #include "density/density_grid.h"
 
 namespace nephos {
 
 struct CloudBases {
-    static constexpr int kMostTexels = 192;  // along an edge; larger grids have texels of several columns
+    // Along an edge; larger grids have texels of several columns, as many as divide a periodic grid.
+    static constexpr int kMostTexels = 192;
 
     double x_m = 0, y_m = 0;  // south-western corner, world
     double texel_m = 1;       // edge of a texel, > 0
@@ -19,17 +21,21 @@ struct CloudBases {
     // Of each texel, x fastest: its water, 1 - exp(-depth / 10) of the optical depth, 0..1; and that times the world height
     // of its base. Products, so that between a texel with cloud and one without the base is that of the cloud.
     std::vector<float> water, water_base_m;
+    bool repeats_x = false,
+         repeats_y = false;  // beyond the sides the opposite ones follow; else there is no water
 
     struct Column {
         double water = 0;
         double base_m = 0;  // world z; meaningless without water
     };
-    // Returns the column at a place of the world, bilinearly; beyond the grid there is no water.
+    // Returns the column at a place of the world, bilinearly.
     Column at(double x_m, double y_m) const;
 };
 
 // Returns the bases of a grid: in each column the lowest height at which the density is above a tenth of the column's
-// largest, half a voxel within the cloud. Extinction in 1/m where density is 1, >= 0. Pure; thread-safe.
-CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m);
+// largest, half a voxel within the cloud. Extinction in 1/m where density is 1, >= 0. `boundaries`: of the grid. Pure;
+// thread-safe.
+CloudBases cloud_bases(const DensityGrid& density, double extinction_per_m,
+                       const Boundaries& boundaries = {});
 
 }  // namespace nephos

@@ -42,24 +42,37 @@ void lean(RainCurtain& curtain, const Wind& wind, const PrecipitationOptions& p,
 }
 
 constexpr double kLeastWater = 0.05;  // of columns in an area that rain
+constexpr int kProbes = 24;           // of the cloud, along each axis of an area
 
 // Lets rain begin where the cloud is: at the highest base within the area, or not at all.
 void fall_from(const std::shared_ptr<const CloudBases>& cloud, RainCurtain& curtain) {
     double highest_m = curtain.ground_m;
-    const Ellipse area = ellipse_at(curtain, curtain.ground_m);
-    for (int j = 0; j < cloud->rows; ++j) {
-        for (int i = 0; i < cloud->columns; ++i) {
-            const std::size_t n = std::size_t(j) * std::size_t(cloud->columns) + std::size_t(i);
-            const double water = double(cloud->water[n]);
-            if (water < kLeastWater) continue;
-            const double x = cloud->x_m + (i + 0.5) * cloud->texel_m,
-                         y = cloud->y_m + (j + 0.5) * cloud->texel_m;
-            if (ellipse_value(area, x, y) < 1)
-                highest_m = std::max(highest_m, double(cloud->water_base_m[n]) / water);
+    for (int j = 0; j < kProbes; ++j) {
+        for (int i = 0; i < kProbes; ++i) {
+            const double u = (2 * i + 1.0) / kProbes - 1, v = (2 * j + 1.0) / kProbes - 1;
+            if (u * u + v * v >= 1) continue;
+            const double a = u * curtain.semi_a_m, b = v * curtain.semi_b_m;
+            const CloudBases::Column column =
+                cloud->at(curtain.x_m + a * curtain.axis_x - b * curtain.axis_y,
+                          curtain.y_m + a * curtain.axis_y + b * curtain.axis_x);
+            if (column.water >= kLeastWater) highest_m = std::max(highest_m, column.base_m);
         }
     }
     curtain.base_m = highest_m;
     curtain.cloud = cloud;
+}
+
+// The cloud that the rain of a layer falls from: its own, or of a layer whose density is not known that of all. Null: none
+// is known.
+std::shared_ptr<const CloudBases> cloud_of(const Scene& scene, std::size_t n, const LayerFrame& layer,
+                                           const DensityGrid& all) {
+    const bool own = layer.density.extent().cells() > 0;
+    const DensityGrid& density = own ? layer.density : all;
+    if ((!own && layer.direct) || density.extent().cells() == 0) return nullptr;
+    const LayerOptions& options = scene.layers[n];
+    const bool whole = density.extent() == options.extent && density.placement() == options.placement;
+    return std::make_shared<CloudBases>(
+        cloud_bases(density, scene.density.extinction_per_m, whole ? layer.boundaries : Boundaries{}));
 }
 
 }  // namespace
@@ -82,11 +95,12 @@ void FramePainter::set_scene(const Scene& scene, bool same_layers) {
 }
 
 void FramePainter::add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,
-                              std::optional<std::size_t> layer, double time_s, std::size_t first, std::size_t count,
-                              std::vector<DetailedVoxels>& to) const {
+                              std::optional<std::size_t> layer, double time_s, std::size_t first,
+                              std::size_t count, std::vector<DetailedVoxels>& to) const {
     const DetailSetting setting = detail_setting(scene_, layer, density, time_s);
     if (!setting.options.enabled || count == 0) return;
-    to.push_back({.density = density, .moisture = moisture, .setting = setting, .first = first, .count = count});
+    to.push_back(
+        {.density = density, .moisture = moisture, .setting = setting, .first = first, .count = count});
 }
 
 // The metaballs of every lattice, each with the size of its own cells.
@@ -120,7 +134,7 @@ std::vector<DrawnVeil> FramePainter::veils_of(const FrameResult& frame) const {
     std::vector<DrawnVeil> veils;
     for (std::size_t n = 0; n < frame.layers.size(); ++n) {
         const LayerOptions& layer = scene_.layers[n];
-        if (!layer.is_slab || frame.layers[n].density.active_voxels() == 0) continue;
+        if (!layer.is_slab || frame.layers[n].density.extent().cells() == 0) continue;
         const double opacity = opacity_at(layer, scene_.climate, frame.time_s);
         if (opacity <= 0) continue;
         std::optional<VeilSides> sides;
@@ -142,7 +156,8 @@ PendingFrame FramePainter::begin(FrameResult frame) {
     std::vector<DetailedVoxels> detailed;
     std::vector<Metaball> balls = metaballs_of(frame, detailed);
     const double radius = scene_.density.metaball_radius_cells;
-    const MetaballCloud cloud{balls, scene_.density.extinction_per_m, metaball_normalisation(radius), detailed};
+    const MetaballCloud cloud{balls, scene_.density.extinction_per_m, metaball_normalisation(radius),
+                              detailed};
     std::vector<DrawnVeil> veils = veils_of(frame);
     std::vector<SkyLayer> layers;
     for (const LayerFrame& layer : frame.layers) {
@@ -154,11 +169,12 @@ PendingFrame FramePainter::begin(FrameResult frame) {
     RenderOptions options = scene_.render;
     options.sun = scene_sun_at(scene_, frame.time_s);
     std::optional<FilmFrame> film;
-    if (frame.number > 0) film = FilmFrame{frame.number - 1, &scene_.frames, &scene_.render.sun,
-                                                    place.given ? place.heading_deg : 0};
+    if (frame.number > 0)
+        film = FilmFrame{frame.number - 1, &scene_.frames, &scene_.render.sun,
+                         place.given ? place.heading_deg : 0};
     PendingSkyPicture picture =
         painter_.begin(renderer_, cloud, layers, options, frame.time_s, scene_.frames.exr, ground,
-                       weather_of(scene_, frame.layers, frame.time_s), film, veils);
+                       weather_of(scene_, frame.layers, frame.density, frame.time_s), film, veils);
     return {std::move(frame), std::move(balls), std::move(detailed), std::move(veils), std::move(picture)};
 }
 
@@ -168,7 +184,8 @@ Picture FramePainter::finish(PendingFrame&& pending) {
 
 Picture FramePainter::draw(const FrameResult& frame) { return finish(begin(frame)); }
 
-Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, double time_s) {
+Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, const DensityGrid& all,
+                   double time_s) {
     const PrecipitationOptions& p = scene.render.precipitation;
     Weather weather;
     weather.seed = scene.automaton.seed;
@@ -183,10 +200,8 @@ Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, doubl
     weather.carried_y_m = p.wind_drift * path.y;
     for (std::size_t n = 0; n < layers.size(); ++n) {
         const Range& base = scene.layers[n].base_height_m;
-        std::shared_ptr<const CloudBases> cloud;
-        if (!layers[n].rain.empty() && layers[n].density.active_voxels() > 0)
-            cloud =
-                std::make_shared<CloudBases>(cloud_bases(layers[n].density, scene.density.extinction_per_m));
+        const std::shared_ptr<const CloudBases> cloud =
+            layers[n].rain.empty() ? nullptr : cloud_of(scene, n, layers[n], all);
         for (const RainArea& area : layers[n].rain) {
             RainCurtain curtain;
             curtain.id = area.id;
@@ -202,6 +217,10 @@ Weather weather_of(const Scene& scene, std::span<const LayerFrame> layers, doubl
             if (curtain.base_m <= ground_m) continue;  // no cloud above
             curtain.rate_mm_per_h = area.intensity_mm_per_h;
             lean(curtain, layer_wind(scene, n), p, time_s);
+            if (curtain.cloud) {  // its top is below the cloud, its foot lags
+                curtain.x_m -= curtain.lean_x * (curtain.base_m - ground_m);
+                curtain.y_m -= curtain.lean_y * (curtain.base_m - ground_m);
+            }
             weather.curtains.push_back(curtain);
         }
     }

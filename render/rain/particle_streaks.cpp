@@ -63,10 +63,10 @@ double real_particles(const ParticlePass& pass, const PrecipitationOptions& p, c
         double most = 0;
         for (const CurtainTerm& term : terms) {
             const RainCurtain& c = *term.curtain;
-            const double height = (place.z - c.ground_m) / (c.base_m - c.ground_m);
-            if (height < 0 || height > 1) continue;
+            if (place.z < c.ground_m || place.z > c.base_m) continue;
             const CloudBases::Column cloud = cloud_above(c, place);
             if (place.z > cloud.base_m) continue;
+            const double height = (place.z - c.ground_m) / (cloud.base_m - c.ground_m);
             const double fraction =
                 cloud.water * rain_fraction(ellipse_at(c, place.z), place.x, place.y, p.edge);
             if (fraction <= 0) continue;

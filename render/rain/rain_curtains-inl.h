@@ -107,17 +107,34 @@ HWY_INLINE Floats falls_at(const ShaftPass& p, const SeenCurtain& c, const Way& 
     return fast_exp(hn::MulAdd(set(1.5f / 255 * p.contrast), falls, set(-0.75f * p.contrast)));
 }
 
-// Returns the rain of the cloud above points of rays: its part of the rate, fading in below the base of each column.
-HWY_INLINE Floats rain_of_cloud(const SeenCurtain& c, const Way& way, Floats t, Floats height_m) {
+// A place in texels, of a grid that repeats or else a little beyond its sides at most.
+HWY_INLINE Floats texel_place(Floats at, int texels, bool repeats) {
+    const auto count = float(texels);
+    if (!repeats) return clamped(at, -2, count + 1);
+    return hn::NegMulAdd(set(count), hn::Floor(hn::Mul(at, set(1 / count))), at);
+}
+
+// Rain of the cloud above points of rays: its part of the rate, fading in below the base of each column; and their heights
+// as fractions of that of the column's base, 0..1 in the rain.
+struct ColumnRain {
+    Floats part, height;
+};
+HWY_INLINE ColumnRain rain_of_cloud(const SeenCurtain& c, const Way& way, Floats t, Floats height_m) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
     const CloudBases& cloud = *c.cloud;
     const Floats zero = hn::Zero(d), along = hn::Mul(t, set(c.per_texel));
-    const Floats u = clamped(hn::MulAdd(along, way.level_x, set(c.cloud_x)), -2, float(cloud.columns) + 1),
-                 v = clamped(hn::MulAdd(along, way.level_y, set(c.cloud_y)), -2, float(cloud.rows) + 1);
+    const Floats u = texel_place(hn::MulAdd(along, way.level_x, set(c.cloud_x)), cloud.columns,
+                                 cloud.repeats_x),
+                 v = texel_place(hn::MulAdd(along, way.level_y, set(c.cloud_y)), cloud.rows, cloud.repeats_y);
     const Floats i = hn::Floor(u), j = hn::Floor(v), part_x = hn::Sub(u, i), part_y = hn::Sub(v, j);
     Floats water = zero, base = zero;
     const auto add_texel = [&](Floats column, Floats row, Floats weight) {
+        const auto first_again = [](Floats n, int texels) {
+            return hn::IfThenElseZero(hn::Lt(n, set(float(texels))), n);
+        };
+        if (cloud.repeats_x) column = first_again(column, cloud.columns);
+        if (cloud.repeats_y) row = first_again(row, cloud.rows);
         const Floats x = clamped(column, 0, float(cloud.columns - 1)),
                      y = clamped(row, 0, float(cloud.rows - 1));
         const Mask inside = hn::And(hn::Eq(x, column), hn::Eq(y, row));
@@ -135,7 +152,7 @@ HWY_INLINE Floats rain_of_cloud(const SeenCurtain& c, const Way& way, Floats t, 
     add_texel(i1, j1, hn::Mul(part_x, part_y));
     const Floats top = hn::Sub(hn::Div(base, hn::Max(water, set(1e-6f))), set(c.ground_m));
     const Floats below = hn::Div(hn::Sub(top, height_m), hn::Max(top, one));
-    return hn::Mul(water, clamped(hn::Mul(below, set(1 / kShaftCloudFade)), 0, 1));
+    return {hn::Mul(water, clamped(hn::Mul(below, set(1 / kShaftCloudFade)), 0, 1)), hn::Sub(one, below)};
 }
 
 // Returns the extinction of one curtain at distances along its rays, without the factor of f.
@@ -144,10 +161,15 @@ HWY_INLINE Floats extinction(const ShaftPass& p, const SeenCurtain& c, const Way
     const Lanes d;
     const Floats zero = hn::Zero(d), one = set(1);
     const Floats x = hn::MulAdd(t, way.x, set(c.eye_x)), y = hn::MulAdd(t, way.y, set(c.eye_y));
-    const Floats radius2 = hn::MulAdd(x, x, hn::Mul(y, y)), height_m = hn::MulAdd(t, rise, set(c.eye_z)),
-                 h = hn::Mul(height_m, set(c.per_height));
-    const Floats part = c.cloud != nullptr ? rain_of_cloud(c, way, t, height_m)
-                                           : clamped(hn::Mul(hn::Sub(one, h), set(1 / kShaftTopFade)), 0, 1);
+    const Floats radius2 = hn::MulAdd(x, x, hn::Mul(y, y)), height_m = hn::MulAdd(t, rise, set(c.eye_z));
+    Floats h = hn::Mul(height_m, set(c.per_height)), part;
+    if (c.cloud != nullptr) {
+        const ColumnRain rain = rain_of_cloud(c, way, t, height_m);
+        part = rain.part;
+        h = rain.height;
+    } else {
+        part = clamped(hn::Mul(hn::Sub(one, h), set(1 / kShaftTopFade)), 0, 1);
+    }
     Floats most = hn::Mul(set(c.per_m), part);
     if (p.evaporation > 0) {
         const Floats left = clamped(

@@ -12,7 +12,7 @@
 //     exp(c (4.5 (s - 1/2) + 1.5 (f - 1/2)) - c^2 / 4)
 //
 // where the first factor is w min(1, (1 - H) / kShaftCloudFade) below a cloud that is known (RainCurtain::cloud): w is its
-// water and H the height between ground and base, both of the column from which the drops at that place fell;
+// water and H the height between ground and base, both of the column from which the drops at that place fell; rain is left by H there;
 // with smooth(x) = 3 x^2 - 2 x^3 in 0..1 and softness = `edge`, at least kShaftSoftest unless 0: the outline
 // is frayed inwards by the strands. Where curtains overlap, the densest counts. Noise N is bilinear between
 // random bytes on a lattice, with weights smooth(). In cells of grain_m, from the area's centre along the

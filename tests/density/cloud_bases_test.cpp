@@ -5,6 +5,7 @@
 #include "density/cloud_bases.h"
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -54,6 +55,30 @@ TEST(CloudBases, OfLargeGridsHaveFewerTexels) {
     const CloudBases::Column middle = bases.at(1000 + 15'000, -500 + 1500);
     EXPECT_NEAR(middle.base_m, 950, 0.05);
     EXPECT_NEAR(middle.water, 1 - std::exp(-0.5), 1e-4);
+}
+
+// Beyond a periodic side the cloud at the opposite one begins; texels fit the period.
+TEST(CloudBases, RepeatWithTheirGrid) {
+    std::vector<float> values(kExtent.cells(), 0.0f);
+    for (int k = 3; k < 8; ++k) values[at(0, 3, k)] = 0.8f;
+    const CloudBases open = cloud_bases(grid_of(values), 0.02),
+                     bases = cloud_bases(grid_of(values), 0.02,
+                                         {Boundary::periodic, Boundary::periodic, Boundary::open});
+    const CloudBases::Column in = bases.at(1050, -150);
+    EXPECT_GT(in.water, 0.3);
+    for (const auto& [x, y] :
+         {std::pair{1050 + 600, -150}, {1050 - 1800, -150}, {1050, -150 - 400}, {1050 + 1200, -150 + 800}}) {
+        EXPECT_NEAR(bases.at(x, y).water, in.water, 1e-9) << x << " " << y;
+        EXPECT_NEAR(bases.at(x, y).base_m, in.base_m, 1e-6);
+        EXPECT_EQ(open.at(x, y).water, 0);
+    }
+    EXPECT_NEAR(bases.at(1000, -150).water, 0.5 * in.water, 1e-9) << "on the seam";
+    const Extent wide{400, 30, 1};
+    const CloudBases coarse =
+        cloud_bases(DensityGrid::from_dense(std::vector<float>(wide.cells(), 1.0f), wide, kPlacement), 0.05,
+                    {Boundary::periodic, Boundary::periodic, Boundary::open});
+    EXPECT_NEAR(coarse.texel_m, 500, 1e-9);  // the least number of columns from 3 on that divides 400 and 30
+    EXPECT_EQ(coarse.columns * 5, wide.x);
 }
 
 TEST(CloudBases, OfNothingAreDry) {

@@ -43,7 +43,8 @@ Picture cloudy(const Camera& camera, std::mt19937& random) {
     GroundLight& ground = picture.ground_light;
     ground.corner_m = {-2100, -1900};
     ground.texel_m = {45, 50};
-    for (int i = 0; i < GroundLight::kTexels * GroundLight::kTexels; ++i) ground.words.push_back(std::uint32_t(random()));
+    for (int i = 0; i < GroundLight::kTexels * GroundLight::kTexels; ++i)
+        ground.words.push_back(std::uint32_t(random()));
     return picture;
 }
 
@@ -143,8 +144,8 @@ TEST(RainShafts, AreThoseOfTheTwin) {
 }
 
 // A cloud over the whole of the areas, with holes and a base that rises from 500 to 1100 m.
-std::shared_ptr<const CloudBases> uneven_cloud() {
-    CloudBases cloud{-2000, -1000, 150, 40, 36, {}, {}};
+std::shared_ptr<const CloudBases> uneven_cloud(bool repeats) {
+    CloudBases cloud{-2000, -1000, 150, 40, 36, {}, {}, repeats, repeats};
     for (int j = 0; j < cloud.rows; ++j) {
         for (int i = 0; i < cloud.columns; ++i) {
             const float water = (i / 5 + j / 4) % 3 == 0 ? 0.0f : 0.25f * float(1 + (i + 2 * j) % 4);
@@ -155,25 +156,31 @@ std::shared_ptr<const CloudBases> uneven_cloud() {
     return std::make_shared<CloudBases>(cloud);
 }
 
+// In the middle of a cloud and across the seams of one that repeats, with rain that evaporates on its way.
 TEST(RainShafts, FallFromTheCloudAsThoseOfTheTwin) {
-    std::vector<RainCurtain> curtains(2, area());
-    curtains[0].lean_x = 0.3;
-    curtains[0].lean_y = -0.2;
-    curtains[1].id = 62;
-    curtains[1].x_m = 600;
-    curtains[1].semi_b_m = 650;
-    for (RainCurtain& curtain : curtains) {
-        curtain.base_m = 1100;
-        curtain.cloud = uneven_cloud();
-    }
-    std::mt19937 random(17);
-    const Vec3 eyes[] = {{-400, -1900, 20}, {300, 300, 2600}, {-9000, -4000, 500}};
-    for (const Vec3& eye : eyes) {
-        const RenderOptions options = options_at(eye, {150, 900, 300});
-        const Picture picture = cloudy(options.camera, random);
-        const Drawn drawn = draw(picture, options, curtains, 100);
-        EXPECT_LE(drawn.apart, 2) << eye.x;
-        EXPECT_NE(drawn.picture.beauty, picture.beauty);
+    for (const bool repeats : {false, true}) {
+        std::vector<RainCurtain> curtains(2, area());
+        curtains[0].lean_x = 0.3;
+        curtains[0].lean_y = -0.2;
+        curtains[1].id = 62;
+        curtains[1].x_m = 600;
+        curtains[1].semi_b_m = 650;
+        for (RainCurtain& curtain : curtains) {
+            curtain.base_m = 1100;
+            curtain.cloud = uneven_cloud(repeats);
+            if (repeats) curtain.x_m += 3900;
+        }
+        std::mt19937 random(17);
+        const Vec3 eyes[] = {{-400, -1900, 20}, {300, 300, 2600}, {-9000, -4000, 500}};
+        for (const Vec3& eye : eyes) {
+            const double moved = repeats ? 3900 : 0;
+            RenderOptions options = options_at(eye + Vec3(moved, 0, 0), {150 + moved, 900, 300});
+            options.precipitation.evaporation = repeats ? 0.3 : 0;
+            const Picture picture = cloudy(options.camera, random);
+            const Drawn drawn = draw(picture, options, curtains, 100);
+            EXPECT_LE(drawn.apart, 2) << eye.x << " " << repeats;
+            EXPECT_NE(drawn.picture.beauty, picture.beauty);
+        }
     }
 }
 

@@ -59,14 +59,15 @@ inline double extinction(const Shafts& s, const RainCurtain& c, double whole_per
     const double inner = p.edge > 0 ? smooth(std::clamp(inside / std::max(p.edge, kShaftSoftest), 0.0, 1.0))
                                     : double(inside > 0);
     const double contrast = p.shaft_texture;
-    double falls = std::min(1.0, (1 - h) / double(kShaftTopFade));
+    double falls = std::min(1.0, (1 - h) / double(kShaftTopFade)), height = h;
     if (c.cloud) {
         const CloudBases::Column above = cloud_above(c, place);
         const double to_base = above.base_m - c.ground_m;
         falls = above.water *
                 std::clamp((to_base - height_m) / std::max(to_base, 1.0) / double(kShaftCloudFade), 0.0, 1.0);
+        height = height_m / std::max(to_base, 1.0);
     }
-    return whole_per_m * falls * left_of_rain(h, p.evaporation) * inner *
+    return whole_per_m * falls * left_of_rain(height, p.evaporation) * inner *
            std::exp(contrast * 4.5 * (strands - 0.5) - 0.25 * contrast * contrast);
 }
 
