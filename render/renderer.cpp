@@ -306,6 +306,8 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
     if (options.shadow_map_size > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
     if (splats.ground_cover) check(*splats.ground_cover);
+    if (!veils.empty() && !splats.depth)
+        throw Error(ErrorCode::usage, "a picture with veils needs the distances of what stands before them: Splats::depth");
     check_memory(splats, options, impl_->part_size);
     const auto work = [&] {
         auto state = std::make_unique<PendingPicture::State>(splats, options);

@@ -31,12 +31,9 @@ std::shared_ptr<const ModelTextures> read_textures(std::span<const BaseModel> mo
                                           std::to_string(kMostBillboardPictures));
     }
     auto textures = std::make_shared<ModelTextures>();
-    std::vector<AlphaImage> images;
-    for (const std::string& file : files) {
-        textures->index[file] = std::int32_t(images.size());
-        images.push_back(read_alpha_image(file));
-    }
-    textures->pictures = billboard_pictures(images);
+    for (std::size_t n = 0; n < files.size(); ++n) textures->index[files[n]] = std::int32_t(n);
+    textures->pictures =
+        billboard_pictures(files.size(), [&](std::size_t n) { return read_alpha_image(files[n]); });
     return textures;
 }
 

@@ -5,7 +5,9 @@
 // docs/sources.md), which are sorted and composited together. Plain data in world metres; the memory behind
 // spans must not change until the frame is finished (Renderer::finish(); draw_splats() finishes it itself).
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -79,7 +81,8 @@ inline constexpr std::size_t kMostBillboardPictures = 200;
 // Each picture fills the rectangle of its billboard, but for a rim of 1/128 of its sides that is clear. It is resampled to
 // 126 x 126 texels: its alpha is their opacity, its luminance scales the light. Throws Error(usage) when there are more
 // than kMostBillboardPictures, or one has no pixels or values that its size does not state.
-std::shared_ptr<const BillboardPictures> billboard_pictures(std::span<const AlphaImage> images);
+std::shared_ptr<const BillboardPictures> billboard_pictures(std::size_t count,
+                                                            const std::function<AlphaImage(std::size_t)>& image_of);
 
 struct Splats {
     std::span<const BillboardCloud> clouds;

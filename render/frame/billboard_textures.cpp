@@ -222,14 +222,16 @@ const std::vector<BillboardLevel>& billboard_textures() {
     return levels;
 }
 
-std::shared_ptr<const BillboardPictures> billboard_pictures(std::span<const AlphaImage> images) {
-    if (images.size() > kMostBillboardPictures) {
-        throw Error(ErrorCode::usage, std::to_string(images.size()) + " pictures of billboards; expected at most " +
+std::shared_ptr<const BillboardPictures> billboard_pictures(std::size_t count,
+                                                            const std::function<AlphaImage(std::size_t)>& image_of) {
+    if (count > kMostBillboardPictures) {
+        throw Error(ErrorCode::usage, std::to_string(count) + " pictures of billboards; expected at most " +
                                           std::to_string(kMostBillboardPictures));
     }
     static std::atomic<std::uint64_t> last_serial{0};
     BillboardLevel finest{kBillboardTexels, {}};
-    for (const AlphaImage& image : images) {
+    for (std::size_t n = 0; n < count; ++n) {
+        const AlphaImage image = image_of(n);
         const std::size_t pixels = std::size_t(std::max(image.width, 0)) * std::size_t(std::max(image.height, 0));
         if (pixels == 0 || image.opacity.size() != pixels || image.bright.size() != pixels)
             throw Error(ErrorCode::usage, "a picture of billboards: its values do not have the size that it states");
@@ -237,9 +239,9 @@ std::shared_ptr<const BillboardPictures> billboard_pictures(std::span<const Alph
     }
     auto made = std::make_shared<BillboardPictures>();
     made->serial = ++last_serial;
-    made->count = int(images.size());
+    made->count = int(count);
     made->levels = billboard_textures();
-    if (images.empty()) return made;
+    if (count == 0) return made;
     const std::vector<BillboardLevel> own = levels_from(std::move(finest), true);
     for (std::size_t n = 0; n < own.size(); ++n)
         made->levels[n].texels.insert(made->levels[n].texels.end(), own[n].texels.begin(), own[n].texels.end());

@@ -24,12 +24,13 @@ namespace nephos::HWY_NAMESPACE {
 HWY_INLINE Slopes waves_at(const Water& water, const Floats3& point, const Footprint& print, Floats strength) {
     const Lanes d;
     const Floats zero = hn::Zero(d);
+    constexpr float kTurn = 6.2831853f;
     Slopes sum{zero, zero, set(water.slope_variance)};
     const Floats across = hn::Sqrt(hn::MulAdd(print.across_x, print.across_x, hn::Mul(print.across_y, print.across_y)));
     for (const WaterWave& wave : water.waves) {
         const Floats length = set(wave.wavelength_m);
         if (hn::AllFalse(d, hn::Gt(length, hn::Mul(set(1.5f), across)))) break;  // the next ones are shorter still
-        const float per = wave.wavelength_m / 6.2831853f;
+        const float per = wave.wavelength_m / kTurn;
         const auto covers = [&](Floats x, Floats y) {
             return hn::Abs(hn::MulAdd(set(per * wave.x), x, hn::Mul(set(per * wave.y), y)));
         };
@@ -38,8 +39,9 @@ HWY_INLINE Slopes waves_at(const Water& water, const Floats3& point, const Footp
         const Floats seen = smooth_step(set(1.5f), set(3.5f), hn::Div(length, wide));
         if (hn::AllTrue(d, hn::Eq(seen, zero))) continue;
         const Floats phase = hn::MulAdd(set(wave.x), point.x, hn::MulAdd(set(wave.y), point.y, set(wave.phase)));
-        // Within the range of cos(); waves this far away are not seen.
-        const Floats cosine = hn::Cos(d, hn::Max(hn::Min(phase, set(3.0e4f)), set(-3.0e4f)));
+        // In the first turn, where cos() is exact.
+        const Floats turns = hn::Round(hn::Mul(phase, set(1 / kTurn)));
+        const Floats cosine = hn::Cos(d, hn::NegMulAdd(turns, set(kTurn), phase));
         sum.x = hn::MulAdd(hn::Mul(seen, set(wave.slope_x)), cosine, sum.x);
         sum.y = hn::MulAdd(hn::Mul(seen, set(wave.slope_y)), cosine, sum.y);
         sum.variance = hn::NegMulAdd(hn::Mul(seen, seen), set(wave.variance), sum.variance);
@@ -126,11 +128,12 @@ HWY_INLINE Surface water_surface(const GroundPass& pass, const Seen& seen, Float
     }
 
     const float height = pass.white.to_sun.z;
-    if (height > 0.01f && !hn::AllFalse(d, hn::Gt(sun, zero))) {
+    constexpr float kSunSets = 0.001f, kSunFades = 0.01f;  // sines of the sun's elevation
+    if (height > kSunSets && !hn::AllFalse(d, hn::Gt(sun, zero))) {
         const Floats3 to_eye{hn::Neg(seen.ray.x), hn::Neg(seen.ray.y), hn::Mul(elevation, level)};
         const Floats shine = hn::Mul(sun, glint(to_eye, set3(pass.white.to_sun), slopes, variance, hn::Mul(facets.area, level)));
         constexpr float kPi = 3.14159265f;  // from radiance of white ground to irradiance
-        const Floats scale = hn::Mul(shine, set(kPi / height));
+        const Floats scale = hn::Mul(shine, set(kPi / height * std::min(1.0f, (height - kSunSets) / kSunFades)));
         surface.reflected = add(surface.reflected, times(scale, each_times(seen.beta, set3(pass.white.ground_sun))));
     }
 

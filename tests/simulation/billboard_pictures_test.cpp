@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,10 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path kTextures = fs::path(NEPHOS_SOURCE_DIR) / "scenes/torchelsen/textures";
+
+std::shared_ptr<const BillboardPictures> pictures_of(const std::vector<AlphaImage>& images) {
+    return billboard_pictures(images.size(), [&](std::size_t n) { return images[n]; });
+}
 
 std::string message_of(const fs::path& path) {
     try {
@@ -91,7 +96,7 @@ class PicturesOfBillboards : public test::AllBackends {
         Splats splats;
         splats.clouds = clouds;
         splats.billboards = billboards;
-        splats.pictures = billboard_pictures(images);
+        splats.pictures = pictures_of(images);
         return renderer_.draw_splats(splats, test::view({0, -1000, 1000}, {0, 0, 1000}, 23, 64, 64));
     }
 };
@@ -130,7 +135,7 @@ TEST_P(PicturesOfBillboards, IndicesAreChecked) {
         Splats splats;
         splats.clouds = clouds;
         splats.billboards = billboards;
-        if (index == 2) splats.pictures = billboard_pictures(std::vector<AlphaImage>{quarters(1, 1, 1, 1, 1)});
+        if (index == 2) splats.pictures = pictures_of({quarters(1, 1, 1, 1, 1)});
         EXPECT_THROW(renderer_.draw_splats(splats, test::view({0, -1000, 1000}, {0, 0, 1000})), Error) << index;
     }
 }
@@ -141,9 +146,9 @@ INSTANTIATE_TEST_SUITE_P(Ways, PicturesOfBillboards,
 TEST(BillboardPictures, ValuesMustHaveTheSizeThatIsStated) {
     AlphaImage image = quarters(1, 1, 1, 1, 1);
     image.bright.pop_back();
-    EXPECT_THROW(billboard_pictures(std::vector<AlphaImage>{image}), Error);
-    EXPECT_THROW(billboard_pictures(std::vector<AlphaImage>{AlphaImage{}}), Error);
-    EXPECT_THROW(billboard_pictures(std::vector<AlphaImage>(kMostBillboardPictures + 1, quarters(1, 1, 1, 1, 1))), Error);
+    EXPECT_THROW(pictures_of({image}), Error);
+    EXPECT_THROW(pictures_of({AlphaImage{}}), Error);
+    EXPECT_THROW(pictures_of(std::vector<AlphaImage>(kMostBillboardPictures + 1, quarters(1, 1, 1, 1, 1))), Error);
 }
 
 Scene painted() { return read_scene(fs::path(NEPHOS_SOURCE_DIR) / "scenes/torchelsen/painted.toml"); }
