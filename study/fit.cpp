@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include "study/design.h"
 #include "study/emulator.h"
@@ -53,16 +54,21 @@ struct Box {
     }
 };
 
-// Whether points, one after the other, reach to all sides of a box.
+// Whether points, one after the other, reach to all sides of a box. None lies on a side of the cube itself, where the prior
+// ends: such a side is reached when points that fill the box could leave that gap, two of their spacings.
 bool surround(const std::vector<double>& points, const Box& box) {
     const std::size_t dimensions = box.low.size();
+    const double count = double(points.size() / dimensions);
+    const double gap = 2 / std::pow(std::max(1.0, count), 1 / double(dimensions));  // of the width
     for (std::size_t d = 0; d < dimensions; ++d) {
         double low = 1, high = 0;
         for (std::size_t n = d; n < points.size(); n += dimensions) {
             low = std::min(low, points[n]);
             high = std::max(high, points[n]);
         }
-        if (low > box.low[d] || high < box.high[d]) return false;
+        const double width = box.high[d] - box.low[d];
+        const double below = box.low[d] > 0 ? 0 : gap * width, above = box.high[d] < 1 ? 0 : gap * width;
+        if (low > box.low[d] + below || high < box.high[d] - above) return false;
     }
     return true;
 }
@@ -87,6 +93,10 @@ class Fitter {
           box_(dimensions_) {
         if (problem.parameters.empty() || problem.targets.empty())
             throw Error(ErrorCode::usage, "a fit needs a parameter and a target");
+        if (problem.runs < fewest_runs(dimensions_))
+            throw Error(ErrorCode::usage,
+                        fmt::format("{} runs are too few for {} parameters: expected {} or more",
+                                    problem.runs, dimensions_, fewest_runs(dimensions_)));
         for (const FitTarget& target : problem.targets) {
             transforms_.push_back(transform_of(target.statistic));
             z_.push_back(forward(transforms_.back(), target.value));
@@ -98,8 +108,7 @@ class Fitter {
     }
 
     FitResult result() {
-        const std::uint64_t first = std::max<std::uint64_t>(problem_.runs / 2, dimensions_ + 4);
-        run_wave(1, take(box_, first));
+        run_wave(1, take(box_, problem_.runs / 2));
         for (int wave = 2; wave <= 3; ++wave) {
             const std::uint64_t left = problem_.runs > tried_.size() ? problem_.runs - tried_.size() : 0;
             const std::uint64_t count = wave == 2 ? left / 2 : left;
@@ -133,10 +142,11 @@ class Fitter {
     }
 
     void run_wave(int wave, const std::vector<Point>& points) {
-        tried_.insert(tried_.end(), points.begin(), points.end());
+        tried_.insert(points.begin(), points.end());
         for (FitRun& run : simulate_(wave, points)) {
             bool whole = true;
             for (std::size_t n = 0; n < z_.size(); ++n) {
+                run.errors[n] *= slope(transforms_[n], run.statistics[n]);
                 run.statistics[n] = forward(transforms_[n], run.statistics[n]);
                 whole = whole && std::isfinite(run.statistics[n]);
             }
@@ -173,16 +183,17 @@ class Fitter {
         const bool any_inside =
             std::ranges::any_of(runs_, [&](const FitRun& r) { return box_.holds(r.unit); });
         for (Box box = box_;; box = box.grown(2)) {
-            std::vector<double> points, values;
+            std::vector<double> points, values, errors;
             std::vector<bool> inside;
             for (const FitRun& run : runs_) {
                 if (!box.holds(run.unit)) continue;
                 points.insert(points.end(), run.unit.begin(), run.unit.end());
                 values.push_back(run.statistics[target]);
+                errors.push_back(run.errors[target]);
                 inside.push_back(!any_inside || box_.holds(run.unit));
             }
             if ((values.size() >= enough && surround(points, looked_at_)) || box.is_whole()) {
-                Emulator emulator(points, values, dimensions_);
+                Emulator emulator(points, values, errors, dimensions_);
                 double error = 0, leverage = 0;
                 for (std::size_t n = 0; n < values.size(); ++n)
                     if (inside[n]) error += emulator.left_out()[n] * emulator.left_out()[n];
@@ -273,11 +284,11 @@ class Fitter {
     // a ridge through a box of many dimensions, also points ever closer to those that were found.
     std::vector<Point> proposals(const Box& box, double limit, std::uint64_t count) {
         std::vector<Point> found;
+        std::set<Point> known;
         const auto add = [&](const std::vector<Point>& points) {
             for (const Point& point : points) {
                 if (found.size() == count) return;
-                if (implausibility(point) <= limit && std::ranges::count(tried_, point) == 0 &&
-                    std::ranges::count(found, point) == 0)
+                if (implausibility(point) <= limit && !tried_.contains(point) && known.insert(point).second)
                     found.push_back(point);
             }
         };
@@ -383,7 +394,7 @@ class Fitter {
             }
             const FitTarget& target = problem_.targets[n];
             result.targets.push_back({target.value, target.sd, mean,
-                                      std::sqrt(variance) / slope(transforms_[n], mean), kNaN, kNaN});
+                                      std::sqrt(variance) / slope(transforms_[n], mean), kNaN, kNaN, 0});
         }
         directions(result.best, result);
     }
@@ -414,11 +425,17 @@ class Fitter {
         }
     }
 
+    // At different points, in the random order of the samples: a point that comes twice has the same seed, and would be the same
+    // run twice.
     void prove(FitResult& result) {
-        if (problem_.proof == 0) return;
-        std::vector<std::vector<double>> points;
-        for (std::uint64_t n = 0; n < problem_.proof; ++n)
-            points.push_back(result.posterior[(2 * n + 1) * result.posterior.size() / (2 * problem_.proof)]);
+        std::vector<Point> points;
+        std::set<Point> known = tried_;
+        for (const Point& sample : result.posterior) {
+            if (points.size() == problem_.proof) break;
+            if (known.insert(sample).second) points.push_back(sample);
+        }
+        result.proof = points.size();
+        if (points.empty()) return;
         const std::vector<FitRun> runs = simulate_(4, points);
         for (std::size_t n = 0; n < z_.size(); ++n) {
             double sum = 0, squares = 0, count = 0;
@@ -430,6 +447,7 @@ class Fitter {
             }
             if (count < 1) continue;
             result.targets[n].got = sum / count;
+            result.targets[n].got_runs = std::uint64_t(count);
             if (count > 1)
                 result.targets[n].got_error =
                     std::sqrt(std::max(0.0, squares - sum * sum / count) / (count - 1) / count);
@@ -445,7 +463,7 @@ class Fitter {
     std::vector<Transform> transforms_;
     std::vector<double> z_, sd_;  // targets and their sd, transformed
     std::vector<FitRun> runs_;    // statistics transformed
-    std::vector<Point> tried_;    // of all runs, those that were lost included
+    std::set<Point> tried_;       // of all runs, those that were lost included
     std::uint64_t taken_ = 0;     // points of the Sobol sequence
     std::uint64_t lost_ = 0;
     std::vector<Emulator> emulators_;
@@ -457,6 +475,8 @@ double parameter_value(const FitParameter& parameter, double unit) {
     if (parameter.scale == Scale::log) return parameter.from * std::pow(parameter.to / parameter.from, unit);
     return parameter.from + unit * (parameter.to - parameter.from);
 }
+
+std::uint64_t fewest_runs(std::size_t parameters) { return 2 * (parameters + 4); }
 
 FitResult fit(const FitProblem& problem, const Simulate& simulate) {
     return Fitter(problem, simulate).result();

@@ -9,7 +9,7 @@
 //     2. emulator a polynomial for each target, of logit(x) for fractions and log(x) for sizes and times, from the runs in and
 //                 about the region of the last wave
 //     3. posterior prior x normal likelihood of the targets, with the emulator's variance, by importance sampling
-//     4. proof    fresh runs at points of the posterior: what the emulator promised, and what the simulation gave
+//     4. proof    fresh runs at different points of the posterior: what the emulator promised, and what the simulation gave
 //
 // Uncertainty therefore has two parts: that of the targets, and that of the runs. More runs make only the second smaller.
 
@@ -32,6 +32,8 @@ struct FitParameter {
 struct FitTarget {
     std::string statistic;  // of kStatistics
     double value = 0, sd = 0;
+    std::uint64_t missing =
+        0;  // values of the cloud mask it is from that are missing, and were taken as clear
 };
 
 struct FitProblem {
@@ -58,7 +60,9 @@ struct ParameterEstimate {
 struct TargetCheck {
     double target, sd;
     double predicted, predicted_sd;  // by the emulator over the posterior; sd of its mean
-    double got, got_error;           // mean of the proof, its standard error; NaN without proof
+    // Of the proof: the mean, NaN of no run, its standard error, NaN of fewer than two, and the runs that it is of.
+    double got, got_error;
+    std::uint64_t got_runs = 0;
 };
 
 // A combination of parameters, in units of their prior ranges.
@@ -72,16 +76,23 @@ struct FitResult {
     std::vector<TargetCheck> targets;
     std::vector<Direction> directions;           // strongest first
     std::vector<std::vector<double>> posterior;  // values of the parameters, 1,000 equally likely points
-    std::uint64_t runs = 0, lost = 0;            // lost: without a mean (not steady, or failed)
-    std::vector<double> best;                    // the parameters of the highest posterior density
+    // Without the proof: fewer than were asked for where no more points are possible. Lost: without a mean (not steady, or
+    // failed).
+    std::uint64_t runs = 0, lost = 0;
+    std::uint64_t proof =
+        0;  // different points of the posterior that were run afresh, at most as many as asked for
+    std::vector<double> best;   // the parameters of the highest posterior density
     double implausibility = 0;  // of the best point; above 3 the targets cannot be met in the prior
     // Number of independent points that the weighted ones of the posterior are worth, (sum w)^2 / sum w^2; below 200 the
     // quantiles are rough.
     double effective_samples = 0;
 };
 
-// Throws Error(usage) when more than half the runs have no mean, or the problem has no parameter or target. Pure but for
-// `simulate`.
+// Returns how many runs a fit of so many parameters takes at least: half of them must give each emulator its first degree.
+std::uint64_t fewest_runs(std::size_t parameters);
+
+// Throws Error(usage) when more than half the runs have no mean, the problem has no parameter or target, or fewer runs than
+// fewest_runs(). Pure but for `simulate`.
 FitResult fit(const FitProblem& problem, const Simulate& simulate);
 
 // Returns the value of a parameter at a place of its prior, 0..1.

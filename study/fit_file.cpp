@@ -36,9 +36,19 @@ void read_target_mask(TomlTable& target, const std::filesystem::path& folder, Fi
     const std::optional<double> sd = target.number("sd", kSmallest, kLargest);
     if (target.has("value"))
         target.report("value", "a target has both value and from", "expected one of them");
+    const bool clear_if_missing = target.word("missing", {"clear"}).has_value();
     SeriesMean mean{};
     try {
-        mean = mask_statistics(read_masks({folder / file}, mask)).statistics[statistic_index(to.statistic)];
+        const CloudMasks masks = read_masks({folder / file}, mask);
+        to.missing = masks.missing;
+        const std::size_t values = masks.snapshots.size() * masks.snapshots.front().extent().cells();
+        if (masks.missing > 0 && !clear_if_missing) {
+            target.report(
+                "from", fmt::format("{} of {} values of {} are missing", masks.missing, values, file),
+                "expected a part of the mask without such, or missing = \"clear\" where they are clear air");
+            return;
+        }
+        mean = mask_statistics(masks).statistics[statistic_index(to.statistic)];
     } catch (const Error& error) {
         target.report("from", error.what(), "expected a cloud mask: .vdb, .nc or .png");
         return;
@@ -99,6 +109,12 @@ FitOptions read_fit_file(const std::filesystem::path& path) {
         });
         if (options.problem.parameters.empty())
             table.report("parameter", "the fit has no parameter", "expected a table [[parameter]]");
+        const std::uint64_t fewest = fewest_runs(options.problem.parameters.size());
+        if (options.problem.runs < fewest)
+            table.report("runs",
+                         fmt::format("{} runs are too few for {} parameters", options.problem.runs,
+                                     options.problem.parameters.size()),
+                         fmt::format("expected {} or more", fewest));
         table.tables("target", [&](TomlTable& target) {
             FitTarget& to = options.problem.targets.emplace_back();
             std::vector<std::string_view> names;

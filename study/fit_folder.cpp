@@ -70,6 +70,13 @@ std::string direction_text(const FitOptions& options, const Direction& direction
     return text;
 }
 
+// "0.301 (0.002 of 8)": the mean of the proof, its standard error, and the runs that it is of.
+std::string proof_text(const TargetCheck& target) {
+    if (target.got_runs == 0) return "none";
+    if (target.got_runs == 1) return fmt::format("{:.5g} (one run)", target.got);
+    return fmt::format("{:.5g} ({:.2g} of {})", target.got, target.got_error, target.got_runs);
+}
+
 void write_results(const FitOptions& options, const FitResult& result, const std::filesystem::path& folder) {
     std::string csv;
     for (const FitParameter& parameter : options.problem.parameters)
@@ -111,13 +118,18 @@ void write_results(const FitOptions& options, const FitResult& result, const std
                            {"predicted", number(t.predicted)},
                            {"predicted_sd", number(t.predicted_sd)},
                            {"got", number(t.got)},
-                           {"got_se", number(t.got_error)}});
+                           {"got_se", number(t.got_error)},
+                           {"got_runs", t.got_runs},
+                           {"missing", options.problem.targets[n].missing}});
     }
     for (const Direction& direction : result.directions)
         directions.push_back({{"weights", direction.weights}, {"strength", number(direction.strength)}});
     const Json json = {{"format", "nephos fit"},
+                       {"runs_asked", options.problem.runs},
                        {"runs", result.runs},
                        {"lost", result.lost},
+                       {"proof_asked", options.problem.proof},
+                       {"proof", result.proof},
                        {"implausibility", number(result.implausibility)},
                        {"effective_samples", number(result.effective_samples)},
                        {"parameters", parameters},
@@ -163,13 +175,13 @@ std::string fit_text(const FitOptions& options, const FitResult& result) {
         text += fmt::format("{:32} {:>11.6g} {:>11.3g} {:>11.6g} .. {:<11.6g}\n",
                             name_of(options.problem.parameters[d]), p.mean, p.sd, p.low, p.high);
     }
-    text += fmt::format("\n{:22} {:>20} {:>22} {:>24}\n", "target", "asked for", "emulator (its error)",
-                        "fresh runs (se)");
+    text += fmt::format("\n{:22} {:>20} {:>22} {:>26}\n", "target", "asked for", "emulator (its error)",
+                        "fresh runs (se of number)");
     for (std::size_t n = 0; n < result.targets.size(); ++n) {
         const TargetCheck& t = result.targets[n];
-        text += fmt::format("{:22} {:>10.5g} +- {:<7.3g} {:>11.5g} ({:.2g}){:5} {:>11.5g} ({:.2g})\n",
-                            options.problem.targets[n].statistic, t.target, t.sd, t.predicted, t.predicted_sd,
-                            "", t.got, t.got_error);
+        text += fmt::format("{:22} {:>10.5g} +- {:<7.3g} {:>21} {:>26}\n",
+                            options.problem.targets[n].statistic, t.target, t.sd,
+                            fmt::format("{:.5g} ({:.2g})", t.predicted, t.predicted_sd), proof_text(t));
     }
     std::size_t fixed = 0;
     for (const Direction& direction : result.directions) fixed += direction.strength > 1;
@@ -190,6 +202,17 @@ std::string fit_text(const FitOptions& options, const FitResult& result) {
             "narrower "
             "priors, or leave out a parameter that the targets do not fix\n",
             result.effective_samples);
+    if (result.proof < options.problem.proof)
+        text += fmt::format("warning: {} of {} fresh runs: the posterior has no more points\n", result.proof,
+                            options.problem.proof);
+    if (result.runs < options.problem.runs)
+        text +=
+            fmt::format("warning: {} of {} runs: no more points were found where the targets are possible\n",
+                        result.runs, options.problem.runs);
+    for (const FitTarget& target : options.problem.targets)
+        if (target.missing > 0)
+            text += fmt::format("note: {} values of the mask of `{}` are missing, and count as clear\n",
+                                target.missing, target.statistic);
     if (result.lost > 0)
         text +=
             fmt::format("warning: {} of {} runs had no mean (not steady, dead or failed) and told nothing\n",

@@ -21,6 +21,7 @@ struct FitArguments {
     std::string file, out;
     std::optional<std::uint64_t> runs;
     int workers = 0;
+    bool retry_failed = false, overwrite = false;
     WorkArguments work;
 };
 
@@ -31,6 +32,8 @@ int fit(const FitArguments& a) {
     SweepJob job;
     job.folder = a.out.empty() ? "out/fit-" + std::filesystem::path(a.file).stem().string() : a.out;
     job.workers = a.workers > 0 ? a.workers : int(std::max(1u, std::thread::hardware_concurrency()));
+    job.retry_failed = a.retry_failed;
+    job.overwrite = a.overwrite;
     std::unique_ptr<ProgressBar> bar;
     int shown = 0;
     defer_signals();
@@ -77,6 +80,9 @@ void add_fit_command(CLI::App& app, Action& action) {
     add_value(*command, "-j,--workers", "N",
               "Runs at a time, each in a process with one thread (default: all cores)",
               [a](const std::string& text) { a->workers = int(parse_unsigned(text, 1, 1024)); });
+    command->add_flag("--retry-failed", a->retry_failed, "Run again what failed");
+    command->add_flag("--overwrite", a->overwrite,
+                      "Throw the records of an earlier fit in the folder away first");
     add_quiet(*command, a->work);
     command->footer(
         "The file:\n"

@@ -11,6 +11,7 @@
 #include <random>
 #include <set>
 
+#include "study/design.h"
 #include "study/emulator.h"
 #include "study/fit_folder.h"
 #include <fmt/format.h>
@@ -53,9 +54,11 @@ Simulate toy(const FitProblem& problem, std::uint64_t seed, Waves* waves = nullp
             const double c = null_cover(act, ext), logit = std::log(c / (1 - c)) + noise(random);
             FitRun run{unit, {}, {}};
             for (const FitTarget& target : problem.targets) {
-                run.statistics.push_back(target.statistic == "cover" ? 1 / (1 + std::exp(-logit))
+                const double cover = 1 / (1 + std::exp(-logit));
+                run.statistics.push_back(target.statistic == "cover" ? cover
                                                                      : std::exp(noise(random)) * 10 / ext);
-                run.errors.push_back(0);
+                run.errors.push_back(
+                    kNoise * (target.statistic == "cover" ? cover * (1 - cover) : run.statistics.back()));
             }
             runs.push_back(std::move(run));
         }
@@ -110,11 +113,11 @@ TEST(Fit, OneParameterIsFoundWithinHalfAPercentFrom64Runs) {
     EXPECT_GT(result.directions[0].strength, 1);
     EXPECT_NEAR(result.targets[0].got, result.targets[0].target, 5 * result.targets[0].got_error);
     ASSERT_EQ(result.posterior.size(), 1000u);
-    // Any eight rows are a sample: those of the proof are not all at one place.
+    // Any eight rows are a sample: those of the proof, the first, are not all at one place.
     double low = 1, high = 0;
     for (std::size_t n = 0; n < 8; ++n) {
-        low = std::min(low, result.posterior[(2 * n + 1) * 1000 / 16][0]);
-        high = std::max(high, result.posterior[(2 * n + 1) * 1000 / 16][0]);
+        low = std::min(low, result.posterior[n][0]);
+        high = std::max(high, result.posterior[n][0]);
     }
     EXPECT_GT(high - low, result.parameters[0].sd);
     EXPECT_LT(result.implausibility, 1);
@@ -156,6 +159,13 @@ TEST(Fit, ARidgeIsFoundAndNamed) {
 struct Coverage {
     int inside = 0;
     std::array<int, 5> ranks{};  // of the truth among the samples
+
+    void add(double truth, const FitResult& result) {
+        inside += truth > result.parameters[0].low && truth < result.parameters[0].high;
+        std::size_t below = 0;
+        for (const std::vector<double>& sample : result.posterior) below += sample[0] < truth;
+        ++ranks[std::min<std::size_t>(4, below * 5 / result.posterior.size())];
+    }
 };
 
 // Fits of `truths` truths from `runs` runs; what is observed is off the truth by what the target's sd says.
@@ -168,11 +178,41 @@ Coverage coverage(int truths, std::uint64_t runs, double relative_sd, std::uint6
         const double truth = parameter_value(kExt, uniform(random)), cover = null_cover(1e-3, truth);
         const double sd = relative_sd * cover, seen = cover + sd * normal(random);
         const FitProblem problem{{kExt}, {{"cover", seen, sd}}, runs, 0, 1};
-        const FitResult result = fit(problem, toy(problem, 1000 * seed + std::uint64_t(n)));
-        found.inside += truth > result.parameters[0].low && truth < result.parameters[0].high;
-        std::size_t below = 0;
-        for (const std::vector<double>& sample : result.posterior) below += sample[0] < truth;
-        ++found.ranks[std::min<std::size_t>(4, below * 5 / result.posterior.size())];
+        found.add(truth, fit(problem, toy(problem, 1000 * seed + std::uint64_t(n))));
+    }
+    return found;
+}
+
+// A response that goes from a plateau to another, of the first parameter alone: logit C = 3 tanh(6 (x - 1/2)). The others change
+// nothing, so that what is possible reaches from side to side of the cube along each of them.
+double plateaus(double x) { return 3 * std::tanh(6 * (x - 0.5)); }
+
+// As coverage(), with free parameters beside the one that is found, and truths in all of its prior.
+Coverage coverage_beside_free_ones(std::size_t dimensions, int truths, std::uint64_t runs, double sd,
+                                   std::uint64_t seed) {
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    std::normal_distribution<double> normal(0, 1);
+    Coverage found;
+    for (int n = 0; n < truths; ++n) {
+        const double truth = uniform(random),
+                     seen = 1 / (1 + std::exp(-plateaus(truth) - sd * normal(random)));
+        const FitProblem problem{
+            std::vector<FitParameter>(dimensions, {{"field.background.ext"}, 0, 1, Scale::linear}),
+            {{"cover", seen, sd * seen * (1 - seen)}},
+            runs,
+            0,
+            1};
+        std::mt19937_64 of_run(1000 * seed + std::uint64_t(n));
+        const FitResult result = fit(problem, [&](int, const std::vector<std::vector<double>>& points) {
+            std::vector<FitRun> all;
+            for (const std::vector<double>& unit : points) {
+                const double cover = 1 / (1 + std::exp(-plateaus(unit[0]) - kNoise * normal(of_run)));
+                all.push_back({unit, {cover}, {kNoise * cover * (1 - cover)}});
+            }
+            return all;
+        });
+        found.add(truth, result);
     }
     return found;
 }
@@ -192,6 +232,14 @@ TEST(Fit, IntervalsHoldTheTruthAsOftenAsTheySay) {
         EXPECT_GE(found.inside, 83) << relative_sd;
         EXPECT_LE(found.inside, 96) << relative_sd;
         EXPECT_LT(chi_squared(found), 13.28) << relative_sd << ": p = 0.01 at four degrees of freedom";
+    }
+}
+
+// A line through two plateaus knows its own mean well, and is far off nearly everywhere: what it misses has to be in the error.
+TEST(Fit, IntervalsHoldTheTruthBesideFreeParameters) {
+    for (const double sd : {0.3, 0.03}) {
+        const Coverage found = coverage_beside_free_ones(4, 50, 64, sd, 1);
+        EXPECT_GE(found.inside, 41) << sd;
     }
 }
 
@@ -221,6 +269,73 @@ TEST(Fit, CoverageOfManyTruths) {
             std::puts(fmt::format("{} runs, sd {} of the target:{}", runs, relative_sd, line).c_str());
         }
     }
+    for (const std::size_t dimensions : {1u, 4u}) {
+        for (const double sd : {0.3, 0.03, 0.001}) {
+            const Coverage found = coverage_beside_free_ones(dimensions, 100, 64, sd, 2);
+            EXPECT_GE(found.inside, 80);
+            std::puts(fmt::format("{} parameters, sd {} of the logit: {} ({:.1f})", dimensions, sd,
+                                  found.inside, chi_squared(found))
+                          .c_str());
+        }
+    }
+}
+
+// A sheet through a cube of six parameters, thinner than the gaps between all the points that are tried: the posterior rests on
+// a few of them.
+TEST(Fit, TheProofRunsNoPointTwice) {
+    const FitProblem problem{std::vector<FitParameter>(6, {{"field.background.ext"}, 0, 1, Scale::linear}),
+                             {{"cover", 0.5, 1e-7}},
+                             64,
+                             8,
+                             1};
+    Waves waves;
+    FitResult result = fit(problem, [&](int wave, const std::vector<std::vector<double>>& points) {
+        std::vector<FitRun> runs;
+        for (const std::vector<double>& unit : points) {
+            double sum = -3;
+            for (const double x : unit) sum += x;
+            runs.push_back({unit, {1 / (1 + std::exp(-sum))}, {1e-9}});
+        }
+        waves[wave] = points;
+        return runs;
+    });
+    const std::set<std::vector<double>> samples(result.posterior.begin(), result.posterior.end());
+    ASSERT_LT(result.effective_samples, 8) << "else nothing is tested";
+    const std::set<std::vector<double>> points(waves[4].begin(), waves[4].end());
+    EXPECT_EQ(points.size(), waves[4].size());
+    EXPECT_EQ(points.size(), std::min<std::size_t>(8, samples.size()));
+    EXPECT_EQ(result.proof, points.size());
+    EXPECT_EQ(result.targets[0].got_runs, points.size());
+    FitOptions options;
+    options.problem = problem;
+    TargetCheck& one = result.targets[0];
+    EXPECT_EQ(std::isnan(one.got_error), one.got_runs < 2);
+    one.got_runs = 1;
+    EXPECT_NE(fit_text(options, result).find("(one run)"), std::string::npos);
+    one.got_runs = 0;
+    EXPECT_NE(fit_text(options, result).find(" none\n"), std::string::npos);
+}
+
+TEST(Fit, FewerRunsThanAskedForAreSaidSo) {
+    const FitProblem few{{kExt}, {{"cover", 0.3, 0.01}}, 9, 0, 1};
+    try {
+        fit(few, toy(few, 1));
+        FAIL() << "9 runs of one parameter";
+    } catch (const Error& error) {
+        EXPECT_STREQ(error.what(), "9 runs are too few for 1 parameters: expected 10 or more");
+    }
+    const FitProblem enough{{kExt}, {{"cover", 0.3, 0.01}}, 10, 0, 1};
+    FitResult result = fit(enough, toy(enough, 1));
+    EXPECT_EQ(result.runs, 10u);
+    FitOptions options;
+    options.problem = enough;
+    EXPECT_EQ(fit_text(options, result).find(" of 10 runs"), std::string::npos);
+    result.runs = 7;
+    EXPECT_NE(fit_text(options, result).find("warning: 7 of 10 runs: no more points were found"),
+              std::string::npos);
+    result.proof = 3;
+    options.problem.proof = 8;
+    EXPECT_NE(fit_text(options, result).find("warning: 3 of 8 fresh runs"), std::string::npos);
 }
 
 // A normal posterior over a box of some ten deviations: each point counts by its weight.
@@ -252,6 +367,28 @@ TEST(Fit, TargetsOutOfReachAreSaidSo) {
     EXPECT_THROW(fit(problem, lost), Error);
 }
 
+// A step along one of six coordinates: 64 values are too few for all products, and enough for the powers of that one. What the
+// polynomial misses is more than the errors say, and stays in the variance.
+TEST(Emulator, OneOfManyParametersHasAHighDegree) {
+    std::vector<double> points = sobol_points(0, 64, 6, 1), values, errors(64, 1e-3);
+    for (std::size_t n = 0; n < 64; ++n) values.push_back(std::tanh(6 * (points[6 * n + 2] - 0.5)));
+    const Emulator emulator(points, values, errors, 6);
+    EXPECT_EQ(emulator.degree(), 5);
+    EXPECT_GT(emulator.misfit(), 0.01);
+    EXPECT_LT(emulator.misfit(), 0.1);
+    double squares = 0;
+    const std::vector<double> fresh = sobol_points(64, 200, 6, 1);
+    for (std::size_t n = 0; n < 200; ++n) {
+        const Emulator::Prediction p = emulator.at(std::span(fresh).subspan(6 * n, 6));
+        squares += std::pow(p.mean - std::tanh(6 * (fresh[6 * n + 2] - 0.5)), 2) / p.variance / 200;
+    }
+    EXPECT_GT(squares, 0.3);
+    EXPECT_LT(squares, 3) << "8 without the misfit";
+    // Errors that explain the scatter leave no misfit.
+    const Emulator noisy(points, values, std::vector<double>(64, 0.5), 6);
+    EXPECT_EQ(noisy.misfit(), 0);
+}
+
 TEST(Emulator, GivesBackACubic) {
     std::vector<double> points, values;
     for (int n = 0; n < 30; ++n) {
@@ -259,12 +396,12 @@ TEST(Emulator, GivesBackACubic) {
         points.push_back(x);
         values.push_back(1 + x - 3 * x * x + 2 * x * x * x);
     }
-    const Emulator emulator(points, values, 1);
+    const Emulator emulator(points, values, {}, 1);
     EXPECT_GE(emulator.degree(), 3);
     const std::array<double, 1> at{0.37};
     EXPECT_NEAR(emulator.at(at).mean, 1 + 0.37 - 3 * 0.37 * 0.37 + 2 * 0.37 * 0.37 * 0.37, 1e-7);
     EXPECT_LT(emulator.noise(), 1e-6);
-    EXPECT_THROW(Emulator(std::span(points).first(3), std::span(values).first(3), 1), Error);
+    EXPECT_THROW(Emulator(std::span(points).first(3), std::span(values).first(3), {}, 1), Error);
 }
 
 // The same cubic within a thousandth of the cube: the terms are of the box of the points, so they stay apart.
@@ -279,7 +416,7 @@ TEST(Emulator, IsAsExactInASmallBox) {
             points.push_back(0.7 + width * n / 29.0);
             values.push_back(cubic(points.back()));
         }
-        const Emulator emulator(points, values, 1);
+        const Emulator emulator(points, values, {}, 1);
         for (const double u : {0.1, 0.37, 0.9}) {
             const std::array<double, 1> at{0.7 + width * u};
             EXPECT_NEAR(emulator.at(at).mean, cubic(at[0]), 1e-6) << width;

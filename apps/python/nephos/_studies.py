@@ -122,7 +122,8 @@ def _plan(axes, options):
 
 
 def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", points=None, seed=1, seeds="per_point",
-          clouds_every=10, tracks=False, layer=None, until=None, workers=None, shard=None):
+          clouds_every=10, tracks=False, layer=None, until=None, workers=None, shard=None, retry_failed=False,
+          overwrite=False):
     """Runs a scene over values of its keys, as `nephos sweep` does, and returns the Sweep.
 
     scene     a Scene, or the path of one
@@ -136,6 +137,7 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
     workers   processes at a time; None: one a core
     shard     (i, n): only the i-th of n parts of the runs, i from 0, for calls on several machines; then None is returned, and
               merge() makes the tables
+    retry_failed, overwrite   run again what failed; throw the records in the folder (of the shard, if one is named) away first
 
     Raises Error before the first run where a value is out of range, with the text of the command. Runs that fail are in
     failures(), and do not raise. Ctrl-C stops, and what is done stays."""
@@ -154,25 +156,31 @@ def sweep(scene, axes, out, *, replicates=5, steps=(300, 3000), design="grid", p
         plan.write_text(_plan(axes, options), encoding="utf-8")
         jobs = [] if workers is None else ["--workers", workers]
         part = [] if shard is None else ["--shard", f"{shard[0]}/{shard[1]}"]
-        _call(["sweep", plan, "--out", out, "--quiet", *jobs, *part], allowed=(0, 1))
+        _call(["sweep", plan, "--out", out, "--quiet", *jobs, *part, *_flags(retry_failed, overwrite)], allowed=(0, 1))
     return Sweep(out) if shard is None else None
 
 
-def merge(folders, out=None):
+def _flags(retry_failed, overwrite):
+    return ["--retry-failed"] * bool(retry_failed) + ["--overwrite"] * bool(overwrite)
+
+
+def merge(folders, out=None, *, overwrite=False):
     """Makes the tables of a sweep from the shards in one or several folders, and returns the Sweep; `out` is the first
-    folder by default. Runs that are missing yet stand in runs.csv as missing."""
+    folder by default. Runs that are missing yet stand in runs.csv as missing. Raises Error where that would lose runs of earlier
+    tables, unless `overwrite`."""
     folders = [folders] if isinstance(folders, (str, os.PathLike)) else list(folders)
     out = folders[0] if out is None else out
-    _call(["merge", *folders, "--out", out, "--quiet"])
+    _call(["merge", *folders, "--out", out, "--quiet", *_flags(False, overwrite)])
     return Sweep(out)
 
 
-def fit(path, out, *, workers=None):
+def fit(path, out, *, workers=None, retry_failed=False, overwrite=False):
     """Finds the parameters that a fit file asks for, as `nephos fit` does, and returns fit.json as a dict with `posterior`
-    added: a dict of arrays, 1,000 equally likely values of each key. The same call again runs only what is missing. Raises
-    Error with the text of the command."""
+    added: a dict of arrays, 1,000 equally likely values of each key. The same call again runs only what is missing;
+    `retry_failed` runs again what failed, `overwrite` throws the records of an earlier fit away first. Raises Error with the
+    text of the command."""
     jobs = [] if workers is None else ["--workers", workers]
-    _call(["fit", path, "--out", out, "--quiet", *jobs])
+    _call(["fit", path, "--out", out, "--quiet", *jobs, *_flags(retry_failed, overwrite)])
     result = json.loads(pathlib.Path(out, "fit.json").read_text(encoding="utf-8"))
     result["posterior"] = _table(pathlib.Path(out, "posterior.csv"))
     return result

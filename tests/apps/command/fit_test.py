@@ -3,7 +3,10 @@
 
 import csv
 import json
+import re
 import unittest
+
+import xxhash
 
 from case import Case
 
@@ -63,6 +66,22 @@ class Fit(Case):
         self.assertEqual(self.call("fit", file, "--out", "fit", "-j", "1").stdout, result.stdout)
         self.assertEqual((self.folder / "fit/wave-1/timing.csv").read_text(), before)
 
+    def test_a_fit_of_another_version_is_overwritten(self):
+        """Its records are refused with a cure that helps."""
+        self.write("null.toml", NULL)
+        file = self.write("fit.toml", FIT.replace("runs = 32", "runs = 10").replace("proof = 4", "proof = 0"))
+        self.call("fit", file, "--out", "fit", "-j", "2")
+        before = (self.folder / "fit/fit.json").read_bytes()
+        for shard in self.folder.glob("fit/wave-*/shards/*.jsonl"):
+            lines = []
+            for line in shard.read_text().splitlines():
+                text = re.sub(r'"statistics_version":\d+', '"statistics_version":1', line.rsplit(',"xxh3":"', 1)[0])
+                lines.append(f'{text},"xxh3":"{xxhash.xxh3_128(text.encode()).hexdigest()}"}}\n')
+            shard.write_text("".join(lines))
+        self.assertIn("give --overwrite", self.call("fit", file, "--out", "fit", status=2).stderr)
+        self.call("fit", file, "--out", "fit", "-j", "2", "--overwrite")
+        self.assertEqual((self.folder / "fit/fit.json").read_bytes(), before)
+
     def test_bad_files(self):
         self.write("null.toml", NULL)
         for old, new, says in (("statistic = \"cover\"", "statistic = \"cower\"", "did you mean \"cover\"?"),
@@ -71,7 +90,8 @@ class Fit(Case):
                                ("sd = 0.003", "", "needs statistic, and value and sd or from"),
                                ("field.background.ext", "field.background.exd", "did you mean `ext`"),
                                ("to = 0.3", "to = 1.3", "field.background.ext"),
-                               ("runs = 32", "runs = 3", "from 8")):
+                               ("runs = 32", "runs = 3", "from 8"),
+                               ("runs = 32", "runs = 9", "9 runs are too few for 1 parameters")):
             with self.subTest(new=new):
                 file = self.write("bad.toml", FIT.replace(old, new))
                 self.assertIn(says, self.call("fit", file, "--out", "bad", status=2).stderr)

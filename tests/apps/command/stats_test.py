@@ -208,6 +208,20 @@ class Stats(Case):
         self.refused_fit("from = \"0.vdb\"\nsd = 0.1\ntreshold = 0.3", "threshold")
         self.refused_fit("from = \"0.vdb\"\nsd = 0.1\nperiodic = [\"z\"]", "'z' is no axis of a mask")
 
+    def test_missing_values_of_a_target_are_not_clear_in_silence(self):
+        """Half a swath is not half the cover: the fit says so, unless the file says that what is missing is clear."""
+        self.write("null.toml", NULL)
+        values = numpy.zeros((4, 8))
+        values[:, :2] = 1
+        values[:, 4:] = -9
+        self.netcdf("swath.nc", values, ("y", "x"), _FillValue=-9.0)
+        text = "from = \"swath.nc\"\ncell_size_m = 50\nsd = 0.05\n"
+        self.refused_fit(text, "16 of 32 values of swath.nc are missing")
+        self.refused_fit(text + "missing = \"cloud\"", "clear")
+        self.call("fit", self.with_target(text + "missing = \"clear\""), "--out", "clear", "-j", "2")
+        target = json.loads((self.folder / "clear/fit.json").read_text())["targets"][0]
+        self.assertEqual((target["target"], target["missing"]), (0.25, 16))
+
     def with_target(self, text):
         return self.write("fit.toml", FIT.replace("value = 0.3\nsd = 0.003\n", text + "\n"))
 

@@ -256,6 +256,14 @@ class Studies(Case):
         nephos.sweep(scene, {"field.background.ext": [0.05, 0.1], "field.background.act": [0.001, 0.004]},
                      out=sweep.folder, replicates=2, steps=(200, 400))
         self.assertEqual((sweep.folder / "shards/0000-of-0001.jsonl").stat().st_mtime_ns, before)
+        # Records that are thrown away are computed again; tables that would lose runs stay, unless one says so.
+        nephos.sweep(scene, {"field.background.ext": [0.05], "field.background.act": [0.001]}, out=sweep.folder, replicates=2,
+                     steps=(200, 400), overwrite=True, retry_failed=True)
+        self.assertNotEqual((sweep.folder / "shards/0000-of-0001.jsonl").stat().st_mtime_ns, before)
+        (sweep.folder / "shards/0000-of-0001.jsonl").unlink()
+        with self.assertRaisesRegex(nephos.Error, "--overwrite"):
+            nephos.merge(sweep.folder)
+        self.assertEqual(set(nephos.merge(sweep.folder, overwrite=True).runs()["status"]), {"missing"})
 
     def test_a_fit_has_the_numbers_of_the_command(self):
         self.write("null.toml", NULL_SCENE)
@@ -280,6 +288,13 @@ sd = 0.01
         self.assertEqual(posterior.shape, (1000,))
         self.assertAlmostEqual(posterior.mean(), found["parameters"][0]["mean"], delta=0.01)
         self.assertLess(found["parameters"][0]["low"], found["parameters"][0]["high"])
+        # Records that are thrown away are computed again.
+        records = self.folder / "fit/wave-1/shards/0000-of-0001.jsonl"
+        before = records.stat().st_mtime_ns
+        nephos.fit(path, self.folder / "fit", retry_failed=True)
+        self.assertEqual(records.stat().st_mtime_ns, before)
+        self.assertEqual(nephos.fit(path, self.folder / "fit", overwrite=True)["parameters"], found["parameters"])
+        self.assertNotEqual(records.stat().st_mtime_ns, before)
 
     def test_errors_are_those_of_the_command(self):
         scene = nephos.Scene.from_text(NULL_SCENE)
