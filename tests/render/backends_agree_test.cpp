@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -100,6 +103,59 @@ TEST_P(BackendsAgree, AgreesWithBillboardsInEveryLight) {
             EXPECT_LE(worst, 1.0f / 255.0f) << name << ", sun in " << azimuth;
             EXPECT_GT(brightest, 0.3f) << name;
         }
+    }
+    test::expect_no_messages(reference_renderer);
+}
+
+// A broken veil between two clouds, whose pixels are the same in each way: the near cloud hides the veil, the veil hides
+// the far one as far as it is opaque.
+TEST_P(BackendsAgree, AgreesAboutVeilsBetweenClouds) {
+    Renderer reference_renderer(test::validated(Splatting::blended));
+    const std::vector<Metaball> balls{{-300, 2000, 1500, 700, 1}, {700, 9000, 7600, 2500, 1}};
+    Splats both, near;
+    both.metaballs = {balls, 0.05, 0.7};
+    near.metaballs = {std::span(balls).first(1), 0.05, 0.7};
+    VeilOptions veil;
+    veil.form = VeilForm::stratus;
+    veil.coverage = 0.5;
+    veil.wavelength_m = 900;
+    veil.base_m = 3000;
+    veil.top_m = 3600;
+    for (const VeilLighting light : {VeilLighting::physical, VeilLighting::two_samples}) {
+        VeilView view;
+        view.light = light;
+        const std::vector<DrawnVeil> veils{
+            {std::make_shared<VeilSlab>(veil, Wind{}, 0, 2, std::nullopt), 0.02, view}};
+        const RenderOptions options = test::view({0, 0, 100}, {0, 2000, 1700}, 40, 90, 60);
+        const Picture ours = renderer_.draw_splats(both, options, veils),
+                      other = reference_renderer.draw_splats(both, options, veils);
+        EXPECT_LE(test::largest_difference(ours.beauty, other.beauty), 2.0f / 255);
+        EXPECT_LE(test::largest_difference(ours.transmittance, other.transmittance), 2.0f / 255);
+        const Picture clear = renderer_.draw_splats(both, options),
+                      sheet = renderer_.draw_splats({}, options, veils),
+                      first = renderer_.draw_splats(near, options);
+        std::size_t hidden = 0, hiding = 0, between = 0;
+        for (std::size_t n = 0; n < ours.pixels(); ++n) {
+            const float change = std::abs(ours.beauty[3 * n + 1] - clear.beauty[3 * n + 1]);
+            if (first.transmittance[n] < 0.002f) {  // the near cloud: nothing of the veil
+                ++hidden;
+                EXPECT_LT(change, 0.02f) << n;
+            } else if (first.transmittance[n] == 1 && clear.transmittance[n] < 0.5f) {
+                const float left = sheet.transmittance[n];
+                EXPECT_NEAR(ours.transmittance[n], left * clear.transmittance[n], 1e-3f) << n;
+                if (left < 0.01f) {
+                    ++hiding;
+                    EXPECT_NEAR(ours.beauty[3 * n + 1], sheet.beauty[3 * n + 1],
+                                0.05f * sheet.beauty[3 * n + 1])
+                        << n;
+                } else if (left < 0.9f) {
+                    ++between;
+                }
+            }
+        }
+        EXPECT_GT(hidden, 50u);
+        EXPECT_GT(hiding, 20u);
+        EXPECT_GT(between, 50u);
     }
     test::expect_no_messages(reference_renderer);
 }
