@@ -193,6 +193,7 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
         options, veils);
     RenderOptions raining = moving;  // knows the camera's path itself
     raining.sun = options.sun;
+    if (ground_cover) raining.ground.albedo = mean_albedo(options, *ground_cover);
     return {std::move(picture), std::move(options), std::move(raining), weather, time_s,
             std::move(lines),   std::move(drawn)};
 }

@@ -246,6 +246,21 @@ bool shows_reflections(const RenderOptions& options, const GroundCoverView& cove
     return options.wet_ground.reflection > 0 && water && ground_in_view(options);
 }
 
+Rgb mean_albedo(const RenderOptions& options, const GroundCoverView& cover) {
+    const WetGroundOptions& look = options.wet_ground;
+    const auto white = [&](double snow_mm) {  // as covered() in ground_look-inl.h, where nothing is resolved
+        if (!(snow_mm > 0)) return 0.0;
+        return 1 / (1 + std::exp(-1.702 * std::log(snow_mm / look.snow_cover_mm) / double(kFilmSpread)));
+    };
+    double sum = 0;
+    for (const float snow_mm : cover.snow_mm) sum += white(double(snow_mm));
+    const double part = cover.snow_mm.empty() ? white(cover.outside.snow_mm) : sum / double(cover.snow_mm.size());
+    Rgb albedo;
+    for (std::size_t c = 0; c < 3; ++c)
+        albedo[c] = std::lerp(options.ground.albedo[c], look.snow_albedo[c], part);
+    return albedo;
+}
+
 void check(const GroundCoverView& cover) {
     const auto require = [](bool good, const char* what) {
         if (!good) throw Error(ErrorCode::usage, std::string("ground cover: ") + what);

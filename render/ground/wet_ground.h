@@ -53,6 +53,9 @@ bool shows_wet_ground(const RenderOptions& options, const GroundCoverView& cover
 // Returns true when reflections need a mirrored view.
 bool shows_reflections(const RenderOptions& options, const GroundCoverView& cover);
 
+// Returns the mean albedo of the ground that is not water, with the snow on it: what lights falling snow from below.
+Rgb mean_albedo(const RenderOptions& options, const GroundCoverView& cover);
+
 struct GroundLight;
 struct MarchedScene;
 

@@ -190,6 +190,25 @@ TEST(WetGroundTest, SnowIsWhiteAndWearsTheShadow) {
     EXPECT_LT(brightest, 1.2);
 }
 
+// The albedo below falling snow is that of looking down on it from far above, where no tuft is resolved.
+TEST(WetGroundTest, MeanAlbedoIsThatFromAbove) {
+    RenderOptions options = small_options();
+    options.camera.position_m = {0, 0, 30'000};
+    options.camera.target_m = {0, 1, 0};
+    options.atmosphere.model = AirModel::gradient;
+    options.air.extinction_per_m = {};
+    const GroundCoverView none;
+    EXPECT_EQ(mean_albedo(options, none), options.ground.albedo);
+    const Picture dry = draw(options, {}, {});
+    for (const float snow_mm : {0.5f, 2.0f, 6.0f}) {
+        const GroundCoverView cover = everywhere(0, snow_mm);
+        const Picture white = draw(options, cover, {});
+        const std::size_t middle = 3 * (dry.pixels() / 2) + 1;
+        EXPECT_NEAR(white.beauty[middle] / dry.beauty[middle], mean_albedo(options, cover)[1] / options.ground.albedo[1], 0.1)
+            << snow_mm;
+    }
+}
+
 // More light than falls on it leaves no ground: in a white furnace every surface is at most as bright.
 TEST(WetGroundTest, NeverReflectsMoreThanArrives) {
     RenderOptions options = small_options();
