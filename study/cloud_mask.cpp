@@ -63,14 +63,14 @@ CloudMasks read_vdb_mask(const std::filesystem::path& path, const MaskOptions& o
 }
 
 CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions& options) {
-    const NetcdfData data = read_netcdf(path, options.variable);
-    std::vector<std::uint64_t> sizes = data.sizes;
+    const NetcdfSource source(path, options.variable);
+    std::vector<std::uint64_t> sizes = source.sizes();
     if (sizes.size() < 2 || sizes.size() > 4)
         fail(ErrorCode::usage, path,
              fmt::format("the variable has {} dimensions; expected (y, x), (z, y, x) or (time, z, y, x)",
                          sizes.size()));
     // Of three dimensions the first is time where its name says so.
-    const std::string& first = data.dimensions.front();
+    const std::string& first = source.dimensions().front();
     const bool has_time = sizes.size() == 4 || (sizes.size() == 3 && (first == "time" || first == "t"));
     const std::uint64_t times = has_time ? sizes.front() : 1;
     if (has_time) sizes.erase(sizes.begin());
@@ -82,12 +82,23 @@ CloudMasks read_netcdf_mask(const std::filesystem::path& path, const MaskOptions
     const Extent extent{int(sizes[2]), int(sizes[1]), int(sizes[0])};
     const double size = cell_size(path, options);
     CloudMasks masks{{}, size, options.level_height_m.value_or(size), 0, options.boundaries, 0};
-    masks.missing =
-        std::uint64_t(std::ranges::count_if(data.values, [](double value) { return std::isnan(value); }));
-    for (std::uint64_t time = 0; time < times; ++time)
-        masks.snapshots.push_back(plane_of(extent, options.threshold.value_or(0), [&](int i, int j, int k) {
-            return data.values[time * extent.cells() + linear_index(extent, i, j, k)];
-        }));
+    // Row by row: as bits the masks are a small part of their values.
+    const double threshold = options.threshold.value_or(0);
+    std::vector<double> row(sizes[2]);
+    std::uint64_t at = 0;
+    for (std::uint64_t time = 0; time < times; ++time) {
+        BitPlane& plane = masks.snapshots.emplace_back(extent);
+        for (int k = 0; k < extent.z; ++k)
+            for (int j = 0; j < extent.y; ++j) {
+                source.read(at, row);
+                at += row.size();
+                for (int i = 0; i < extent.x; ++i) {
+                    const double value = row[std::size_t(i)];
+                    masks.missing += std::isnan(value);
+                    if (value > threshold) plane.set(i, j, k, true);
+                }
+            }
+    }
     return masks;
 }
 

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,18 +41,39 @@ struct NetcdfVariable {
 void write_netcdf(const std::filesystem::path& path, const std::vector<NetcdfDimension>& dimensions,
                   const NetcdfAttributes& attributes, const std::vector<NetcdfVariable>& variables);
 
-// A variable of a file that was read, its values as doubles; a CDF-1, CDF-2 or CDF-5 file.
+// A variable of a file of others, CDF-1, CDF-2 or CDF-5, whose values are taken a piece at a time: as doubles they are up to
+// eight times the file.
+class NetcdfSource {
+  public:
+    // `name`, or the only variable with two or more dimensions where it is empty. Throws Error(io) that says what the file is
+    // instead (a NetCDF-4 file: `nccopy -k classic` converts it), or which variables it has, or which of the attributes below
+    // has no sense; Error(usage) when it does not fit into memory.
+    NetcdfSource(const std::filesystem::path& path, const std::string& name);
+    ~NetcdfSource();
+    NetcdfSource(NetcdfSource&&) noexcept;
+    NetcdfSource& operator=(NetcdfSource&&) noexcept;
+
+    const std::vector<std::string>& dimensions() const;
+    const std::vector<std::uint64_t>& sizes() const;
+    // Takes the values from place `first` on, the last dimension fastest. Unpacked: times scale_factor plus add_offset. NaN:
+    // missing, that is _FillValue (or the usual one of the type where the file names none), one of missing_value, or outside
+    // valid_range, valid_min or valid_max. Whole numbers whose attribute _Unsigned is "true" are unsigned, and so are fill and
+    // range of their type. Precondition: there are so many. Throws Error(io) when the file ends before them.
+    void read(std::uint64_t first, std::span<double> values) const;
+
+  private:
+    struct Variable;
+    std::unique_ptr<Variable> variable_;
+};
+
+// All values of a variable.
 struct NetcdfData {
     std::vector<std::string> dimensions;
     std::vector<std::uint64_t> sizes;
-    // Unpacked: times scale_factor plus add_offset. NaN: missing, that is _FillValue (or the usual one of the type where the
-    // file names none), one of missing_value, or outside valid_range, valid_min or valid_max.
     std::vector<double> values;
 };
 
-// Reads one variable: `name`, or the only one with two or more dimensions where it is empty. Throws Error(io) that says what
-// the file is instead (a NetCDF-4 file: `nccopy -k classic` converts it), or which variables it has, or which of the
-// attributes above has no sense.
+// Reads one variable as a whole. Throws as NetcdfSource.
 NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& name);
 
 }  // namespace nephos

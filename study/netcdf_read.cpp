@@ -3,6 +3,7 @@
 // The reader of NetCDF classic files.
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -14,6 +15,7 @@
 
 #include "core/descriptor.h"
 #include "core/error.h"
+#include "simulation/memory.h"
 
 namespace nephos {
 namespace {
@@ -110,10 +112,11 @@ double value_at(const Reader& reader, std::uint64_t at, std::uint32_t type) {
     }
 }
 
-// The values of an attribute as numbers; none of a text.
+// The values of an attribute as numbers, or its text.
 struct Attribute {
     std::uint32_t type = 0;
     std::vector<double> values;
+    std::string text;
 };
 using Attributes = std::map<std::string, Attribute>;
 
@@ -128,11 +131,34 @@ Attributes read_attributes(Reader& reader, const std::filesystem::path& path) {
         if (count > reader.size()) throw Error(ErrorCode::io, path.string() + ": ends early");
         const std::uint64_t begin = reader.at();
         reader.skip(count * bytes);
-        if (attribute.type == kCharacters) continue;
-        for (std::uint64_t n = 0; n < count; ++n)
+        for (std::uint64_t n = 0; n < count && attribute.type == kCharacters; ++n)
+            attribute.text.push_back(char(reader.get<std::uint8_t>(begin + n)));
+        for (std::uint64_t n = 0; n < count && attribute.type != kCharacters; ++n)
             attribute.values.push_back(value_at(reader, begin + n * bytes, attribute.type));
     }
     return attributes;
+}
+
+// The type of the same bits without a sign; of others the type itself.
+std::uint32_t unsigned_type(std::uint32_t type) {
+    switch (type) {
+        case 1:
+            return 7;
+        case 3:
+            return 8;
+        case 4:
+            return 9;
+        case 10:
+            return 11;
+        default:
+            return type;
+    }
+}
+
+// The number of the bits of a whole number, read without its sign.
+double without_sign(double value, std::uint32_t type) {
+    const double bits = type == 1 ? 8 : type == 3 ? 16 : type == 4 ? 32 : 64;
+    return value < 0 ? value + std::exp2(bits) : value;
 }
 
 struct FoundVariable {
@@ -163,6 +189,28 @@ std::optional<double> default_fill(std::uint32_t type) {
             return 18446744073709551614.0;
         default:
             return {};
+    }
+}
+
+// NetCDF classic has no unsigned types but in CDF-5: the attribute _Unsigned says that a variable is meant so, and with it its
+// attributes of the same type (NetCDF Users Guide, "Attribute Conventions").
+void take_as_unsigned(FoundVariable& variable) {
+    const auto found = variable.attributes.find("_Unsigned");
+    if (found == variable.attributes.end()) return;
+    std::string text = found->second.text;
+    while (!text.empty() && text.back() == '\0') text.pop_back();
+    std::ranges::transform(text, text.begin(),
+                           [](char c) { return char(std::tolower(static_cast<unsigned char>(c))); });
+    const std::uint32_t type = variable.type;
+    if (text != "true" || unsigned_type(type) == type) return;
+    variable.type = unsigned_type(type);
+    if (variable.attributes.find("_FillValue") == variable.attributes.end())
+        if (const std::optional<double> usual = default_fill(type))
+            variable.attributes["_FillValue"] = {type, {*usual}, {}};
+    for (auto& [name, attribute] : variable.attributes) {
+        if (attribute.type != type) continue;
+        attribute.type = variable.type;
+        for (double& value : attribute.values) value = without_sign(value, type);
     }
 }
 
@@ -255,15 +303,39 @@ class Packing {
     bool range_is_unpacked_ = false;
 };
 
-}  // namespace
-
-NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& name) {
+Reader opened(const std::filesystem::path& path) {
     constexpr std::size_t kLargestFile = std::size_t(1) << 32;
     std::error_code error;
     const std::uintmax_t file_bytes = std::filesystem::file_size(path, error);
     if (!error && file_bytes > kLargestFile)
         throw Error(ErrorCode::io, path.string() + ": is larger than 4 GiB");
-    Reader reader(path, read_beginning(path, error ? 4096 : std::size_t(file_bytes)));
+    if (!error) require_memory(std::size_t(file_bytes), path.string());
+    return {path, read_beginning(path, error ? 4096 : std::size_t(file_bytes))};
+}
+
+}  // namespace
+
+struct NetcdfSource::Variable {
+    std::filesystem::path path;
+    Reader reader;
+    FoundVariable found;
+    std::optional<Packing> packing;
+    std::vector<std::string> dimensions;
+    std::vector<std::uint64_t> sizes;
+    bool is_record = false;
+    std::uint64_t in_record = 1, record_bytes = 0;
+};
+
+NetcdfSource::~NetcdfSource() = default;
+NetcdfSource::NetcdfSource(NetcdfSource&&) noexcept = default;
+NetcdfSource& NetcdfSource::operator=(NetcdfSource&&) noexcept = default;
+
+const std::vector<std::string>& NetcdfSource::dimensions() const { return variable_->dimensions; }
+const std::vector<std::uint64_t>& NetcdfSource::sizes() const { return variable_->sizes; }
+
+NetcdfSource::NetcdfSource(const std::filesystem::path& path, const std::string& name)
+    : variable_(new Variable{path, opened(path), {}, {}, {}, {}}) {
+    Reader& reader = variable_->reader;
     const std::uint64_t records = reader.count();
     std::vector<NetcdfDimension> dimensions;
     reader.next<std::uint32_t>();
@@ -307,8 +379,8 @@ NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& nam
     if (found->dimensions.empty())
         throw Error(ErrorCode::io, fmt::format("{}: the variable {} is a single number without dimensions",
                                                path.string(), found->name));
-    NetcdfData data;
-    std::uint64_t count = 1, in_record = 1;
+    Variable& data = *variable_;
+    std::uint64_t count = 1;
     for (std::size_t n = 0; n < found->dimensions.size(); ++n) {
         const NetcdfDimension& dimension = dimensions[found->dimensions[n]];
         const std::uint64_t size = dimension.size == 0 ? records : dimension.size;
@@ -317,20 +389,36 @@ NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& nam
         if (size == 0 || count > reader.size() / size)
             throw Error(ErrorCode::io, path.string() + ": is damaged or empty");
         count *= size;
-        if (n > 0) in_record *= size;
+        if (n > 0) data.in_record *= size;
     }
-    const bool is_record = dimensions[found->dimensions[0]].size == 0;
-    const std::uint64_t bytes = size_of_type(found->type, path);
+    data.is_record = dimensions[found->dimensions[0]].size == 0;
+    data.found = *found;
     // Records of a file's only record variable follow each other without padding (NetCDF classic format, note on vsize).
-    if (record_variables == 1) record_bytes = in_record * bytes;
-    const Packing packing(*found, path);
-    data.values.reserve(count);
-    for (std::uint64_t n = 0; n < count; ++n) {
-        const std::uint64_t at = is_record
-                                     ? found->begin + n / in_record * record_bytes + n % in_record * bytes
-                                     : found->begin + n * bytes;
-        data.values.push_back(packing(value_at(reader, at, found->type)));
+    data.record_bytes =
+        record_variables == 1 ? data.in_record * size_of_type(data.found.type, path) : record_bytes;
+    take_as_unsigned(data.found);
+    data.packing.emplace(data.found, data.path);
+}
+
+void NetcdfSource::read(std::uint64_t first, std::span<double> values) const {
+    const Variable& v = *variable_;
+    const std::uint64_t bytes = size_of_type(v.found.type, v.path);
+    for (std::size_t n = 0; n < values.size(); ++n) {
+        const std::uint64_t place = first + n;
+        const std::uint64_t at =
+            v.is_record ? v.found.begin + place / v.in_record * v.record_bytes + place % v.in_record * bytes
+                        : v.found.begin + place * bytes;
+        values[n] = (*v.packing)(value_at(v.reader, at, v.found.type));
     }
+}
+
+NetcdfData read_netcdf(const std::filesystem::path& path, const std::string& name) {
+    const NetcdfSource source(path, name);
+    std::uint64_t count = 1;
+    for (const std::uint64_t size : source.sizes()) count *= size;
+    require_memory(std::size_t(count) * sizeof(double), path.string() + ": its values");
+    NetcdfData data{source.dimensions(), source.sizes(), std::vector<double>(count)};
+    source.read(0, data.values);
     return data;
 }
 

@@ -314,6 +314,33 @@ void remove_shards(const std::filesystem::path& folder, std::uint32_t number, st
     }
 }
 
+FolderGuard::FolderGuard(const std::filesystem::path& folder) : folder_(folder) {
+    const std::filesystem::path shards = folder / "shards";
+    std::error_code error;
+    std::filesystem::create_directories(shards, error);
+    if (error) throw Error(ErrorCode::io, shards.string() + ": cannot make the folder: " + error.message());
+    shards_ = ::open(shards.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (shards_ < 0)
+        throw Error(ErrorCode::io, shards.string() + ": cannot open the folder: " + std::strerror(errno));
+    // Where a file system has no locks, nothing is kept apart, as with those of shards.
+    while (::flock(shards_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+}
+
+FolderGuard::~FolderGuard() { ::close(shards_); }
+
+void FolderGuard::require_no_other_writer(std::uint32_t number, std::uint32_t of) const {
+    for (const std::filesystem::path& path : files_of_shards(folder_)) {
+        if (path == shard_path(folder_, number, of)) continue;
+        const Descriptor file = open_regular_file(path, O_RDONLY);
+        if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+            throw Error(ErrorCode::io,
+                        path.string() +
+                            ": a sweep of another plan is writing into this folder: wait for its "
+                            "end, or choose another --out");
+    }
+}
+
 struct Shard::Files {
     Descriptor records, series;
 };

@@ -68,6 +68,23 @@ class Records {
 // process writes one of them; then none is removed.
 void remove_shards(const std::filesystem::path& folder, std::uint32_t number, std::uint32_t of);
 
+// Keeps other processes from beginning a sweep in a folder, or from replacing its plan, while it lives; waits for one that
+// does. Makes the folder. Throws Error(io).
+class FolderGuard {
+  public:
+    explicit FolderGuard(const std::filesystem::path& folder);
+    ~FolderGuard();
+    FolderGuard(const FolderGuard&) = delete;
+    FolderGuard& operator=(const FolderGuard&) = delete;
+
+    // Throws Error(io) when another process writes a shard of the folder, whichever but that of the number.
+    void require_no_other_writer(std::uint32_t number, std::uint32_t of) const;
+
+  private:
+    std::filesystem::path folder_;
+    int shards_ = -1;  // descriptor of the folder of shards
+};
+
 // A shard while its process appends to it.
 class Shard {
   public:

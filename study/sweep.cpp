@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <optional>
 #include <set>
 
 #include "study/sweep_file.h"
@@ -12,6 +13,7 @@
 
 #include "core/atomic_file.h"
 #include "core/bytes.h"
+#include "core/descriptor.h"
 #include "core/error.h"
 
 namespace nephos {
@@ -73,6 +75,23 @@ RunResult unpacked(const std::string& text) {
     return result;
 }
 
+bool has_content(const std::filesystem::path& path, const std::string& content) {
+    std::error_code error;
+    if (!std::filesystem::exists(path, error)) return false;
+    return read_beginning(path, content.size() + 1) == content;
+}
+
+// A folder whose plan is another one may get this one as soon as nobody makes runs of that; none has plans side by side.
+void replace_plan(const SweepPlan& plan, const FolderGuard& guard, const SweepJob& job) {
+    const std::filesystem::path scene = job.folder / "scene.toml", sweep = job.folder / "sweep.toml";
+    std::error_code error;
+    const bool is_new = !std::filesystem::exists(sweep, error);
+    if (!is_new && !(has_content(scene, plan.scene_text()) && has_content(sweep, plan.to_toml())))
+        guard.require_no_other_writer(job.shard, job.shards);
+    write_atomically(scene, plan.scene_text());
+    write_atomically(sweep, plan.to_toml());
+}
+
 // Counts what is there. Goes over all runs, but keeps none.
 SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records& records) {
     SweepReport report;
@@ -101,8 +120,8 @@ SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records&
 }  // namespace
 
 void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
-    write_atomically(folder / "scene.toml", plan.scene_text());
-    write_atomically(folder / "sweep.toml", plan.to_toml());
+    const FolderGuard guard(folder);
+    replace_plan(plan, guard, {.folder = folder, .shards = 0});
 }
 
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
@@ -113,7 +132,10 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<void(const SweepProgress&)>& progress,
                       const std::function<bool()>& stop) {
     const Clock::time_point begin = Clock::now();
-    if (job.overwrite) remove_shards(job.folder, job.shard, job.shards);
+    if (job.overwrite) {
+        const FolderGuard guard(job.folder);
+        remove_shards(job.folder, job.shard, job.shards);
+    }
     // Whoever overwrites does not ask what other shards have done: they may be of another version.
     const Records records = job.overwrite ? Records() : Records::read({job.folder});
     SweepReport report = status_of(plan, job, records);
@@ -129,10 +151,14 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
         count.failed = 0;
         report.failures.clear();
     }
-    write_plan(plan, job.folder);
-    if (count.done == count.in_all) return report;
-
-    Shard shard(job.folder, job.shard, job.shards);
+    std::optional<Shard> opened;
+    {
+        const FolderGuard guard(job.folder);
+        if (count.done < count.in_all) opened.emplace(job.folder, job.shard, job.shards);
+        replace_plan(plan, guard, job);
+    }
+    if (!opened) return report;
+    Shard& shard = *opened;
     std::uint64_t at = 0;
     bool give_up = false;
     const auto next = [&]() -> std::optional<std::uint64_t> {

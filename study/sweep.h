@@ -45,14 +45,16 @@ struct SweepReport {
     std::vector<std::string> problems;  // of shards that could not be read as a whole (Records::problems)
 };
 
-// Writes the plan and the scene, as run_sweep() does, and runs nothing. Throws Error(io).
+// Writes the plan and the scene, as run_sweep() does, and runs nothing. Throws Error(io), also when the folder has another plan
+// whose shards are being written: its tables are made by it.
 void write_plan(const SweepPlan& plan, const std::filesystem::path& folder);
 
 // Returns what is done of a plan in some folders.
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job);
 
 // Runs what is missing. Writes the plan, the scene and the shard; not the tables. Throws Error(io) on a full disk: what is on
-// disk is whole; also when the folder is removed meanwhile; Error(usage) when the folder's records are of another version.
+// disk is whole; also when the folder is removed meanwhile; before it changes anything, when another process writes the shard,
+// or any shard of another plan in the folder; Error(usage) when the folder's records are of another version.
 // Precondition: the process has one thread.
 SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<void(const SweepProgress&)>& progress,

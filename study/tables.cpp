@@ -167,6 +167,12 @@ NetcdfAttributes described(std::string_view unit, std::string_view definition,
     return attributes;
 }
 
+void remove_table(const std::filesystem::path& path) {
+    std::error_code error;
+    std::filesystem::remove(path, error);
+    if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
+}
+
 void write_series(const SweepPlan& plan, const Records& records, const std::filesystem::path& path) {
     std::vector<DoneRun> done;
     std::uint64_t steps = 0;
@@ -180,11 +186,7 @@ void write_series(const SweepPlan& plan, const Records& records, const std::file
         bins = std::max(bins, record->result.sizes.size());
         done.push_back({std::move(run), record});
     }
-    if (done.empty()) {
-        std::error_code ignored;
-        std::filesystem::remove(path, ignored);
-        return;
-    }
+    if (done.empty()) return remove_table(path);
     levels = std::max<std::size_t>(levels, 1);
     const Placement placement = automaton_options(plan.scene(), plan.measured_lattice()).placement;
     const std::vector<NetcdfDimension> dimensions{{"run", done.size()},
@@ -376,20 +378,25 @@ PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint6
     return summary;
 }
 
-std::uint64_t runs_lost(const SweepPlan& plan, const Records& records, const std::filesystem::path& folder) {
+LostRuns runs_lost(const SweepPlan& plan, const Records& records, const std::filesystem::path& folder) {
     const std::filesystem::path path = folder / "runs.csv";
-    if (!std::filesystem::exists(path)) return 0;
+    LostRuns lost;
+    if (!std::filesystem::exists(path)) return lost;
     require_regular_file(path);
     std::ifstream table(path);
-    std::set<std::string, std::less<>> ids;
+    std::set<std::string, std::less<>> ids;  // of runs that are in a record
     for (std::string line; std::getline(table, line);) {
-        const std::string_view id = std::string_view(line).substr(0, line.find(','));
-        const RunRecord* record = records.find(std::string(id));
-        if (line.find(",done,") != line.npos && (record == nullptr || record->failed)) ids.emplace(id);
+        if (line.find(",done,") == line.npos) continue;
+        std::string id = line.substr(0, line.find(','));
+        const RunRecord* record = records.find(id);
+        if (record == nullptr || record->failed)
+            ++lost.unreadable;
+        else
+            ids.insert(std::move(id));
     }
     check_reading(table, path);
-    std::uint64_t lost = 0;
-    for (std::uint64_t n = 0; !ids.empty() && n < plan.runs(); ++n) lost += ids.contains(plan.run(n).id);
+    for (std::uint64_t n = 0; !ids.empty() && n < plan.runs(); ++n) ids.erase(plan.run(n).id);
+    lost.of_another_plan = ids.size();
     return lost;
 }
 
@@ -398,7 +405,10 @@ std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
     write_runs(plan, records, folder / "runs.csv");
     write_points(plan, records, folder / "points.csv");
     const std::uint64_t missing = write_failures(plan, records, folder / "failures.csv");
-    if (plan.options().tracks) write_tracks(plan, records, folder / "tracks.csv");
+    if (plan.options().tracks)
+        write_tracks(plan, records, folder / "tracks.csv");
+    else
+        remove_table(folder / "tracks.csv");  // of another plan
     write_series(plan, records, folder / "series.nc");
     write_manifest(plan, records, folder / "manifest.json");
     return missing;

@@ -39,12 +39,18 @@ struct PointSummary {
 // Returns the summary of a point. Of a point with a run that is missing, failed or not steady nothing is averaged.
 PointSummary summarise(const SweepPlan& plan, const Records& records, std::uint64_t point);
 
-// Returns how many runs of the plan DIR/runs.csv has that are in no record: what writing the tables again would lose.
-// Throws Error(io) when the file is there and cannot be read.
-std::uint64_t runs_lost(const SweepPlan& plan, const Records& records, const std::filesystem::path& folder);
+// The runs that are done in a table, and that writing it again would lose.
+struct LostRuns {
+    std::uint64_t unreadable = 0;       // in no record, or in one of a failure
+    std::uint64_t of_another_plan = 0;  // in a record, but of no run of the plan
+};
+
+// Compares DIR/runs.csv with a plan and its records; nothing is lost where it is not there. Throws Error(io) when the file is
+// there and cannot be read.
+LostRuns runs_lost(const SweepPlan& plan, const Records& records, const std::filesystem::path& folder);
 
 // Writes DIR/runs.csv, points.csv, failures.csv, series.nc and manifest.json, of a plan with tracks also tracks.csv, each
-// atomically. Returns how many runs of the plan have no record. Throws Error(io).
+// atomically; of another plan removes a tracks.csv that is there. Returns how many runs of the plan have no record. Throws Error(io).
 std::uint64_t write_tables(const SweepPlan& plan, const Records& records,
                            const std::filesystem::path& folder);
 

@@ -119,6 +119,7 @@ nlohmann::ordered_json report_json(const SweepPlan& plan, const SweepReport& rep
             {"before", report.progress.before},
             {"unused", report.unused},
             {"complete", report.complete},
+            {"problems", report.problems},
             {"wall_s", report.wall_s}};
 }
 
@@ -193,10 +194,11 @@ int sweep(const SweepArguments& a) {
     Output output;
     if (a.dry_run || a.status) {
         const SweepReport report = sweep_status(plan, job);
+        const int status = report.problems.empty() ? 0 : int(ErrorCode::io);
         print_problems(report.problems);
         if (a.work.json) {
             output.line(json_text(report_json(plan, report, folder)));
-            return 0;
+            return status;
         }
         output.line(describe(plan));
         output.line(fmt::format("{}: {} of {} runs done, {} failed", folder,
@@ -207,7 +209,7 @@ int sweep(const SweepArguments& a) {
                                     plan.command_of(plan.run(n))));
         if (a.dry_run && plan.runs() > 10)
             output.line(fmt::format("  ... and {} more", human_count(plan.runs() - 10)));
-        return 0;
+        return status;
     }
     if (a.emit) {
         const std::string next = emit_sweep(plan, *a.emit, a.tasks, job.folder);
@@ -246,6 +248,7 @@ int sweep(const SweepArguments& a) {
                                 job.shard, job.shards, folder));
     }
     print_failures(report, folder);
+    if (!report.problems.empty()) return int(ErrorCode::io);
     return report.progress.failed > 0 ? int(ErrorCode::check) : 0;
 }
 
@@ -263,12 +266,17 @@ int merge(const MergeArguments& a) {
     const Records records = Records::read(folders);
     const std::string out = a.out.empty() ? a.folders.front() : a.out;
     print_problems(records.problems());
-    const std::uint64_t lost = a.overwrite ? 0 : runs_lost(plan, records, out);
-    if (lost > 0)
+    const LostRuns lost = a.overwrite ? LostRuns{} : runs_lost(plan, records, out);
+    if (lost.unreadable > 0)
         throw Error(ErrorCode::io,
                     fmt::format("{}/runs.csv has {} runs that are in no shard that can be read: the "
                                 "tables stay as they are; --overwrite replaces them",
-                                out, lost));
+                                out, lost.unreadable));
+    if (lost.of_another_plan > 0)
+        throw Error(ErrorCode::io,
+                    fmt::format("{}/runs.csv has {} runs that {}/sweep.toml does not ask for: the tables of "
+                                "another plan stay as they are; --overwrite replaces them",
+                                out, lost.of_another_plan, a.folders.front()));
     write_and_print_tables(plan, records, out, a.work.quiet);
     return records.problems().empty() ? 0 : int(ErrorCode::io);
 }
@@ -342,7 +350,10 @@ void add_sweep_command(CLI::App& app, Action& action) {
         "stopped, and\n"
         "computes only what is missing when an axis has grown. Means are given of steady and of pulsing runs "
         "only.\n"
-        "Exit status 1: some runs failed; the others are in the tables.\n"
+        "Exit status 1: some runs failed; the others are in the tables. 3: a shard is damaged, and named; "
+        "also with "
+        "--status\n"
+        "and --dry-run.\n"
         "\n"
         "Examples:\n"
         "  nephos sweep fair.toml --axis field.background.ext=0.05,0.1,0.2 --replicates 5 --out sweep\n"
@@ -360,7 +371,8 @@ void add_merge_command(CLI::App& app, Action& action) {
         ->required()
         ->type_name("DIR");
     command->add_option("-o,--out", a->out, "Folder for the tables (default: the first)")->type_name("DIR");
-    command->add_flag("--overwrite", a->overwrite, "Replace tables that have more runs than the shards");
+    command->add_flag("--overwrite", a->overwrite,
+                      "Replace tables that have more runs than the shards, or those of another plan");
     add_quiet(*command, a->work);
     command->footer(
         "The tables have the same bytes for any number of shards, in any order. A damaged shard is named, "

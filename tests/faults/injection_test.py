@@ -319,7 +319,7 @@ class Fit(Injection):
     def prepare(cls):
         (cls.folder / "fit.toml").write_text("""\
 scene = "null.toml"
-runs = 8
+runs = 10
 proof = 1
 clouds_every = 0
 [steps]

@@ -6,6 +6,8 @@ import math
 import os
 import resource
 import struct
+import subprocess
+import sys
 import unittest
 import zlib
 
@@ -14,7 +16,7 @@ from PIL import Image
 from scipy import ndimage
 from scipy.io import netcdf_file
 
-from case import Case
+from case import Case, NEPHOS
 from fit_test import FIT, NULL
 from sweep_test import rows
 
@@ -98,6 +100,12 @@ class Stats(Case):
                 # The range is of packed values where it has their type, and of unpacked ones where it has the type of the factor.
                 (numpy.where(gone, 99, packed), "i2", {"scale_factor": 1e-6, "valid_range": numpy.array([0, 50], dtype="i2")}),
                 (numpy.where(gone, 99, packed), "i2", {"scale_factor": 1e-6, "valid_range": numpy.array([0, 5e-5])}),
+                # Whole numbers without a sign, as bytes of a byte mask are stored: 255 is -1, 200 is -56.
+                (numpy.where(gone, -1, mask * -56), "i1", {"_Unsigned": "true", "_FillValue": numpy.int8(-1)}),
+                (numpy.where(gone, -1, mask * -56), "i1", {"_Unsigned": "true", "valid_range": numpy.array([0, -6], dtype="i1")}),
+                (numpy.where(gone, -32767, mask * -20), "i2", {"_Unsigned": "true", "scale_factor": 1e-6}),
+                (numpy.where(gone, -2, mask * -20), "i4", {"_Unsigned": "true", "missing_value": numpy.int32(-2)}),
+                (numpy.where(gone, 99, packed), "i2", {"_Unsigned": "false", "scale_factor": 1e-6, "_FillValue": numpy.int16(99)}),
                 (numpy.where(gone, 99, packed + 5), "i2", {"scale_factor": 1e-6, "add_offset": -5e-6,
                                                            "missing_value": numpy.int16(99)}))):
             with self.subTest(kind=kind, **attributes):
@@ -113,6 +121,17 @@ class Stats(Case):
                                  ({"scale_factor": math.nan}, "scale_factor of the variable ql is not finite")):
             name = self.netcdf("bad.nc", values, ("y", "x"), **attributes)
             self.refused(3, "stats", name, "--cell-size", "50", says=says)
+
+    def test_a_large_mask_takes_little_more_than_its_file(self):
+        """Not eight bytes for each of its values."""
+        mask = numpy.zeros((4, 4096, 4096), dtype="i1")
+        mask[:, 5:9, 7:11] = 1
+        name = self.netcdf("large.nc", mask, ("time", "y", "x"), kind="i1")
+        took = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL); " \
+               "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+        most = subprocess.run([sys.executable, "-c", took, NEPHOS, "stats", name, "--cell-size", "50"], cwd=self.folder,
+                              env=self.environment, capture_output=True, text=True, check=True).stdout
+        self.assertLess(int(most), 400 << 10, "KiB; the file has 64 MiB, its values as doubles 512")
 
     def test_pictures_whose_head_lies_cost_nothing(self):
         def png(width, height, depth, data):

@@ -2,6 +2,7 @@
 """`nephos sweep` and `nephos merge`: the same tables whatever happened on the way, and statistics with a known answer."""
 
 import csv
+import json
 import math
 import os
 import pathlib
@@ -219,7 +220,10 @@ direction_deg = 90
             self.assertEqual((statuses.count("done"), statuses.count("missing")), (8, 1))
         # The other shard is not stopped by it; its own sweep is, and says what to do.
         number = int(path.name[:4])
-        self.assertIn(said, self.sweep("two", "--shard", f"{1 - number}/2").stderr)
+        self.assertIn(said, self.sweep("two", "--shard", f"{1 - number}/2", status=3).stderr)
+        for argument in ("--status", "--dry-run"):
+            self.assertIn(said, self.sweep("two", argument, status=3).stderr)
+        self.assertIn(said, json.loads(self.sweep("two", "--status", "--json", status=3).stdout)["problems"][0])
         self.assertIn("--overwrite", self.sweep("two", "--shard", f"{number}/2", status=3).stderr)
         self.sweep("two", "--shard", f"{number}/2", "--overwrite")
         self.call("merge", "two")
@@ -262,6 +266,44 @@ direction_deg = 90
             process.wait(timeout=100)
             self.assertEqual(process.returncode, 3)
             self.assertIn("was removed or replaced while the sweep wrote it", process.stderr.read())
+
+    def test_a_plan_is_not_replaced_while_it_is_run(self):
+        """Its runs would be in no table of the other plan."""
+        process = self.started("shared", "--shard", "0/2")
+        plan = {name: (self.folder / "shared" / name).read_bytes() for name in ("scene.toml", "sweep.toml")}
+        for arguments in ([], ["--shard", "0/2"], ["--shard", "1/2"], ["--shard", "1/2", "--overwrite"], ["--emit", "slurm"]):
+            said = self.sweep("shared", *arguments, status=3).stderr
+            self.assertIn("0000-of-0002.jsonl: a", said)
+            self.assertIn("wait for its end", said)
+            for name, content in plan.items():
+                self.assertEqual((self.folder / "shared" / name).read_bytes(), content)
+        self.assertEqual(self.call("sweep", "shared/sweep.toml", "--out", "shared", "--status").returncode, 0)
+        process.send_signal(signal.SIGTERM)
+        process.wait(timeout=60)
+        self.sweep("shared")  # as soon as nobody runs it
+
+    def test_tables_of_another_plan_stay(self):
+        self.sweep("tables", "--tracks")
+        self.assertTrue((self.folder / "tables/tracks.csv").exists())
+        before = self.tables("tables")
+        self.sweep("tables", "--tracks", "--shard", "0/1", axis="field.background.ext=0.3")  # of one part, so it makes the tables
+        self.assertEqual(len(rows(self.folder / "tables/runs.csv")), 3)
+        self.sweep("tables", "--tracks")
+        self.assertEqual(self.tables("tables"), before)
+        # Another plan, whose parts are merged.
+        for shard in range(2):
+            self.sweep("tables", "--shard", f"{shard}/2", axis="field.background.ext=0.3,0.4")
+        said = self.call("merge", "tables", status=3).stderr
+        self.assertIn("tables/runs.csv has 9 runs that tables/sweep.toml does not ask for", said)
+        self.assertEqual(self.tables("tables"), before)
+        # The same where the records are elsewhere: done runs that are in no record are counted, of whatever plan.
+        self.sweep("other", axis="field.background.ext=0.3")
+        said = self.call("merge", "other", "--out", "tables", status=3).stderr
+        self.assertIn("tables/runs.csv has 9 runs that are in no shard that can be read", said)
+        self.assertEqual(self.tables("tables"), before)
+        self.call("merge", "tables", "--overwrite")
+        self.assertEqual(len(rows(self.folder / "tables/runs.csv")), 6)
+        self.assertFalse((self.folder / "tables/tracks.csv").exists(), "of the plan before")
 
     def test_a_shard_that_is_written_is_not_removed(self):
         process = self.started("busy", "--shard", "0/2")
@@ -418,7 +460,7 @@ direction_deg = 90
         self.assertIn("8 points (grid; field.background.ext: 8 values) x 3 replicates = 24 runs of 300 to 3000 steps",
                       result.stdout)
         self.sweep("a", "-j", "2")
-        self.call("fit", page / "cover.toml", "--runs", "8", "--out", "fit", "-j", "2")
+        self.call("fit", page / "cover.toml", "--runs", "10", "--out", "fit", "-j", "2")
         for arguments in (["points", "a/points.csv", "field.background.ext", "cover", "0.1", "0.01"],):
             picture = subprocess.run(["/usr/bin/python3", page / "plot.py", *arguments], cwd=self.folder, text=True,
                                      capture_output=True, check=True).stdout
