@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/memory.h"
 #include "core/text.h"
+#include "render/backend/host_light.h"
 #include "render/blended/blended_backend.h"
 #include "render/cpu/cpu_backend.h"
 #include "render/frame/frame_data.h"
@@ -19,6 +20,7 @@
 #include "render/ground/wet_ground.h"
 #include "render/renderer_impl.h"
 #include "render/veil/veil_pass.h"
+#include "render/veil/veil_shade.h"
 #include "render/vulkan/vulkan_backend.h"
 
 namespace nephos {
@@ -32,10 +34,11 @@ std::size_t memory_needed(const Splats& splats, const RenderOptions& options, in
     const std::size_t part = std::min(pixels, square(std::size_t(part_size)));
     // Orders, sort keys, light, box and splat of a metaball, and what is kept of it.
     constexpr std::size_t kPerMetaball = 36 + 16 + 4 * 5 + 16 + 64 + 16 + 24 + 24,
-                          kPerBillboard = 32 + 16 + 4 * 5 + 16 + 64;
+                          kPerBillboard = 32 + 16 + 4 * 5 + 16 + 64,
+                          kPerCaster = 80 + 72 + 40 + 48 + 16;  // key, caster, sphere, footprint, lists
     return 20 * pixels + 40 * part + 12 * square(std::size_t(options.shadow_map_size)) +
            kPerMetaball * splats.metaballs.metaballs.size() + kPerBillboard * splats.billboards.size() +
-           (std::size_t(96) << 20);
+           kPerCaster * (splats.billboards.size() + splats.unseen.size()) + (std::size_t(96) << 20);
 }
 
 void check_memory(const Splats& splats, const RenderOptions& options, int part_size) {
@@ -111,6 +114,7 @@ void Renderer::Impl::absorb_sunlight(LitCloud& cloud, const DensityBlocks& block
     cloud.shadow = shadow_by_absorption(blocks, cloud.frame, cloud.shadow_size, distance);
     cloud.sun_depths = light_by_absorption(cloud.cloud, blocks, direction_to_sun(options.sun), distance);
     to_sun_depths(cloud.sun_depths);
+    add_screen(cloud);
     cloud.all_known = true;
     cloud.note_light_pass();
 }
@@ -123,6 +127,26 @@ std::vector<float> Renderer::Impl::absorb_light(const Splats& splats, const Rend
     if (absorbs) absorb_sunlight(lit, blocks, options);
     if (flash == nullptr) return {};
     return flash_by_absorption(lit.cloud, blocks, flash->position_m, options.light.light_distance_m);
+}
+
+void Renderer::Impl::shade_by_veils(const Splats& splats, const RenderOptions& options) {
+    constexpr double kRainReach_m = 8000;
+    veil_depth = {};
+    if (veils.empty()) return;
+    PlaceBox places;
+    for (const Metaball& ball : splats.metaballs.metaballs)
+        if (ball.density > 0) places.add({ball.x, ball.y, ball.z}, ball.radius);
+    for (const CloudBillboard& each : splats.billboards)
+        places.add(each.centre_m, 0.5 * std::max(each.width_m, each.height_m));
+    if (options.precipitation.enabled) {
+        Vec3 eye = options.camera.position_m;
+        eye.z = options.ground.height_m;
+        places.add(eye, kRainReach_m);
+    }
+    if (!places.any()) return;
+    const auto shade = std::make_shared<const VeilShade>(veils, places, direction_to_sun(options.sun));
+    veil_depth.key = key_of_numbers(shade->content());
+    veil_depth.at = [shade](const Vec3& place_m) { return shade->depth_at(place_m); };
 }
 
 void Renderer::Impl::use_scattering(const CloudLight& light) {
@@ -138,6 +162,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
     Picture& picture = drawing.picture = blank_picture(options);
     {
         const StageTimer timer(&times, DrawStage::prepare);
+        cache_screen(lit, splats, veil_depth, options);
         // The key of the light says nothing of the view, from which other metaballs may be merged.
         cache_cloud(lit, splats.metaballs, options, drawing.detail);
         cache_volumes(lit, splats.metaballs, options);
@@ -145,6 +170,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
     }
     times[DrawStage::prepare].bytes = splats.metaballs.metaballs.size_bytes();
     picture.shadow_frame = lit.frame;
+    cache_billboard_light(lit, splats, options, times);
     use_scattering(options.light);
     const Flash* flash = splats.flash ? &*splats.flash : nullptr;
     FrameDescription frame{.splats = splats,
@@ -161,7 +187,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
     for (int y = 0; y < picture.height; y += part_size) {
         for (int x = 0; x < picture.width; x += part_size) {
             const PicturePart area{x, y, std::min(part_size, picture.width - x),
-                            std::min(part_size, picture.height - y)};
+                                   std::min(part_size, picture.height - y)};
             frame.parts.push_back(
                 {area, frame_data(options, frame.camera, lit.frame, flash, area, frame.sky)});
             PictureFrame& part = frame.parts.back().frame;
@@ -195,6 +221,8 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
     if (!lit.merged.empty()) {
         RenderOptions given = options;
         given.level_of_detail.pixels = 0;
+        whole.screen = lit.screen;
+        whole.screen_key = lit.screen_key;
         cache_cloud(whole, splats.metaballs, given, {});
         if (options.light.lighting == Lighting::cfa)
             absorb_sunlight(whole, DensityBlocks(whole.cloud, splats.metaballs.extinction_per_m), given);
@@ -207,6 +235,10 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
         picture.light[known->cloud.visible[i]] = std::exp(-known->sun_depths[i]);
     picture.shadow = lit.volumes.empty() ? known->shadow : lit.shadow;
     picture.shadow_frame = known->frame;
+    if (veil_depth.any())
+        picture.sunlight_of_veils = [at = veil_depth.at](const Vec3& place_m) {
+            return std::exp(-at(place_m));
+        };
     if (options.precipitation.enabled) {
         cache_ground_light(lit, options);
         picture.ground_light = lit.ground_light;
@@ -313,6 +345,7 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
         auto state = std::make_unique<PendingPicture::State>(splats, options);
         impl_->times = {};
         impl_->veils = veils;
+        impl_->shade_by_veils(splats, options);
         const bool wet = splats.ground_cover && shows_wet_ground(options, *splats.ground_cover);
         if (wet || shows_pattern(options) || !veils.empty()) {
             state->picture = impl_->draw_in_passes(splats, options);

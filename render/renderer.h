@@ -11,7 +11,8 @@
 //     step 2   from the eye: sky and ground, which wears the shadow map, then all splats back to front:
 //              buffer = buffer * attenuation + colour
 //
-// Clouds drawn as billboards cast no shadow on the ground or on other clouds.
+// Clouds drawn as billboards take sunlight away as what they hide when they are looked at from the sun
+// (render/frame/billboard_shade.h): on the ground, in voxel clouds and air, from rain, and from other billboards.
 //
 // Drawn by one of three back-ends (Splatting in device_options.h): vectors on the processor, compute shaders,
 // or D's blended billboards, the latter two offscreen in Vulkan 1.3. The picture is a function of cloud and

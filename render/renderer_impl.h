@@ -54,6 +54,8 @@ struct Renderer::Impl {
     std::vector<float> absorb_light(const Splats& splats, const RenderOptions& options);
     void hand_out_light(const Splats& splats, const RenderOptions& options, Picture& picture);
     void use_scattering(const CloudLight& light);
+    // Makes `veil_depth` that of the veils above clouds and rain; it is none without these.
+    void shade_by_veils(const Splats& splats, const RenderOptions& options);
     const SkyLight* sky_of(const Splats& splats, const RenderOptions& options);
 
     std::unique_ptr<Backend> backend;
@@ -65,6 +67,7 @@ struct Renderer::Impl {
     AirCache air;
     SkyLights sky_lights;
     std::span<const DrawnVeil> veils;  // of the picture that is being drawn
+    VeilDepth veil_depth;              // likewise: their shade, where something is below them
 };
 
 }  // namespace nephos

@@ -81,6 +81,15 @@ Light relative(const Light& light, const Vec3& position_m) {
     return {{v.x - position_m.x, v.y - position_m.y, v.z - position_m.z}, false};
 }
 
+// Returns the weights of a cloud's boxes; none when all are whole.
+std::vector<double> weights_of(const CloudToLight& lit) {
+    std::vector<double> weights;
+    if (lit.phase >= 1) return weights;
+    for (const SeedBox& box : lit.cloud->boxes)
+        weights.push_back(phase_weight(box.distance, lit.phase, lit.softness));
+    return weights;
+}
+
 }  // namespace
 
 void absorb_light(const Cloud& cloud, const Vec3& position_m, const Light& light, std::span<double> out,
@@ -120,10 +129,11 @@ std::size_t LightAbsorption::update(std::span<const CloudToLight> clouds) {
         const bool known = entry.listed != 0;
         entry.listed = calls_;
         const Light seen = relative(lit.light, lit.position_m);
-        if (known && entry.seen == seen) continue;
+        if (known && entry.seen == seen && entry.phase == lit.phase) continue;
         entry.absorbed.resize(lit.cloud->boxes.size());
-        absorb_light(*lit.cloud, lit.position_m, lit.light, entry.absorbed);
+        absorb_light(*lit.cloud, lit.position_m, lit.light, entry.absorbed, weights_of(lit));
         entry.seen = seen;
+        entry.phase = lit.phase;
         ++computed;
     }
     std::erase_if(entries_, [&](const auto& item) { return item.second.listed != calls_; });

@@ -47,11 +47,13 @@ struct CloudToLight {
     const Cloud* cloud = nullptr;  // not null; an id always has the same shape
     Vec3 position_m{};
     Light light;
+    // Only boxes that are there take light away: each counts by its phase_weight(). At phase 1 all are whole.
+    double phase = 1, softness = 0.5;
 };
 
-// Caches the absorption of many clouds, and recomputes it where the light moved relative to the cloud: a
-// drifting cloud is recomputed for lightning, but never for the sun. absorbed() depends on the last light
-// alone; LightSchedule bounds the number of lights that move in a frame. Not thread-safe.
+// Caches the absorption of many clouds, and recomputes it where the light moved relative to the cloud, or the cloud forms or
+// dissolves: a whole drifting cloud is recomputed for lightning, but never for the sun. absorbed() depends on the last light
+// and phase alone; LightSchedule bounds the number of lights that move in a frame. Not thread-safe.
 class LightAbsorption {
   public:
     // Computes new clouds and those whose light moved; of a repeated id the first counts. Drops clouds that
@@ -64,6 +66,7 @@ class LightAbsorption {
   private:
     struct Entry {
         Light seen;                // as it was, relative to the cloud
+        double phase = 1;          // of the cloud then
         std::uint64_t listed = 0;  // last call that named it, from 1
         std::vector<double> absorbed;
     };

@@ -12,8 +12,8 @@
 // plus a quarter for clouds that dissolve. New clouds take the lowest free slots (SkyCloud::slot). When
 // frames are drawn in their order, each updates at most clouds_per_frame of the clouds of the frame before as
 // long as there were never more than `room` clouds at once, else ceil(slots / P). In addition each frame
-// computes the clouds that enter (once, with the light of their slot), and the first frame of a run computes
-// all.
+// computes the clouds that enter (once, with the light of their slot), those that form or dissolve, and the first frame
+// of a run computes all.
 
 #include <algorithm>
 #include <cstdint>

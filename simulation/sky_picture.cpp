@@ -23,7 +23,8 @@ double fastest_m_per_s(const Wind& wind) {
     double fastest = 0;
     for (const WindKeyframe& key : wind.keyframes)
         for (const WindLevel& level : key.levels)
-            fastest = std::max(fastest, std::hypot(level.velocity.east_m_per_s, level.velocity.north_m_per_s));
+            fastest =
+                std::max(fastest, std::hypot(level.velocity.east_m_per_s, level.velocity.north_m_per_s));
     return fastest;
 }
 
@@ -64,13 +65,15 @@ std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<cons
         if (schedule.period() == 1) return present;
         const int frame = schedule.frame_of_light(cloud.slot, film->index);
         const auto [found, added] = earlier.try_emplace(frame);
-        if (added) found->second = light_of(
-                turned_sun_at(*film->sun, film->heading_deg, frame_time_s(*film->frames, frame)));
+        if (added)
+            found->second =
+                light_of(turned_sun_at(*film->sun, film->heading_deg, frame_time_s(*film->frames, frame)));
         return found->second;
     };
     std::vector<CloudToLight> lit;
     for (const auto& [cloud, form] : clouds)
-        lit.push_back({light_id(*cloud, form), &sky.shapes()[form.shape].cloud, sky.position_m(*cloud), light_for(*cloud)});
+        lit.push_back({light_id(*cloud, form), &sky.shapes()[form.shape].cloud, sky.position_m(*cloud),
+                       light_for(*cloud), form.phase, sky.options().formation_softness});
     return sun_.update(lit);
 }
 
@@ -81,11 +84,37 @@ void SkyBillboards::light_by_flash(const SkySimulation& sky, const Flash& flash,
         const Cloud& shape = sky.shapes()[form.shape].cloud;
         const Vec3 place = sky.position_m(*cloud);
         const double nearest = std::max(
-            length(place + shape.centre_m - flash.position_m) - shape.radius_m - scattered(sky, form).reach_m, 1.0);
+            length(place + shape.centre_m - flash.position_m) - shape.radius_m - scattered(sky, form).reach_m,
+            1.0);
         if (flash.intensity * 1e6 / (nearest * nearest) < kLeastFlash) continue;
-        lit.push_back({light_id(*cloud, form), &shape, place, light_of(flash)});
+        lit.push_back({light_id(*cloud, form), &shape, place, light_of(flash), form.phase,
+                       sky.options().formation_softness});
     }
     flash_.update(lit);
+}
+
+template <class Work>
+void SkyBillboards::each_billboard(const SkySimulation& sky, const FormedCloud& formed, double time_s,
+                                   const DrawnClouds& out, std::vector<CloudBillboard>& to,
+                                   const Work& work) {
+    const auto& [cloud, form] = formed;
+    const Cloud& shape = sky.shapes()[form.shape].cloud;
+    const Vec3 place = sky.position_m(*cloud);
+    for (const Billboard& billboard : scattered(sky, form).billboards) {
+        const double weight =
+            phase_weight(shape.boxes[billboard.box].distance, form.phase, sky.options().formation_softness);
+        if (weight <= 0) continue;
+        CloudBillboard& drawn = to.emplace_back();
+        drawn.centre_m = billboard.centre_m + place;
+        drawn.centre_m += sky.lean_m(*cloud, form, drawn.centre_m.z, time_s);
+        drawn.width_m = float(billboard.width_m);
+        drawn.height_m = float(billboard.height_m);
+        drawn.opacity = float(weight);
+        drawn.texture = billboard.texture;
+        drawn.variant = billboard.variant;
+        if (out.textures) drawn.picture = out.textures->picture_of(sky.model(form), billboard.variant);
+        work(billboard, drawn);
+    }
 }
 
 void SkyBillboards::list(const SkySimulation& sky, const FormedCloud& formed, bool flash, double time_s,
@@ -100,23 +129,17 @@ void SkyBillboards::list(const SkySimulation& sky, const FormedCloud& formed, bo
         flash ? flash_.absorbed(light_id(*cloud, form)) : std::span<const double>{};
     const auto index = std::uint32_t(out.clouds.size());
     out.clouds.push_back({shape.centre_m + place, what.low_m + place.z, what.high_m + place.z});
-    for (const Billboard& billboard : what.billboards) {
-        const double weight =
-            phase_weight(shape.boxes[billboard.box].distance, form.phase, sky.options().formation_softness);
-        if (weight <= 0) continue;
-        CloudBillboard& drawn = out.billboards.emplace_back();
-        drawn.centre_m = billboard.centre_m + place;
-        drawn.centre_m += sky.lean_m(*cloud, form, drawn.centre_m.z, time_s);
-        drawn.width_m = float(billboard.width_m);
-        drawn.height_m = float(billboard.height_m);
-        drawn.sun_absorbed = float(sun[billboard.box]);
-        drawn.flash_absorbed = lightning.empty() ? 1.0f : float(lightning[billboard.box]);
-        drawn.opacity = float(weight);
-        drawn.texture = billboard.texture;
-        drawn.variant = billboard.variant;
-        if (out.textures) drawn.picture = out.textures->picture_of(sky.model(form), billboard.variant);
-        drawn.cloud = index;
-    }
+    each_billboard(sky, formed, time_s, out, out.billboards,
+                   [&](const Billboard& billboard, CloudBillboard& drawn) {
+                       drawn.sun_absorbed = float(sun[billboard.box]);
+                       drawn.flash_absorbed = lightning.empty() ? 1.0f : float(lightning[billboard.box]);
+                       drawn.cloud = index;
+                   });
+}
+
+void SkyBillboards::list_unseen(const SkySimulation& sky, const FormedCloud& formed, double time_s,
+                                DrawnClouds& out) {
+    each_billboard(sky, formed, time_s, out, out.unseen, [](const Billboard&, CloudBillboard&) {});
 }
 
 std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
@@ -132,23 +155,26 @@ std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyC
                       mirror = camera_frame(mirrored.value_or(options.camera));
     const Frustum frustum(camera), below(mirror);
     const double lean_m = 2 * sky.options().shear_s * fastest_m_per_s(sky.options().wind);
-    std::vector<FormedCloud> seen;
+    std::vector<FormedCloud> seen, unseen;
     for (const FormedCloud& each : formed) {
         const Cloud& shape = sky.shapes()[each.form.shape].cloud;
         const Vec3 centre_m = sky.position_m(*each.cloud) + shape.centre_m;
         const double radius_m = shape.radius_m + scattered(sky, each.form).reach_m + lean_m;
-        if (!cull || frustum.may_see(centre_m - camera.position_m, radius_m) ||
-            below.may_see(centre_m - mirror.position_m, radius_m))
-            seen.push_back(each);
+        const bool is_seen = !cull || frustum.may_see(centre_m - camera.position_m, radius_m) ||
+                             below.may_see(centre_m - mirror.position_m, radius_m);
+        (is_seen ? seen : unseen).push_back(each);
     }
     if (flash) light_by_flash(sky, *flash, seen);
-    std::size_t billboards = out.billboards.size();
+    std::size_t billboards = out.billboards.size(), more = out.unseen.size();
     for (const FormedCloud& each : seen) billboards += scattered(sky, each.form).billboards.size();
-    // With what the renderer makes of one: its order and its form on the device.
-    require_memory(billboards * (sizeof(CloudBillboard) + 128),
-                   "the billboards of " + std::to_string(seen.size()) + " clouds");
+    for (const FormedCloud& each : unseen) more += scattered(sky, each.form).billboards.size();
+    // With what the renderer makes of one: its order and its form on the device, and its shade.
+    require_memory((billboards + more) * (sizeof(CloudBillboard) + 384),
+                   "the billboards of " + std::to_string(formed.size()) + " clouds");
     out.billboards.reserve(billboards);
+    out.unseen.reserve(more);
     for (const FormedCloud& each : seen) list(sky, each, flash.has_value(), time_s, out);
+    for (const FormedCloud& each : unseen) list_unseen(sky, each, time_s, out);
     return computed;
 }
 
@@ -176,7 +202,8 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     drawn.textures = textures_;
     const std::optional<Flash> flash = flash_at(options.lightning, time_s);
     std::optional<Camera> mirrored;
-    if (shows_reflections(options, ground_cover.value_or(GroundCoverView{}))) mirrored = mirrored_camera(options);
+    if (shows_reflections(options, ground_cover.value_or(GroundCoverView{})))
+        mirrored = mirrored_camera(options);
     for (std::size_t i = 0; i < layers.size(); ++i) {
         const SkyLayer& layer = layers[i];
         if (layer.direct)
@@ -187,10 +214,10 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
         lines.push_back(debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun)));
     // Rain wants the depth of the clouds and their shadow, veils the depth.
     const bool all = depth || rain;
-    PendingPicture picture = renderer.begin(
-        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all, ground_cover,
-         textures_ ? textures_->pictures : nullptr},
-        options, veils);
+    PendingPicture picture =
+        renderer.begin({drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all,
+                        ground_cover, textures_ ? textures_->pictures : nullptr, drawn.unseen},
+                       options, veils);
     RenderOptions raining = moving;  // knows the camera's path itself
     raining.sun = options.sun;
     if (ground_cover) raining.ground.albedo = mean_albedo(options, *ground_cover);

@@ -32,6 +32,7 @@ namespace nephos {
 struct DrawnClouds {
     std::vector<BillboardCloud> clouds;
     std::vector<CloudBillboard> billboards;
+    std::vector<CloudBillboard> unseen;  // of clouds that the camera does not see: they cast shadows
     std::shared_ptr<const ModelTextures> textures;  // of the base models; null: none comes from a file
 };
 
@@ -49,8 +50,8 @@ class SkyBillboards {
     // Lists what the camera can see of `clouds`, which have shapes of `sky`. Light first: the sun's
     // absorption of all clouds of the layer, with options.sun or, in a film with a bound on the clouds that
     // are computed in a frame, the sun of the frame whose turn it was; and the lightning's of those that it
-    // reaches. What is listed never depends on earlier calls. `cull` false lists also what the camera cannot
-    // see: the picture is the same. `mirrored`: another camera whose clouds are listed as well. Returns of
+    // reaches. What is listed never depends on earlier calls. What the camera cannot see is listed apart; `cull` false
+    // lists it with the rest: the picture is the same. `mirrored`: another camera whose clouds are listed as well. Returns of
     // how many clouds the sun's absorption was computed anew. `time_s`: decides the forms of clouds that change, and their
     // lean; none: the time of `sky`.
     std::size_t append(const SkySimulation& sky, std::span<const SkyCloud> clouds,
@@ -84,7 +85,14 @@ class SkyBillboards {
     std::size_t light_by_sun(const SkySimulation& sky, std::span<const FormedCloud> clouds,
                              const RenderOptions& options, const std::optional<FilmFrame>& film);
     void light_by_flash(const SkySimulation& sky, const Flash& flash, const std::vector<FormedCloud>& seen);
-    void list(const SkySimulation& sky, const FormedCloud& formed, bool flash, double time_s, DrawnClouds& out);
+    void list(const SkySimulation& sky, const FormedCloud& formed, bool flash, double time_s,
+              DrawnClouds& out);
+    void list_unseen(const SkySimulation& sky, const FormedCloud& formed, double time_s, DrawnClouds& out);
+    // Appends the billboards of a cloud as far as they are there, without their light; calls work(billboard, what it
+    // became) for each.
+    template <class Work>
+    void each_billboard(const SkySimulation& sky, const FormedCloud& formed, double time_s,
+                        const DrawnClouds& out, std::vector<CloudBillboard>& to, const Work& work);
 
     std::vector<std::optional<ScatteredBillboards>> scattered_;  // one for each of SkySimulation::shapes()
     LightAbsorption sun_, flash_;

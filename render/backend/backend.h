@@ -70,14 +70,14 @@ struct FrameDescription {
 
   private:
     AirShells shells(std::span<const float> shadow) const {
-        return air_shells(options, cloud.cloud, cloud.frame, shadow, cloud.shadow_size, cloud.light,
+        return air_shells(options, cloud.cloud, cloud.casters(), cloud.frame, shadow, cloud.shadow_size, cloud.light,
                           splats.time_s, air.noise, air.shade);
     }
     ViewSortedSplats view_sorted(const PreparedCloud& metaballs) const {
         const StageTimer timer(&times, DrawStage::view_sorting);
         ViewSortedSplats order = sort_for_view(metaballs, splats, camera,
                                                pixels_per_unit(options.camera, camera), options.ground,
-                                               footprint_scale(cloud.volumes));
+                                               footprint_scale(cloud.volumes), cloud.billboard_sunlight);
         // Balls are read twice; keys move through memory three times, and back and forth.
         times[DrawStage::view_sorting].bytes =
             metaballs.metaballs.size_bytes() +

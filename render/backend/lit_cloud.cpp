@@ -2,6 +2,9 @@
 #include "render/backend/lit_cloud.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -11,6 +14,7 @@
 #include <xxhash.h>
 
 #include "render/cloud/light_below.h"
+#include "render/frame/frame_data.h"
 #include "render/frame/tile_bins.h"
 
 namespace nephos {
@@ -56,7 +60,7 @@ CacheKey metaballs_key(const MetaballCloud& cloud) {
     return key_of(hash_of(std::as_bytes(cloud.metaballs)), rest);
 }
 
-CacheKey light_key(const CacheKey& metaballs, const RenderOptions& options) {
+CacheKey light_key(const CacheKey& metaballs, const CacheKey& screen, const RenderOptions& options) {
     const Vec3 to_sun = direction_to_sun(options.sun);
     const double rest[] = {to_sun.x,
                            to_sun.y,
@@ -64,7 +68,9 @@ CacheKey light_key(const CacheKey& metaballs, const RenderOptions& options) {
                            double(options.shadow_map_size),
                            double(int(options.light.lighting)),
                            options.light.light_distance_m,
-                           options.level_of_detail.pixels};
+                           options.level_of_detail.pixels,
+                           std::bit_cast<double>(screen[0]),
+                           std::bit_cast<double>(screen[1])};
     return key_of({metaballs[0], metaballs[1]}, rest);
 }
 
@@ -90,7 +96,45 @@ CacheKey volumes_key(const CacheKey& metaballs, const MetaballCloud& cloud, cons
     return key_of({metaballs[0], metaballs[1]}, rest);
 }
 
+// What of a billboard its shade depends on.
+void append_words(const CloudBillboard& of, std::vector<double>& words) {
+    words.insert(words.end(), {of.centre_m.x, of.centre_m.y, of.centre_m.z, double(of.width_m), double(of.height_m),
+                               double(of.opacity), double(int(of.texture)), double(of.variant), double(of.picture),
+                               double(of.cloud)});
+}
+
 }  // namespace
+
+float SunScreen::depth_at(const Vec3& place_m, std::uint32_t but_for_cloud) const {
+    constexpr float kLeastLeft = 1e-30f;
+    float depth = veils.any() ? veils.at(place_m) : 0;
+    if (const float left = billboards.sunlight_at(place_m, but_for_cloud); left < 1)
+        depth -= std::log(std::max(left, kLeastLeft));
+    return depth;
+}
+
+CacheKey key_of_numbers(std::span<const float> numbers) { return key_of(hash_of(std::as_bytes(numbers)), {}); }
+
+void cache_screen(LitCloud& cached, const Splats& splats, const VeilDepth& veils, const RenderOptions& options) {
+    const bool shines = daylight(options.sun.elevation_deg).sun > 0;
+    if (!shines || (splats.billboards.empty() && splats.unseen.empty() && !veils.any())) {
+        cached.screen = nullptr;
+        cached.screen_key = {};
+        return;
+    }
+    const Vec3 to_sun = direction_to_sun(options.sun);
+    std::vector<double> words{to_sun.x, to_sun.y, to_sun.z, double(splats.billboards.size()),
+                              splats.pictures ? double(reinterpret_cast<std::uintptr_t>(splats.pictures.get())) : 0.0,
+                              std::bit_cast<double>(veils.key[0]), std::bit_cast<double>(veils.key[1])};
+    words.reserve(words.size() + 10 * (splats.billboards.size() + splats.unseen.size()));
+    for (const CloudBillboard& each : splats.billboards) append_words(each, words);
+    for (const CloudBillboard& each : splats.unseen) append_words(each, words);
+    const CacheKey key = key_of(hash_of(std::as_bytes(std::span(words))), {});
+    if (cached.screen && key == cached.screen_key) return;
+    cached.screen = std::make_shared<const SunScreen>(
+        SunScreen{BillboardShade(splats.billboards, splats.unseen, splats.pictures, to_sun), veils});
+    cached.screen_key = key;
+}
 
 void cache_ground_light(LitCloud& cached, const RenderOptions& options) {
     const Vec3 to_sun = direction_to_sun(options.sun);
@@ -123,7 +167,9 @@ void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOpt
         cached.volumes_version = next_version();
     }
     if (cached.light_key == cached.volumes_light_key) return;
-    light_volumes(cached.volumes, direction_to_sun(options.sun), options.light, are_new);
+    DepthOfOthers others;
+    if (cached.screen) others = [&](const Vec3& place_m) { return cached.screen->depth_at(place_m); };
+    light_volumes(cached.volumes, direction_to_sun(options.sun), options.light, are_new, others);
     cached.volumes_key = key;  // only now: if light fails, all is new again
     cached.volumes_light_key = cached.light_key;
     cached.volumes_light = next_version();
@@ -133,7 +179,7 @@ void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptio
                  const DetailView& view) {
     const CacheKey metaballs = metaballs_key(cloud),
                    volumes = cloud.detailed.empty() ? metaballs : volumes_key(metaballs, cloud, options),
-                   light = light_key(volumes, options);
+                   light = light_key(volumes, cached.screen_key, options);
     cached.given_volumes_key = volumes;
     const bool was_cached = cached.shadow_size != 0;
     const bool is_known = was_cached && light == cached.light_key;
@@ -150,7 +196,7 @@ void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptio
         cached.blocks.reset();
         if (options.level_of_detail.pixels > 0) cached.blocks = detail_blocks(cached.given, cloud);
         // The frame is that of the given metaballs, as are base and top: level of detail does not move it.
-        cached.frame = shadow_frame(cached.given, direction_to_sun(options.sun), options.shadow_map_size);
+        cached.frame = shadow_frame(cached.given, direction_to_sun(options.sun), options.shadow_map_size, cached.casters());
     }
     std::optional<MergedCloud> merged;
     if (cached.blocks)
@@ -171,7 +217,7 @@ void cache_cloud(LitCloud& cached, const MetaballCloud& cloud, const RenderOptio
     cached.shadow.assign(std::size_t(grid.width) * std::size_t(grid.height), 1.0f);
     cached.known_light.assign(cached.sun_depths.size(), 0);
     cached.known_tiles.assign(grid.tiles(), 0);
-    cached.all_known = cached.cloud.visible.empty();  // the map is white
+    cached.all_known = !cached.casts_shadow();  // the map is white
     cached.drawn_again = false;
     cached.light = cached.host_light = next_version();
     cached.shadow_size = options.shadow_map_size;

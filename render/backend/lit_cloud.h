@@ -7,12 +7,16 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "render/cloud/cloud_preparation.h"
 #include "render/cloud/cloud_volume.h"
 #include "render/cloud/level_of_detail.h"
+#include "render/frame/billboard_shade.h"
 #include "render/frame/versioned.h"
 #include "render/image/ground_light.h"
 #include "render/image/picture.h"
@@ -22,6 +26,22 @@ namespace nephos {
 
 // Hash of 128 bits of what a cached value was computed from. A few 10 microseconds per 10,000 metaballs.
 using CacheKey = std::array<std::uint64_t, 2>;
+
+// The optical depth of veils between a place of the world and the sun.
+struct VeilDepth {
+    CacheKey key{};  // of all that the depth depends on
+    DepthOfOthers at;
+    bool any() const { return bool(at); }
+};
+
+// What shades a cloud of voxels beside itself.
+struct SunScreen {
+    BillboardShade billboards;
+    VeilDepth veils;
+
+    // Returns the optical depth towards the sun of everything, but for the billboards of one cloud.
+    float depth_at(const Vec3& place_m, std::uint32_t but_for_cloud = BillboardShade::kNoCloud) const;
+};
 
 struct LitCloud {
     CacheKey metaballs_key{};  // of the given metaballs, extinction and normalisation
@@ -50,6 +70,21 @@ struct LitCloud {
     Version host_light = 0;
     std::size_t light_passes = 0;  // so far
 
+    std::shared_ptr<const SunScreen> screen;  // null: nothing else takes sunlight away
+    CacheKey screen_key{};
+    // Fraction of the sunlight at each of Splats::billboards that everything but its own cloud leaves; empty: all of it.
+    std::vector<float> billboard_sunlight;
+    CacheKey billboard_key{};  // of which it was computed
+
+    // Returns what casts shadows beside the metaballs.
+    std::span<const ShadowCaster> casters() const {
+        return screen ? screen->billboards.casters() : std::span<const ShadowCaster>{};
+    }
+    // Returns whether there may be shade in the shadow map.
+    bool casts_shadow() const { return !cloud.visible.empty() || !casters().empty(); }
+    // Returns whether the processor computes all light, for every back-end (host_light.h).
+    bool lit_on_host() const { return !volumes.empty() || screen != nullptr; }
+
     // The parts with detail, in their order, with their light. See DetailedVoxels.
     std::vector<CloudVolume> volumes;
     GroundLight ground_light;  // below `given`; made by cache_ground_light()
@@ -67,6 +102,12 @@ struct LitCloud {
         ++light_passes;
     }
 };
+
+// Returns the key of some numbers.
+CacheKey key_of_numbers(std::span<const float> numbers);
+
+// Makes cached.screen that of billboards and veils; none while the sun is below the horizon. Before cache_cloud().
+void cache_screen(LitCloud& cached, const Splats& splats, const VeilDepth& veils, const RenderOptions& options);
 
 // Makes `cached` that of a cloud as it is drawn from a view, without its light, unless it is already. `cloud`
 // must live as long as `cached` is read. Another view keeps the light if it merges the same metaballs, as it

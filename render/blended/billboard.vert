@@ -40,5 +40,5 @@ void main() {
     coordinate = billboard_coordinate(corner, billboard.texture_bits >> 8 & 15u);
     lit = air.transmitted * billboard_light_at(position, billboard, clouds[billboard.cloud]);
     veil = vec4(air.veil, billboard.opacity);
-    layer_level_distance = vec3(uvec2(billboard.texture_bits & 255u, billboard.texture_bits >> 12), distance);
+    layer_level_distance = vec3(uvec2(billboard.texture_bits & 255u, billboard.texture_bits >> 12 & 15u), distance);
 }

@@ -20,8 +20,8 @@ GpuImage upload_attenuation(const GpuDevice& gpu) {
 
 }  // namespace
 
-void BlendedBackend::light_all(LitCloud& cloud, StageTimes&) {
-    scene_.light(cloud);
+void BlendedBackend::light_all(LitCloud& cloud, StageTimes& times) {
+    scene_.light(cloud, times);
     scene_.fetch_map(cloud);
 }
 
@@ -44,9 +44,9 @@ ViewPass& BlendedBackend::pass_for(const FrameDescription& frame, const AirShell
 bool BlendedBackend::begin(const FrameDescription& frame, Picture& picture) {
     LitCloud& cloud = frame.cloud;
     ViewSortedSplats order = frame.view_sorted();
-    scene_.light(cloud);
+    scene_.light(cloud, frame.times);
     set_light(order, {cloud.sun_depths, frame.lightning});
-    if (has_shells(frame.options, cloud.cloud)) scene_.fetch_map(cloud);
+    if (has_shells(frame.options, cloud.casts_shadow())) scene_.fetch_map(cloud);
     const AirShells shells = frame.shells();
     const StageTimer timer(&frame.times, DrawStage::view);
     ViewPass& pass = pass_for(frame, shells, order);

@@ -145,13 +145,23 @@ PreparedCloud prepare(const MetaballCloud& cloud) {
     return prepared;
 }
 
-ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size) {
-    // u is horizontal; with the sun in the zenith it is east.
+ShadowAxes shadow_axes(const Vec3& to_sun) {
     const bool zenith = std::hypot(to_sun.x, to_sun.y) < 1e-6;
-    const Vec3 u = zenith ? Vec3{1, 0, 0} : glm::normalize(cross(Vec3{0, 0, 1}, to_sun));
-    const Vec3 v = glm::normalize(cross(to_sun, u));
+    const Vec3 right = zenith ? Vec3{1, 0, 0} : glm::normalize(cross(Vec3{0, 0, 1}, to_sun));
+    return {right, glm::normalize(cross(to_sun, right))};
+}
+
+ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size,
+                         std::span<const ShadowCaster> others) {
+    const auto [u, v] = shadow_axes(to_sun);
     auto [along_u, along_v, along_sun] = extent_along(cloud, u, v, to_sun);
-    if (cloud.visible.empty()) {
+    for (const ShadowCaster& other : others) {
+        const double r = other.radius_m;
+        along_u.add(dot(u, other.centre_m) - r, dot(u, other.centre_m) + r);
+        along_v.add(dot(v, other.centre_m) - r, dot(v, other.centre_m) + r);
+        along_sun.add(dot(to_sun, other.centre_m) - r, dot(to_sun, other.centre_m) + r);
+    }
+    if (cloud.visible.empty() && others.empty()) {
         along_u.add(-0.5, 0.5);
         along_v.add(-0.5, 0.5);
         along_sun.add(-0.5, 0.5);

@@ -38,8 +38,24 @@ struct PreparedCloud {
 // there are more than 2^31 of them.
 PreparedCloud prepare(const MetaballCloud& cloud);
 
-// Returns the smallest frame along the sun's rays around all visible metaballs, with a margin of two texels.
-ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size);
+// What casts shadows without being a metaball: a sphere around it, and how much of the shade there is its.
+struct ShadowCaster {
+    Vec3 centre_m{};  // world
+    double radius_m = 1;
+    double weight = 1;  // opacity times area, m^2
+};
+
+// Returns the axes of a shadow map: to the right, which is level (east with the sun in the zenith), and up, as seen from
+// the sun.
+struct ShadowAxes {
+    Vec3 right{1, 0, 0}, up{0, 1, 0};
+};
+ShadowAxes shadow_axes(const Vec3& to_sun);
+
+// Returns the smallest frame along the sun's rays around all visible metaballs and other casters, with a margin of two
+// texels.
+ShadowFrame shadow_frame(const PreparedCloud& cloud, const Vec3& to_sun, int shadow_size,
+                         std::span<const ShadowCaster> others = {});
 
 // Metaballs projected to the shadow map, nearest to the sun first.
 struct LightSortedSplats {

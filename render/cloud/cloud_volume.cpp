@@ -118,29 +118,36 @@ std::vector<std::uint32_t> shade_words(const LightFront& front) {
 
 namespace {
 
-// Adds the depths of the other volumes at the corners of a brick's cells.
-void add_other_depths(std::span<const CloudVolume> volumes, std::size_t n, std::size_t brick, std::span<float> depths) {
-    const CoverageField& field = volumes[n].field;
+// Calls work(number, place) for the corners of a brick's cells.
+template <class Work>
+void each_corner(const CoverageField& field, std::size_t brick, const Work& work) {
     const auto& bricks = field.bricks();
     const std::int32_t at = field.places()[brick];
     const Vec3 corner(at % bricks[0], at / bricks[0] % bricks[1], at / bricks[0] / bricks[1]);
     for (std::size_t i = 0; i < kLightNodesOfBrick; ++i) {
         const Vec3 node(i % kLightNodes, i / kLightNodes % kLightNodes, i / kLightNodes / kLightNodes);
-        const Vec3 place = field.corner_m() + 2 * field.node_m() * (double(kCells) * corner + node);
-        for (std::size_t m = 0; m < volumes.size(); ++m)
-            if (m != n) depths[i] += sun_depth_at(volumes[m], place);
+        work(i, field.corner_m() + 2 * field.node_m() * (double(kCells) * corner + node));
     }
 }
 
+// Adds the depths of the other volumes at the corners of a brick's cells.
+void add_other_volumes(std::span<const CloudVolume> volumes, std::size_t n, std::size_t brick, std::span<float> depths) {
+    each_corner(volumes[n].field, brick, [&](std::size_t i, const Vec3& place) {
+        for (std::size_t m = 0; m < volumes.size(); ++m)
+            if (m != n) depths[i] += sun_depth_at(volumes[m], place);
+    });
+}
+
 void light_by_sun(std::span<CloudVolume> volumes, std::span<const DiffusionCells> cells, const Vec3& to_sun,
-                  const CloudLight& light) {
+                  const CloudLight& light, const DepthOfOthers& others) {
+    const bool alone = volumes.size() == 1 && !others;
     // First each by itself, then what the others add.
     std::vector<std::vector<float>> depths(volumes.size());
     tbb::parallel_for(std::size_t{0}, volumes.size(), [&](std::size_t n) {
         CloudVolume& volume = volumes[n];
         const auto& bricks = volume.field.bricks();
         depths[n].resize(volume.field.places().size() * kLightNodesOfBrick);
-        volume.own_depths.resize(volumes.size() == 1 ? 0 : depths[n].size());
+        volume.own_depths.resize(alone ? 0 : depths[n].size());
         volume.corner_depths.resize(std::size_t(bricks[0] + 1) * std::size_t(bricks[1] + 1) * std::size_t(bricks[2] + 1));
         volume.to_sun = to_sun;
         volume.front = sweep(volume.field, volume.extinction, to_sun, depths[n], volume.corner_depths);
@@ -159,16 +166,14 @@ void light_by_sun(std::span<CloudVolume> volumes, std::span<const DiffusionCells
         volume.sun_depths.resize(depths[n].size() + 1);
         volume.sun_depths.back() = 0;
         const auto pack = [&](std::size_t brick) {
-            const std::size_t first = brick * kLightNodesOfBrick;
-            if (volumes.size() > 1)
-                add_other_depths(volumes, n, brick, std::span(depths[n]).subspan(first, kLightNodesOfBrick));
-            const float* const from = &depths[n][first];
-            std::uint16_t* const to = &volume.sun_depths[first];
-            const bool absorbs = light.lighting == Lighting::cfa;
-            for (std::size_t i = 0; absorbs && i < kLightNodesOfBrick; ++i)
-                to[i] = packed_depth(
-                    absorbed_depth(from[i], volume.field.extinction_per_m(), light.light_distance_m));
-            for (std::size_t i = 0; !absorbs && i < kLightNodesOfBrick; ++i) to[i] = packed_depth(from[i]);
+            const std::span of_brick = std::span(depths[n]).subspan(brick * kLightNodesOfBrick, kLightNodesOfBrick);
+            if (volumes.size() > 1) add_other_volumes(volumes, n, brick, of_brick);
+            if (light.lighting == Lighting::cfa)
+                for (float& depth : of_brick)
+                    depth = absorbed_depth(depth, volume.field.extinction_per_m(), light.light_distance_m);
+            if (others)
+                each_corner(volume.field, brick, [&](std::size_t i, const Vec3& place) { of_brick[i] += others(place); });
+            std::ranges::transform(of_brick, &volume.sun_depths[brick * kLightNodesOfBrick], packed_depth);
         };
         tbb::parallel_for(std::size_t{0}, volume.field.places().size(), pack);
         volume.diffuse = diffuses(light) ? diffuse_sunlight(cells[n], depths[n], to_sun, light.albedo) : DiffuseLight{};
@@ -177,7 +182,8 @@ void light_by_sun(std::span<CloudVolume> volumes, std::span<const DiffusionCells
 
 }  // namespace
 
-void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light, bool are_new) {
+void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light, bool are_new,
+                   const DepthOfOthers& others) {
     std::vector<DiffusionCells> cells;
     for (std::size_t n = 0; n < volumes.size() && (are_new || diffuses(light)); ++n)
         cells.emplace_back(volumes[n].field, volumes[n].extinction, mean_cosine(light.phase));
@@ -185,7 +191,7 @@ void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const Clo
         for (std::size_t n = 0; n < volumes.size() && are_new; ++n)
             volumes[n].surroundings = diffuse_surroundings(cells[n]);
     };
-    tbb::parallel_invoke(see_surroundings, [&] { light_by_sun(volumes, cells, to_sun, light); });
+    tbb::parallel_invoke(see_surroundings, [&] { light_by_sun(volumes, cells, to_sun, light, others); });
 }
 
 namespace {

@@ -5,6 +5,7 @@
 // sun, diffuse sunlight, and the light of sky and ground, at the corners of the lattice's cells. Private to the module.
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -31,7 +32,7 @@ struct CloudVolume {
     // fractions of light from the sky (lower byte) and from the ground (upper byte), 0..255 (diffuse_surroundings()).
     std::vector<std::uint16_t> sun_depths, surroundings;
     // Sunlight that this volume alone attenuates: on the way out, at the corners of all bricks (x fastest, bricks + 1 on
-    // each axis), and like sun_depths, where there are other volumes.
+    // each axis), and like sun_depths, where anything else shades it.
     Vec3 to_sun{0, 0, 1};
     LightFront front;
     // Of a field that repeats: its depths as endless.glsl reads them, a word for each: with those of the next
@@ -54,9 +55,13 @@ double footprint_scale(std::span<const CloudVolume> volumes);
 // absorption of T.
 bool diffuses(const CloudLight& light);
 
-// Computes the sunlight in all volumes; they shade each other. With Lighting::cfa its absorption is that of T. Where they
-// are new, also the surroundings, which do not depend on the sun.
-void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light, bool are_new);
+// Optical depth towards the sun at a place of the world of what is no cloud of voxels; empty: 0. Thread-safe.
+using DepthOfOthers = std::function<float(const Vec3& place_m)>;
+
+// Computes the sunlight in all volumes; they shade each other, and `others` shade them. With Lighting::cfa its absorption is
+// that of T. Where they are new, also the surroundings, which do not depend on the sun.
+void light_volumes(std::span<CloudVolume> volumes, const Vec3& to_sun, const CloudLight& light, bool are_new,
+                   const DepthOfOthers& others = {});
 
 // Returns the optical depth of a volume alone towards the sun, at any place of the world. After light_volumes().
 float sun_depth_at(const CloudVolume& volume, const Vec3& place_m);

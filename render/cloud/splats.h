@@ -55,7 +55,8 @@ struct MetaballCloud {
 //     radiance = texture * albedo * diffuse
 //
 // with ambient light by the corner's height between the cloud's base and top, then attenuated by the air. A
-// flash of lightning adds a second term of the same form, towards its position and times its irradiance.
+// flash of lightning adds a second term of the same form, towards its position and times its irradiance. The sun's term is
+// multiplied by the sunlight that other clouds leave at the billboard's centre (render/frame/billboard_shade.h).
 struct CloudBillboard {
     Vec3 centre_m{};                  // world
     float width_m = 1, height_m = 1;  // > 0, at most 60000
@@ -97,6 +98,8 @@ struct Splats {
     bool light = true;
     std::optional<GroundCoverView> ground_cover{};  // none: the ground is dry
     std::shared_ptr<const BillboardPictures> pictures{};  // of billboards; null: none has one
+    // Billboards of clouds that the camera does not see: they are not drawn but cast shadows. `cloud` has no meaning.
+    std::span<const CloudBillboard> unseen{};
 };
 
 }  // namespace nephos

@@ -53,7 +53,7 @@ struct BillboardSampler {
     float middle, last;
 
     BillboardSampler(const BillboardTexels& all, std::uint32_t bits) {
-        const std::uint32_t layer = bits & 255u, turn = bits >> 8 & 15u, level = bits >> 12;
+        const std::uint32_t layer = bits & 255u, turn = bits >> 8 & 15u, level = bits >> 12 & 15u;
         const int side = kBillboardTexels >> level;
         const std::uint32_t exchanged = (turn & 4u) != 0 ? all.layers : 0;
         stride = side + 2;

@@ -11,7 +11,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "render/backend/volume_light.h"
+#include "render/backend/host_light.h"
 #include "render/backend/processor_light.h"
 #include "render/cpu/processor_view.h"
 #include "render/frame/view_sorting.h"
@@ -51,14 +51,14 @@ void complete_light(LitCloud& cloud, const std::vector<std::uint32_t>& source, c
             std::ranges::fill(tiles, std::uint8_t{1});
         }
     }
-    if (!cloud.volumes.empty()) std::ranges::fill(tiles, std::uint8_t{1});
+    if (cloud.lit_on_host()) std::ranges::fill(tiles, std::uint8_t{1});
     take_missing(balls, cloud.known_light);
     take_missing(tiles, cloud.known_tiles);
     cloud.all_known =
         std::ranges::count(cloud.known_light, 0) == 0 && std::ranges::count(cloud.known_tiles, 0) == 0;
 
-    if (!cloud.volumes.empty()) {
-        complete_light_of_volumes(cloud, balls, tiles, times);
+    if (cloud.lit_on_host()) {
+        complete_light_on_host(cloud, balls, tiles, times);
         cloud.note_light_pass();
         return;
     }
@@ -111,7 +111,7 @@ bool CpuBackend::begin(const FrameDescription& frame, Picture& picture) {
     if (!frame.splats.light && !cloud.all_known) {
         seen.emplace(order, cloud.shadow_size);
         for (ProcessorView& view : views) view.find_visible(cloud.shadow_size, *seen);
-        if (has_shells(frame.options, cloud.cloud)) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
+        if (has_shells(frame.options, cloud.casts_shadow())) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
     }
     const VisibleSet* const known = seen ? &*seen : nullptr;
     complete_light(cloud, order.source, known, frame.times);

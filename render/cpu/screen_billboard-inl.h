@@ -47,7 +47,7 @@ struct BillboardPlaces {
 
 // Their light.
 struct BillboardColumns : BillboardPlaces {
-    HWY_ALIGN float sun_absorbed[kMaxLanes], flash_absorbed[kMaxLanes], opacity[kMaxLanes],
+    HWY_ALIGN float arrives[kMaxLanes], sun_absorbed[kMaxLanes], flash_absorbed[kMaxLanes], opacity[kMaxLanes],
         cloud_x[kMaxLanes], cloud_y[kMaxLanes], cloud_z[kMaxLanes], base[kMaxLanes],
         inverse_height[kMaxLanes];
 
@@ -58,6 +58,7 @@ struct BillboardColumns : BillboardPlaces {
         for (std::size_t lane = 0; lane < lanes; ++lane) {
             const shader::ViewBillboard& billboard = *billboards[std::min(lane, billboards.size() - 1)];
             const shader::ViewCloud& cloud = clouds[billboard.cloud];
+            arrives[lane] = float(billboard.texture_bits >> 16) / 65535.0f;
             sun_absorbed[lane] = float(billboard.absorbed & 0xffffu) * (1.0f / 65535.0f);
             flash_absorbed[lane] = float(billboard.absorbed >> 16) * (1.0f / 65535.0f);
             opacity[lane] = billboard.opacity;
@@ -90,8 +91,9 @@ HWY_INLINE Floats3 billboard_light_at(const PictureFrame& frame, const Billboard
     const Floats above =
         hn::Mul(hn::Sub(position.z, hn::Load(d, billboard.base)), hn::Load(d, billboard.inverse_height));
     const Floats height = hn::Min(hn::Max(above, hn::Zero(d)), one);
-    Floats3 light = add(billboard_diffuse(dot(set3(frame.to_sun), outwards), sunlight_at(frame, position.z),
-                                          hn::Load(d, billboard.sun_absorbed)),
+    const Floats3 of_sun = billboard_diffuse(dot(set3(frame.to_sun), outwards), sunlight_at(frame, position.z),
+                                             hn::Load(d, billboard.sun_absorbed));
+    Floats3 light = add(times(hn::Load(d, billboard.arrives), of_sun),
                         mix(set3(frame.ambient_base), set3(frame.ambient_top), {height, height, height}));
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), position);

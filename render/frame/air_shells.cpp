@@ -85,9 +85,9 @@ struct Along {
 // shade each other at one height.
 Vec3 shade_axis(const Vec3& light) { return light.z < -0.25 ? Vec3{0, 0, -1} : light; }
 
-Along along_axis(const PreparedCloud& cloud, const Vec3& direction) {
+Along along_axis(const PreparedCloud& cloud, std::span<const ShadowCaster> others, const Vec3& direction) {
     using Ends = std::pair<double, double>;
-    const auto [first, last] = tbb::parallel_reduce(
+    auto [first, last] = tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, cloud.visible.size(), 8192), Ends{1e300, -1e300},
         [&](const auto& range, Ends ends) {
             for (std::size_t i = range.begin(); i != range.end(); ++i) {
@@ -101,6 +101,11 @@ Along along_axis(const PreparedCloud& cloud, const Vec3& direction) {
         [](const Ends& a, const Ends& b) {
             return Ends{std::min(a.first, b.first), std::max(a.second, b.second)};
         });
+    for (const ShadowCaster& other : others) {
+        const double at = dot(direction, other.centre_m);
+        first = std::min(first, at - other.radius_m);
+        last = std::max(last, at + other.radius_m);
+    }
     return {(1 / (last - first)) * direction, -first / (last - first)};
 }
 
@@ -119,9 +124,10 @@ class ShadeMap {
     double scale() const { return double(shadow_size_) / step_; }
     static double shift() { return 0.5; }
 
-    std::vector<std::uint32_t> words(const PreparedCloud& cloud, const ShadowFrame& frame, const Along& along,
-                                     float& first_shade) const {
-        const std::vector<std::uint32_t> light = means(), range = ranges(cloud, frame, along, first_shade);
+    std::vector<std::uint32_t> words(const PreparedCloud& cloud, std::span<const ShadowCaster> others,
+                                     const ShadowFrame& frame, const Along& along, float& first_shade) const {
+        const std::vector<std::uint32_t> light = means(),
+                                         range = ranges(cloud, others, frame, along, first_shade);
         std::vector<std::uint32_t> words(3 * texels());
         const auto columns = std::size_t(columns_), last = texels() - 1;
         tbb::parallel_for(std::size_t{0}, columns, [&](std::size_t row) {
@@ -165,28 +171,33 @@ class ShadeMap {
     }
 
     // Adds each metaball to the texel of its centre, then to each texel those around it within the radius of
-    // metaballs.
-    std::vector<Span> spans(const PreparedCloud& cloud, const ShadowFrame& frame, const Along& along,
-                            int& reach) const {
+    // metaballs; other casters likewise.
+    std::vector<Span> spans(const PreparedCloud& cloud, std::span<const ShadowCaster> others,
+                            const ShadowFrame& frame, const Along& along, int& reach) const {
         std::vector<Span> spans(texels());
         const Vec3& u = frame.u_axis_m;
         const Vec3& v = frame.v_axis_m;
         const Vec3 across = (scale() / dot(u, u)) * u, down = (scale() / dot(v, v)) * v;
         double radius_sum = 0;
-        for (std::size_t n = 0; n < cloud.visible.size(); ++n) {
-            const Metaball& ball = cloud.metaballs[cloud.visible[n]];
-            const Vec3 centre{ball.x, ball.y, ball.z}, offset = centre - frame.origin_m;
+        const auto add = [&](const Vec3& centre, double radius, double weight) {
+            const Vec3 offset = centre - frame.origin_m;
             const int column = std::clamp(int(dot(across, offset)) + 1, 0, columns_ - 1),
                       row = std::clamp(int(dot(down, offset)) + 1, 0, columns_ - 1);
             Span& span = spans[std::size_t(row) * std::size_t(columns_) + std::size_t(column)];
-            const double radius = ball.radius, at = along(centre), half = radius * length(along.row);
-            const double weight = double(cloud.depth_scale[n]) * radius * radius;
+            const double at = along(centre), half = radius * length(along.row);
             span.add({weight, weight * at, weight * (at * at + 0.15 * half * half), float(at - half),
                       float(at + half)});
             radius_sum += radius;
+        };
+        for (std::size_t n = 0; n < cloud.visible.size(); ++n) {
+            const Metaball& ball = cloud.metaballs[cloud.visible[n]];
+            const double radius = ball.radius;
+            add({ball.x, ball.y, ball.z}, radius, double(cloud.depth_scale[n]) * radius * radius);
         }
+        for (const ShadowCaster& other : others) add(other.centre_m, other.radius_m, other.weight);
         const double texel_m = std::max(length(u), length(v)) / scale();
-        const double mean_radius_m = cloud.visible.empty() ? 0 : radius_sum / double(cloud.visible.size());
+        const std::size_t casters = cloud.visible.size() + others.size();
+        const double mean_radius_m = casters == 0 ? 0 : radius_sum / double(casters);
         reach = std::clamp(int(std::ceil(mean_radius_m / texel_m)), 1, 8);
         return spans;
     }
@@ -204,10 +215,11 @@ class ShadeMap {
     }
 
     // Shade increases linearly over the length of a uniform cloud with the same mean and variance.
-    std::vector<std::uint32_t> ranges(const PreparedCloud& cloud, const ShadowFrame& frame,
-                                      const Along& along, float& first_shade) const {
+    std::vector<std::uint32_t> ranges(const PreparedCloud& cloud, std::span<const ShadowCaster> others,
+                                      const ShadowFrame& frame, const Along& along,
+                                      float& first_shade) const {
         int reach = 0;
-        std::vector<Span> all = spans(cloud, frame, along, reach);
+        std::vector<Span> all = spans(cloud, others, frame, along, reach);
         const auto columns = std::size_t(columns_);
         tbb::parallel_for(std::size_t{0}, columns,
                           [&](std::size_t row) { blur(all, row * columns, 1, columns_, reach); });
@@ -251,15 +263,15 @@ double shafts_strength(const RenderOptions& options) {
 }
 
 // Computes the shade map of a cloud.
-void make_shade(const PreparedCloud& cloud, const ShadowFrame& frame, std::span<const float> shadow,
-                int shadow_size, Version light, ShadeCache& cache) {
-    if (cloud.visible.empty()) {  // full light
+void make_shade(const PreparedCloud& cloud, std::span<const ShadowCaster> others, const ShadowFrame& frame,
+                std::span<const float> shadow, int shadow_size, Version light, ShadeCache& cache) {
+    if (cloud.visible.empty() && others.empty()) {  // full light
         cache.columns = 2;
         cache.words.assign(std::size_t{3} * 4, ~std::uint32_t{0});
     } else {
-        const Along along = along_axis(cloud, shade_axis(frame.direction));
+        const Along along = along_axis(cloud, others, shade_axis(frame.direction));
         const ShadeMap map(shadow, shadow_size);
-        cache.words = map.words(cloud, frame, along, cache.first_shade);
+        cache.words = map.words(cloud, others, frame, along, cache.first_shade);
         cache.columns = map.columns();
         cache.texels_per_map = map.scale();
         cache.along = along.row;
@@ -281,14 +293,14 @@ void add_fog_noise(const Fog& fog, FogNoise& noise, ShadeCache& cache) {
     ++cache.serial;
 }
 
-void use_shade(const ShadeCache& cache, const PreparedCloud& cloud, const ShadowFrame& frame, const Vec3& eye,
+void use_shade(const ShadeCache& cache, bool casts_shadow, const ShadowFrame& frame, const Vec3& eye,
                AirShells& shells) {
     shader::Shells& data = shells.data;
     shells.shade = cache.words;
     shells.serial = cache.serial;
     data.settings.z = float(cache.columns);
     data.settings.w = float(cache.columns * cache.columns);
-    if (cloud.visible.empty()) return;
+    if (!casts_shadow) return;
     const auto row = [&](const Vec3& axis) {
         const Vec3 per_m = (cache.texels_per_map / dot(axis, axis)) * axis;
         return to_vec4(per_m, dot(per_m, eye - frame.origin_m) + ShadeMap::shift());
@@ -330,23 +342,25 @@ std::size_t shells_before(const shader::Shells& data, float distance) {
     return first;
 }
 
-bool has_shells(const RenderOptions& options, const PreparedCloud& cloud) {
-    return options.fog.extinction_per_m > 0 || (shafts_strength(options) > 0 && !cloud.visible.empty());
+bool has_shells(const RenderOptions& options, bool casts_shadow) {
+    return options.fog.extinction_per_m > 0 || (shafts_strength(options) > 0 && casts_shadow);
 }
 
-AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
+AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud,
+                     std::span<const ShadowCaster> others, const ShadowFrame& frame,
                      std::span<const float> shadow, int shadow_size, Version light, double time_s,
                      FogNoise& noise, ShadeCache& cache) {
     AirShells shells;
     const bool has_fog = options.fog.extinction_per_m > 0;
-    if (!has_shells(options, cloud)) return shells;
+    const bool casts_shadow = !cloud.visible.empty() || !others.empty();
+    if (!has_shells(options, casts_shadow)) return shells;
     shader::Shells& data = shells.data;
-    if (cache.light != light) make_shade(cloud, frame, shadow, shadow_size, light, cache);
+    if (cache.light != light) make_shade(cloud, others, frame, shadow, shadow_size, light, cache);
     add_fog_noise(options.fog, noise, cache);
-    use_shade(cache, cloud, frame, options.camera.position_m, shells);
+    use_shade(cache, casts_shadow, frame, options.camera.position_m, shells);
     set_ends(data, options.shells, has_fog);
     data.settings.x = float(options.shells.count + (has_fog ? 1 : 0));
-    data.settings.y = cloud.visible.empty() ? 0.0f : float(shafts_strength(options));
+    data.settings.y = casts_shadow ? float(shafts_strength(options)) : 0.0f;
     data.shade.w = float(reach_m(options.shells));
     for (std::size_t k = 0; k < shells.count(); ++k) {
         std::array<float, 3>& clear = shells.clear.emplace_back();

@@ -74,12 +74,13 @@ std::size_t shells_before(const shader::Shells& data, float distance);
 
 // Returns true when the options have shells: fog, or light shafts with clouds that cast a shadow. Shells
 // sample the whole shadow map.
-bool has_shells(const RenderOptions& options, const PreparedCloud& cloud);
+bool has_shells(const RenderOptions& options, bool casts_shadow);
 
 // Returns the shells of a frame; none when the options have none or they would have no effect. `shadow`: the
 // shadow map, or empty: its plane of `shade` is left 0; `light`: version of cloud, frame and shadow; `time_s`:
 // simulated time of the picture. What is returned lives as long as `cache` is not given to another call.
-AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud, const ShadowFrame& frame,
+AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud,
+                     std::span<const ShadowCaster> others, const ShadowFrame& frame,
                      std::span<const float> shadow, int shadow_size, Version light, double time_s,
                      FogNoise& noise, ShadeCache& cache);
 

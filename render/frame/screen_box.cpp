@@ -66,7 +66,7 @@ PixelBox screen_box(const shader::ViewBillboard& billboard, const Screen& screen
     const auto [reach_x, reach_y] = unpack_halves(billboard.half_size);
     const double per_depth = 1 / dot(centre, screen.camera.forward);
     const double per_x = screen.per_x * per_depth, per_y = screen.per_y * per_depth;
-    const double seen = 1.0001 * (1 - 1.0 / (kBillboardTexels >> (billboard.texture_bits >> 12)));
+    const double seen = 1.0001 * (1 - 1.0 / (kBillboardTexels >> (billboard.texture_bits >> 12 & 15u)));
     const double x = screen.half_width + dot(centre, screen.camera.right) * per_x - screen.part.x,
                  y = screen.half_height - dot(centre, screen.camera.up) * per_y - screen.part.y;
     const double across = seen * double(reach_x) * per_x + 0.001,

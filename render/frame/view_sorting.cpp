@@ -65,9 +65,10 @@ shader::ViewCloud billboard_cloud(const BillboardCloud& cloud, std::size_t index
 class Collector {
   public:
     Collector(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
-              double pixels_per_unit, const Ground& ground, double footprint_scale)
+              double pixels_per_unit, const Ground& ground, double footprint_scale, std::span<const float> sunlight)
         : cloud_(cloud),
           footprint_scale_(footprint_scale),
+          sunlight_(sunlight),
           splats_(splats),
           camera_(camera),
           eye_(camera.position_m),
@@ -184,7 +185,7 @@ class Collector {
                            : SplatKind::metaball;
             } else {
                 order.billboards[billboard++] =
-                    view_billboard(splats_.billboards[source - cloud_.visible.size()]);
+                    view_billboard(source - cloud_.visible.size());
             }
             kinds[i] = std::uint8_t(kind);
         }
@@ -275,7 +276,8 @@ class Collector {
 
     int pictures() const { return splats_.pictures ? splats_.pictures->count : 0; }
 
-    shader::ViewBillboard view_billboard(const CloudBillboard& billboard) const {
+    shader::ViewBillboard view_billboard(std::size_t index) const {
+        const CloudBillboard& billboard = splats_.billboards[index];
         const Vec3 offset = billboard.centre_m - eye_;
         const Drawn what = drawn(billboard);
         const BillboardPicture picture = billboard.picture >= 0
@@ -286,7 +288,8 @@ class Collector {
                 float(offset.z),
                 pack_halves(float(what.half_width_m), float(what.half_height_m)),
                 std::uint32_t(picture.layer) | std::uint32_t(picture.turn) << 8 |
-                    std::uint32_t(level_of(what)) << 12,
+                    std::uint32_t(level_of(what)) << 12 |
+                    unorm16(sunlight_.empty() ? 1.0f : sunlight_[index]) << 16,
                 unorm16(billboard.sun_absorbed) | unorm16(billboard.flash_absorbed) << 16,
                 float(what.opacity),
                 billboard.cloud};
@@ -294,6 +297,7 @@ class Collector {
 
     const PreparedCloud& cloud_;
     const double footprint_scale_;
+    std::span<const float> sunlight_;
     const Splats& splats_;
     const CameraFrame& camera_;
     Vec3 eye_{};
@@ -308,12 +312,13 @@ class Collector {
 }  // namespace
 
 ViewSortedSplats sort_for_view(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
-                               double pixels_per_unit, const Ground& ground, double footprint_scale) {
+                               double pixels_per_unit, const Ground& ground, double footprint_scale,
+                               std::span<const float> sunlight) {
     if (splats.billboards.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
         throw Error(ErrorCode::usage, "more than 2^31 billboards");
     if (splats.clouds.size() >> 28 != 0)  // a shader::ViewBillboard has 28 bits for its cloud
         throw Error(ErrorCode::usage, "more than 2^28 clouds of billboards");
-    Collector collector(cloud, splats, camera, pixels_per_unit, ground, footprint_scale);
+    Collector collector(cloud, splats, camera, pixels_per_unit, ground, footprint_scale, sunlight);
     collector.add_metaballs();
     collector.add_billboards();
     return collector.order();

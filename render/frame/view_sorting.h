@@ -52,9 +52,10 @@ struct MetaballLight {
 // Culls splats to the view and sorts them; metaballs are without light. `pixels_per_unit` is the size in
 // pixels of a unit at distance 1. If clouds with detail are marched (footprint_scale() above 0), metaballs that stand for them are only where
 // they take over (shader::splatted_weight()). Throws Error(usage) naming the first billboard or cloud with a field out of
-// the range in splats.h.
+// the range in splats.h. `sunlight`: the fraction that arrives at each of the billboards, 0..1; empty: all of it.
 ViewSortedSplats sort_for_view(const PreparedCloud& cloud, const Splats& splats, const CameraFrame& camera,
-                               double pixels_per_unit, const Ground& ground, double footprint_scale = 0);
+                               double pixels_per_unit, const Ground& ground, double footprint_scale = 0,
+                               std::span<const float> sunlight = {});
 
 // Sets the light of the metaballs of an order.
 void set_light(ViewSortedSplats& order, const MetaballLight& light);

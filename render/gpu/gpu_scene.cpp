@@ -7,6 +7,8 @@
 #include <span>
 #include <utility>
 
+#include "render/backend/host_light.h"
+
 namespace nephos {
 namespace {
 
@@ -82,7 +84,7 @@ const GpuImage& GpuScene::shadow_map(const LitCloud& cloud) {
     if (has_map(cloud)) return light_tiles().shadow_map();
     wait();
     map_ = 0;
-    if (cloud.cloud.visible.empty())
+    if (!cloud.casts_shadow())
         light_tiles().use(gpu, std::vector<float>(std::size_t{kWhiteMap} * kWhiteMap, 1.0f), kWhiteMap);
     else
         light_tiles().use(gpu, cloud.shadow, cloud.shadow_size);
@@ -90,8 +92,9 @@ const GpuImage& GpuScene::shadow_map(const LitCloud& cloud) {
     return light_tiles().shadow_map();
 }
 
-void GpuScene::light(LitCloud& cloud) {
+void GpuScene::light(LitCloud& cloud, StageTimes& times) {
     if (cloud.all_known) return;
+    if (cloud.lit_on_host()) return complete_light_on_host(cloud, times);
     wait();
     map_ = 0;
     const LightSortedSplats order = sort_for_light(cloud.cloud, cloud.frame, cloud.shadow_size);

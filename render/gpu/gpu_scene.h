@@ -42,8 +42,8 @@ class GpuScene {
     void note_map(const LitCloud& cloud) { map_ = cloud.light; }
 
     // D, step 1, in compute shaders, from an order that the host makes: completes the light of a cloud. The
-    // shadow map stays on the device until fetch_map().
-    void light(LitCloud& cloud);
+    // shadow map stays on the device until fetch_map(). Light that the host computes is computed there.
+    void light(LitCloud& cloud, StageTimes& times);
     void fetch_map(LitCloud& cloud);
 
   private:

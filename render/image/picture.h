@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -50,6 +51,9 @@ struct Picture {
     int shadow_size = 0;        // texels on a side
     std::vector<float> shadow;  // shadow_size^2, transmittance of the whole cloud along the sun's rays
     ShadowFrame shadow_frame;
+
+    // Fraction of sunlight that veils leave at a place of the world, which the shadow map has not; empty: all of it.
+    std::function<float(const Vec3& place_m)> sunlight_of_veils;
 
     GroundLight ground_light;  // where it rains (RenderOptions::precipitation); else all is open
 

@@ -72,7 +72,9 @@ PrecipitationLight precipitation_light(const Picture& picture, const RenderOptio
     return light;
 }
 
-float sunlight_at(const Picture& picture, const Vec3& place_m) {
+namespace {
+
+float sunlight_of_map(const Picture& picture, const Vec3& place_m) {
     if (picture.shadow.empty()) return 1.0f;
     const ShadowFrame& f = picture.shadow_frame;
     const Vec3 from = place_m - f.origin_m;
@@ -89,6 +91,13 @@ float sunlight_at(const Picture& picture, const Vec3& place_m) {
     const float above = texel(x, y) + fraction_x * (texel(x + 1, y) - texel(x, y));
     const float below = texel(x, y + 1) + fraction_x * (texel(x + 1, y + 1) - texel(x, y + 1));
     return above + fraction_y * (below - above);
+}
+
+}  // namespace
+
+float sunlight_at(const Picture& picture, const Vec3& place_m) {
+    const float left = sunlight_of_map(picture, place_m);
+    return picture.sunlight_of_veils ? left * picture.sunlight_of_veils(place_m) : left;
 }
 
 Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Vec3& place_m,

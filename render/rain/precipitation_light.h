@@ -33,7 +33,7 @@ PrecipitationLight precipitation_light(const Picture& picture, const RenderOptio
 // Returns Picture::air, or if there is none the air of the options' gradient.
 PictureAir air_of(const Picture& picture, const RenderOptions& options);
 
-// Returns the fraction of sunlight that reaches a point, by the picture's shadow map. The map is for points
+// Returns the fraction of sunlight that reaches a point, by the picture's shadow map and veils. The map is for points
 // below all clouds; points between or above them count as shaded, too.
 float sunlight_at(const Picture& picture, const Vec3& place_m);
 

@@ -12,7 +12,8 @@ vec3 billboard_light_at(vec3 position, ViewBillboard billboard, ViewCloud cloud)
     vec3 outwards = offset / max(length(offset), 1.0e-6);
     vec2 absorbed = unpackUnorm2x16(billboard.absorbed);
     float height = clamp((position.z - cloud.base) * cloud.inverse_height, 0.0, 1.0);
-    vec3 light = billboard_diffuse(frame.to_sun.xyz, outwards, sunlight_at(position.z), absorbed.x) +
+    float arrives = float(billboard.texture_bits >> 16) / 65535.0;
+    vec3 light = arrives * billboard_diffuse(frame.to_sun.xyz, outwards, sunlight_at(position.z), absorbed.x) +
                  mix(frame.ambient_base.rgb, frame.ambient_top.rgb, height);
     vec3 way = frame.flash.xyz - position;  // adds nothing in the dark; no branch, see lighting.glsl
     float squared = dot(way, way);

@@ -87,7 +87,7 @@ struct ViewBall {
 struct ViewBillboard {
     float x, y, z;      // centre relative to the eye
     uint half_size;     // half width, half height in metres as two 16-bit floats
-    uint texture_bits;  // layer | turn << 8 | level << 12
+    uint texture_bits;  // layer | turn << 8 | level << 12 | sunlight that arrives, 0..65535, << 16
     uint absorbed;      // of the sun, of the lightning: two times 0..65535 for 0..1
     float opacity;
     uint cloud;

@@ -106,8 +106,10 @@ struct Ray {
 struct Samples {
     std::size_t pixel = 0, first = 0;
     int count = 0;
-    double begin_m = 0, step_m = 0;
+    double begin_m = 0, step_m = 0, last_m = 0;  // last_m: what the last sample stands for, at most step_m
     Ray ray;
+    double stands_for_m(int i) const { return i + 1 < count ? step_m : last_m; }
+    double distance_m(int i) const { return begin_m + i * step_m + 0.5 * stands_for_m(i); }
 };
 
 // Evaluates the samples of several pixels together.
@@ -121,12 +123,13 @@ class SampleGroup {
         const double length = part.end - part.begin, middle = 0.5 * (part.begin + part.end);
         const double wanted =
             std::max(kStepPerFinest * sheet_.veil->slab->finest_m(), kStepPixels * sheet_.per_pixel * middle);
-        const int count =
-            int(std::clamp(std::ceil(length / wanted), double(kFewestSamples), double(view.samples)));
-        const double step = length / count;
-        runs_.push_back({pixel, points_.size(), count, part.begin, step, ray});
+        // Steps change evenly from pixel to pixel, and what remains of the ray has a sample that counts less: with equal
+        // steps their number would jump, which draws contours.
+        const double step = std::clamp(wanted, length / view.samples, length / kFewestSamples);
+        const int count = std::max(1, int(std::ceil(length / step - 1e-9)));
+        runs_.push_back({pixel, points_.size(), count, part.begin, step, length - (count - 1) * step, ray});
         for (int i = 0; i < count; ++i) {
-            const double t = part.begin + (i + 0.5) * step;
+            const double t = runs_.back().distance_m(i);
             points_.add(ray.x * t, ray.y * t, ray.height(t, sheet_.bend),
                         std::max(sheet_.per_pixel * t, double(kFootprintPerStep) * step));
         }
@@ -193,7 +196,7 @@ class SampleGroup {
             const double sun_z = double(sun_.z[next_sun]),
                          towards = sheet_.height_factor(sun_z) * double(sun_.density[next_sun]);
             ++next_sun;
-            const double optical = sheet_.veil->extinction_per_m * density * run.step_m;
+            const double optical = sheet_.veil->extinction_per_m * density * run.stands_for_m(i);
             const double covers =
                 seen.transmittance * (by_samples ? std::min(optical, 1.0) : 1 - std::exp(-optical));
             Rgb light;
@@ -212,7 +215,7 @@ class SampleGroup {
                     light[c] = (of_sun + of_ring * ring[c]) * sheet_.sun[c] + of_sky * sheet_.sky[c];
             }
             for (std::size_t c = 0; c < 3; ++c) seen.light[c] += covers * light[c];
-            seen.weighted_m += covers * (run.begin_m + (i + 0.5) * run.step_m);
+            seen.weighted_m += covers * run.distance_m(i);
             seen.transmittance -= covers;
         }
     }

@@ -13,7 +13,7 @@ void add_billboard(uint at, vec2 pixel) {
     vec3 l2 = vec3(unpackHalf2x16(light.w), l2b_l3r.x), l3 = vec3(l2b_l3r.y, unpackHalf2x16(more.y));
     vec3 veil = vec3(unpackHalf2x16(more.z), air_b.x);
     float opacity = uintBitsToFloat(last.x), distance = uintBitsToFloat(last.y);
-    float layer = float(last.z & 255u), level = float(last.z >> 12);
+    float layer = float(last.z & 255u), level = float(last.z >> 12 & 15u);
     uint turn = last.z >> 8 & 15u;
 
     float s = (pixel.x - place.x) * place.z;

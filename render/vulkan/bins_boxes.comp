@@ -33,7 +33,7 @@ ivec4 screen_box(CloudBall ball, FromEye place) {
 ivec4 screen_box(ViewBillboard billboard) {
     vec3 centre = vec3(billboard.x, billboard.y, billboard.z);
     vec2 per_m = vec2(frame.right.w, frame.up.w) / dot(centre, frame.forward.xyz);
-    float visible = 1.0001 * (1.0 - 1.0 / float(kBillboardTexels >> (billboard.texture_bits >> 12)));
+    float visible = 1.0001 * (1.0 - 1.0 / float(kBillboardTexels >> (billboard.texture_bits >> 12 & 15u)));
     vec2 middle = frame.middle.xy + vec2(dot(centre, frame.right.xyz), -dot(centre, frame.up.xyz)) * per_m;
     vec2 extent = visible * unpackHalf2x16(billboard.half_size) * per_m + 0.001;
     vec4 box = vec4(ceil(middle - extent - 0.5), floor(middle + extent + 0.5));

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "render/backend/volume_light.h"
+#include "render/backend/host_light.h"
 #include "render/shared/half_floats.h"
 
 namespace nephos {
@@ -76,13 +76,7 @@ void VulkanBackend::use_volumes(const LitCloud& cloud) {
 
 void VulkanBackend::light(LitCloud& cloud, StageTimes& times) {
     if (cloud.all_known) return;
-    if (!cloud.volumes.empty()) {  // on the host, all at once
-        const std::vector<std::uint8_t> balls(cloud.sun_depths.size(), 1), tiles(cloud.known_tiles.size(), 1);
-        complete_light_of_volumes(cloud, balls, tiles, times);
-        cloud.all_known = true;
-        cloud.note_light_pass();
-        return;
-    }
+    if (cloud.lit_on_host()) return complete_light_on_host(cloud, times);
     use_cloud(cloud);
     held_light_ = 0;
     view().light(cloud.frame, cloud.shadow_size, largest_radius(cloud.cloud), scene_.light_tiles());
@@ -125,7 +119,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
     const GpuImage& shadow_map = scene_.shadow_map(cloud);
     const AirShells shells = frame.shells_without_light();
     if (shells.any())
-        view().use_shade({shells.shade, shells.serial, cloud.cloud.visible.empty() ? nullptr : &shadow_map,
+        view().use_shade({shells.shade, shells.serial, cloud.casts_shadow() ? &shadow_map : nullptr,
                           shade_step(frame.air.shade, cloud.shadow_size)});
     shader::March march{};
     if (!cloud.volumes.empty()) {

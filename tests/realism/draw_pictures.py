@@ -51,6 +51,9 @@ PICTURES = {
     "lighting-light-pass.png": (1, (640, 480), [("cumulus", 40, {"light.lighting": "light_pass"} | NO_DETAIL)]),
     "lighting-cfa.png": (1, (640, 480), [("cumulus", 40, {"light.lighting": "cfa", "light.light_distance_m": "100"}
                                           | NO_DETAIL)]),
+    "torchelsen-shade.jpg": (1, (640, 400), [("torchelsen/shade", 1, {})]),
+    "torchelsen-cumulonimbus.jpg": (1, (640, 400), [("torchelsen/cumulonimbus", 1, {})]),
+    "sapronov-shade.jpg": (1, (640, 400), [("sapronov/shade", 1, {})]),
     "debug-view.png": (1, (640, 480), [("torchelsen/cloud-1", 1, {f"debug_view.{part}": "true" for part in ("boxes", "axes", "roots", "rays")} | {"camera.vertical_fov_deg": "22"})]),
 }
 GAP = 3  # pixels between parts

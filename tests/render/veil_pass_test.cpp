@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "core/random.h"
+#include "render/rain/precipitation_light.h"
 #include "render/renderer.h"
 #include "render/veil/sheet_light.h"
 #include "render/veil/slab_path.h"
@@ -219,6 +220,33 @@ TEST(VeilPass, TheFartherSheetIsBehindTheNearer) {
     const Picture a = picture_of(low_first, options), b = picture_of(high_first, options);
     EXPECT_EQ(a.beauty, b.beauty);
     EXPECT_LT(a.depth_m[kMiddle], 3000);
+}
+
+// Below an even sheet a metaball, a billboard and rain have exp(-(1 - g) depth) of the sunlight, half within it, all above.
+TEST(VeilShade, IsTheSlabsTransmittanceTowardsTheSun) {
+    const double extinction = 0.0007, thickness = 900;
+    for (const VeilLighting lighting : {VeilLighting::physical, VeilLighting::two_samples}) {
+        DrawnVeil veil = even_sheet(4000, 4000 + thickness, extinction, lighting);
+        veil.view.g = 0.6;
+        const double forwards = lighting == VeilLighting::physical ? 0.4 : 1;
+        for (const double elevation : {90.0, 30.0}) {
+            RenderOptions options = looking({0, -6000, 1000}, {0, 0, 1000});
+            options.sun.elevation_deg = elevation;
+            const std::vector<Metaball> balls{{0, 0, 1000, 50, 1}, {2000, 0, 4450, 50, 1}, {4000, 0, 6000, 50, 1}};
+            Splats splats;
+            splats.metaballs = {balls, 0.001, 1.0};
+            options.precipitation.enabled = true;
+            Renderer renderer({.splatting = Splatting::cpu});
+            const Picture open = renderer.draw_splats(splats, options),
+                          below = renderer.draw_splats(splats, options, {&veil, 1});
+            const double depth = forwards * extinction * thickness / std::sin(elevation * 3.14159265358979 / 180);
+            EXPECT_NEAR(below.light[0] / open.light[0], std::exp(-depth), 2e-3);
+            EXPECT_NEAR(below.light[1] / open.light[1], std::exp(-0.5 * depth), 2e-3);
+            EXPECT_NEAR(below.light[2] / open.light[2], 1, 1e-5);
+            EXPECT_NEAR(sunlight_at(below, {500, 300, 20}), std::exp(-depth), 2e-3);
+            EXPECT_EQ(below.shadow, open.shadow) << "the ground would be darkened twice";
+        }
+    }
 }
 
 }  // namespace

@@ -142,6 +142,28 @@ TEST(LightAbsorption, BitsDoNotDependOnLanes) {
     }
 }
 
+// Two boxes of 100 m above each other, the upper one at the rim: while the cloud forms it is not there and takes no light.
+TEST(LightAbsorptionUpdate, CountsBoxesAsFarAsTheyAreThere) {
+    const Cloud cloud = cloud_of({{.centre_m = {0, 0, 50}, .size_m = {100, 100, 100}, .distance = 0},
+                                  {.centre_m = {0, 0, 250}, .size_m = {100, 100, 100}, .distance = 0}},
+                                 400);
+    Cloud placed = cloud;
+    placed.boxes[0].distance = 0;
+    placed.boxes[1].distance = 1;
+    LightAbsorption light;
+    const auto lower_at = [&](double phase, std::size_t computed) {
+        const CloudToLight lit{7, &placed, {0, 0, 0}, {{0, 0, 1}, true}, phase, 0.5};
+        EXPECT_EQ(light.update({&lit, 1}), computed) << phase;
+        return light.absorbed(7)[0];
+    };
+    // Weights by phase_weight(): (1.5 phase - distance) / 0.5.
+    EXPECT_DOUBLE_EQ(lower_at(0.2, 1), 0.6 * 50 / 400);
+    EXPECT_DOUBLE_EQ(lower_at(0.5, 1), 50.0 / 400);
+    EXPECT_DOUBLE_EQ(lower_at(0.5, 0), 50.0 / 400);
+    EXPECT_NEAR(lower_at(0.8, 1), (50 + 0.4 * 100) / 400, 1e-12);
+    EXPECT_DOUBLE_EQ(lower_at(1, 1), 150.0 / 400);
+}
+
 TEST(LightAbsorptionUpdate, OnlyWhereTheLightMoved) {
     std::mt19937_64 random(4);
     std::vector<Cloud> shapes;

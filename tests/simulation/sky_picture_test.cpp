@@ -76,8 +76,11 @@ TEST(SkyBillboards, StandInTheirBoxesAndAbsorbWhatTheirBoxesDo) {
         const Vec3 place = sky.position_m(cloud);
         EXPECT_DOUBLE_EQ(drawn.clouds[c].centre_m.x, shape.centre_m.x + place.x);
         EXPECT_LT(drawn.clouds[c].base_m, drawn.clouds[c].top_m);
-        const std::vector<double> sun = absorbed_light(shape, place, light_of(options.sun));
-        const std::vector<double> lightning = absorbed_light(shape, place, light_of(flash));
+        std::vector<double> sun(shape.boxes.size()), lightning(shape.boxes.size()), weights;
+        for (const SeedBox& box : shape.boxes)
+            weights.push_back(phase_weight(box.distance, cloud.phase, sky.options().formation_softness));
+        absorb_light(shape, place, light_of(options.sun), sun, weights);
+        absorb_light(shape, place, light_of(flash), lightning, weights);
         for (std::size_t b = 0; b < shape.boxes.size(); ++b) {
             const SeedBox& box = shape.boxes[b];
             const double weight = phase_weight(box.distance, cloud.phase, sky.options().formation_softness);
@@ -112,8 +115,12 @@ TEST(SkyBillboards, CullingChangesNoBitOfAPicture) {
         const DrawnClouds some = listed(culled, sky, options), every = listed(all, sky, options, {}, false);
         EXPECT_LT(some.clouds.size(), every.clouds.size());
         EXPECT_GT(some.clouds.size(), 0u);
-        const Picture a = renderer.draw_splats({some.clouds, some.billboards, {}, {}}, options);
-        const Picture b = renderer.draw_splats({every.clouds, every.billboards, {}, {}}, options);
+        EXPECT_EQ(some.billboards.size() + some.unseen.size(), every.billboards.size());
+        EXPECT_TRUE(every.unseen.empty());
+        Splats part{some.clouds, some.billboards, {}, {}}, whole{every.clouds, every.billboards, {}, {}};
+        part.unseen = some.unseen;
+        const Picture a = renderer.draw_splats(part, options);
+        const Picture b = renderer.draw_splats(whole, options);
         EXPECT_EQ(a.beauty, b.beauty);
         EXPECT_EQ(a.transmittance, b.transmittance);
     }
