@@ -32,10 +32,10 @@ PreparedCloud plain_metaballs(const PreparedCloud& cloud) {
     return plain;
 }
 
-// Adds the optical depths of plain metaballs at places: metaballs that take no light away stand there.
+// Adds the optical depths of plain metaballs, as they were given, at places: metaballs that take no light away stand there.
 void add_depths_of_metaballs(const LitCloud& cloud, std::span<const CloudBillboard> at,
                              std::vector<float>& depths, StageTimes& times) {
-    PreparedCloud with_places = plain_metaballs(cloud.cloud);
+    PreparedCloud with_places = plain_metaballs(cloud.given);
     const std::size_t balls = with_places.visible.size();
     std::vector<Metaball> all;
     all.reserve(balls + at.size());
@@ -67,7 +67,7 @@ void complete_light_on_host(LitCloud& cloud, std::span<const std::uint8_t> balls
                             std::span<const std::uint8_t> tiles, StageTimes& times) {
     const StageTimer timer(&times, DrawStage::light);
     cloud.drawn_depths.resize(cloud.sun_depths.size());
-    if (cloud.cloud.detailed.empty() || has_plain_metaballs(cloud.cloud)) {
+    if (has_plain_metaballs(cloud.cloud)) {
         const LightSortedSplats order =
             sort_for_light(plain_metaballs(cloud.cloud), cloud.frame, cloud.shadow_size);
         std::vector<std::uint8_t> centres(order.source.size());
@@ -121,7 +121,7 @@ void cache_billboard_light(LitCloud& cloud, const Splats& splats, const RenderOp
         return;
     const StageTimer timer(&times, DrawStage::light);
     std::vector<float> depths(splats.billboards.size(), 0.0f);
-    const bool absorbs = options.light.lighting == Lighting::cfa && !cloud.cloud.visible.empty();
+    const bool absorbs = options.light.lighting == Lighting::cfa && !cloud.given.visible.empty();
     if (absorbs) {
         const DensityBlocks blocks(cloud.given, splats.metaballs.extinction_per_m);
         const Vec3 to_sun = direction_to_sun(options.sun);
@@ -130,7 +130,7 @@ void cache_billboard_light(LitCloud& cloud, const Splats& splats, const RenderOp
                                                             options.light.light_distance_m);
             depths[i] = float(-std::log(std::max(1 - absorbed, 1e-30)));
         });
-    } else if (has_plain_metaballs(cloud.cloud)) {
+    } else if (has_plain_metaballs(cloud.given)) {
         add_depths_of_metaballs(cloud, splats.billboards, depths, times);
     }
     tbb::parallel_for(std::size_t{0}, depths.size(), [&](std::size_t i) {
