@@ -59,6 +59,18 @@ struct TurnedTexture {
     }
 };
 
+// Spheres that fill an ellipsoid with the level semi-axes a and the upright one b about: none reaches above or below it.
+void add_spheres(const Vec3& centre_m, double a, double b, double weight, std::vector<ShadowCaster>& to) {
+    const double r = std::min(a, b);
+    if (a > b) {
+        for (const Vec3& side : {Vec3{1, 0, 0}, Vec3{-1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 0}})
+            to.push_back({centre_m + (a - r) * side, r, weight / 5});
+    } else {
+        for (const double side : {-1, 0, 1})
+            to.push_back({centre_m + Vec3{0, 0, side * (b - r)}, r, weight / 3});
+    }
+}
+
 }  // namespace
 
 struct BillboardShade::Footprint {
@@ -82,14 +94,13 @@ BillboardShade::BillboardShade(std::span<const CloudBillboard> seen, std::span<c
     };
     std::sort(casters_.begin(), casters_.end(),
               [&](const Caster& a, const Caster& b) { return key(a) < key(b); });
-    spheres_.reserve(casters_.size());
-    for (const Caster& caster : casters_) {
-        const double area = std::numbers::pi * double(caster.half_u) * double(caster.half_v);
-        spheres_.push_back({caster.u * right_ + caster.v * up_ - caster.s * to_sun_,
-                            double(std::max({caster.half_u, caster.half_v, caster.half_chord})),
-                            kMeanOpacity * double(caster.opacity) * area});
+    for (const Caster& caster : casters_)
         longest_half_chord_ = std::max(longest_half_chord_, caster.half_chord);
-    }
+    const auto by_place = [](const ShadowCaster& a, const ShadowCaster& b) {
+        return std::tie(a.centre_m.x, a.centre_m.y, a.centre_m.z, a.radius_m, a.weight) <
+               std::tie(b.centre_m.x, b.centre_m.y, b.centre_m.z, b.radius_m, b.weight);
+    };
+    std::sort(spheres_.begin(), spheres_.end(), by_place);
     bin();
 }
 
@@ -112,6 +123,9 @@ void BillboardShade::add(std::span<const CloudBillboard> billboards) {
         caster.layer = std::uint16_t(picture.layer);
         caster.turn = std::uint16_t(picture.turn);
         caster.cloud = of.cloud;
+        add_spheres(of.centre_m, a, b,
+                    kMeanOpacity * double(of.opacity) * std::numbers::pi * a * double(caster.half_v),
+                    spheres_);
     }
 }
 
