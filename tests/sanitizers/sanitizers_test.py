@@ -29,8 +29,7 @@ NOTICED = {"asan": {**ADDRESS, **UNDEFINED},
 MEMCHECK = {"heap-overflow": "Invalid read of size 1", "use-after-free": "Invalid read of size 1",
             "uninitialised": "depends on uninitialised value", "leak": "definitely lost"}
 VALGRIND = ["valgrind", "--quiet", "--error-exitcode=99", "--leak-check=full", "--errors-for-leak-kinds=definite",
-            "--show-leak-kinds=definite",
-            f"--suppressions={HERE / 'valgrind.supp'}"]
+            "--show-leak-kinds=definite"]
 
 LAYERED = SCENE.replace("[field.background]\nhum = 0.15\nact = 0.01\next = 0.05\n", "") + """\
 [[sky]]
