@@ -200,9 +200,27 @@ void Renderer::Impl::begin(Drawing& drawing) {
 }
 
 void Renderer::Impl::finish(Drawing& drawing) {
-    if (drawing.backend == nullptr) return;
     const StageTimer timer(&times, DrawStage::view);
-    std::exchange(drawing.backend, nullptr)->finish(drawing.picture);
+    const auto wait = [&] {
+        if (drawing.backend != nullptr) std::exchange(drawing.backend, nullptr)->finish(drawing.picture);
+    };
+    wait();
+    begin_rain(drawing, false);
+    wait();
+}
+
+void Renderer::Impl::begin_rain(Drawing& drawing, bool known) {
+    if (!drawing.rain) return;
+    const Rainfall rain = *std::exchange(drawing.rain, std::nullopt);
+    Picture& picture = drawing.picture;
+    const std::optional<RainFrame> frame = rain_frame(picture, rain.options, rain.weather, rain.time_s);
+    if (!frame) return;
+    // Of merged metaballs the picture has the light of those that they stand for.
+    const bool same = known && (lit.merged.empty() || !lit.volumes.empty());
+    if (backend->begin_rain(*frame, rain.weather, same ? &lit : nullptr, picture))
+        drawing.backend = backend.get();
+    else
+        painter.draw(picture, rain.options, rain.weather, rain.time_s);
 }
 
 Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail) {
@@ -326,14 +344,15 @@ Picture Renderer::draw(const MetaballCloud& cloud, const RenderOptions& options)
     return draw_splats(splats, options);
 }
 
-Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options,
-                              std::span<const DrawnVeil> veils) {
-    return finish(begin(splats, options, veils));
+Picture Renderer::draw_splats(const Splats& splats, const RenderOptions& options, std::span<const DrawnVeil> veils,
+                              std::optional<Rainfall> rain) {
+    return finish(begin(splats, options, veils, std::move(rain)));
 }
 
-PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& options,
-                               std::span<const DrawnVeil> veils) {
+PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& options, std::span<const DrawnVeil> veils,
+                               std::optional<Rainfall> rain) {
     check(options);
+    if (rain) check(rain->options.precipitation);
     const int limit = impl_->backend->largest_shadow_map();
     if (options.shadow_map_size > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
@@ -349,7 +368,10 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
         const bool wet = splats.ground_cover && shows_wet_ground(options, *splats.ground_cover);
         if (wet || shows_pattern(options) || !veils.empty()) {
             state->picture = impl_->draw_in_passes(splats, options);
+            state->rain = std::move(rain);
+            impl_->begin_rain(*state, true);
         } else {
+            state->rain = std::move(rain);
             const CameraFrame camera = camera_frame(options.camera);
             state->detail = {camera.position_m, pixels_per_unit(options.camera, camera)};
             impl_->begin(*state);

@@ -20,6 +20,7 @@
 // number of threads.
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,6 +30,7 @@
 #include "render/image/picture.h"
 #include "render/options/device_options.h"
 #include "render/options/options.h"
+#include "render/rain/precipitation.h"
 #include "render/veil/drawn_veil.h"
 
 namespace nephos {
@@ -72,8 +74,8 @@ class Renderer {
     // View-independent results (light, shadow map) are cached and reused while metaballs, extinction, sun and
     // size of the shadow map are the same, by their content.
     // `veils` are drawn per pixel over the rest; with them Splats::depth is needed.
-    Picture draw_splats(const Splats& splats, const RenderOptions& options,
-                        std::span<const DrawnVeil> veils = {});
+    Picture draw_splats(const Splats& splats, const RenderOptions& options, std::span<const DrawnVeil> veils = {},
+                        std::optional<Rainfall> rain = {});
     Picture draw(const MetaballCloud& cloud, const RenderOptions& options);
 
     // Draw in two steps, so that a graphics card draws one frame while the next is prepared:
@@ -87,8 +89,10 @@ class Renderer {
     // back-ends cpu and blended draw in begin(), as do all back-ends with wet ground or veils. Both functions throw
     // as draw_splats(); an error of a frame in flight is thrown by its own finish(). Only the Renderer that
     // began a frame may finish it, and only once.
-    PendingPicture begin(const Splats& splats, const RenderOptions& options,
-                         std::span<const DrawnVeil> veils = {});
+    //
+    // `rain` is drawn over the rest, by the back-end `vulkan` on its device; it needs Splats::depth and Splats::light.
+    PendingPicture begin(const Splats& splats, const RenderOptions& options, std::span<const DrawnVeil> veils = {},
+                         std::optional<Rainfall> rain = {});
     Picture finish(PendingPicture&& pending);
 
     std::string backend_name() const;  // "cpu", "vulkan" or "blended"

@@ -12,6 +12,7 @@
 #include "render/atmosphere/sky_light.h"
 #include "render/backend/backend.h"
 #include "render/cloud/voxel_absorption.h"
+#include "render/rain/precipitation.h"
 #include "render/renderer.h"
 
 namespace nephos {
@@ -30,6 +31,7 @@ struct PendingPicture::State {
     DetailView detail;  // from which the cloud's metaballs are merged
     Picture picture;
     Backend* backend = nullptr;  // that draws it; null: it is finished
+    std::optional<Rainfall> rain;  // still to be drawn
 };
 
 struct Renderer::Impl {
@@ -38,6 +40,9 @@ struct Renderer::Impl {
     using Drawing = PendingPicture::State;
     void begin(Drawing& drawing);
     void finish(Drawing& drawing);
+    // Draws the rain of a picture that is complete otherwise, or begins to. `known`: the light of the cloud is still that of
+    // the picture.
+    void begin_rain(Drawing& drawing, bool known);
     // Begins and finishes a frame.
     Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail);
     // Draws a frame over which the processor draws: ground that is not plain, veils per pixel.
@@ -68,6 +73,7 @@ struct Renderer::Impl {
     SkyLights sky_lights;
     std::span<const DrawnVeil> veils;  // of the picture that is being drawn
     VeilDepth veil_depth;              // likewise: their shade, where something is below them
+    PrecipitationPainter painter;      // of rain that the back-end leaves to the processor
 };
 
 }  // namespace nephos

@@ -100,6 +100,14 @@ Vec2 drift_m(const Wind& wind, double time_s, double base_m, double ground_m, do
     return {drift.x * seconds, drift.y * seconds};
 }
 
+Vec2 lag_m(const Wind& wind, double time_s, double base_m, double ground_m, double fall_speed_m_per_s) {
+    if (!(base_m > ground_m) || std::isinf(fall_speed_m_per_s)) return {};
+    const Velocity cloud = wind_at(wind, base_m, time_s);
+    const double seconds = (base_m - ground_m) / fall_speed_m_per_s;
+    return drift_m(wind, time_s, base_m, ground_m, fall_speed_m_per_s) -
+           Vec2(cloud.east_m_per_s * seconds, cloud.north_m_per_s * seconds);
+}
+
 GroundCover::GroundCover(const GroundCoverOptions& options, PrecipitationKind kind,
                          const WorldRectangle& world)
     : options_(options), kind_(kind) {

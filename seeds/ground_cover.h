@@ -69,8 +69,11 @@ GroundCoverMap mix(const GroundCoverMap& from, const GroundCoverMap& to, double 
 //
 // Drops move with the air at every height. Zero when the base is not above the ground. Pure.
 Vec2 drift_m(const Wind& wind, double time_s, double base_m, double ground_m, double fall_speed_m_per_s);
+// Returns the same from below where the cloud is when they arrive, if the wind at its base carries it: opposite to the wind
+// that grows with height.
+Vec2 lag_m(const Wind& wind, double time_s, double base_m, double ground_m, double fall_speed_m_per_s);
 
-// Rain areas whose drops have the same displacement: those of one layer.
+// Rain areas whose drops have the same displacement: those of one layer that move alike.
 struct FallingRain {
     std::span<const RainArea> areas;
     Vec2 drift{};  // metres

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -447,12 +448,20 @@ void Simulation::remember() {
 // The rain areas of a new state fall onto the ground, which lies as it does now.
 void Simulation::expose_ground(Past& state) {
     const double time_s = double(state.step) * scene_.automaton.time_step_s;
+    std::vector<std::array<std::vector<RainArea>, 2>> areas(scene_.layers.size());  // of each layer: still, carried
     std::vector<FallingRain> falling;
     for (std::size_t n = 0; n < scene_.layers.size(); ++n) {
-        const Range& base_m = scene_.layers[n].base_height_m;
-        falling.push_back({state.layers[n].rain,
-                           drift_m(layer_wind(scene_, n), time_s, (base_m.min + base_m.max) / 2,
-                                   scene_.render.ground.height_m, scene_.ground_cover.fall_speed_m_per_s)});
+        std::set<std::uint64_t> still;
+        const std::vector<PlacedRain>& placed = scene_.layers[n].rain.placed;
+        for (std::size_t i = 0; i < placed.size(); ++i)
+            if (!placed[i].carried) still.insert(rain_id(RainSource::placed, std::uint32_t(n), 0, std::uint32_t(i)));
+        for (const RainArea& area : state.layers[n].rain) areas[n][!still.contains(area.id)].push_back(area);
+        const Range& base = scene_.layers[n].base_height_m;
+        const double base_m = (base.min + base.max) / 2, ground_m = scene_.render.ground.height_m,
+                     fall_m_per_s = scene_.ground_cover.fall_speed_m_per_s;
+        const Wind& wind = layer_wind(scene_, n);
+        falling.push_back({areas[n][0], drift_m(wind, time_s, base_m, ground_m, fall_m_per_s)});
+        falling.push_back({areas[n][1], lag_m(wind, time_s, base_m, ground_m, fall_m_per_s)});
     }
     ground_->expose(falling);
     state.ground = std::make_shared<const GroundCoverMap>(ground_->map());

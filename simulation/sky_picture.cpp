@@ -214,20 +214,21 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
         lines.push_back(debug_lines(*layer.sky, layer.clouds, options, light_of(options.sun)));
     // Rain wants the depth of the clouds and their shadow, veils the depth.
     const bool all = depth || rain;
-    PendingPicture picture =
-        renderer.begin({drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all,
-                        ground_cover, textures_ ? textures_->pictures : nullptr, drawn.unseen},
-                       options, veils);
-    RenderOptions raining = moving;  // knows the camera's path itself
-    raining.sun = options.sun;
-    if (ground_cover) raining.ground.albedo = mean_albedo(options, *ground_cover);
-    return {std::move(picture), std::move(options), std::move(raining), weather, time_s,
-            std::move(lines),   std::move(drawn)};
+    std::optional<Rainfall> rainfall;
+    if (rain) {
+        rainfall = Rainfall{moving, weather, time_s};
+        rainfall->options.sun = options.sun;
+        if (ground_cover) rainfall->options.ground.albedo = mean_albedo(options, *ground_cover);
+    }
+    PendingPicture picture = renderer.begin(
+        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all, ground_cover,
+         textures_ ? textures_->pictures : nullptr, drawn.unseen},
+        options, veils, std::move(rainfall));
+    return {std::move(picture), std::move(options), std::move(lines), std::move(drawn)};
 }
 
 Picture SkyPainter::finish(Renderer& renderer, PendingSkyPicture&& pending) {
     Picture picture = renderer.finish(std::move(pending.picture));
-    precipitation_.draw(picture, pending.raining, pending.weather, pending.time_s);
     for (const std::vector<WorldLine>& lines : pending.lines)
         draw_lines(picture, pending.options.camera, lines);
     return picture;

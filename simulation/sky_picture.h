@@ -108,9 +108,7 @@ struct SkyLayer {
 // A picture that was begun, and what is drawn over it.
 struct PendingSkyPicture {
     PendingPicture picture;
-    RenderOptions options, raining;
-    Weather weather;
-    double time_s = 0;
+    RenderOptions options;
     std::vector<std::vector<WorldLine>> lines;  // of each layer
     DrawnClouds drawn;                          // what `picture` refers to
 };
@@ -144,7 +142,6 @@ class SkyPainter {
   private:
     std::vector<SkyBillboards> layers_;
     std::shared_ptr<const ModelTextures> textures_;
-    PrecipitationPainter precipitation_;
 };
 
 // Return the light of the sun, or of a flash, as the absorption factor takes it.

@@ -229,8 +229,10 @@ TrackStatistics track_statistics(std::span<const Track> tracks, std::uint64_t fi
         if (t + 1 < ages) area += survival[t];
         variance += area * area * greenwood[t];
     }
-    result.mean = area;
-    result.mean_error = std::sqrt(variance);
+    const std::uint64_t died = result.tracks - result.censored;
+    result.restricted = s > 0;
+    if (died > 0) result.mean = area;
+    if (died > 1) result.mean_error = std::sqrt(variance);
     return result;
 }
 

@@ -85,9 +85,11 @@ struct TrackStatistics {
                   entered = 0;  // in the steps that were looked at
     // Of the lifetimes: tracks, and how many of them are censored.
     std::uint64_t tracks = 0, censored = 0;
-    // Kaplan and Meier's mean with Greenwood's standard error, and median; steps. Where the oldest track is censored the mean
-    // is restricted to its age, and too small. NaN without a track; the median also where fewer than half were seen to die.
+    // Kaplan and Meier's mean with Greenwood's standard error, and median; steps. Where the oldest track is censored the mean is
+    // `restricted` to its age, and too small. The mean is NaN where no track was seen to die, its error where fewer than two
+    // were: one says nothing of a scatter. The median is NaN also where fewer than half were seen to die.
     double mean, mean_error, median;
+    bool restricted = false;
     std::uint64_t longest = 0;  // age in steps that a track was seen to reach
 };
 

@@ -99,7 +99,8 @@ RunRecord record_of(const Json& json) {
     result.snapshots = json.at("snapshots").get<std::uint64_t>();
     if (const auto tracks = json.find("tracks"); tracks != json.end())
         for (std::size_t n = 0; n < kTrackColumns.size(); ++n)
-            result.tracks.push_back(number_of(tracks->at(n)));
+            // Records of earlier versions have fewer columns.
+            result.tracks.push_back(n < tracks->size() ? number_of(tracks->at(n)) : std::nan(""));
     result.state_hash = json.at("state_hash").get<std::string>();
     record.series_offset = json.at("series_offset").get<std::uint64_t>();
     record.series_bytes = json.at("series_bytes").get<std::uint64_t>();

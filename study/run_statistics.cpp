@@ -200,7 +200,8 @@ std::vector<double> Measurement::tracks(const Judgement& judgement) const {
             s.mean * step_s,
             s.mean_error * step_s,
             s.median * step_s,
-            s.tracks > 0 ? double(s.longest) * step_s : kNaN};
+            s.tracks > 0 ? double(s.longest) * step_s : kNaN,
+            s.tracks > 0 ? double(s.restricted) : kNaN};
 }
 
 RunResult Measurement::result(const Judgement& judgement) const {

@@ -60,7 +60,7 @@ inline constexpr std::array<SeriesInfo, 7> kSeries{{
 }};
 
 // What is known of the tracks of a run, in the order of tracks.csv; NaN without value. Of the steps that the means are over.
-inline constexpr std::array<StatisticInfo, 11> kTrackColumns{{
+inline constexpr std::array<StatisticInfo, 12> kTrackColumns{{
     {"births", "1", "clouds that share no column with those of the step before"},
     {"splits", "1", "clouds that share some, and go on from none"},
     {"deaths", "1", "clouds that share no column with those of the next step"},
@@ -69,9 +69,11 @@ inline constexpr std::array<StatisticInfo, 11> kTrackColumns{{
     {"tracks", "1", "births and splits whose lifetimes are taken"},
     {"censored", "1", "those of them that were not seen to die"},
     {"track_lifetime_mean_s", "s", "mean lifetime (Kaplan and Meier 1958)"},
-    {"track_lifetime_mean_s_se", "s", "its standard error (Greenwood)"},
+    {"track_lifetime_mean_s_se", "s", "its standard error (Greenwood), of two deaths or more"},
     {"track_lifetime_median_s", "s", "median lifetime"},
     {"track_age_longest_s", "s", "greatest age that was seen"},
+    {"track_lifetime_is_restricted", "1",
+     "1: a track of that age was not seen to die, and the mean is too small"},
 }};
 
 // What a finished run leaves.

@@ -41,10 +41,11 @@ RENDER_LAYERS = (
     {"cloud"},
     {"frame"},
     {"shading"},
+    {"rain"},
     {"backend"},
     {"gpu"},
     {"vulkan", "cpu", "blended"},
-    {"rain", "ground", "veil"},
+    {"ground", "veil"},
 )
 # render/shared/ is a leaf of plain structs that C++ and GLSL both read.
 LEAF = "render/shared/"

@@ -171,12 +171,12 @@ int run_command(const ExportArguments& a) {
 
 void add_shape_options(CLI::App& command, const std::shared_ptr<ExportArguments>& a) {
     ExportOptions& o = a->options;
-    add_value(
-        command, "--type", "TYPE",
-        "Voxels of raw, bricks, dds, ktx2, vti and slices: r8, r16, r16f, r32f or bc4 (r16f: VDB of 16-bit floats)",
-        [&o](const std::string& text) {
-            o.type = word_of<VoxelType>(text, {"r8", "r16", "r16f", "r32f", "bc4"});
-        });
+    add_value(command, "--type", "TYPE",
+              "Voxels of raw, bricks, dds, ktx2, vti and slices: r8, r16, r16f, r32f or bc4 (r16f: VDB of "
+              "16-bit floats)",
+              [&o](const std::string& text) {
+                  o.type = word_of<VoxelType>(text, {"r8", "r16", "r16f", "r32f", "bc4"});
+              });
     add_value(command, "--range", "RANGE",
               "0..1, or auto: divide by the largest value of the sequence; the sidecar has the factor",
               [&o](const std::string& text) {
@@ -192,7 +192,8 @@ void add_shape_options(CLI::App& command, const std::shared_ptr<ExportArguments>
     command.add_flag(
         "--mips", o.mips,
         "Levels of detail down to 32 voxels in dds, ktx2, raw and bricks; each has the mass of the first");
-    add_value(command, "--bricks", "N", "Edge of the bricks of `bricks`, without their border of 1 (default: 32)",
+    add_value(command, "--bricks", "N",
+              "Edge of the bricks of `bricks`, without their border of 1 (default: 32)",
               [&o](const std::string& text) { o.brick_edge = int(parse_integer(text, 8, 256)); });
     add_value(command, "--border", "KIND",
               "One voxel around the box: none, zero, or wrap (of the opposite side where it repeats)",
@@ -212,6 +213,16 @@ void add_shape_options(CLI::App& command, const std::shared_ptr<ExportArguments>
               [&o](const std::string& text) {
                   o.layout.axes = word_of<AxisOrder>(text, {"enu", "unity", "unreal"});
               });
+}
+
+// Frames of a run are counted from 1, those of files as they are named, often from 0.
+FrameRange parse_frames_from_0(const std::string& text) {
+    if (text == "0" || text == "..0" || text == "0..0") return {0, 0};
+    if (text == "0..") return {0};
+    const bool from_0 = text.starts_with("0..");
+    FrameRange range = parse_frames(from_0 ? text.substr(1) : text);
+    if (from_0 || text.starts_with("..")) range.first = 0;
+    return range;
 }
 
 }  // namespace
@@ -242,10 +253,11 @@ void add_export_command(CLI::App& app, Action& action) {
             "--layer", [a](const std::string& text) { a->options.layer = text; },
             "A layer by name, each, or all together (default)")
         ->type_name("NAME");
-    add_value(*command, "--frames", "A..B[/STEP]", "Only these frames, by their numbers",
+    add_value(*command, "--frames", "A..B[/STEP]",
+              "Only these frames, by their numbers (of a run from 1, of files from 0)",
               [a](const std::string& text) {
                   const std::size_t slash = text.find('/');
-                  const FrameRange range = parse_frames(text.substr(0, slash));
+                  const FrameRange range = parse_frames_from_0(text.substr(0, slash));
                   a->options.first_frame = range.first;
                   a->options.last_frame = range.last;
                   if (slash != text.npos)

@@ -82,26 +82,35 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
 
 namespace {
 
+// The float grid of a file, of values as they are or quantised. (The conversion of a handle would compile all kinds of grids.)
+FloatGrid::Ptr float_grid_of(const nanovdb::GridHandle<>& handle) {
+    if (const auto* plain = handle.grid<float>()) return nanovdb::nanoToOpenVDB(*plain);
+    if (const auto* fp8 = handle.grid<nanovdb::Fp8>()) return nanovdb::nanoToOpenVDB(*fp8);
+    if (const auto* fp16 = handle.grid<nanovdb::Fp16>()) return nanovdb::nanoToOpenVDB(*fp16);
+    return nullptr;
+}
+
 // In the child: the blocks of the only grid of an open file.
 void send_grid(int file, const Extent& extent, SandboxWriter& writer) {
     __gnu_cxx::stdio_filebuf<char> buffer(file, std::ios::in | std::ios::binary);
     std::istream stream(&buffer);
     const auto handles = nanovdb::io::readGrids(stream);
-    const nanovdb::NanoGrid<float>* const nano = handles.size() == 1 ? handles.front().grid<float>() : nullptr;
-    if (nano == nullptr) throw std::runtime_error("it holds no float grid that is not quantised");
-    const auto grid = nanovdb::nanoToOpenVDB(*nano);  // of the handle: it would compile all kinds of grids
+    const FloatGrid::Ptr grid = handles.size() == 1 ? float_grid_of(handles.front()) : nullptr;
+    if (grid == nullptr) throw std::runtime_error("it holds no float grid of 32, 16 or 8 bits");
     const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
     const openvdb::Coord last(extent.x - 1, extent.y - 1, extent.z - 1);
     if (!box.empty() && !openvdb::CoordBBox(openvdb::Coord(0), last).isInside(box))
         throw std::runtime_error("it has voxels outside of its box");
-    for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) send_leaf(writer, leaf->origin(), leaf->buffer().data());
+    for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf)
+        send_leaf(writer, leaf->origin(), leaf->buffer().data());
     auto tile = grid->tree().cbeginValueOn();
     tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
     for (; tile; ++tile) {
         const openvdb::CoordBBox block = tile.getBoundingBox();
         for (int z = block.min().z(); z <= block.max().z(); z += kBlock)
             for (int y = block.min().y(); y <= block.max().y(); y += kBlock)
-                for (int x = block.min().x(); x <= block.max().x(); x += kBlock) send_tile(writer, {x, y, z}, *tile);
+                for (int x = block.min().x(); x <= block.max().x(); x += kBlock)
+                    send_tile(writer, {x, y, z}, *tile);
     }
     send_end(writer);
 }
@@ -123,7 +132,8 @@ DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const
             } catch (const std::bad_alloc&) {
                 throw;
             } catch (const std::exception& error) {
-                throw std::runtime_error(std::string("it is no NanoVDB file, or is damaged: ") + error.what());
+                throw std::runtime_error(std::string("it is no NanoVDB file, or is damaged: ") +
+                                         error.what());
             }
         },
         [&](SandboxReader& reader) { density = receive_blocks(reader, extent, placement); });

@@ -17,9 +17,8 @@ enum class NanoQuantise { none, fp8, fp16 };  // bits of a value, by the range o
 void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density, NanoCodec codec,
                    NanoQuantise quantise);
 
-// Reads the float grid of a file that was not quantised, as a grid of this extent and placement. A confined child process
-// parses it (density/vdb/sandbox.h). Throws Error(io) naming the file, also when it is quantised or has voxels outside of
-// the extent.
+// Reads the float grid of a file, quantised or not, as a grid of this extent and placement. A confined child process
+// parses it (density/vdb/sandbox.h). Throws Error(io) naming the file, also when it has voxels outside of the extent.
 DensityGrid read_nanovdb(const std::filesystem::path& path, Extent extent, const Placement& placement);
 
 }  // namespace nephos

@@ -26,6 +26,7 @@
 #include "render/frame/view_sorting.h"
 #include "render/image/picture.h"
 #include "render/options/device_options.h"
+#include "render/rain/rain_frame.h"
 
 namespace nephos {
 
@@ -111,6 +112,11 @@ class Backend {
     virtual void finish(Picture&) {}
     // Waits for a picture in flight and discards it.
     virtual void abandon(const Picture&) noexcept {}
+
+    // Draws rain over a finished picture. Returns false if it has not: then the processor does (precipitation.h); true if
+    // it is in flight: the picture must not move until finish() or abandon(). `cloud`: that of the picture, which is the one
+    // last passed to begin(); null: it may be another, and Picture::shadow is read instead.
+    virtual bool begin_rain(const RainFrame&, const Weather&, const LitCloud*, Picture&) { return false; }
 
     // Returns whether it ray-marches volumes with detail (LitCloud::volumes); otherwise it draws their metaballs.
     virtual bool marches() const { return false; }

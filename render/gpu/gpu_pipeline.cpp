@@ -19,6 +19,10 @@ namespace spirv {
 #include "billboard_vert.h"
 #include "light_centres_comp.h"
 #include "light_map_comp.h"
+#include "rain_bands_comp.h"
+#include "rain_shafts_comp.h"
+#include "rain_streaks_comp.h"
+#include "rain_tiles_comp.h"
 #include "shade_light_comp.h"
 #include "shell_frag.h"
 #include "shell_vert.h"
@@ -92,7 +96,8 @@ const ShaderSet& shaders() {
         spirv::view_finish_comp, spirv::background_vert,    spirv::background_frag,   spirv::view_splat_vert,
         spirv::view_splat_frag,  spirv::billboard_vert,     spirv::billboard_frag,    spirv::view_shells_comp,
         spirv::shell_vert,       spirv::shell_frag,          spirv::march_tiles_comp,  spirv::march_shells_comp,
-        spirv::march_finish_comp, spirv::shade_light_comp};
+        spirv::march_finish_comp, spirv::shade_light_comp,   spirv::rain_shafts_comp,  spirv::rain_streaks_comp,
+        spirv::rain_bands_comp,   spirv::rain_tiles_comp};
     return kShaders;
 }
 

@@ -20,6 +20,7 @@ struct ShaderSet {
     ShaderCode billboard_vert, billboard_frag;
     ShaderCode view_shells_comp, shell_vert, shell_frag;
     ShaderCode march_tiles_comp, march_shells_comp, march_finish_comp, shade_light_comp;
+    ShaderCode rain_shafts_comp, rain_streaks_comp, rain_bands_comp, rain_tiles_comp;
 };
 const ShaderSet& shaders();
 

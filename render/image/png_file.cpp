@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "core/text.h"
 #include "render/image/exposure.h"
 #include "render/image/image_file.h"
+#include "render/image/png_input.h"
 #include "render/image/tone_map.h"
 
 namespace nephos {
@@ -155,6 +155,7 @@ void write_png(const std::filesystem::path& path, const Rgb8Image& image, const 
 // Chunks follow a signature of 8 bytes: length, most significant byte first; type; content; checksum. Content
 // of an iTXt chunk: keyword, 0, two flags, two texts that end with 0, text.
 double read_png_exposure(const std::filesystem::path& path) {
+    require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
     if (!stream) fail(path, "cannot read PNG", std::strerror(errno));
     stream.seekg(8);
@@ -182,18 +183,9 @@ double read_png_exposure(const std::filesystem::path& path) {
 }
 
 Rgb8Image read_png(const std::filesystem::path& path) {
-    png_image png{};
-    png.version = PNG_IMAGE_VERSION;
-    const std::unique_ptr<png_image, void (*)(png_image*)> cleanup(&png, png_image_free);
-    const auto require = [&](bool done) {
-        if (!done) fail(path, "cannot read PNG", png.message);
-    };
-    require(png_image_begin_read_from_file(&png, path.c_str()) != 0);
-    if (png.width > kMaxSide || png.height > kMaxSide)
-        fail(path, "cannot read PNG", "more than " + std::to_string(kMaxSide) + " pixels on a side");
-    png.format = PNG_FORMAT_RGB;
-    Rgb8Image image{int(png.width), int(png.height), std::vector<std::uint8_t>(PNG_IMAGE_SIZE(png))};
-    require(png_image_finish_read(&png, nullptr, image.rgb.data(), 0, nullptr) != 0);
+    PngInput png(path, kMaxSide);
+    Rgb8Image image{png.width(), png.height(), std::vector<std::uint8_t>(png.bytes(PNG_FORMAT_RGB))};
+    png.read(image.rgb.data());
     return image;
 }
 

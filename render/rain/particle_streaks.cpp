@@ -14,16 +14,9 @@ namespace nephos {
 namespace {
 
 constexpr std::size_t kChunk = 4096;
-constexpr double kNearest_m = 0.3, kNearFade_m = 0.7;  // drops before the eye vanish
-constexpr double kFadeFraction = 0.2;                  // of the reach
-constexpr double kVerticalFade = 0.3;                  // of half the height
-constexpr double kMostOpaque = 0.85, kLeastOpaque = 1.0 / 2048;
-constexpr double kGrowth[2] = {8, 2};        // of the size over the depth, rain and snow
+constexpr double kGrowth[2] = {shader::kRainGrowth, shader::kSnowGrowth};
 constexpr double kMostSize[2] = {1e6, 1.5};  // s0; flakes are large enough as they are
-constexpr double kMostPixels = 2;            // width of a far streak
 constexpr double kOpacityAtEye = 0.5;
-constexpr double kFlicker = 0.25;
-constexpr double kNumberFade = 0.1;  // fraction of the particles that fade when their number decreases
 
 // Far from overflow, which std::hypot() takes its time to rule out.
 double flat_length(double x, double y) { return std::sqrt(x * x + y * y); }
@@ -46,13 +39,14 @@ struct Sway {
 };
 
 Sway sway_of(std::size_t i, double diameter_mm, double time_s) {
-    const double start = double(i % 977) * 0.37, turn = (i & 1) != 0 ? 1.0 : -1.0;
-    const double per_s = turn * (1.5 + 0.13 * double(i % 19));  // rad/s: a turn in 1.6 to 4 s
-    const double radius_m = 0.04 + 0.01 * double(i % 7) / (0.5 + diameter_mm);
+    const double start = double(i % shader::kSwayStarts) * shader::kSwayStart, turn = (i & 1) != 0 ? 1.0 : -1.0;
+    const double per_s = turn * sway_per_s(i);  // a turn in 1.6 to 4 s
+    const double radius_m =
+        shader::kSwayLeast_m + shader::kSwayMore_m * double(i % shader::kSwayRadii) / (0.5 + diameter_mm);
     const double angle = start + per_s * time_s;
     const double c = std::cos(angle), s = std::sin(angle);
     return {radius_m * c, radius_m * s, -radius_m * per_s * s, radius_m * per_s * c,
-            0.7 + 0.3 * std::cos(2.3 * angle + start)};
+            0.7 + 0.3 * std::cos(shader::kSwayHarmonic * angle + start)};
 }
 
 // Returns the ratio of real to drawn particles per m^3 at a point: of the strongest rain there, less the part
@@ -84,12 +78,12 @@ double linear(double low, double high, double x) { return std::clamp((x - low) /
 // Returns the fade weight of a particle: by its reach, the container's top and bottom, the eye, the number.
 double presence(const Pass& p, std::size_t i, double d, double z, double distance_m) {
     const double reach = double(p.particles.reach[i]);
-    double fraction = p.pass.fraction * std::min(1.0, (reach - d) / (kFadeFraction * reach));
-    fraction *= linear(kNearest_m, kNearFade_m, distance_m);
-    if (!p.pass.far) fraction *= linear(1, 1 - kVerticalFade, std::abs(z) / (0.5 * p.pass.boxes.height_m));
+    double fraction = p.pass.fraction * std::min(1.0, (reach - d) / (shader::kReachFade * reach));
+    fraction *= linear(shader::kNearestDrop_m, shader::kNearDropFade_m, distance_m);
+    if (!p.pass.far) fraction *= linear(1, 1 - shader::kVerticalFade, std::abs(z) / (0.5 * p.pass.boxes.height_m));
     if (p.pass.number < 1) {
         const double order = double(i) / double(p.particles.size());
-        fraction *= linear(0, kNumberFade, p.pass.number * (1 + kNumberFade) - order);
+        fraction *= linear(0, shader::kNumberFade, p.pass.number * (1 + shader::kNumberFade) - order);
     }
     return fraction;
 }
@@ -152,7 +146,7 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     const Vec3 way = place - eye;
     if (!container.whole && way.x * container.axis.x + way.y * container.axis.y < 0) return;
     const double distance = length(way);
-    if (dot(way, p.view.camera.forward) < kNearest_m) return;
+    if (dot(way, p.view.camera.forward) < shader::kNearestDrop_m) return;
     const double present = presence(p, i, d, double(z), distance);
     if (present <= 0) return;
 
@@ -166,7 +160,7 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     if (!ends.from.in_front || !ends.to.in_front) return;
     const double scale = p.pixels_per_unit / distance;
     double width = std::max(1.0, width_m * scale);
-    if (p.pass.far) width = std::min(width, kMostPixels);
+    if (p.pass.far) width = std::min(width, shader::kMostFarPixels);
     if (beside_picture(ends, width, p.view.options.camera)) return;
 
     const double real = real_particles(p.pass, options, place, d_mm);
@@ -176,11 +170,12 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
         stands_for * 1e-6 * shadow_mm2(p.particles.kind, d_mm) * scale * scale * sway.cover;  // pixels
     ends = at_least(ends, p.snow ? width : 1.0);
     const double span = flat_length(ends.to.x - ends.from.x, ends.to.y - ends.from.y);
-    const double opacity = present * std::min(kMostOpaque, options.visibility * shadow / (width * span));
-    if (opacity < kLeastOpaque) return;
+    const double opacity = present * std::min(shader::kMostDropOpaque, options.visibility * shadow / (width * span));
+    if (opacity < shader::kLeastDropOpaque) return;
     Rgb light = particle_radiance(p.view.light, (1 / distance) * way, place, p.sunlight);
     // Drops oscillate and show now more of the sky, now more of the ground.
-    const double turn = 1 + kFlicker * (2 * std::fmod(911 * double(p.particles.z[i]), 1.0) - 1);
+    const double turns = shader::kDropFlickers * double(p.particles.z[i]);
+    const double turn = 1 + shader::kDropFlicker * (2 * std::fmod(turns, 1.0) - 1);
     for (double& value : light) value *= turn;
     Streak streak{float(ends.from.x), float(ends.from.y), float(ends.to.x), float(ends.to.y),
                   float(width),       float(opacity),     float(distance),  float(light[0]),
@@ -192,52 +187,65 @@ void add(const Pass& p, std::size_t i, float x, float y, float z, std::vector<St
     out.push_back(streak);
 }
 
+}  // namespace
+
+double sway_per_s(std::size_t i) {
+    return shader::kSwaySlowest + shader::kSwayFaster * double(i % shader::kSwaySpeeds);
+}
+
+double drawn_per_m3(std::size_t count, const ParticleBoxes& boxes, double d) {
+    // The integral of 3 e^2 / (4 e^2) from d to 1, with the fade weights of particles near their reach.
+    const double left = d <= 1 - shader::kReachFade
+                            ? 1 - d - 0.5 * shader::kReachFade / (1 - shader::kReachFade) * d
+                            : (1 - d) * (1 - d) * (1 - shader::kReachFade) / (2 * shader::kReachFade * d);
+    return 0.75 * double(count) * std::max(left, 0.01) / (boxes.depth_m * boxes.depth_m * boxes.height_m);
+}
+
+namespace {
+
 // Returns s0 (see the header), for a particle of the size with the greatest extinction, at the eye.
-double size_at_eye(const Particles& particles, const ParticlePass& pass, const StreakView& view) {
-    const PrecipitationOptions& p = view.options.precipitation;
+double size_at_eye(std::size_t count, const ParticlePass& pass, const PrecipitationOptions& p) {
     double largest = 1;
     for (const CurtainTerm& term : pass.rain) {
         const double d_mm = std::clamp(2 / term.law.slope, kSmallest_mm, kLargest_mm);
-        const double w = 1e-3 * width_mm(particles.kind, d_mm);
-        const double streak = particles.kind == PrecipitationKind::snow
+        const double w = 1e-3 * width_mm(p.kind, d_mm);
+        const double streak = p.kind == PrecipitationKind::snow
                                   ? w
-                                  : std::max(w, fall_speed_m_per_s(particles.kind, d_mm) * p.exposure_s);
+                                  : std::max(w, fall_speed_m_per_s(p.kind, d_mm) * p.exposure_s);
         const double stands_for =
-            real_per_drawn(term.law, d_mm) / drawn_per_m3(particles.size(), pass.boxes, 0);
-        const double shadow = p.visibility * stands_for * 1e-6 * shadow_mm2(particles.kind, d_mm);
+            real_per_drawn(term.law, d_mm) / drawn_per_m3(count, pass.boxes, 0);
+        const double shadow = p.visibility * stands_for * 1e-6 * shadow_mm2(p.kind, d_mm);
         largest = std::max(largest, std::sqrt(shadow / (kOpacityAtEye * w * streak)));
     }
-    return std::min(largest, kMostSize[int(particles.kind)]);
+    return std::min(largest, kMostSize[int(p.kind)]);
 }
 
 }  // namespace
 
-double drawn_per_m3(std::size_t count, const ParticleBoxes& boxes, double d) {
-    // The integral of 3 e^2 / (4 e^2) from d to 1, with the fade weights of particles near their reach.
-    const double left = d <= 1 - kFadeFraction
-                            ? 1 - d - 0.5 * kFadeFraction / (1 - kFadeFraction) * d
-                            : (1 - d) * (1 - d) * (1 - kFadeFraction) / (2 * kFadeFraction * d);
-    return 0.75 * double(count) * std::max(left, 0.01) / (boxes.depth_m * boxes.depth_m * boxes.height_m);
+PassShape pass_shape(std::size_t count, const ParticlePass& pass, const PrecipitationOptions& p, const Vec3& eye_m) {
+    PassShape shape;
+    if (pass.far) {
+        const Vec2 way{pass.container.nearest.x - eye_m.x, pass.container.nearest.y - eye_m.y};
+        const double length = flat_length(way.x, way.y);
+        if (length > 0) shape.ahead = way / length;
+    }
+    shape.size = size_at_eye(count, pass, p);
+    shape.lit_m = {pass.container.nearest.x, pass.container.nearest.y, pass.boxes.centre_z_m};
+    return shape;
 }
 
 std::vector<Streak> streaks_of(const Particles& particles, const ParticlePass& pass, const StreakView& view,
                                const Picture& picture) {
-    Pass shared{particles,
-                pass,
-                view,
-                pixels_per_unit(view.options.camera, view.camera),
-                1,
-                1,
-                particles.kind == PrecipitationKind::snow};
-    if (pass.far) {
-        const Vec2 way{pass.container.nearest.x - view.camera.position_m.x,
-                       pass.container.nearest.y - view.camera.position_m.y};
-        const double length = flat_length(way.x, way.y);
-        if (length > 0) shared.ahead = way / length;
-    }
-    shared.size = size_at_eye(particles, pass, view);
-    shared.sunlight = double(
-        sunlight_at(picture, {pass.container.nearest.x, pass.container.nearest.y, pass.boxes.centre_z_m}));
+    const PassShape shape =
+        pass_shape(particles.size(), pass, view.options.precipitation, view.camera.position_m);
+    const Pass shared{particles,
+                      pass,
+                      view,
+                      pixels_per_unit(view.options.camera, view.camera),
+                      shape.size,
+                      double(sunlight_at(picture, shape.lit_m)),
+                      particles.kind == PrecipitationKind::snow,
+                      shape.ahead};
     const std::size_t chunks = (particles.size() + kChunk - 1) / kChunk;
     std::vector<std::vector<Streak>> parts(chunks);
     tbb::parallel_for(std::size_t(0), chunks, [&](std::size_t chunk) {

@@ -72,6 +72,19 @@ std::vector<ParticlePass> particle_passes(const RenderOptions& options, const Ca
 // particles fade in over the last fifth of their reach.
 double drawn_per_m3(std::size_t count, const ParticleBoxes& boxes, double d);
 
+// What all particles of a pass have in common.
+struct PassShape {
+    double size = 1;    // s0
+    Vec2 ahead{1, 0};   // far: from the eye to the container, unit
+    Vec3 lit_m{};       // the place whose sunlight they have
+};
+// Returns it for `count` particles and an eye.
+PassShape pass_shape(std::size_t count, const ParticlePass& pass, const PrecipitationOptions& precipitation,
+                     const Vec3& eye_m);
+
+// Returns how fast flake i turns in its circle, rad/s.
+double sway_per_s(std::size_t i);
+
 struct StreakView {
     const RenderOptions& options;          // with the camera at the frame's time
     CameraFrame camera, opening, closing;  // in the middle, at the begin and at the end of the exposure

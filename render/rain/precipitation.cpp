@@ -13,6 +13,7 @@
 #include "render/image/overlay.h"
 #include "render/rain/drop_sizes.h"
 #include "render/rain/particle_streaks.h"
+#include "render/rain/rain_frame.h"
 #include "render/rain/precipitation_light.h"
 #include "render/rain/rain_shafts.h"
 
@@ -50,7 +51,7 @@ std::vector<ParticlePass> particle_passes(const RenderOptions& options, const Ca
     std::vector<CurtainTerm> near, far;
     std::vector<RainContainer> outside;
     for (const RainCurtain& curtain : weather.curtains) {
-        if (!(curtain.base_m > curtain.ground_m) || !(curtain.rate_mm_per_h > 0)) continue;
+        if (!falls(curtain)) continue;
         const CurtainTerm term{&curtain, size_law(p.kind, p.intensity_scale * curtain.rate_mm_per_h)};
         const RainContainer at = rain_container(curtain, camera, p.margin_m, far_depth);
         if (at.near) {
@@ -113,29 +114,36 @@ const Particles& PrecipitationPainter::particles(PrecipitationKind kind, std::ui
     return *particles_;
 }
 
+std::optional<RainFrame> rain_frame(const Picture& picture, const RenderOptions& options, const Weather& weather,
+                                    double time_s) {
+    const PrecipitationOptions& p = options.precipitation;
+    if (!p.enabled || weather.curtains.empty()) return {};
+    check(p);
+    RainFrame frame;
+    frame.options = options;
+    frame.options.camera = camera_at(options.camera, time_s);
+    frame.camera = camera_frame(frame.options.camera);
+    frame.opening = camera_frame(camera_at(options.camera, time_s - 0.5 * p.exposure_s));
+    frame.closing = camera_frame(camera_at(options.camera, time_s + 0.5 * p.exposure_s));
+    frame.light = precipitation_light(picture, frame.options, time_s);
+    frame.time_s = time_s;
+    if (p.particles == 0 || p.visibility <= 0) return frame;
+    frame.particles = std::size_t(std::ceil(kMadePerDrawn * p.particles));
+    frame.passes = particle_passes(frame.options, frame.camera, weather, time_s);
+    return frame;
+}
+
 void PrecipitationPainter::draw(Picture& picture, const RenderOptions& options, const Weather& weather,
                                 double time_s) {
     streaks_ = 0;
-    const PrecipitationOptions& p = options.precipitation;
-    if (!p.enabled || weather.curtains.empty()) return;
-    check(p);
-    RenderOptions now = options;
-    now.camera = camera_at(options.camera, time_s);
-    const CameraFrame camera = camera_frame(now.camera);
-    const PrecipitationLight light = precipitation_light(picture, now, time_s);
-    draw_shafts(picture, now, camera, weather.curtains, light, time_s, weather.seed);
-    if (p.particles == 0 || p.visibility <= 0) return;
-    const auto count = std::size_t(std::ceil(kMadePerDrawn * p.particles));
-    const Particles& all = particles(p.kind, weather.seed, count);
-    StreakView view{now,
-                    camera,
-                    camera_frame(camera_at(options.camera, time_s - 0.5 * p.exposure_s)),
-                    camera_frame(camera_at(options.camera, time_s + 0.5 * p.exposure_s)),
-                    light,
-                    weather.wind_x_m_per_s,
-                    weather.wind_y_m_per_s,
-                    time_s};
-    for (const ParticlePass& pass : particle_passes(now, camera, weather, time_s)) {
+    const std::optional<RainFrame> frame = rain_frame(picture, options, weather, time_s);
+    if (!frame) return;
+    draw_shafts(picture, frame->options, frame->camera, weather.curtains, frame->light, time_s, weather.seed);
+    if (frame->particles == 0) return;
+    const Particles& all = particles(options.precipitation.kind, weather.seed, frame->particles);
+    const StreakView view{frame->options, frame->camera,          frame->opening,         frame->closing,
+                          frame->light,   weather.wind_x_m_per_s, weather.wind_y_m_per_s, time_s};
+    for (const ParticlePass& pass : frame->passes) {
         const std::vector<Streak> streaks = streaks_of(all, pass, view, picture);
         draw_streaks(picture, streaks);
         streaks_ += streaks.size();

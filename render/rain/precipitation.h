@@ -3,8 +3,8 @@
 
 // Rain and snow in a finished picture (P, S): shafts below distant clouds (rain_shafts.h), and particles near
 // the eye as streaks or flakes (particles.h, overlay.h). What is drawn is a function of options,
-// weather and time alone, and lies over the picture by its depth and transmittance: the same code for all
-// ways of drawing clouds, far rain behind nearer clouds.
+// weather and time alone, and lies over the picture by its depth and transmittance, far rain behind nearer clouds. The
+// back-end `vulkan` draws it on the device (render/vulkan/device_rain.h), the others with PrecipitationPainter.
 //
 // An area that contains the eye has its particles around the eye. When the eye leaves it they stay at the
 // perimeter and fade with the distance, while the larger particles of far rain appear between ground and
@@ -28,6 +28,13 @@ struct Weather {
     std::vector<RainCurtain> curtains;
     double wind_x_m_per_s = 0, wind_y_m_per_s = 0;  // near the ground, times PrecipitationOptions::wind_drift
     double carried_x_m = 0, carried_y_m = 0;        // displacement of the air since time 0, likewise
+};
+
+// The rain of one picture.
+struct Rainfall {
+    RenderOptions options;  // know the camera's path
+    Weather weather;
+    double time_s = 0;
 };
 
 // Draws precipitation; caches the particles from frame to frame. Not thread-safe.

@@ -5,6 +5,7 @@
 
 #include "render/image/picture.h"
 #include "render/options/options.h"
+#include "render/shared/rain.h"
 
 namespace nephos {
 
@@ -39,7 +40,7 @@ float sunlight_at(const Picture& picture, const Vec3& place_m);
 
 // Phase function of particles: the fraction kForwardFraction is Henyey-Greenstein with g = 0.85 for drops and
 // 0.6 for flakes, the rest isotropic. Drops have their bows beside it (rainbow.h).
-inline constexpr double kForwardFraction = 0.8;
+using shader::kForwardFraction;
 double forward_g(PrecipitationKind kind);
 
 // Returns the radiance of a particle, or of an opaque curtain of particles, along a unit ray; `sunlight`

@@ -37,6 +37,11 @@ struct RainCurtain {
     std::shared_ptr<const CloudBases> cloud{};
 };
 
+// Returns whether rain falls in a curtain.
+inline bool falls(const RainCurtain& curtain) {
+    return curtain.base_m > curtain.ground_m && curtain.rate_mm_per_h > 0;
+}
+
 // Returns the cloud from which the rain at a place fell: its water (0..1) and its base. Without RainCurtain::cloud all the
 // water at base_m.
 CloudBases::Column cloud_above(const RainCurtain& curtain, const Vec3& place_m);

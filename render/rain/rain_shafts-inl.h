@@ -163,13 +163,13 @@ HWY_INLINE void march(const ShaftPass& p, MetCurtains& met, const Floats3& ray, 
     }
 }
 
-// The displacements (kShaftOffset) of the pixels of a row.
+// The displacements (shader::kShaftOffsetX) of the pixels of a row.
 HWY_INLINE Floats shaft_offsets(std::size_t x, std::size_t y) {
     const Lanes d;
     const hn::RebindToUnsigned<Lanes> du;
-    const auto first = hn::Set(du, std::uint32_t(x) * kShaftOffset[0] + std::uint32_t(y) * kShaftOffset[1]);
-    const auto sum = hn::Add(first, hn::Mul(hn::Iota(du, 0), hn::Set(du, kShaftOffset[0])));
-    const auto mixed = hn::ShiftRight<8>(hn::Mul(hn::ShiftRight<8>(sum), hn::Set(du, kShaftOffset[2])));
+    const auto first = hn::Set(du, std::uint32_t(x) * shader::kShaftOffsetX + std::uint32_t(y) * shader::kShaftOffsetY);
+    const auto sum = hn::Add(first, hn::Mul(hn::Iota(du, 0), hn::Set(du, shader::kShaftOffsetX)));
+    const auto mixed = hn::ShiftRight<8>(hn::Mul(hn::ShiftRight<8>(sum), hn::Set(du, shader::kShaftOffsetMix)));
     const Floats fraction = hn::ConvertTo(d, hn::BitCast(hn::RebindToSigned<Lanes>(), mixed));
     return hn::MulAdd(set(0x1p-25f), fraction, set(0.25f));
 }

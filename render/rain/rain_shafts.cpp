@@ -172,29 +172,36 @@ std::vector<std::uint8_t> shaft_noise(std::uint64_t seed) {
     return values;
 }
 
-void draw_shafts(Picture& picture, const RenderOptions& options, const CameraFrame& camera,
-                 std::span<const RainCurtain> curtains, const PrecipitationLight& light, double time_s,
-                 std::uint64_t seed) {
+ShaftPass shaft_pass(const Picture& picture, const RenderOptions& options, const CameraFrame& camera,
+                     std::span<const RainCurtain> curtains, const PrecipitationLight& light, double time_s) {
     const PrecipitationOptions& p = options.precipitation;
-    if (p.shafts <= 0) return;
     ShaftPass pass;
     for (const RainCurtain& c : curtains)
-        if (c.base_m > c.ground_m && c.rate_mm_per_h > 0)
-            pass.curtains.push_back(seen_curtain(c, p, camera.position_m, time_s));
-    if (pass.curtains.empty()) return;
+        if (falls(c)) pass.curtains.push_back(seen_curtain(c, p, camera.position_m, time_s));
     pass.forward = floats(camera.forward);
     pass.right = floats(camera.half_width * camera.right);
     pass.up = floats(camera.half_height * camera.up);
     pass.width = std::size_t(picture.width);
     pass.column = 2 / float(options.camera.width);
     pass.row = 2 / float(options.camera.height);
-    pass.noise = corners(shaft_noise(seed));
     pass.softness = p.edge > 0 ? float(std::max(p.edge, kShaftSoftest)) : 0.0f;
     pass.fray = float(kShaftFray * p.shaft_texture);
     pass.contrast = float(p.shaft_texture);
     pass.evaporation = float(p.evaporation);
     pass.clear_m = p.particles > 0 ? float(p.depth_m) : 0.0f;
     set_light(pass, picture, light, air_of(picture, options), camera.position_m);
+    return pass;
+}
+
+std::vector<std::uint32_t> shaft_noise_cells(std::uint64_t seed) { return corners(shaft_noise(seed)); }
+
+void draw_shafts(Picture& picture, const RenderOptions& options, const CameraFrame& camera,
+                 std::span<const RainCurtain> curtains, const PrecipitationLight& light, double time_s,
+                 std::uint64_t seed) {
+    if (options.precipitation.shafts <= 0) return;
+    ShaftPass pass = shaft_pass(picture, options, camera, curtains, light, time_s);
+    if (pass.curtains.empty()) return;
+    pass.noise = shaft_noise_cells(seed);
     tbb::parallel_for(std::size_t(0), std::size_t(picture.height), [&](std::size_t y) {
         HWY_DYNAMIC_DISPATCH(draw_shaft_row)(pass, y, picture);
     });

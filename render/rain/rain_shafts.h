@@ -34,21 +34,17 @@
 #include "render/options/options.h"
 #include "render/rain/precipitation_light.h"
 #include "render/rain/rain_container.h"
+#include "render/shared/rain.h"
 
 namespace nephos {
 
-inline constexpr int kShaftSteps = 24;
-inline constexpr float kShaftLeastSeen = 1.0f / 4096;
-inline constexpr int kShaftStepsPerLight =
-    3;  // three steps have light and falls (f) of the one in their middle
-inline constexpr float kShaftTopFade = 0.15f;    // fraction of the height over which a curtain fades in
-inline constexpr float kShaftCloudFade = 0.04f;  // likewise below the base of a cloud that is known
+using shader::kShaftCloudFade, shader::kShaftLeastSeen, shader::kShaftNoiseBits, shader::kShaftNoiseSide,
+    shader::kShaftSteps, shader::kShaftStepsPerLight, shader::kShaftTopFade;
 inline constexpr double kShaftSoftest = 0.6;     // least softness of a curtain with an edge
 inline constexpr double kShaftFray = 0.4;        // fraction of the radius by which its outline varies
 inline constexpr double kShaftFall_m_per_s = 6;  // of the texture
 inline constexpr float kShaftFallCell_m = 700;   // height of the denser falls
 inline constexpr std::uint64_t kShaftsOwn = 61;  // number of curtains with different textures
-inline constexpr int kShaftNoiseBits = 7, kShaftNoiseSide = 1 << kShaftNoiseBits;
 
 // Returns the extinction per metre of rain of a rate, seen from afar: twice the geometric cross-section.
 double rain_extinction_per_m(PrecipitationKind kind, double rate_mm_per_h);
@@ -58,9 +54,6 @@ double left_of_rain(double height, double evaporation);
 
 // Returns the width of a curtain's strands, metres.
 double shaft_grain_m(const RainCurtain& curtain);
-// Offset of a pixel's steps, 0.25..0.75 of a step: interleaved gradient noise (Jimenez 2014),
-// frac(53 frac(0.06711056 x + 0.00583715 y)), in integers.
-inline constexpr std::uint32_t kShaftOffset[3] = {288'237'660, 25'070'368, 13'564};
 // Returns the lattice of the noise, kShaftNoiseSide^2 values, x fastest, periodic.
 std::vector<std::uint8_t> shaft_noise(std::uint64_t seed);
 

@@ -40,7 +40,7 @@ struct ShaftPass {
     std::size_t width = 0;
     float column = 0, row = 0;  // of a pixel, in halves of the picture
     std::vector<SeenCurtain> curtains;
-    std::vector<std::uint32_t> noise;  // of each cell its four corners, a byte each
+    std::vector<std::uint32_t> noise;  // shaft_noise_cells()
     float softness = 0, fray = 0, contrast = 0, evaporation = 0;
     float clear_m = 0;  // around the eye, where particles are drawn instead
     glm::vec3 by_sky{}, by_sunlit_ground{}, by_scattered_sun{}, sun{}, to_sun{}, flash{}, flash_m{}, air_per_m{};
@@ -55,5 +55,13 @@ struct ShaftPass {
     float shadow_u = 0, shadow_v = 0;  // the eye in the map, 0..1
     glm::vec3 to_u{}, to_v{};
 };
+
+// Returns the parameters of a picture's rain, without its noise: of the curtains in which rain falls, in their order. It
+// refers to the picture and the curtains' clouds.
+ShaftPass shaft_pass(const Picture& picture, const RenderOptions& options, const CameraFrame& camera,
+                     std::span<const RainCurtain> curtains, const PrecipitationLight& light, double time_s);
+
+// Returns the noise of a seed: of each cell of its lattice the four corners, a byte each.
+std::vector<std::uint32_t> shaft_noise_cells(std::uint64_t seed);
 
 }  // namespace nephos

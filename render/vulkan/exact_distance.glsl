@@ -2,25 +2,7 @@
 // Offsets and distances from the eye in sums of two floats, some 45 bits: the host's doubles and these give the same
 // float but for one of some 10^6, and so the same order. Sums and products without loss: T. J. Dekker, "A floating-point
 // technique for extending the available precision", 1971; D. E. Knuth, The Art of Computer Programming 2, 4.2.2.
-
-struct Pair {
-    float high, low;
-};
-
-Pair exact_sum(float a, float b) {
-    precise float sum = a + b;
-    precise float part = sum - a;
-    precise float rest = (a - (sum - part)) + (b - part);
-    return Pair(sum, rest);
-}
-
-// Upper and lower half of a number's bits.
-Pair halves(float a) {
-    precise float c = 4097.0 * a;
-    precise float high = c - (c - a);
-    precise float low = a - high;
-    return Pair(high, low);
-}
+#include "render/vulkan/pairs.glsl"
 
 Pair exact_square(float a) {
     Pair half_ = halves(a);

@@ -41,12 +41,18 @@ shader::ShadeStep shade_step(const ShadeCache& shade, int shadow_size) {
 VulkanBackend::VulkanBackend(GpuDevice device) : scene_(std::move(device)) {
     scene_.wait_idle = [this] {
         if (view_) view_->flush();
+        if (rain_) rain_->flush();  // reads the shadow map
     };
 }
 
 BinnedView& VulkanBackend::view() {
     if (!view_) view_.emplace(scene_.gpu, scene_.unused(), scene_.clamped, scene_.white_beyond);
     return *view_;
+}
+
+DeviceRain& VulkanBackend::rain() {
+    if (!rain_) rain_.emplace(scene_.gpu, scene_.white_beyond);
+    return *rain_;
 }
 
 void VulkanBackend::check_limits(const FrameDescription& frame) {
@@ -79,6 +85,7 @@ void VulkanBackend::light(LitCloud& cloud, StageTimes& times) {
     if (cloud.lit_on_host()) return complete_light_on_host(cloud, times);
     use_cloud(cloud);
     held_light_ = 0;
+    if (rain_) rain_->flush();
     view().light(cloud.frame, cloud.shadow_size, largest_radius(cloud.cloud), scene_.light_tiles());
     cloud.all_known = true;
     cloud.note_light_pass();
@@ -156,10 +163,20 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
     return true;
 }
 
-void VulkanBackend::finish(Picture& picture) { view().finish(picture); }
+bool VulkanBackend::begin_rain(const RainFrame& frame, const Weather& weather, const LitCloud* cloud, Picture& picture) {
+    const GpuImage* const map =
+        cloud != nullptr && !cloud->cloud.visible.empty() && scene_.has_map(*cloud) ? &scene_.shadow_map(*cloud) : nullptr;
+    return rain().begin(frame, weather, map, picture);
+}
+
+void VulkanBackend::finish(Picture& picture) {
+    if (view_) view_->finish(picture);
+    if (rain_) rain_->finish(picture);
+}
 
 void VulkanBackend::abandon(const Picture& picture) noexcept {
     if (view_) view_->abandon(picture);
+    if (rain_) rain_->abandon(picture);
 }
 
 }  // namespace nephos

@@ -9,6 +9,7 @@
 
 #include "render/gpu/gpu_scene.h"
 #include "render/vulkan/binned_view.h"
+#include "render/vulkan/device_rain.h"
 
 namespace nephos {
 
@@ -27,12 +28,15 @@ class VulkanBackend : public Backend {
     bool begin(const FrameDescription& frame, Picture& picture) override;
     void finish(Picture& picture) override;
     void abandon(const Picture& picture) noexcept override;
+    bool begin_rain(const RainFrame& rain, const Weather& weather, const LitCloud* cloud, Picture& picture) override;
     bool marches() const override { return true; }
     std::vector<std::string> validation_messages() const override { return scene_.validation_messages(); }
 
     GpuScene& scene() { return scene_; }
-    // Returns the view, created by the first call.
+    // Return the view and the rain, created by the first call.
     BinnedView& view();
+    DeviceRain& rain();
+    const DeviceRain* rain_if_created() const { return rain_ ? &*rain_ : nullptr; }
     const BinnedView* view_if_created() const { return view_ ? &*view_ : nullptr; }
 
   private:
@@ -46,8 +50,9 @@ class VulkanBackend : public Backend {
     Version held_metaballs_ = 0;    // LitCloud::metaballs of what is in view_
     Version held_light_ = 0;        // LitCloud::light of the light of these
     Version depths_on_device_ = 0;  // LitCloud::light of the depths that view_ computed
-    // Last, and so the first to go: it waits for frames in flight, which read the others.
+    // Last, and so the first to go: they wait for frames in flight, which read the others.
     std::optional<BinnedView> view_;
+    std::optional<DeviceRain> rain_;  // with the first rain
 };
 
 }  // namespace nephos

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <system_error>
 
@@ -188,6 +189,7 @@ class FrameExporter {
             throw Error(ErrorCode::io,
                         frame.file.string() + ": has another box than the first file of its sequence");
         const ExportSource source{frame.file, file_digest(frame.file)};
+        require_unchanged(frame);
         std::map<VoxelType, EncodedVolume> encoded;
         std::vector<Volume> levels;
         for (const ExportFormat format : all_formats(options_)) {
@@ -271,9 +273,7 @@ void write_weather(const ExportOptions& options, ExportList& list) {
     const RunListing run = read_run(options.source);
     std::vector<WeatherSummary> frames;
     for (const ListedFrame& frame : run.frames) {
-        const bool wanted = frame.number >= options.first_frame && frame.number <= options.last_frame &&
-                            (frame.number - options.first_frame) % options.frame_step == 0;
-        if (wanted) frames.push_back(summarise(run, frame));
+        if (is_wanted(options, frame.number, 1)) frames.push_back(summarise(run, frame));
     }
     const auto write = [&](WeatherFormat format, std::span<const std::byte> content) {
         for (const NamedWeather& named : weather_formats()) {
@@ -409,6 +409,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
         }
         write_texts(options, sequences, figures, list);
         lock.require_in_place();
+        std::ranges::move(list.remove_left_over(), std::back_inserter(notes));
         list.write(true);
     } catch (...) {
         // What failed in a folder that is gone failed for that; and nothing may be listed in a new one of its name.

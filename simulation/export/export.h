@@ -42,7 +42,9 @@ struct ExportOptions {
     std::optional<VoxelType> type;       // none: that of the format (format_type())
     bool range_auto = false;  // divide by the largest value of the sequence, so that all codes are used
     std::optional<std::string> layer;  // a name, or "each"; none: all layers together
-    int first_frame = 1, last_frame = 1 << 30, frame_step = 1;
+    // Frames by their numbers, each `frame_step`-th from `first_frame` on; 0: from the first that there is, of a run 1, of files
+    // the number of the first one.
+    int first_frame = 0, last_frame = 1 << 30, frame_step = 1;
     VolumeLayout layout;
     std::optional<double> voxel_m;  // edge of a voxel; a multiple of the grid's
     std::optional<int> largest_side;

@@ -210,6 +210,29 @@ void ExportList::write(bool complete) const {
                      std::string_view(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"));
 }
 
+std::vector<std::string> ExportList::remove_left_over() const {
+    std::set<std::string> listed;
+    for (const ExportedFile& file : files_) listed.insert(file.path.generic_string());
+    std::size_t removed = 0;
+    std::vector<std::string> notes;
+    for (const auto& [name, file] : earlier_) {
+        std::error_code error;
+        const std::filesystem::path path = folder_ / name;
+        if (listed.contains(name) || !std::filesystem::is_regular_file(path, error)) continue;
+        if (!(file_digest(path) == file.digest)) {
+            notes.push_back(path.string() + ": is of an earlier export and was changed since: it stays");
+            continue;
+        }
+        std::filesystem::remove(path, error);
+        if (error) throw Error(ErrorCode::io, path.string() + ": cannot remove: " + error.message());
+        ++removed;
+    }
+    if (removed > 0)
+        notes.push_back(folder_.string() + ": " + std::to_string(removed) +
+                        " files of an earlier export, which this one does not make, were removed");
+    return notes;
+}
+
 // After a failure, whose message is the one to show.
 void ExportList::write_quietly() const noexcept {
     try {
@@ -235,6 +258,7 @@ ListedExport read_export(const std::filesystem::path& folder) {
     list.half_voxel_shift = options.at("half_voxel_shift").truth();
     list.quantise = NanoQuantise(options.at("quantise").integer(0, int(NanoQuantise::fp16)));
     list.grid = options.at("grid").text();
+    list.brick_edge = int(options.at("brick_edge").integer(1, kMostMultiple));
     return list;
 }
 

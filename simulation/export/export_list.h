@@ -34,6 +34,9 @@ class ExportList {
     bool keep(const std::string& name, const ExportSource& source);
     // Lists a file that was written.
     void add(const std::string& name, const ExportSource& source, std::string_view format);
+    // Removes what an earlier export wrote and this one does not list, so that the folder holds what was asked for last; but not
+    // what somebody changed since. Returns what is to be told of that. Throws Error(io).
+    std::vector<std::string> remove_left_over() const;
     // Writes the list. Throws Error(io).
     void write(bool complete) const;
     void write_quietly() const noexcept;
@@ -66,13 +69,18 @@ struct ListedExport {
     std::map<std::string, VoxelType> types;  // by the name of a format
     bool half_voxel_shift = false;
     NanoQuantise quantise = NanoQuantise::none;
+    int brick_edge = 32;
     std::string grid;
 };
+
+// Returns the sequence of a listed file by its name; null where it is of none.
+const ListedExport::Sequence* sequence_of(const ListedExport& list, const std::string& name);
 
 // Throws Error(io) naming the file, and the value that is not what it must be.
 ListedExport read_export(const std::filesystem::path& folder);
 
-// Compares the sidecars with the list; none where there is no sidecar.
+// Compares the sidecars with the list, and with the box of their sources, where those are there and unchanged; none where there is
+// no sidecar. That of a complete export of volumes must be there.
 std::optional<Check> check_sidecars(const std::filesystem::path& folder, const ListedExport& list);
 
 // Returns the grid half a voxel towards -x, -y and -z, sharing its voxels.

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -25,14 +26,16 @@ std::pair<std::string, std::optional<int>> split_name(const std::filesystem::pat
     const std::string digits = at == stem.npos ? stem : stem.substr(at + 1);
     int number = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-    if (digits.empty() || error != std::errc() || number < 1) return {stem, {}};
+    if (digits.empty() || error != std::errc() || number < 0) return {stem, {}};
     std::string name = stem.substr(0, stem.size() - digits.size());
     while (!name.empty() && (name.back() == '_' || name.back() == '.' || name.back() == '-')) name.pop_back();
     return {name.empty() ? "volume" : name, number};
 }
 
-bool is_wanted(const ExportOptions& o, int number) {
-    return number >= o.first_frame && number <= o.last_frame && (number - o.first_frame) % o.frame_step == 0;
+FileStamp stamp_of(const std::filesystem::path& file) {
+    struct stat found {};
+    if (::stat(file.c_str(), &found) != 0) return {};
+    return {found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec, found.st_ino};
 }
 
 std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> layer,
@@ -67,9 +70,10 @@ ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& r
     s.name = run.scene.name + (layer ? "_" + *layer : "");
     s.layer = layer.value_or("");
     for (const ListedFrame& frame : run.frames) {
-        if (!is_wanted(options, frame.number)) continue;
-        s.frames.push_back({density_file(run, frame, layer), frame.number, frame.time_s,
-                            utc_at(run.scene.georeference, frame.time_s)});
+        if (!is_wanted(options, frame.number, 1)) continue;
+        const std::filesystem::path file = density_file(run, frame, layer);
+        s.frames.push_back(
+            {file, frame.number, frame.time_s, utc_at(run.scene.georeference, frame.time_s), stamp_of(file)});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, run.folder.string() + ": has no frame of this range");
     read_first(options, s);
@@ -82,6 +86,7 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
     const std::vector<std::filesystem::path> files =
         options.files.empty() ? std::vector{options.source} : options.files;
     s.name = split_name(files.front()).first;
+    const int least = split_name(files.front()).second.value_or(1);
     int next = 1;
     for (const std::filesystem::path& file : files) {
         const int number =
@@ -90,7 +95,7 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
             throw Error(ErrorCode::usage,
                         file.string() + ": its number does not follow that of the file before");
         next = number + 1;
-        if (is_wanted(options, number)) s.frames.push_back({file, number, 0, {}});
+        if (is_wanted(options, number, least)) s.frames.push_back({file, number, 0, {}, stamp_of(file)});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, "no file has a number of this range");
     read_first(options, s);
@@ -238,6 +243,11 @@ void choose_layout(const ExportOptions& options, ExportSequence& s, std::vector<
 
 }  // namespace
 
+bool is_wanted(const ExportOptions& o, int number, int least) {
+    const int first = o.first_frame > 0 ? o.first_frame : least;
+    return number >= first && number <= o.last_frame && (number - first) % o.frame_step == 0;
+}
+
 bool is_dense(ExportFormat format) {
     return format != ExportFormat::nvdb && format != ExportFormat::usd && format != ExportFormat::vdb;
 }
@@ -287,6 +297,11 @@ std::vector<ExportFormat> all_formats(const ExportOptions& options) {
     std::sort(formats.begin(), formats.end());
     formats.erase(std::unique(formats.begin(), formats.end()), formats.end());
     return formats;
+}
+
+void require_unchanged(const SourceFrame& frame) {
+    if (stamp_of(frame.file) == frame.stamp) return;
+    throw Error(ErrorCode::io, frame.file.string() + ": was changed while it was exported: export it again");
 }
 
 std::string frame_name(const ExportSequence& sequence, int number, ExportFormat format) {

@@ -16,11 +16,19 @@
 
 namespace nephos {
 
+// What changes with the content of a file: bytes, time of the last change, number of the inode.
+struct FileStamp {
+    std::int64_t bytes = -1, changed_s = 0, changed_ns = 0;
+    std::uint64_t inode = 0;
+    bool operator==(const FileStamp&) const = default;
+};
+
 struct SourceFrame {
     std::filesystem::path file;
     int number = 1;
     double time_s = 0;
-    std::string utc;  // empty without a start
+    std::string utc;    // empty without a start
+    FileStamp stamp{};  // when it was listed, before its voxels were read
 };
 
 // A moment and the wind by height at it.
@@ -58,6 +66,12 @@ std::vector<std::array<int, 3>> level_sizes(const ExportSequence& sequence, Expo
 std::uint64_t dense_bytes(const ExportOptions& options, const ExportSequence& sequence, ExportFormat format);
 // USD refers to VDB files, which are written with it. Sorted, each once.
 std::vector<ExportFormat> all_formats(const ExportOptions& options);
+
+// Returns whether a frame is to be exported; the source begins with the number `least`.
+bool is_wanted(const ExportOptions& options, int number, int least);
+
+// Throws Error(io) when a file is not what it was when it was listed: its voxels may then be of another content than its digest.
+void require_unchanged(const SourceFrame& frame);
 
 // Returns the name of a file: NAME_0001.EXT.
 std::string frame_name(const ExportSequence& sequence, int number, ExportFormat format);

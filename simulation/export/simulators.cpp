@@ -200,11 +200,11 @@ WeatherLayer fog_layer(const WeatherSummary& weather) {
     return fog;
 }
 
-WeatherLayer cloud_layer(const WeatherSummary& weather, const LayerSummary& s, int id) {
+WeatherLayer cloud_layer(const WeatherSummary& weather, const LayerSummary& s, int id, bool lightning) {
     WeatherLayer cloud;
     cloud.id = id;
     cloud.enabled = true;
-    cloud.lightning = weather.thunder && id == 1;
+    cloud.lightning = lightning;
     cloud.type = cigi_type(s.genus);
     cloud.coverage = s.columns.cover;
     cloud.base_m = s.columns.cloud_base_m + weather.elevation_m;
@@ -216,6 +216,12 @@ WeatherLayer cloud_layer(const WeatherSummary& weather, const LayerSummary& s, i
 }
 
 }  // namespace
+
+// The layer that lightning comes from, counted from 1: the lowest cumulonimbus, or the lowest layer where none is named.
+static int thundery_layer(const std::vector<LayerSummary>& clouds) {
+    const auto found = std::ranges::find(clouds, "Cb", &LayerSummary::genus);
+    return found == clouds.end() ? 1 : int(found - clouds.begin()) + 1;
+}
 
 std::vector<std::byte> cigi_packets(const WeatherSummary& weather) {
     ByteWriter w;
@@ -229,13 +235,13 @@ std::vector<std::byte> cigi_packets(const WeatherSummary& weather) {
                regional ? RegionState::active : RegionState::destroyed);
     put_layer(w, fog_layer(weather), regional);
     const std::vector<LayerSummary> clouds = three_layers(weather.layers);
+    const int thundery = weather.thunder ? thundery_layer(clouds) : 0;
     for (int id = 1; id <= kCloudLayers; ++id) {
-        WeatherLayer none;
-        none.id = id;
-        put_layer(
-            w,
-            std::size_t(id) <= clouds.size() ? cloud_layer(weather, clouds[std::size_t(id) - 1], id) : none,
-            regional);
+        WeatherLayer layer;
+        layer.id = id;
+        if (std::size_t(id) <= clouds.size())
+            layer = cloud_layer(weather, clouds[std::size_t(id) - 1], id, id == thundery);
+        put_layer(w, layer, regional);
     }
     return w.take();
 }

@@ -267,7 +267,9 @@ std::vector<LayerSummary> three_layers(std::vector<LayerSummary> layers) {
         LayerSummary& low = layers[nearest];
         const LayerSummary& high = layers[nearest + 1];
         low.name += "+" + high.name;
-        if (high.columns.cover > low.columns.cover) low.genus = high.genus;
+        // Of the larger cover, but a cumulonimbus is what a pilot must know of.
+        if (high.genus == "Cb" || (low.genus != "Cb" && high.columns.cover > low.columns.cover))
+            low.genus = high.genus;
         // Of clouds that lie over each other at random.
         low.columns.cover = 1 - (1 - low.columns.cover) * (1 - high.columns.cover);
         low.columns.top_m = std::max(low.columns.top_m, high.columns.top_m);

@@ -33,6 +33,11 @@ FUSED = 1 << 9 | 1 << 8 | 1 << 7  # have fused multiply-add, which refined densi
 TARGETS = {"scalar": SCALAR, "sse4": SSE4, "avx2": AVX2, "avx512": AVX512}
 
 
+# glibc then takes the versions of its functions (exp, sin, pow ...) that old processors get: some round otherwise.
+OLD_LIBRARY = "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX512F,-AVX512VL,-AVX512BW,-AVX,-SSE4_1,-SSE4_2"
+SINES = "import math; print(sum(math.sin(n) * math.exp(n % 7) for n in range(100000)))"
+
+
 class Runner:
     """Runs scenes in a temporary folder by one program."""
 
@@ -40,8 +45,10 @@ class Runner:
         self.program, self.folder = str(program), pathlib.Path(folder)
         self.fused = True  # whether the last program that was told its targets had fused multiply-add
 
-    def run(self, scene, out, *more, targets=None, threads=2):
+    def run(self, scene, out, *more, targets=None, threads=2, old_library=False):
         environment = dict(os.environ, LC_ALL="C.UTF-8")
+        if old_library:
+            environment["GLIBC_TUNABLES"] = OLD_LIBRARY
         log = self.folder / "targets.log"
         if targets is not None:
             log.unlink(missing_ok=True)
@@ -141,6 +148,9 @@ class Matrix(unittest.TestCase):
             for target, threads in combinations:
                 with self.subTest(scene=scene.stem, target=target, threads=threads):
                     self.compare(runner, scene, reference, targets=TARGETS[target], threads=threads)
+            with self.subTest(scene=scene.stem, library="old"):
+                type(self).runs += 1
+                self.assertEqual(promised(scene, runner.hashes(scene, old_library=True)), self.golden[scene.stem])
             split = draw.randrange(1, len(steps_of(reference)) - 1)
             with self.subTest(scene=scene.stem, resumed_at=split):
                 self.compare(runner, scene, reference, split=split, targets=AVX512, threads=draw.choice(THREADS))
@@ -155,6 +165,14 @@ class Matrix(unittest.TestCase):
         self.assertGreater(len(last), 0.9 * golden_scenes.COUNT)
         moving = [lines for lines in self.golden.values() if len({line.split()[-1] for line in lines}) > len(lines) // 2]
         self.assertGreater(len(moving), 0.9 * golden_scenes.COUNT)
+
+    def test_the_old_library_rounds_otherwise(self):
+        """Else the runs with it would show nothing."""
+        sums = [subprocess.run(["/usr/bin/python3", "-c", SINES], check=True, capture_output=True, text=True,
+                               env={**os.environ, **more}).stdout for more in ({}, {"GLIBC_TUNABLES": OLD_LIBRARY})]
+        if "fma" not in pathlib.Path("/proc/cpuinfo").read_text():
+            self.skipTest("this processor has no fused multiply-add: the library is the old one anyway")
+        self.assertNotEqual(*sums)
 
     def test_another_seed_is_noticed(self):
         scene = self.scenes[0]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records of a sweep: lines as they are, and with the hash at the end of each made right.
+// Records of a sweep: lines as they are, and with the version and with the hash at the end of each made right.
 
 #include <fstream>
 
@@ -13,6 +13,16 @@ using namespace nephos;
 
 constexpr std::string_view kHashField = ",\"xxh3\":\"";
 
+constexpr std::string_view kVersion = "\"statistics_version\":";
+
+// The line with the version of this program's statistics, so that inputs outlive one.
+std::string of_this_version(std::string line) {
+    const std::size_t at = line.find(kVersion);
+    if (at == line.npos) return line;
+    const std::size_t begin = at + kVersion.size(), end = line.find_first_not_of("0123456789", begin);
+    return line.substr(0, begin) + std::to_string(NEPHOS_STATISTICS_VERSION) + (end == line.npos ? "" : line.substr(end));
+}
+
 // Each line that has a hash, with the hash of what stands before it.
 std::string sealed(std::string_view text) {
     std::string out;
@@ -20,8 +30,8 @@ std::string sealed(std::string_view text) {
         const std::size_t end = std::min(text.find('\n'), text.size());
         const std::string_view line = text.substr(0, end);
         if (const std::size_t field = line.rfind(kHashField); field != line.npos) {
-            const std::string_view body = line.substr(0, field);
-            out += std::string(body) + std::string(kHashField) + hash_of_bytes(std::as_bytes(std::span(body))).hex() + "\"}";
+            const std::string body = of_this_version(std::string(line.substr(0, field)));
+            out += body + std::string(kHashField) + hash_of_bytes(std::as_bytes(std::span(body))).hex() + "\"}";
         } else {
             out += line;
         }
@@ -47,7 +57,11 @@ class Study {
     }
     void read(std::string_view lines) const {
         std::ofstream(folder_ / "shards/0000-of-0001.jsonl", std::ios::binary) << lines;
-        fuzz::accepts([&] { Records::read({folder_}); });
+        fuzz::accepts([&] {
+            const Records records = Records::read({folder_});
+            if (!records.problems().empty()) throw Error(ErrorCode::io, records.problems().front());
+            if (records.size() == 0) throw Error(ErrorCode::io, "no record");
+        });
     }
 
   private:

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // TARGET [--mutations N] FILE|FOLDER...: calls a target with each file and with N damaged copies of it, the same at each
-// call: a run of the targets where there is no libFuzzer. Prints how many inputs there were; a fault ends it by a signal.
+// call: a run of the targets where there is no libFuzzer. Prints how many inputs there were; a fault ends it by a signal. Fails
+// with status 1 and the name of each whole file that no reader of the target accepts: damage to it would be found at the same
+// place as the fault that it has. Only files below a folder `inputs` are held to that: scenes may need others beside them.
 
 #include <algorithm>
 #include <cstring>
@@ -62,7 +64,7 @@ void call(const std::string& bytes) {
 
 int main(int count, char** arguments) {
     unsigned mutations = 0;
-    std::size_t inputs = 0;
+    std::size_t inputs = 0, refused = 0;
     for (int n = 1; n < count; ++n) {
         if (std::strcmp(arguments[n], "--mutations") == 0 && n + 1 < count) {
             mutations = unsigned(std::strtoul(arguments[++n], nullptr, 10));
@@ -70,12 +72,17 @@ int main(int count, char** arguments) {
         }
         for (const fs::path& path : files_in(arguments[n])) {
             const std::string bytes = content(path);
+            nephos::fuzz::accepted = 0;
             call(bytes);
+            if (nephos::fuzz::accepted == 0 && path.string().find("/inputs/") != std::string::npos) {
+                std::fprintf(stderr, "%s: no reader accepts it\n", path.c_str());
+                ++refused;
+            }
             std::mt19937 random(unsigned(bytes.size()));
             for (unsigned m = 0; m < mutations; ++m) call(damaged(bytes, random));
             inputs += 1 + mutations;
         }
     }
     std::printf("%zu inputs\n", inputs);
-    return inputs == 0 ? 2 : 0;
+    return inputs == 0 ? 2 : refused > 0 ? 1 : 0;
 }

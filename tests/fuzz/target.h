@@ -29,11 +29,15 @@ inline void require(bool holds, const char* property) {
     std::abort();
 }
 
+// Calls of accepts() that returned true: an input that no reader takes tests only the first checks of all of them.
+inline std::size_t accepted = 0;
+
 // Calls a reader; returns true when it accepted its input, false on an Error.
 template <class Read>
 bool accepts(const Read& read) {
     try {
         read();
+        ++accepted;
         return true;
     } catch (const Error& error) {
         require(error.what()[0] != '\0', "an error has a message");

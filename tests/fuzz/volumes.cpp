@@ -24,6 +24,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     fuzz::accepts([&] { check(read_ktx2(file.path())); });
     fuzz::accepts([&] { check(read_vti(file.path())); });
     fuzz::accepts([&] { check(read_bricks(file.path())); });
+    fuzz::accepts([&] { check(read_slices(file.path(), 4, 3, 3, 2)); });
     fuzz::accepts([&] { check(read_raw(file.path(), VoxelType::r8, 8, 4, 4, 3)); });
     return 0;
 }

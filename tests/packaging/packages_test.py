@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Debian packages: `cpack -G DEB` makes them, dpkg installs them into a root that holds the files of their dependencies
-alone, and there the command works. The Python module is installed there, and tried from the build tree (python.*).
+alone, and there the command and the Python module work.
 
     BUILD=build/release SOURCE=. /usr/bin/python3 tests/packaging/packages_test.py       as root, for chroot"""
 
@@ -28,6 +28,18 @@ field.background = {hum = 0.15, act = 0.01, ext = 0.05}
 frames = {per_second = 1, time_scale = 15}
 camera = {width = 64, height = 48}
 sun.shadow_map_size = 64
+"""
+
+# The installed module steps the scene to the hashes that the command prints, and gives its bits as arrays of NumPy.
+MODULE = """\
+import pathlib
+import nephos
+print(pathlib.Path(nephos.__file__).parent)
+simulation = nephos.Simulation(nephos.Scene("/tmp/small.toml"))
+print(0, simulation.hash())
+for step in range(1, 4):
+    print(step, simulation.step().hash())
+assert simulation.cld().shape == (12, 24, 32) and simulation.density().values.max() > 0
 """
 
 
@@ -148,6 +160,15 @@ class Packages(unittest.TestCase):
                 continue
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(path, target, follow_symlinks=False)
+        # Links that the packages' scripts make, which are not run here: NumPy's BLAS is an alternative.
+        for link in pathlib.Path("/etc/alternatives").iterdir():
+            administration = pathlib.Path("/var/lib/dpkg/alternatives") / link.name
+            if not administration.exists() or os.readlink(link) not in paths:
+                continue
+            for each in (link, pathlib.Path(administration.read_text().splitlines()[1])):
+                target = root / str(each).lstrip("/")
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(each, target, follow_symlinks=False)
         (root / "var/lib/dpkg/status").write_text(output("dpkg-query", "-s", *closure))
         subprocess.run(["ldconfig", "-r", root], check=True)
         return root
@@ -165,7 +186,10 @@ class Packages(unittest.TestCase):
         (root / "tmp/small.toml").write_text(SCENE)
 
         def inside(*command):
-            return output("/usr/sbin/chroot", root, *command, env={"PATH": "/usr/bin", "LC_ALL": "C.UTF-8", "HOME": "/tmp"})
+            result = subprocess.run(["/usr/sbin/chroot", root, *command], capture_output=True, text=True,
+                                    env={"PATH": "/usr/bin", "LC_ALL": "C.UTF-8", "HOME": "/tmp"})
+            self.assertEqual(result.returncode, 0, result.stderr)
+            return result.stdout
         self.assertRegex(inside("nephos", "--version"), r"^nephos \d")
         inside("nephos", "run", "/tmp/small.toml", "--splatting", "cpu", "--quiet", "--out", "/tmp/out")
         self.assertTrue(list((root / "tmp/out/frames").glob("*.png")))
@@ -173,6 +197,10 @@ class Packages(unittest.TestCase):
         inside("nephos", "validate", "/usr/share/nephos/scenes/cumulus.toml")
         here = output(BUILD / "bin/nephos", "hash", root / "tmp/small.toml")
         self.assertEqual(inside("nephos", "hash", "/tmp/small.toml"), here)
+        (root / "tmp/module.py").write_text(MODULE)
+        module, *steps = inside("python3", "-B", "/tmp/module.py").splitlines()
+        self.assertEqual(module, "/usr/lib/python3/dist-packages/nephos")
+        self.assertEqual(steps, here.splitlines())
         output("dpkg", f"--root={root}", "--force-script-chrootless", "--remove", "python3-nephos", "nephos")
         self.assertFalse((root / "usr/bin/nephos").exists())
 

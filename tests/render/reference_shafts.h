@@ -171,10 +171,10 @@ inline void march(const Shafts& s, const Vec3& ray, double offset, const Stretch
     }
 }
 
-// By how much of a step the steps of a pixel are displaced: see kShaftOffset.
+// By how much of a step the steps of a pixel are displaced: see shader::kShaftOffsetX.
 inline double shaft_offset(std::uint32_t x, std::uint32_t y) {
-    const std::uint32_t sum = x * kShaftOffset[0] + y * kShaftOffset[1];
-    return 0.25 + 0.5 * double((sum >> 8) * kShaftOffset[2] >> 8) / (1 << 24);
+    const std::uint32_t sum = x * shader::kShaftOffsetX + y * shader::kShaftOffsetY;
+    return 0.25 + 0.5 * double((sum >> 8) * shader::kShaftOffsetMix >> 8) / (1 << 24);
 }
 
 // A pixel of the picture with the shafts over it.

@@ -86,6 +86,13 @@ std::size_t RendererTestAccess::light_passes(const Renderer& renderer) {
     return renderer.impl_->lit.light_passes;
 }
 
+std::size_t RendererTestAccess::rains_on_device(const Renderer& renderer) {
+    const VulkanBackend* const backend = vulkan(renderer);
+    return backend != nullptr && backend->rain_if_created() != nullptr ? backend->rain_if_created()->pictures : 0;
+}
+
+void RendererTestAccess::limit_rain_rows(Renderer& renderer, int rows) { vulkan(renderer)->rain().most_rows = rows; }
+
 std::uint64_t RendererTestAccess::uploaded_bytes(const Renderer& renderer) {
     return device(renderer).uploaded_bytes;
 }

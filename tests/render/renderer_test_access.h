@@ -19,6 +19,10 @@ class VulkanBackend;
 struct RendererTestAccess {
     // Returns the number of light passes so far.
     static std::size_t light_passes(const Renderer& renderer);
+    // Returns the pictures whose rain the device has drawn so far.
+    static std::size_t rains_on_device(const Renderer& renderer);
+    // Fewer rows of a picture than the device draws rain over at once.
+    static void limit_rain_rows(Renderer& renderer, int rows);
     // Returns the bytes uploaded to the device so far.
     static std::uint64_t uploaded_bytes(const Renderer& renderer);
     // Simulates a card whose memory the processor reads slowly; to be called before the first picture.

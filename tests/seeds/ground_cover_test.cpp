@@ -210,6 +210,20 @@ TEST(DriftTest, IsTheWindOnTheWayDown) {
     EXPECT_EQ(drift_m(wind, 0, 1100, 100, std::numeric_limits<double>::infinity()).x, 0);
 }
 
+// The cloud is 2000 m farther after those 200 s.
+TEST(DriftTest, LagsBehindACloudThatIsCarried) {
+    Wind wind;
+    wind.keyframes = {{0, {{0, {0, 0}}, {600, {0, 0}}, {600.001, {10, -4}}}}};
+    const Vec2 lag = lag_m(wind, 0, 1100, 100, 5);
+    EXPECT_NEAR(lag.x, -1000, 1e-6);
+    EXPECT_NEAR(lag.y, 400, 1e-6);
+    EXPECT_EQ(lag_m(wind, 0, 100, 1100, 5).x, 0);
+    EXPECT_EQ(lag_m(wind, 0, 1100, 100, std::numeric_limits<double>::infinity()).x, 0);
+    Wind even;  // all move alike
+    even.keyframes = {{0, {{0, {7, 3}}}}};
+    EXPECT_NEAR(lag_m(even, 0, 1100, 100, 5).x, 0, 1e-9);
+}
+
 TEST(GroundCoverTest, RefusesBadOptions) {
     const auto refused = [](auto change) {
         GroundCoverOptions options;

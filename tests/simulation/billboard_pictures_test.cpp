@@ -9,9 +9,11 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "core/error.h"
 #include "render/image/image_file.h"
@@ -73,6 +75,44 @@ TEST(AlphaImages, OthersAreRefusedByName) {
     const fs::path half = folder.path() / "half.png";
     std::ofstream(half, std::ios::binary) << cut.substr(0, cut.size() / 2);
     EXPECT_NE(message_of(half).find("half.png: cannot be read as PNG"), std::string::npos) << message_of(half);
+}
+
+TEST(AlphaImages, PipesAndFoldersAreNotWaitedFor) {
+    const TemporaryFolder folder;
+    const fs::path pipe = folder.path() / "pipe.png";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    for (const auto& [path, reason] : {std::pair(pipe, "is not a regular file"), std::pair(folder.path(), "is a folder")}) {
+        EXPECT_NE(message_of(path).find(reason), std::string::npos) << message_of(path);
+        for (const auto& read : {+[](const fs::path& each) { read_png(each); },
+                                 +[](const fs::path& each) { read_png_exposure(each); }}) {
+            try {
+                read(path);
+                ADD_FAILURE() << path;
+            } catch (const Error& error) {
+                EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
+            }
+        }
+    }
+}
+
+// A head alone that claims 8192 x 8192 pixels would take 256 MiB before libpng finds the file's end.
+TEST(AlphaImages, AHeadThatClaimsMoreThanTheFileHoldsIsRefusedAtOnce) {
+    const TemporaryFolder folder;
+    const fs::path small = folder.path() / "small.png", lies = folder.path() / "lies.png";
+    write_png(small, Rgb8Image{2, 2, std::vector<std::uint8_t>(12, 200)}, {}, {});
+    std::ifstream stream(small, std::ios::binary);
+    std::string bytes(std::istreambuf_iterator<char>(stream), {});
+    const std::string size{0, 0, 0x20, 0, 0, 0, 0x20, 0};  // from byte 16 on; the checksum of the head follows at 29
+    bytes.replace(16, size.size(), size);
+    std::uint32_t sum = ~0u;  // of PNG, annex D
+    for (std::size_t n = 12; n < 29; ++n) {
+        sum ^= std::uint8_t(bytes[n]);
+        for (int bit = 0; bit < 8; ++bit) sum = sum & 1 ? 0xEDB88320u ^ sum >> 1 : sum >> 1;
+    }
+    for (int n = 0; n < 4; ++n) bytes[std::size_t(29 + n)] = char(~sum >> (24 - 8 * n));
+    std::ofstream(lies, std::ios::binary) << bytes;
+    EXPECT_NE(message_of(lies).find("its head claims 8192 x 8192 pixels, more than"), std::string::npos) << message_of(lies);
+    EXPECT_THROW(read_png(lies), Error);
 }
 
 // Quarters of an image by their opacity, all of one brightness.

@@ -69,7 +69,7 @@ TEST(SimulationGroundTest, IsTheCoverUnderTheScenesRain) {
     ASSERT_EQ(int(found.maps.size()), frame_count(scene));
     GroundCover cover(scene.ground_cover, scene.render.precipitation.kind, whole_world(scene));
     SkySimulation sky(sky_options(scene, 0));
-    const Vec2 drift = drift_m(scene.automaton.wind, 0, 1000, 0, scene.ground_cover.fall_speed_m_per_s);
+    const Vec2 drift = lag_m(scene.automaton.wind, 0, 1000, 0, scene.ground_cover.fall_speed_m_per_s);
     std::vector<GroundCoverMap> maps;
     for (std::uint64_t step = 0; step <= scene.steps; ++step) {
         const std::vector<RainArea> areas =

@@ -227,6 +227,20 @@ TEST(Tracks, LifetimesAreThoseOfKaplanAndMeier) {
     EXPECT_EQ(more.deaths, 6u);
     // n = 6, 5 and 1 at the ages 1, 2 and 4.
     EXPECT_DOUBLE_EQ(more.mean, 1 + 5.0 / 6 + 2 * (5.0 / 6 * 4 / 5));
+    EXPECT_TRUE(more.restricted == false && s.restricted == false);
+    // One death has no scatter, and none no mean; the greatest age of a track that goes on restricts the mean.
+    const TrackStatistics one = track_statistics(std::vector{track(5, 7, TrackEnd::death)}, 0, 20);
+    EXPECT_DOUBLE_EQ(one.mean, 3);
+    EXPECT_TRUE(std::isnan(one.mean_error));
+    const std::vector<Track> going{track(5, 30, TrackEnd::last_state), track(6, 30, TrackEnd::last_state)};
+    const TrackStatistics alive = track_statistics(going, 0, 20);
+    EXPECT_EQ(alive.tracks, 2u);
+    EXPECT_TRUE(std::isnan(alive.mean) && std::isnan(alive.mean_error) && alive.restricted);
+    const std::vector<Track> some{track(5, 6, TrackEnd::death), track(5, 7, TrackEnd::death), going[0]};
+    const TrackStatistics restricted = track_statistics(some, 0, 20);
+    EXPECT_TRUE(restricted.restricted);
+    EXPECT_DOUBLE_EQ(restricted.mean, 2 + 2.0 / 3 + 12.0 / 3);
+    EXPECT_GT(restricted.mean_error, 0);
     const TrackStatistics none = track_statistics({}, 0, 20);
     EXPECT_TRUE(none.tracks == 0 && std::isnan(none.mean) && std::isnan(none.median));
 }

@@ -5,6 +5,7 @@ import json
 import os
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -190,6 +191,62 @@ class Export(Case):
         self.refused(2, "export", "run", "--to", "raw", "--type", "r8", "-o", "out", says="other options")
         self.refused(2, "export", "run", "--to", "raw", "-o", "run", says="not empty")
 
+    def test_a_second_export_leaves_what_was_asked_for_last(self):
+        """Frames that it does not make are of the first, and in no list: they go, but for what somebody changed."""
+        folder = self.export("out", "--to", "raw", "--to", "layers")
+        (folder / "placed_0004.raw").write_bytes(b"mine")
+        said = self.call("export", "run", "--to", "raw", "--frames", "1", "-o", "out").stderr
+        self.assertIn("out: 4 files of an earlier export, which this one does not make, were removed", said)
+        self.assertIn("placed_0004.raw: is of an earlier export and was changed since: it stays", said)
+        self.assertEqual({path.name for path in folder.iterdir()},
+                         {"README.txt", "export.json", "placed.volume.json", "placed_0001.raw", "placed_0004.raw"})
+        self.assertIn("listed nowhere", self.call("verify", "out", status=1).stdout)
+        (folder / "placed_0004.raw").unlink()
+        self.call("verify", "out")
+
+    def test_sequences_are_numbered_from_0(self):
+        """As most programs number them."""
+        for number in range(3):
+            shutil.copy(self.folder / f"run/density/placed_000{number + 1}.vdb", self.folder / f"smoke_000{number}.vdb")
+        files = [f"smoke_000{number}.vdb" for number in range(3)]
+        def names(*arguments):
+            self.call("export", *files, "--to", "raw", "-o", "from0", *arguments)
+            self.call("verify", "from0")
+            return sorted(path.name for path in (self.folder / "from0").glob("*.raw"))
+        self.assertEqual(names(), ["smoke_0000.raw", "smoke_0001.raw", "smoke_0002.raw"])
+        sidecar = json.loads((self.folder / "from0/smoke.volume.json").read_text())
+        self.assertEqual((sidecar["first"], [frame["number"] for frame in sidecar["frames"]]), (0, [0, 1, 2]))
+        self.assertEqual(names("--frames", "..2/2"), ["smoke_0000.raw", "smoke_0002.raw"])
+        self.assertEqual(names("--frames", "1.."), ["smoke_0001.raw", "smoke_0002.raw"])
+        self.assertEqual(names("--frames", "0"), ["smoke_0000.raw"])
+        folder = self.export("run2", "--to", "raw", "--frames", "..5/2")
+        self.assertEqual(sorted(path.name for path in folder.glob("*.raw")), [f"placed_000{n}.raw" for n in (1, 3, 5)])
+
+    def test_verify_says_what_it_did_not_look_at(self):
+        for codes, most in (("fp8", 0.5 / 255), ("fp16", 0.5 / 65535)):
+            folder = self.export(codes, "--to", "nvdb", "--quantise", codes)
+            checks = {check["name"]: check for check in json.loads(self.call("verify", folder, "--json").stdout)["checks"]}
+            self.assertIn("5 files read back", checks["nvdb"]["detail"])
+            self.assertLess(0, checks["nvdb"]["figures"]["largest"])
+            self.assertLessEqual(checks["nvdb"]["figures"]["largest"], most * 1.01 + 1e-6)
+        # Another frame under its name, with the checksum made right.
+        shutil.copy(folder / "placed_0005.nvdb", folder / "placed_0002.nvdb")
+        self.relisted(folder, "placed_0002.nvdb")
+        self.assertIn("FAIL  nvdb", self.call("verify", folder, status=1).stdout)
+        # No sidecar of volumes.
+        folder = self.export("alone", "--to", "raw")
+        listing = json.loads((folder / "export.json").read_text())
+        listing["files"] = [file for file in listing["files"] if not file["path"].endswith(".volume.json")]
+        (folder / "export.json").write_text(json.dumps(listing))
+        (folder / "placed.volume.json").unlink()
+        self.assertIn("lists volumes, but no placed.volume.json", self.call("verify", folder, status=1).stdout)
+        # No source.
+        folder = self.export("orphan", "--to", "raw")
+        shutil.rmtree(self.folder / "run")
+        said = self.call("verify", folder).stdout
+        self.assertIn("5 of 5 files were not compared: their sources are not there any more; only checksums and sidecars", said)
+        self.assertIn("box, axes and levels were not compared", said)
+
     def test_a_changed_source_is_exported_anew(self):
         """Files of an export know their source: what another run of the same scene left is not taken over."""
         folder = self.export("out", "--to", "raw")
@@ -229,6 +286,25 @@ class Export(Case):
         self.assertEqual(process.returncode, 3, error)
         self.assertIn("was removed or renamed while the export was writing", error)
         self.assertFalse((out / "export.json").exists())
+
+    def test_a_source_that_changes_meanwhile(self):
+        """Its voxels may be of the old file and its checksum of the new one: it is not listed."""
+        self.call("run", self.scene, "--no-render", "--out", "long", "--set", "time.steps=600")
+        process = subprocess.Popen([NEPHOS, "export", "long", "--to", "vti", "--zip", "-o", "raced"], cwd=self.folder,
+                                   env=self.environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        while process.poll() is None and not (self.folder / "raced/tiny_0003.vti").exists():
+            time.sleep(0.001)
+        process.send_signal(signal.SIGSTOP)
+        last = max((self.folder / "long/density").glob("*.vdb"))
+        self.assertFalse((self.folder / "raced" / last.with_suffix(".vti").name).exists())
+        shutil.copy(self.folder / "long/density/tiny_0001.vdb", last)
+        process.send_signal(signal.SIGCONT)
+        error = process.communicate(timeout=120)[1]
+        self.assertEqual(process.returncode, 3, error)
+        self.assertIn(f"{last.name}: was changed while it was exported", error)
+        listing = json.loads((self.folder / "raced/export.json").read_text())
+        self.assertNotIn(last.with_suffix(".vti").name, [file["path"] for file in listing["files"]])
+        self.call("export", "long", "--to", "vti", "--zip", "-o", "raced")
 
     def test_lists_that_were_tampered_with(self):
         """Each wrong value of export.json is named with its file, its place and what was expected; nothing crashes."""
@@ -285,15 +361,27 @@ class Export(Case):
         (folder / "export.json").write_text(json.dumps(listing))
 
     def test_sidecars_that_lie(self):
-        folder = self.export("out", "--to", "raw", "--type", "r8")
+        folder = self.export("out", "--to", "raw", "--type", "r8", "--mips", "--pad", "64")
         whole = json.loads((folder / "placed.volume.json").read_text())
         def without(key):
             return {name: value for name, value in whole.items() if name != key}
+        def with_format(**values):
+            return dict(whole, formats=[dict(whole["formats"][0], **values)])
+        levels = whole["formats"][0]["levels"]
+        self.assertGreater(len(levels), 1)
         for sidecar, says in ((without("scale"), "`scale` is missing"), (dict(whole, scale="1"), '`scale` is "1": expected a number'),
                               (dict(whole, scale=0.5), "expected 1, as in export.json"), (dict(whole, count=6), "`count` is 6: expected 5"),
                               (dict(whole, name="other"), 'expected "placed"'), (dict(whole, frames=3), "`frames` is 3: expected a list"),
                               (dict(whole, formats=[dict(whole["formats"][0], type="r16")]), '`formats[0].type` is "r16": expected "r8"'),
-                              (dict(whole, frames=[dict(whole["frames"][0], number=9)] * 5), "there is no placed_0009.raw")):
+                              (dict(whole, frames=[dict(whole["frames"][0], number=9)] * 5), "there is no placed_0009.raw"),
+                              (dict(whole, size=[1, 2, 3]), "`size` is"), (without("min_m"), "`min_m` is missing"),
+                              (dict(whole, voxel_size_m=[x * 2 for x in whole["voxel_size_m"]]), "`voxel_size_m` is"),
+                              (dict(whole, min_m=[0.5, 0, 0]), "`min_m` is"), (dict(whole, period_m=[12345, None, None]), "`period_m` is"),
+                              (dict(whole, axes=["north", "east", "up"]), "`axes` is"), (dict(whole, border=1), "`border` is"),
+                              (dict(whole, handedness="left"), '`handedness` is "left": expected "right"'),
+                              (dict(whole, extinction_per_m=1e-3), "`extinction_per_m` is"), (dict(whole, half_voxel_shift=True), "no such value"),
+                              (with_format(levels=levels[:1]), "`formats[0].levels` is"),
+                              (with_format(levels=[dict(levels[0], offset=4), *levels[1:]]), "`formats[0].levels` is")):
             with self.subTest(says=says):
                 (folder / "placed.volume.json").write_text(json.dumps(sidecar))
                 self.relisted(folder, "placed.volume.json")

@@ -210,6 +210,19 @@ class Weather(Case):
         self.assertAlmostEqual(self.number(fog, "Visibility"), 350, delta=1)
         self.assertIn("Destroyed", re.search(r"Region State: ([^\n]*)", said)[1])
 
+    def test_cigi_lightning_comes_from_the_cumulonimbus(self):
+        """Not from the scattered cumulus below it; and a merge of layers keeps the cumulonimbus."""
+        for number, (groups, layer) in enumerate((("SCT010 BKN045CB", 2), ("FEW010 SCT020CB BKN030 OVC090", 2))):
+            with self.subTest(groups=groups):
+                self.call("metar", f"EDDM 211350Z 24010KT 9999 TS {groups} 20/15 Q1013", "-o", f"ts{number}.toml", "-q")
+                self.call("run", f"ts{number}.toml", "--no-render", "--frames", "1", "--out", f"ts{number}", "-q")
+                packets, said = self.cigi(f"ts{number}", f"thunder{number}")
+                clouds = [fields for name, fields in packets.items() if "Cloud" in name]
+                found = [n + 1 for n, fields in enumerate(clouds)
+                         if next(value for name, value in fields.items() if "Lightning" in name) == "1"]
+                self.assertEqual(found, [layer], said[:6000])
+                self.assertIn("umulonimbus", next(value for name, value in clouds[layer - 1].items() if "Cloud Type" in name))
+
     def test_heights_above_the_ellipsoid(self):
         """Simulators count from mean sea level: 45 m above the ellipsoid here."""
         heights = {}

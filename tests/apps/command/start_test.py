@@ -74,6 +74,19 @@ class Start(Case):
         # Commands that need none of it go on.
         self.assertEqual(subprocess.run([program, "hash", self.scene], capture_output=True).returncode, 0)
 
+    def test_without_room_for_its_threads_nothing_hangs(self):
+        """Their libraries' own threads would end the process or wait for ever when some cannot be started."""
+        self.call("run", self.scene, "--no-render", "--out", "grids")
+        grid = self.folder / "grids/density/tiny_0001.vdb"
+        statuses = set()
+        for kib in range(90_000, 240_000, 10_000):
+            result = subprocess.run(["sh", "-c", f'ulimit -v {kib}; exec "$@"', "sh", NEPHOS, "info", grid], env=self.environment,
+                                    capture_output=True, text=True, timeout=60)
+            statuses.add(result.returncode)
+            if result.returncode != 0:
+                self.assertRegex(result.stderr, "^error: a part of nephos cannot be loaded: it needs 6 threads")
+        self.assertEqual(statuses, {0, 3})
+
     def test_a_library_without_the_functions_is_another_version(self):
         program, place = self.copied_program()
         source = self.write("empty.c", "int nephos_nothing;\n")

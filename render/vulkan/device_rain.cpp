@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/vulkan/device_rain.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+#include "render/rain/rain_shafts_pass.h"
+
+namespace nephos {
+namespace {
+
+constexpr std::size_t kFramesInFlight = 2;
+
+void copy(const vk::raii::CommandBuffer& commands, const GpuBuffer& from, const GpuBuffer& to,
+          std::size_t bytes) {
+    commands.copyBuffer(*from.buffer, *to.buffer, vk::BufferCopy(0, 0, bytes));
+}
+
+std::size_t groups_of(std::size_t count, std::size_t group) { return (count + group - 1) / group; }
+
+// Makes a buffer at least so large that is written by the processor and copied from.
+void reserve_staging(const GpuDevice& gpu, GpuBuffer& buffer, std::size_t bytes) {
+    if (buffer.bytes >= bytes) return;
+    buffer = {};
+    buffer = create_buffer(gpu, bytes, vk::BufferUsageFlagBits::eTransferSrc, HostAccess::write);
+}
+
+// Uploads data that no shader reads before it is there; not empty, as descriptors need a buffer.
+template <class T>
+void upload_some(const GpuDevice& gpu, GpuBuffer& buffer, std::vector<T> data) {
+    if (data.empty()) data.push_back(T{});
+    upload(gpu, buffer, std::as_bytes(std::span(data)));
+}
+
+}  // namespace
+
+struct DeviceRain::Strip {
+    int width = 0, first_row = 0, rows = 0;
+};
+
+// One picture in flight, or a strip of it.
+struct DeviceRain::Slot {
+    explicit Slot(const GpuDevice& gpu)
+        : sets(gpu),
+          uniforms(create_buffer(gpu, sizeof(shader::RainUniforms), vk::BufferUsageFlagBits::eUniformBuffer,
+                                 HostAccess::write)),
+          fence(gpu.device, vk::FenceCreateInfo()) {
+        const vk::CommandBufferAllocateInfo info(*gpu.pool, vk::CommandBufferLevel::ePrimary, 1);
+        commands = std::move(vk::raii::CommandBuffers(gpu.device, info).front());
+    }
+
+    DescriptorSets sets;
+    GpuBuffer uniforms, passes, bases, ground;  // read by the device
+    GpuBuffer given, given_depths, result;      // copied to and from it
+    vk::raii::CommandBuffer commands{nullptr};
+    vk::raii::Fence fence;
+    bool submitted = false;      // and not known to be done
+    Picture* picture = nullptr;  // whose pixels are not stored yet
+    Strip strip;
+};
+
+DeviceRain::DeviceRain(const GpuDevice& gpu, const vk::raii::Sampler& white_beyond)
+    : gpu_(gpu),
+      white_beyond_(white_beyond),
+      shafts_(create_compute_pipeline(gpu, shaders().rain_shafts_comp)),
+      streaks_of_(create_compute_pipeline(gpu, shaders().rain_streaks_comp)),
+      bands_of_(create_compute_pipeline(gpu, shaders().rain_bands_comp)),
+      tiles_(create_compute_pipeline(gpu, shaders().rain_tiles_comp)) {
+    for (std::size_t n = 0; n < kFramesInFlight; ++n) slots_.push_back(std::make_unique<Slot>(gpu));
+    const std::vector<shader::vec4> nodes = bow_nodes();
+    make_storage(gpu, bow_, sizeof(shader::vec4) * nodes.size());
+    upload_staged(gpu, bow_, std::as_bytes(std::span(nodes)));
+    make_storage(gpu, streaks_, 3 * sizeof(shader::vec4) * shader::kParticlesAtOnce);
+    make_storage(gpu, segment_counts_, sizeof(shader::uint) * shader::kStreakSegments);
+}
+
+DeviceRain::~DeviceRain() {
+    for (const std::unique_ptr<Slot>& slot : slots_)
+        if (slot->picture != nullptr) abandon(*slot->picture);
+}
+
+void DeviceRain::use_particles(PrecipitationKind kind, std::uint64_t seed, std::size_t count) {
+    const Made wanted{kind, seed, count};
+    if (count == 0 || wanted == made_) return;
+    flush();
+    made_ = {};  // until all of it is there
+    const std::vector<shader::RainParticle> all = rain_particles(make_particles(kind, seed, count));
+    reserve_storage(gpu_, particles_, sizeof(shader::RainParticle) * all.size());
+    upload_staged(gpu_, particles_, std::as_bytes(std::span(all)));
+    made_ = wanted;
+}
+
+void DeviceRain::use_noise(std::uint64_t seed) {
+    if (noise_seed_ == seed) return;
+    flush();
+    noise_seed_.reset();
+    const std::vector<std::uint32_t> cells = shaft_noise_cells(seed);
+    reserve_storage(gpu_, noise_, sizeof(std::uint32_t) * cells.size());
+    upload_staged(gpu_, noise_, std::as_bytes(std::span(cells)));
+    noise_seed_ = seed;
+}
+
+// A picture without a map has one texel, which is not read.
+void DeviceRain::use_shadow(const Picture& picture) {
+    flush();
+    const std::vector<float> white(1, 1.0f);
+    const bool some = !picture.shadow.empty();
+    const auto size = some ? std::uint32_t(picture.shadow_size) : 1u;
+    if (shadow_.width != size) {
+        shadow_ = {};
+        shadow_ = create_image(gpu_, size, size, 1, vk::Format::eR32Sfloat,
+                               vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst);
+    }
+    upload_image(gpu_, shadow_, std::as_bytes(std::span(some ? picture.shadow : white)));
+}
+
+bool DeviceRain::begin(const RainFrame& rain, const Weather& weather, const GpuImage* shadow_map,
+                       Picture& picture) {
+    std::optional<RainData> data = rain_data(rain, weather, picture);
+    if (!data) return false;
+    if (sizeof(shader::RainParticle) * rain.particles > gpu_.properties.limits.maxStorageBufferRange)
+        return false;
+    if (!data->shafts && data->passes.empty()) return true;  // nothing falls in view
+    ++pictures;
+    use_noise(weather.seed);
+    use_particles(rain.options.precipitation.kind, weather.seed, rain.particles);
+    if (particles_.bytes == 0) make_storage(gpu_, particles_, sizeof(shader::RainParticle));
+    if (shadow_map == nullptr) use_shadow(picture);
+    data->uniforms.extra.y = shadow_map != nullptr || !picture.shadow.empty() ? 1.0f : 0.0f;
+    const std::size_t row_bytes = 4 * sizeof(float) * std::size_t(picture.width);
+    const int rows = int(std::clamp<std::size_t>(gpu_.properties.limits.maxStorageBufferRange / row_bytes, 1,
+                                                 std::size_t(most_rows)));
+    for (int row = 0; row < picture.height; row += rows) {
+        Slot& slot = *slots_[next_];
+        next_ = (next_ + 1) % slots_.size();
+        complete(slot);
+        upload_frame(*data, picture, slot);
+        begin_strip(*data, shadow_map != nullptr ? *shadow_map : shadow_,
+                    {picture.width, row, std::min(rows, picture.height - row)}, picture, slot);
+    }
+    return true;
+}
+
+void DeviceRain::upload_frame(const RainData& data, const Picture& picture, Slot& slot) {
+    write(gpu_, slot.uniforms, data.uniforms);
+    upload_some(gpu_, slot.passes, data.passes);
+    upload_some(gpu_, slot.bases, data.bases);
+    upload_some(gpu_, slot.ground, picture.ground_light.words);
+}
+
+void DeviceRain::begin_strip(const RainData& data, const GpuImage& shadow_map, const Strip& strip,
+                             Picture& picture, Slot& slot) {
+    const std::size_t width = std::size_t(picture.width), pixels = width * std::size_t(strip.rows),
+                      first = width * std::size_t(strip.first_row);
+    const std::size_t bands = groups_of(std::size_t(strip.rows), shader::kStreakBandRows);
+    reserve_staging(gpu_, slot.given, 4 * sizeof(float) * pixels);
+    reserve_staging(gpu_, slot.given_depths, sizeof(float) * pixels);
+    reserve_copy(gpu_, slot.result, 4 * sizeof(float) * pixels);
+    if (pixels_.bytes < 4 * sizeof(float) * pixels || band_counts_.bytes < sizeof(shader::uint) * bands) {
+        flush();
+        reserve_storage(gpu_, pixels_, 4 * sizeof(float) * pixels);
+        reserve_storage(gpu_, depths_, sizeof(float) * pixels);
+        reserve_storage(gpu_, band_counts_, sizeof(shader::uint) * bands);
+        reserve_storage(gpu_, band_lists_, sizeof(shader::uint) * bands * shader::kParticlesAtOnce);
+    }
+    float* const to = reinterpret_cast<float*>(slot.given.mapped);
+    tbb::parallel_for(0, strip.rows, [&](int row) {
+        for (std::size_t i = std::size_t(row) * width; i < std::size_t(row + 1) * width; ++i) {
+            std::copy_n(&picture.beauty[3 * (first + i)], 3, to + 4 * i);
+            to[4 * i + 3] = picture.transmittance[first + i];
+        }
+    });
+    std::memcpy(slot.given_depths.mapped, &picture.depth_m[first], sizeof(float) * pixels);
+    gpu_.uploaded_bytes += 5 * sizeof(float) * pixels;
+    slot.strip = strip;
+    slot.sets.reset();
+    slot.commands.reset();
+    slot.commands.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
+    record(slot.commands, data, shadow_map, slot);
+    slot.commands.end();
+    gpu_.device.resetFences(*slot.fence);
+    const vk::CommandBufferSubmitInfo commands(*slot.commands);
+    vk::SubmitInfo2 info;
+    info.setCommandBufferInfos(commands);
+    gpu_.queue.submit2(info, *slot.fence);
+    slot.submitted = true;
+    slot.picture = &picture;
+}
+
+void DeviceRain::record(const vk::raii::CommandBuffer& commands, const RainData& data,
+                        const GpuImage& shadow_map, Slot& slot) {
+    const std::size_t width = std::size_t(slot.strip.width), rows = std::size_t(slot.strip.rows),
+                      pixels = width * rows;
+    const std::size_t tiles_x = groups_of(width, shader::kRainTile);
+    shader::RainStep step{};
+    step.y = shader::uint(slot.strip.first_row);
+    step.width = shader::uint(width);
+    step.height = shader::uint(rows);
+    step.tiles_x = shader::uint(tiles_x);
+    step.tiles = shader::uint(tiles_x * groups_of(rows, shader::kRainTile));
+    step.bands = shader::uint(groups_of(rows, shader::kStreakBandRows));
+    const Resources resources{{0, slot.uniforms}, {1, shadow_map, white_beyond_},
+                              {2, slot.bases},    {3, slot.ground},
+                              {4, bow_},          {5, noise_},
+                              {6, pixels_},       {7, depths_},
+                              {8, slot.passes},   {9, particles_},
+                              {10, streaks_},     {11, segment_counts_},
+                              {12, band_counts_}, {13, band_lists_}};
+    full_barrier(commands);  // the picture before has the same buffers
+    copy(commands, slot.given, pixels_, 4 * sizeof(float) * pixels);
+    copy(commands, slot.given_depths, depths_, sizeof(float) * pixels);
+    full_barrier(commands);
+    if (data.shafts) {
+        begin_compute(commands, shafts_, slot.sets.fill(shafts_, resources), step);
+        dispatch_groups(commands, step.tiles);
+        compute_barrier(commands);
+    }
+    for (std::size_t n = 0; n < data.passes.size(); ++n) {
+        step.pass = shader::uint(n);
+        record_particles(commands, resources, step, slot);
+    }
+    full_barrier(commands);
+    copy(commands, pixels_, slot.result, 4 * sizeof(float) * pixels);
+    buffer_barrier(commands, slot.result, access::copy_to, access::host);
+}
+
+void DeviceRain::record_particles(const vk::raii::CommandBuffer& commands, const Resources& resources,
+                                  shader::RainStep step, Slot& slot) {
+    const vk::DescriptorSet streaks = slot.sets.fill(streaks_of_, resources),
+                            bands = slot.sets.fill(bands_of_, resources),
+                            tiles = slot.sets.fill(tiles_, resources);
+    for (std::size_t first = 0; first < made_.count; first += shader::kParticlesAtOnce) {
+        step.first = shader::uint(first);
+        step.count = shader::uint(std::min<std::size_t>(shader::kParticlesAtOnce, made_.count - first));
+        begin_compute(commands, streaks_of_, streaks, step);
+        dispatch_groups(commands, groups_of(step.count, shader::kStreakSegment));
+        compute_barrier(commands);
+        begin_compute(commands, bands_of_, bands, step);
+        dispatch_groups(commands, step.bands);
+        compute_barrier(commands);
+        begin_compute(commands, tiles_, tiles, step);
+        dispatch_groups(commands, step.tiles);
+        compute_barrier(commands);
+    }
+}
+
+void DeviceRain::wait(Slot& slot) {
+    if (!slot.submitted) return;
+    const vk::Result result = gpu_.device.waitForFences(*slot.fence, VK_TRUE, UINT64_MAX);
+    if (result != vk::Result::eSuccess) fail_gpu("waiting for the device", result);
+    slot.submitted = false;
+}
+
+void DeviceRain::complete(Slot& slot) {
+    wait(slot);
+    if (slot.picture == nullptr) return;
+    Picture& picture = *std::exchange(slot.picture, nullptr);
+    const std::size_t width = std::size_t(picture.width), first = width * std::size_t(slot.strip.first_row);
+    const float* const from = reinterpret_cast<const float*>(slot.result.mapped);
+    tbb::parallel_for(0, slot.strip.rows, [&](int row) {
+        for (std::size_t i = std::size_t(row) * width; i < std::size_t(row + 1) * width; ++i)
+            std::copy_n(from + 4 * i, 3, &picture.beauty[3 * (first + i)]);
+    });
+}
+
+void DeviceRain::finish(const Picture& picture) {
+    for (const std::unique_ptr<Slot>& slot : slots_)
+        if (slot->picture == &picture) complete(*slot);
+}
+
+void DeviceRain::flush() {
+    for (const std::unique_ptr<Slot>& slot : slots_) complete(*slot);
+}
+
+void DeviceRain::abandon(const Picture& picture) noexcept {
+    for (const std::unique_ptr<Slot>& slot : slots_) {
+        if (slot->picture != &picture) continue;
+        slot->picture = nullptr;
+        try {
+            wait(*slot);
+        } catch (...) {  // whoever waits for another picture hears of it
+        }
+    }
+}
+
+}  // namespace nephos
