@@ -265,6 +265,28 @@ class Studies(Case):
             nephos.merge(sweep.folder)
         self.assertEqual(set(nephos.merge(sweep.folder, overwrite=True).runs()["status"]), {"missing"})
 
+    def test_tracks_have_the_numbers_of_the_command(self):
+        scene = nephos.Scene.from_text(NULL_SCENE)
+        axes = {"field.background.ext": [0.05, 0.1]}
+        sweep = nephos.sweep(scene, axes, self.folder / "python", replicates=2, steps=(200, 400), tracks=True, workers=2)
+        self.call("sweep", self.write("null.toml", NULL_SCENE), "--axis", "field.background.ext=0.05,0.1", "--tracks",
+                  "--replicates", "2", "--steps", "200..400", "--out", "command")
+        for name in ("runs.csv", "tracks.csv"):
+            self.assertEqual((sweep.folder / name).read_bytes(), (self.folder / "command" / name).read_bytes(), name)
+        tracks = sweep.tracks()
+        numpy.testing.assert_array_equal(tracks["run"], sweep.runs()["run"])
+        self.assertTrue((tracks["births"] > 100).all() and (tracks["deaths"] > 100).all())
+        self.assertTrue((tracks["censored"] < tracks["tracks"]).all())
+        # Cells of the null scene die with probability ext a step: clouds of one cell live longer where it is smaller, and
+        # none can live for less than a step.
+        means = tracks["track_lifetime_mean_s"]
+        self.assertGreater(means[tracks["field.background.ext"] == 0.05].min(),
+                           means[tracks["field.background.ext"] == 0.1].max())
+        self.assertTrue((tracks["track_lifetime_median_s"] <= tracks["track_age_longest_s"]).all())
+        plain = nephos.sweep(scene, {"field.background.ext": [0.1]}, self.folder / "plain", replicates=1, steps=(200, 400))
+        with self.assertRaisesRegex(nephos.Error, "tracks=True"):
+            plain.tracks()
+
     def test_a_fit_has_the_numbers_of_the_command(self):
         self.write("null.toml", NULL_SCENE)
         path = self.write("fit.toml", """\
