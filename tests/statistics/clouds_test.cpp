@@ -266,7 +266,7 @@ Organisation naive_organisation(const std::vector<ConnectedCloud>& clouds, const
         iorg += double(k) / double(n) * (g - before);
         before = g;
     }
-    return {iorg + 1 - before,
+    return {iorg + (1 - before),
             1000 * double(n) / (columns / 2) * std::exp(logarithms / pairs) / std::hypot(extent.x, extent.y),
             potential / std::sqrt(std::numbers::pi) / pairs};
 }
