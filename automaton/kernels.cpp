@@ -26,10 +26,13 @@ void step_part_target(const StepPlanes& planes, const StepRandom& random, int bz
     constexpr std::size_t kLargePlane = std::size_t{1} << 18;  // words: 2 MiB
     const std::size_t words =
         planes.words_per_row * std::size_t(planes.extent.y) * std::size_t(planes.extent.z);
-    if (quiet && planes.words_per_row % kMaxLanes64 == 0 && words >= kLargePlane) {
-        grow<true>(planes, z0, z1, y0, y1);
+    const bool large = words >= kLargePlane;
+    if (quiet && planes.words_per_row % kMaxLanes64 == 0 && large) {
+        grow<true, true>(planes, z0, z1, y0, y1);
+    } else if (large) {
+        grow<false, true>(planes, z0, z1, y0, y1);
     } else {
-        grow<false>(planes, z0, z1, y0, y1);
+        grow<false, false>(planes, z0, z1, y0, y1);
     }
     if (!quiet) draw_part(planes, random, bz, by_begin, by_end, draw_segment);
 }

@@ -75,6 +75,29 @@ HWY_NOINLINE void run_close(DF d, const SparseJob& job, hn::Mask<DF> close, int 
     }
 }
 
+#if HWY_TARGET <= HWY_AVX2
+// Returns the lanes whose cells, the low 9 bits of `first`, have a bit in `cloud`: looks up the cell's word of 32 cells, in a
+// vector of 16 lanes or two of 8, and moves its bit to the sign.
+template <class DU, class V = hn::Vec<DU>>
+HWY_INLINE hn::Mask<DU> has_cloud(DU du, const CellBits& cloud, V first) {
+    const hn::RebindToSigned<DU> di;
+    const auto* words = reinterpret_cast<const std::uint32_t*>(&cloud[0]);
+    const auto look_up = [&](const std::uint32_t* table, V index) HWY_ATTR {
+        return hn::TableLookupLanes(hn::LoadU(du, table), hn::IndicesFromVec(du, index));
+    };
+    const auto index = hn::ShiftRight<5>(first);
+#if HWY_TARGET <= HWY_AVX3
+    const auto word = look_up(words, hn::And(index, hn::Set(du, 15)));
+#else
+    const auto lane = hn::And(index, hn::Set(du, 7));
+    const auto upper = hn::TestBit(index, hn::Set(du, 8));
+    const auto word = hn::IfThenElse(upper, look_up(words + 8, lane), look_up(words, lane));
+#endif
+    const auto bit = hn::Shl(word, hn::AndNot(first, hn::Set(du, 31)));
+    return hn::RebindMask(du, hn::Lt(hn::BitCast(di, bit), hn::Zero(di)));
+}
+#endif
+
 // Rates of the cells of a vector of events.
 template <class V>
 struct EventRates {
@@ -128,10 +151,9 @@ HWY_INLINE void run_sparse([[maybe_unused]] const Segment& g, const SparseJob& j
     const auto of_hum = hn::Set(du, pack_event(job.block, kHum, 0)),
                of_act = hn::Set(du, pack_event(job.block, kAct, 0)),
                of_ext = hn::Set(du, pack_event(job.block, kExt, 0));
-#if HWY_TARGET <= HWY_AVX3
+#if HWY_TARGET <= HWY_AVX2
     const bool extinguishes = (job.draws & 1u << kExt) != 0;
     const CellBits& cloud = extinguishes ? cloud_of_block(g, job.block, s) : s.cloud[0];
-    const auto cloud_words = hn::LoadU(du, reinterpret_cast<const std::uint32_t*>(&cloud[0]));
 #endif
     for (int e = 0; e < job.events; e += lanes) {
         const int at = 2 * job.first + e;
@@ -144,14 +166,9 @@ HWY_INLINE void run_sparse([[maybe_unused]] const Segment& g, const SparseJob& j
         const auto used = hn::FirstN(d, std::size_t(job.events - e));
         const auto up_to_act = hn::Lt(v, rates.two);
         auto accepted = hn::And(used, hn::Lt(v, rates.three));
-#if HWY_TARGET <= HWY_AVX3
-        if (extinguishes) {
-            // The cell's bit of `cloud`, moved to the sign.
-            const auto word = hn::TableLookupLanes(
-                cloud_words, hn::IndicesFromVec(du, hn::And(hn::ShiftRight<5>(first), hn::Set(du, 15))));
-            const auto bit = hn::Shl(word, hn::AndNot(first, hn::Set(du, 31)));
-            accepted = hn::And(accepted, hn::Or(up_to_act, hn::MaskFromVec(hn::BitCast(d, bit))));
-        }
+#if HWY_TARGET <= HWY_AVX2
+        if (extinguishes)
+            accepted = hn::And(accepted, hn::Or(up_to_act, hn::RebindMask(d, has_cloud(du, cloud, first))));
 #endif
         const auto close = hn::And(used, hn::Lt(distance, slack));
         if (HWY_UNLIKELY(!hn::AllFalse(d, close))) {

@@ -6,90 +6,27 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "statistics/cloud_statistics.h"
 
 namespace nephos {
 namespace {
 
-// Cells [begin, end) of a row.
-struct Run {
-    int begin, end;
-};
-
-// All runs of a plane, row by row, and the union-find over them. `roots` of a root is itself and the smallest of its set.
-class Runs {
+// Union-find over runs: `roots` of a root is itself and the smallest of its set.
+class Sets {
   public:
-    explicit Runs(const BitPlaneView& plane) : plane_(plane) {
-        const int rows = plane.extent.y * plane.extent.z;
-        starts_.reserve(std::size_t(rows) + 1);
-        for (int row = 0; row < rows; ++row) {
-            starts_.push_back(runs_.size());
-            add_row(plane.words + std::size_t(row) * plane.words_per_row);
-        }
-        starts_.push_back(runs_.size());
-        roots_.resize(runs_.size());
-        for (std::size_t n = 0; n < roots_.size(); ++n) roots_[n] = std::uint32_t(n);
-    }
-
-    std::size_t count() const { return runs_.size(); }
-    const Run& run(std::size_t n) const { return runs_[n]; }
-    std::size_t first(int row) const { return starts_[std::size_t(row)]; }
-    std::size_t last(int row) const { return starts_[std::size_t(row) + 1]; }
-
+    explicit Sets(std::size_t count) : roots_(count) { std::iota(roots_.begin(), roots_.end(), 0u); }
     std::uint32_t root(std::uint32_t n) {
         while (roots_[n] != n) n = roots_[n] = roots_[roots_[n]];
         return n;
     }
-    void unite(std::size_t a, std::size_t b) {
-        const std::uint32_t one = root(std::uint32_t(a)), other = root(std::uint32_t(b));
+    void unite(std::uint32_t a, std::uint32_t b) {
+        const std::uint32_t one = root(a), other = root(b);
         roots_[std::max(one, other)] = std::min(one, other);
     }
 
-    // Calls use(a, b, cells) for all runs a of row `one` and b of row `other` that share columns when those of `other`
-    // are moved by `shift` and made longer by `reach` at both ends.
-    template <typename Use>
-    void for_overlaps(int one, int other, int shift, int reach, Use&& use) const {
-        std::size_t a = first(one), b = first(other);
-        while (a < last(one) && b < last(other)) {
-            const int begin = runs_[b].begin + shift - reach, end = runs_[b].end + shift + reach;
-            const int cells = std::min(runs_[a].end, end) - std::max(runs_[a].begin, begin);
-            if (cells > 0) use(a, b, cells);
-            if (runs_[a].end < end) {
-                ++a;
-            } else {
-                ++b;
-            }
-        }
-    }
-
   private:
-    void add_row(const std::uint64_t* words) {
-        const int nx = plane_.extent.x;
-        int at = 0;
-        while (at < nx) {
-            at = next(words, at, false);
-            if (at >= nx) break;
-            const int end = std::min(next(words, at, true), nx);
-            runs_.push_back({at, end});
-            at = end;
-        }
-    }
-    // The first cell from `at` on that is 1, or 0 if `clear`; nx or more if there is none.
-    int next(const std::uint64_t* words, int at, bool clear) const {
-        const std::uint64_t flip = clear ? ~std::uint64_t(0) : 0;
-        std::size_t n = std::size_t(at) / 64;
-        std::uint64_t word = (words[n] ^ flip) >> (at % 64) << (at % 64);
-        while (word == 0) {
-            if (++n == plane_.words_per_row) return plane_.extent.x;
-            word = words[n] ^ flip;
-        }
-        return int(n * 64) + std::countr_zero(word);
-    }
-
-    BitPlaneView plane_;
-    std::vector<Run> runs_;
-    std::vector<std::size_t> starts_;  // of rows, in runs_
     std::vector<std::uint32_t> roots_;
 };
 
@@ -138,76 +75,114 @@ struct Sums {
 class Labelling {
   public:
     Labelling(const BitPlaneView& plane, const Boundaries& boundaries, int reach)
-        : plane_(plane), runs_(plane), reach_(reach) {
+        : plane_(plane), runs_(runs_of(plane)), sets_(runs_.runs.size()), reach_(reach) {
         periodic_x_ = boundaries.x == Boundary::periodic;
         periodic_y_ = boundaries.y == Boundary::periodic;
         periodic_z_ = boundaries.z == Boundary::periodic;
-        open_edges_.assign(runs_.count(), 0);
     }
 
-    std::vector<ConnectedCloud> clouds() {
-        join();
-        return collected(nullptr);
+    std::vector<ConnectedCloud> clouds(bool with_centroids) {
+        open_edges_.assign(runs_.runs.size(), 0);
+        join<true>();
+        return with_centroids ? collected<true>() : collected<false>();
     }
     LabelledClouds labelled() {
-        join();
-        LabelledClouds labelled;
-        labelled.clouds = collected(&labelled.runs);
-        for (int row = 0; row < plane_.extent.y; ++row) labelled.rows.push_back(runs_.first(row));
-        labelled.rows.push_back(runs_.count());
-        return labelled;
+        join<false>();
+        return numbered();
     }
 
   private:
+    std::size_t first(int row) const { return runs_.rows[std::size_t(row)]; }
+    std::size_t last(int row) const { return runs_.rows[std::size_t(row) + 1]; }
+
+    // kEdges: counts the sides towards clear air, too.
+    template <bool kEdges>
     void join() {
         const Extent& e = plane_.extent;
         for (int k = 0; k < e.z; ++k) {
             for (int j = 0; j < e.y; ++j) {
-                join_in_row(k * e.y + j);
-                if (j + 1 < e.y || periodic_y_) join_rows(k * e.y + j, k * e.y + (j + 1) % e.y, reach_);
+                join_in_row<kEdges>(k * e.y + j);
+                if (j + 1 < e.y || periodic_y_)
+                    join_rows<kEdges>(k * e.y + j, k * e.y + (j + 1) % e.y, reach_);
                 if (e.z > 1 && (k + 1 < e.z || periodic_z_))
-                    join_rows(k * e.y + j, (k + 1) % e.z * e.y + j, 0);
+                    join_rows<kEdges>(k * e.y + j, (k + 1) % e.z * e.y + j, 0);
             }
         }
     }
 
     // The two ends of the runs of a row, and the run that goes on around a periodic axis.
+    template <bool kEdges>
     void join_in_row(int row) {
         const int nx = plane_.extent.x;
-        for (std::size_t n = runs_.first(row); n < runs_.last(row); ++n) {
-            open_edges_[n] += unsigned(runs_.run(n).begin > 0) + unsigned(runs_.run(n).end < nx);
+        if constexpr (kEdges) {
+            for (std::size_t n = first(row); n < last(row); ++n)
+                open_edges_[n] += unsigned(runs_.runs[n].begin > 0) + unsigned(runs_.runs[n].end < nx);
         }
-        if (!periodic_x_ || runs_.first(row) == runs_.last(row)) return;
-        const std::size_t west = runs_.first(row), east = runs_.last(row) - 1;
-        const bool at_west = runs_.run(west).begin == 0, at_east = runs_.run(east).end == nx;
+        if (!periodic_x_ || first(row) == last(row)) return;
+        const std::size_t west = first(row), east = last(row) - 1;
+        const bool at_west = runs_.runs[west].begin == 0, at_east = runs_.runs[east].end == nx;
         if (at_west && at_east) {
-            runs_.unite(west, east);
-        } else if (at_west) {
-            ++open_edges_[west];
-        } else if (at_east) {
-            ++open_edges_[east];
+            sets_.unite(std::uint32_t(west), std::uint32_t(east));
+        } else if constexpr (kEdges) {
+            open_edges_[west] += unsigned(at_west);
+            open_edges_[east] += unsigned(at_east);
         }
     }
 
     // Rows that lie side by side; `reach` = 1 joins corners too.
+    template <bool kEdges>
     void join_rows(int one, int other, int reach) {
-        for (std::size_t n = runs_.first(one); n < runs_.last(one); ++n) open_edges_[n] += length(n);
-        for (std::size_t n = runs_.first(other); n < runs_.last(other); ++n) open_edges_[n] += length(n);
-        runs_.for_overlaps(one, other, 0, 0, [&](std::size_t a, std::size_t b, int cells) {
-            open_edges_[a] -= std::uint64_t(cells);
-            open_edges_[b] -= std::uint64_t(cells);
-            runs_.unite(a, b);
-        });
+        overlaps_.resize(std::size_t(plane_.extent.x) + 2);
+        const auto first_one = std::uint32_t(first(one)), first_other = std::uint32_t(first(other));
+        const auto overlaps = [&](int shift, int longer) {
+            const std::size_t count =
+                find_overlaps(runs_.of_row(one), runs_.of_row(other), shift, longer, overlaps_.data());
+            for (std::size_t n = 0; n < count; ++n)
+                sets_.unite(first_one + overlaps_[n].one, first_other + overlaps_[n].other);
+            return count;
+        };
+        const std::size_t count = overlaps(0, 0);
+        if constexpr (kEdges) {
+            for (std::size_t n = first(one); n < last(one); ++n) open_edges_[n] += length(n);
+            for (std::size_t n = first(other); n < last(other); ++n) open_edges_[n] += length(n);
+            for (std::size_t n = 0; n < count; ++n) {
+                open_edges_[first_one + overlaps_[n].one] -= std::uint64_t(overlaps_[n].cells);
+                open_edges_[first_other + overlaps_[n].other] -= std::uint64_t(overlaps_[n].cells);
+            }
+        }
         if (reach == 0) return;
-        const auto unite = [&](std::size_t a, std::size_t b, int) { runs_.unite(a, b); };
-        runs_.for_overlaps(one, other, 0, reach, unite);
+        overlaps(0, reach);
         if (!periodic_x_) return;
-        runs_.for_overlaps(one, other, plane_.extent.x, reach, unite);
-        runs_.for_overlaps(one, other, -plane_.extent.x, reach, unite);
+        overlaps(plane_.extent.x, reach);
+        overlaps(-plane_.extent.x, reach);
+    }
+
+    // Numbers the clouds by their first run. The root of a run comes before it.
+    LabelledClouds numbered() {
+        LabelledClouds result;
+        const Extent& e = plane_.extent;
+        result.cloud.resize(runs_.runs.size());
+        std::uint32_t count = 0;
+        for (std::uint32_t n = 0; n < result.cloud.size(); ++n) {
+            const std::uint32_t root = sets_.root(n);
+            result.cloud[n] = root == n ? count : result.cloud[root];
+            count += root == n;
+        }
+        result.cut.assign(count, 0);
+        const auto cut = [&](std::size_t run) { result.cut[result.cloud[run]] = 1; };
+        for (int row = 0; row < e.y; ++row) {
+            if (first(row) == last(row)) continue;
+            if (!periodic_x_ && runs_.runs[first(row)].begin == 0) cut(first(row));
+            if (!periodic_x_ && runs_.runs[last(row) - 1].end == e.x) cut(last(row) - 1);
+            if (!periodic_y_ && (row == 0 || row + 1 == e.y))
+                for (std::size_t n = first(row); n < last(row); ++n) cut(n);
+        }
+        result.shadow = std::move(runs_);
+        return result;
     }
 
     std::uint64_t length(std::size_t run) const {
-        return std::uint64_t(runs_.run(run).end - runs_.run(run).begin);
+        return std::uint64_t(runs_.runs[run].end - runs_.runs[run].begin);
     }
 
     void mark_sides(ConnectedCloud& cloud, const Sums& sum) const {
@@ -218,34 +193,33 @@ class Labelling {
         cloud.spans = (!periodic_x_ && sum.low_x && sum.high_x) || (!periodic_y_ && sum.low_y && sum.high_y);
     }
 
-    // With the runs in their order, and without centroids, where `labels` is given.
-    std::vector<ConnectedCloud> collected(std::vector<LabelledRun>* labels) {
+    template <bool kCentroids>
+    std::vector<ConnectedCloud> collected() {
         const Extent& e = plane_.extent;
-        const Centre x(e.x, periodic_x_), y(e.y, periodic_y_), z(e.z, periodic_z_);
-        constexpr std::uint32_t kNone = ~std::uint32_t(0);
-        std::vector<std::uint32_t> number(runs_.count(), kNone);
+        const Centre x(e.x, kCentroids && periodic_x_), y(e.y, kCentroids && periodic_y_),
+            z(e.z, kCentroids && periodic_z_);
+        std::vector<std::uint32_t> number(runs_.runs.size());
         std::vector<ConnectedCloud> clouds;
         std::vector<Sums> sums;
         for (int row = 0; row < e.y * e.z; ++row) {
             const int j = row % e.y, k = row / e.y;
-            for (std::size_t n = runs_.first(row); n < runs_.last(row); ++n) {
-                const std::uint32_t root = runs_.root(std::uint32_t(n));
-                if (number[root] == kNone) {
+            for (std::size_t n = first(row); n < last(row); ++n) {
+                const std::uint32_t root = sets_.root(std::uint32_t(n));
+                if (root == n) {  // the first run of its cloud
                     number[root] = std::uint32_t(clouds.size());
                     clouds.push_back({});
                     clouds.back().lowest = k;
                     sums.emplace_back();
                 }
-                if (labels) labels->push_back({runs_.run(n).begin, runs_.run(n).end, number[root]});
                 ConnectedCloud& cloud = clouds[number[root]];
                 Sums& sum = sums[number[root]];
-                const Run run = runs_.run(n);
+                const CellRun run = runs_.runs[n];
                 const double cells = run.end - run.begin;
                 cloud.cells += std::uint64_t(run.end - run.begin);
                 cloud.edges += open_edges_[n];
                 cloud.lowest = std::min(cloud.lowest, k);
                 cloud.highest = std::max(cloud.highest, k);
-                if (!labels) {
+                if constexpr (kCentroids) {
                     x.add(sum.x, run.begin, run.end, 1);
                     y.add(sum.y, j, j + 1, cells);
                     z.add(sum.z, k, k + 1, cells);
@@ -262,7 +236,7 @@ class Labelling {
             ConnectedCloud& cloud = clouds[n];
             const Sums& sum = sums[n];
             mark_sides(cloud, sum);
-            if (labels) continue;
+            if constexpr (!kCentroids) continue;
             cloud.x = x.mean(sum.x, double(cloud.cells));
             cloud.y = y.mean(sum.y, double(cloud.cells));
             if (e.z > 1) cloud.z = z.mean(sum.z, double(cloud.cells));
@@ -271,30 +245,78 @@ class Labelling {
     }
 
     BitPlaneView plane_;
-    Runs runs_;
+    CellRuns runs_;
+    Sets sets_;
     int reach_;
     bool periodic_x_, periodic_y_, periodic_z_;
     std::vector<std::uint64_t> open_edges_;  // of each run
+    std::vector<RunOverlap> overlaps_;       // of two rows
 };
+
+std::vector<ConnectedCloud> clouds_of_shadow(const BitPlaneView& cld, const Boundaries& boundaries, int reach,
+                                             bool with_centroids) {
+    const BitPlane shadow = shadow_of(cld);
+    return Labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, reach)
+        .clouds(with_centroids);
+}
 
 }  // namespace
 
+CellRuns runs_of(const BitPlaneView& plane) {
+    const std::size_t rows = std::size_t(plane.extent.y) * std::size_t(plane.extent.z);
+    CellRuns result;
+    result.rows.reserve(rows + 1);
+    std::vector<int> ends(std::size_t(plane.extent.x) + 2);  // begin, end, begin, end ... of a row
+    for (std::size_t row = 0; row < rows; ++row) {
+        result.rows.push_back(result.runs.size());
+        const std::uint64_t* words = plane.words + row * plane.words_per_row;
+        std::size_t count = 0;
+        std::uint64_t before = 0;  // the last cell of the word before
+        for (std::size_t w = 0; w < plane.words_per_row; ++w) {
+            // Where a cell differs from the one before it.
+            for (std::uint64_t turns = words[w] ^ (words[w] << 1 | before); turns != 0; turns &= turns - 1)
+                ends[count++] = int(64 * w) + std::countr_zero(turns);
+            before = words[w] >> 63;
+        }
+        if (count % 2 != 0) ends[count++] = plane.extent.x;
+        for (std::size_t n = 0; n < count; n += 2) result.runs.push_back({ends[n], ends[n + 1]});
+    }
+    result.rows.push_back(result.runs.size());
+    return result;
+}
+
+std::size_t find_overlaps(std::span<const CellRun> one, std::span<const CellRun> other, int shift, int reach,
+                          RunOverlap* overlaps) {
+    std::size_t a = 0, b = 0, count = 0;
+    // Each turn leaves one run behind. Without branches, as nobody can foretell which of the two.
+    while (a < one.size() && b < other.size()) {
+        const int begin = other[b].begin + shift - reach, end = other[b].end + shift + reach;
+        const int cells = std::min(one[a].end, end) - std::max(one[a].begin, begin);
+        overlaps[count] = {std::uint32_t(a), std::uint32_t(b), cells};
+        count += std::size_t(cells > 0);
+        const bool ends_first = one[a].end < end;
+        a += std::size_t(ends_first);
+        b += std::size_t(!ends_first);
+    }
+    return count;
+}
+
 std::vector<ConnectedCloud> clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries,
                                       Neighbours neighbours) {
-    const BitPlane shadow = shadow_of(cld);
-    Labelling labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open},
-                        neighbours == Neighbours::eight ? 1 : 0);
-    return labelling.clouds();
+    return clouds_of_shadow(cld, boundaries, neighbours == Neighbours::eight ? 1 : 0, true);
+}
+
+std::vector<ConnectedCloud> cloud_sizes_2d(const BitPlaneView& cld, const Boundaries& boundaries) {
+    return clouds_of_shadow(cld, boundaries, 0, false);
 }
 
 std::vector<ConnectedCloud> clouds_3d(const BitPlaneView& cld, const Boundaries& boundaries) {
-    return Labelling(cld, boundaries, 0).clouds();
+    return Labelling(cld, boundaries, 0).clouds(true);
 }
 
 LabelledClouds labelled_clouds_2d(const BitPlaneView& cld, const Boundaries& boundaries) {
     const BitPlane shadow = shadow_of(cld);
-    Labelling labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, 0);
-    return labelling.labelled();
+    return Labelling(shadow.view(), {boundaries.x, boundaries.y, Boundary::open}, 0).labelled();
 }
 
 }  // namespace nephos

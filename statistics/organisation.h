@@ -13,6 +13,7 @@
 //
 // Distances are between centroids, along periodic axes to the nearest image.
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -24,7 +25,12 @@ struct Organisation {
     double iorg, scai, cop;  // NaN with fewer than two clouds
 };
 
-// Returns the indices of 2-D clouds of a lattice. SCAI and COP go over all pairs: n^2 operations. Thread-safe.
+// SCAI and COP are means over all pairs up to this number of clouds, 5 * 10^7 of them; of more clouds they are means over
+// as many pairs as kSampledPairs, drawn from Philox, the same for the same number of clouds: within 0.1 % of those over all.
+inline constexpr std::size_t kMaxCloudsOfAllPairs = 10'000;
+inline constexpr std::uint32_t kSampledPairs = 10'000'000;
+
+// Returns the indices of 2-D clouds of a lattice; equal clouds give equal bits. Thread-safe.
 Organisation organisation(std::span<const ConnectedCloud> clouds, const Extent& extent,
                           const Boundaries& boundaries);
 

@@ -14,35 +14,27 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint32_t kNone = ~std::uint32_t(0);
 
-// Cells [begin, end) of a row of the state before, that belong to one of its clouds.
-struct Piece {
-    int row, begin, end;
-    std::uint32_t cloud;
+// The runs of the columns with cloud in the levels of one shift, and the cloud of the whole shadow that each belongs to.
+struct Pieces {
+    CellRuns runs;
+    std::vector<std::uint32_t> cloud;
 };
 
-std::vector<Piece> pieces_of(const LabelledClouds& clouds) {
-    std::vector<Piece> pieces;
-    for (std::size_t row = 0; row + 1 < clouds.rows.size(); ++row)
-        for (std::size_t n = clouds.rows[row]; n < clouds.rows[row + 1]; ++n)
-            pieces.push_back({int(row), clouds.runs[n].begin, clouds.runs[n].end, clouds.runs[n].cloud});
-    return pieces;
-}
-
-// The columns with cloud in the levels of one shift, each with the cloud of the whole shadow that it belongs to.
-std::vector<Piece> pieces_of_shift(const BitPlaneView& cld, const LabelledClouds& clouds,
-                                   std::span<const CellShift> shifts, const CellShift& shift) {
+Pieces pieces_of_shift(const BitPlaneView& cld, const LabelledClouds& clouds,
+                       std::span<const CellShift> shifts, const CellShift& shift) {
     BitPlane part({cld.extent.x, cld.extent.y, 1});
     for (int k = 0; k < cld.extent.z; ++k) {
         if (!(shifts[std::size_t(k)] == shift)) continue;
         for (int j = 0; j < cld.extent.y; ++j)
             for (std::size_t w = 0; w < cld.words_per_row; ++w) part.row(j, 0)[w] |= cld.row(j, k)[w];
     }
-    std::vector<Piece> pieces = pieces_of(labelled_clouds_2d(part.view(), {}));
-    std::size_t n = 0;
-    for (Piece& piece : pieces) {
-        n = std::max(n, clouds.rows[std::size_t(piece.row)]);
-        while (clouds.runs[n].end <= piece.begin) ++n;
-        piece.cloud = clouds.runs[n].cloud;
+    Pieces pieces{runs_of(part.view()), {}};
+    for (std::size_t row = 0; row + 1 < pieces.runs.rows.size(); ++row) {
+        std::size_t whole = clouds.shadow.rows[row];
+        for (std::size_t n = pieces.runs.rows[row]; n < pieces.runs.rows[row + 1]; ++n) {
+            while (clouds.shadow.runs[whole].end <= pieces.runs.runs[n].begin) ++whole;
+            pieces.cloud.push_back(clouds.cloud[whole]);
+        }
     }
     return pieces;
 }
@@ -54,6 +46,22 @@ int moved(std::int64_t at, std::int64_t by, int cells, Boundary boundary) {
     return to >= 0 && to < cells ? int(to) : -1;
 }
 
+// Sorts what a cloud shares by the cloud that it shares it with. Most share with one or two.
+template <class Iterator>
+void sort_by_cloud_now(Iterator first, Iterator last) {
+    constexpr std::ptrdiff_t kFew = 12;
+    if (last - first > kFew) {
+        std::sort(first, last, [](const auto& a, const auto& b) { return a.now < b.now; });
+        return;
+    }
+    for (auto one = first; one != last; ++one) {
+        const auto moving = *one;
+        auto to = one;
+        for (; to != first && (to - 1)->now > moving.now; --to) *to = *(to - 1);
+        *to = moving;
+    }
+}
+
 }  // namespace
 
 std::vector<Tracker::Shared> Tracker::shared_columns(const LabelledClouds& now,
@@ -63,52 +71,46 @@ std::vector<Tracker::Shared> Tracker::shared_columns(const LabelledClouds& now,
     for (const CellShift& shift : shifts)
         if (std::ranges::count(different, shift) == 0) different.push_back(shift);
     std::vector<Shared> shared;
-    // Pieces come row by row from west to east, so the search goes on where it ended, but for the first of a row.
-    std::size_t at = 0;
-    int at_row = -1, at_begin = 0;
-    const auto meet = [&](int row, int begin, int end, std::uint32_t cloud) {
-        if (row != at_row || begin < at_begin) at = now.rows[std::size_t(row)];
-        at_row = row;
-        at_begin = begin;
-        const std::size_t last = now.rows[std::size_t(row) + 1];
-        while (at < last && now.runs[at].end <= begin) ++at;
-        for (std::size_t n = at; n < last && now.runs[n].begin < end; ++n) {
-            const LabelledRun& run = now.runs[n];
-            shared.push_back(
-                {cloud, run.cloud, std::uint64_t(std::min(end, run.end) - std::max(begin, run.begin))});
-        }
-    };
+    shared.reserve(clouds_.cloud.size() + now.cloud.size());
+    std::vector<RunOverlap> overlaps(std::size_t(extent.x) + 2);
+    const bool periodic = boundaries_.x == Boundary::periodic;
     for (const CellShift& shift : different) {
-        const std::vector<Piece> pieces =
-            different.size() == 1 ? pieces_of(clouds_) : pieces_of_shift(cld_.view(), clouds_, shifts, shift);
-        for (const Piece& piece : pieces) {
-            const int row = moved(piece.row, shift.y, extent.y, boundaries_.y);
-            if (row < 0) continue;
-            if (boundaries_.x == Boundary::periodic) {
-                const int begin = moved(piece.begin, shift.x, extent.x, Boundary::periodic);
-                const int end = begin + piece.end - piece.begin;
-                meet(row, begin, std::min(end, extent.x), piece.cloud);
-                if (end > extent.x) meet(row, 0, end - extent.x, piece.cloud);
-            } else {
-                const std::int64_t begin = std::max<std::int64_t>(0, piece.begin + shift.x),
-                                   end = std::min<std::int64_t>(extent.x, piece.end + shift.x);
-                if (begin < end) meet(row, int(begin), int(end), piece.cloud);
-            }
+        const bool whole = different.size() == 1;
+        const Pieces part = whole ? Pieces{} : pieces_of_shift(cld_.view(), clouds_, shifts, shift);
+        const CellRuns& before = whole ? clouds_.shadow : part.runs;
+        const std::vector<std::uint32_t>& cloud = whole ? clouds_.cloud : part.cloud;
+        // Beyond an open side, and far beyond, nothing is shared.
+        const int dx = int(std::clamp<std::int64_t>(
+            periodic ? moved(0, shift.x, extent.x, Boundary::periodic) : shift.x, -extent.x, extent.x));
+        for (int row = 0; row < extent.y; ++row) {
+            const int to = moved(row, shift.y, extent.y, boundaries_.y);
+            if (to < 0) continue;
+            const std::uint32_t* cloud_now = now.cloud.data() + now.shadow.rows[std::size_t(to)];
+            const std::uint32_t* cloud_before = cloud.data() + before.rows[std::size_t(row)];
+            const auto meet = [&](int by) {
+                const std::size_t count =
+                    find_overlaps(now.shadow.of_row(to), before.of_row(row), by, 0, overlaps.data());
+                for (std::size_t n = 0; n < count; ++n)
+                    shared.push_back({cloud_before[overlaps[n].other], cloud_now[overlaps[n].one],
+                                      std::uint64_t(overlaps[n].cells)});
+            };
+            meet(dx);
+            if (periodic && dx != 0) meet(dx - extent.x);
         }
     }
     // By cloud before, and of each of those, which are few, by cloud now.
-    std::vector<std::size_t> begins(clouds_.clouds.size() + 1, 0);
+    std::vector<std::size_t> begins(clouds_.cut.size() + 1, 0);
     for (const Shared& one : shared) ++begins[one.before + 1];
     std::partial_sum(begins.begin(), begins.end(), begins.begin());
     std::vector<Shared> sorted(shared.size());
     std::vector<std::size_t> places(begins.begin(), begins.end() - 1);
     for (const Shared& one : shared) sorted[places[one.before]++] = one;
     std::vector<Shared> sums;
+    sums.reserve(sorted.size());
     for (std::size_t n = 0; n + 1 < begins.size(); ++n) {
         const auto first = sorted.begin() + std::ptrdiff_t(begins[n]),
                    last = sorted.begin() + std::ptrdiff_t(begins[n + 1]);
-        if (last - first > 1)
-            std::sort(first, last, [](const Shared& a, const Shared& b) { return a.now < b.now; });
+        sort_by_cloud_now(first, last);
         for (auto one = first; one != last; ++one) {
             if (one != first && sums.back().now == one->now)
                 sums.back().columns += one->columns;
@@ -121,10 +123,10 @@ std::vector<Tracker::Shared> Tracker::shared_columns(const LabelledClouds& now,
 
 void Tracker::add(const BitPlaneView& cld, std::span<const CellShift> shifts) {
     LabelledClouds now = labelled_clouds_2d(cld, boundaries_);
-    const std::size_t count = now.clouds.size();
+    const std::size_t count = now.cut.size();
     std::vector<Track> current(count);
     std::vector<std::uint64_t> identity(count);
-    std::vector<std::uint32_t> heir(clouds_.clouds.size(), kNone), parent(count, kNone);
+    std::vector<std::uint32_t> heir(clouds_.cut.size(), kNone), parent(count, kNone);
     if (states_ > 0) {
         std::vector<std::uint64_t> most_before(heir.size(), 0), most_now(count, 0);
         for (const Shared& s : shared_columns(now, shifts)) {
@@ -151,13 +153,13 @@ void Tracker::add(const BitPlaneView& cld, std::span<const CellShift> shifts) {
         } else {
             current[n].first = states_;
             if (states_ > 0)
-                current[n].begin = parent[n] != kNone  ? TrackBegin::split
-                                   : now.clouds[n].cut ? TrackBegin::entered
-                                                       : TrackBegin::birth;
+                current[n].begin = parent[n] != kNone ? TrackBegin::split
+                                   : now.cut[n] != 0  ? TrackBegin::entered
+                                                      : TrackBegin::birth;
             identity[n] = next_identity_++;
         }
         current[n].last = states_;
-        if (now.clouds[n].cut && current[n].cut == Track::kNever) current[n].cut = states_;
+        if (now.cut[n] != 0 && current[n].cut == Track::kNever) current[n].cut = states_;
     }
     if (cld_.extent() != cld.extent) cld_ = BitPlane(cld.extent);
     std::copy_n(cld.words, cld.word_count(), cld_.words().begin());

@@ -18,7 +18,7 @@ double columns(const Extent& extent) { return double(extent.x) * extent.y; }
 Snapshot take_snapshot(const BitPlaneView& cld, const Boundaries& boundaries, double cell_size_m,
                        const SizeRange& range) {
     const double area_km2 = columns(cld.extent) * cell_size_m * cell_size_m / 1e6;
-    const std::vector<ConnectedCloud> clouds = clouds_2d(cld, boundaries);
+    const std::vector<ConnectedCloud> clouds = cloud_sizes_2d(cld, boundaries);
     const double number = double(clouds.size());
     Snapshot snapshot{{}, CloudSizes(range)};
     snapshot.sizes.add(clouds);

@@ -9,10 +9,6 @@
 
 #include "apps/editor/state.h"
 #include "core/error.h"
-#include "density/vdb/vdb_file.h"
-#include "render/image/image_file.h"
-#include "scenes/format/writer.h"
-#include "simulation/frame_writer.h"
 
 namespace nephos {
 namespace {
@@ -29,31 +25,22 @@ const char* title_of(FileDialog dialog) {
             return "Export the present grid";
         case FileDialog::screenshot:
             return "Save a picture of the window";
+        case FileDialog::choose:
+            return "Choose a file";
         case FileDialog::none:
             break;
     }
     return "";
 }
 
-const char* extension_of(FileDialog dialog) {
+std::string extension_of(const Editor& editor, FileDialog dialog) {
+    if (dialog == FileDialog::choose) return editor.chosen_extension;
     if (dialog == FileDialog::export_grid) return ".vdb";
     return dialog == FileDialog::screenshot ? ".png" : ".toml";
 }
 
-// The density that is shown now, of all layers together.
-void export_grid(Editor& editor, const fs::path& path) {
-    const std::shared_ptr<const LiveFrame> frame = editor.live.frame();
-    if (!frame || !editor.shown_scene) throw Error(ErrorCode::usage, "there is no grid yet");
-    if (!has_density(*editor.shown_scene)) {
-        throw Error(ErrorCode::usage, "the clouds of this scene are drawn directly: there is no grid");
-    }
-    const FrameResult& result = frame->frame;
-    const VdbMetadata metadata =
-        density_metadata(*editor.shown_scene, scene_hash(*editor.shown_scene), result.time_s, result.hash);
-    VdbContent content;
-    content.density = &result.density;
-    write_vdb(path, content, metadata);
-}
+// Whether it asks for a file that is there.
+bool is_reading(FileDialog dialog) { return dialog == FileDialog::open || dialog == FileDialog::choose; }
 
 // Does with the chosen file what the dialog was opened for.
 bool accept(Editor& editor, const fs::path& path) {
@@ -70,13 +57,15 @@ bool accept(Editor& editor, const fs::path& path) {
                 say(editor, "Saved " + path.string());
                 return true;
             case FileDialog::export_grid:
-                export_grid(editor, path);
-                say(editor, "Grid of step " + std::to_string(editor.picture ? editor.picture->step : 0) +
-                                ": " + path.string());
+                start_export(editor, path);
                 return true;
             case FileDialog::screenshot:
                 editor.capture_to = path;
                 editor.capture_by_user = true;
+                return true;
+            case FileDialog::choose:
+                if (!fs::is_regular_file(path)) throw Error(ErrorCode::io, path.string() + ": no such file");
+                editor.take_chosen(path);
                 return true;
             case FileDialog::none:
                 return true;
@@ -112,14 +101,14 @@ std::vector<Listed> content_of(const fs::path& folder, const std::string& extens
 
 fs::path chosen_path(const Editor& editor) {
     fs::path path = editor.dialog_folder / editor.dialog_name;  // an absolute name stays as it is
-    if (path.extension() != extension_of(editor.dialog)) path += extension_of(editor.dialog);
+    if (path.extension() != extension_of(editor, editor.dialog)) path += extension_of(editor, editor.dialog);
     return path;
 }
 
 // Whether writing there would replace a file that is not the scene's own, or that another program has changed.
 bool is_asked_first(const Editor& editor, const fs::path& path) {
     std::error_code error;
-    if (editor.dialog == FileDialog::open || !fs::exists(fs::symlink_status(path, error))) return false;
+    if (is_reading(editor.dialog) || !fs::exists(fs::symlink_status(path, error))) return false;
     const bool own = editor.dialog == FileDialog::save_as && editor.document->has_file() &&
                      fs::equivalent(path, editor.document->path(), error);
     return !own || editor.document->is_changed_on_disk();
@@ -138,9 +127,12 @@ void file_dialog(Editor& editor) {
     }
     bool accepted = false;
     ImGui::TextWrapped("%s", editor.dialog_folder.string().c_str());
-    ImGui::BeginChild("files", ImVec2(0, -3.6f * ImGui::GetFrameHeightWithSpacing()), true);
+    const bool previews = editor.dialog == FileDialog::choose;
+    const float list_width = previews ? 0.58f * ImGui::GetContentRegionAvail().x : 0;
+    ImGui::BeginChild("files", ImVec2(list_width, -3.6f * ImGui::GetFrameHeightWithSpacing()), true);
     if (ImGui::Selectable("..")) editor.dialog_folder = editor.dialog_folder.parent_path();
-    for (const Listed& entry : content_of(editor.dialog_folder, extension_of(editor.dialog))) {
+    editor.controls.note("file ..");
+    for (const Listed& entry : content_of(editor.dialog_folder, extension_of(editor, editor.dialog))) {
         const std::string label = entry.is_folder ? entry.name + "/" : entry.name;
         if (ImGui::Selectable(label.c_str(), entry.name == editor.dialog_name,
                               ImGuiSelectableFlags_AllowDoubleClick)) {
@@ -154,6 +146,12 @@ void file_dialog(Editor& editor) {
         editor.controls.note("file " + entry.name);
     }
     ImGui::EndChild();
+    if (previews) {
+        ImGui::SameLine();
+        ImGui::BeginChild("preview", ImVec2(0, -3.6f * ImGui::GetFrameHeightWithSpacing()), true);
+        if (!editor.dialog_name.empty()) file_preview(editor, chosen_path(editor));
+        ImGui::EndChild();
+    }
     ImGui::SetNextItemWidth(-1);
     if (ImGui::InputTextWithHint("##name", "name of the file", &editor.dialog_name,
                                  ImGuiInputTextFlags_EnterReturnsTrue)) {
@@ -166,10 +164,12 @@ void file_dialog(Editor& editor) {
     ImGui::TextWrapped("%s", editor.dialog_problem.c_str());
     if (!named) ImGui::BeginDisabled();
     bool replaces = false;
-    if (editor.dialog != FileDialog::open && !editor.replaced.empty()) {
+    if (!is_reading(editor.dialog) && !editor.replaced.empty()) {
         replaces = button(editor, "Replace it");
     } else {
-        accepted |= button(editor, editor.dialog == FileDialog::open ? "Open" : "Save");
+        accepted |= button(editor, editor.dialog == FileDialog::open ? "Open"
+                                   : is_reading(editor.dialog)       ? "Choose"
+                                                                     : "Save");
     }
     if (!named) ImGui::EndDisabled();
     ImGui::SameLine();
@@ -246,6 +246,10 @@ void open_dialog(Editor& editor, FileDialog dialog) {
     editor.dialog = dialog;
     editor.dialog_problem.clear();
     editor.replaced.clear();
+    editor.opens_beside = false;
+    // Files that keys name are sought from the scene on; where they were found is no place for anything else.
+    if (dialog == FileDialog::choose || editor.take_chosen) editor.dialog_folder.clear();
+    editor.take_chosen = nullptr;
     std::error_code error;
     if (editor.dialog_folder.empty()) {
         const fs::path start = editor.document->has_file()
@@ -254,13 +258,13 @@ void open_dialog(Editor& editor, FileDialog dialog) {
         editor.dialog_folder = start;
     }
     const fs::path stem = editor.document->path().stem();
-    editor.dialog_name = dialog == FileDialog::open ? "" : stem.string() + extension_of(dialog);
+    editor.dialog_name = is_reading(dialog) ? "" : stem.string() + extension_of(editor, dialog);
 }
 
 void ask_before(Editor& editor, Pending what, fs::path path) {
     editor.pending = what;
     editor.pending_path = std::move(path);
-    if (!editor.document->is_modified()) do_pending(editor);
+    if (editor.opens_beside || !editor.document->is_modified()) do_pending(editor);
 }
 
 void do_pending(Editor& editor) {
@@ -276,21 +280,35 @@ void do_pending(Editor& editor) {
         return;
     }
     const Pending what = std::exchange(editor.pending, Pending::none);
+    const bool beside = std::exchange(editor.opens_beside, false);
+    const auto open = [&](std::unique_ptr<SceneDocument> document) {
+        if (beside) {
+            add_scene(editor, std::move(document));
+        } else {
+            open_document(editor, std::move(document));
+        }
+    };
     attempt(editor, [&] {
         if (what == Pending::close) {
-            editor.document->remove_autosave();
+            editor.is_answered = true;
+            for (std::size_t n = 0; n < editor.scenes.size(); ++n) {
+                const OpenScene& scene = n == editor.shown ? editor : editor.scenes[n];
+                if (scene.is_answered || !scene.document->is_modified()) continue;
+                show_scene(editor, n);  // it is asked about next
+                editor.pending = Pending::close;
+                return;
+            }
             editor.quit = true;
+        } else if (what == Pending::close_scene) {
+            close_scene(editor);
         } else if (what == Pending::new_scene) {
             open_document(editor, std::make_unique<SceneDocument>(first_scene_text()));
         } else if (what == Pending::empty_scene) {
             open_document(editor, std::make_unique<SceneDocument>(empty_scene_text()));
         } else if (what == Pending::open && editor.pending_path.extension() == ".vdb") {
-            say(editor,
-                "A grid is no scene: name it as `initial_state` in [lattice], or draw it with `nephos "
-                "render`",
-                true);
+            offer_grid(editor, editor.pending_path);
         } else if (what == Pending::open) {
-            open_document(editor, std::make_unique<SceneDocument>(editor.pending_path));
+            open(std::make_unique<SceneDocument>(editor.pending_path));
         }
     });
 }

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/editor/report.h"
 #include "apps/editor/script.h"
 #include "apps/editor/state.h"
 #include "apps/nephos/commands.h"
@@ -17,13 +18,9 @@
 namespace nephos {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = Report::Clock;
 
 constexpr double kFrameSeconds = 1.0 / 60, kIdleSeconds = 0.1;
-
-double seconds_since(Clock::time_point begin) {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 // Sends what the document became to the live scene.
 void follow_document(Editor& editor) {
@@ -35,7 +32,8 @@ void follow_document(Editor& editor) {
         const double start = scene->frames.enabled ? scene->frames.start_s : 0;
         const Moment moment = moment_of(std::max(0.0, start), scene->automaton.time_step_s);
         editor.shown_scene = *scene;
-        editor.live.start(*scene, std::min<std::uint64_t>(moment.step, scene->steps));
+        editor.live->start(*scene,
+                           editor.start_step.value_or(std::min<std::uint64_t>(moment.step, scene->steps)));
         take_scene_camera(editor);
         return;
     }
@@ -43,27 +41,27 @@ void follow_document(Editor& editor) {
     const bool camera_changed = !(editor.shown_scene->render.camera == scene->render.camera);
     editor.shown_scene = *scene;
     if (change == SceneChange::simulation) {
-        const LiveStatus status = editor.live.status();
-        editor.live.start(*scene, std::max(status.goal, status.step));
+        const LiveStatus status = editor.live->status();
+        editor.live->start(*scene, std::max(status.goal, status.step));
     } else if (change == SceneChange::picture) {
-        editor.live.redraw(*scene);
+        editor.live->redraw(*scene);
     }
     if (camera_changed) take_scene_camera(editor);
 }
 
 void take_new_results(Editor& editor) {
     const std::uint64_t known = editor.picture ? editor.picture->number : 0;
-    if (std::shared_ptr<const LivePicture> next = editor.live.picture(known)) {
+    if (std::shared_ptr<const LivePicture> next = editor.live->picture(known)) {
         editor.window->set_picture(next->width, next->height, next->rgba.data());
         editor.picture = std::move(next);
         ++editor.pictures;
     }
-    const LiveStatus status = editor.live.status();
+    const LiveStatus status = editor.live->status();
     if (status.rows_version != editor.steps_version || status.rows < editor.steps.size())
         editor.steps.clear();
     editor.steps_version = status.rows_version;
     if (status.rows != editor.steps.size()) {
-        const std::vector<LiveStep> more = editor.live.steps(editor.steps.size());
+        const std::vector<LiveStep> more = editor.live->steps(editor.steps.size());
         editor.steps.insert(editor.steps.end(), more.begin(), more.end());
     }
 }
@@ -85,8 +83,7 @@ void look_after_files(Editor& editor) {
                 say(editor, "The file is gone from the disk; saving makes it anew", true);
         });
     }
-    // Edits of an earlier session stand where those of this one go: they wait for the answer.
-    if (now - editor.last_autosave > std::chrono::seconds(5) && !editor.show_recovery) {
+    if (now - editor.last_autosave > std::chrono::seconds(5)) {
         editor.last_autosave = now;
         try {
             editor.document->autosave(editor.folder);
@@ -125,13 +122,13 @@ void shortcuts(Editor& editor) {
     if (pressed(key_code("F1"))) editor.show_shortcuts = !editor.show_shortcuts;
     if (pressed(key_code("F12"))) open_dialog(editor, FileDialog::screenshot);
     if (io.WantTextInput) return;
-    const LiveStatus status = editor.live.status();
-    if (pressed(key_code("SPACE"))) editor.live.run(editor.running = !editor.running);
+    const LiveStatus status = editor.live->status();
+    if (pressed(key_code("SPACE"))) editor.live->run(editor.running = !editor.running);
     const bool goes = pressed(key_code("HOME")) || pressed(key_code(",")) || pressed(key_code("."));
-    if (goes) editor.live.run(editor.running = false);
-    if (pressed(key_code("HOME"))) editor.live.seek(0);
-    if (pressed(key_code(","))) editor.live.seek(status.step > 0 ? status.step - 1 : 0);
-    if (pressed(key_code("."))) editor.live.seek(status.step + 1);
+    if (goes) editor.live->run(editor.running = false);
+    if (pressed(key_code("HOME"))) editor.live->seek(0);
+    if (pressed(key_code(","))) editor.live->seek(status.step > 0 ? status.step - 1 : 0);
+    if (pressed(key_code("."))) editor.live->seek(status.step + 1);
     if (pressed('F')) frame_scene(editor);
     if (pressed('C')) take_scene_camera(editor);
     if (pressed('G')) editor.show_gizmos = !editor.show_gizmos;
@@ -157,33 +154,6 @@ void save_capture(Editor& editor) {
     }
     say(editor, "Picture of the window: " + path.string());
 }
-
-// Times and rates of a session, for --report.
-struct Report {
-    Clock::time_point begin = Clock::now();
-    double first_frame_s = 0, first_picture_s = 0, longest_frame_s = 0;
-    std::uint64_t frames = 0;
-    std::vector<double> intervals;  // between frames that were drawn without waiting for input
-
-    void print(const Editor& editor) const {
-        const double seconds = seconds_since(begin);
-        std::vector<double> sorted = intervals;
-        std::ranges::sort(sorted);
-        const double slowest = sorted.empty() ? 0 : sorted[std::size_t(0.99 * double(sorted.size() - 1))];
-        fmt::print("first frame {:.2f} s, first picture {:.2f} s after the start\n", first_frame_s,
-                   first_picture_s);
-        fmt::print("interface {:.1f} frames/s, longest frame {:.0f} ms, 99 % within {:.0f} ms\n",
-                   double(frames) / seconds, 1e3 * longest_frame_s, 1e3 * slowest);
-        const double shown = std::max(0.1, seconds - first_picture_s);
-        fmt::print("pictures {:.1f} a second, the last of {}x{} in {:.0f} ms by {}\n",
-                   double(editor.pictures) / shown, editor.picture ? editor.picture->width : 0,
-                   editor.picture ? editor.picture->height : 0, editor.picture ? editor.picture->draw_ms : 0,
-                   editor.live.status().device);
-        const LiveStatus status = editor.live.status();
-        fmt::print("step {} of {}, {:.2f} ms a step, {} checkpoints of {} MiB\n", status.step, status.rows,
-                   status.step_ms, status.checkpoints, status.checkpoint_bytes >> 20);
-    }
-};
 
 void draw_interface(Editor& editor) {
     const float scale = ImGui::GetFontSize() / 15;
@@ -211,15 +181,17 @@ int loop(Editor& editor, Report& report) {
     bool screenshot_due = !editor.options.screenshot.empty();
     while (!editor.quit) {
         if (const int signal = pending_signal(); signal != 0) {
-            editor.document->autosave(editor.folder);
+            for_each_scene(editor, [&](OpenScene& scene) { scene.document->autosave(editor.folder); });
             return 128 + signal;
         }
         if (!editor.window->is_minimised()) {
             editor.settings.width = editor.window->width();
             editor.settings.height = editor.window->height();
         }
-        const bool busy = editor.running || script.is_active() || seconds_since(last_input) < 1 ||
-                          editor.live.status().goal != editor.live.status().step ||
+        bool any_runs = false;
+        for_each_scene(editor, [&](const OpenScene& scene) { any_runs |= scene.running; });
+        const bool busy = any_runs || script.is_active() || seconds_since(last_input) < 1 ||
+                          editor.live->status().goal != editor.live->status().step ||
                           editor.window->is_minimised();
         const double pause = (busy ? kFrameSeconds : kIdleSeconds) - seconds_since(last_frame);
         if (script.is_active() && pause > 0)
@@ -239,7 +211,9 @@ int loop(Editor& editor, Report& report) {
         }
         follow_document(editor);
         take_new_results(editor);
+        report.watch(editor);
         look_after_files(editor);
+        watch_export(editor);
         for (const std::filesystem::path& path : editor.window->take_dropped())
             ask_before(editor, Pending::open, path);
         draw_interface(editor);
@@ -257,8 +231,6 @@ int loop(Editor& editor, Report& report) {
         editor.window->end_frame();
         if (!editor.capture_to.empty() && !editor.window->is_minimised()) save_capture(editor);
         if (report.frames++ == 0) report.first_frame_s = seconds_since(report.begin);
-        if (report.first_picture_s == 0 && editor.picture)
-            report.first_picture_s = seconds_since(report.begin);
         const double spent = seconds_since(last_frame);
         if (report.frames > 3) report.longest_frame_s = std::max(report.longest_frame_s, spent);
         if (report.frames > 3 && busy) report.intervals.push_back(interval);
@@ -283,9 +255,11 @@ std::unique_ptr<SceneDocument> first_document(Editor& editor) {
 
 // Writes unsaved edits down before the program ends by an error; what to say about it.
 std::string kept_edits(Editor& editor) {
-    if (!editor.document->is_modified()) return {};
+    bool any = false;
+    for_each_scene(editor, [&](const OpenScene& scene) { any |= scene.document->is_modified(); });
+    if (!any) return {};
     try {
-        editor.document->autosave(editor.folder);
+        for_each_scene(editor, [&](OpenScene& scene) { scene.document->autosave(editor.folder); });
     } catch (const std::exception& error) {
         return std::string("; unsaved edits could not be kept: ") + error.what();
     }
@@ -295,10 +269,8 @@ std::string kept_edits(Editor& editor) {
 }  // namespace
 
 Editor::Editor(const EditorOptions& from)
-    : options(from),
-      folder(settings_folder()),
-      settings(read_settings(folder)),
-      live({.splatting = Splatting::cpu}) {
+    : options(from), folder(settings_folder()), settings(read_settings(folder)) {
+    live = std::make_unique<LiveScene>(DeviceOptions{.splatting = Splatting::cpu});
     if (!options.theme.empty()) settings.dark = options.theme != "light";
     show_plots = settings.plots;
     show_gizmos = settings.shapes;
@@ -311,7 +283,7 @@ Editor::Editor(const EditorOptions& from)
     of_window.validation = options.validation;
     // Simulates the first picture while the window opens.
     follow_document(*this);
-    live.run(running);
+    live->run(running);
     window = std::make_unique<Window>(of_window);
     apply_theme(*this);
     last_autosave = Clock::now();
@@ -377,7 +349,7 @@ int run_editor(const EditorOptions& options) {
     defer_signals();
     Editor editor(options);
     if (editor.document->has_file()) note_recent(editor.settings, editor.document->path());
-    if (editor.document->found_autosave(editor.folder) && options.screenshot.empty()) editor.show_recovery = true;
+    if (options.screenshot.empty()) editor.left_autosaves = editor.document->left_autosaves(editor.folder);
     int status = 0;
     try {
         status = loop(editor, report);
@@ -390,7 +362,7 @@ int run_editor(const EditorOptions& options) {
     }
     if (options.report) report.print(editor);
     if (status != 0) return status;  // by a signal: edits were kept
-    editor.document->remove_autosave();
+    for_each_scene(editor, [](OpenScene& scene) { scene.document->remove_autosave(); });
     keep_settings(editor);
     const std::vector<std::string> messages = editor.window->validation_messages();
     for (const std::string& message : messages) fmt::print(stderr, "validation: {}\n", message);

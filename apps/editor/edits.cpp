@@ -53,26 +53,28 @@ void set_values(Editor& editor, const TextPath& table, const std::vector<TextEnt
 }
 
 void open_document(Editor& editor, std::unique_ptr<SceneDocument> document) {
-    editor.document->remove_autosave();
+    if (editor.document) editor.document->remove_autosave();
     editor.document = std::move(document);
-    editor.live.clear();  // until the scene of the new one is there, which may have problems
+    editor.live->clear();  // until the scene of the new one is there, which may have problems
     editor.picture.reset();
     editor.window->clear_picture();
     editor.disk = SceneDocument::Disk::same;
     editor.shown_version = 0;
     editor.shown_scene.reset();
+    editor.start_step.reset();
+    editor.is_answered = false;
     editor.selected.clear();
     editor.steps.clear();
     editor.checkpoints.clear();
     editor.text_version = 0;
     editor.defaults.clear();
     editor.defaults_version = 0;
-    editor.live.run(editor.running = true);
+    editor.live->run(editor.running = true);
     if (editor.document->has_file()) {
         note_recent(editor.settings, editor.document->path());
         keep_settings(editor);
     }
-    editor.show_recovery = editor.document->found_autosave(editor.folder).has_value();
+    editor.left_autosaves = editor.document->left_autosaves(editor.folder);
 }
 
 bool save_document(Editor& editor) {

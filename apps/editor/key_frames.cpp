@@ -49,8 +49,8 @@ std::vector<KeyMark> marks_of(const Scene& scene) {
 }
 
 void go_to(Editor& editor, std::uint64_t step) {
-    editor.live.run(editor.running = false);
-    editor.live.seek(step);
+    editor.live->run(editor.running = false);
+    editor.live->seek(step);
 }
 
 }  // namespace
@@ -120,7 +120,7 @@ void keep_checkpoint(Editor& editor) {
 }
 
 void back_to_checkpoint(Editor& editor) {
-    const std::uint64_t now = editor.live.status().step;
+    const std::uint64_t now = editor.live->status().step;
     const auto next = std::ranges::lower_bound(editor.checkpoints, now);
     if (next == editor.checkpoints.begin()) {
         say(editor, editor.checkpoints.empty() ? "There is no checkpoint: M sets one" : "There is no earlier checkpoint",

@@ -16,7 +16,6 @@ namespace {
 
 // A picture is drawn with its detail when nothing has moved for so long.
 constexpr std::chrono::milliseconds kRest{180};
-constexpr std::size_t kMostCheckpointBytes = 512u << 20;
 // Checkpoints are compared by this name alone: which scene they belong to is known here.
 const std::string kLive = "live";
 
@@ -102,6 +101,7 @@ void LiveScene::start(const Scene& scene, std::uint64_t goal) {
     new_scene_ = live_scene(scene);
     keeps_state_ = false;
     next_drawn_ = scene;
+    next_number_ = ++scenes_;
     goal_ = goal;
     clear_ = false;
     status_.failure.clear();
@@ -115,6 +115,7 @@ void LiveScene::change(const Scene& scene) {
     new_scene_ = live_scene(scene);
     keeps_state_ = keeps;
     next_drawn_ = scene;
+    next_number_ = ++scenes_;
     simulation_due_.notify_all();
 }
 
@@ -122,9 +123,11 @@ void LiveScene::redraw(const Scene& scene) {
     const std::scoped_lock lock(mutex_);
     if (next_drawn_) {  // frames of its simulation are still to come
         next_drawn_ = scene;
+        next_number_ = ++scenes_;
         return;
     }
     drawn_scene_ = scene;
+    drawn_number_ = ++scenes_;
     scene_to_draw_ = true;
     drawing_due_.notify_all();
 }
@@ -185,6 +188,17 @@ void LiveScene::set_view(const LiveView& view) {
     drawing_due_.notify_all();
 }
 
+void LiveScene::show(bool shown) {
+    const std::scoped_lock lock(mutex_);
+    shown_ = shown;
+    drawing_due_.notify_all();
+}
+
+void LiveScene::keep_at_most(std::size_t checkpoint_bytes) {
+    const std::scoped_lock lock(mutex_);
+    most_checkpoint_bytes_ = checkpoint_bytes;
+}
+
 std::shared_ptr<const LivePicture> LiveScene::picture(std::uint64_t than) const {
     const std::scoped_lock lock(mutex_);
     return picture_ && picture_->number > than ? picture_ : nullptr;
@@ -200,6 +214,7 @@ LiveStatus LiveScene::status() const {
     LiveStatus status = status_;
     status.goal = goal_;
     status.rows = rows_.size();
+    status.scenes = scenes_;
     if (status.failure.empty()) status.failure = draw_failure_;
     return status;
 }
@@ -317,6 +332,7 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     if (!new_scene_ && next_drawn_) {  // otherwise it belongs to a scene that is taken next
         drawn_scene_ = std::move(*next_drawn_);
         next_drawn_.reset();
+        drawn_number_ = next_number_;
         scene_to_draw_ = true;
         drawing_due_.notify_all();
     }
@@ -328,7 +344,7 @@ void LiveScene::keep_checkpoint() {
     Checkpoint checkpoint = simulation_->save();
     checkpoint_bytes_ += checkpoint.automaton.size() + checkpoint.history.size();
     checkpoints_.emplace(step, std::move(checkpoint));
-    while (checkpoint_bytes_ > kMostCheckpointBytes && checkpoints_.size() > 2) {
+    while (checkpoint_bytes_ > most_checkpoint_bytes_ && checkpoints_.size() > 2) {
         checkpoint_every_ *= 2;
         std::erase_if(checkpoints_, [this](const auto& entry) {
             const bool goes = entry.first % checkpoint_every_ != 0;
@@ -406,12 +422,12 @@ void LiveScene::draw() {
     LivePictureMaker maker;
     while (true) {
         const auto is_new = [&] {
-            return ended_ ||
-                   (frame_ && (frame_ != maker.frame() || !(view_ == maker.view()) || scene_to_draw_));
+            return ended_ || (frame_ && shown_ &&
+                              (frame_ != maker.frame() || !(view_ == maker.view()) || scene_to_draw_));
         };
         const auto rests = [&] {
             const bool stands = !running_ || !status_.failure.empty();
-            return frame_ && maker.is_draft() && stands && goal_ == status_.step;
+            return frame_ && shown_ && maker.is_draft() && stands && goal_ == status_.step;
         };
         drawing_due_.wait(lock, [&] { return is_new() || rests(); });
         bool refine = false;
@@ -424,7 +440,7 @@ void LiveScene::draw() {
         const std::shared_ptr<const LiveFrame> frame = frame_;
         const LiveView view = view_;
         const Scene scene = drawn_scene_;
-        const std::uint64_t clears = clears_;
+        const std::uint64_t clears = clears_, scene_number = drawn_number_;
         scene_to_draw_ = false;
         lock.unlock();
         std::shared_ptr<LivePicture> made;
@@ -444,6 +460,7 @@ void LiveScene::draw() {
         if (clears != clears_) continue;  // of a scene that is gone
         if (made) {
             made->number = ++pictures_;
+            made->scene_number = scene_number;
             picture_ = std::move(made);
             status_.device = device;
         }

@@ -84,7 +84,8 @@ struct LivePicture {
     Camera camera;         // that it was drawn with
     bool refined = false;  // at the full size, with detail
     double draw_ms = 0;
-    std::uint64_t number = 0;  // rises
+    std::uint64_t number = 0;        // rises
+    std::uint64_t scene_number = 0;  // of the scene that it was drawn with, LiveStatus::scenes then
 };
 
 struct LiveStatus {
@@ -92,6 +93,7 @@ struct LiveStatus {
     std::uint64_t step = 0;         // of the newest frame
     std::uint64_t goal = 0;         // step that is being simulated to
     std::uint64_t steps_taken = 0;  // by the automata: a change of the scene acts from this step on
+    std::uint64_t scenes = 0;       // that were started, changed to or redrawn
     std::uint64_t rows = 0;         // steps whose statistics are known, from 0 on
     std::uint64_t rows_version = 0; // rises when rows that were known are not those of the scene any more
     double step_ms = 0;             // mean wall time of a step
@@ -127,6 +129,10 @@ class LiveScene {
     // Shows a step: simulates to it, or goes back to it.
     void seek(std::uint64_t step);
     void set_view(const LiveView& view);
+    // Whether pictures are drawn; the simulation runs all the same.
+    void show(bool shown);
+    // Memory for checkpoints; the newest is always kept.
+    void keep_at_most(std::size_t checkpoint_bytes);
 
     // Return the newest; null while there is none, or nothing newer than `than`.
     std::shared_ptr<const LivePicture> picture(std::uint64_t than) const;
@@ -152,7 +158,8 @@ class LiveScene {
     std::condition_variable simulation_due_, drawing_due_, held_;
 
     // Shared, under the mutex.
-    bool ended_ = false, running_ = false, hold_ = false, is_held_ = false;
+    bool ended_ = false, running_ = false, hold_ = false, is_held_ = false, shown_ = true;
+    std::size_t most_checkpoint_bytes_ = std::size_t(512) << 20;
     std::optional<Scene> new_scene_;  // to simulate
     bool keeps_state_ = false;        // new_scene_ goes on from the present state
     bool is_advancing_ = false;       // steps are under way
@@ -160,6 +167,7 @@ class LiveScene {
     Scene drawn_scene_;                // of frame_: same layers, same lattices
     std::optional<Scene> next_drawn_;  // takes its place with the simulation that is due; of one that failed never
     bool scene_to_draw_ = false, clear_ = false;
+    std::uint64_t scenes_ = 0, drawn_number_ = 0, next_number_ = 0;  // of drawn_scene_ and next_drawn_
     std::uint64_t clears_ = 0;
     std::string draw_failure_;
     double steps_per_second_ = 6;

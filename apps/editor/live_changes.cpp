@@ -75,13 +75,16 @@ std::vector<WindKeyframe> changed_keys(const Wind& before, const std::vector<Win
     return keys;
 }
 
+// The step of the picture that is shown: what it shows is decided by the newest change.
+std::uint64_t shown_step(const Editor& editor) { return editor.picture ? editor.picture->step : 0; }
+
 // Applies a text that goes on from the present state.
 void apply(Editor& editor, const std::string& text, const std::string& what, const std::string& merge) {
     editor.document->edit(text, what, merge);
     editor.shown_version = editor.document->version();
     if (!editor.document->problems().empty() || !editor.document->scene()) return;
     editor.shown_scene = *editor.document->scene();
-    editor.live.change(*editor.shown_scene);
+    editor.live->change(*editor.shown_scene);
 }
 
 struct Held {
@@ -104,22 +107,25 @@ const Wind& wind_at_path(const Scene& scene, const TextPath& path) {
     return path.size() == 1 ? scene.automaton.wind : scene.layers.at(path[1].index).wind;
 }
 
+// The scene of a text; none when it has problems, which are shown as any other.
+std::optional<Scene> scene_of(const Editor& editor, const std::string& text) {
+    try {
+        return read_scene_text(text, editor.document->title(), editor.document->folder());
+    } catch (const SceneErrors&) {
+        return std::nullopt;
+    }
+}
+
 bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, const std::string& edited) {
-    const Held held(editor.live);
+    const Held held(*editor.live);
     const Scene before = *editor.shown_scene;
     const std::string& text = editor.document->text();
-    const std::filesystem::path folder =
-        editor.document->has_file() ? std::filesystem::absolute(editor.document->path()).parent_path() : "";
-    Scene wanted;
-    try {
-        wanted = read_scene_text(edited, editor.document->title(), folder);
-    } catch (const SceneErrors&) {
-        return false;  // shown as any other problem
-    }
+    const std::optional<Scene> wanted = scene_of(editor, edited);
+    if (!wanted) return false;
     // Clouds that enter at the end of the present step were placed with the wind that it has there: the change follows it.
     const std::uint64_t from = held.step + 1;
     const std::size_t index = path[array.size()].index;
-    const Wind& changed = wind_at_path(wanted, array);
+    const Wind& changed = wind_at_path(*wanted, array);
     if (index >= changed.keyframes.size()) return false;
     const std::vector<WindKeyframe> keys =
         changed_keys(wind_at_path(before, array), changed.keyframes[index].levels, from,
@@ -137,6 +143,29 @@ bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, co
 
 }  // namespace
 
+Sun sun_now(const Editor& editor) {
+    return scene_sun_at(*editor.shown_scene,
+                        double(shown_step(editor)) * editor.shown_scene->automaton.time_step_s);
+}
+
+void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dragging) {
+    const TextPath sun = text_path("sun");
+    if (!editor.shown_scene || !editor.document->problems().empty()) return;
+    if (editor.shown_scene->render.sun.date.empty()) {
+        set_values(editor, sun,
+                   {{"elevation_deg", number_text(elevation_deg)}, {"azimuth_deg", number_text(azimuth_deg)}},
+                   dragging);
+        return;
+    }
+    const auto moved = [&](std::string text) {  // a place in the stead of a date
+        for (const char* key : {"sun.date", "sun.time", "sun.moves", "sun.latitude_deg", "sun.longitude_deg"})
+            text = without(text, text_path(key));
+        text = with_value(text, text_path("sun.elevation_deg"), number_text(elevation_deg));
+        return with_value(text, text_path("sun.azimuth_deg"), number_text(azimuth_deg));
+    };
+    change_text(editor, moved, "Move the sun", dragging ? "sun" : "");
+}
+
 bool record_live(Editor& editor, const TextPath& path, const std::string& edited) {
     if (!editor.shown_scene || !editor.document->problems().empty()) return false;
     const std::size_t length = wind_length(path);
@@ -149,7 +178,7 @@ bool record_live(Editor& editor, const TextPath& path, const std::string& edited
 
 void record_climate(Editor& editor, double final_state, double duration_s) {
     if (!editor.shown_scene || !editor.document->problems().empty()) return;
-    const Held held(editor.live);
+    const Held held(*editor.live);
     const Scene& scene = *editor.shown_scene;
     const double step_s = scene.automaton.time_step_s, now = double(held.step) * step_s;
     const auto state_at = [&](double time_s) {

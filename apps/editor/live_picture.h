@@ -28,7 +28,7 @@ class LivePictureMaker {
     std::shared_ptr<const LiveFrame> frame_;
     LiveView view_;
     bool is_draft_ = false;
-    double draft_scale_ = 1;  // of a draft's sides
+    double draft_scale_ = 0.5;  // of a draft's sides
 };
 
 // Wall time that a draft may take, which its size is adapted to.

@@ -163,14 +163,14 @@ void menu_bar(Editor& editor) {
         ImGui::Separator();
         ImGui::TextDisabled("nephos %s", version().c_str());
         ImGui::TextDisabled("window: %s", editor.window->device_name().c_str());
-        ImGui::TextDisabled("pictures: %s", editor.live.status().device.c_str());
+        ImGui::TextDisabled("pictures: %s", editor.live->status().device.c_str());
         ImGui::EndMenu();
     }
     ImGui::EndMainMenuBar();
 }
 
 void status_bar(Editor& editor) {
-    const LiveStatus status = editor.live.status();
+    const LiveStatus status = editor.live->status();
     const std::size_t problems = editor.document->problems().size();
     const ImVec4 red(0.93f, 0.36f, 0.32f, 1);
     const bool fresh = std::chrono::steady_clock::now() - editor.message_time < std::chrono::seconds(12);
@@ -228,7 +228,7 @@ void view_options_panel(Editor& editor) {
     }
     toggle(editor, "Detail when nothing moves", editor.view.detail,
            "Noise below the voxel, as frames have it; drafts while something moves are drawn without");
-    simulations_list(editor);
+    layers_list(editor);
     ImGui::Spacing();
     ImGui::TextDisabled("CLOUDS FROM BASE MODELS");
     toggle(editor, "Seed boxes", editor.view.debug.boxes, "Edges of the boxes, blue (T, figure 28)");
@@ -299,6 +299,7 @@ void view_options_panel(Editor& editor) {
                            60 * std::round(double(editor.climate_minutes)));
         }
     }
+    sun_dial(editor, "sun dial in view");
     toggle(editor, "Lightning where I click", editor.flash_on_click,
            "The next click on the picture is a flash at that place, at the step that is shown (L)");
 }

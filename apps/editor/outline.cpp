@@ -205,6 +205,7 @@ void outline_keys(Editor& editor, const Section& section, const TextPath& path, 
 }  // namespace
 
 void outline_panel(Editor& editor) {
+    simulations_list(editor);
     const ImGuiTreeNodeFlags flags =
         ImGuiTreeNodeFlags_Leaf | ImGuiTreeNodeFlags_SpanAvailWidth |
         (editor.selected.empty() ? ImGuiTreeNodeFlags_Selected : ImGuiTreeNodeFlags_None);

@@ -70,7 +70,7 @@ double first_box(const Ray& ray, const LayerFrame& layer) {
 }  // namespace
 
 std::optional<Vec3> cloud_under(const Editor& editor, const ImVec2& mouse) {
-    const std::shared_ptr<const LiveFrame> frame = editor.live.frame();
+    const std::shared_ptr<const LiveFrame> frame = editor.live->frame();
     if (!frame) return std::nullopt;
     const Camera camera = camera_of_view(editor);
     const CameraFrame axes = camera_frame(camera);

@@ -232,6 +232,10 @@ void properties_panel(Editor& editor) {
             } else if (section != nullptr) {
                 section_rows(editor, *section, editor.selected);
                 hodograph(editor);
+                if (editor.selected.size() == 1 && editor.selected[0].name == "sun") {
+                    ImGui::Spacing();
+                    sun_dial(editor, "sun dial");
+                }
             }
         }
     }

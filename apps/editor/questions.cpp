@@ -35,6 +35,7 @@ void unsaved_dialog(Editor& editor) {
                                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
         return;
     ImGui::Text("%s has edits that are not saved.", editor.document->title().c_str());
+    editor.controls.note("unsaved " + editor.document->title());
     ImGui::Spacing();
     if (button(editor, "Save them")) {
         if (!editor.document->has_file()) {
@@ -55,53 +56,60 @@ void unsaved_dialog(Editor& editor) {
     ImGui::SameLine();
     if (button(editor, "Go on editing") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) {
         editor.pending = Pending::none;
+        editor.opens_beside = false;
+        for_each_scene(editor, [](OpenScene& scene) { scene.is_answered = false; });
         ImGui::CloseCurrentPopup();
     }
     ImGui::EndPopup();
 }
 
+// One file after the other; what the user decides is done to the file that was found, or said to be gone.
 void recovery_dialog(Editor& editor) {
-    if (!editor.show_recovery) return;
+    if (editor.left_autosaves.empty()) return;
     constexpr const char* kTitle = "Edits of an earlier session";
     if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
     if (!ImGui::BeginPopupModal(kTitle, nullptr,
                                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
         return;
-    ImGui::Text("An earlier session with %s ended before its edits were saved.",
-                editor.document->title().c_str());
-    const auto found = editor.document->found_autosave(editor.folder);
-    const auto close = [&] {
-        editor.show_recovery = false;
-        ImGui::CloseCurrentPopup();
-    };
-    if (!found) {
-        close();
-        return ImGui::EndPopup();
+    const LeftAutosave found = editor.left_autosaves.front();
+    const std::string title = editor.document->title();
+    bool answered = false;
+    if (!found.problem.empty()) {
+        ImGui::Text("An earlier session with %s left edits that cannot be read:", title.c_str());
+        ImGui::PushTextWrapPos(34 * ImGui::GetFontSize());
+        ImGui::TextUnformatted(found.problem.c_str());
+        ImGui::PopTextWrapPos();
+        editor.controls.note("unreadable edits");
+        ImGui::Spacing();
+    } else {
+        ImGui::Text("An earlier session with %s ended before its edits were saved.", title.c_str());
+        ImGui::TextDisabled("The edits are of %s.", time_text(found.time).c_str());
+        if (const auto newer = editor.document->file_newer_than(found)) {
+            ImGui::Text("The file itself is newer: it was written on %s.", time_text(*newer).c_str());
+            editor.controls.note("the file is newer");
+        }
+        ImGui::Spacing();
+        if (button(editor, "Take them", "In place of what the file has; undo goes back to that")) {
+            if (attempt(editor, [&] { editor.document->take_autosave(found); }))
+                say(editor, "Edits recovered; save to keep them, undo to go back");
+            answered = true;
+        }
+        ImGui::SameLine();
     }
-    ImGui::TextDisabled("The edits are of %s.", time_text(found->time).c_str());
-    if (found->file_is_newer) {
-        ImGui::Text("The file itself is newer: it was written on %s.",
-                    time_text(*found->file_is_newer).c_str());
-        editor.controls.note("the file is newer");
-    }
-    ImGui::Spacing();
-    if (button(editor, "Take them", "In place of what the file has; undo goes back to that")) {
-        const bool taken = attempt(editor, [&] {
-            const SceneDocument saved(found->path);
-            editor.document->edit(saved.text(), "Recover");
-        });
-        if (taken) say(editor, "Edits recovered; save to keep them, undo to go back");
-        close();
-    }
-    ImGui::SameLine();
     if (button(editor, "Keep them in a file", "As a scene beside this one, to look at later")) {
-        attempt(editor, [&] { say(editor, "Kept as " + keep_autosave(found->path).string()); });
-        close();
+        attempt(editor, [&] { say(editor, "Kept as " + keep_autosave(found, title).string()); });
+        answered = true;
     }
     ImGui::SameLine();
     if (button(editor, "Delete them")) {
-        attempt(editor, [&] { fs::remove(found->path); });
-        close();
+        attempt(editor, [&] { delete_autosave(found); });
+        answered = true;
+    }
+    ImGui::SameLine();
+    if (button(editor, "Ask again next time", "They stay where they are")) answered = true;
+    if (answered) {
+        editor.left_autosaves.erase(editor.left_autosaves.begin());
+        ImGui::CloseCurrentPopup();
     }
     ImGui::EndPopup();
 }

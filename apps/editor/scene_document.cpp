@@ -4,6 +4,8 @@
 #include <system_error>
 #include <utility>
 
+#include <sys/stat.h>
+
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "scenes/format/reader.h"
@@ -15,26 +17,20 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostHistoryBytes = 256u << 20;
-constexpr std::string_view kAutosaveEnd = ".autosave";
-
-std::string read_file(const fs::path& path) {
-    std::string text = read_text_file(path, kMaxSceneBytes);
-    if (text.size() > kMaxSceneBytes) throw Error(ErrorCode::io, path.string() + ": too large for a scene");
-    return text;
-}
-
 }  // namespace
 
-SceneDocument::SceneDocument(std::string text, std::string name) : path_(std::move(name)) {
+SceneDocument::SceneDocument(std::string text, std::string name, fs::path folder)
+    : path_(std::move(name)), folder_(std::move(folder)) {
     saved_text_ = text;
     history_.push_back({std::move(text), "New"});
     read();
 }
 
 SceneDocument::SceneDocument(const fs::path& path) : path_(path), has_file_(true) {
-    saved_text_ = read_file(path);
+    FileText now = read_file(path);
+    saved_text_ = std::move(now.text);
+    file_stamp_ = now.stamp;
     history_.push_back({saved_text_, "Open"});
-    note_file();
     read();
 }
 
@@ -43,7 +39,6 @@ void SceneDocument::read() {
     problems_.clear();
     syntax_error_ = true;
     try {
-        const fs::path folder = has_file_ ? fs::absolute(path_).parent_path() : fs::path();
         Document document;
         const int origin = document.add_origin(path_.filename().string(), text(), true);
         std::optional<Node> parsed = document.parse(origin);
@@ -54,7 +49,7 @@ void SceneDocument::read() {
         values_ = std::move(*parsed);
         tree_ = toml_tree(text());
         syntax_error_ = false;
-        Scene scene = read_scene_text(text(), path_.filename().string(), folder);
+        Scene scene = read_scene_text(text(), path_.filename().string(), folder());
         if (values_.find("name") == nullptr && has_file_) scene.name = path_.stem().string();
         scene_ = std::move(scene);
     } catch (const SceneErrors& errors) {
@@ -102,10 +97,30 @@ void SceneDocument::redo() {
     read();
 }
 
-void SceneDocument::note_file() {
+fs::path SceneDocument::folder() const { return has_file_ ? fs::absolute(path_).parent_path() : folder_; }
+
+std::optional<SceneDocument::FileStamp> SceneDocument::stamp_of(const fs::path& path) {
+    struct stat status {};
+    if (::stat(path.c_str(), &status) != 0) return std::nullopt;
     std::error_code error;
-    const auto time = fs::last_write_time(path_, error);
-    file_time_ = error ? std::nullopt : std::optional(time);
+    FileStamp stamp{fs::last_write_time(path, error), std::uintmax_t(status.st_size),
+                    std::uintmax_t(status.st_ino)};
+    return error ? std::nullopt : std::optional(stamp);
+}
+
+// The stamp is taken before the text: a version that is written meanwhile has another one, and is read instead.
+SceneDocument::FileText SceneDocument::read_file(const fs::path& path) {
+    constexpr int kAttempts = 5;
+    FileText now;
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+        now.stamp = stamp_of(path);
+        now.text = read_text_file(path, kMaxSceneBytes);
+        if (now.text.size() > kMaxSceneBytes)
+            throw Error(ErrorCode::io, path.string() + ": too large for a scene");
+        if (now.stamp && stamp_of(path) == now.stamp) return now;
+    }
+    now.stamp.reset();  // it is looked at again
+    return now;
 }
 
 void SceneDocument::save() { save_as(path_); }
@@ -113,22 +128,26 @@ void SceneDocument::save() { save_as(path_); }
 void SceneDocument::save_as(const fs::path& path) {
     write_atomically(path, text());
     const bool moved = !has_file_ || path != path_;
+    remove_autosave();
     path_ = path;
     has_file_ = true;
     saved_text_ = text();
-    note_file();
+    file_stamp_.reset();
+    try {
+        const FileText now = read_file(path_);
+        if (now.text == saved_text_) file_stamp_ = now.stamp;  // otherwise another program was as quick
+    } catch (const Error&) {
+        // It was saved; look_at_disk() says what became of it.
+    }
     merge_.clear();
-    remove_autosave();
     if (moved) read();  // names of files in it are relative to its folder
 }
 
 bool SceneDocument::is_changed_on_disk() const {
-    if (!has_file_) return false;
     std::error_code error;
-    const auto time = fs::last_write_time(path_, error);
-    if (error || time == file_time_) return false;
+    if (!has_file_ || !fs::exists(path_, error)) return false;
     try {
-        return read_file(path_) != saved_text_;
+        return read_file(path_).text != saved_text_;
     } catch (const Error&) {
         return true;  // something is there that cannot be read
     }
@@ -136,18 +155,17 @@ bool SceneDocument::is_changed_on_disk() const {
 
 SceneDocument::Disk SceneDocument::look_at_disk() {
     if (!has_file_) return Disk::same;
-    std::error_code error;
-    const auto time = fs::last_write_time(path_, error);
-    if (error) return Disk::gone;
-    if (time == file_time_) return Disk::same;
-    std::string now;
+    const std::optional<FileStamp> stamp = stamp_of(path_);
+    if (!stamp) return Disk::gone;
+    if (stamp == file_stamp_) return Disk::same;
+    FileText now;
     try {
         now = read_file(path_);
     } catch (const Error&) {
         return Disk::gone;
     }
-    if (now == saved_text_) {
-        note_file();
+    if (now.text == saved_text_) {
+        file_stamp_ = now.stamp;
         return Disk::same;
     }
     if (is_modified()) return Disk::differs;
@@ -157,62 +175,38 @@ SceneDocument::Disk SceneDocument::look_at_disk() {
 
 void SceneDocument::reload() { take_from_disk(read_file(path_)); }
 
-void SceneDocument::take_from_disk(std::string text) {
-    saved_text_ = std::move(text);
-    note_file();
+void SceneDocument::take_from_disk(FileText now) {
+    saved_text_ = std::move(now.text);
+    file_stamp_ = now.stamp;
     edit(saved_text_, "Change on disk");
 }
 
-fs::path SceneDocument::autosave_path(const fs::path& folder) const {
-    const fs::path name = "." + path_.filename().string() + std::string(kAutosaveEnd);
-    return has_file_ ? fs::absolute(path_).parent_path() / name : folder / name;
+fs::path SceneDocument::autosave_folder(const fs::path& folder) const {
+    return has_file_ ? this->folder() : folder;
 }
 
 void SceneDocument::autosave(const fs::path& folder) {
     if (!is_modified()) return remove_autosave();
-    if (version_ == autosaved_version_) return;
-    const fs::path path = autosave_path(folder);
-    write_atomically(path, text());
-    autosaved_ = path;
+    if (version_ == autosaved_version_ && autosave_.is_in_place()) return;
+    autosave_.write(autosave_folder(folder), title(), text());
     autosaved_version_ = version_;
 }
 
-void SceneDocument::remove_autosave() {
-    if (autosaved_.empty()) return;
-    std::error_code ignored;  // it may be gone
-    fs::remove(autosaved_, ignored);
-    autosaved_.clear();
-    autosaved_version_ = 0;
+std::vector<LeftAutosave> SceneDocument::left_autosaves(const fs::path& folder) const {
+    std::vector<LeftAutosave> left = nephos::left_autosaves(autosave_folder(folder), title());
+    std::erase_if(left,
+                  [this](const LeftAutosave& one) { return one.problem.empty() && one.text == text(); });
+    return left;
 }
 
-std::optional<SceneDocument::Autosave> SceneDocument::found_autosave(const fs::path& folder) const {
-    Autosave found;
-    found.path = autosave_path(folder);
-    std::error_code error;
-    if (!fs::is_regular_file(found.path, error)) return std::nullopt;
-    found.time = fs::last_write_time(found.path, error);
-    if (error) return std::nullopt;
-    try {
-        if (read_file(found.path) == text()) return std::nullopt;  // they were saved after all
-    } catch (const Error&) {
-        return std::nullopt;
-    }
-    if (has_file_ && file_time_ && *file_time_ > found.time) found.file_is_newer = file_time_;
-    return found;
+void SceneDocument::take_autosave(const LeftAutosave& left) {
+    autosave_.adopt(left);
+    edit(read_file(left.path).text, "Recover");  // nobody else writes it now
 }
 
-fs::path keep_autosave(const fs::path& autosave) {
-    const fs::path scene = autosave.stem().string().substr(1);  // ".sky.toml" without its point
-    for (int number = 1;; ++number) {
-        const std::string end = number == 1 ? "-recovered" : "-recovered-" + std::to_string(number);
-        const fs::path kept =
-            autosave.parent_path() / (scene.stem().string() + end + scene.extension().string());
-        std::error_code error;
-        if (fs::exists(fs::symlink_status(kept, error))) continue;
-        fs::rename(autosave, kept, error);
-        if (error) throw Error(ErrorCode::io, kept.string() + ": " + error.message());
-        return kept;
-    }
+std::optional<fs::file_time_type> SceneDocument::file_newer_than(const LeftAutosave& left) const {
+    if (has_file_ && file_stamp_ && file_stamp_->time > left.time) return file_stamp_->time;
+    return std::nullopt;
 }
 
 }  // namespace nephos

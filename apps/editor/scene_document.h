@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/editor/autosave.h"
 #include "scenes/format/document.h"
 #include "scenes/format/errors.h"
 #include "scenes/format/scene.h"
@@ -23,7 +24,9 @@ namespace nephos {
 class SceneDocument {
   public:
     // A new scene that has never been saved; `text` is its start.
-    explicit SceneDocument(std::string text, std::string name = "untitled.toml");
+    // Names of files in it are relative to `folder`.
+    explicit SceneDocument(std::string text, std::string name = "untitled.toml",
+                           std::filesystem::path folder = {});
     // Throws Error(io) when the file cannot be read; a file with problems is opened all the same.
     explicit SceneDocument(const std::filesystem::path& path);
 
@@ -55,8 +58,10 @@ class SceneDocument {
     bool is_modified() const { return text() != saved_text_; }
     bool has_file() const { return has_file_; }
     const std::filesystem::path& path() const { return path_; }
+    // The folder that names of files in the text are relative to; empty: the present one.
+    std::filesystem::path folder() const;
     std::string title() const { return path_.filename().string(); }
-    // Returns whether another program has written the file since it was read or saved.
+    // Returns whether the file has another content than when it was read or saved, whatever its time says.
     bool is_changed_on_disk() const;
     // Throw Error(io) naming the file; the file then is as it was.
     void save();
@@ -68,35 +73,46 @@ class SceneDocument {
     Disk look_at_disk();
     void reload();
 
-    // Writes unsaved edits into a file beside the scene's, in `folder` for one that has none; removes that file when
-    // there are none. Throws Error(io).
+    // Writes unsaved edits into a file beside the scene's (autosave.h), in `folder` for one that has none; removes that
+    // file when there are none. Files that are there already stay as they are. Throws Error(io).
     void autosave(const std::filesystem::path& folder);
-    void remove_autosave();
-    // A file of that kind that a crashed editor left for this scene, with edits that the text does not have.
-    struct Autosave {
-        std::filesystem::path path;
-        std::filesystem::file_time_type time;
-        // When the scene's file was written after these edits: the time of that.
-        std::optional<std::filesystem::file_time_type> file_is_newer;
-    };
-    std::optional<Autosave> found_autosave(const std::filesystem::path& folder) const;
+    void remove_autosave() { autosave_.remove(); }
+    // Returns the files of that kind that ended editors left for this scene, with edits that the text does not have, and
+    // those that cannot be read; the newest first.
+    std::vector<LeftAutosave> left_autosaves(const std::filesystem::path& folder) const;
+    // Takes the edits of such a file, as one step of the history, and the file for its own. Throws Error(io).
+    void take_autosave(const LeftAutosave& left);
+    // When the scene's file was written after such edits: the time of that.
+    std::optional<std::filesystem::file_time_type> file_newer_than(const LeftAutosave& left) const;
 
   private:
     struct Version {
         std::string text, what;
     };
+    // What tells one version of a file from another.
+    struct FileStamp {
+        std::filesystem::file_time_type time;
+        std::uintmax_t size = 0, inode = 0;
+        bool operator==(const FileStamp&) const = default;
+    };
+    struct FileText {
+        std::string text;
+        std::optional<FileStamp> stamp;  // none: the file changed while it was read
+    };
+    static std::optional<FileStamp> stamp_of(const std::filesystem::path& path);
+    static FileText read_file(const std::filesystem::path& path);
     void read();
-    void note_file();
-    void take_from_disk(std::string text);
-    std::filesystem::path autosave_path(const std::filesystem::path& folder) const;
+    void take_from_disk(FileText now);
+    std::filesystem::path autosave_folder(const std::filesystem::path& folder) const;
 
     std::vector<Version> history_;
     std::size_t at_ = 0, history_bytes_ = 0;
     std::string merge_, saved_text_;
     std::filesystem::path path_;
     bool has_file_ = false;
-    std::optional<std::filesystem::file_time_type> file_time_;
-    std::filesystem::path autosaved_;
+    std::filesystem::path folder_;         // of one without a file
+    std::optional<FileStamp> file_stamp_;  // of the version that saved_text_ is
+    AutosaveFile autosave_;
     std::uint64_t version_ = 0, autosaved_version_ = 0;
 
     TomlNode tree_;
@@ -105,9 +121,5 @@ class SceneDocument {
     std::vector<Problem> problems_;
     bool syntax_error_ = false;
 };
-
-// Moves edits of an earlier session into a scene file of their own beside it, whose name no file has, and returns that
-// name: "sky-recovered" with its ending for ".sky.toml.autosave". Throws Error(io).
-std::filesystem::path keep_autosave(const std::filesystem::path& autosave);
 
 }  // namespace nephos

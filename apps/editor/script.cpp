@@ -266,7 +266,7 @@ void Script::begin_line(Editor& editor) {
         if (!editor.picture || double(editor.picture->step) < number(1)) return;
     } else if (command == "wait-picture") {
         waited(kLongPatience, "a picture");
-        const LiveStatus status = editor.live.status();
+        const LiveStatus status = editor.live->status();
         const bool whole = editor.picture && editor.picture->step == status.step &&
                            status.goal == status.step && (editor.picture->refined || editor.running);
         // One that stays: a draft of the last edit may be on its way.
@@ -285,7 +285,7 @@ void Script::begin_line(Editor& editor) {
         save_rgba(name, editor.picture->width, editor.picture->height, editor.picture->rgba);
     } else if (command == "hashes") {
         std::string text;
-        const std::vector<LiveStep> steps = editor.live.steps();
+        const std::vector<LiveStep> steps = editor.live->steps();
         for (std::size_t n = 0; n < steps.size(); ++n)
             text += std::to_string(n) + " " + steps[n].hash.hex() + "\n";
         write_atomically(rest_of(words, 1), text);

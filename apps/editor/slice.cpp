@@ -71,7 +71,7 @@ double probability_at(const Vec3& at, std::span<const ActiveEllipsoid> field, co
 
 void slice_over_picture(Editor& editor) {
     if (editor.slice_of == SliceOf::nothing) return;
-    const std::shared_ptr<const LiveFrame> frame = editor.live.frame();
+    const std::shared_ptr<const LiveFrame> frame = editor.live->frame();
     const auto shown = frame ? shown_lattice(editor, frame->frame) : std::nullopt;
     if (!shown) return;
     const Extent& cells = shown->cld.extent;

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -60,6 +61,19 @@ struct BackgroundRun {
     }
 };
 
+// The writing of a grid beside the window.
+struct BackgroundExport {
+    std::thread thread;
+    std::atomic<bool> done = false;
+    std::filesystem::path path;
+    std::uint64_t step = 0;
+    std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
+    std::string failure;  // when done
+    ~BackgroundExport() {
+        if (thread.joinable()) thread.join();
+    }
+};
+
 // A cloud that a base model makes.
 struct GeneratedCloud {
     std::uint32_t number = 0;
@@ -83,6 +97,15 @@ struct Generation {
     Made one, grid;
 };
 
+// What a file dialog shows of the file that is named.
+struct FilePreview {
+    std::filesystem::path path;
+    std::filesystem::file_time_type time;
+    int width = 0, height = 0;          // of the thumbnail
+    std::vector<std::uint32_t> pixels;  // of the thumbnail, as ImGui has colours; empty: no picture
+    std::string text, problem;          // what it holds, or why it cannot be used
+};
+
 enum class SliceOf { nothing, bits, p_hum, p_act, p_ext };
 inline constexpr const char* kSliceNames[] = {"no slice", "bits", "probability of hum", "probability of act",
                                               "probability of ext"};
@@ -93,11 +116,46 @@ struct Question {
     std::function<void()> act;
 };
 
-enum class FileDialog { none, open, save_as, export_grid, screenshot };
+enum class FileDialog { none, open, save_as, export_grid, screenshot, choose };
 // What waits for an answer about unsaved edits.
-enum class Pending { none, close, open, new_scene, empty_scene };
+enum class Pending { none, close, close_scene, open, new_scene, empty_scene };
 
-struct Editor {
+// A scene that is open: its document, and its simulation, which runs whether it is the one that is shown or not.
+struct OpenScene {
+    std::unique_ptr<SceneDocument> document;
+    std::unique_ptr<LiveScene> live;
+
+    // Of the scene as the live part has it.
+    std::optional<Scene> shown_scene;
+    std::uint64_t shown_version = 0;
+    std::optional<std::uint64_t> start_step;  // that is shown first; none: that of the first frame
+    bool running = true;
+    double speed = 60;  // simulated seconds a second
+    LiveView view;
+    ViewCamera camera;
+    std::shared_ptr<const LivePicture> picture;
+    std::vector<LiveStep> steps;
+    std::uint64_t steps_version = 0;
+    std::vector<std::uint64_t> checkpoints;  // steps that the user wants to come back to, rising
+    bool record = false;  // edits of wind, climate and lights become key frames at the present step
+
+    // Of the panels.
+    TextPath selected;                     // in the outline: a section or an element
+    TextPath revealed;                     // what the outline has opened for
+    std::map<std::string, Node> defaults;  // values of keys that the text does not have
+    std::uint64_t defaults_version = 0;
+    std::string text_buffer;
+    std::uint64_t text_version = 0;
+    Generation generation;
+
+    SceneDocument::Disk disk = SceneDocument::Disk::same;  // as it was last said
+    std::vector<LeftAutosave> left_autosaves;  // of earlier sessions, that the user is asked about
+    bool is_answered = false;                  // at the end of the program: saved or discarded
+};
+
+// The base part is the scene that is shown; the others stand in `scenes`, in which its own place is empty
+// (simulations.cpp).
+struct Editor : OpenScene {
     explicit Editor(const EditorOptions& options);
     ~Editor();
 
@@ -105,39 +163,21 @@ struct Editor {
     std::filesystem::path folder;  // of settings and of what was never saved
     Settings settings;
     std::unique_ptr<Window> window;
-    std::unique_ptr<SceneDocument> document;
-    LiveScene live;
+    std::vector<OpenScene> scenes{1};
+    std::size_t shown = 0;                   // index in `scenes`
+    std::vector<std::future<void>> closing;  // simulations that end
     Controls controls;
 
-    // Of the scene as the live part has it.
-    std::optional<Scene> shown_scene;
-    std::uint64_t shown_version = 0;
-    bool running = true;
-    double speed = 60;  // simulated seconds a second
-    LiveView view;
-    ViewCamera camera;
-    ImVec2 view_min{}, view_max{};  // of the picture in the window
-    std::shared_ptr<const LivePicture> picture;
-    std::vector<LiveStep> steps;
-    std::uint64_t steps_version = 0;
-    std::vector<std::uint64_t> checkpoints;  // steps that the user wants to come back to, rising
-    bool record = false;  // edits of wind, climate and lights become key frames at the present step
+    ImVec2 view_min{}, view_max{};                // of the picture in the window
     float final_state = 1, climate_minutes = 30;  // of a change of climate
     std::uint64_t pictures = 0;                   // that were shown
 
     // Of the panels.
-    TextPath selected;                     // in the outline: a section or an element
-    TextPath revealed;                     // what the outline has opened for
-    std::map<std::string, Node> defaults;  // values of keys that the text does not have
-    std::uint64_t defaults_version = 0;
-    std::string filter;            // of the properties
-    int tab = 0, wanted_tab = -1;  // properties, text
-    std::string text_buffer;
-    std::uint64_t text_version = 0;
+    std::string filter;                   // of the properties
+    int tab = 0, wanted_tab = -1;         // properties, text
     SliceOf slice_of = SliceOf::nothing;  // what a slice over the picture shows
     int slice = 0;                        // its height, in cells
     double slice_most = 0;                // the largest probability in it
-    Generation generation;
     bool show_gizmos = true, show_plots = true;
     bool flash_on_click = false;  // the next click on the picture is lightning
 
@@ -146,15 +186,21 @@ struct Editor {
     std::filesystem::path dialog_folder, pending_path;
     std::string dialog_name, dialog_problem;
     std::filesystem::path replaced;  // an existing file that the dialog has asked about
+    // Of FileDialog::choose: the ending of the files, and what is done with the chosen one.
+    std::string chosen_extension;
+    std::function<void(const std::filesystem::path&)> take_chosen;
+    FilePreview preview;
+    std::future<FilePreview> coming_preview;
     std::optional<Question> question;
     Pending pending = Pending::none;
-    bool show_shortcuts = false, show_about = false, show_run = false, show_recovery = false;
+    bool opens_beside = false;  // what is opened is one more scene
+    bool show_shortcuts = false, show_about = false, show_run = false;
     std::vector<std::filesystem::path> folder_scenes;
     std::string message;  // in the status bar
     bool message_is_bad = false;
     std::chrono::steady_clock::time_point message_time, last_disk_look, last_autosave;
-    SceneDocument::Disk disk = SceneDocument::Disk::same;  // as it was last said
     std::unique_ptr<BackgroundRun> run;
+    std::unique_ptr<BackgroundExport> exported;
     bool quit = false, theme_changed = false;
     std::filesystem::path capture_to;  // a picture of the window that is due
     bool capture_by_user = false;      // who goes on without it; otherwise the program was started for it
@@ -234,8 +280,32 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
 void keep_checkpoint(Editor& editor);     // at the step that is shown
 void back_to_checkpoint(Editor& editor);  // the last before the present step
 
-// simulations.cpp: the layers that run.
+// simulations.cpp: scenes that are open, each with its simulation.
 void simulations_list(Editor& editor);
+void layers_list(Editor& editor);  // the layers that run in the shown one
+inline constexpr std::size_t kMostScenes = 8;
+// Opens one more scene and shows it; with kMostScenes open it says so and returns false.
+bool add_scene(Editor& editor, std::unique_ptr<SceneDocument> document);
+void show_scene(Editor& editor, std::size_t index);
+void copy_scene(Editor& editor);
+void close_scene(Editor& editor);  // the shown one, if there is another; without a question
+// Calls `act` with each open scene.
+void for_each_scene(Editor& editor, const std::function<void(OpenScene&)>& act);
+
+// sun.cpp: a dial of the sky in which the sun is dragged.
+void sun_dial(Editor& editor, const char* name);
+
+// files.cpp: writes the density that is shown, beside the window; what it says of it over the picture.
+void start_export(Editor& editor, const std::filesystem::path& path);
+void watch_export(Editor& editor);
+// A button that opens a dialog of files with an ending, and gives their path, relative to the scene where that is
+// shorter, to `take`.
+void file_button(Editor& editor, const std::string& name, const std::string& extension,
+                 std::function<void(const std::string&)> take);
+// Asks whether a VDB file is to be the state that the simulation starts from.
+void offer_grid(Editor& editor, const std::filesystem::path& path);
+// The preview of a file, read when it is another than before.
+void file_preview(Editor& editor, const std::filesystem::path& path);
 
 // generate.cpp: buttons of a base model that is selected; sketches of its clouds; and the one that is shown over the
 // picture, null when none is.
@@ -254,6 +324,9 @@ void slice_over_picture(Editor& editor);
 // live_changes.cpp: writes a change of a key that was made while the scene runs as key frames at the present step;
 // `edited`: the text as it would be without recording. Returns false for keys that cannot be recorded.
 bool record_live(Editor& editor, const TextPath& path, const std::string& edited);
+// Moves the sun; one that follows a date stands still then.
+void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dragging);
+Sun sun_now(const Editor& editor);  // at the step that is shown
 // From the present step on the climate goes to a state, 0..1, within a time.
 void record_climate(Editor& editor, double final_state, double duration_s);
 void add_flash(Editor& editor, const Vec3& at_m);  // lightning at the step that is shown

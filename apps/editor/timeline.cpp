@@ -115,30 +115,30 @@ void plot(Editor& editor, const char* title, const char* unit, std::span<const C
     text += "\nClick: go there";
     ImGui::SetTooltip("%s", text.c_str());
     if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
-        editor.live.run(editor.running = false);
-        editor.live.seek(step);
+        editor.live->run(editor.running = false);
+        editor.live->seek(step);
     }
 }
 
 void transport(Editor& editor, const LiveStatus& status) {
-    const auto pause = [&] { editor.live.run(editor.running = false); };
+    const auto pause = [&] { editor.live->run(editor.running = false); };
     if (button(editor, editor.running ? "Pause" : "Run", "Run or pause (Space)")) {
-        editor.live.run(editor.running = !editor.running);
+        editor.live->run(editor.running = !editor.running);
     }
     ImGui::SameLine();
     if (button(editor, "|<", "Back to the start (Home)")) {
         pause();
-        editor.live.seek(0);
+        editor.live->seek(0);
     }
     ImGui::SameLine();
     if (button(editor, "<", "A step back (,)")) {
         pause();
-        editor.live.seek(status.step > 0 ? status.step - 1 : 0);
+        editor.live->seek(status.step > 0 ? status.step - 1 : 0);
     }
     ImGui::SameLine();
     if (button(editor, ">", "A step on (.)")) {
         pause();
-        editor.live.seek(status.step + 1);
+        editor.live->seek(status.step + 1);
     }
     ImGui::SameLine();
     if (button(editor, "Mark", "A checkpoint at this step (M); B goes back to the last one")) keep_checkpoint(editor);
@@ -162,10 +162,10 @@ void transport(Editor& editor, const LiveStatus& status) {
 }  // namespace
 
 void timeline_panel(Editor& editor) {
-    const LiveStatus status = editor.live.status();
+    const LiveStatus status = editor.live->status();
     transport(editor, status);
     const double step_s = editor.shown_scene ? editor.shown_scene->automaton.time_step_s : 10;
-    editor.live.set_speed(editor.speed / step_s);
+    editor.live->set_speed(editor.speed / step_s);
     std::uint64_t last = editor.shown_scene ? editor.shown_scene->steps : 1;
     last = std::max<std::uint64_t>({last, status.step, std::uint64_t(editor.steps.size())});
     ImGui::SameLine();
@@ -174,8 +174,8 @@ void timeline_panel(Editor& editor) {
     std::uint64_t step = editor.running ? status.step : status.goal;
     const std::uint64_t first = 0;
     if (ImGui::SliderScalar("##step", ImGuiDataType_U64, &step, &first, &last, "step %llu")) {
-        editor.live.run(editor.running = false);
-        editor.live.seek(step);
+        editor.live->run(editor.running = false);
+        editor.live->seek(step);
     }
     editor.controls.note("time");
     tooltip_of_last(

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include <imgui.h>
 #include <imgui_stdlib.h>
@@ -141,13 +142,42 @@ std::optional<std::string> edit_numbers(Editor& editor, const ValueRow& row, std
     return number_list(numbers, integers);
 }
 
-std::optional<std::string> edit_text(const ValueRow& row) {
+// The ending of the files that a key names; empty: none. These keys are texts of the schema, whose files are no kind.
+std::string_view files_of(const Key& key) {
+    if (key.kind == KeyKind::path || key.name == "file" || key.name == "files") return ".vdb";
+    if (key.name == "textures") return ".png";
+    return {};
+}
+
+// A button behind a text that chooses a file; leaves room for it.
+void file_choice(Editor& editor, const ValueRow& row,
+                 const std::function<std::string(const std::string&)>& value_of) {
+    const std::string extension(files_of(row.key));
+    if (extension.empty()) return;
+    ImGui::SameLine(0, ImGui::GetStyle().ItemInnerSpacing.x);
+    file_button(editor, path_text(row.path), extension,
+                [&editor, path = row.path, value_of](const std::string& name) {
+                    set_value(editor, path, value_of(name));
+                });
+}
+
+float width_before_file_button(const ValueRow& row) {
+    const ImGuiStyle& style = ImGui::GetStyle();
+    if (files_of(row.key).empty()) return -1;
+    return -(ImGui::CalcTextSize("...").x + 2 * style.FramePadding.x + style.ItemInnerSpacing.x);
+}
+
+std::optional<std::string> edit_text(Editor& editor, const ValueRow& row) {
     std::string text = row.node != nullptr ? row.node->text : "";
     if (row.node != nullptr && row.node->kind == Node::Kind::integer)
         text = std::to_string(row.node->integer);
-    ImGui::SetNextItemWidth(-1);
+    ImGui::BeginGroup();
+    ImGui::SetNextItemWidth(width_before_file_button(row));
     ImGui::InputText("##value", &text);
-    if (!ImGui::IsItemDeactivatedAfterEdit()) return std::nullopt;
+    const bool typed = ImGui::IsItemDeactivatedAfterEdit();
+    file_choice(editor, row, [](const std::string& name) { return toml_string(name); });
+    ImGui::EndGroup();
+    if (!typed) return std::nullopt;
     if (row.key.kind == KeyKind::seed) {
         std::uint64_t seed = 0;
         if (!parse_seed(text, seed)) return std::nullopt;
@@ -234,11 +264,19 @@ std::optional<std::string> edit_texts(Editor& editor, const ValueRow& row) {
     };
     std::string shown;
     for (const std::string& text : texts) shown += (shown.empty() ? "" : ", ") + text;
-    ImGui::SetNextItemWidth(-1);
     const std::vector<std::string> names = candidates(editor, row);
+    ImGui::SetNextItemWidth(names.empty() ? width_before_file_button(row) : -1);
     if (names.empty()) {
+        ImGui::BeginGroup();
         ImGui::InputText("##value", &shown);
-        if (!ImGui::IsItemDeactivatedAfterEdit()) return std::nullopt;
+        const bool typed = ImGui::IsItemDeactivatedAfterEdit();
+        file_choice(editor, row, [texts, as_toml](const std::string& name) {
+            std::vector<std::string> more = texts;
+            if (std::ranges::find(more, name) == more.end()) more.push_back(name);
+            return as_toml(more);
+        });
+        ImGui::EndGroup();
+        if (!typed) return std::nullopt;
         std::vector<std::string> parts;
         for (std::size_t at = 0; at <= shown.size();) {
             const std::size_t comma = std::min(shown.find(',', at), shown.size());
@@ -303,7 +341,7 @@ std::optional<std::string> edit_value(Editor& editor, const ValueRow& row) {
         case KeyKind::text:
         case KeyKind::path:
         case KeyKind::seed:
-            return edit_text(row);
+            return edit_text(editor, row);
         case KeyKind::table:
         case KeyKind::tables:
             break;

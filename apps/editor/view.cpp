@@ -117,6 +117,20 @@ void captions(Editor& editor, const LiveStatus& status) {
         list.AddText(nullptr, 0, ImVec2(corner.x, editor.view_max.y - 2.6f * line), white, text.c_str(),
                      nullptr, editor.view_max.x - corner.x - line);
     }
+    if (editor.exported) {
+        char export_text[160];
+        const double seconds =
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - editor.exported->begin).count();
+        std::snprintf(export_text, sizeof export_text, "writing the grid of step %llu, %.0f s",
+                      static_cast<unsigned long long>(editor.exported->step), seconds);
+        const ImVec2 at(editor.view_max.x - ImGui::CalcTextSize(export_text).x - line, corner.y);
+        write(at, export_text, white);
+        const float part = float(std::fmod(seconds, 1.5) / 1.5),
+                    width = editor.view_max.x - 0.6f * line - at.x;
+        list.AddRectFilled(ImVec2(at.x + 0.8f * part * width, at.y + line),
+                           ImVec2(at.x + (0.8f * part + 0.2f) * width, at.y + line + 3),
+                           IM_COL32(120, 180, 245, 230));
+    }
     if (!editor.picture) {
         write(corner, "Preparing the first picture\u2026", white);
         return;
@@ -158,7 +172,7 @@ void take_scene_camera(Editor& editor) {
 }
 
 void frame_scene(Editor& editor) {
-    const std::shared_ptr<const LiveFrame> frame = editor.live.frame();
+    const std::shared_ptr<const LiveFrame> frame = editor.live->frame();
     if (!frame || !editor.shown_scene) return;
     WorldBox box{{1e30, 1e30, 1e30}, {-1e30, -1e30, -1e30}};
     const auto add = [&](const DensityGrid& grid) {
@@ -221,14 +235,14 @@ void view_panel(Editor& editor) {
     if (hovered && editor.flash_on_click) ImGui::SetTooltip("Lightning here");
     if (hovered) wheel(editor);
     if (ImGui::IsWindowFocused() || hovered) keys(editor);
-    captions(editor, editor.live.status());
+    captions(editor, editor.live->status());
     ImGui::GetWindowDrawList()->PopClipRect();
 
     const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
     editor.view.width = std::clamp(int(std::lround(size.x * scale.x)), 16, 4096);
     editor.view.height = std::clamp(int(std::lround(size.y * scale.y)), 16, 4096);
     editor.view.camera = editor.camera.camera;
-    editor.live.set_view(editor.view);
+    editor.live->set_view(editor.view);
 }
 
 }  // namespace nephos

@@ -234,7 +234,7 @@ std::string rain_text(const Precipitation& p, const std::string& name, double ba
 // The scene's head; `day` to `minute` are its start.
 std::string head_text(const std::string& report, const std::string& station, int day, int hour, int minute,
                       const MetarSceneOptions& o, const std::string& time) {
-    std::string text = "# SPDX-License-Identifier: Apache-2.0\n#\n# " + report +
+    std::string text = "# SPDX-License-Identifier: Apache-2.0\n#\n# " + escaped(report) +
                        "\n#\n# The sky of this report. Heights are above the aerodrome, which is z = 0.\n\n";
     text += "name = \"" + (o.name.empty() ? station : o.name) + "\"\nseed = " + std::to_string(o.seed) +
             "\n\n[time]\n" + time;

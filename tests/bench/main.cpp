@@ -28,6 +28,7 @@
 #include "tests/bench/render_bench.h"
 #include "tests/bench/seeds_bench.h"
 #include "tests/bench/study_bench.h"
+#include "tests/bench/study_command_bench.h"
 #include "tests/bench/veil_bench.h"
 
 namespace {
@@ -73,6 +74,7 @@ int main(int argc, char** argv) {
         {"veil", [] { return veil_bench_rows(); }},
         {"seeds", [] { return seeds_rows(); }},
         {"study", [] { return study_rows(); }},
+        {"study_command", [&] { return study_command_rows(source, programs / "../../bin/nephos"); }},
         {"ground", [] { return ground_rows(); }},
         {"rain", [] { return rain_rows(); }},
         {"atmosphere", [] { return atmosphere_rows(); }},

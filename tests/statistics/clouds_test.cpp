@@ -104,6 +104,7 @@ TEST(Clouds, MatchFloodFill) {
         expect_same(clouds_2d(shadow.view(), b, Neighbours::eight),
                     flood_fill(shadow, {b.x, b.y, Boundary::open}, true));
         expect_same(clouds_3d(cld.view(), b), flood_fill(cld, b, false));
+        expect_same(cloud_sizes_2d(shadow.view(), b), clouds_2d(shadow.view(), b));
         // What the shadow's edges sum up to is the perimeter of the state.
         std::uint64_t edges = 0;
         for (const ConnectedCloud& cloud : clouds_2d(shadow.view(), b)) edges += cloud.edges;
@@ -221,6 +222,82 @@ TEST(Organisation, OfRandomPointsIsAHalf) {
     EXPECT_NEAR(pair.cop, 4 / (8 * std::sqrt(std::numbers::pi)), 1e-12);
     EXPECT_NEAR(pair.scai, 1000 * 2 / 5000.0 * 8 / std::hypot(100, 100), 1e-12);
     EXPECT_TRUE(std::isnan(organisation({}, extent, {}).iorg));
+}
+
+std::vector<ConnectedCloud> random_clouds(std::size_t count, const Extent& extent, std::mt19937_64& random) {
+    std::uniform_real_distribution<double> unit(0, 1);
+    std::vector<ConnectedCloud> clouds(count);
+    for (ConnectedCloud& cloud : clouds) {
+        cloud.cells = 1 + random() % 40;
+        // Half of them in a corner, so that squares are empty or full.
+        const double part = random() % 2 == 0 ? 0.1 : 1;
+        cloud.x = part * unit(random) * extent.x;
+        cloud.y = part * unit(random) * extent.y;
+    }
+    return clouds;
+}
+
+// The definitions, pair by pair.
+Organisation naive_organisation(const std::vector<ConnectedCloud>& clouds, const Extent& extent,
+                                const Boundaries& b) {
+    const auto along = [](double from, double to, int cells, Boundary boundary) {
+        const double d = std::abs(from - to);
+        return boundary == Boundary::periodic ? std::min(d, cells - d) : d;
+    };
+    const std::size_t n = clouds.size();
+    std::vector<double> nearest(n, 1e300);
+    double logarithms = 0, potential = 0;
+    for (std::size_t one = 0; one < n; ++one) {
+        for (std::size_t other = one + 1; other < n; ++other) {
+            const double dx = along(clouds[one].x, clouds[other].x, extent.x, b.x),
+                         dy = along(clouds[one].y, clouds[other].y, extent.y, b.y);
+            const double d = std::max(0.1, std::sqrt(dx * dx + dy * dy));
+            nearest[one] = std::min(nearest[one], d);
+            nearest[other] = std::min(nearest[other], d);
+            logarithms += std::log(d);
+            potential += (std::sqrt(double(clouds[one].cells)) + std::sqrt(double(clouds[other].cells))) / d;
+        }
+    }
+    std::ranges::sort(nearest);
+    const double columns = double(extent.x) * extent.y, pairs = double(n) * double(n - 1) / 2;
+    double iorg = 0, before = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+        const double g = 1 - std::exp(-double(n) / columns * std::numbers::pi * nearest[k] * nearest[k]);
+        iorg += double(k) / double(n) * (g - before);
+        before = g;
+    }
+    return {iorg + (1 - before),
+            1000 * double(n) / (columns / 2) * std::exp(logarithms / pairs) / std::hypot(extent.x, extent.y),
+            potential / std::sqrt(std::numbers::pi) / pairs};
+}
+
+TEST(Organisation, MatchesTheNaiveTwin) {
+    std::mt19937_64 random(5);
+    for (int round = 0; round < 60; ++round) {
+        SCOPED_TRACE(round);
+        const Extent extent{int(random() % 300) + 1, int(random() % 60) + 1, 1};
+        const Boundaries b = test::random_boundaries(random);
+        const std::vector<ConnectedCloud> clouds = random_clouds(random() % 200 + 2, extent, random);
+        const Organisation got = organisation(clouds, extent, b),
+                           expected = naive_organisation(clouds, extent, b);
+        EXPECT_DOUBLE_EQ(got.iorg, expected.iorg);
+        EXPECT_DOUBLE_EQ(got.scai, expected.scai);
+        EXPECT_DOUBLE_EQ(got.cop, expected.cop);
+    }
+}
+
+// Beyond 10,000 clouds a sample of pairs stands for all of them.
+TEST(Organisation, OfManyCloudsSamplesPairs) {
+    std::mt19937_64 random(6);
+    const Extent extent{2048, 1024, 1};
+    const Boundaries periodic{Boundary::periodic, Boundary::periodic, Boundary::open};
+    const std::vector<ConnectedCloud> clouds = random_clouds(kMaxCloudsOfAllPairs + 1, extent, random);
+    const Organisation got = organisation(clouds, extent, periodic),
+                       expected = naive_organisation(clouds, extent, periodic);
+    EXPECT_DOUBLE_EQ(got.iorg, expected.iorg);
+    EXPECT_NEAR(got.scai, expected.scai, 0.001 * expected.scai);
+    EXPECT_NEAR(got.cop, expected.cop, 0.001 * expected.cop);
+    EXPECT_EQ(organisation(clouds, extent, periodic).cop, got.cop);
 }
 
 // The null value of a cover of 0.3 is 0.24, not 0.5.

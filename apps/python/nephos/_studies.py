@@ -88,6 +88,14 @@ class Sweep:
         """Returns points.csv, a value a point: means over the replicates, with their 95 % intervals."""
         return _table(self.folder / "points.csv")
 
+    def tracks(self):
+        """Returns tracks.csv of a sweep with tracks=True, a value a run: births, deaths, splits, mergers and lifetimes of
+        clouds. Raises Error where clouds were not followed."""
+        path = self.folder / "tracks.csv"
+        if not path.is_file():
+            raise _error(f"{self.folder}: has no tracks.csv; a sweep with tracks=True makes it", "io")
+        return _table(path)
+
     def failures(self):
         """Returns failures.csv: what failed, why, and the command that repeats it."""
         return _table(self.folder / "failures.csv")

@@ -33,9 +33,9 @@ class Case(unittest.TestCase):
             command = ["xvfb-run", "-a", "-s", " ".join(["-screen 0 1600x1000x24", *server]), *command]
         return command
 
-    def edit(self, *arguments, status=0, environment=None, **call):
-        """Runs the editor; returns what it printed. A hang ends it after four minutes."""
-        done = subprocess.run(self.command(*arguments, **call), capture_output=True, text=True, timeout=240,
+    def edit(self, *arguments, status=0, environment=None, timeout=240, **call):
+        """Runs the editor; returns what it printed. A hang ends it after `timeout` seconds."""
+        done = subprocess.run(self.command(*arguments, **call), capture_output=True, text=True, timeout=timeout,
                               cwd=self.folder, env={**self.environment, **(environment or {})}, check=False)
         output = done.stdout + done.stderr
         self.assertEqual(done.returncode, status, output)

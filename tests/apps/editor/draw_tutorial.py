@@ -23,6 +23,22 @@ wait 0.3
 wait-picture
 screenshot editor-voxels.png
 """
+SIMULATIONS = """
+wait-step 30
+click "copy simulation"
+wait-step 34
+click sun
+set sun.elevation_deg 9
+set sun.azimuth_deg 300
+click "new simulation"
+wait-step 20
+click "simulation 2"
+wait-step 60
+click "run all simulations"
+click sun
+wait-picture
+screenshot editor-simulations.png
+"""
 GRID = """
 wait-step 1
 key SPACE
@@ -48,6 +64,8 @@ def main():
         walk(nephos, HERE / "tutorial.txt", folder)
         (folder / "voxels.txt").write_text(VOXELS, encoding="utf-8")
         walk(nephos, folder / "voxels.txt", folder, str(SOURCE / "scenes/cumulus.toml"))
+        (folder / "simulations.txt").write_text(SIMULATIONS, encoding="utf-8")
+        walk(nephos, folder / "simulations.txt", folder, str(SOURCE / "scenes/cumulus.toml"))
         (folder / "grid.txt").write_text(GRID, encoding="utf-8")
         walk(nephos, folder / "grid.txt", folder, str(SOURCE / "scenes/torchelsen/cloud-4.toml"))
         for picture in sorted(folder.glob("*.png")):

@@ -445,6 +445,109 @@ class Story(Case):
             """)
 
 
+class Together(Case):
+    def test_simulations_side_by_side(self):
+        """A copy of a scene and a new one run beside it, each on its own clock; changing one leaves the other as it is; each
+        has the state hashes of `nephos hash`; closing asks about unsaved edits of all."""
+        scene = self.folder / "one.toml"
+        scene.write_text(LIVE_SCENE, encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait-step 3
+            click "copy simulation"
+            wait-step 5
+            click wind
+            click wind[0]
+            click open wind[0].levels
+            wait 0.3
+            click wind[0].levels[0]
+            set wind[0].levels[0].speed_m_per_s 9
+            wait-step 12
+            key CTRL+S
+            set "file name" two.toml
+            wait 0.3
+            hashes two.txt
+            click "new simulation"
+            wait-step 6
+            click "run simulation 3"
+            click "simulation 1"
+            wait-step 15
+            click "run all simulations"
+            wait 0.3
+            hashes one.txt
+            wait-picture
+            screenshot three.png
+            click sun
+            set sun.elevation_deg 21
+            click "delete simulation 3"
+            wait 0.3
+            click "simulation 1"
+            wait-picture
+            key CTRL+Q
+            wait 0.3
+            expect-control "unsaved one.toml"
+            click "Save them"
+            wait 0.5
+            """)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+        two = tomllib.loads((self.folder / "two.toml").read_text(encoding="utf-8"))
+        self.assertEqual(two["wind"][0]["levels"][0]["speed_m_per_s"], 9)
+        for name in ("one", "two"):
+            seen = (self.folder / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+            self.assertGreater(len(seen), 12, name)
+            replay = subprocess.run([NEPHOS, "hash", str(self.folder / f"{name}.toml"), "--steps", str(len(seen) - 1)],
+                                    capture_output=True, text=True, check=True).stdout.splitlines()
+            self.assertEqual(replay, seen, name)
+        one = (self.folder / "one.txt").read_text(encoding="utf-8").splitlines()
+        two = (self.folder / "two.txt").read_text(encoding="utf-8").splitlines()
+        self.assertNotEqual(one[12], two[12])
+
+    def test_files_are_chosen_and_exported(self):
+        """A texture is chosen in the file dialog, which shows it; one without transparency is said to be none; a wind field's
+        file likewise. The present grid is exported beside the window."""
+        pictures = self.folder / "pictures"
+        pictures.mkdir()
+        Image.new("RGBA", (64, 48), (255, 255, 255, 128)).save(pictures / "soft.png")
+        Image.new("RGB", (64, 48), (255, 255, 255)).save(pictures / "opaque.png")
+        scene = self.folder / "files.toml"
+        scene.write_text(LIVE_SCENE, encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait-step 2
+            key SPACE
+            click model
+            click model[0]
+            click "file of model[0].textures"
+            wait 0.3
+            click "file pictures"
+            wait 0.3
+            click "file opaque.png"
+            expect-control "problem of opaque.png"
+            click "file soft.png"
+            expect-control "preview of soft.png"
+            screenshot choice.png
+            click Choose
+            wait 0.3
+            wait-picture
+            click menu File
+            click "menu Export the grid..."
+            set "file name" grid.vdb
+            wait 2
+            key CTRL+S
+            wait 0.5
+            click new wind_field
+            wait 0.3
+            click "file of wind_field[0].files"
+            wait 0.3
+            click "file grid.vdb"
+            expect-control "preview of grid.vdb"
+            click Cancel
+            wait 0.3
+            """)
+        saved = tomllib.loads(scene.read_text(encoding="utf-8"))
+        self.assertEqual(saved["model"][0]["textures"], ["pictures/soft.png"])
+        info = subprocess.run([NEPHOS, "info", str(self.folder / "grid.vdb")], capture_output=True, text=True, check=True)
+        self.assertIn("density", info.stdout)
+
+
 class Tutorial(Case):
     def test_the_page_leads_from_nothing_to_rain(self):
         """The walk of docs/editor.md, click by click: the page names every value of the script, each step has its picture, and
@@ -477,8 +580,9 @@ class Tutorial(Case):
 class Wild(Case):
     def test_two_thousand_random_inputs(self):
         """Clicks, drags and keys at random: no crash, no message of the validation layer, no frame of two seconds. Files
-        are not written: dialogs have no folder to save into but the test's own."""
-        output = self.edit(self.scene("torchelsen/cloud-1.toml"), "--validation", "--report", size="1000x640",
+        are not written: dialogs have no folder to save into but the test's own. They open up to eight simulations: beside
+        other work that takes minutes."""
+        output = self.edit(self.scene("torchelsen/cloud-1.toml"), "--validation", "--report", size="1000x640", timeout=840,
                            script="wait-step 1\nrandom 2000 20261122\n")
         longest = int(re.search(r"longest frame (\d+) ms", output).group(1))
         self.assertLess(longest, 2000, output)

@@ -134,6 +134,25 @@ TEST(LiveScene, RunsAtItsSpeedAndStops) {
     EXPECT_EQ(live.picture(0)->width, 96);
 }
 
+// A simulation that is not shown goes on, without pictures; shown again it has that of its step.
+TEST(LiveScene, RunsUnseen) {
+    LiveScene live({.splatting = Splatting::cpu});
+    live.set_view(small_view());
+    live.keep_at_most(1);  // a checkpoint has more: two are kept
+    live.start(small_scene(), 5);
+    ASSERT_TRUE(comes([&] { return live.picture(0) && live.picture(0)->refined; }));
+    live.show(false);
+    const std::uint64_t number = live.picture(0)->number;
+    live.seek(40);
+    ASSERT_TRUE(comes([&] { return live.status().step == 40; }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    EXPECT_EQ(live.picture(number), nullptr);
+    EXPECT_LE(live.status().checkpoints, 3u);
+    EXPECT_EQ(live.frame()->frame.hash.hex(), true_hashes(small_scene(), 40)[40]);
+    live.show(true);
+    ASSERT_TRUE(comes([&] { return live.picture(number) && live.picture(0)->step == 40; }));
+}
+
 TEST(LiveScene, FailuresAreSaidAndAnotherSceneGoesOn) {
     LiveScene live({.splatting = Splatting::cpu});
     live.set_view(small_view());

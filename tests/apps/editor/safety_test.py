@@ -190,6 +190,69 @@ class Safety(Case):
         self.assertEqual((self.folder / "models-recovered.toml").read_text(encoding="utf-8"), "seed = 5\n")
         self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
 
+    def test_two_editors_of_one_scene(self):
+        """The second editor is not asked about the edits of the first, which lives, and does not touch its file; killed, each
+        leaves its edits, and the next editor asks about both."""
+        scene = self.models()
+        programs = []
+        for number in (1, 2):
+            script = self.folder / f"script-{number}.txt"
+            script.write_text(f"wait-step 1\nclick sun\nset sun.elevation_deg {20 + number}\nwait 6\n"
+                              f"hashes ready-{number}.txt\nwait 100\n", encoding="utf-8")
+            programs.append(subprocess.Popen([*self.command(scene), "--script", str(script)], cwd=self.folder,
+                                             env=self.environment, stderr=subprocess.PIPE, text=True))
+            self.wait_for(self.folder / f"ready-{number}.txt", programs[-1])
+        kept = sorted(self.folder.glob(".models.toml.*autosave"))
+        self.assertEqual(len(kept), 2, kept)
+        self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
+        # A picture for the documentation asks nothing and overwrites nothing.
+        before = {path: path.read_bytes() for path in kept}
+        self.edit(scene, "--screenshot", self.folder / "picture.png", "--after", "6", script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 50
+            wait 6
+            """)
+        self.assertEqual({path: path.read_bytes() for path in self.folder.glob(".models.toml.*autosave")}, before)
+        for number, program in enumerate(programs, 1):
+            name = f"script-{number}.txt"
+            (editor,) = [int(pid) for pid in os.listdir("/proc") if pid.isdigit() and self.is_our_editor(pid, name)]
+            os.kill(editor, signal.SIGKILL)
+            program.communicate(timeout=30)
+        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            click "Keep them in a file"
+            wait 0.3
+            click "Take them"
+            wait-step 1
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertIn("elevation_deg = 22", (self.folder / "models-recovered.toml").read_text(encoding="utf-8"))
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+        self.assertEqual(list(self.folder.glob(".models.toml.*autosave")), [])
+
+    def test_edits_that_cannot_be_read_are_a_question(self):
+        """An autosave that is no text of a scene is said to be there, and stays until the user decides."""
+        scene = self.models()
+        autosave = self.folder / ".models.toml.autosave"
+        with autosave.open("wb") as file:
+            file.truncate(64 << 20)
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            expect-control "unreadable edits"
+            click "Ask again next time"
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            wait 6
+            key CTRL+S
+            wait 0.5
+            """)
+        self.assertEqual(autosave.stat().st_size, 64 << 20)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+
     def test_a_signal_keeps_the_edits(self):
         """An end of the session: the program ends by SIGTERM within a moment, and unsaved edits are beside the scene."""
         scene = self.models()
@@ -209,13 +272,13 @@ class Safety(Case):
         self.assertIn("elevation_deg = 21", (self.folder / ".models.toml.autosave").read_text(encoding="utf-8"))
         self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
 
-    def is_our_editor(self, pid):
+    def is_our_editor(self, pid, script="script.txt"):
         try:
             with open(f"/proc/{pid}/cmdline", "rb") as file:
                 words = file.read().split(b"\0")
         except OSError:
             return False
-        return words[0].endswith(b"nephos-editor") and str(self.folder / "script.txt").encode() in words
+        return words[0].endswith(b"nephos-editor") and str(self.folder / script).encode() in words
 
     def test_a_scene_with_problems_shows_none_of_the_clouds_before(self):
         """The clouds of one scene are not left under the title of the next, which cannot be simulated."""

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "apps/editor/schema_values.h"
 #include "core/error.h"
@@ -194,14 +195,19 @@ TEST(SceneDocument, UnsavedEditsSurviveACrash) {
     }  // no orderly end
     fs::last_write_time(path, fs::last_write_time(path) - std::chrono::seconds(60));
     SceneDocument next(path);
-    const auto found = next.found_autosave(folder.path);
-    ASSERT_TRUE(found);
-    EXPECT_EQ(content(found->path), "seed = 9\n");
-    EXPECT_FALSE(found->file_is_newer);
-    next.edit(content(found->path), "Recover");
+    const auto left = next.left_autosaves(folder.path);
+    ASSERT_EQ(left.size(), 1u);
+    EXPECT_EQ(left[0].text, "seed = 9\n");
+    EXPECT_EQ(left[0].problem, "");
+    EXPECT_FALSE(next.file_newer_than(left[0]));
+    next.take_autosave(left[0]);
+    EXPECT_EQ(next.text(), "seed = 9\n");
+    EXPECT_TRUE(SceneDocument(path).left_autosaves(folder.path).empty());  // it is that of `next` now
     next.autosave(folder.path);
+    EXPECT_EQ(content(folder.path / ".a.toml.autosave"), "seed = 9\n");
     next.save();
-    EXPECT_FALSE(next.found_autosave(folder.path));  // saved: there is nothing to recover
+    EXPECT_TRUE(next.left_autosaves(folder.path).empty());  // saved: there is nothing to recover
+    EXPECT_FALSE(fs::exists(folder.path / ".a.toml.autosave"));
     EXPECT_EQ(content(path), "seed = 9\n");
 }
 
@@ -221,15 +227,15 @@ TEST(SceneDocument, AutosaveOlderThanTheFileSaysSo) {
     std::filesystem::last_write_time(path, written);
     const SceneDocument next(path);
     EXPECT_EQ(next.text(), "seed = 5\n");
-    const auto found = next.found_autosave(folder.path);
-    ASSERT_TRUE(found);
-    ASSERT_TRUE(found->file_is_newer);
-    EXPECT_EQ(*found->file_is_newer, written);
+    const auto left = next.left_autosaves(folder.path);
+    ASSERT_EQ(left.size(), 1u);
+    ASSERT_TRUE(next.file_newer_than(left[0]));
+    EXPECT_EQ(*next.file_newer_than(left[0]), written);
     write(folder.path / "a-recovered.toml", "name = \"another\"\n");
-    const std::filesystem::path kept = keep_autosave(found->path);
+    const std::filesystem::path kept = keep_autosave(left[0], "a.toml");
     EXPECT_EQ(kept.filename(), "a-recovered-2.toml");
     EXPECT_EQ(content(kept), "seed = 9\n");
-    EXPECT_FALSE(next.found_autosave(folder.path));
+    EXPECT_TRUE(next.left_autosaves(folder.path).empty());
 }
 
 // An autosave with what the file has is nothing to ask about.
@@ -243,7 +249,105 @@ TEST(SceneDocument, AutosaveThatWasSavedIsNotOffered) {
         document.autosave(folder.path);
     }
     write(path, "seed = 9\n");
-    EXPECT_FALSE(SceneDocument(path).found_autosave(folder.path));
+    EXPECT_TRUE(SceneDocument(path).left_autosaves(folder.path).empty());
+}
+
+// Two editors of one scene: each has a file of its own, neither is offered that of the other, none is overwritten, and
+// each file goes with its editor alone. So do two new scenes, which have the same name.
+TEST(SceneDocument, TwoEditorsKeepTheirOwnEdits) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml", own = folder.path / ".a.toml.autosave",
+                                second =
+                                    folder.path / (".a.toml." + std::to_string(::getpid()) + ".autosave");
+    write(path, "seed = 1\n");
+    SceneDocument a(path), b(path);
+    a.edit("seed = 2\n", "edit");
+    a.autosave(folder.path);
+    EXPECT_TRUE(b.left_autosaves(folder.path).empty());
+    b.edit("seed = 3\n", "edit");
+    b.autosave(folder.path);
+    EXPECT_EQ(content(own), "seed = 2\n");
+    EXPECT_EQ(content(second), "seed = 3\n");
+    a.edit("seed = 4\n", "edit");
+    a.autosave(folder.path);
+    EXPECT_EQ(content(own), "seed = 4\n");
+    LeftAutosave live{own, {}, "seed = 4\n", {}};
+    EXPECT_THROW(b.take_autosave(live), Error);
+    EXPECT_THROW(delete_autosave(live), Error);
+    EXPECT_THROW(keep_autosave(live, "a.toml"), Error);
+    b.save();
+    EXPECT_FALSE(std::filesystem::exists(second));
+    EXPECT_EQ(content(own), "seed = 4\n");
+    // Somebody removes the file: it is written again without another edit.
+    std::filesystem::remove(own);
+    a.autosave(folder.path);
+    EXPECT_EQ(content(own), "seed = 4\n");
+
+    SceneDocument c(std::string("seed = 5\n")), d(std::string("seed = 5\n"));
+    c.edit("seed = 6\n", "edit");
+    d.edit("seed = 7\n", "edit");
+    c.autosave(folder.path);
+    d.autosave(folder.path);
+    EXPECT_EQ(content(folder.path / ".untitled.toml.autosave"), "seed = 6\n");
+    EXPECT_TRUE(SceneDocument(std::string("seed = 5\n")).left_autosaves(folder.path).empty());
+}
+
+// Files that are there stay: those of crashed sessions until somebody answers, and one that cannot be read, which is
+// asked about and not taken for none.
+TEST(SceneDocument, AutosaveLeavesOtherFilesAlone) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    write(folder.path / ".a.toml.autosave", std::string("seed = \xff\xfe\n"));
+    write(folder.path / ".a.toml.4711.autosave", "seed = 8\n");
+    write(folder.path / ".a.toml.backup.autosave", "seed = 7\n");  // not one of ours
+    std::filesystem::create_directory(folder.path / ".b.toml.autosave");
+    std::filesystem::last_write_time(folder.path / ".a.toml.4711.autosave",
+                                     std::filesystem::last_write_time(path) - std::chrono::seconds(100));
+    SceneDocument document(path);
+    document.edit("seed = 2\n", "edit");
+    document.autosave(folder.path);
+    document.edit("seed = 3\n", "edit");
+    document.autosave(folder.path);
+    EXPECT_EQ(content(folder.path / ".a.toml.autosave"), "seed = \xff\xfe\n");
+    EXPECT_EQ(content(folder.path / ".a.toml.4711.autosave"), "seed = 8\n");
+    const auto left = SceneDocument(path).left_autosaves(folder.path);
+    ASSERT_EQ(left.size(), 2u);
+    EXPECT_EQ(left[1].text, "seed = 8\n");
+    if (::geteuid() != 0) {  // root reads everything
+        std::filesystem::permissions(left[1].path, std::filesystem::perms::none);
+        const auto unreadable = SceneDocument(path).left_autosaves(folder.path);
+        ASSERT_EQ(unreadable.size(), 2u);
+        EXPECT_NE(unreadable[1].problem, "");
+        std::filesystem::permissions(left[1].path, std::filesystem::perms::owner_all);
+    }
+    std::filesystem::resize_file(folder.path / ".a.toml.4711.autosave", kMaxSceneBytes + 1);
+    const auto large = SceneDocument(path).left_autosaves(folder.path);
+    ASSERT_EQ(large.size(), 2u);
+    EXPECT_NE((large[0].problem + large[1].problem).find("too large"), std::string::npos);
+    SceneDocument b(folder.path / "a.toml");
+    EXPECT_NO_THROW(b.autosave(folder.path));
+}
+
+// A file that another program writes with the time and size that it had before: saving sees its content.
+TEST(SceneDocument, SavingComparesTheContent) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    SceneDocument document(path);
+    const auto time = std::filesystem::last_write_time(path);
+    write(path, "seed = 2\n");
+    std::filesystem::last_write_time(path, time);
+    EXPECT_TRUE(document.is_changed_on_disk());
+    document.save();
+    EXPECT_FALSE(document.is_changed_on_disk());
+    EXPECT_EQ(content(path), "seed = 1\n");
+    // Replaced by another file of the same time and size: another inode.
+    write(folder.path / "b.toml", "seed = 3\n");
+    std::filesystem::last_write_time(folder.path / "b.toml", std::filesystem::last_write_time(path));
+    std::filesystem::rename(folder.path / "b.toml", path);
+    EXPECT_EQ(document.look_at_disk(), SceneDocument::Disk::reloaded);
+    EXPECT_EQ(document.text(), "seed = 3\n");
 }
 
 TEST(SceneDocument, KnowsWhatAnotherProgramWrote) {

@@ -265,6 +265,31 @@ class Studies(Case):
             nephos.merge(sweep.folder)
         self.assertEqual(set(nephos.merge(sweep.folder, overwrite=True).runs()["status"]), {"missing"})
 
+    def test_tracks_have_the_numbers_of_the_command(self):
+        scene = nephos.Scene.from_text(NULL_SCENE)
+        axes = {"field.background.ext": [0.05, 0.1]}
+        sweep = nephos.sweep(scene, axes, self.folder / "python", replicates=2, steps=(200, 400), tracks=True, workers=2)
+        self.call("sweep", self.write("null.toml", NULL_SCENE), "--axis", "field.background.ext=0.05,0.1", "--tracks",
+                  "--replicates", "2", "--steps", "200..400", "--out", "command")
+        for name in ("runs.csv", "tracks.csv"):
+            self.assertEqual((sweep.folder / name).read_bytes(), (self.folder / "command" / name).read_bytes(), name)
+        tracks = sweep.tracks()
+        numpy.testing.assert_array_equal(tracks["run"], sweep.runs()["run"])
+        # Cells of the null scene die with probability ext a step: clouds live longer where it is smaller. Runs that are not
+        # steady have no value.
+        steady = tracks["regime"] == "steady"
+        few, many = (tracks["field.background.ext"] == ext for ext in (0.05, 0.1))
+        self.assertTrue((steady & few).any() and (steady & many).any())
+        self.assertTrue(numpy.isnan(tracks["births"][~steady]).all())
+        self.assertTrue((tracks["births"][steady] > 100).all() and (tracks["deaths"][steady] > 100).all())
+        self.assertTrue((tracks["censored"][steady] < tracks["tracks"][steady]).all())
+        mean, median = tracks["track_lifetime_mean_s"], tracks["track_lifetime_median_s"]
+        self.assertGreater(mean[steady & few].min(), mean[steady & many].max())
+        self.assertTrue((median[steady] <= tracks["track_age_longest_s"][steady]).all())
+        plain = nephos.sweep(scene, {"field.background.ext": [0.1]}, self.folder / "plain", replicates=1, steps=(200, 400))
+        with self.assertRaisesRegex(nephos.Error, "tracks=True"):
+            plain.tracks()
+
     def test_a_fit_has_the_numbers_of_the_command(self):
         self.write("null.toml", NULL_SCENE)
         path = self.write("fit.toml", """\

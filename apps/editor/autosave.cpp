@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/editor/autosave.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <span>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "scenes/format/reader.h"
+#include "scenes/format/text.h"
+
+namespace nephos {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kEnd = ".autosave";
+
+[[noreturn]] void fail(const fs::path& path, const std::string& what, int error) {
+    throw Error(ErrorCode::io, path.string() + ": " + what + ": " + std::strerror(error));
+}
+
+// Returns 0, EWOULDBLOCK when another has it, or why locks are not to be had here.
+int lock(int file) {
+    int result;
+    do result = ::flock(file, LOCK_EX | LOCK_NB);
+    while (result != 0 && errno == EINTR);
+    return result == 0 ? 0 : errno;
+}
+
+// Returns the file with its lock. On a file system without locks the file alone: nothing says that another has it.
+Descriptor locked(const fs::path& path) {
+    Descriptor file(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    if (file.get() < 0) fail(path, "cannot be opened", errno);
+    if (lock(file.get()) == EWOULDBLOCK || !is_same_file(file.get(), path))
+        throw Error(ErrorCode::io, path.string() + ": another editor has it now");
+    return file;
+}
+
+fs::path numbered(const fs::path& folder, const std::string& name, int attempt) {
+    std::string middle;
+    if (attempt > 0) middle = "." + std::to_string(::getpid());
+    if (attempt > 1) middle += "-" + std::to_string(attempt);
+    return folder / ("." + name + middle + std::string(kEnd));
+}
+
+// Returns whether a file name is one of those of numbered().
+bool is_of(const std::string& file, const std::string& name) {
+    const std::string begin = "." + name;
+    if (file.size() < begin.size() + kEnd.size() || !file.starts_with(begin) || !file.ends_with(kEnd))
+        return false;
+    const std::string middle = file.substr(begin.size(), file.size() - begin.size() - kEnd.size());
+    return middle.empty() || (middle[0] == '.' && middle.size() > 1 &&
+                              middle.find_first_not_of("0123456789-", 1) == std::string::npos);
+}
+
+}  // namespace
+
+bool AutosaveFile::is_in_place() const { return is_open() && is_same_file(file_.get(), path_); }
+
+void AutosaveFile::claim(const fs::path& folder, const std::string& name) {
+    constexpr int kAttempts = 1000;
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) fail(folder, "cannot create the folder", error.value());
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+        const fs::path path = numbered(folder, name, attempt);
+        Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+        if (file.get() < 0 && errno == EEXIST) continue;
+        if (file.get() < 0) fail(path, "cannot be written", errno);
+        lock(file.get());
+        file_ = std::move(file);
+        path_ = path;
+        return;
+    }
+    throw Error(ErrorCode::io, numbered(folder, name, 0).string() + ": there are too many of them");
+}
+
+void AutosaveFile::write(const fs::path& folder, const std::string& name, std::string_view text) {
+    if (!is_in_place()) claim(folder, name);
+    AtomicFile next(path_);
+    Descriptor file(::open(next.temporary().c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
+    if (file.get() < 0) fail(path_, "cannot be written", errno);
+    lock(file.get());  // before it gets the name: nobody sees it without
+    if (const int failed = write_all(file.get(), std::as_bytes(std::span(text))))
+        fail(path_, "cannot be written", failed);
+    next.publish();
+    file_ = std::move(file);
+}
+
+void AutosaveFile::adopt(const LeftAutosave& left) {
+    Descriptor file = locked(left.path);
+    remove();
+    file_ = std::move(file);
+    path_ = left.path;
+}
+
+void AutosaveFile::remove() {
+    if (is_in_place()) ::unlink(path_.c_str());
+    file_ = Descriptor();
+    path_.clear();
+}
+
+std::vector<LeftAutosave> left_autosaves(const fs::path& folder, const std::string& name) {
+    std::vector<LeftAutosave> out;
+    std::error_code error;
+    for (auto at = fs::directory_iterator(folder, error); !error && at != fs::directory_iterator();
+         at.increment(error)) {
+        std::error_code ignored;
+        if (!is_of(at->path().filename().string(), name) || at->is_symlink(ignored) ||
+            !at->is_regular_file(ignored))
+            continue;
+        LeftAutosave left{at->path(), at->last_write_time(ignored), {}, {}};
+        const Descriptor file(::open(left.path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+        if (file.get() < 0 && errno == ENOENT) continue;
+        if (file.get() >= 0 && lock(file.get()) == EWOULDBLOCK) continue;
+        try {
+            left.text = read_text_file(left.path, kMaxSceneBytes);
+            if (left.text.size() > kMaxSceneBytes)
+                left.problem = left.path.string() + ": too large for a scene";
+        } catch (const Error& problem) {
+            left.problem = problem.what();
+        }
+        if (left.text.empty() && left.problem.empty()) continue;
+        out.push_back(std::move(left));
+    }
+    std::ranges::sort(out, [](const LeftAutosave& a, const LeftAutosave& b) {
+        return a.time != b.time ? a.time > b.time : a.path < b.path;
+    });
+    return out;
+}
+
+void delete_autosave(const LeftAutosave& left) {
+    const Descriptor file = locked(left.path);
+    if (::unlink(left.path.c_str()) != 0) fail(left.path, "cannot be removed", errno);
+}
+
+fs::path keep_autosave(const LeftAutosave& left, const fs::path& name) {
+    const Descriptor file = locked(left.path);
+    for (int number = 1;; ++number) {
+        const std::string end = number == 1 ? "-recovered" : "-recovered-" + std::to_string(number);
+        const fs::path kept =
+            left.path.parent_path() / (name.stem().string() + end + name.extension().string());
+        if (::renameat2(AT_FDCWD, left.path.c_str(), AT_FDCWD, kept.c_str(), RENAME_NOREPLACE) == 0)
+            return kept;
+        if (errno == EEXIST) continue;
+        // A file system that cannot: a second name is refused, too, when there is one.
+        if (errno != EINVAL && errno != ENOSYS) fail(kept, "cannot be written", errno);
+        if (::link(left.path.c_str(), kept.c_str()) == 0) {
+            ::unlink(left.path.c_str());
+            return kept;
+        }
+        if (errno != EEXIST) fail(kept, "cannot be written", errno);
+    }
+}
+
+}  // namespace nephos
