@@ -7,7 +7,7 @@
 
 namespace nephos::bench {
 
-// Particles of rain: their places, and a picture of them. Needs no Vulkan device.
+// Particles of rain: their places, and pictures of them; one more on a Vulkan device where there is one.
 std::vector<BenchRow> rain_rows();
 
 }  // namespace nephos::bench
