@@ -186,10 +186,10 @@ void add_metar_command(CLI::App& app, Action& action) {
         ->type_name("YYYY-MM");
     add_value(*command, "--at", "LAT,LON,M", "Place of the aerodrome, degrees, and its elevation in metres",
               [a](const std::string& text) {
-                  const std::vector<double> numbers = parse_reals(text, 3, -180, 9000);
+                  const std::vector<double> numbers = parse_reals(text, 3, -500, 9000);
                   if (std::abs(numbers[0]) > 90)
                       throw Error(ErrorCode::usage, "'" + text + "' has a latitude beyond 90 degrees");
-                  if (numbers[1] > 180)
+                  if (std::abs(numbers[1]) > 180)
                       throw Error(ErrorCode::usage, "'" + text + "' has a longitude beyond 180 degrees");
                   a->options.place = MetarPlace{numbers[0], numbers[1], numbers[2]};
               });

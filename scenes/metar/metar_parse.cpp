@@ -12,17 +12,20 @@ namespace {
 
 constexpr double kKnot = 1852.0 / 3600;
 constexpr double kStatuteMile_m = 1609.344;
+constexpr std::size_t kMostClouds = 8;  // groups of clouds: reports have three, some countries six
 
 bool all_digits(std::string_view text) {
     return !text.empty() &&
            std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 bool all_slashes(std::string_view text) { return !text.empty() && text.find_first_not_of('/') == text.npos; }
+// Of at most nine digits.
 int number(std::string_view text) {
     int value = 0;
     std::from_chars(text.data(), text.data() + text.size(), value);
     return value;
 }
+bool is_count(std::string_view text) { return all_digits(text) && text.size() <= 3; }
 
 // The report word by word. Each of the read_ functions takes the group at hand if it is of its kind.
 class Reader {
@@ -44,6 +47,11 @@ class Reader {
     }
 
     Metar read() {
+        for (; at_ < words_.size(); ++at_) {
+            if (!std::ranges::all_of(word(), [](char c) { return c > ' ' && c <= '~'; }))
+                fail("expected letters, digits and signs that a report has");
+        }
+        at_ = 0;
         if (words_.empty())
             throw Error(
                 ErrorCode::usage,
@@ -134,6 +142,8 @@ class Reader {
     bool read_wind() {
         std::string w = word();
         std::size_t words = 1;
+        if (w.size() == 7 && all_digits(w.substr(0, 3)) && w[3] == 'V' && all_digits(w.substr(4)))
+            return read_sector(w);
         const auto gap = [&](std::size_t n) {
             return at_ + n < words_.size() ? words_[at_ + n].text : std::string();
         };
@@ -142,11 +152,6 @@ class Reader {
             (gap(1).ends_with("KT") || gap(1).ends_with("MPS"))) {
             w += gap(1);
             words = 2;
-        } else if (w.size() == 7 && all_digits(w.substr(0, 3)) && w[3] == 'V' && all_digits(w.substr(4))) {
-            metar_.wind.from_between_deg = number(w.substr(0, 3));
-            metar_.wind.to_between_deg = number(w.substr(4));
-            take("wind between " + w.substr(0, 3) + " and " + w.substr(4) + " degrees", false);
-            return true;
         }
         double unit = kKnot;
         bool with_unit = true;
@@ -169,7 +174,7 @@ class Reader {
         const bool known_direction = all_digits(direction), slashes = all_slashes(direction);
         if (!(known_direction || slashes || direction == "VRB")) return false;
         if (!(all_digits(speed) || all_slashes(speed)) || speed.size() > 3 || speed.size() < 2) return false;
-        if (!gust.empty() && !all_digits(gust) && !all_slashes(gust)) return false;
+        if (!gust.empty() && !is_count(gust) && !all_slashes(gust)) return false;
         if (!with_unit && (gust.empty() || !known_direction)) return false;  // five digits alone are no wind
         if (known_direction && number(direction) > 360 && lenient_) return false;
         if (known_direction && number(direction) > 360) fail("a direction of more than 360 degrees");
@@ -189,9 +194,21 @@ class Reader {
         return true;
     }
 
+    // dddVddd: the sector that the wind turns in.
+    bool read_sector(const std::string& w) {
+        const int from = number(w.substr(0, 3)), to = number(w.substr(4));
+        if (std::max(from, to) > 360 && lenient_) return false;
+        if (std::max(from, to) > 360) fail("a direction of more than 360 degrees");
+        metar_.wind.from_between_deg = from;
+        metar_.wind.to_between_deg = to;
+        take("wind between " + w.substr(0, 3) + " and " + w.substr(4) + " degrees", false);
+        return true;
+    }
+
     bool set_visibility(int metres, const std::string& meaning, std::size_t words = 1) {
-        if (!metar_.visibility_m) metar_.visibility_m = metres;
-        take(meaning, true, words);
+        const bool first = !metar_.visibility_m;
+        if (first) metar_.visibility_m = metres;
+        take(first ? meaning : "a second visibility", first, words);
         return true;
     }
 
@@ -237,11 +254,11 @@ class Reader {
         const std::size_t slash = miles.find('/');
         double value = 0;
         if (slash == miles.npos) {
-            if (!all_digits(miles)) return false;
+            if (!is_count(miles)) return false;
             value = number(miles);
         } else {
             const std::string over = miles.substr(0, slash), under = miles.substr(slash + 1);
-            if (!all_digits(over) || !all_digits(under) || number(under) == 0) return false;
+            if (!is_count(over) || !is_count(under) || number(under) == 0) return false;
             value = double(number(over)) / number(under);
         }
         return set_visibility(std::min(9999, int(std::lround((whole + value) * kStatuteMile_m))),
@@ -264,6 +281,7 @@ class Reader {
                                                                          {"OVC", CloudAmount::overcast},
                                                                          {"///", CloudAmount::unknown}};
         if (w.size() == 5 && w.starts_with("VV") && (all_digits(w.substr(2)) || all_slashes(w.substr(2)))) {
+            check_clouds();
             MetarCloud cloud{CloudAmount::obscured, {}, {}};
             if (all_digits(w.substr(2))) cloud.height_ft = 100 * number(w.substr(2));
             metar_.clouds.push_back(cloud);
@@ -296,6 +314,7 @@ class Reader {
                 take("clouds unknown", false, words);
                 return true;
             }
+            check_clouds();
             metar_.clouds.push_back(cloud);
             take(known ? "cloud base at " + std::to_string(*cloud.height_ft) + " ft" +
                              (type.empty() ? "" : ", " + type)
@@ -304,6 +323,11 @@ class Reader {
             return true;
         }
         return false;
+    }
+
+    void check_clouds() const {
+        if (metar_.clouds.size() >= kMostClouds)
+            fail("the report has " + std::to_string(kMostClouds) + " groups of clouds already, the most that are read");
     }
 
     // 14/08, M02/M05, 14///, 14/, /////.

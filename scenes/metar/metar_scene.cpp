@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "core/error.h"
 #include "core/place.h"
@@ -175,7 +176,7 @@ std::string wind_text(const Metar& m, const MetarSceneOptions& o, double time_s 
     text += "levels = [\n";
     const double turn = o.place && o.place->latitude_deg < 0 ? -20 : 20;
     double from = m.wind.from_deg;
-    if (m.wind.variable) from = double((o.seed * 73) % 36) * 10;
+    if (m.wind.variable) from = double(std::int64_t{o.seed} * 73 % 36) * 10;
     const auto level = [&](double height, double speed, double direction) {
         direction -= 360 * std::floor(direction / 360);
         text += "    { height_m = " + text_of(height) + ", from_deg = " + text_of(direction) +
@@ -373,8 +374,10 @@ std::string schedule_text(const Taf& taf) {
     std::string text = "\n[climate]\nschedule = [\n";
     for (std::size_t n = 1; n < taf.periods.size(); ++n) {
         const TafPeriod& period = taf.periods[n];
-        text += "    { time_s = " + text_of(period.from_s) + ", state = " + state_text(taf, n - 1) +
-                " },\n    { time_s = " + text_of(period.until_s) + ", state = " + state_text(taf, n) +
+        // Where one change follows another at once the state is that of its end already.
+        if (n == 1 || period.from_s > taf.periods[n - 1].until_s)
+            text += "    { time_s = " + text_of(period.from_s) + ", state = " + state_text(taf, n - 1) + " },\n";
+        text += "    { time_s = " + text_of(period.until_s) + ", state = " + state_text(taf, n) +
                 " },  # " + period.change + "\n";
     }
     return text + "]\n";

@@ -104,10 +104,16 @@ class TafReader {
             if (is_from(word)) last_day_ = std::max(last_day_, number(word.substr(2, 2)));
         }
         taf_.length_s = moment(valid.substr(5), 0);
-        if (taf_.day < 1 || taf_.day > 31 || taf_.hour > 24 || taf_.length_s <= 0 ||
+        if (!is_moment(valid.substr(0, 4)) || taf_.hour > 23 || !is_moment(valid.substr(5)) || taf_.length_s <= 0 ||
             taf_.length_s > 48 * kHour)
-            fail("expected a validity of at most 48 hours");
+            fail("expected a validity of at most 48 hours, from day 01 to 31, hour 00 to 23, to hour 00 to 24");
         ++at_;
+    }
+
+    // A day and an hour, "2118".
+    static bool is_moment(const std::string& text) {
+        const int day = number(text.substr(0, 2)), hour = number(text.substr(2, 2));
+        return day >= 1 && day <= 31 && hour <= 24;
     }
 
     // Seconds after the beginning of validity of a day and an hour, "2118".
@@ -161,19 +167,28 @@ class TafReader {
             return;
         }
         TafPeriod period;
+        const TafPeriod& before = taf_.periods.back();
         if (is_from(word)) {
-            const double moment_s = moment(word.substr(2, 4), number(word.substr(6, 2)));
-            period.from_s = moment_s - kRapid_s / 2;
+            const int minute = number(word.substr(6, 2));
+            at_ = first;
+            if (!is_moment(word.substr(2, 4)) || minute > 59)
+                fail("expected day, hour and minute of the change, such as FM211530");
+            ++at_;
+            const double moment_s = moment(word.substr(2, 4), minute);
+            // It may begin where the change before it has just ended.
+            period.from_s = moment_s < before.until_s ? moment_s : std::max(moment_s - kRapid_s / 2, before.until_s);
             period.until_s = moment_s + kRapid_s / 2;
         } else {
             if (at_ >= words_.size() || !is_interval(words_[at_]))
                 fail("expected the time of the change, such as 2115/2118");
-            period.from_s = moment(words_[at_].substr(0, 4), 0);
-            period.until_s = moment(words_[at_].substr(5), 0);
+            const std::string begin = words_[at_].substr(0, 4), end = words_[at_].substr(5);
+            if (!is_moment(begin) || !is_moment(end)) fail("expected days from 01 to 31 and hours from 00 to 24");
+            period.from_s = moment(begin, 0);
+            period.until_s = moment(end, 0);
             ++at_;
+            if (read_overlap(first, period)) return;
         }
         period.change = joined(words_, first, at_);
-        const TafPeriod& before = taf_.periods.back();
         if (period.until_s <= period.from_s || period.from_s < before.until_s ||
             period.from_s > taf_.length_s) {
             at_ = first;
@@ -184,6 +199,24 @@ class TafReader {
         period.weather = is_from(word) ? change : changed(before.weather, change);
         at_ = end;
         taf_.periods.push_back(std::move(period));
+    }
+
+    // Changes of parts of the weather may overlap: one within the time of that before it joins it, and one that lasts
+    // longer begins at its end.
+    bool read_overlap(std::size_t first, TafPeriod& period) {
+        TafPeriod& before = taf_.periods.back();
+        if (taf_.periods.size() == 1 || period.from_s < before.from_s || period.from_s >= before.until_s) return false;
+        const std::string text = joined(words_, first, at_);
+        if (period.until_s > before.until_s) {
+            taf_.notes.push_back("`" + text + "` begins at the end of `" + before.change + "`, which it overlaps");
+            period.from_s = before.until_s;
+            return false;
+        }
+        const std::size_t end = next_change();
+        before.weather = changed(before.weather, weather_of(text, end));
+        before.change += ", " + text;
+        at_ = end;
+        return true;
     }
 
     // The weather after a change that names part of it.

@@ -56,7 +56,8 @@ std::uint16_t checksum(std::span<const std::byte> header) {
 enum class RegionState : std::uint8_t { active = 1, destroyed = 2 };
 
 // Environmental Region Control (section 4.1.11): the rectangle of the clouds around their place on Earth, with the weather
-// of its own; turned by the heading of the world's y axis. In a region of no transition clouds would end like a wall.
+// of its own. The region's axes are those of its place, X to the north and Y to the east (NED), turned clockwise: X is the
+// world's y axis. In a region of no transition clouds would end like a wall.
 void put_region(ByteWriter& w, const WeatherRegion& region, RegionState state) {
     w.put(std::uint8_t{11});
     w.put(std::uint8_t{48});
@@ -66,7 +67,7 @@ void put_region(ByteWriter& w, const WeatherRegion& region, RegionState state) {
     for (int n = 0; n < 3; ++n) w.put(std::uint8_t{0});
     put_big(w, region.latitude_deg);
     put_big(w, region.longitude_deg);
-    for (const double value : {region.east_m, region.north_m, 0.0, std::remainder(region.heading_deg, 360.0),
+    for (const double value : {region.north_m, region.east_m, 0.0, std::remainder(region.heading_deg, 360.0),
                                0.1 * std::min(region.east_m, region.north_m)})
         put_big(w, float(value));
     put_big(w, std::uint32_t{0});
@@ -160,6 +161,19 @@ struct WeatherLayer {
     double wind_m_per_s = 0, wind_from_deg = 0;
 };
 
+// Temperature and pressure of the standard atmosphere (ISO 2533) below its tropopause at 11 km, and of the layer of one
+// temperature above it, to which all higher clouds are assigned.
+struct StandardAir {
+    double temperature_c = 0, pressure_hpa = 0;
+};
+StandardAir standard_air(double height_m) {
+    constexpr double kTropopause_m = 11'000, kLapse = 0.0065, kScale_m = 6341.62;
+    const double below = std::min(height_m, kTropopause_m);
+    StandardAir air{15 - kLapse * below, 1013.25 * std::pow(1 - kLapse / 288.15 * below, 5.25588)};
+    if (height_m > kTropopause_m) air.pressure_hpa *= std::exp((kTropopause_m - height_m) / kScale_m);
+    return air;
+}
+
 void put_layer(ByteWriter& w, const WeatherLayer& layer, bool regional) {
     w.put(std::uint8_t{12});
     w.put(std::uint8_t{56});
@@ -169,8 +183,8 @@ void put_layer(ByteWriter& w, const WeatherLayer& layer, bool regional) {
     w.put(std::uint8_t((layer.enabled ? 1 : 0) | (layer.lightning ? 8 : 0) | layer.type << 4));
     w.put(std::uint8_t(regional ? 1 : 0));  // scope: regional or global; no severity
     const double from = layer.wind_from_deg > 180 ? layer.wind_from_deg - 360 : layer.wind_from_deg;
-    // Temperature and pressure are those of the standard atmosphere.
-    const double on[] = {15.0 - 0.0065 * layer.base_m,
+    const StandardAir air = standard_air(layer.base_m);
+    const double on[] = {air.temperature_c,
                          layer.visibility_m,
                          0.0,
                          100 * layer.coverage,
@@ -180,7 +194,7 @@ void put_layer(ByteWriter& w, const WeatherLayer& layer, bool regional) {
                          layer.wind_m_per_s,
                          0.0,
                          from,
-                         1013.25 * std::pow(1 - 2.25577e-5 * layer.base_m, 5.25588),
+                         air.pressure_hpa,
                          0.0};
     for (const double value : on) put_big(w, float(layer.enabled ? value : 0.0));
 }

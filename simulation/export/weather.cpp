@@ -25,24 +25,6 @@ constexpr double kTowering_m = 1200;
 
 double speed_of(const Velocity& v) { return std::hypot(v.east_m_per_s, v.north_m_per_s); }
 
-// "Sc1" of a scene that was made of a report, or a model's genus.
-std::string genus_of(const Scene& scene, const LayerOptions& layer) {
-    static constexpr const char* kGenera[] = {"Ci", "Cc", "Cs", "Ac", "As", "Ns",
-                                              "Sc", "St", "Cu", "Cb", "VV"};
-    for (const char* genus : kGenera) {
-        const std::string rest = layer.name.starts_with(genus) ? layer.name.substr(2) : "x";
-        if (rest.find_first_not_of("0123456789") == rest.npos) return genus;
-    }
-    for (const std::string& sky : layer.skies) {
-        for (const NamedSky& named : scene.skies) {
-            if (named.name != sky || named.models.empty()) continue;
-            for (const char* genus : kGenera)
-                if (named.models.front().starts_with(genus)) return genus;
-        }
-    }
-    return {};
-}
-
 LayerSummary summary_of(const RunListing& run, const std::string& name, const DensityGrid& density,
                         const Wind& wind, double time_s) {
     LayerSummary s;
@@ -70,6 +52,23 @@ WeatherRegion region_of(const Scene& scene) {
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 }  // namespace
+
+std::string genus_of(const Scene& scene, const LayerOptions& layer) {
+    static constexpr const char* kGenera[] = {"Ci", "Cc", "Cs", "Ac", "As", "Ns",
+                                              "Sc", "St", "Cu", "Cb", "VV"};
+    for (const char* genus : kGenera) {
+        const std::string rest = layer.name.starts_with(genus) ? layer.name.substr(2) : "x";
+        if (rest.find_first_not_of("0123456789") == rest.npos) return genus;
+    }
+    for (const std::string& sky : layer.skies) {
+        for (const NamedSky& named : scene.skies) {
+            if (named.name != sky || named.models.empty()) continue;
+            for (const char* genus : kGenera)
+                if (named.models.front().starts_with(genus)) return genus;
+        }
+    }
+    return {};
+}
 
 double bearing_from(const Velocity& v, double heading_deg) {
     const double degrees =
@@ -181,8 +180,9 @@ std::string datum_note(const Scene& scene) {
 std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
     Metar m;
     const std::string& name = run.scene.name;
-    const bool station =
-        name.size() == 4 && std::ranges::all_of(name, [](char c) { return c >= 'A' && c <= 'Z'; });
+    const auto is_letter = [](char c) { return c >= 'A' && c <= 'Z'; };
+    const bool station = name.size() == 4 && is_letter(name[0]) &&
+                         std::ranges::all_of(name, [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); });
     m.station = station ? name : "ZZZZ";
     m.day = 1;
     if (!weather.utc.empty()) {
@@ -204,7 +204,7 @@ std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
         if (!amount) continue;
         MetarCloud c;
         c.amount = *amount;
-        c.height_ft = int(std::lround(layer.columns.cloud_base_m / kFoot_m / 100)) * 100;
+        c.height_ft = 100 * int(std::lround(std::clamp(layer.columns.cloud_base_m / kFoot_m / 100, 0.0, 999.0)));
         if (layer.genus == "Cb") c.type = "CB";
         if (layer.towering) c.type = "TCU";
         if (layer.genus == "VV") c.amount = CloudAmount::obscured;

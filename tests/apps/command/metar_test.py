@@ -2,6 +2,7 @@
 """`nephos metar`, summaries of layers, and the way from a report to clouds and back."""
 
 import json
+import math
 import random
 import re
 import shutil
@@ -9,6 +10,7 @@ import subprocess
 import unittest
 
 from case import Case
+from verify_test import PLACED
 
 REAL = [  # groups as real reports have them
     "EGLL 211350Z 24012KT 9999 FEW020 SCT045 BKN200 14/08 Q1017 NOSIG",
@@ -73,7 +75,11 @@ class Metar(Case):
     def test_mistakes_have_a_caret(self):
         for report, word in (("EGLL 211350Z 24012KT 9999 FEWO20 14/08 Q1017", "FEWO20"), ("EGLL 321350Z 24012KT 9999", "321350Z"),
                              ("EGLL 211350Z 24012KT 28012KT 9999", "28012KT"), ("EGLL 211350Z NIL", "NIL"), ("EGLLX 211350Z", "EGLLX"),
-                             ("EGLL 211350Z 37012KT 9999", "37012KT")):
+                             ("EGLL 211350Z 37012KT 9999", "37012KT"), ("EGLL 211350Z 24012KT 200V370 9999", "200V370"),
+                             ("KJFK 211350Z 24012KT 9999999SM", "9999999SM"), ("KJFK 211350Z 24012KT 1/99999999999SM", "1/99999999999SM"),
+                             ("KJFK 211350Z 24012G99999999999KT 9999", "24012G99999999999KT"),
+                             ("EGLL 211350Z 24012KT 9999 " + "FEW020 " * 8 + "BKN099", "BKN099"),
+                             ("EGLL 211350Z 24012KT 9999\x01", "9999")):
             error = self.call("metar", report, status=2).stderr
             lines = error.splitlines()
             caret = next(n for n, line in enumerate(lines) if set(line.strip()) == {"^"})
@@ -83,6 +89,40 @@ class Metar(Case):
         self.assertIn("empty", self.call("metar", "", status=2).stderr)
         self.assertIn("left out", self.call("metar", "EGLL 211350Z 24012KT 9999 FEWO20", "--lenient", "--explain").stderr)
         self.assertIn("does not fit", self.call("metar", REAL[0], "--date", "2024-06-22", status=2).stderr)
+
+    def test_groups_of_no_effect_say_so(self):
+        groups = {group["group"]: group for group in self.explained("EGLL 211350Z 24012KT 200V280 4000 8000 FEW020")["groups"]}
+        self.assertEqual([groups[word]["used"] for word in ("200V280", "4000", "8000")], [False, True, False])
+        self.assertEqual(groups["8000"]["meaning"], "a second visibility")
+
+    def test_places_at_the_edges(self):
+        """Bar Yehuda lies 378 m below the sea; the last direction of a large seed is a direction."""
+        text = self.call("metar", "LLMZ 210600Z VRB05KT 9999 FEW020", "--at", "31.3,35.4,-378", "--seed", 1000000000, "-q").stdout
+        self.assertIn("height_m = -378", text)
+        for direction in re.findall(r"from_deg = (-?\d+)", text):
+            self.assertIn(int(direction), range(360))
+        for place in ("0,-190,0", "0,190,0", "-95,0,0"):
+            self.assertIn("beyond", self.call("metar", REAL[0], "--at", place, status=2).stderr)
+
+    def test_changes_of_forecasts_that_meet(self):
+        """One begins where another ends, overlaps it or lies within it; moments that no day has are refused."""
+        def periods(changes):
+            explained = self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, "--explain", "--json")
+            self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, "-o", "taf.toml", "-q")
+            self.call("validate", "taf.toml")
+            return json.loads(explained.stdout)
+        found = periods("BECMG 2113/2115 BKN030 FM211500 30015KT 9999 SCT045")
+        self.assertEqual([(p["from_s"], p["until_s"]) for p in found["periods"]], [(0, 0), (3600, 10800), (10800, 11400)])
+        found = periods("BECMG 2113/2116 BKN030 BECMG 2115/2118 30015KT")
+        self.assertEqual([(p["from_s"], p["until_s"]) for p in found["periods"]], [(0, 0), (3600, 14400), (14400, 21600)])
+        self.assertIn("which it overlaps", " ".join(found["notes"]))
+        found = periods("BECMG 2113/2116 BKN030 BECMG 2113/2116 30015KT")
+        self.assertEqual(len(found["periods"]), 2)
+        self.assertIn("30015KT", found["periods"][1]["weather"])
+        self.assertIn("BKN030", found["periods"][1]["weather"])
+        for changes in ("BECMG 2113/2199 BKN030", "BECMG 0013/0016 BKN030", "FM211270 BKN030", "FM219900 BKN030", "BECMG 2115/2113 BKN030"):
+            self.assertIn("expected", self.call("metar", "TAF EGLL 2112/2218 24012KT 9999 FEW020 " + changes, status=2).stderr)
+        self.assertIn("expected a validity", self.call("metar", "TAF EGLL 2124/2218 24012KT 9999 FEW020", status=2).stderr)
 
     def test_another_decoder_agrees(self):
         """Geo::METAR on 300 generated reports: wind, clouds, temperature, pressure."""
@@ -199,6 +239,21 @@ class Weather(Case):
         fog = next(fields for name, fields in packets.items() if "Fog" in name)
         self.assertNotIn("Enable", fog["Weather Enable"])
         self.assertIn("Active", re.search(r"Region State: ([^\n]*)", said)[1])
+
+    def test_cigi_regions_and_high_clouds(self):
+        """A region's X axis points north; clouds of the stratosphere are no colder than its air."""
+        self.call("run", self.write("placed.toml", PLACED), "--no-render", "--frames", "1", "--out", "placed", "-q")
+        _, said = self.cigi("placed", "region")
+        x_m, y_m = (float(re.search(rf"Size {axis}[^:]*: ([\d.]+)", said)[1]) for axis in "XY")
+        self.assertAlmostEqual(x_m / y_m, 24 / 32, msg=said[:4000])  # of 32 cells to the east and 24 to the north
+        high = PLACED.replace("[lattice]\n", "[lattice]\norigin_m = [0, 0, 50000]\n").replace("[density]\n", "[density]\nextinction_per_m = 0.2\n")
+        self.call("run", self.write("high.toml", high), "--no-render", "--frames", "1", "--out", "high", "-q")
+        packets, said = self.cigi("high", "cold")
+        cloud = next(fields for name, fields in packets.items() if "Enable" in fields["Weather Enable"])
+        self.assertAlmostEqual(self.number(cloud, "Air Temperature"), -56.5, delta=0.1)
+        # ISO 2533 continued: 226.32 hPa at 11 km, a scale height of 6,341.6 m.
+        base_m = self.number(cloud, "Base Elevation")
+        self.assertAlmostEqual(self.number(cloud, "Barometric Pressure"), 226.32 * math.exp((11000 - base_m) / 6341.62), delta=0.01)
 
     def test_cigi_switches_off_what_is_not_there(self):
         """Fog is a layer of its own; clouds that are not there any more, and the region of an earlier sky, do not stay."""
