@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "density/level_window.h"
 #include "density/openvdb_access.h"
 #include "density/smoothing.h"
 
@@ -20,7 +21,6 @@ using openvdb::Coord;
 
 constexpr int kTaps = 6, kBefore = 2;         // voxels of the polynomial, and how many lie before the one below
 constexpr int kWindow = kBlock + kTaps - 1;   // voxels along an axis that a block of results needs
-constexpr int kMostLeaves = kWindow / kBlock + 2;
 
 // One axis of one level: result i lies between the voxels i + base and i + base + 1.
 struct AxisShift {
@@ -45,25 +45,7 @@ AxisShift axis_shift(double shift) {
     return axis;
 }
 
-// Where the voxels of a window lie in the leaves of a tree, along one axis.
-struct WindowAxis {
-    std::array<int, kWindow> leaf, inside;   // index in `origins`, and voxel in the leaf
-    std::array<int, kMostLeaves + 2> origins;
-    int leaves = 0;
-
-    WindowAxis(int first, int voxels, Boundary boundary) {
-        for (std::size_t n = 0; n < kWindow; ++n) {
-            const int at = boundary == Boundary::open ? std::clamp(first + int(n), 0, voxels - 1)
-                                                      : repeated(first + int(n), voxels, boundary);
-            const int origin = at & ~(kBlock - 1);
-            if (leaves == 0 || origins[std::size_t(leaves - 1)] != origin) origins[std::size_t(leaves++)] = origin;
-            leaf[n] = leaves - 1;
-            inside[n] = at - origin;
-        }
-    }
-};
-
-using Window = std::array<std::array<float, kWindow>, kWindow>;  // [y][x]
+using Window = LevelWindow<kWindow>;
 
 // Returns the value between two voxels of a window by its six, limited to the range of the two.
 inline float between(const float* taps, std::ptrdiff_t stride, const AxisShift& axis) {
@@ -179,34 +161,12 @@ class Carrier {
 
     // Reads the voxels that a block of results needs of a level; false when all are 0.
     bool gather(const Coord& origin, int k, Window& window) const {
-        const WindowAxis x(origin.x() + x_[std::size_t(k)].base - kBefore, extent_.x, boundaries_.x),
+        const WindowAxis<kWindow> x(origin.x() + x_[std::size_t(k)].base - kBefore, extent_.x, boundaries_.x),
             y(origin.y() + y_[std::size_t(k)].base - kBefore, extent_.y, boundaries_.y);
-        const auto& tree = grid_.tree();
-        struct Source {
-            const float* values;
-            float tile;
-        };
-        std::array<std::array<Source, kMostLeaves + 2>, kMostLeaves + 2> sources;
         const int z = k & ~(kBlock - 1);
-        bool any = false;
-        for (int j = 0; j < y.leaves; ++j) {
-            for (int i = 0; i < x.leaves; ++i) {
-                const Coord at(x.origins[std::size_t(i)], y.origins[std::size_t(j)], z);
-                const FloatLeaf* leaf = tree.probeConstLeaf(at);
-                Source& source = sources[std::size_t(j)][std::size_t(i)];
-                source = leaf ? Source{leaf->buffer().data() + (k - z), 0} : Source{nullptr, tree.getValue(at)};
-                any = any || leaf != nullptr || source.tile > 0;
-            }
-        }
-        if (!any) return false;
-        for (std::size_t j = 0; j < kWindow; ++j) {
-            const auto& row = sources[std::size_t(y.leaf[j])];
-            for (std::size_t i = 0; i < kWindow; ++i) {
-                const Source& source = row[std::size_t(x.leaf[i])];
-                window[j][i] = source.values ? source.values[leaf_offset(x.inside[i], y.inside[j], 0)] : source.tile;
-            }
-        }
-        return true;
+        const WindowLeaves<kWindow> leaves(grid_.tree(), x, y, z);
+        if (leaves.any()) leaves.read(k - z, window);
+        return leaves.any();
     }
 
     const DensityGrid& density_;

@@ -232,7 +232,9 @@ class Simulation {
     struct Densities {
         std::uint64_t step = 0;
         std::vector<DensityGrid> layers;
-        std::vector<std::optional<DensityGrid>> moisture;  // of each layer, once a frame has asked for it
+        // Of each layer, once a frame has asked for them: moisture, and the sums of gradients of the frame on this step.
+        std::vector<std::optional<DensityGrid>> moisture;
+        std::vector<std::optional<std::vector<Vec2>>> gradients;
     };
 
     void step();
@@ -247,6 +249,7 @@ class Simulation {
     DensityGrid density_at(std::size_t layer, const Moment& moment);
     DensityGrid carried_to(std::size_t layer, const Moment& moment, const DensityGrid& before,
                            const DensityGrid& after) const;
+    const std::vector<Vec2>& gradients_at_step(std::size_t layer, std::uint64_t step);
     DensityGrid moisture_of(std::size_t layer, std::uint64_t step);
     std::optional<DensityGrid> moisture_at(std::size_t layer, const Moment& moment);
     const Past& past(std::uint64_t step) const;

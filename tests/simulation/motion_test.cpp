@@ -118,6 +118,29 @@ TEST(Motion, EdgesAreAsSharpBetweenStepsAsAtThem) {
     }
 }
 
+// Cells are born and die in every step, so that states that follow each other differ; in calm air, too. Four frames a step.
+TEST(Motion, FramesOfChangingCloudsAreAsSharpAsThoseOnTheSteps) {
+    for (const double east : {0.0, 5.0}) {
+        Scene scene = drifting(east, -0.4 * east);
+        scene.automaton.field.background = {0.05, 0.004, 0.03};
+        scene.frames.time_scale = 2.5;
+        const std::vector<Figures> frames = frames_of(scene);
+        ASSERT_EQ(frames.size(), 64u);
+        double changed = 0;
+        for (std::size_t n = 0; n + 4 < frames.size(); n += 4) {
+            const Figures &from = frames[n], &to = frames[n + 4];
+            changed += std::abs(to.mass - from.mass) / from.mass;
+            for (std::size_t m = 1; m < 4; ++m) {
+                const double wanted = from.gradients + (to.gradients - from.gradients) * double(m) / 4;
+                EXPECT_NEAR(frames[n + m].gradients, wanted, 0.01 * wanted) << east << " " << n + m;
+                const double mass = from.mass + (to.mass - from.mass) * double(m) / 4;
+                EXPECT_NEAR(frames[n + m].mass, mass, 0.005 * mass) << east << " " << n + m;
+            }
+        }
+        EXPECT_GT(changed, 0);
+    }
+}
+
 // In calm air a frame on a step is that step's q, bit by bit, and so it is where bits move whole cells with the wind.
 TEST(Motion, AFrameOnAStepOfWholeCellsIsThatOfTheStep) {
     for (const double east : {0.0, 8.0}) {
