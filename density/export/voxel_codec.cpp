@@ -37,50 +37,25 @@ float half_value(std::uint16_t bits) {
     return std::bit_cast<float>(sign | std::bit_cast<std::uint32_t>(std::bit_cast<float>(rest) * 0x1p112f));
 }
 
-// Four rows of four voxels as the eight bytes of a block: its largest and smallest value, and for each voxel how many
-// sevenths it lies below the largest.
-std::uint64_t bc4_block(const float (&v)[16], float to_code) {
-    float low = v[0], high = v[0];
-    for (int n = 1; n < 16; ++n) {
-        low = std::min(low, v[n]);
-        high = std::max(high, v[n]);
-    }
-    const auto code = [&](float value) { return std::uint32_t(std::min(value * to_code, 255.0f) + 0.5f); };
-    const std::uint32_t first = code(high), second = code(low);
-    std::uint64_t block = first | second << 8;
-    if (first == second) return block;
-    // Index of n sevenths: 0, 2, 3, .., 7, 1.
-    const float top = float(first), sevenths = 7.0f / float(first - second);
-    std::uint32_t index[16];
-    for (int n = 0; n < 16; ++n) {
-        const float below = (top - v[n] * to_code) * sevenths;
-        const auto t = std::uint32_t(std::clamp(below, 0.0f, 7.0f) + 0.5f);
-        index[n] = t == 0 ? 0 : t == 7 ? 1 : t + 1;
-    }
-    for (int n = 0; n < 16; ++n) block |= std::uint64_t(index[n]) << (16 + 3 * n);
-    return block;
-}
-
 void encode_bc4(const Volume& v, float to_code, std::vector<std::byte>& out) {
     const int bx = (v.nx + 3) / 4, by = (v.ny + 3) / 4;
     tbb::parallel_for(0, v.nz, [&](int k) {
         const float* slice = v.values.data() + std::size_t(k) * std::size_t(v.nx) * std::size_t(v.ny);
         std::byte* to = out.data() + std::size_t(k) * std::size_t(bx) * std::size_t(by) * 8;
-        for (int j = 0; j < by; ++j) {
-            for (int i = 0; i < bx; ++i, to += 8) {
-                float block[16];
-                for (int y = 0; y < 4; ++y) {
-                    const float* row = slice + std::size_t(std::min(4 * j + y, v.ny - 1)) * std::size_t(v.nx);
-                    if (4 * i + 4 <= v.nx)
-                        std::memcpy(block + 4 * y, row + 4 * i, 16);
-                    else
-                        for (int x = 0; x < 4; ++x) block[4 * y + x] = row[std::min(4 * i + x, v.nx - 1)];
-                }
-                float any = 0;
-                for (const float value : block) any += value;
-                const std::uint64_t bits = any == 0 ? 0 : bc4_block(block, to_code);
-                std::memcpy(to, &bits, 8);
-            }
+        const auto whole = std::size_t(v.nx / 4);
+        for (int j = 0; j < by; ++j, to += std::size_t(bx) * 8) {
+            const float* rows[4];
+            for (int y = 0; y < 4; ++y)
+                rows[y] = slice + std::size_t(std::min(4 * j + y, v.ny - 1)) * std::size_t(v.nx);
+            auto* blocks = reinterpret_cast<std::uint8_t*>(to);
+            to_bc4_blocks(rows[0], rows[1], rows[2], rows[3], whole, to_code, blocks);
+            if (v.nx % 4 == 0) continue;
+            // The last voxels of each row are repeated.
+            float rest[4][4];
+            for (std::size_t y = 0; y < 4; ++y)
+                for (std::size_t x = 0; x < 4; ++x)
+                    rest[y][x] = rows[y][std::min(4 * whole + x, std::size_t(v.nx) - 1)];
+            to_bc4_blocks(rest[0], rest[1], rest[2], rest[3], 1, to_code, blocks + 8 * whole);
         }
     });
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "density/export/voxel_kernel.h"
 
+#include <cstring>
+
 // Compiled once for each SIMD target of Highway and dispatched at run time.
 #ifndef HWY_DISABLED_TARGETS
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4)
@@ -85,6 +87,71 @@ void halves(const float* values, std::size_t count, float factor, std::uint16_t*
     for_each(count, vector, tail);
 }
 
+// Indices of the four voxels of a row: how many sevenths each lies below the largest of its block, as 0, 2, 3, .., 7, 1.
+#if HWY_TARGET == HWY_SCALAR
+std::uint64_t bc4_indices(const float* row, float to_code, float top, float sevenths) {
+    std::uint64_t indices = 0;
+    for (int n = 0; n < 4; ++n) {
+        const float below = (top - row[n] * to_code) * sevenths;
+        const auto t = std::uint64_t((below > 0 ? (below < 7 ? below : 7.0f) : 0.0f) + 0.5f);
+        indices |= (t == 0 ? 0 : t == 7 ? 1 : t + 1) << (3 * n);
+    }
+    return indices;
+}
+
+void extremes_of(const float* const (&rows)[4], std::size_t at, float& low, float& high) {
+    low = high = rows[0][at];
+    for (const float* row : rows) {
+        for (std::size_t n = at; n < at + 4; ++n) {
+            low = row[n] < low ? row[n] : low;
+            high = row[n] > high ? row[n] : high;
+        }
+    }
+}
+#else
+std::uint64_t bc4_indices(const float* row, float to_code, float top, float sevenths) {
+    const hn::FixedTag<float, 4> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    HWY_ALIGN static constexpr float kPlaces[4] = {1, 8, 64, 512};  // of indices of three bits
+    const auto one = hn::Set(d, 1.0f), seven = hn::Set(d, 7.0f), scaled = hn::Mul(hn::LoadU(d, row), hn::Set(d, to_code));
+    const auto below = hn::Mul(hn::Sub(hn::Set(d, top), scaled), hn::Set(d, sevenths));
+    const auto rounded = hn::Add(hn::Min(hn::Max(below, hn::Zero(d)), seven), hn::Set(d, 0.5f));
+    const auto t = hn::ConvertTo(d, hn::ConvertTo(di, rounded));
+    const auto next = hn::IfThenElse(hn::Eq(t, seven), one, hn::Add(t, one));
+    const auto index = hn::IfThenZeroElse(hn::Eq(t, hn::Zero(d)), next);
+    return std::uint64_t(hn::GetLane(hn::SumOfLanes(d, hn::Mul(index, hn::Load(d, kPlaces)))));
+}
+
+void extremes_of(const float* const (&rows)[4], std::size_t at, float& low, float& high) {
+    const hn::FixedTag<float, 4> d;
+    const auto a = hn::LoadU(d, rows[0] + at), b = hn::LoadU(d, rows[1] + at), c = hn::LoadU(d, rows[2] + at),
+               e = hn::LoadU(d, rows[3] + at);
+    low = hn::GetLane(hn::MinOfLanes(d, hn::Min(hn::Min(a, b), hn::Min(c, e))));
+    high = hn::GetLane(hn::MaxOfLanes(d, hn::Max(hn::Max(a, b), hn::Max(c, e))));
+}
+#endif
+
+void bc4_blocks(const float* a, const float* b, const float* c, const float* e, std::size_t count, float to_code,
+                std::uint8_t* blocks) {
+    const float* const rows[4] = {a, b, c, e};
+    const auto code = [to_code](float value) {
+        const float scaled = value * to_code;
+        return std::uint32_t((scaled < 255.0f ? scaled : 255.0f) + 0.5f);
+    };
+    for (std::size_t n = 0; n < count; ++n, blocks += 8) {
+        float low = 0, high = 0;
+        extremes_of(rows, 4 * n, low, high);
+        const std::uint32_t first = code(high), second = code(low);
+        std::uint64_t block = first | second << 8;
+        if (first != second) {
+            const float top = float(first), sevenths = 7.0f / float(first - second);
+            for (std::size_t y = 0; y < 4; ++y)
+                block |= bc4_indices(rows[y] + 4 * n, to_code, top, sevenths) << (16 + 12 * y);
+        }
+        std::memcpy(blocks, &block, sizeof block);
+    }
+}
+
 void halved_rows(const float* a, const float* b, const float* c, const float* e, std::size_t count, float* to) {
     const Floats d;
     // Sums of neighbours, a vector of them from two of the row.
@@ -113,6 +180,7 @@ namespace nephos {
 HWY_EXPORT(codes8);
 HWY_EXPORT(codes16);
 HWY_EXPORT(halves);
+HWY_EXPORT(bc4_blocks);
 HWY_EXPORT(halved_rows);
 
 void to_codes(const float* values, std::size_t count, float factor, std::uint8_t* codes) {
@@ -123,6 +191,10 @@ void to_codes(const float* values, std::size_t count, float factor, std::uint16_
 }
 void to_halves(const float* values, std::size_t count, float factor, std::uint16_t* out) {
     HWY_DYNAMIC_DISPATCH(halves)(values, count, factor, out);
+}
+void to_bc4_blocks(const float* a, const float* b, const float* c, const float* d, std::size_t count, float to_code,
+                   std::uint8_t* blocks) {
+    HWY_DYNAMIC_DISPATCH(bc4_blocks)(a, b, c, d, count, to_code, blocks);
 }
 void halve_rows(const float* a, const float* b, const float* c, const float* d, std::size_t count, float* to) {
     HWY_DYNAMIC_DISPATCH(halved_rows)(a, b, c, d, count, to);

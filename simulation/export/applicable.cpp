@@ -18,6 +18,9 @@ bool takes_type(ExportFormat format, const ExportOptions& given) {
     return given.type == VoxelType::r32f || (given.type == VoxelType::r16f && format == ExportFormat::vdb);
 }
 bool takes_shape(ExportFormat format, const ExportOptions&) { return is_dense(format); }
+bool takes_range(ExportFormat format, const ExportOptions&) {
+    return is_dense(format) || format == ExportFormat::flightgear;
+}
 bool takes_mips(ExportFormat format, const ExportOptions&) {
     return is_dense(format) && format != ExportFormat::vti && format != ExportFormat::slices;
 }
@@ -50,7 +53,7 @@ void refuse_unused(const ExportOptions& given, const ExportOptions& options) {
         Takes takes;
     } rules[] = {
         {"--type", given.type.has_value(), takes_type},
-        {"--range auto", given.range_auto, takes_shape},
+        {"--range auto", given.range_auto, takes_range},
         {"--voxel", given.voxel_m.has_value(), takes_voxels},
         {"--size", given.largest_side.has_value(), takes_voxels},
         {"--budget", given.budget_bytes.has_value(), takes_shape},

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <memory>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -14,10 +15,9 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "density/combine.h"
-#include "density/export/bricks.h"
 #include "density/export/containers.h"
 #include "simulation/export/export_list.h"
+#include "simulation/export/frame_export.h"
 #include "simulation/export/sequence.h"
 #include "simulation/export/weather.h"
 #include "simulation/folder_lock.h"
@@ -27,12 +27,6 @@ namespace nephos {
 namespace {
 
 constexpr std::size_t kListEvery = 16;  // frames
-
-std::string_view name_of(ExportFormat format) {
-    for (const NamedFormat& named : export_formats())
-        if (named.format == format) return named.name;
-    return {};
-}
 
 void check_options(const ExportOptions& o) {
     if (o.formats.empty() && o.weather.empty())
@@ -115,7 +109,8 @@ class GridReader {
   public:
     explicit GridReader(const ExportOptions& options) { reading_.grid = options.grid; }
 
-    using Each = std::function<bool(std::size_t frame, const LoadedDensity& loaded)>;  // false: stop
+    using Read = std::shared_ptr<const LoadedDensity>;
+    using Each = std::function<bool(std::size_t frame, Read loaded)>;  // false: stop
 
     void read(const std::vector<SourceFrame>& frames, bool keep, const Each& each) {
         for (std::size_t n = 0; n < frames.size();) {
@@ -128,12 +123,13 @@ class GridReader {
                 files.push_back(frames[m].file);
             bool goes_on = true;
             load_densities(files, reading_, [&](std::size_t index, LoadedDensity&& loaded) {
-                goes_on = each(n + index, loaded);
-                const std::size_t bytes = loaded.density.memory_bytes();
+                const auto read = std::make_shared<const LoadedDensity>(std::move(loaded));
+                const std::size_t bytes = read->density.memory_bytes();
                 if (keep && bytes_ + bytes < kMostKept) {
                     bytes_ += bytes;
-                    kept_.emplace(files[index], std::move(loaded));
+                    kept_.emplace(files[index], read);
                 }
+                goes_on = each(n + index, read);
                 return goes_on;
             });
             if (!goes_on) return;
@@ -144,128 +140,8 @@ class GridReader {
   private:
     static constexpr std::size_t kMostKept = std::size_t(256) << 20;
     VdbReadOptions reading_;
-    std::map<std::filesystem::path, LoadedDensity> kept_;
+    std::map<std::filesystem::path, Read> kept_;
     std::size_t bytes_ = 0;
-};
-
-// The grid as VDB files hold it: coarser if the options want that.
-DensityGrid grid_of(const DensityGrid& density, int factor) {
-    if (factor == 1) return density;
-    VolumeLayout layout;
-    layout.factor = factor;
-    const Volume volume = lay_out(density, layout);
-    Placement placement = density.placement();
-    placement.cell_size_m *= factor;
-    return DensityGrid::from_dense(volume.values, {volume.nx, volume.ny, volume.nz}, placement);
-}
-
-void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
-                    const LoadedDensity& loaded) {
-    DensityGrid density = grid_of(loaded.density, s.layout.factor);
-    VdbContent content;
-    VdbMetadata metadata = loaded.metadata.value_or(VdbMetadata{});
-    if (!loaded.metadata) metadata.nephos_version = version();
-    if (options.half_voxel_shift) density = shifted_by_half_a_voxel(density);
-    content.density = &density;
-    content.half = options.type == VoxelType::r16f;
-    if (!options.velocity_name.empty() && !metadata.wind.empty()) {
-        const Wind wind{{{0, metadata.wind}}};
-        const Placement& at = loaded.density.placement();
-        for (int k = 0; k < density.extent().z; ++k)
-            content.wind.push_back(
-                wind_at(wind, at.origin_m.z + (k + 0.5) * density.placement().cell_size_m, 0));
-        content.wind_name = options.velocity_name;
-    }
-    write_vdb(path, content, metadata);
-}
-
-// Writes the files of one frame that are not there yet.
-class FrameExporter {
-  public:
-    FrameExporter(const ExportOptions& options, ExportList& list) : options_(options), list_(list) {}
-
-    FrameFigures write(const ExportSequence& s, const SourceFrame& frame, const LoadedDensity& loaded) {
-        if (!(loaded.density.extent() == s.extent) || !(loaded.density.placement() == s.placement))
-            throw Error(ErrorCode::io,
-                        frame.file.string() + ": has another box than the first file of its sequence");
-        const ExportSource source{frame.file, file_digest(frame.file)};
-        require_unchanged(frame);
-        std::map<VoxelType, EncodedVolume> encoded;
-        std::vector<Volume> levels;
-        for (const ExportFormat format : all_formats(options_)) {
-            if (format == ExportFormat::usd) continue;
-            const std::string name = frame_name(s, frame.number, format);
-            if (list_.keep(name, source)) continue;
-            const std::filesystem::path path = options_.folder / name;
-            if (format == ExportFormat::vdb) {
-                write_vdb_file(path, options_, s, loaded);
-            } else if (format == ExportFormat::nvdb) {
-                write_nanovdb(path, grid_of(loaded.density, s.layout.factor),
-                              options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
-            } else {
-                if (levels.empty()) levels = levels_of(loaded.density, s);
-                const VoxelType type = type_of(options_, format);
-                if (format == ExportFormat::bricks) {
-                    write_bricks(path, levels, brick_options(s, type));
-                } else {
-                    auto found = encoded.find(type);
-                    if (found == encoded.end())
-                        found = encoded.emplace(type, encoded_levels(levels, type, s.scale)).first;
-                    write_dense(path, format, s, frame, found->second);
-                }
-            }
-            list_.add(name, source, name_of(format));
-        }
-        return {loaded.density.sum(), double(loaded.density.max_value())};
-    }
-
-  private:
-    static std::vector<Volume> levels_of(const DensityGrid& density, const ExportSequence& s) {
-        std::vector<Volume> levels{lay_out(density, s.layout)};
-        for (int n = 1; n < s.levels; ++n) levels.push_back(halved(levels.back()));
-        return levels;
-    }
-
-    static EncodedVolume encoded_levels(const std::vector<Volume>& levels, VoxelType type, float scale) {
-        EncodedVolume encoded{type, {}};
-        for (const Volume& v : levels) encoded.levels.push_back({v.nx, v.ny, v.nz, encode(v, type, scale)});
-        return encoded;
-    }
-
-    // Bricks wrap around where the box repeats and nothing stands between its sides.
-    BrickOptions brick_options(const ExportSequence& s, VoxelType type) const {
-        const VolumeBox box = box_of(s.extent, s.placement, s.layout);
-        BrickOptions bricks{options_.brick_edge, type, s.scale, {}};
-        for (std::size_t a = 0; a < 3; ++a)
-            bricks.periodic[a] =
-                s.layout.periodic[std::size_t(box.axis[a])] && box.border == 0 && box.padding[a] == 0;
-        return bricks;
-    }
-
-    void write_dense(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
-                     const SourceFrame& frame, const EncodedVolume& encoded) const {
-        const VolumeBox box = box_of(s.extent, s.placement, s.layout);
-        switch (format) {
-            case ExportFormat::raw:
-                return write_raw(path, encoded);
-            case ExportFormat::dds:
-                return write_dds(path, encoded, options_.legacy_dds);
-            case ExportFormat::ktx2:
-                return write_ktx2(path, encoded, sidecar_text(options_, s, {}));
-            case ExportFormat::slices:
-                return write_slices(path, encoded, slice_columns(box.size[0], box.size[1], box.size[2]));
-            default: {
-                VtiPlace place;
-                place.time_s = frame.time_s;
-                place.voxel_m = box.voxel_m;
-                for (std::size_t a = 0; a < 3; ++a) place.first_m[a] = box.min_m[a] + box.voxel_m[a] / 2;
-                return write_vti(path, encoded, place, options_.zip);
-            }
-        }
-    }
-
-    const ExportOptions& options_;
-    ExportList& list_;
 };
 
 // The summaries of a run's layers, in all forms that are wanted.
@@ -280,7 +156,7 @@ void write_weather(const ExportOptions& options, ExportList& list) {
             if (named.format != format) continue;
             const std::string name = run.scene.name + std::string(named.extension);
             write_atomically(options.folder / name, content);
-            list.add(name, {}, {});
+            list.add_written(list.written_file(name, {}, {}));
         }
     };
     const auto write_text = [&](WeatherFormat format, const std::string& text) {
@@ -315,7 +191,7 @@ void write_texts(const ExportOptions& options, const std::vector<ExportSequence>
     if (!options.weather.empty()) write_weather(options, list);
     const auto write = [&](const std::string& name, const std::string& text) {
         write_atomically(options.folder / name, std::string_view(text));
-        list.add(name, {}, {});
+        list.add_written(list.written_file(name, {}, {}));
     };
     const std::vector<ExportFormat> formats = all_formats(options);
     for (std::size_t n = 0; n < sequences.size(); ++n) {
@@ -339,12 +215,6 @@ void write_texts(const ExportOptions& options, const std::vector<ExportSequence>
 
 }  // namespace
 
-DensityGrid shifted_by_half_a_voxel(const DensityGrid& density) {
-    Placement placement = density.placement();
-    for (int a = 0; a < 3; ++a) placement.origin_m[a] -= placement.cell_size_m / 2;
-    return placed_at(density, placement);
-}
-
 ExportReport plan_export(const ExportOptions& options) {
     check_options(options);
     std::vector<std::string> notes;
@@ -365,8 +235,8 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
         frames += s.frames.size();
         if (!options.range_auto) continue;
         float most = 0;
-        reader.read(s.frames, true, [&](std::size_t, const LoadedDensity& loaded) {
-            most = std::max(most, loaded.density.max_value());
+        reader.read(s.frames, true, [&](std::size_t, const GridReader::Read& loaded) {
+            most = std::max(most, loaded->density.max_value());
             return true;
         });
         if (most > 0) s.scale = most;
@@ -375,13 +245,28 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     ExportList list(options, sequences);
     FrameExporter exporter(options, list);
     std::vector<std::vector<FrameFigures>> figures(sequences.size());
+    const auto take = [&](const ExportSequence& s, std::vector<FrameFigures>& of, ExportedFrame&& frame) {
+        for (ExportedFile& file : frame.kept) list.add_kept(std::move(file));
+        for (ExportedFile& file : frame.written) list.add_written(std::move(file));
+        if (frame.figures.max > s.scale && options.type != VoxelType::r32f)
+            notes.push_back(fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
+                                        "(--range auto keeps them)",
+                                        s.frames[of.size()].file.string(), frame.figures.max, s.scale));
+        of.push_back(frame.figures);
+        if (++done % kListEvery != 0) return;
+        lock.require_in_place();
+        list.write(false);
+    };
     try {
         list.write(false);  // the folder is known as that of an export, whenever this one is killed
         for (std::size_t n = 0; n < sequences.size(); ++n) {
             ExportSequence& s = sequences[n];
             if (all_formats(options).empty()) break;
             bool stopped = false;
-            reader.read(s.frames, false, [&](std::size_t index, const LoadedDensity& loaded) {
+            FramesAtWork work(frames_at_once(options, s),
+                              [&](ExportedFrame&& frame) { take(s, figures[n], std::move(frame)); });
+            reader.read(s.frames, false, [&](std::size_t index, std::shared_ptr<const LoadedDensity> read) {
+                const LoadedDensity& loaded = *read;
                 lock.require_in_place();
                 SourceFrame& frame = s.frames[index];
                 if (loaded.metadata) {
@@ -390,16 +275,15 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 }
                 for (const std::string& note : loaded.notes)
                     notes.push_back(frame.file.string() + ": " + note);
-                figures[n].push_back(exporter.write(s, frame, loaded));
-                if (figures[n].back().max > s.scale && options.type != VoxelType::r32f)
-                    notes.push_back(
-                        fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
-                                    "(--range auto keeps them)",
-                                    frame.file.string(), figures[n].back().max, s.scale));
-                if (++done % kListEvery == 0) list.write(false);
+                work.add([&, read] {
+                    lock.require_in_place();
+                    return exporter.write(s, frame, *read);
+                });
                 stopped = progress && !progress(done, frames);
                 return !stopped;
             });
+            work.finish();
+            if (progress && !stopped) progress(done, frames);
             lock.require_in_place();
             if (stopped) {
                 list.write(false);

@@ -30,7 +30,7 @@ namespace nephos {
 // Forms of a summary of the layers, for simulators that take no voxels.
 enum class WeatherFormat { layers, metar, xplane, wpr, cigi };
 
-enum class ExportFormat { raw, vti, dds, ktx2, nvdb, usd, slices, vdb, bricks };
+enum class ExportFormat { raw, vti, dds, ktx2, nvdb, usd, slices, vdb, bricks, flightgear };
 
 struct ExportOptions {
     std::filesystem::path source;                // folder of a run, or a VDB file

@@ -160,21 +160,29 @@ ExportList::ExportList(const ExportOptions& options, const std::vector<ExportSeq
     }
 }
 
-bool ExportList::keep(const std::string& name, const ExportSource& source) {
+std::optional<ExportedFile> ExportList::kept_file(const std::string& name, const ExportSource& source) const {
     const auto found = earlier_.find(name);
     std::error_code error;
-    if (found == earlier_.end() || !std::filesystem::is_regular_file(folder_ / name, error)) return false;
-    if (!(found->second.source_digest == source.digest)) return false;
-    if (!(file_digest(folder_ / name) == found->second.digest)) return false;
-    files_.push_back(found->second);
-    files_.back().source = below_folder(source.path);
-    ++kept_;
-    return true;
+    if (found == earlier_.end() || !std::filesystem::is_regular_file(folder_ / name, error)) return {};
+    if (!(found->second.source_digest == source.digest)) return {};
+    if (!(file_digest(folder_ / name) == found->second.digest)) return {};
+    ExportedFile file = found->second;
+    file.source = below_folder(source.path);
+    return file;
 }
 
-void ExportList::add(const std::string& name, const ExportSource& source, std::string_view format) {
-    files_.push_back(
-        {name, file_digest(folder_ / name), below_folder(source.path), std::string(format), source.digest});
+ExportedFile ExportList::written_file(const std::string& name, const ExportSource& source,
+                                      std::string_view format) const {
+    return {name, file_digest(folder_ / name), below_folder(source.path), std::string(format), source.digest};
+}
+
+void ExportList::add_kept(ExportedFile file) {
+    files_.push_back(std::move(file));
+    ++kept_;
+}
+
+void ExportList::add_written(ExportedFile file) {
+    files_.push_back(std::move(file));
     ++written_;
 }
 

@@ -29,11 +29,14 @@ class ExportList {
     // holds an export with other options, or a file without a list; Error(io) when the list is damaged.
     ExportList(const ExportOptions& options, const std::vector<ExportSequence>& sequences);
 
-    // Returns true when the file is there as it was listed, and was made of this source: it need not be written again,
-    // and is listed.
-    bool keep(const std::string& name, const ExportSource& source);
-    // Lists a file that was written.
-    void add(const std::string& name, const ExportSource& source, std::string_view format);
+    // Returns the entry of a file that is there as it was listed, and was made of this source: it need not be written
+    // again. Thread-safe.
+    std::optional<ExportedFile> kept_file(const std::string& name, const ExportSource& source) const;
+    // Returns the entry of a file that was written, with its checksum. Thread-safe. Throws Error(io).
+    ExportedFile written_file(const std::string& name, const ExportSource& source, std::string_view format) const;
+    // List a file; those of frames in their order.
+    void add_kept(ExportedFile file);
+    void add_written(ExportedFile file);
     // Removes what an earlier export wrote and this one does not list, so that the folder holds what was asked for last; but not
     // what somebody changed since. Returns what is to be told of that. Throws Error(io).
     std::vector<std::string> remove_left_over() const;

@@ -2,6 +2,7 @@
 // Texts of an export: sidecar, USD scene and README.
 
 #include <algorithm>
+#include <set>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -21,6 +22,10 @@ Json format_json(const ExportOptions& options, const ExportSequence& s, const Na
     const VolumeBox box = box_of(s.extent, s.placement, s.layout);
     Json json = {{"format", named.name}, {"files", s.name + "_%04d" + std::string(named.extension)}};
     if (!is_dense(named.format)) {
+        if (named.format == ExportFormat::flightgear) {
+            json["type"] = "r8";
+            return json;
+        }
         json["type"] = named.format == ExportFormat::nvdb && options.quantise != NanoQuantise::none
                            ? (options.quantise == NanoQuantise::fp8 ? "fp8" : "fp16")
                            : type_name(type_of(options, named.format));
@@ -170,8 +175,10 @@ std::string usd_text(const ExportOptions& options, const std::vector<ExportSeque
         "startTimeCode = {}\n"
         "    endTimeCode = {}\n    timeCodesPerSecond = {}\n)\n\ndef Xform \"clouds\"\n{{\n",
         first.frames.front().number, first.frames.back().number, number_text(first.frames_per_second));
+    std::set<std::string> prims;
     for (const ExportSequence& s : sequences) {
-        const std::string prim = prim_name(s.layer.empty() ? "all" : s.layer);
+        std::string prim = prim_name(s.layer.empty() ? "all" : s.layer);
+        while (!prims.insert(prim).second) prim += "_";  // "a-b" and "a_b" are two layers
         const VolumeBox box = box_of(s.extent, s.placement, {.factor = s.layout.factor});
         const double shift = options.half_voxel_shift ? -box.voxel_m[0] / 2 : 0;
         text += fmt::format(

@@ -55,7 +55,10 @@ void vulkan(ExportOptions& o) {
 void xplane(ExportOptions& o) { o.weather.push_back(WeatherFormat::xplane); }
 void msfs(ExportOptions& o) { o.weather.push_back(WeatherFormat::wpr); }
 void cigi(ExportOptions& o) { o.weather.push_back(WeatherFormat::cigi); }
-void flightgear(ExportOptions& o) { o.weather.push_back(WeatherFormat::metar); }
+void flightgear(ExportOptions& o) {
+    add_format(o, ExportFormat::flightgear);
+    o.weather.push_back(WeatherFormat::metar);
+}
 
 constexpr const char* kXplane =
     "X-Plane 12 (not tried in X-Plane; report what differs)\n\n"
@@ -82,8 +85,16 @@ constexpr const char* kCigi =
     "the scene says where that is. Play it with tcpreplay, or take the payloads as they are.\n";
 
 constexpr const char* kFlightgear =
-    "FlightGear 2020.3 (not tried on its screen; its METAR syntax is that of FM 15)\n\n"
-    "fgfs --metar=\"$(head -n 1 {NAME}.metar.txt)\" with the aerodrome's letters in the place of ZZZZ.\n";
+    "FlightGear (not tried in FlightGear; report what differs)\n\n"
+    "The weather, all versions: fgfs --metar=\"$(head -n 1 {NAME}.metar.txt)\" with the aerodrome's letters in "
+    "the place of ZZZZ.\n\n"
+    "A cloud, versions after 2024: {FIRST} is the largest cloud of its frame. Copy it into Textures/Sky of the "
+    "data\n"
+    "folder, and name it as a <voxel-texture> of a cloud in Environment/cloudlayers.xml. A voxel of the picture is "
+    "drawn as\n"
+    "large as FlightGear's own voxels, whatever it was here: choose --voxel so that they agree. Green is the type "
+    "(0\n"
+    "wispy, 1 billowy), blue the density; FlightGear computes the rest, and turns clouds at random.\n";
 
 constexpr const char* kBlender =
     "Blender (tried in 3.4)\n\n"
@@ -162,6 +173,7 @@ const std::vector<NamedFormat>& export_formats() {
         {ExportFormat::vdb, "vdb", ".vdb", "OpenVDB with names of a flat folder"},
         {ExportFormat::bricks, "bricks", ".bricks",
          "bricks with a border, a table of ranges, nothing where it is empty"},
+        {ExportFormat::flightgear, "flightgear", ".voxels.png", "the largest cloud as FlightGear's picture of voxels"},
     };
     return formats;
 }

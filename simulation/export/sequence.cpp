@@ -77,7 +77,11 @@ ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& r
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, run.folder.string() + ": has no frame of this range");
     read_first(options, s);
-    s.wind = wind_of(run.scene, layer ? std::optional(layer_index(run.scene, *layer)) : std::nullopt, s);
+    const std::optional<std::size_t> index =
+        layer ? std::optional(layer_index(run.scene, *layer)) : std::nullopt;
+    s.wind = wind_of(run.scene, index, s);
+    if (index || run.scene.layers.size() == 1)
+        s.genus = genus_of(run.scene, run.scene.layers[index.value_or(0)]);
     return s;
 }
 
@@ -249,7 +253,8 @@ bool is_wanted(const ExportOptions& o, int number, int least) {
 }
 
 bool is_dense(ExportFormat format) {
-    return format != ExportFormat::nvdb && format != ExportFormat::usd && format != ExportFormat::vdb;
+    return format != ExportFormat::nvdb && format != ExportFormat::usd && format != ExportFormat::vdb &&
+           format != ExportFormat::flightgear;
 }
 
 std::vector<std::array<int, 3>> level_sizes(const ExportSequence& s, ExportFormat format) {

@@ -45,6 +45,7 @@ struct ExportSequence {
     Placement placement;
     VdbMetadata metadata;  // of the first frame; defaults in a file of another program
     bool of_nephos = false;
+    std::string genus;  // WMO abbreviation of a layer; empty where the scene names none
     int refine = 1;
     double frames_per_second = 24;
     std::vector<WindTable> wind;

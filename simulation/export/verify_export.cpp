@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "density/export/bricks.h"
+#include "density/export/cloud_picture.h"
 #include "density/export/containers.h"
 #include "simulation/export/export_list.h"
 
@@ -89,6 +90,14 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         const auto type = list.types.find(file.format);
         compare(path, expected.values, found.to_dense(),
                 allowed_error(type == list.types.end() ? VoxelType::r32f : type->second, 1), d);
+        return true;
+    }
+    if (file.format == "flightgear") {
+        const CloudVoxels expected = largest_cloud(lay_out(source, plain), s.layout.periodic, s.scale),
+                          found = read_cloud_picture(path);
+        if (found.side != expected.side || found.height != expected.height)
+            bad_file(path, "has another size than its source's cloud");
+        compare(path, {expected.codes.begin(), expected.codes.end()}, {found.codes.begin(), found.codes.end()}, 0, d);
         return true;
     }
     const auto type = list.types.find(file.format);

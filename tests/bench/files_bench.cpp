@@ -90,7 +90,9 @@ BenchRow export_row(const NamedFormat& format, const fs::path& run, const std::v
     return {fmt::format("{} frames of cumulus.toml to {}, reading included, against writing them as VDB",
                         frames.size(), format.name),
             ours, other, "<= 1x",
-            fmt::format("{:.2f} MiB a frame", double(bytes) / double(frames.size()) / 1048576)};
+            fmt::format("{} threads; {:.2f} MiB a frame",
+                        tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism),
+                        double(bytes) / double(frames.size()) / 1048576)};
 }
 
 BenchRow bc4_row(const DensityGrid& density) {
@@ -133,7 +135,6 @@ std::vector<BenchRow> verify_rows(const fs::path& run, const std::vector<fs::pat
 }  // namespace
 
 std::vector<BenchRow> files_rows(const fs::path& source) {
-    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     const Folder folder;
     RunSettings settings = run_settings(read_scene(source / "scenes/cumulus.toml"), "cumulus.toml");
     settings.folder = folder.path / "run";
@@ -145,6 +146,7 @@ std::vector<BenchRow> files_rows(const fs::path& source) {
     std::vector<BenchRow> rows;
     for (const NamedFormat& format : export_formats())
         rows.push_back(export_row(format, run, frames, folder.path));
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     rows.push_back(bc4_row(frames.at(frames.size() / 2).density));
     for (BenchRow& row : verify_rows(run, files)) rows.push_back(std::move(row));
     return rows;

@@ -140,6 +140,48 @@ TEST(Volume, HalvesAreRoundedToNearestEven) {
     EXPECT_TRUE(std::isnan(decoded(0x7E00)));
 }
 
+// A block of the twin: extremes, and the nearest of the sevenths between them, as BC4's indices count them.
+std::uint64_t bc4_twin(const Volume& v, int i, int j, int k, float scale) {
+    constexpr std::uint64_t kIndex[] = {0, 2, 3, 4, 5, 6, 7, 1};
+    float low = 1e30f, high = 0;
+    const auto value = [&](int n) {
+        const int x = std::min(4 * i + n % 4, v.nx - 1), y = std::min(4 * j + n / 4, v.ny - 1);
+        return v.values[(std::size_t(k) * std::size_t(v.ny) + std::size_t(y)) * std::size_t(v.nx) + std::size_t(x)];
+    };
+    for (int n = 0; n < 16; ++n) {
+        low = std::min(low, value(n));
+        high = std::max(high, value(n));
+    }
+    const float factor = 255 * (1 / scale);
+    const auto first = std::uint64_t(std::min(high * factor, 255.0f) + 0.5f),
+               second = std::uint64_t(std::min(low * factor, 255.0f) + 0.5f);
+    std::uint64_t block = first | second << 8;
+    for (int n = 0; n < 16 && first != second; ++n) {
+        const float below = (float(first) - value(n) * factor) * (7.0f / float(first - second));
+        block |= kIndex[int(std::clamp(below, 0.0f, 7.0f) + 0.5f)] << (16 + 3 * n);
+    }
+    return block;
+}
+
+TEST(Volume, Bc4EqualsTheTwin) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<float> drawn(0, 0.8f);
+    for (const int nx : {13, 16}) {
+        Volume v{nx, 9, 3, {}};
+        // Blocks of nothing, of one value and of many; some above the scale.
+        for (std::size_t n = 0; n < v.voxels(); ++n)
+            v.values.push_back(n < 60 ? 0.0f : n < 120 ? 0.25f : random() % 3 == 0 ? 0.0f : drawn(random));
+        const std::vector<std::byte> bytes = encode(v, VoxelType::bc4, 0.7f);
+        const int bx = (nx + 3) / 4;
+        ASSERT_EQ(bytes.size(), std::size_t(bx) * 3 * 3 * 8);
+        for (int block = 0; block < bx * 3 * 3; ++block) {
+            std::uint64_t bits = 0;
+            std::memcpy(&bits, bytes.data() + 8 * block, 8);
+            EXPECT_EQ(bits, bc4_twin(v, block % bx, block / bx % 3, block / bx / 3, 0.7f)) << nx << " " << block;
+        }
+    }
+}
+
 TEST(Volume, Bc4IsOfLittleError) {
     // Smooth as clouds are: within 1/255 in the mean.
     Volume v{64, 64, 16, {}};

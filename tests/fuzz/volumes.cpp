@@ -2,6 +2,7 @@
 // Exported volumes, as `nephos verify` reads them.
 
 #include "density/export/bricks.h"
+#include "density/export/cloud_picture.h"
 #include "density/export/containers.h"
 #include "tests/fuzz/target.h"
 
@@ -25,6 +26,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     fuzz::accepts([&] { check(read_vti(file.path())); });
     fuzz::accepts([&] { check(read_bricks(file.path())); });
     fuzz::accepts([&] { check(read_slices(file.path(), 4, 3, 3, 2)); });
+    fuzz::accepts([&] { fuzz::require(read_cloud_picture(file.path()).side > 0, "a picture of a cloud has voxels"); });
     fuzz::accepts([&] { check(read_raw(file.path(), VoxelType::r8, 8, 4, 4, 3)); });
     return 0;
 }

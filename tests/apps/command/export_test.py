@@ -260,6 +260,44 @@ class Export(Case):
         self.assertEqual((folder / "placed_0002.raw").read_bytes(), (folder / "placed_0005.raw").read_bytes())
         self.call("verify", "out")
 
+    def test_flightgear_gets_the_largest_cloud(self):
+        """The picture's voxels are those of the cloud that SciPy finds: slices from the left, north at the top."""
+        from PIL import Image
+        from scipy import ndimage
+        folder = self.export("out", "--to", "flightgear", "--range", "auto")
+        sidecar = json.loads((folder / "placed.volume.json").read_text())
+        self.assertEqual(sidecar["period_m"], [None] * 3)
+        codes = numpy.rint(self.density / sidecar["scale"] * 255 + 1e-6).astype("u1")
+        names, _ = ndimage.label(self.density >= 0.3 * self.density.max())
+        masses = ndimage.sum_labels(self.density, names, range(1, names.max() + 1))
+        whole = ndimage.binary_dilation(names == 1 + masses.argmax(), iterations=3, mask=codes > 0)
+        cloud = numpy.where(whole, codes, 0)
+        z, y, x = (slice(axis.min(), axis.max() + 1) for axis in cloud.nonzero())
+        picture = numpy.array(Image.open(folder / "placed_0003.voxels.png"))
+        side = picture.shape[0]
+        self.assertEqual((side, picture.shape), (32, (32, 32 * (z.stop - z.start), 4)))
+        found = picture.reshape(side, -1, side, 4).transpose(1, 0, 2, 3)[:, ::-1]  # up, north, east
+        first = [(side - (axis.stop - axis.start)) // 2 for axis in (y, x)]
+        expected = numpy.zeros(found.shape[:3], "u1")
+        expected[:, first[0]:first[0] + y.stop - y.start, first[1]:first[1] + x.stop - x.start] = cloud[z, y, x]
+        self.assertGreater(cloud.max(), 100)
+        self.assertLessEqual(abs(found[..., 2].astype(int) - expected).max(), 1)
+        self.assertEqual(set(numpy.unique(found[..., 1][found[..., 2] > 0])), {204})  # cumulus
+        self.assertEqual(found[..., 0].max(), 0)
+        for name, says in (("placed_0003.voxels.png", "no picture of a cloud"), ("placed_0004.voxels.png", "is no PNG file")):
+            path = folder / name
+            if "no PNG" in says:
+                path.write_bytes(path.read_bytes()[:100])
+            else:
+                Image.new("RGBA", (40, 40)).save(path)
+            self.relisted(folder, name)
+            self.assertIn(says, self.call("verify", "out", status=1).stdout)
+            self.export_again()
+
+    def export_again(self):
+        shutil.rmtree(self.folder / "out")
+        self.export("out", "--to", "flightgear", "--range", "auto")
+
     def test_one_export_at_a_time(self):
         import fcntl
         folder = self.export("out", "--to", "raw")

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/export/frame_export.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <tbb/global_control.h>
+
+#include "core/error.h"
+#include "density/combine.h"
+#include "density/export/bricks.h"
+#include "density/export/cloud_picture.h"
+#include "simulation/simulation.h"
+
+namespace nephos {
+namespace {
+
+std::string_view name_of(ExportFormat format) {
+    for (const NamedFormat& named : export_formats())
+        if (named.format == format) return named.name;
+    return {};
+}
+
+// The grid as VDB files hold it: coarser if the options want that.
+DensityGrid grid_of(const DensityGrid& density, int factor) {
+    if (factor == 1) return density;
+    VolumeLayout layout;
+    layout.factor = factor;
+    const Volume volume = lay_out(density, layout);
+    Placement placement = density.placement();
+    placement.cell_size_m *= factor;
+    return DensityGrid::from_dense(volume.values, {volume.nx, volume.ny, volume.nz}, placement);
+}
+
+void write_vdb_file(const std::filesystem::path& path, const ExportOptions& options, const ExportSequence& s,
+                    const LoadedDensity& loaded) {
+    DensityGrid density = grid_of(loaded.density, s.layout.factor);
+    VdbContent content;
+    VdbMetadata metadata = loaded.metadata.value_or(VdbMetadata{});
+    if (!loaded.metadata) metadata.nephos_version = version();
+    if (options.half_voxel_shift) density = shifted_by_half_a_voxel(density);
+    content.density = &density;
+    content.half = options.type == VoxelType::r16f;
+    if (!options.velocity_name.empty() && !metadata.wind.empty()) {
+        const Wind wind{{{0, metadata.wind}}};
+        const Placement& at = loaded.density.placement();
+        for (int k = 0; k < density.extent().z; ++k)
+            content.wind.push_back(
+                wind_at(wind, at.origin_m.z + (k + 0.5) * density.placement().cell_size_m, 0));
+        content.wind_name = options.velocity_name;
+    }
+    write_vdb(path, content, metadata);
+}
+
+std::vector<Volume> levels_of(const DensityGrid& density, const ExportSequence& s) {
+    std::vector<Volume> levels{lay_out(density, s.layout)};
+    for (int n = 1; n < s.levels; ++n) levels.push_back(halved(levels.back()));
+    return levels;
+}
+
+EncodedVolume encoded_levels(const std::vector<Volume>& levels, VoxelType type, float scale) {
+    EncodedVolume encoded{type, {}};
+    for (const Volume& v : levels) encoded.levels.push_back({v.nx, v.ny, v.nz, encode(v, type, scale)});
+    return encoded;
+}
+
+// FlightGear's type of a cloud, 0 wispy to 1 billowy; of an unknown genus that of cumulus, which the automaton makes.
+double billows_of(const std::string& genus) {
+    constexpr std::pair<std::string_view, double> kTypes[] = {
+        {"Ci", 0},   {"Cs", 0.1}, {"Cc", 0.2}, {"St", 0.3}, {"Ns", 0.3}, {"As", 0.3},
+        {"VV", 0.3}, {"Sc", 0.5}, {"Ac", 0.5}, {"Cu", 0.8}, {"Cb", 1}};
+    for (const auto& [name, type] : kTypes)
+        if (genus == name) return type;
+    return 0.8;
+}
+
+// Bricks wrap around where the box repeats and nothing stands between its sides.
+BrickOptions brick_options(const ExportOptions& options, const ExportSequence& s, VoxelType type) {
+    const VolumeBox box = box_of(s.extent, s.placement, s.layout);
+    BrickOptions bricks{options.brick_edge, type, s.scale, {}};
+    for (std::size_t a = 0; a < 3; ++a)
+        bricks.periodic[a] =
+            s.layout.periodic[std::size_t(box.axis[a])] && box.border == 0 && box.padding[a] == 0;
+    return bricks;
+}
+
+}  // namespace
+
+DensityGrid shifted_by_half_a_voxel(const DensityGrid& density) {
+    Placement placement = density.placement();
+    for (int a = 0; a < 3; ++a) placement.origin_m[a] -= placement.cell_size_m / 2;
+    return placed_at(density, placement);
+}
+
+ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& frame,
+                                   const LoadedDensity& loaded) const {
+    if (!(loaded.density.extent() == s.extent) || !(loaded.density.placement() == s.placement))
+        throw Error(ErrorCode::io,
+                    frame.file.string() + ": has another box than the first file of its sequence");
+    const ExportSource source{frame.file, file_digest(frame.file)};
+    require_unchanged(frame);
+    std::map<VoxelType, EncodedVolume> encoded;
+    std::vector<Volume> levels;
+    ExportedFrame result{{loaded.density.sum(), double(loaded.density.max_value())}, {}, {}};
+    for (const ExportFormat format : all_formats(options_)) {
+        if (format == ExportFormat::usd) continue;
+        const std::string name = frame_name(s, frame.number, format);
+        if (std::optional<ExportedFile> kept = list_.kept_file(name, source)) {
+            result.kept.push_back(std::move(*kept));
+            continue;
+        }
+        const std::filesystem::path path = options_.folder / name;
+        if (format == ExportFormat::vdb) {
+            write_vdb_file(path, options_, s, loaded);
+        } else if (format == ExportFormat::flightgear) {
+            VolumeLayout layout;
+            layout.factor = s.layout.factor;
+            write_cloud_picture(path,
+                                largest_cloud(lay_out(loaded.density, layout), s.layout.periodic, s.scale),
+                                billows_of(s.genus));
+        } else if (format == ExportFormat::nvdb) {
+            write_nanovdb(path, grid_of(loaded.density, s.layout.factor),
+                          options_.zip ? NanoCodec::zip : NanoCodec::none, options_.quantise);
+        } else {
+            if (levels.empty()) levels = levels_of(loaded.density, s);
+            const VoxelType type = type_of(options_, format);
+            if (format == ExportFormat::bricks) {
+                write_bricks(path, levels, brick_options(options_, s, type));
+            } else {
+                auto found = encoded.find(type);
+                if (found == encoded.end())
+                    found = encoded.emplace(type, encoded_levels(levels, type, s.scale)).first;
+                write_dense(path, format, s, frame, found->second);
+            }
+        }
+        result.written.push_back(list_.written_file(name, source, name_of(format)));
+    }
+    return result;
+}
+
+void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat format,
+                                const ExportSequence& s, const SourceFrame& frame,
+                                const EncodedVolume& encoded) const {
+    const VolumeBox box = box_of(s.extent, s.placement, s.layout);
+    switch (format) {
+        case ExportFormat::raw:
+            return write_raw(path, encoded);
+        case ExportFormat::dds:
+            return write_dds(path, encoded, options_.legacy_dds);
+        case ExportFormat::ktx2:
+            return write_ktx2(path, encoded, sidecar_text(options_, s, {}));
+        case ExportFormat::slices:
+            return write_slices(path, encoded, slice_columns(box.size[0], box.size[1], box.size[2]));
+        default: {
+            VtiPlace place;
+            place.time_s = frame.time_s;
+            place.voxel_m = box.voxel_m;
+            for (std::size_t a = 0; a < 3; ++a) place.first_m[a] = box.min_m[a] + box.voxel_m[a] / 2;
+            return write_vti(path, encoded, place, options_.zip);
+        }
+    }
+}
+
+// Each frame takes its grid, its voxels as floats and their codes.
+std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s) {
+    constexpr std::uint64_t kMemory = std::uint64_t(256) << 20;
+    const std::size_t threads =
+        tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    if (threads <= 1) return 1;
+    std::uint64_t voxels = 1, codes = 0;
+    for (const int side : {s.extent.x, s.extent.y, s.extent.z}) voxels *= std::uint64_t(side);
+    for (const ExportFormat format : all_formats(options))
+        if (is_dense(format)) codes += dense_bytes(options, s, format);
+    return std::size_t(std::clamp<std::uint64_t>(kMemory / (8 * voxels + codes), 1, threads + 1));
+}
+
+}  // namespace nephos

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The files of frames, several frames at a time (not installed).
+
+#include <deque>
+#include <functional>
+#include <future>
+#include <utility>
+#include <vector>
+
+#include "density/export/containers.h"
+#include "simulation/export/export_list.h"
+#include "simulation/export/sequence.h"
+
+namespace nephos {
+
+// What came of a frame.
+struct ExportedFrame {
+    FrameFigures figures;
+    std::vector<ExportedFile> written, kept;
+};
+
+// Writes the files of one frame that are not there yet. Thread-safe for different frames.
+class FrameExporter {
+  public:
+    FrameExporter(const ExportOptions& options, const ExportList& list) : options_(options), list_(list) {}
+
+    // Throws Error(io) when the frame has another box than its sequence, or a file cannot be written.
+    ExportedFrame write(const ExportSequence& s, const SourceFrame& frame, const LoadedDensity& loaded) const;
+
+  private:
+    void write_dense(const std::filesystem::path& path, ExportFormat format, const ExportSequence& s,
+                     const SourceFrame& frame, const EncodedVolume& encoded) const;
+
+    const ExportOptions& options_;
+    const ExportList& list_;
+};
+
+// Frames that are written at the same time, so that one is encoded while another is read and a third is flushed to the
+// device. They end in their order.
+class FramesAtWork {
+  public:
+    using Finished = std::function<void(ExportedFrame&& frame)>;
+
+    // `most` frames at a time; 1: none is left to a thread of its own.
+    FramesAtWork(std::size_t most, Finished finished) : most_(most), finished_(std::move(finished)) {}
+    ~FramesAtWork() = default;  // waits for those at work
+    FramesAtWork(const FramesAtWork&) = delete;
+    FramesAtWork& operator=(const FramesAtWork&) = delete;
+
+    template <typename Work>
+    void add(Work work) {
+        if (most_ <= 1) return finished_(work());
+        if (frames_.size() == most_) finish_first();
+        frames_.push_back(std::async(std::launch::async, std::move(work)));
+    }
+    void finish() {
+        while (!frames_.empty()) finish_first();
+    }
+
+  private:
+    void finish_first() {
+        std::future<ExportedFrame> first = std::move(frames_.front());
+        frames_.pop_front();
+        finished_(first.get());
+    }
+
+    std::size_t most_;
+    Finished finished_;
+    std::deque<std::future<ExportedFrame>> frames_;
+};
+
+// Returns a frame more than there are threads to compute with, as one waits for the device most of the time; of large frames
+// as many as fit into memory; 1 with one thread.
+std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& sequence);
+
+}  // namespace nephos
