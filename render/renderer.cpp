@@ -19,6 +19,8 @@
 #include "render/frame/scattering_table.h"
 #include "render/ground/wet_ground.h"
 #include "render/renderer_impl.h"
+#include "render/terrain/terrain_edges.h"
+#include "render/terrain/terrain_pass.h"
 #include "render/veil/veil_pass.h"
 #include "render/veil/veil_shade.h"
 #include "render/vulkan/vulkan_backend.h"
@@ -184,6 +186,9 @@ void Renderer::Impl::begin(Drawing& drawing) {
                            .air = air,
                            .times = times};
     if (frame.sky != nullptr) picture.air = air_of(*frame.sky);
+    if (splats.terrain != nullptr)
+        drawing.terrain = terrain_view(*splats.terrain, options, double(earth_bend(frame.sky)));
+    frame.terrain = drawing.terrain.distance_m;
     for (int y = 0; y < picture.height; y += part_size) {
         for (int x = 0; x < picture.width; x += part_size) {
             const PicturePart area{x, y, std::min(part_size, picture.width - x),
@@ -191,6 +196,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
             frame.parts.push_back(
                 {area, frame_data(options, frame.camera, lit.frame, flash, area, frame.sky)});
             PictureFrame& part = frame.parts.back().frame;
+            part.terrain = drawing.terrain.distance_m.empty() ? nullptr : drawing.terrain.distance_m.data();
             part.scattering = scattering.get().data();
             if (!lit.volumes.empty()) use_ground_light(lit.ground_light, options.camera.position_m, part);
         }
@@ -217,17 +223,21 @@ void Renderer::Impl::begin_rain(Drawing& drawing, bool known) {
     if (!frame) return;
     // Of merged metaballs the picture has the light of those that they stand for.
     const bool same = known && (lit.merged.empty() || !lit.volumes.empty());
-    if (backend->begin_rain(*frame, rain.weather, same ? &lit : nullptr, picture))
+    // Devices know nothing of terrain that hides rain.
+    const bool level = picture.terrain_m.empty();
+    if (level && backend->begin_rain(*frame, rain.weather, same ? &lit : nullptr, picture))
         drawing.backend = backend.get();
     else
         painter.draw(picture, rain.options, rain.weather, rain.time_s);
 }
 
-Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail) {
+Picture Renderer::Impl::draw(const Splats& splats, const RenderOptions& options, const DetailView& detail,
+                             TerrainView& terrain) {
     Drawing drawing(splats, options);
     drawing.detail = detail;
     begin(drawing);
     finish(drawing);
+    terrain = std::move(drawing.terrain);
     return std::move(drawing.picture);
 }
 
@@ -266,33 +276,62 @@ void Renderer::Impl::hand_out_light(const Splats& splats, const RenderOptions& o
 Picture Renderer::Impl::draw_in_passes(const Splats& splats, const RenderOptions& options) {
     const CameraFrame camera = camera_frame(options.camera);
     const DetailView detail{camera.position_m, pixels_per_unit(options.camera, camera)};
-    Picture picture = draw(splats, options, detail);
+    TerrainView terrain;
+    Picture picture = draw(splats, options, detail, terrain);
     static const GroundCoverView kDry;
     const GroundCoverView& cover = splats.ground_cover ? *splats.ground_cover : kDry;
+    const std::optional<MirrorView> mirror = mirror_of(splats, options, cover, detail);
+    const MirrorView* const mirrored = mirror ? &*mirror : nullptr;
+    if (splats.terrain != nullptr)
+        draw_terrain_of(splats, options, cover, detail, terrain, mirrored, picture);
     if (shows_wet_ground(options, cover) || shows_pattern(options))
-        draw_ground(splats, options, cover, detail, picture);
+        draw_ground(splats, options, cover, detail, mirrored, picture);
     if (!veils.empty()) draw_veils_of(splats, options, detail, picture);
+    if (splats.terrain != nullptr)
+        smooth_edges(*splats.terrain, options, double(earth_bend(sky_of(splats, options))), terrain, picture);
     return picture;
 }
 
+std::optional<MirrorView> Renderer::Impl::mirror_of(const Splats& splats, const RenderOptions& options,
+                                                    const GroundCoverView& cover, const DetailView& detail) {
+    if (!shows_reflections(options, cover)) return std::nullopt;
+    RenderOptions below = options;
+    below.camera = mirrored_camera(options);
+    // Waves make a glint of the sun.
+    if (options.ground.pattern == GroundPattern::water) below.atmosphere.sun_disc = false;
+    Splats mirrored = splats;
+    mirrored.depth = !veils.empty();
+    mirrored.light = false;
+    // The merged metaballs are reused, and with them the light.
+    TerrainView terrain;
+    Picture view = draw(mirrored, below, detail, terrain);
+    if (splats.terrain != nullptr) draw_terrain_of(splats, below, cover, detail, terrain, nullptr, view);
+    if (!veils.empty()) draw_veils_of(splats, below, detail, view);
+    return mirror_view(std::move(view), below.camera);
+}
+
+void Renderer::Impl::draw_terrain_of(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
+                                     const DetailView& detail, const TerrainView& view, const MirrorView* mirror,
+                                     Picture& picture) {
+    backend->fetch_light(lit);
+    const CloudHeights clouds = heights_of(lit.cloud, splats, {});
+    TerrainGround ground{options, *splats.terrain, view, cover, splats.flash ? &*splats.flash : nullptr, splats.time_s, mirror};
+    ground.shadow = lit.shadow.data();
+    ground.shadow_size = lit.shadow_size;
+    ground.sky = sky_of(splats, options);
+    const MarchedScene marched(lit.volumes, camera_frame(options.camera), detail.pixels_per_unit, options.light,
+                               earth_bend(ground.sky));
+    if (marched.repeats) ground.endless = &marched;
+    if (!lit.volumes.empty()) ground.light = &lit.ground_light;
+    ground.cloud_base_m = clouds.base_m;
+    ground.cloud_top_m = clouds.top_m;
+    draw_terrain(ground, picture);
+}
+
 void Renderer::Impl::draw_ground(const Splats& splats, const RenderOptions& options,
-                                 const GroundCoverView& cover, const DetailView& detail, Picture& picture) {
-    WetGround ground{options, cover, splats.flash ? &*splats.flash : nullptr, splats.time_s};
-    std::optional<MirrorView> mirror;
-    if (shows_reflections(options, cover)) {
-        RenderOptions below = options;
-        below.camera = mirrored_camera(options);
-        // Waves make a glint of the sun.
-        if (options.ground.pattern == GroundPattern::water) below.atmosphere.sun_disc = false;
-        Splats mirrored = splats;
-        mirrored.depth = !veils.empty();
-        mirrored.light = false;
-        // The merged metaballs are reused, and with them the light.
-        Picture view = draw(mirrored, below, detail);
-        if (!veils.empty()) draw_veils_of(splats, below, detail, view);
-        mirror = mirror_view(std::move(view), below.camera);
-        ground.mirror = &*mirror;
-    }
+                                 const GroundCoverView& cover, const DetailView& detail, const MirrorView* mirror,
+                                 Picture& picture) {
+    WetGround ground{options, cover, splats.flash ? &*splats.flash : nullptr, splats.time_s, mirror};
     backend->fetch_light(lit);
     ground.shadow = lit.shadow.data();  // the mirrored view may have completed it
     ground.shadow_size = lit.shadow_size;
@@ -357,6 +396,7 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
     if (options.shadow_map_size > limit)
         throw Error(ErrorCode::usage, "shadow_map_size: this device allows at most " + std::to_string(limit));
     if (splats.ground_cover) check(*splats.ground_cover);
+    if (splats.terrain != nullptr) require_above_terrain(*splats.terrain, options);
     if (!veils.empty() && !splats.depth)
         throw Error(ErrorCode::usage, "a picture with veils needs the distances of what stands before them: Splats::depth");
     check_memory(splats, options, impl_->part_size);
@@ -366,7 +406,7 @@ PendingPicture Renderer::begin(const Splats& splats, const RenderOptions& option
         impl_->veils = veils;
         impl_->shade_by_veils(splats, options);
         const bool wet = splats.ground_cover && shows_wet_ground(options, *splats.ground_cover);
-        if (wet || shows_pattern(options) || !veils.empty()) {
+        if (wet || shows_pattern(options) || !veils.empty() || splats.terrain != nullptr) {
             state->picture = impl_->draw_in_passes(splats, options);
             state->rain = std::move(rain);
             impl_->begin_rain(*state, true);

@@ -12,8 +12,10 @@
 #include "render/atmosphere/sky_light.h"
 #include "render/backend/backend.h"
 #include "render/cloud/voxel_absorption.h"
+#include "render/ground/mirror_view.h"
 #include "render/rain/precipitation.h"
 #include "render/renderer.h"
+#include "render/terrain/terrain_view.h"
 
 namespace nephos {
 
@@ -30,6 +32,7 @@ struct PendingPicture::State {
     RenderOptions options;
     DetailView detail;  // from which the cloud's metaballs are merged
     Picture picture;
+    TerrainView terrain;  // of ground that is not level
     Backend* backend = nullptr;  // that draws it; null: it is finished
     std::optional<Rainfall> rain;  // still to be drawn
 };
@@ -43,13 +46,19 @@ struct Renderer::Impl {
     // Draws the rain of a picture that is complete otherwise, or begins to. `known`: the light of the cloud is still that of
     // the picture.
     void begin_rain(Drawing& drawing, bool known);
-    // Begins and finishes a frame.
-    Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail);
-    // Draws a frame over which the processor draws: ground that is not plain, veils per pixel.
+    // Begins and finishes a frame, which is left dark where its rays meet terrain.
+    Picture draw(const Splats& splats, const RenderOptions& options, const DetailView& detail, TerrainView& terrain);
+    // Draws the terrain of `splats`, seen as `view` has it, into a picture that draw() left dark there; `mirror` may be null.
+    void draw_terrain_of(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
+                         const DetailView& detail, const TerrainView& view, const MirrorView* mirror, Picture& picture);
+    // The view of the mirrored eye, where water shows it.
+    std::optional<MirrorView> mirror_of(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
+                                        const DetailView& detail);
+    // Draws a frame over which the processor draws: ground that is not plain or not level, veils per pixel.
     Picture draw_in_passes(const Splats& splats, const RenderOptions& options);
     // The passes: wet, snowy or farmed ground; veils. They change `picture`, which was drawn with `detail`.
     void draw_ground(const Splats& splats, const RenderOptions& options, const GroundCoverView& cover,
-                     const DetailView& detail, Picture& picture);
+                     const DetailView& detail, const MirrorView* mirror, Picture& picture);
     void draw_veils_of(const Splats& splats, const RenderOptions& options, const DetailView& detail,
                        Picture& picture);
     // Computes light by T's absorption factor instead of the light pass.

@@ -12,6 +12,7 @@
 
 #include "core/wind.h"
 #include "density/veil.h"
+#include "render/terrain/terrain.h"
 #include "scenes/format/layers.h"
 #include "simulation/frame_detail.h"
 #include "simulation/memory.h"
@@ -80,18 +81,24 @@ std::shared_ptr<const CloudBases> cloud_of(const Scene& scene, std::size_t n, co
 FramePainter::FramePainter(const Scene& scene, const DeviceOptions& device)
     : scene_(scene), renderer_(device) {
     painter_.use_textures(read_textures(scene.models));
+    painter_.use_terrain(make_terrain(scene.render.terrain, scene.render.ground));
 }
 
 void FramePainter::set_scene(const Scene& scene, bool same_layers) {
     const bool same_textures = texture_files(scene.models) == texture_files(scene_.models);
-    if (same_layers && same_textures) {
+    const bool same_terrain = scene.render.terrain == scene_.render.terrain &&
+                              scene.render.ground.height_m == scene_.render.ground.height_m;
+    if (same_layers && same_textures && same_terrain) {
         scene_ = scene;
         return;
     }
     std::shared_ptr<const ModelTextures> textures = read_textures(scene.models);
+    std::shared_ptr<const HeightMap> terrain =
+        same_terrain ? painter_.terrain() : make_terrain(scene.render.terrain, scene.render.ground);
     scene_ = scene;
     if (!same_layers) painter_ = SkyPainter();
     painter_.use_textures(std::move(textures));
+    painter_.use_terrain(std::move(terrain));
 }
 
 void FramePainter::add_detail(const DensityGrid& density, const std::optional<DensityGrid>& moisture,

@@ -158,6 +158,20 @@ double ground_bytes(const Scene& scene, double under_way) {
     return map * (history * (1 + kCheckpointCopies) + under_way);
 }
 
+// Heights with their quadtree, slopes and what they see, and what reading or making them takes; and where the rays of a
+// picture meet them.
+double terrain_bytes(const Scene& scene, double pixels) {
+    const TerrainOptions& terrain = scene.render.terrain;
+    if (!terrain.any()) return 0;
+    constexpr double kMostOfFile = 4096;
+    const double side = terrain.relief != Relief::none ? terrain.cells
+                        : terrain.raw_columns > 0      ? std::max(terrain.raw_columns, terrain.raw_rows)
+                                                       : kMostOfFile;
+    const double shape = std::min(terrain.width_m, terrain.length_m) / std::max(terrain.width_m, terrain.length_m);
+    constexpr double kBytesPerHeight = 64, kBytesPerPixelOfTerrain = 16;
+    return side * side * (terrain.relief != Relief::none ? shape : 1.0) * kBytesPerHeight + pixels * kBytesPerPixelOfTerrain;
+}
+
 // The mirrored view and its levels.
 double mirror_bytes(const Scene& scene, double pixels) {
     const bool mirrors = scene.ground_cover.enabled || scene.render.ground.pattern == GroundPattern::water;
@@ -197,7 +211,7 @@ MemoryEstimate memory_estimate(const Scene& scene, RunParts parts) {
     const double metaballs = cells * kPlannedCover;
     estimate.pictures =
         saturated(metaballs * kBytesPerMetaball + pixels * kBytesPerPixel + texels * kBytesPerShadowTexel +
-                  mirror_bytes(scene, pixels) +
+                  mirror_bytes(scene, pixels) + terrain_bytes(scene, pixels) +
                   kPlannedCover * detailed * (kBytesPerCoverage + kBytesPerMarchedLight) +
                   double(kFramesWritten) * (pixels * kBytesPerPictureWritten + texels * sizeof(float)));
     if (wants_video(scene))

@@ -10,6 +10,7 @@
 #include "core/vec.h"
 #include "render/ground/wet_ground.h"
 #include "render/options/camera.h"
+#include "render/terrain/height_map.h"
 #include "seeds/light_schedule.h"
 #include "simulation/debug_view.h"
 #include "simulation/memory.h"
@@ -193,8 +194,10 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
                                     const Weather& weather, const std::optional<FilmFrame>& film,
                                     std::span<const DrawnVeil> veils) {
     check(moving);
-    RenderOptions options = moving;
-    options.camera = camera_at(moving.camera, time_s);
+    RenderOptions standing = moving;
+    standing.camera = standing_camera(moving.camera, terrain_.get(), moving.ground);
+    RenderOptions options = standing;
+    options.camera = camera_at(standing.camera, time_s);
     options.sun = sun_at(moving.sun, time_s);
     const bool rain = options.precipitation.enabled && !weather.curtains.empty();
     layers_.resize(layers.size());
@@ -216,13 +219,13 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     const bool all = depth || rain;
     std::optional<Rainfall> rainfall;
     if (rain) {
-        rainfall = Rainfall{moving, weather, time_s};
+        rainfall = Rainfall{standing, weather, time_s};  // knows the camera's path itself
         rainfall->options.sun = options.sun;
         if (ground_cover) rainfall->options.ground.albedo = mean_albedo(options, *ground_cover);
     }
     PendingPicture picture = renderer.begin(
         {drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all, ground_cover,
-         textures_ ? textures_->pictures : nullptr, drawn.unseen},
+         textures_ ? textures_->pictures : nullptr, drawn.unseen, terrain_},
         options, veils, std::move(rainfall));
     return {std::move(picture), std::move(options), std::move(lines), std::move(drawn)};
 }

@@ -138,10 +138,14 @@ class SkyPainter {
 
     // Sets the textures of later pictures: those of all base models of the layers, or null when none has any.
     void use_textures(std::shared_ptr<const ModelTextures> textures) { textures_ = std::move(textures); }
+    // Sets the ground of later pictures that is not level (render/terrain/terrain.h); null: it is.
+    void use_terrain(std::shared_ptr<const HeightMap> terrain) { terrain_ = std::move(terrain); }
+    const std::shared_ptr<const HeightMap>& terrain() const { return terrain_; }
 
   private:
     std::vector<SkyBillboards> layers_;
     std::shared_ptr<const ModelTextures> textures_;
+    std::shared_ptr<const HeightMap> terrain_;
 };
 
 // Return the light of the sun, or of a flash, as the absorption factor takes it.

@@ -43,6 +43,7 @@ RenderOptions render_options(const VolumePictureOptions& given, const std::optio
     if (given.g) options.light.phase.g = *given.g;
     if (given.view || !scene)
         frame(options.camera, box, given.view.value_or(View::side), options.ground.height_m);
+    if (given.view || given.camera_m) options.camera.above_ground = false;
     if (given.camera_m) options.camera.position_m = *given.camera_m;
     if (given.target_m) options.camera.target_m = *given.target_m;
     if (options.camera.position_m == options.camera.target_m)

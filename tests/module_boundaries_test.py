@@ -46,6 +46,7 @@ RENDER_LAYERS = (
     {"gpu"},
     {"vulkan", "cpu", "blended"},
     {"ground", "veil"},
+    {"terrain"},
 )
 # render/shared/ is a leaf of plain structs that C++ and GLSL both read.
 LEAF = "render/shared/"

@@ -57,6 +57,7 @@ struct FrameDescription {
     const Versioned<std::vector<float>>& table;  // scattering_table.h
     AirCache& air;
     StageTimes& times;
+    std::span<const float> terrain{};  // TerrainView::distance_m; empty: level ground
 
     // Returns the splats that the camera sees in view order, the metaballs still without their light. Throws
     // Error(usage) naming a billboard that is not as splats.h requires.

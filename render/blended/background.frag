@@ -12,6 +12,7 @@ layout(location = 0) out vec4 radiance;  // alpha: transmittance of the clouds, 
 layout(location = 1) out vec4 depth;
 
 void main() {
+    terrain_end = terrain_at(gl_FragCoord.xy);
     radiance = vec4(background(pixel_ray(gl_FragCoord.xy)), 1.0);
     depth = vec4(0.0, 0.0, 0.0, 1.0);
 }

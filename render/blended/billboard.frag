@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "render/shared/shared.h"
 // Step 2, T's billboards: texture * light over what lies behind. Alpha of both outputs is the transmittance.
+
+#include "render/shading/frame.glsl"
+#include "render/shading/ray.glsl"
 
 layout(set = 0, binding = 3) uniform sampler2DArray billboard_textures;
 
@@ -14,6 +18,7 @@ layout(location = 0) out vec4 radiance;
 layout(location = 1) out vec4 depth;
 
 void main() {
+    if (kTerrain && layer_level_distance.z > terrain_at(gl_FragCoord.xy)) discard;
     vec2 texel = textureLod(billboard_textures, vec3(coordinate, layer_level_distance.x), layer_level_distance.y).rg;
     float opacity = texel.r * veil.a;
     radiance = vec4(lit * texel.g + veil.rgb * texel.r, 1.0 - opacity);

@@ -38,7 +38,7 @@ class BlendedBackend : public Backend {
     std::optional<GpuImage> attenuation_;  // created when it is needed
     // Created when they are needed: without and with the physical sky; without shells of air, with them, and with
     // fog in them.
-    std::optional<ViewPass> passes_[2][3];
+    std::optional<ViewPass> passes_[2][2][3];
 };
 
 }  // namespace nephos

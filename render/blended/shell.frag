@@ -16,6 +16,7 @@ layout(location = 1) out vec4 depth;
 
 void main() {
     vec3 ray = pixel_ray(gl_FragCoord.xy);
+    terrain_end = terrain_at(gl_FragCoord.xy);
     uvec2 pixel = uvec2(gl_FragCoord.xy) + uvec2(frame.picture.zw);
     AirLayer air = air_shell(shell, sunlit_air(ray), ray, pixel);
     radiance = vec4(air.light, air.transmittance);

@@ -12,6 +12,11 @@ namespace {
 constexpr std::uint32_t kBatch = 1u << 20;  // metaballs, and billboards, on the device at once: 32 MiB each
 constexpr std::array kFormats{vk::Format::eR32G32B32A32Sfloat, vk::Format::eR32Sfloat};
 
+ShaderVariant exactly(ShaderVariant variant) {
+    variant.exact = true;
+    return variant;
+}
+
 }  // namespace
 
 ViewPass::ViewPass(const GpuDevice& gpu, const ShaderVariant& variant)
@@ -21,7 +26,7 @@ ViewPass::ViewPass(const GpuDevice& gpu, const ShaderVariant& variant)
                                       Blend::over, variant)),
       integrated_splat_(create_graphics_pipeline(gpu, shaders().view_splat_vert, shaders().view_splat_frag,
                                                  kFormats, Blend::over,
-                                                 {true, variant.physical_sky, variant.shells, variant.fog})),
+                                                 exactly(variant))),
       sets_(gpu),
       frame_(create_buffer(gpu, sizeof(shader::FrameUniforms), vk::BufferUsageFlagBits::eUniformBuffer,
                            HostAccess::write)),
@@ -32,6 +37,7 @@ ViewPass::ViewPass(const GpuDevice& gpu, const ShaderVariant& variant)
     if (variant.shells)
         shell_ = create_graphics_pipeline(gpu, shaders().shell_vert, shaders().shell_frag, kFormats,
                                           Blend::over, variant);
+    use_terrain(gpu, {});
     resources_.set({{0, frame_}, {1, balls_}, {13, shells_.shells()}, {14, shells_.shade()}});
 }
 
@@ -41,6 +47,11 @@ void ViewPass::use_shells(const GpuDevice& gpu, const AirShells& shells, const V
     shells_.use(gpu, shells);
     resources_.set({{14, shells_.shade()}});
     runs_ = runs_between_shells(shells, order);
+}
+
+void ViewPass::use_terrain(const GpuDevice& gpu, std::span<const float> distance_m) {
+    upload(gpu, terrain_, std::as_bytes(distance_m));
+    resources_.set({{23, terrain_}});
 }
 
 void ViewPass::resize_targets(const GpuDevice& gpu, const PicturePart& part) {

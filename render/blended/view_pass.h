@@ -24,6 +24,9 @@ class ViewPass {
     // Sets the air between the clouds, in front of what `order` has; for a pass made for shells.
     void use_shells(const GpuDevice& gpu, const AirShells& shells, const ViewSortedSplats& order);
 
+    // Sets where rays end at ground that is not level (TerrainView::distance_m); for a pass made for terrain.
+    void use_terrain(const GpuDevice& gpu, std::span<const float> distance_m);
+
     // Draws one part and stores its pixels in the picture.
     void draw_part(const GpuDevice& gpu, const shader::FrameUniforms& frame, const PicturePart& part,
                    const ViewSortedSplats& order, Picture& picture);
@@ -39,7 +42,7 @@ class ViewPass {
     Pipeline background_, splat_, integrated_splat_, shell_;
     DescriptorSets sets_;
     Resources resources_;
-    GpuBuffer frame_, balls_, radiance_pixels_, depth_pixels_;
+    GpuBuffer frame_, balls_, terrain_, radiance_pixels_, depth_pixels_;
     GpuImage radiance_, depth_;
     BillboardPass billboards_;
     ShellBuffers shells_;

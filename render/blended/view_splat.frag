@@ -23,6 +23,8 @@ layout(location = 1) out vec4 depth;
 
 void main() {
     vec3 ray = pixel_ray(gl_FragCoord.xy);
+    terrain_end = terrain_at(gl_FragCoord.xy);
+    if (kTerrain && shape.w > terrain_end) discard;
     float opacity;
     if (kExact) {
         opacity = integrated_opacity(centre_radius.xyz, centre_radius.w, ray, shape.x);

@@ -21,6 +21,8 @@
 
 namespace nephos {
 
+struct HeightMap;
+
 // The renderer's view of the map of water and snow on the ground (seeds/ground_cover.h) at the time of a
 // frame; each span has columns * rows values >= 0. Towards its edge the map fades to the outside values.
 struct GroundCoverView : GroundTexels {
@@ -100,6 +102,7 @@ struct Splats {
     std::shared_ptr<const BillboardPictures> pictures{};  // of billboards; null: none has one
     // Billboards of clouds that the camera does not see: they are not drawn but cast shadows. `cloud` has no meaning.
     std::span<const CloudBillboard> unseen{};
+    std::shared_ptr<const HeightMap> terrain{};  // ground that is not level (render/terrain/height_map.h); null: it is
 };
 
 }  // namespace nephos

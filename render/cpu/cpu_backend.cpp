@@ -111,7 +111,8 @@ bool CpuBackend::begin(const FrameDescription& frame, Picture& picture) {
     if (!frame.splats.light && !cloud.all_known) {
         seen.emplace(order, cloud.shadow_size);
         for (ProcessorView& view : views) view.find_visible(cloud.shadow_size, *seen);
-        if (has_shells(frame.options, cloud.casts_shadow())) std::ranges::fill(seen->map_tiles, std::uint8_t{1});
+        if (has_shells(frame.options, cloud.casts_shadow()) || frame.splats.terrain != nullptr)
+            std::ranges::fill(seen->map_tiles, std::uint8_t{1});
     }
     const VisibleSet* const known = seen ? &*seen : nullptr;
     complete_light(cloud, order.source, known, frame.times);

@@ -48,6 +48,27 @@ struct TileRays {
                 hn::Store(ground_distance(frame, ray.z), d, ground + at);
             }
         }
+        if (whole && frame.terrain != nullptr) end_at_terrain(frame, tile);
+    }
+
+    // Pixels beyond the picture's sides, of which tiles have some, keep the plane.
+    void end_at_terrain(const PictureFrame& frame, const ViewTile& tile) {
+        const auto width = std::size_t(frame.picture.x), height = std::size_t(frame.picture.y);
+        const std::size_t left = std::size_t(frame.picture.z) + std::size_t(tile.x),
+                          top = std::size_t(frame.picture.w) + std::size_t(tile.y);
+        const Layout layout;
+        for (std::size_t block = 0; block < layout.blocks; ++block) {
+            for (std::size_t row = 0; row < shader::kTileHeight; row += layout.rows) {
+                for (std::size_t lane = 0; lane < layout.lanes; ++lane) {
+                    const std::size_t pixel = block * layout.lanes + lane;
+                    const std::size_t column = left + pixel % shader::kTileWidth,
+                                      line = top + row + pixel / shader::kTileWidth;
+                    if (column >= width || line >= height) continue;
+                    float& end = ground[row * shader::kTileWidth + block * layout.lanes + lane];
+                    end = std::min(end, frame.terrain[line * width + column]);
+                }
+            }
+        }
     }
 };
 

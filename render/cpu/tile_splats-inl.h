@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include <hwy/cache_control.h>
 #include <hwy/contrib/math/math-inl.h>
@@ -133,6 +134,42 @@ HWY_INLINE float distance_of(const ScreenBall& ball, const ViewScene& scene) {
                               : scene.exact[std::bit_cast<std::uint32_t>(ball.x)].distance;
 }
 
+// Hides the pixels of a tile from splats beyond ground that is not level: their transmittance is 0 while one is drawn.
+class TerrainMask {
+  public:
+    TerrainMask(const PictureFrame& frame, const TileRays& rays) : rays_(rays), any_(frame.terrain != nullptr) {
+        if (!any_) return;
+        nearest_ = *std::min_element(rays.ground, rays.ground + kTilePixels);
+        farthest_ = *std::max_element(rays.ground, rays.ground + kTilePixels);
+    }
+    // Whether all pixels end before a distance, so that nothing beyond it is seen.
+    bool ends_before(float distance_m) const { return any_ && farthest_ < distance_m; }
+    bool hides_some(float distance_m) const { return any_ && nearest_ < distance_m; }
+    void hide(float distance_m, TileSums& sums) {
+        const Lanes d;
+        for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(d)) {
+            const Floats left = hn::Load(d, sums.transmittance + at);
+            hn::Store(left, d, before_ + at);
+            const auto seen = hn::Ge(hn::Load(d, rays_.ground + at), set(distance_m));
+            hn::Store(hn::IfThenElseZero(seen, left), d, sums.transmittance + at);
+        }
+    }
+    void show(float distance_m, TileSums& sums) const {
+        const Lanes d;
+        for (std::size_t at = 0; at < kTilePixels; at += hn::Lanes(d)) {
+            const auto seen = hn::Ge(hn::Load(d, rays_.ground + at), set(distance_m));
+            const Floats now = hn::Load(d, sums.transmittance + at);
+            hn::Store(hn::IfThenElse(seen, now, hn::Load(d, before_ + at)), d, sums.transmittance + at);
+        }
+    }
+
+  private:
+    const TileRays& rays_;
+    bool any_;
+    float nearest_ = 0, farthest_ = 0;
+    HWY_ALIGN float before_[kTilePixels] = {};
+};
+
 // Front to back, until the tile is opaque; what it took. Clouds with detail are marched meanwhile, if there are any.
 template <bool kColours>
 HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileSums& sums,
@@ -143,20 +180,30 @@ HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileS
     for (const std::uint32_t splat : tile.list.first(std::min(kAtOnce, tile.list.size())))
         hwy::Prefetch(&scene.balls[splat]);
     const bool shells = kColours && !scene.before_shells.empty();
-    TileRays rays(*scene.frame, tile, shells || march != nullptr || !scene.exact.empty());
+    const bool terrain = scene.frame->terrain != nullptr;
+    TileRays rays(*scene.frame, tile, shells || march != nullptr || terrain || !scene.exact.empty());
+    TerrainMask mask(*scene.frame, rays);
     if (shells) set_shell_offsets(*scene.frame, tile, rays);
     FirstPixels first[shader::kTileWidth] = {{layout, 0}, {layout, 1}, {layout, 2}, {layout, 3},
                                              {layout, 4}, {layout, 5}, {layout, 6}, {layout, 7}};
     std::size_t end = 0, rows = 0;
-    for (std::size_t begin = 0; begin < tile.list.size(); begin += kAtOnce) {
+    bool ended = false;
+    for (std::size_t begin = 0; begin < tile.list.size() && !ended; begin += kAtOnce) {
         end = std::min(begin + kAtOnce, tile.list.size());
         for (std::size_t i = begin; i < end; ++i) {
             if (i + kAtOnce < tile.list.size()) hwy::Prefetch(&scene.balls[tile.list[i + kAtOnce]]);
             const ScreenBall& ball = scene.balls[tile.list[i]];
+            const float ball_m = terrain ? distance_of(ball, scene) : 0.0f;
+            if (mask.ends_before(ball_m)) {
+                ended = true;
+                break;
+            }
             if (shells) add_shells_before(scene, rays, scene.first_ball + tile.list[i], sums, march);
             if (march != nullptr) march_to(scene, rays, distance_of(ball, scene), *march, sums);
             const Rows of_ball = rows_of(ball, tile, layout);
             rows += of_ball.end - std::min(of_ball.begin, of_ball.end);
+            const bool masked = mask.hides_some(ball_m);
+            if (masked) mask.hide(ball_m, sums);
             if (ball.distance > 0) {
                 add_fitted<kColours>(ball, tile, layout, first, rays, sums);
             } else if (ball.distance < 0) {
@@ -166,6 +213,7 @@ HWY_INLINE TileWork add_some(const ViewScene& scene, const ViewTile& tile, TileS
                 const ExactBall& exact = scene.exact[std::bit_cast<std::uint32_t>(ball.x)];
                 add_exact<kColours>(ball, exact, tile, layout, *scene.frame, rays, sums);
             }
+            if (masked) mask.show(ball_m, sums);
         }
         if (is_opaque(sums, layout.lanes)) break;
     }
@@ -177,6 +225,14 @@ inline TileWork add_balls(const ViewScene& scene, const ViewTile& tile, TileSums
 }
 inline TileWork find_visible_balls(const ViewScene& scene, const ViewTile& tile, TileSums& sums) {
     return add_some<false>(scene, tile, sums);
+}
+
+// Returns 0 where a ray ends at ground that is not level, which is drawn later, else 1.
+HWY_INLINE Floats before_terrain(const PictureFrame& frame, const TileRays& ends, const Floats3& ray, std::size_t at) {
+    // Terrain is nearer than the plane by more than this (terrain_caster.cpp); rays differ by their rounding.
+    const Floats level_m = hn::Mul(set(0.999f), ground_distance(frame, ray.z));
+    const auto level = hn::Ge(hn::Load(Lanes(), ends.ground + at), level_m);
+    return hn::IfThenElseZero(level, set(1.0f));
 }
 
 // Adds what is seen of the background behind the clouds; distances become means.
@@ -191,6 +247,8 @@ inline void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& 
         if (shells) add_shells_before(scene, rays, SIZE_MAX, sums, march);
         if (march != nullptr) march_to(scene, rays, kNowhere, *march, sums);
     }
+    std::optional<TileRays> ends;
+    if (scene.frame->terrain != nullptr) ends.emplace(*scene.frame, tile, true);
     for (std::size_t block = 0; block < layout.blocks; ++block) {
         const FirstPixels first(layout, block);
         for (std::size_t row = 0; row < shader::kTileHeight; row += layout.rows) {
@@ -208,7 +266,8 @@ inline void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& 
                 pixel_direction(*scene.frame, hn::Add(hn::Load(d, first.x), set(float(tile.x))),
                                 hn::Add(hn::Load(d, first.y), set(float(tile.y) + float(row))));
             const Floats3 ray = times(hn::Div(set(1.0f), hn::Sqrt(dot(direction, direction))), direction);
-            const Floats3 behind = background(*scene.frame, map, ray);
+            Floats3 behind = background(*scene.frame, map, ray);
+            if (ends) behind = times(before_terrain(*scene.frame, *ends, ray, at), behind);
             hn::Store(hn::MulAdd(seen, behind.x, hn::Load(d, sums.red + at)), d, sums.red + at);
             hn::Store(hn::MulAdd(seen, behind.y, hn::Load(d, sums.green + at)), d, sums.green + at);
             hn::Store(hn::MulAdd(seen, behind.z, hn::Load(d, sums.blue + at)), d, sums.blue + at);

@@ -39,6 +39,9 @@ struct PictureFrame : shader::FrameUniforms {
     const float* sky = nullptr;         // SkyLight::texels; null: gradient
     const float* scattering = nullptr;  // scattering_table.h, for metaballs on the processor
     const AirShells* shells = nullptr;  // likewise; null: none
+    // Distances at which the rays of the whole picture meet ground that is not level (terrain_view.h), row by row; null: it
+    // is. Nothing is drawn beyond, and no background there.
+    const float* terrain = nullptr;
     const MarchedScene* endless = nullptr;  // clouds that repeat to the horizon; null: none does
     // Scattered light below clouds; null: that of open ground. Where a point relative to the eye is in it.
     const GroundLight* ground_light = nullptr;

@@ -106,7 +106,8 @@ std::vector<ShaderConstant> constants_of(const ShaderVariant& variant) {
             {5, variant.physical_sky},
             {6, variant.shells},
             {7, variant.fog},
-            {8, variant.billboards}};
+            {8, variant.billboards},
+            {9, variant.terrain}};
 }
 
 Pipeline create_graphics_pipeline(const GpuDevice& gpu, ShaderCode vertex, ShaderCode fragment,

@@ -48,6 +48,7 @@ struct ShaderVariant {
     bool shells = false;        // 6, whatever includes shells.glsl
     bool fog = false;           // 7, likewise
     bool billboards = false;    // 8, compute shaders that draw splats: some are T's billboards
+    bool terrain = false;       // 9, whatever includes ray.glsl: ground that is not level
     bool march = false;         // no constant: other shaders, which march through clouds with detail
     bool operator==(const ShaderVariant&) const = default;
 };

@@ -19,8 +19,11 @@
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfIntAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRationalAttribute.h>
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfVecAttribute.h>
@@ -30,6 +33,7 @@
 #include "core/descriptor.h"
 #include "core/error.h"
 #include "density/vdb/sandbox.h"
+#include "render/image/exr_grid.h"
 #include "render/image/image_file.h"
 
 namespace nephos {
@@ -202,12 +206,59 @@ ExrPart received(SandboxReader& reader) {
 
 }  // namespace
 
+void prepare_exr() { Imf::staticInitialize(); }
+
+ExrGrid parse_exr_grid(int fd, int most) {
+    try {
+        OpenFile stream(fd, "heights");
+        Imf::MultiPartInputFile file(stream, 0);  // no threads
+        const Imf::Header& header = file.header(0);
+        if (header.hasType() && Imf::isDeepData(header.type())) throw std::runtime_error("it holds deep data");
+        const Imath::Box2i window = header.dataWindow();
+        const long long columns = 1LL + window.max.x - window.min.x, rows = 1LL + window.max.y - window.min.y;
+        if (columns < 2 || rows < 2 || columns > most || rows > most) {
+            throw std::runtime_error("it is " + std::to_string(columns) + " x " + std::to_string(rows) +
+                                     " heights; expected 2 to " + std::to_string(most) + " on a side");
+        }
+        const Imf::ChannelList& channels = header.channels();
+        std::string name, all;
+        int count = 0;
+        for (auto c = channels.begin(); c != channels.end(); ++c, ++count) {
+            all += (count > 0 ? ", " : "") + std::string(c.name());
+            if (count == 0) name = c.name();
+        }
+        if (count > 1) {
+            name.clear();
+            for (const char* known : {"R", "height", "Y", "Z"})
+                if (channels.findChannel(known) != nullptr) name = known;
+        }
+        const Imf::Channel* channel = name.empty() ? nullptr : channels.findChannel(name);
+        if (channel == nullptr)
+            throw std::runtime_error("its channels are " + all + "; expected one alone, or one named Z, Y, height or R");
+        if (channel->xSampling != 1 || channel->ySampling != 1)
+            throw std::runtime_error("its channel " + name + " has fewer samples than pixels");
+        ExrGrid grid{int(columns), int(rows), {}};
+        grid.values.resize(std::size_t(columns) * std::size_t(rows));
+        const std::size_t row = sizeof(float) * std::size_t(columns);
+        Imf::FrameBuffer buffer;
+        buffer.insert(name, Imf::Slice::Make(Imf::FLOAT, grid.values.data(), window, sizeof(float), row));
+        Imf::InputPart part(file, 0);
+        part.setFrameBuffer(buffer);
+        part.readPixels(window.min.y, window.max.y);
+        return grid;
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& reason) {
+        throw std::runtime_error(std::string("cannot read heights of OpenEXR: ") + reason.what());
+    }
+}
+
 ExrInfo read_exr_info(const std::filesystem::path& path) {
     constexpr SandboxLimits kLimits{.seconds = 60, .memory_bytes = std::size_t{1} << 30, .most_bytes = 16u << 20};
     const Descriptor opened = open_regular_file(path, O_RDONLY);
     const int kept[] = {opened.get()};
     ExrInfo info;
-    Imf::staticInitialize();  // before the fork, so that the child finds it done
+    prepare_exr();  // before the fork, so that the child finds it done
     run_sandboxed(
         path, "OpenEXR", kLimits, kept,
         [&](SandboxWriter& writer) {

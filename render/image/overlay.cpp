@@ -127,6 +127,7 @@ float reach_of(const Streak& s) { return s.width + 1.0f; }
 
 void blend(Picture& picture, const Streak& s, int x, int y, float cover) {
     const std::size_t i = std::size_t(y) * std::size_t(picture.width) + std::size_t(x);
+    if (!picture.terrain_m.empty() && s.distance_m > picture.terrain_m[i]) return;
     const float seen = s.distance_m <= picture.depth_m[i] ? 1.0f : picture.transmittance[i];
     const float fraction = s.opacity * cover * seen;
     float* pixel = &picture.beauty[3 * i];

@@ -48,6 +48,10 @@ struct Picture {
 
     std::optional<PictureAir> air;  // of the physical sky; none: by RenderOptions::air
 
+    // Of ground that is not level (HeightMap), else empty: its distance in each pixel, 1e30 where there is none, and its
+    // radiance at the eye, 3 a pixel, with the air before it and without clouds.
+    std::vector<float> terrain_m, terrain_light;
+
     int shadow_size = 0;        // texels on a side
     std::vector<float> shadow;  // shadow_size^2, transmittance of the whole cloud along the sun's rays
     ShadowFrame shadow_frame;

@@ -136,6 +136,21 @@ void check(const Fog& fog) {
             "three numbers, -1000..1000 metres per second");
 }
 
+void check(const TerrainOptions& terrain) {
+    require(!terrain.height_map || terrain.relief == Relief::none, "ground.height_map", "a height map or relief, not both");
+    require(finite({terrain.x_m, terrain.y_m, 0}), "terrain.x_m", "finite metres");
+    require(within(terrain.width_m, 10, 1e6), "terrain.width_m", "10..1e6 metres");
+    require(within(terrain.length_m, 10, 1e6), "terrain.length_m", "10..1e6 metres");
+    require(within(terrain.height_scale_m, 0, 20000), "terrain.height_scale_m", "0..20,000 metres");
+    require(within(terrain.offset_m, -1e5, 1e5), "terrain.offset_m", "-1e5..1e5 metres");
+    require(within(terrain.edge, 0, 0.5), "terrain.edge", "0..0.5");
+    require(terrain.cells >= 16 && terrain.cells <= 4096, "terrain.cells", "16..4096 heights on a side");
+    require(within(terrain.feature_m, 100, 1e5), "terrain.feature_m", "100..1e5 metres");
+    require(within(terrain.rock_slope_deg, 0, 90), "terrain.rock_slope_deg", "0..90 degrees");
+    for (const double part : terrain.rock_albedo) require(within(part, 0, 1), "terrain.rock_albedo", "0..1");
+    require(!std::isnan(terrain.snow_line_m), "terrain.snow_line_m", "a number");
+}
+
 void check(const RenderOptions& options) {
     const Camera& camera = options.camera;
     require(finite(camera.position_m), "camera.position_m", "finite metres");
@@ -175,6 +190,7 @@ void check(const RenderOptions& options) {
     check_colour(options.air.zenith, "air.zenith");
     check(options.atmosphere);
     require(std::isfinite(options.ground.height_m), "ground.height_m", "finite metres");
+    check(options.terrain);
     require(within(options.ground.field_m, 20, 5000), "ground.field_m", "20..5000 metres");
     require(within(options.ground.albedo, 0, 1), "ground.albedo", "three numbers from 0 to 1");
     check(options.water);

@@ -16,6 +16,7 @@
 #include "render/options/phase_function.h"
 #include "render/options/precipitation_options.h"
 #include "render/options/shell_options.h"
+#include "render/options/terrain_options.h"
 
 namespace nephos {
 
@@ -58,6 +59,8 @@ struct Camera {
     double glare = 0;
     // Key frames that replace position_m and target_m (camera_at()); empty: a static camera.
     std::vector<CameraKey> path;
+    // True: the z of position_m, target_m and of those of the path are above the ground below them (standing_camera()).
+    bool above_ground = false;
     bool operator==(const Camera&) const = default;
 };
 
@@ -233,6 +236,7 @@ struct RenderOptions {
     Air air;
     AtmosphereOptions atmosphere;
     Ground ground;
+    TerrainOptions terrain;       // of ground that is not level
     WaterOptions water;           // where the ground is water
     WetGroundOptions wet_ground;  // appearance of wet and snowy ground
     Shells shells;

@@ -178,6 +178,7 @@ HWY_INLINE Floats shaft_offsets(std::size_t x, std::size_t y) {
 struct Pixels {
     float* beauty;
     const float *depth_m, *transmittance;
+    const float* terrain_m;  // where ground that is not level ends the rays; null: it is level
 };
 
 void draw_pixels(const ShaftPass& p, MetCurtains& met, std::size_t x, std::size_t y, const Pixels& pixels) {
@@ -191,7 +192,8 @@ void draw_pixels(const ShaftPass& p, MetCurtains& met, std::size_t x, std::size_
     const Floats level2 = hn::MulAdd(ray.x, ray.x, hn::Mul(ray.y, ray.y));
     for (const SeenCurtain& c : p.curtains) {
         if (!may_meet(c, ray, level2)) continue;
-        const Way way = way_through(c, ray);
+        Way way = way_through(c, ray);
+        if (pixels.terrain_m != nullptr) way.end = hn::Min(way.end, hn::LoadU(d, pixels.terrain_m));
         if (!hn::AllFalse(d, hn::Lt(way.begin, way.end))) met.add(c, way);
     }
     if (met.count == 0) return;

@@ -30,18 +30,21 @@ void draw_shaft_row(const ShaftPass& p, std::size_t y, Picture& picture) {
     const Lanes d;
     const std::size_t lanes = hn::Lanes(d), first = y * p.width;
     MetCurtains met(p.curtains.size());
+    const bool terrain = !picture.terrain_m.empty();
     std::size_t x = 0;
     for (; x + lanes <= p.width; x += lanes)
         draw_pixels(p, met, x, y,
                     {&picture.beauty[3 * (first + x)], &picture.depth_m[first + x],
-                     &picture.transmittance[first + x]});
+                     &picture.transmittance[first + x], terrain ? &picture.terrain_m[first + x] : nullptr});
     const std::size_t rest = p.width - x;
     if (rest == 0) return;
-    std::array<float, 3 * hn::MaxLanes(Lanes())> beauty{}, depth_m{}, transmittance{};
+    std::array<float, 3 * hn::MaxLanes(Lanes())> beauty{}, depth_m{}, transmittance{}, terrain_m{};
     std::copy_n(&picture.beauty[3 * (first + x)], 3 * rest, beauty.begin());
     std::copy_n(&picture.depth_m[first + x], rest, depth_m.begin());
     std::copy_n(&picture.transmittance[first + x], rest, transmittance.begin());
-    draw_pixels(p, met, x, y, {beauty.data(), depth_m.data(), transmittance.data()});
+    if (terrain) std::copy_n(&picture.terrain_m[first + x], rest, terrain_m.begin());
+    draw_pixels(p, met, x, y,
+                {beauty.data(), depth_m.data(), transmittance.data(), terrain ? terrain_m.data() : nullptr});
     std::copy_n(beauty.begin(), 3 * rest, &picture.beauty[3 * (first + x)]);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sky, and the ground plane with the shadow map; needs ray.glsl and air.glsl.
+// Sky, and the ground plane with the shadow map, dark where ground that is not level hides them; needs ray.glsl and air.glsl.
 
 layout(set = 0, binding = 4) uniform sampler2D shadow_map;
 
@@ -42,6 +42,7 @@ vec3 ground(vec3 ray, float distance) {
 }
 
 vec3 background(vec3 ray) {
-    float distance = ground_distance(ray);
+    float distance = level_distance(ray);
+    if (kTerrain && terrain_end < distance) return vec3(0.0);  // it is drawn later
     return distance < 1.0e30 ? ground(ray, distance) : sky(ray);
 }

@@ -10,12 +10,31 @@ vec3 pixel_direction(vec2 point) {
 
 vec3 pixel_ray(vec2 point) { return normalize(pixel_direction(point)); }
 
-// Returns the distance at which a ray meets the ground, a sphere under the physical sky, else a plane; a very large
+layout(constant_id = 9) const bool kTerrain = false;  // ground that is not level (render/terrain/terrain_view.h)
+layout(set = 0, binding = 23, std430) readonly buffer Terrain {
+    float terrain[];  // its distance in each pixel of the picture
+};
+float terrain_end = 1.0e30;  // in the pixel of this invocation
+
+// Returns it for a pixel of the tile; those beyond the picture have that of its side.
+float terrain_at(vec2 point) {
+    if (!kTerrain) return 1.0e30;
+    uvec2 size = uvec2(frame.picture.xy), pixel = min(uvec2(point + frame.picture.zw), size - 1u);
+    return terrain[pixel.y * size.x + pixel.x];
+}
+
+// Returns the distance at which a ray meets level ground, a sphere under the physical sky, else a plane; a very large
 // number when it does not. Without a branch: lavapipe would recompile the shader for each height of the eye.
-float ground_distance(vec3 ray) {
+float level_distance(vec3 ray) {
     float below = frame.earth.x - ray.z;
     float slope = sqrt(max(below * (-frame.earth.x - ray.z), 0.0)) - ray.z;
     float way = min(frame.earth.y / max(slope, 1.0e-9), 1.0e30);
     float meets = clamp(below * 1.0e30, 0.0, 1.0) * frame.ground_sun.w;
     return max(way, (1.0 - meets) * 1.0e30);
+}
+
+// Returns the distance at which the ray of this invocation's pixel ends.
+float ground_distance(vec3 ray) {
+    float level = level_distance(ray);
+    return kTerrain ? min(level, terrain_end) : level;
 }

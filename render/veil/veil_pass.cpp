@@ -283,6 +283,17 @@ struct Row {
     Ray ray(std::size_t x) const { return {double(rays.x[x]), double(rays.y[x]), double(rays.z[x])}; }
     bool has_ground(std::size_t x) const { return rays.ground_m[x] < float(sheet.farthest_m); }
 
+    // What lies behind all clouds: sky, level ground, terrain as it was drawn.
+    RowColours background() const {
+        RowColours colours = row_background(pass.frame, rays, pass.shadow, pass.shadow_size);
+        if (picture.terrain_m.empty()) return colours;
+        for (std::size_t x = 0; x < width; ++x) {
+            if (!(picture.terrain_m[first + x] < 1.0e30f)) continue;
+            for (std::size_t c = 0; c < 3; ++c) colours[c][x] = picture.terrain_light[3 * (first + x) + c];
+        }
+        return colours;
+    }
+
     // Darkens the ground by what the sheet keeps of the light.
     void shade_ground() {
         SlabPoints columns;
@@ -305,7 +316,7 @@ struct Row {
         if (pixels.empty()) return;
         columns.evaluate(*sheet.veil->slab, pass.eye_m);
         const RowAir air = row_air(pass.frame, rays, rays.ground_m);
-        const RowColours behind = row_background(pass.frame, rays, pass.shadow, pass.shadow_size);
+        const RowColours behind = background();
         const Rgb sunlit = rgb(pass.frame.ground_sun), skylit = rgb(pass.frame.ground);
         for (std::size_t n = 0; n < pixels.size(); ++n) {
             const SheetLight light(sheet.reduced_depth(double(columns.density[n])), sheet.sun_cosine,
@@ -340,7 +351,7 @@ struct Row {
         if (!any) return;
         const RowAir air = row_air(pass.frame, rays, distance);
         RowColours sky;
-        if (behind_cloud) sky = row_background(pass.frame, rays, pass.shadow, pass.shadow_size);
+        if (behind_cloud) sky = background();
         for (std::size_t x = 0; x < width; ++x) {
             if (seen[x].transmittance >= 1) continue;
             float& left = picture.transmittance[first + x];
@@ -365,6 +376,9 @@ struct Row {
 void draw_row(const VeilPass& pass, const Sheet& sheet, std::size_t y, Picture& picture) {
     const auto width = std::size_t(picture.width);
     Row row{pass, sheet, row_rays(pass.frame, y, width), picture, y * width, width};
+    if (!picture.terrain_m.empty())
+        for (std::size_t x = 0; x < width; ++x)
+            row.rays.ground_m[x] = std::min(row.rays.ground_m[x], picture.terrain_m[row.first + x]);
     row.shade_ground();
     std::vector<SeenVeil> seen(width);
     SampleGroup samples(sheet, pass.eye_m, seen);

@@ -20,6 +20,7 @@ void add_billboard(uint at, vec2 pixel) {
     vec3 beside = l0 + s * l1;
     [[unroll]] for (uint row = 0u; row < kRows; ++row) {
         float t = (place.y - pixel.y - float(row)) * place.w;
+        if (kTerrain && distance > ends[row]) continue;
         vec2 texel = textureLod(billboard_textures, vec3(billboard_coordinate(vec2(s, t), turn), layer), level).rg;
         vec3 lit = beside + t * l2 + max(t - s, 0.0) * l3;
         vec3 sum = transmittance[row] * (lit * texel.g + veil * texel.r);

@@ -82,13 +82,14 @@ struct BinnedView::Slot {
           fence(gpu.device, vk::FenceCreateInfo()) {
         upload(gpu, billboards, {});
         upload(gpu, clouds, {});
+        upload(gpu, terrain, {});
         reserve_copy(gpu, counts, sizeof(shader::OrderCounts));
         const vk::CommandBufferAllocateInfo info(*gpu.pool, vk::CommandBufferLevel::ePrimary, 1);
         commands = std::move(vk::raii::CommandBuffers(gpu.device, info).front());
     }
 
     DescriptorSets sets;
-    GpuBuffer frame, order_frame, shells, march, billboards, clouds;  // read by the device
+    GpuBuffer frame, order_frame, shells, march, billboards, clouds, terrain;  // read by the device
     GpuBuffer radiance, depth, counts;                         // read back
     vk::raii::CommandBuffer commands{nullptr};
     vk::raii::Fence fence;
@@ -199,7 +200,8 @@ Resources BinnedView::view_resources(const Slot& slot) const {
             {14, shade_.words()},
             {15, lists_.parts()},
             {16, slot.billboards},
-            {17, slot.clouds}};
+            {17, slot.clouds},
+            {23, slot.terrain}};
     if (what.variant.march) all.set(what.volumes->resources(slot.march));
     return all;
 }
@@ -403,11 +405,13 @@ void BinnedView::begin_part(const ViewInputs& what, const shader::FrameUniforms&
     if (what.shells != nullptr) write(gpu_, slot.shells, *what.shells);
     upload(gpu_, slot.billboards, std::as_bytes(what.billboards));
     upload(gpu_, slot.clouds, std::as_bytes(what.clouds));
+    upload(gpu_, slot.terrain, std::as_bytes(what.terrain));
     if (what.march != nullptr) write(gpu_, slot.march, *what.march);
     slot.what.shells = nullptr;  // these are there
     slot.what.march = nullptr;
     slot.what.billboards = {};
     slot.what.clouds = {};
+    slot.what.terrain = {};
     slot.with_order = first || ordered_ != &picture;
     submit(slot);
     slot.picture = &picture;

@@ -42,6 +42,7 @@ struct ViewInputs {
     const shader::March* march = nullptr;  // clouds with detail, see variant.march; until begin_part() returns
     MarchVolumes* volumes = nullptr;        // of these
     bool depth = true;
+    std::span<const float> terrain;  // TerrainView::distance_m, see variant.terrain; until begin_part() returns
 };
 
 class BinnedView {

@@ -32,6 +32,7 @@ void main() {
     vec4 clouds = radiance[index];
     if (clouds.a < kOpaque) return;
     vec3 ray = pixel_ray(pixel);
+    terrain_end = terrain_at(pixel);
     MarchState state = load_march(index);
     float sum_distance = step.distances != 0u ? depth[index] : 0.0;
     march_to(march_end(ray), ray, state, clouds, sum_distance);

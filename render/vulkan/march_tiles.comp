@@ -41,6 +41,7 @@ void main() {
     load_sums(first);
     vec2 pixel = vec2(first) + 0.5;
     vec3 ray = pixel_ray(pixel);
+    terrain_end = ends[0];
     uint at = first.y * step.width + first.x;
     MarchState state = begin_march(ray);
     if (step.first_batch == 0u) state = load_march(at);

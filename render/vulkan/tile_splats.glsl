@@ -22,9 +22,11 @@ layout(constant_id = 4) const bool kDistances = true;
 
 float red[kRows], green[kRows], blue[kRows], mean_distance[kRows], transmittance[kRows];
 float per_square[kRows];  // 1 / |direction|^2 of each pixel
+float ends[kRows];        // terrain_at() each pixel
 
 void add(uint row, float opacity, vec3 colour, float distance) {
     float part = transmittance[row] * opacity;
+    if (kTerrain && distance > ends[row]) part = 0.0;
     red[row] += part * colour.r;
     green[row] += part * colour.g;
     blue[row] += part * colour.b;
@@ -87,6 +89,7 @@ void add_exact(uint index, vec2 pixel) {
     }
     [[unroll]] for (uint row = 0u; row < kRows; ++row) {
         vec3 ray = pixel_ray(pixel + vec2(0.0, float(row)));
+        if (kTerrain) terrain_end = ends[row];
         float opacity = integrated_opacity(centre, radius, ray, ball.depth_scale * thinning * thinning);
         add(row, opacity, radiance_along(light, ray), distance);
     }
@@ -133,6 +136,7 @@ void load_sums(uvec2 first) {
         mean_distance[row] = sum_distance;
         vec3 direction = pixel_direction(pixel + vec2(0.0, float(row)));
         per_square[row] = 1.0 / dot(direction, direction);
+        if (kTerrain) ends[row] = terrain_at(pixel + vec2(0.0, float(row)));
     }
 }
 

@@ -21,5 +21,6 @@ void main() {
     if (index >= step.width * step.height) return;
     vec2 pixel = vec2(index % step.width, index / step.width) + 0.5;
     vec4 clouds = radiance[index];
+    terrain_end = terrain_at(pixel);
     if (clouds.a > 0.0) radiance[index].rgb = clouds.rgb + clouds.a * background(pixel_ray(pixel));
 }

@@ -28,6 +28,7 @@ void main() {
     if (sum.a < kOpaque) return;
     uvec2 pixel = uvec2(index % step.width, index / step.width);
     vec3 ray = pixel_ray(vec2(pixel) + 0.5);
+    terrain_end = terrain_at(vec2(pixel));
     SunlitAir sunlit = sunlit_air(ray);
     pixel += uvec2(frame.picture.zw);
     float sum_distance = kFog && step.distances != 0u ? depth[index] : 0.0;

@@ -139,6 +139,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                                       .shells = shells.any(),
                                       .fog = shells.has_fog(),
                                       .billboards = !seen.empty(),
+                                      .terrain = !frame.terrain.empty(),
                                       .march = march.count > 0},
                           .order = order_frame(frame.camera, frame.options.camera, frame.options.ground,
                                                !frame.lightning.empty(), footprint_scale(cloud.volumes)),
@@ -152,7 +153,8 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                           .pictures = frame.splats.pictures.get(),
                           .march = march.count > 0 ? &march : nullptr,
                           .volumes = march.count > 0 ? &*volumes_ : nullptr,
-                          .depth = frame.splats.depth};
+                          .depth = frame.splats.depth,
+                          .terrain = frame.terrain};
     try {
         for (const FramePart& part : frame.parts)
             view().begin_part(what, part.frame, part.area, picture, &part == &frame.parts.front());

@@ -204,6 +204,11 @@ void resolve_files(Scene& scene, const Document& document, const std::filesystem
         if (entry != nullptr && file && document.origin(entry->value.place.origin).is_file)
             file = (folder / *file).lexically_normal();
     }
+    const Entry* ground = document.root.find("ground");
+    const Entry* heights = ground != nullptr ? ground->value.find("height_map") : nullptr;
+    if (std::optional<std::filesystem::path>& file = scene.render.terrain.height_map;
+        heights != nullptr && file && document.origin(heights->value.place.origin).is_file)
+        file = (folder / *file).lexically_normal();
     // Textures of a base model from another file are relative to that file.
     const Entry* models = document.root.find("model");
     for (std::size_t n = 0; models != nullptr && n < scene.models.size(); ++n) {

@@ -165,6 +165,13 @@ const Section& scene_section() {
         water.written = [](const void* owner) {
             return !(static_cast<const Scene*>(owner)->render.water == WaterOptions{});
         };
+        Key terrain = group("terrain", terrain_section());
+        terrain.written = [](const void* owner) {
+            TerrainOptions options = static_cast<const Scene*>(owner)->render.terrain;
+            options.height_map.reset();  // these two are keys of [ground]
+            options.relief = Relief::none;
+            return !(options == TerrainOptions{});
+        };
         Key wet_ground = group("wet_ground", wet_ground_section());
         wet_ground.written = [](const void* owner) {
             const auto& scene = *static_cast<const Scene*>(owner);
@@ -222,6 +229,7 @@ const Section& scene_section() {
              group("air", air_section()),
              group("atmosphere", atmosphere_section()),
              group("ground", ground_section()),
+             std::move(terrain),
              std::move(water),
              std::move(wet_ground),
              std::move(precipitation),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sections of water, and of wet and snowy ground: how much lies there over time, and how it looks.
+// The sections of water, terrain, and of wet and snowy ground: how much lies there over time, and how it looks.
 
 #include "scenes/format/schema_build.h"
 #include "scenes/format/schema_sections.h"
@@ -21,6 +21,12 @@ template <auto... Members>
 Key look_key(std::string name, std::string unit, Limits limits, std::string effect, std::string source = {}) {
     return key<&Scene::render, &RenderOptions::wet_ground, Members...>(
         std::move(name), std::move(unit), limits, std::move(effect), std::move(source));
+}
+
+template <auto... Members>
+Key terrain_key(std::string name, std::string unit, Limits limits, std::string effect, std::string source = {}) {
+    return key<&Scene::render, &RenderOptions::terrain, Members...>(std::move(name), std::move(unit), limits,
+                                                                    std::move(effect), std::move(source));
 }
 
 using Cover = GroundCoverOptions;
@@ -101,6 +107,43 @@ const Section& water_section() {
          key<&Scene::render, &RenderOptions::water, &WaterOptions::whitecaps>(
              "whitecaps", "", between(0, 10), "Foam, as a multiple of what belongs to the wind; 0: none.",
              "Monahan and O'Muircheartaigh 1980; Koepke 1984")},
+        nullptr};
+    return section;
+}
+
+const Section& terrain_section() {
+    using T = TerrainOptions;
+    static const Section section{
+        "Terrain",
+        "Ground that is not level (`ground.height_map`, `ground.relief`): where it lies, how high it is, and what covers it. It "
+        "stands on the plane of `ground`, which is seen where it is higher. See docs/ground.md.",
+        {terrain_key<&T::x_m>("x_m", "m", between(-1e7, 1e7), "World position of its middle."),
+         terrain_key<&T::y_m>("y_m", "m", between(-1e7, 1e7), "Likewise."),
+         terrain_key<&T::width_m>("width_m", "m", between(10, 1e6), "Its size from west to east."),
+         terrain_key<&T::length_m>("length_m", "m", between(10, 1e6), "Its size from south to north."),
+         terrain_key<&T::height_scale_m>(
+             "height_scale_m", "m", between(0, 20000),
+             "Height of the number 65535 of a PNG or raw file above that of 0; of relief: of its highest summit above its "
+             "deepest valley. Without effect on EXR, whose numbers are metres."),
+         terrain_key<&T::offset_m>("offset_m", "m", between(-1e5, 1e5),
+                                   "World height of the number 0; added to the metres of EXR."),
+         terrain_key<&T::edge>("edge", "", between(0, 0.5),
+                               "Outer share of its sides over which it goes down to `ground.height_m`; 0: it ends as it is."),
+         terrain_key<&T::raw_columns>("raw_columns", "", between(0, 4096),
+                                      "Numbers in a row of a raw file, which does not say it."),
+         terrain_key<&T::raw_rows>("raw_rows", "", between(0, 4096), "Rows of a raw file."),
+         terrain_key<&T::cells>("cells", "", between(16, 4096), "Heights of relief along its longer side; more is finer."),
+         terrain_key<&T::feature_m>("feature_m", "m", between(100, 1e5), "Distance between large summits of relief.",
+                                    "Ebert et al. 2003, chapter 16"),
+         seed_key<&Scene::render, &RenderOptions::terrain, &T::seed>("seed", "Of relief: another number, another country."),
+         terrain_key<&T::rock_slope_deg>("rock_slope_deg", "deg", between(0, 90),
+                                         "Slope from about which on rock is bare; 90: nowhere."),
+         terrain_key<&T::rock_albedo>("rock_albedo", "", between(0, 1),
+                                      "Fraction of the light that rock reflects: red, green, blue."),
+         terrain_key<&T::snow_line_m>(
+             "snow_line_m", "m", or_infinite(between(-1e5, 1e5)),
+             "World height from about which on snow lies all year: lower in hollows and towards the north, higher on crests, "
+             "never on walls; inf: none.")},
         nullptr};
     return section;
 }

@@ -201,6 +201,11 @@ const Section& camera_section() {
              "Light that lens and eye scatter around what is bright, relative to the human eye; a clean lens "
              "has about 0.1. Above 0 the sun's disc has its own brightness, else a bounded one.",
              "Spencer et al. 1995"),
+         written_if(render_key<&RenderOptions::camera, &Camera::above_ground>(
+                        "above_ground", "", kAny,
+                        "Whether the heights of `position_m`, `target_m` and those of the path are counted from the ground "
+                        "below them (`ground.height_m`, `ground.height_map`); false: from world height 0."),
+                    [](const void* scene) { return static_cast<const Scene*>(scene)->render.camera.above_ground; }),
          tables<&Scene::render, &RenderOptions::camera, &Camera::path>("path", camera_path_section(), 0,
                                                                        10'000)},
         &finish_camera};
@@ -291,6 +296,16 @@ const Section& air_section() {
     return section;
 }
 
+namespace {
+
+void finish_ground(const SectionReader& reader, void* owner) {
+    const TerrainOptions& terrain = static_cast<const Scene*>(owner)->render.terrain;
+    if (terrain.height_map && terrain.relief != Relief::none)
+        reader.report("relief", reader.quoted("relief") + " is given beside `height_map`", "expected one of the two");
+}
+
+}  // namespace
+
 const Section& ground_section() {
     static const Section section{
         "Ground",
@@ -306,8 +321,21 @@ const Section& ground_section() {
              "`water`: a sea with waves (`water`), `albedo` being that below its surface, such as 0.02, 0.05, 0.06. "
              "See docs/ground.md."),
          render_key<&RenderOptions::ground, &Ground::field_m>("field_m", "m", between(20, 5000),
-                                                              "Size of a field of the country.")},
-        nullptr};
+                                                              "Size of a field of the country."),
+         default_is(key<&Scene::render, &RenderOptions::terrain, &TerrainOptions::height_map>(
+                        "height_map", "", kAny,
+                        "File of heights that stand on the plane, north up: PNG of 16 bits of grey, raw 16-bit numbers "
+                        "(`.raw`, `.r16`, little-endian) or EXR in metres. Relative to the scene's folder. See `terrain`.",
+                        "S, atmosphere"),
+                    "level ground"),
+         written_if(word<&Scene::render, &RenderOptions::terrain, &TerrainOptions::relief>(
+                        "relief", {"none", "hills", "ridges"},
+                        "Heights that are generated instead: rounded hills, or mountains with crests and valleys that rivers "
+                        "have cut. See `terrain`."),
+                    [](const void* scene) {
+                        return static_cast<const Scene*>(scene)->render.terrain.relief != Relief::none;
+                    })},
+        &finish_ground};
     return section;
 }
 

@@ -29,6 +29,7 @@ const Section& shells_section();
 const Section& light_shafts_section();
 const Section& fog_section();
 const Section& water_section();
+const Section& terrain_section();
 const Section& wet_ground_section();
 const Section& precipitation_section();
 const Section& detail_section();

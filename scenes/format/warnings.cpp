@@ -123,6 +123,11 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
     const bool sea = scene.render.ground.pattern == GroundPattern::water;
     if (!sea && !(scene.render.water == WaterOptions{}))
         result.emplace_back("[water] has no effect: `ground.pattern` is not \"water\"");
+    TerrainOptions terrain = scene.render.terrain;
+    terrain.height_map.reset();
+    terrain.relief = Relief::none;
+    if (!scene.render.terrain.any() && !(terrain == TerrainOptions{}))
+        result.emplace_back("[terrain] has no effect: [ground] has neither `height_map` nor `relief`");
     if (sea && scene.ground_cover.enabled)
         result.emplace_back(
             "[wet_ground] has no effect but for its reflection: rain and snow vanish in a ground of water");

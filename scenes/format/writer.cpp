@@ -227,6 +227,7 @@ std::string scene_hash(const Scene& scene) {
         if (file) file = file->filename();
     };
     shorten(named.initial_state_file);
+    shorten(named.render.terrain.height_map);
     for (LayerOptions& layer : named.layers) shorten(layer.initial_state_file);
     for (ProbabilityGrid& grid : named.automaton.field.grids) shorten(grid.file);
     for (WindField& field : named.automaton.wind.fields)

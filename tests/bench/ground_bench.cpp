@@ -3,11 +3,16 @@
 
 #include <cmath>
 #include <cstring>
+#include <memory>
+
+#include <tbb/parallel_for.h>
 
 #include "render/frame/frame_data.h"
 #include "render/ground/ripples.h"
 #include "render/ground/wet_ground.h"
 #include "render/options/camera.h"
+#include "render/terrain/terrain.h"
+#include "render/terrain/terrain_view.h"
 #include "seeds/ground_cover.h"
 
 namespace nephos::bench {
@@ -98,8 +103,37 @@ BenchRow overlay_row() {
         ours, other, "", "without drawing the mirrored view"};
 }
 
+// Rays of a picture that meet mountains, against steps of half a cell along each of them.
+BenchRow terrain_row() {
+    RenderOptions options;
+    options.terrain.relief = Relief::ridges;
+    options.terrain.cells = 1024;
+    options.ground.height_m = -1;
+    const std::shared_ptr<const HeightMap> map = make_terrain(options.terrain, options.ground);
+    options.camera.above_ground = true;
+    options.camera.position_m = {0, -15'000, 300};
+    options.camera.target_m = {0, 0, 0};
+    options.camera = standing_camera(options.camera, map.get(), options.ground);
+    const CameraFrame frame = camera_frame(options.camera);
+    double sum = 0;
+    const auto by_steps = [&] {
+        tbb::parallel_for(0, options.camera.height, [&](int y) {
+            for (int x = 0; x < options.camera.width; ++x) {
+                const Vec3 way = pixel_ray(frame, options.camera, x + 0.5, y + 0.5), &eye = options.camera.position_m;
+                double t = 0;
+                while (t < 60'000 && eye.z + t * way.z > height_at(*map, eye.x + t * way.x, eye.y + t * way.y))
+                    t += 0.5 * map->step_x_m;
+            }
+        });
+    };
+    const auto [ours, other] =
+        interleave(3, [&] { sum += double(terrain_view(*map, options, 0).distance_m.front()); }, by_steps);
+    return {"rays of a picture of 640x480 that meet a height map of 1024x1024, against steps of half a cell", ours, other, "",
+            std::isfinite(sum) ? "exact, where steps miss crests" : "not finite"};
+}
+
 }  // namespace
 
-std::vector<BenchRow> ground_rows() { return {cover_row(), ripples_row(), overlay_row()}; }
+std::vector<BenchRow> ground_rows() { return {cover_row(), ripples_row(), overlay_row(), terrain_row()}; }
 
 }  // namespace nephos::bench

@@ -38,6 +38,7 @@ PICTURES = {
     "sunset.jpg": (1, (960, 540), [("sunset", 20, {})]),
     "shafts.jpg": (1, (640, 480), [("shafts", 20, {})]),
     "sea.jpg": (1, (960, 540), [("sea", 1, {})]),
+    "mountains.jpg": (1, (960, 540), [("mountains", 1, {})]),
     "fog.jpg": (1, (640, 480), [("fog", 8, {})]),
     "cirrus.png": (1, (640, 480), [("cirrus", 1, {})]),
     "rain-shafts.jpg": (1, (640, 480), [("rain", 1, {})]),

@@ -71,7 +71,9 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"light", "octaves"}), member_count<ScatteringOctaves>());
     EXPECT_EQ(keys_at({"air"}), member_count<Air>());
     EXPECT_EQ(keys_at({"atmosphere"}), member_count<AtmosphereOptions>());
-    EXPECT_EQ(keys_at({"ground"}), member_count<Ground>());
+    // [ground] also says where the heights of [terrain] come from.
+    EXPECT_EQ(keys_at({"ground"}), member_count<Ground>() + 2);
+    EXPECT_EQ(keys_at({"terrain"}), member_count<TerrainOptions>() - 2);
     EXPECT_EQ(keys_at({"water"}), member_count<WaterOptions>());
     EXPECT_EQ(keys_at({"wet_ground"}), member_count<GroundCoverOptions>() + member_count<WetGroundOptions>());
     EXPECT_EQ(keys_at({"shells"}), member_count<Shells>());
@@ -84,7 +86,7 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"precipitation"}), member_count<PrecipitationOptions>());
     EXPECT_EQ(keys_at({"level_of_detail"}), member_count<LevelOfDetailOptions>());
     EXPECT_EQ(keys_at({"camera", "path"}), member_count<CameraKey>());
-    EXPECT_EQ(member_count<RenderOptions>(), 16u);
+    EXPECT_EQ(member_count<RenderOptions>(), 17u);
     EXPECT_EQ(keys_at({"field"}), member_count<FieldOptions>());
     EXPECT_EQ(keys_at({"field", "background"}), member_count<Probabilities>());
     EXPECT_EQ(keys_at({"field", "ellipsoids"}), member_count<Ellipsoid>());

@@ -106,7 +106,7 @@ class Window(Case):
     def test_every_panel(self):
         """Opens every section of the outline, every tab, menu and mode once."""
         sections = ["lattice", "time", "field", "wind", "model", "sky", "climate", "layer", "density", "detail", "frames",
-                    "camera", "sun", "light", "lightning", "air", "atmosphere", "ground", "water", "wet_ground", "precipitation",
+                    "camera", "sun", "light", "lightning", "air", "atmosphere", "ground", "terrain", "water", "wet_ground", "precipitation",
                     "shells", "light_shafts", "fog", "level_of_detail", "debug_view", "scene"]
         lines = ["wait-step 1", "key SPACE"]
         lines += [f"click {name}" for name in sections]

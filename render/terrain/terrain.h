@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The ground of a scene's options: read from its file, or generated.
+
+#include <memory>
+
+#include "render/terrain/height_map.h"
+
+namespace nephos {
+
+// Returns null when the options have neither a height map nor relief. Throws as read_height_file(), and Error(usage) as
+// height_map().
+std::shared_ptr<const HeightMap> make_terrain(const TerrainOptions& options, const Ground& ground);
+
+}  // namespace nephos

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Pictures of ground that is not level: what it hides, its shadow, and the three ways of drawing against each other.
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "render/renderer.h"
+#include "render/terrain/height_map.h"
+
+namespace nephos {
+namespace {
+
+Renderer& renderer(Splatting splatting) {
+    const auto make = [](Splatting way) {
+        DeviceOptions options;
+        options.splatting = way;
+        return Renderer(options);
+    };
+    static Renderer processor = make(Splatting::cpu), tiles = make(Splatting::vulkan),
+                    billboards = make(Splatting::blended);
+    return splatting == Splatting::cpu ? processor : splatting == Splatting::vulkan ? tiles : billboards;
+}
+
+// A wall from west to east, 400 m high, whose middle is 3 km in front of the eye, and the plane around it.
+std::shared_ptr<const HeightMap> wall() {
+    HeightImage image{41, 41, std::vector<float>(41 * 41, -10.0f)};
+    for (int j = 18; j <= 22; ++j)
+        for (int i = 5; i <= 35; ++i) image.heights[std::size_t(41 * j + i)] = 400;
+    TerrainOptions options;
+    options.y_m = 3000;
+    options.width_m = options.length_m = 4000;
+    options.edge = 0;
+    return std::make_shared<const HeightMap>(height_map(image, options, 0));
+}
+
+RenderOptions view() {
+    RenderOptions options;
+    options.camera = {{0, 0, 150}, {0, 3000, 300}, 45, 96, 72, 0};
+    options.shadow_map_size = 128;
+    options.sun.elevation_deg = 35;
+    options.sun.azimuth_deg = 180;  // behind the eye
+    return options;
+}
+
+// A ball of cloud at a distance and height.
+std::vector<Metaball> balls_at(double y_m, double z_m) {
+    std::vector<Metaball> balls;
+    for (int n = -3; n <= 3; ++n) balls.push_back({float(150 * n), float(y_m), float(z_m), 250.0f, 1.0f});
+    return balls;
+}
+
+Picture draw(const RenderOptions& options, const std::vector<Metaball>& balls, Splatting way = Splatting::cpu,
+             bool with_wall = true) {
+    Splats splats;
+    splats.metaballs = {balls, 0.02, 0.7};
+    if (with_wall) splats.terrain = wall();
+    return renderer(way).draw_splats(splats, options);
+}
+
+double difference(const Picture& a, const Picture& b) {
+    double most = 0;
+    for (std::size_t n = 0; n < a.beauty.size(); ++n)
+        most = std::max(most, std::abs(double(a.beauty[n]) - double(b.beauty[n])));
+    return most;
+}
+
+TEST(TerrainPicture, HidesCloudsBehindIt) {
+    const Picture without = draw(view(), {}), behind = draw(view(), balls_at(5000, 200)), before = draw(view(), balls_at(1500, 200));
+    int on_wall = 0, hidden = 0, covered = 0;
+    for (std::size_t n = 0; n < without.pixels(); ++n) {
+        if (!(without.terrain_m[n] < 1e30f)) continue;
+        ++on_wall;
+        hidden += behind.transmittance[n] == 1 ? 1 : 0;
+        covered += before.transmittance[n] < 0.5f ? 1 : 0;
+        EXPECT_GT(without.terrain_m[n], 2500);
+        EXPECT_LT(without.terrain_m[n], 4500);
+    }
+    EXPECT_GT(on_wall, 500);
+    EXPECT_EQ(hidden, on_wall);
+    EXPECT_GT(covered, 100);
+}
+
+TEST(TerrainPicture, LevelGroundIsAsWithoutIt) {
+    const Picture with = draw(view(), {}), plain = draw(view(), {}, Splatting::cpu, false);
+    EXPECT_TRUE(plain.terrain_m.empty());
+    for (std::size_t n = 0; n < plain.pixels(); ++n) {
+        // Pixels beside the terrain have smooth edges.
+        bool beside = false;
+        const int x = int(n) % with.width, y = int(n) / with.width;
+        for (int j = std::max(y - 1, 0); j <= std::min(y + 1, with.height - 1); ++j)
+            for (int i = std::max(x - 1, 0); i <= std::min(x + 1, with.width - 1); ++i)
+                beside = beside || with.terrain_m[std::size_t(j * with.width + i)] < 1e30f;
+        if (beside) continue;
+        for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(with.beauty[3 * n + c], plain.beauty[3 * n + c]) << n;
+    }
+}
+
+TEST(TerrainPicture, BackendsAgree) {
+    for (const bool physical : {false, true}) {
+        RenderOptions options = view();
+        if (physical) options.atmosphere.model = AirModel::physical;
+        options.light_shafts.strength = physical ? 1 : 0;
+        options.fog.extinction_per_m = physical ? 2e-4 : 0;
+        for (const double y : {1500.0, 5000.0}) {
+            const std::vector<Metaball> balls = balls_at(y, 350);
+            const Picture processor = draw(options, balls), tiles = draw(options, balls, Splatting::vulkan),
+                          billboards = draw(options, balls, Splatting::blended);
+            EXPECT_LE(difference(processor, tiles), 1.0 / 255) << y << physical;
+            EXPECT_LE(difference(processor, billboards), 1.0 / 255) << y << physical;
+        }
+    }
+}
+
+TEST(TerrainPicture, SunAndCloudsShadeIt) {
+    RenderOptions options = view();
+    options.air.extinction_per_m = {0, 0, 0};
+    const auto brightness = [&](const RenderOptions& of, const std::vector<Metaball>& balls) {
+        const Picture picture = draw(of, balls);
+        double sum = 0;
+        int count = 0;
+        for (std::size_t n = 0; n < picture.pixels(); ++n) {
+            if (!(picture.terrain_m[n] < 1e30f) || picture.transmittance[n] < 1) continue;
+            sum += double(picture.beauty[3 * n + 1]);
+            ++count;
+        }
+        return count > 0 ? sum / count : 0.0;
+    };
+    const double lit = brightness(options, {});
+    RenderOptions against = options;
+    against.sun.azimuth_deg = 0;  // behind the wall
+    const double dark = brightness(against, {});
+    EXPECT_GT(lit, 2 * dark);
+    EXPECT_GT(dark, 0);
+    // A cloud between wall and sun, above the view.
+    const double shaded = brightness(options, balls_at(1900, 900));
+    EXPECT_LT(shaded, 0.9 * lit);
+}
+
+TEST(TerrainPicture, StandsInTheSeaUpsideDown) {
+    RenderOptions options = view();
+    options.ground.pattern = GroundPattern::water;
+    options.water.wind_m_per_s = 0;
+    options.camera.position_m = {0, 0, 30};
+    options.camera.target_m = {0, 3000, 30};
+    options.air.extinction_per_m = {0, 0, 0};
+    const Picture with = draw(options, {}), without = draw(options, {}, Splatting::cpu, false);
+    // As far below the horizon as the wall is above it.
+    const auto green = [](const Picture& picture, int row) { return double(picture.beauty[3 * std::size_t(96 * row + 48) + 1]); };
+    EXPECT_LT(green(with, 32), 0.8 * green(without, 32));
+    EXPECT_LT(green(with, 40), 0.9 * green(without, 40));
+    EXPECT_NEAR(green(with, 70), green(without, 70), 0.02);
+}
+
+TEST(TerrainPicture, RefusesACameraInIt) {
+    RenderOptions options = view();
+    options.camera.position_m = {0, 3000, 300};
+    EXPECT_THROW(draw(options, {}), Error);
+}
+
+}  // namespace
+}  // namespace nephos
