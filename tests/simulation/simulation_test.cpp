@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "density/sharpen.h"
 #include "density/smoothing.h"
 
 namespace nephos {
@@ -136,13 +137,22 @@ TEST(Simulation, FramesAreTheSmoothedAndMixedStates) {
             return smooth(planes, scene.density.smoothing, scene.automaton.placement,
                           scene.automaton.boundaries);
         };
+        // As sharp as both, level by level (density/sharpen.h).
+        const auto sharp_mix = [&](const DensityGrid& before, const DensityGrid& after, double fraction) {
+            const Boundaries& boundaries = scene.automaton.boundaries;
+            std::vector<Vec2> gradients = gradients_of(before, boundaries);
+            const std::vector<Vec2> later = gradients_of(after, boundaries);
+            for (std::size_t k = 0; k < gradients.size(); ++k)
+                gradients[k] += fraction * (later[k] - gradients[k]);
+            return sharpened(mix(before, after, fraction), gradients, boundaries);
+        };
         ASSERT_EQ(int(got.frames.size()), frame_count(scene));
         ASSERT_EQ(got.frames.size(), 18u);  // 0, 7, ... 119 s of 120 s
         bool any = false;
         for (int n = 0; n < 18; ++n) {
             const int step = 7 * n / 10;
             const int rest = 7 * n % 10;
-            const DensityGrid expected = rest == 0 ? q(step) : mix(q(step), q(step + 1), rest / 10.0);
+            const DensityGrid expected = rest == 0 ? q(step) : sharp_mix(q(step), q(step + 1), rest / 10.0);
             const std::vector<float> want = expected.to_dense();
             for (std::size_t c = 0; c < want.size(); ++c) {
                 ASSERT_NEAR(got.frames[std::size_t(n)][c], want[c], 1e-6)
