@@ -117,7 +117,8 @@ TEST_P(ShippedScenes, AreTheSameInEveryBackend) {
         EXPECT_LE(comparison.apart[way], 0.02f) << "way " << way;
     }
     // Rays go on in longer steps the more is hidden: behind fog, of which back-ends differ by 0.002, in other ones.
-    const std::size_t few = comparison.pixels / (scene.render.fog.extinction_per_m > 0 ? 100 : 2000);
+    // Of the numbers, three a pixel.
+    const std::size_t few = 3 * comparison.pixels / (scene.render.fog.extinction_per_m > 0 ? 300 : 2000);
     EXPECT_LE(comparison.apart_in_detail, few) << "with detail";
     std::printf("frame %d, %zu metaballs, least transmittance %.3f; apart by %.5f, %.5f; with detail %zu numbers\n",
                 middle, comparison.given, double(comparison.clearest), double(comparison.apart[1]),
