@@ -141,7 +141,7 @@ class SlurmNode(Emitted):
 
     def test_requeue_goes_on(self):
         """A task that is preempted ends cleanly, and started again it computes only what is missing."""
-        self.sweep("emitted", "--emit", "slurm", "--tasks", "1", steps="2000..2000", replicates=8)
+        self.sweep("emitted", "--emit", "slurm", "--tasks", "1", steps="8000..8000", replicates=8)
         job = self.submit()
         self.running(job, 1)
         result = self.slurm.call("scontrol", "requeue", job)
@@ -165,11 +165,11 @@ class SlurmNode(Emitted):
         self.assertTrue(records.startswith(kept))
         self.assertEqual(records.count(b"\n"), 24)
         self.command(NEPHOS, "merge", ".")
-        self.sweep("here", steps="2000..2000", replicates=8)
+        self.sweep("here", steps="8000..8000", replicates=8)
         self.assertEqual(self.tables("emitted"), self.tables("here"))
 
     def test_scancel_keeps_what_is_done(self):
-        self.sweep("emitted", "--emit", "slurm", "--tasks", "2", steps="2000..2000", replicates=8)
+        self.sweep("emitted", "--emit", "slurm", "--tasks", "2", steps="8000..8000", replicates=8)
         job = self.submit()
         self.running(job, 2)
         self.slurm.call("scancel", job)
@@ -183,7 +183,7 @@ class SlurmNode(Emitted):
         for path, text in kept.items():
             self.assertTrue(path.read_bytes().startswith(text))
         self.command(NEPHOS, "merge", ".")
-        self.sweep("here", steps="2000..2000", replicates=8)
+        self.sweep("here", steps="8000..8000", replicates=8)
         self.assertEqual(self.tables("emitted"), self.tables("here"))
 
 
