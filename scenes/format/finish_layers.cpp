@@ -371,6 +371,7 @@ void check_simulation(const SectionReader& reader, const Scene& scene, std::size
         try {
             check(veil_options(scene, layer), options.extent, options.placement);
         } catch (const Error& error) {
+            if (error.code() != ErrorCode::usage) throw;  // no fault of the scene
             reader.report("veil", error.what());
         }
         return;
@@ -380,6 +381,7 @@ void check_simulation(const SectionReader& reader, const Scene& scene, std::size
         const SkySimulation sky(sky_options(scene, layer));
         if (options.automaton) check_reach_of_clouds(reader, options, sky);
     } catch (const Error& error) {
+        if (error.code() != ErrorCode::usage) throw;
         reader.report("name", error.what());
     }
 }
