@@ -114,7 +114,7 @@ class Window(Case):
         lines += [f"click mode {mode}" for mode in ("density", "transmittance", "light only", "beauty")]
         lines += ["click Seed boxes", "click Centre axes", "click Roots", "click Light rays", "wait-picture"]
         lines += ["screenshot view.png", "key F1", "wait 0.2", "key F1", "key CTRL+R", "wait 0.2",
-                  "expect-control Start the run", "click menu File", "wait 0.2", "click scene", "wait 0.2", "click menu View",
+                  "expect-control Start the run", "click menu File", "wait 0.2", "click mode beauty", "wait 0.2", "click menu View",
                   "wait 0.2", "click menu Light", "wait 0.3", "screenshot light.png"]
         self.edit(self.scene("torchelsen/cloud-1.toml"), "--validation", script="\n".join(lines))
         dark = ImageStat.Stat(self.image("view.png", (5, 40, 200, 780))).mean[0]
