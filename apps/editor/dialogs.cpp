@@ -39,7 +39,7 @@ std::string extension_of(const Editor& editor, FileDialog dialog) {
     return dialog == FileDialog::screenshot ? ".png" : ".toml";
 }
 
-// Whether it asks for a file that is there.
+// Returns whether the dialog asks for a file that is there.
 bool is_reading(FileDialog dialog) { return dialog == FileDialog::open || dialog == FileDialog::choose; }
 
 // Does with the chosen file what the dialog was opened for.

@@ -129,9 +129,9 @@ class LiveScene {
     // Shows a step: simulates to it, or goes back to it.
     void seek(std::uint64_t step);
     void set_view(const LiveView& view);
-    // Whether pictures are drawn; the simulation runs all the same.
+    // Starts or stops drawing pictures; the simulation runs all the same.
     void show(bool shown);
-    // Memory for checkpoints; the newest is always kept.
+    // Limits the memory of checkpoints; the newest is always kept.
     void keep_at_most(std::size_t checkpoint_bytes);
 
     // Return the newest; null while there is none, or nothing newer than `than`.

@@ -12,7 +12,7 @@
 namespace nephos {
 namespace {
 
-// Of all threads.
+// Returns the processor time of all threads.
 double processor_seconds() {
     timespec time{};
     ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);

@@ -14,7 +14,7 @@ struct Editor;
 struct Report {
     using Clock = std::chrono::steady_clock;
 
-    // From a change of the scene, or a step that was gone to, to its picture.
+    // Measures the time from a change of the scene, or a step that was gone to, to its picture.
     struct Wait {
         std::uint64_t wanted = 0;
         Clock::time_point since;

@@ -89,7 +89,7 @@ class SceneDocument {
     struct Version {
         std::string text, what;
     };
-    // What tells one version of a file from another.
+    // Tells one version of a file from another.
     struct FileStamp {
         std::filesystem::file_time_type time;
         std::uintmax_t size = 0, inode = 0;

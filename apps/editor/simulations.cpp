@@ -13,7 +13,7 @@
 namespace nephos {
 namespace {
 
-// Of all simulations together.
+// Limits the checkpoints of all simulations together.
 constexpr std::size_t kCheckpointBytes = std::size_t(512) << 20;
 
 OpenScene& scene_at(Editor& editor, std::size_t index) {

@@ -97,7 +97,7 @@ struct Generation {
     Made one, grid;
 };
 
-// What a file dialog shows of the file that is named.
+// Holds what a file dialog shows of the file that is named.
 struct FilePreview {
     std::filesystem::path path;
     std::filesystem::file_time_type time;
@@ -139,7 +139,7 @@ struct OpenScene {
     std::vector<std::uint64_t> checkpoints;  // steps that the user wants to come back to, rising
     bool record = false;  // edits of wind, climate and lights become key frames at the present step
 
-    // Of the panels.
+    // State of the panels.
     TextPath selected;                     // in the outline: a section or an element
     TextPath revealed;                     // what the outline has opened for
     std::map<std::string, Node> defaults;  // values of keys that the text does not have
@@ -172,7 +172,7 @@ struct Editor : OpenScene {
     float final_state = 1, climate_minutes = 30;  // of a change of climate
     std::uint64_t pictures = 0;                   // that were shown
 
-    // Of the panels.
+    // State of the panels.
     std::string filter;                   // of the properties
     int tab = 0, wanted_tab = -1;         // properties, text
     SliceOf slice_of = SliceOf::nothing;  // what a slice over the picture shows

@@ -70,12 +70,7 @@ void complete_light_on_host(LitCloud& cloud, std::span<const std::uint8_t> balls
     if (has_plain_metaballs(cloud.cloud)) {
         const LightSortedSplats order =
             sort_for_light(plain_metaballs(cloud.cloud), cloud.frame, cloud.shadow_size);
-        std::vector<std::uint8_t> centres(order.source.size());
-        for (std::size_t i = 0; i < centres.size(); ++i) centres[i] = balls[order.source[i]];
-        std::vector<float> depths;
-        light_by_processor(order, cloud.shadow_size, {centres, tiles}, depths, cloud.shadow, {}, &times);
-        for (std::size_t i = 0; i < centres.size(); ++i)
-            if (centres[i] != 0) cloud.sun_depths[order.source[i]] = depths[i];
+        light_some_by_processor(order, cloud.shadow_size, balls, tiles, cloud.sun_depths, cloud.shadow, &times);
     }
     tbb::parallel_for(std::size_t{0}, cloud.sun_depths.size(), [&](std::size_t i) {
         if (balls[i] == 0) return;

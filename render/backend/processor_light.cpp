@@ -369,5 +369,16 @@ void light_by_processor(const LightSortedSplats& order, int shadow_size, const L
         depths[source[i]] = std::min(sums.centres.depth[i], kDarkCentre);
 }
 
+void light_some_by_processor(const LightSortedSplats& order, int shadow_size, std::span<const std::uint8_t> balls,
+                             std::span<const std::uint8_t> tiles, std::vector<float>& sun_depths,
+                             std::vector<float>& shadow, StageTimes* times) {
+    std::vector<std::uint8_t> centres(order.source.size());
+    for (std::size_t i = 0; i < centres.size(); ++i) centres[i] = balls[order.source[i]];
+    std::vector<float> depths;
+    light_by_processor(order, shadow_size, {centres, tiles}, depths, shadow, {}, times);
+    for (std::size_t i = 0; i < centres.size(); ++i)
+        if (centres[i] != 0) sun_depths[order.source[i]] = depths[i];
+}
+
 }  // namespace nephos
 #endif

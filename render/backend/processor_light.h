@@ -30,4 +30,10 @@ void light_by_processor(const LightSortedSplats& order, int shadow_size, const L
                         std::vector<float>& depths, std::vector<float>& shadow,
                         const BatchLimits& limits = {}, StageTimes* times = nullptr);
 
+// Fills the same of `sun_depths` and of `shadow` for the metaballs and tiles that are not 0: one byte for each of sun_depths,
+// which has the order that the splats were sorted from, and for each tile.
+void light_some_by_processor(const LightSortedSplats& order, int shadow_size, std::span<const std::uint8_t> balls,
+                             std::span<const std::uint8_t> tiles, std::vector<float>& sun_depths,
+                             std::vector<float>& shadow, StageTimes* times);
+
 }  // namespace nephos

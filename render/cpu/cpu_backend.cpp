@@ -69,12 +69,7 @@ void complete_light(LitCloud& cloud, const std::vector<std::uint32_t>& source, c
     }
     // Balls are read twice; keys move through memory three times, and back and forth.
     times[DrawStage::sun_order].bytes = order.splats.size() * (2 * sizeof(Metaball) + 7 * 8 + 28);
-    std::vector<std::uint8_t> centres(order.source.size());
-    for (std::size_t i = 0; i < centres.size(); ++i) centres[i] = balls[order.source[i]];
-    std::vector<float> depths;
-    light_by_processor(order, cloud.shadow_size, {centres, tiles}, depths, cloud.shadow, {}, &times);
-    for (std::size_t i = 0; i < centres.size(); ++i)
-        if (centres[i] != 0) cloud.sun_depths[order.source[i]] = depths[i];
+    light_some_by_processor(order, cloud.shadow_size, balls, tiles, cloud.sun_depths, cloud.shadow, &times);
     cloud.note_light_pass();
 }
 

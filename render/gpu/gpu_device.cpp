@@ -281,19 +281,26 @@ std::optional<GpuDevice> open_graphics_card(const DeviceOptions& options) {
     });
 }
 
+void submit(const GpuDevice& gpu, const vk::raii::CommandBuffer& commands, const vk::raii::Fence& fence,
+            const std::function<void()>& record) {
+    commands.reset();
+    commands.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
+    record();
+    commands.end();
+    gpu.device.resetFences(*fence);
+    const vk::CommandBufferSubmitInfo command_info(*commands);
+    vk::SubmitInfo2 info;
+    info.setCommandBufferInfos(command_info);
+    gpu.queue.submit2(info, *fence);
+}
+
 void submit_and_wait(const GpuDevice& gpu,
                      const std::function<void(const vk::raii::CommandBuffer&)>& record) {
     vk::raii::CommandBuffers buffers(
         gpu.device, vk::CommandBufferAllocateInfo(*gpu.pool, vk::CommandBufferLevel::ePrimary, 1));
     const vk::raii::CommandBuffer& commands = buffers.front();
-    commands.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
-    record(commands);
-    commands.end();
-    const vk::CommandBufferSubmitInfo command_info(*commands);
-    vk::SubmitInfo2 submit;
-    submit.setCommandBufferInfos(command_info);
     const vk::raii::Fence fence(gpu.device, vk::FenceCreateInfo());
-    gpu.queue.submit2(submit, *fence);
+    submit(gpu, commands, fence, [&] { record(commands); });
     const vk::Result result = gpu.device.waitForFences(*fence, VK_TRUE, UINT64_MAX);
     if (result != vk::Result::eSuccess) fail_gpu("waiting for the device", result);
 }

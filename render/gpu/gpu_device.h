@@ -59,6 +59,9 @@ GpuDevice open_device(const DeviceOptions& options);
 // usable device and neither the options nor NEPHOS_DEVICE ask for one by name.
 std::optional<GpuDevice> open_graphics_card(const DeviceOptions& options);
 
+// Records `commands` anew with `record` and submits them; resets `fence`, which is signalled when they are done.
+void submit(const GpuDevice& gpu, const vk::raii::CommandBuffer& commands, const vk::raii::Fence& fence,
+            const std::function<void()>& record);
 // Records commands with `record`, submits them and waits until they are done.
 void submit_and_wait(const GpuDevice& gpu, const std::function<void(const vk::raii::CommandBuffer&)>& record);
 

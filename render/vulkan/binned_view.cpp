@@ -286,15 +286,7 @@ void BinnedView::submit(Slot& slot) {
     slot.capacity = lists_.entry_capacity();
     slot.batch = std::min(batch_, slot.billboard_count > 0 ? limits.batch_with_billboards : batch_);
     if (slot.what.variant.march) slot.batch = std::min(slot.batch, limits.batch_with_march);
-    slot.commands.reset();
-    slot.commands.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
-    record(slot.commands, slot);
-    slot.commands.end();
-    gpu_.device.resetFences(*slot.fence);
-    const vk::CommandBufferSubmitInfo commands(*slot.commands);
-    vk::SubmitInfo2 info;
-    info.setCommandBufferInfos(commands);
-    gpu_.queue.submit2(info, *slot.fence);
+    nephos::submit(gpu_, slot.commands, slot.fence, [&] { record(slot.commands, slot); });
     slot.submitted = true;
 }
 

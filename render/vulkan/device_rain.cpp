@@ -177,15 +177,7 @@ void DeviceRain::begin_strip(const RainData& data, const GpuImage& shadow_map, c
     gpu_.uploaded_bytes += 5 * sizeof(float) * pixels;
     slot.strip = strip;
     slot.sets.reset();
-    slot.commands.reset();
-    slot.commands.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
-    record(slot.commands, data, shadow_map, slot);
-    slot.commands.end();
-    gpu_.device.resetFences(*slot.fence);
-    const vk::CommandBufferSubmitInfo commands(*slot.commands);
-    vk::SubmitInfo2 info;
-    info.setCommandBufferInfos(commands);
-    gpu_.queue.submit2(info, *slot.fence);
+    submit(gpu_, slot.commands, slot.fence, [&] { record(slot.commands, data, shadow_map, slot); });
     slot.submitted = true;
     slot.picture = &picture;
 }

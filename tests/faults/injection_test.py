@@ -22,7 +22,7 @@ import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "apps/command"))
-from case import NEPHOS, SCENE, voxels  # noqa: E402
+from case import LAYERED, NEPHOS, SCENE, voxels  # noqa: E402
 
 ALL = os.environ.get("NEPHOS_TEST_ALL") == "1"
 SLICE = 2  # calls of each kind, when not all
@@ -47,16 +47,7 @@ REASONS = {"ENOSPC": "No space left", "EIO": "Input/output error", "EINTR": "Int
 
 LISTS = ("manifest.json", "export.json")  # written anew as the command proceeds
 
-LAYERS = SCENE.replace("[field.background]\nhum = 0.15\nact = 0.01\next = 0.05\n", "") + """\
-[[sky]]
-name = "clear"
-state = 0
-clouds = 0
-[[layer]]
-name = "low"
-skies = "clear"
-base_height_m = 0
-background = { hum = 0.15, act = 0.01, ext = 0.05 }
+LAYERS = LAYERED + """\
 [[layer]]
 name = "high"
 skies = "clear"

@@ -11,20 +11,10 @@
 #include "core/error.h"
 #include "render/renderer.h"
 #include "render/terrain/height_map.h"
+#include "tests/render/shared_renderers.h"
 
 namespace nephos {
 namespace {
-
-Renderer& renderer(Splatting splatting) {
-    const auto make = [](Splatting way) {
-        DeviceOptions options;
-        options.splatting = way;
-        return Renderer(options);
-    };
-    static Renderer processor = make(Splatting::cpu), tiles = make(Splatting::vulkan),
-                    billboards = make(Splatting::blended);
-    return splatting == Splatting::cpu ? processor : splatting == Splatting::vulkan ? tiles : billboards;
-}
 
 // A wall from west to east, 400 m high, whose middle is 3 km in front of the eye, and the plane around it.
 std::shared_ptr<const HeightMap> wall() {
@@ -59,7 +49,7 @@ Picture draw(const RenderOptions& options, const std::vector<Metaball>& balls, S
     Splats splats;
     splats.metaballs = {balls, 0.02, 0.7};
     if (with_wall) splats.terrain = wall();
-    return renderer(way).draw_splats(splats, options);
+    return test::renderer(way).draw_splats(splats, options);
 }
 
 double difference(const Picture& a, const Picture& b) {

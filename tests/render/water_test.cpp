@@ -15,20 +15,10 @@
 #include "render/ground/wet_ground.h"
 #include "render/renderer.h"
 #include "tests/reference/with_threads.h"
+#include "tests/render/shared_renderers.h"
 
 namespace nephos {
 namespace {
-
-Renderer& renderer(Splatting splatting) {
-    const auto make = [](Splatting way) {
-        DeviceOptions options;
-        options.splatting = way;
-        return Renderer(options);
-    };
-    static Renderer processor = make(Splatting::cpu), tiles = make(Splatting::vulkan),
-                    billboards = make(Splatting::blended);
-    return splatting == Splatting::cpu ? processor : splatting == Splatting::vulkan ? tiles : billboards;
-}
 
 RenderOptions sea(double wind) {
     RenderOptions options;
@@ -54,7 +44,7 @@ RenderOptions from_space(double wind) {
 Picture draw(const RenderOptions& options, double time_s = 0, Splatting way = Splatting::cpu) {
     Splats splats;
     splats.time_s = time_s;
-    return renderer(way).draw_splats(splats, options);
+    return test::renderer(way).draw_splats(splats, options);
 }
 
 Rgb pixel(const Picture& picture, int x, int y) {

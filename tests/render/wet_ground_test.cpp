@@ -14,20 +14,10 @@
 #include "core/vec.h"
 #include "render/renderer.h"
 #include "tests/reference/with_threads.h"
+#include "tests/render/shared_renderers.h"
 
 namespace nephos {
 namespace {
-
-Renderer& renderer(Splatting splatting = Splatting::cpu) {
-    const auto make = [](Splatting way) {
-        DeviceOptions options;
-        options.splatting = way;
-        return Renderer(options);
-    };
-    static Renderer processor = make(Splatting::cpu), tiles = make(Splatting::vulkan),
-                    billboards = make(Splatting::blended);
-    return splatting == Splatting::cpu ? processor : splatting == Splatting::vulkan ? tiles : billboards;
-}
 
 // The same everywhere.
 GroundCoverView everywhere(double water_mm, double snow_mm, double rain_mm_per_h = 0) {
@@ -57,7 +47,7 @@ Picture draw(const RenderOptions& options, const std::optional<GroundCoverView>&
     splats.ground_cover = cover;
     splats.time_s = 12.34;
     splats.flash = flash;
-    return renderer(way).draw_splats(splats, options);
+    return test::renderer(way).draw_splats(splats, options);
 }
 
 Rgb pixel(const Picture& picture, int x, int y) {

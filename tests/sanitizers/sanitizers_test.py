@@ -16,7 +16,7 @@ import unittest
 SOURCE = pathlib.Path(os.environ["SOURCE"]).resolve()
 HERE = SOURCE / "tests/sanitizers"
 sys.path.insert(0, str(SOURCE / "tests/apps/command"))
-from case import NEPHOS, SCENE  # noqa: E402
+from case import LAYERED, NEPHOS, SCENE  # noqa: E402
 
 ADDRESS = {"heap-overflow": "heap-buffer-overflow", "stack-overflow": "stack-buffer-overflow",
            "use-after-free": "heap-use-after-free", "leak": "LeakSanitizer: detected memory leaks"}
@@ -31,16 +31,7 @@ MEMCHECK = {"heap-overflow": "Invalid read of size 1", "use-after-free": "Invali
 VALGRIND = ["valgrind", "--quiet", "--error-exitcode=99", "--leak-check=full", "--errors-for-leak-kinds=definite",
             "--show-leak-kinds=definite"]
 
-LAYERED = SCENE.replace("[field.background]\nhum = 0.15\nact = 0.01\next = 0.05\n", "") + """\
-[[sky]]
-name = "clear"
-state = 0
-clouds = 0
-[[layer]]
-name = "low"
-skies = "clear"
-base_height_m = 0
-background = { hum = 0.15, act = 0.01, ext = 0.05 }
+TWO_LAYERS = LAYERED + """\
 [[layer]]
 name = "high"
 lattice = { origin_m = [0, 0, 2000], cells = [40, 30, 6] }
@@ -113,7 +104,7 @@ class Sanitizers(unittest.TestCase):
     def test_a_run_under_valgrind(self):
         """Layers, a veil, states, density, EXR and PNG pictures of the processor, statistics; then resumed."""
         scene = self.folder / "small.toml"
-        scene.write_text(LAYERED.replace("steps = 6", "steps = 2").replace("per_second = 1", "per_second = 1\nexr = true"))
+        scene.write_text(TWO_LAYERS.replace("steps = 6", "steps = 2").replace("per_second = 1", "per_second = 1\nexr = true"))
         out = self.folder / "out"
         call = [*VALGRIND, NEPHOS, "run", scene, "--splatting", "cpu", "--threads", "2", "--quiet", "--out", out]
         for more in ([], ["--resume", "--set", "time.steps=3"]):

@@ -50,6 +50,19 @@ height = 48
 shadow_map_size = 64
 """
 
+# The same in a layer, which others may follow.
+LAYERED = SCENE.replace("[field.background]\nhum = 0.15\nact = 0.01\next = 0.05\n", "") + """\
+[[sky]]
+name = "clear"
+state = 0
+clouds = 0
+[[layer]]
+name = "low"
+skies = "clear"
+base_height_m = 0
+background = { hum = 0.15, act = 0.01, ext = 0.05 }
+"""
+
 # Ten thousand steps with a frame each ten of them: long enough to be interrupted anywhere.
 LONG = SCENE.replace("steps = 6", "steps = 10000").replace("time_scale = 15", "time_scale = 100")
 
