@@ -81,7 +81,7 @@ struct LivePicture {
     std::vector<std::uint8_t> rgba;  // row 0 at the top
     std::uint64_t step = 0;
     double time_s = 0;
-    Camera camera;         // that it was drawn with
+    LiveView view;         // that it was asked for with
     bool refined = false;  // at the full size, with detail
     double draw_ms = 0;
     std::uint64_t number = 0;        // rises

@@ -128,7 +128,7 @@ std::shared_ptr<LivePicture> LivePictureMaker::draw(FramePainter& painter, const
     made->rgba = with_alpha(rgb);
     made->step = frame->frame.step;
     made->time_s = frame->frame.time_s;
-    made->camera = drawn.render.camera;
+    made->view = view;
     made->refined = refine;
     made->draw_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     frame_ = frame;

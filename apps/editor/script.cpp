@@ -50,6 +50,17 @@ std::string rest_of(const std::vector<std::string>& words, std::size_t from) {
     return out;
 }
 
+// Tells whether the picture in the window is that of the present scene, view and step, with all its detail where
+// nothing moves.
+bool picture_is_whole(const Editor& editor) {
+    const LiveStatus status = editor.live->status();
+    if (!editor.picture || editor.shown_version != editor.document->version()) return false;
+    const LivePicture& picture = *editor.picture;
+    if (picture.scene_number != status.scenes || picture.step != status.step || status.goal != status.step)
+        return false;
+    return editor.running || (picture.refined && picture.view == editor.view);
+}
+
 }  // namespace
 
 int key_code(const std::string& name) {
@@ -202,6 +213,7 @@ void Script::begin_line(Editor& editor) {
     if (!line_begun_) found_at_ = ImVec2(-1, -1);
     // Two clicks are one however slow the machine is.
     ImGui::GetIO().MouseDoubleClickTime = command == "double-click-at" ? 30.0f : 0.3f;
+    if (!line_begun_) waited_frames_ = 0;
     line_begun_ = true;
     const auto done = [this] {
         lines_.pop_front();
@@ -260,20 +272,21 @@ void Script::begin_line(Editor& editor) {
     } else if (command == "key") {
         press(words[1]);
     } else if (command == "wait") {
-        if (std::chrono::duration<double>(Clock::now() - line_begin_).count() < number(1)) return;
+        // On a slow machine a short time is less than a frame, and what is waited for needs some.
+        const double seconds = number(1);
+        if (++waited_frames_ < std::min(20.0, 30 * seconds)) return;
+        if (std::chrono::duration<double>(Clock::now() - line_begin_).count() < seconds) return;
     } else if (command == "wait-step") {
         waited(kLongPatience, "step " + words[1]);
         if (!editor.picture || double(editor.picture->step) < number(1)) return;
     } else if (command == "wait-picture") {
         waited(kLongPatience, "a picture");
-        const LiveStatus status = editor.live->status();
-        const bool whole = editor.picture && editor.picture->step == status.step &&
-                           status.goal == status.step && (editor.picture->refined || editor.running);
-        // One that stays: a draft of the last edit may be on its way.
-        if (!whole || editor.picture->number != still_) still_since_ = Clock::now();
-        still_ = editor.picture ? editor.picture->number : 0;
-        const auto wanted = editor.running ? std::chrono::milliseconds(0) : std::chrono::milliseconds(800);
-        if (!whole || Clock::now() - still_since_ < wanted) return;
+        if (!picture_is_whole(editor)) {
+            waited_frames_ = 0;
+            return;
+        }
+        // The frame of an input is laid out before the one after it, which may move what the picture shows.
+        if (++waited_frames_ < 4) return;
     } else if (command == "screenshot") {
         editor.capture_to = rest_of(words, 1);
         mouse_ = ImVec2(-1, -1);  // no tooltip in the picture

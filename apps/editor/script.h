@@ -11,7 +11,7 @@
 //     set NAME VALUE         types a value into a number's control, or a text's; a NAME with blanks stands in quotes
 //     type TEXT              types where the cursor is
 //     key CTRL+S             presses keys: letters, digits, SPACE, ENTER, ESCAPE, DELETE, HOME, F1 ..., with CTRL, SHIFT
-//     wait SECONDS           lets time pass
+//     wait SECONDS           lets time pass, and some frames of the window
 //     wait-step N            until that step is shown (a minute at most)
 //     wait-picture           until the picture is drawn with all its detail (a minute at most)
 //     screenshot FILE        saves a picture of the window
@@ -78,8 +78,7 @@ class Script {
     bool line_begun_ = false;
     ImVec2 found_at_{-1, -1};  // where a control was in the frame before
     int found_frames_ = 0;     // for how many frames
-    std::uint64_t still_ = 0;  // the picture that was last seen, and since when
-    Clock::time_point still_since_ = Clock::now();
+    int waited_frames_ = 0;    // by a line that waits
     std::uint64_t random_left_ = 0;
     std::mt19937 random_;
     int last_key_ = -1;

@@ -15,6 +15,26 @@ NEPHOS = os.environ["NEPHOS"]
 SOURCE = pathlib.Path(os.environ["SOURCE"])
 
 
+class Screen:
+    """An X server of its own without a screen, at the first display that is free. xvfb-run is not used: where it cannot
+    remove its folder, which happens, its status is 5 whatever the program's was."""
+
+    def __init__(self, *arguments):
+        read, write = os.pipe()
+        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1600x1000x24", "-noreset",
+                                        "-nolisten", "tcp", *arguments], pass_fds=[write], stderr=subprocess.PIPE)
+        os.close(write)
+        with os.fdopen(read) as answer:
+            number = answer.readline().strip()
+        if not number:
+            raise RuntimeError(self.server.communicate()[1].decode(errors="replace"))
+        self.display = f":{number}"
+
+    def close(self):
+        self.server.terminate()
+        self.server.communicate()
+
+
 class Case(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="nephos-editor-"))
@@ -30,7 +50,9 @@ class Case(unittest.TestCase):
             command += ["--script", str(path)]
         if display:
             command += ["--size", size] if size else []
-            command = ["xvfb-run", "-a", "-s", " ".join(["-screen 0 1600x1000x24", *server]), *command]
+            screen = Screen(*server)
+            self.addCleanup(screen.close)
+            command = ["env", f"DISPLAY={screen.display}", *command]
         return command
 
     def edit(self, *arguments, status=0, environment=None, timeout=240, **call):
