@@ -178,7 +178,7 @@ PendingFrame FramePainter::begin(FrameResult frame) {
     std::optional<FilmFrame> film;
     if (frame.number > 0)
         film = FilmFrame{frame.number - 1, &scene_.frames, &scene_.render.sun,
-                         place.given ? place.heading_deg : 0};
+                         place.given ? place.heading_deg : 0, scene_.sun_path};
     PendingSkyPicture picture =
         painter_.begin(renderer_, cloud, layers, options, frame.time_s, scene_.frames.exr, ground,
                        weather_of(scene_, frame.layers, frame.density, frame.time_s), film, veils);

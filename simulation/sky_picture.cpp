@@ -67,8 +67,8 @@ std::size_t SkyBillboards::light_by_sun(const SkySimulation& sky, std::span<cons
         const int frame = schedule.frame_of_light(cloud.slot, film->index);
         const auto [found, added] = earlier.try_emplace(frame);
         if (added)
-            found->second =
-                light_of(turned_sun_at(*film->sun, film->heading_deg, frame_time_s(*film->frames, frame)));
+            found->second = light_of(turned_sun_at(*film->sun, film->sun_path, film->heading_deg,
+                                                   frame_time_s(*film->frames, frame)));
         return found->second;
     };
     std::vector<CloudToLight> lit;
@@ -223,10 +223,10 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
         rainfall->options.sun = options.sun;
         if (ground_cover) rainfall->options.ground.albedo = mean_albedo(options, *ground_cover);
     }
-    PendingPicture picture = renderer.begin(
-        {drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all, ground_cover,
-         textures_ ? textures_->pictures : nullptr, drawn.unseen, terrain_},
-        options, veils, std::move(rainfall));
+    PendingPicture picture =
+        renderer.begin({drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all,
+                        ground_cover, textures_ ? textures_->pictures : nullptr, drawn.unseen, terrain_},
+                       options, veils, std::move(rainfall));
     return {std::move(picture), std::move(options), std::move(lines), std::move(drawn)};
 }
 

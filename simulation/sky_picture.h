@@ -43,6 +43,7 @@ struct FilmFrame {
     const FrameOptions* frames = nullptr;  // not null
     const Sun* sun = nullptr;              // not null; before turned_sun_at()
     double heading_deg = 0;                // true bearing of the world's y axis
+    std::span<const SunKey> sun_path{};    // of Scene::sun_path
 };
 
 class SkyBillboards {

@@ -18,7 +18,6 @@ namespace {
 constexpr double kLeastVoxelWithDetail_m = 20;
 constexpr std::uint64_t kMostMarchedVoxels = 16'000'000;
 
-
 RenderOptions render_options(const VolumePictureOptions& given, const std::optional<Scene>& scene,
                              const DensityGrid& grid, double time_s) {
     RenderOptions options;
@@ -97,6 +96,7 @@ VolumePicture draw_volume(const std::string& file, const LoadedDensity& loaded,
     Scene drawn = scene.value_or(Scene());
     drawn.name = file;
     drawn.render = result.options;
+    if (given.sun_deg) drawn.sun_path.clear();
     drawn.density.extinction_per_m = result.extinction_per_m;
     drawn.density.metaball_radius_cells = result.metaball_radius_voxels;
     drawn.frames.exr = given.depth;

@@ -44,7 +44,7 @@ void set_values(Editor& editor, const TextPath& table, const std::vector<TextEnt
         return text;
     };
     bool recorded = false;
-    if (editor.record && !editor.document->has_syntax_error()) {
+    if (is_recorded(editor, path) && !editor.document->has_syntax_error()) {
         const bool tried =
             attempt(editor, [&] { recorded = record_live(editor, path, changed(editor.document->text())); });
         if (!tried) return;

@@ -20,8 +20,8 @@ struct KeyMark {
 
 // Adds the key frames of one list.
 template <typename Key>
-void add_marks(std::vector<KeyMark>& marks, const std::vector<Key>& keys, const std::string& list, const char* kind,
-               ImU32 colour, bool rises = true) {
+void add_marks(std::vector<KeyMark>& marks, const std::vector<Key>& keys, const std::string& list,
+               const char* kind, ImU32 colour, bool rises = true) {
     for (std::size_t n = 0; n < keys.size(); ++n) {
         KeyMark mark{keys[n].time_s, text_path(list + "[" + std::to_string(n) + "]"), kind, colour};
         if (rises && n > 0) mark.least_s = std::nextafter(keys[n - 1].time_s, 1e300);
@@ -43,6 +43,7 @@ std::vector<KeyMark> marks_of(const Scene& scene) {
         add_marks(marks, scene.layers[n].wind.keyframes, layer + "wind", "wind of a layer", kWindMark);
         add_marks(marks, scene.layers[n].schedule, layer + "schedule", "climate of a layer", kClimateMark);
     }
+    add_marks(marks, scene.sun_path, "sun.path", "sun", kSunMark);
     add_marks(marks, scene.render.lightning, "lightning", "lightning", kFlashMark, false);
     add_marks(marks, scene.render.camera.path, "camera.path", "camera", kCameraMark);
     return marks;
@@ -67,7 +68,9 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
     const double step_s = scene->automaton.time_step_s, span = double(std::max<std::uint64_t>(last_step, 1));
     // As the slider's grab: a step's middle lies within its rim.
     const float rim = 0.5f * ImGui::GetStyle().GrabMinSize + 2;
-    const auto x_of = [&](double step) { return from + rim + (width - 2 * rim) * float(std::min(step / span, 1.0)); };
+    const auto x_of = [&](double step) {
+        return from + rim + (width - 2 * rim) * float(std::min(step / span, 1.0));
+    };
     ImDrawList& list = *ImGui::GetWindowDrawList();
     const ImVec2 mouse = ImGui::GetIO().MousePos;
     const float middle = corner.y + 0.5f * height, half = 0.38f * height;
@@ -78,7 +81,8 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
         list.AddLine(ImVec2(x, corner.y), ImVec2(x, corner.y + height), white, 1.5f);
         list.AddTriangleFilled(ImVec2(x, corner.y), ImVec2(x + 1.6f * half, corner.y + half),
                                ImVec2(x, corner.y + 2 * half), white);
-        editor.controls.now["checkpoint " + std::to_string(n)] = {ImVec2(x, corner.y), ImVec2(x + half, middle + half)};
+        editor.controls.now["checkpoint " + std::to_string(n)] = {ImVec2(x, corner.y),
+                                                                  ImVec2(x + half, middle + half)};
         if (!hovered || std::abs(mouse.x - x - 0.5f * half) > 1.5f * half) continue;
         ImGui::SetTooltip("checkpoint: step %llu", static_cast<unsigned long long>(step));
         if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) go_to(editor, step);
@@ -88,14 +92,16 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
     for (const KeyMark& mark : marks_of(*scene)) {
         const double step = mark.time_s / step_s;
         const float x = x_of(step);
-        const bool near = hovered && std::abs(mouse.x - x) < 1.6f * half, chosen = editor.selected == mark.path;
+        const bool near = hovered && std::abs(mouse.x - x) < 1.6f * half,
+                   chosen = editor.selected == mark.path;
         const float size = chosen || near ? 1.3f * half : half;
         list.AddQuadFilled(ImVec2(x, middle - size), ImVec2(x + size, middle), ImVec2(x, middle + size),
                            ImVec2(x - size, middle), mark.colour);
         editor.controls.now["key frame " + path_text(mark.path)] = {ImVec2(x - half, middle - half),
-                                                                   ImVec2(x + half, middle + half)};
+                                                                    ImVec2(x + half, middle + half)};
         if (near && held.empty()) {
-            ImGui::SetTooltip("%s at %g s, step %g\nClick: choose it; drag: another time", mark.kind, mark.time_s, step);
+            ImGui::SetTooltip("%s at %g s, step %g\nClick: choose it; drag: another time", mark.kind,
+                              mark.time_s, step);
             if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
                 held = mark.path;
                 editor.selected = mark.path;
@@ -114,7 +120,8 @@ void key_frame_strip(Editor& editor, float from, float width, std::uint64_t last
 void keep_checkpoint(Editor& editor) {
     if (!editor.picture) return;
     const std::uint64_t step = editor.picture->step;
-    if (std::ranges::find(editor.checkpoints, step) == editor.checkpoints.end()) editor.checkpoints.push_back(step);
+    if (std::ranges::find(editor.checkpoints, step) == editor.checkpoints.end())
+        editor.checkpoints.push_back(step);
     std::ranges::sort(editor.checkpoints);
     say(editor, "Checkpoint at step " + std::to_string(step) + ": B goes back to it");
 }
@@ -123,7 +130,9 @@ void back_to_checkpoint(Editor& editor) {
     const std::uint64_t now = editor.live->status().step;
     const auto next = std::ranges::lower_bound(editor.checkpoints, now);
     if (next == editor.checkpoints.begin()) {
-        say(editor, editor.checkpoints.empty() ? "There is no checkpoint: M sets one" : "There is no earlier checkpoint",
+        say(editor,
+            editor.checkpoints.empty() ? "There is no checkpoint: M sets one"
+                                       : "There is no earlier checkpoint",
             true);
         return;
     }

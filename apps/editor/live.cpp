@@ -67,6 +67,7 @@ SceneChange change_between(const Scene& before, const Scene& after) {
     if (before == after) return SceneChange::none;
     Scene same = before;
     same.render = after.render;
+    same.sun_path = after.sun_path;
     same.frames = after.frames;
     same.name = after.name;
     same.steps = after.steps;

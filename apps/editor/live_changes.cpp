@@ -4,6 +4,7 @@
 // from its present state.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "apps/editor/schema_values.h"
@@ -75,8 +76,81 @@ std::vector<WindKeyframe> changed_keys(const Wind& before, const std::vector<Win
     return keys;
 }
 
+bool is_sun(const TextPath& path) {
+    static constexpr std::array<std::string_view, 3> kKeys{"elevation_deg", "azimuth_deg", "colour"};
+    return path.size() == 2 && path[0].name == "sun" && std::ranges::find(kKeys, path[1].name) != kKeys.end();
+}
+
+std::string colour_toml(const Rgb& colour) {
+    return "[" + number_text(colour[0]) + ", " + number_text(colour[1]) + ", " + number_text(colour[2]) + "]";
+}
+
+SunKey sun_key(const Scene& scene, double time_s) {
+    const Sun sun = scene_sun_at(scene, time_s);
+    return {time_s, sun.elevation_deg, sun.azimuth_deg, sun.colour};
+}
+
+// Key frames of a sun that is as in `scene` up to the step before `step` and `wanted` from it on. Where the sun of the
+// scene moves, every step gets one of its own, so that its pictures keep their bits.
+std::vector<SunKey> changed_sun(const Scene& scene, SunKey wanted, std::uint64_t step) {
+    const double step_s = scene.automaton.time_step_s, now = double(step) * step_s,
+                 last = double(step - 1) * step_s;
+    std::vector<SunKey> keys;
+    for (const SunKey& key : scene.sun_path) {
+        if (step > 0 && key.time_s <= last) keys.push_back(key);
+    }
+    const bool follows_date =
+        scene.sun_path.empty() && !scene.render.sun.date.empty() && scene.render.sun.moves;
+    if (follows_date || (!keys.empty() && keys.size() < scene.sun_path.size())) {
+        const double from = keys.empty() ? -1 : keys.back().time_s;
+        for (std::uint64_t at = std::uint64_t(std::max(0.0, std::ceil(from / step_s))); at < step; ++at) {
+            if (double(at) * step_s > from) keys.push_back(sun_key(scene, double(at) * step_s));
+        }
+    } else if (step > 0 && (keys.empty() || keys.back().time_s < last)) {
+        keys.push_back(sun_key(scene, last));
+    }
+    wanted.time_s = now;
+    keys.push_back(wanted);
+    return keys;
+}
+
+// The text with other key frames of the sun; those that stay are not touched, nor what their author wrote beside them.
+std::string with_sun_keys(std::string text, const Scene& scene, const std::vector<SunKey>& keys) {
+    for (const char* key : {"sun.date", "sun.time", "sun.moves", "sun.latitude_deg", "sun.longitude_deg"})
+        text = without(text, text_path(key));
+    const TextPath path = text_path("sun.path");
+    std::size_t same = 0;
+    while (same < keys.size() && same < scene.sun_path.size() && keys[same] == scene.sun_path[same]) ++same;
+    if (same == 0) {
+        text = without(text, path);
+    } else {
+        for (std::size_t n = scene.sun_path.size(); n-- > same;)
+            text = without(text, text_path("sun.path[" + std::to_string(n) + "]"));
+    }
+    for (std::size_t n = same; n < keys.size(); ++n) {
+        std::vector<TextEntry> entries{{"time_s", number_text(keys[n].time_s)},
+                                       {"elevation_deg", number_text(keys[n].elevation_deg)},
+                                       {"azimuth_deg", number_text(keys[n].azimuth_deg)}};
+        if (keys[n].colour != scene.render.sun.colour)
+            entries.emplace_back("colour", colour_toml(keys[n].colour));
+        text = with_new_element(text, path, entries);
+    }
+    return text;
+}
+
 // The step of the picture that is shown: what it shows is decided by the newest change.
 std::uint64_t shown_step(const Editor& editor) { return editor.picture ? editor.picture->step : 0; }
+
+void record_sun(Editor& editor, const SunKey& wanted) {
+    const std::uint64_t step = shown_step(editor);
+    const Scene& scene = *editor.shown_scene;
+    const auto changed = [&](const std::string& text) {
+        return with_sun_keys(text, scene, changed_sun(scene, wanted, step));
+    };
+    // One drag is one step of the history, over as many steps of the simulation as it lasts.
+    if (change_text(editor, changed, "Sun from step " + std::to_string(step), "live sun"))
+        say(editor, "Sun recorded from step " + std::to_string(step) + " on");
+}
 
 // Applies a text that goes on from the present state.
 void apply(Editor& editor, const std::string& text, const std::string& what, const std::string& merge) {
@@ -127,9 +201,8 @@ bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, co
     const std::size_t index = path[array.size()].index;
     const Wind& changed = wind_at_path(*wanted, array);
     if (index >= changed.keyframes.size()) return false;
-    const std::vector<WindKeyframe> keys =
-        changed_keys(wind_at_path(before, array), changed.keyframes[index].levels, from,
-                     before.automaton.time_step_s);
+    const std::vector<WindKeyframe> keys = changed_keys(
+        wind_at_path(before, array), changed.keyframes[index].levels, from, before.automaton.time_step_s);
     say(editor, "Wind recorded from step " + std::to_string(from) + " on");
     apply(editor, with_keyframes(text, array, keys), "Wind from step " + std::to_string(from),
           "live " + std::to_string(held.step));
@@ -143,14 +216,27 @@ bool record_wind(Editor& editor, const TextPath& array, const TextPath& path, co
 
 }  // namespace
 
+bool is_recorded(const Editor& editor, const TextPath& path) {
+    return editor.record || (is_sun(path) && editor.shown_scene && !editor.shown_scene->sun_path.empty());
+}
+
 Sun sun_now(const Editor& editor) {
     return scene_sun_at(*editor.shown_scene,
                         double(shown_step(editor)) * editor.shown_scene->automaton.time_step_s);
 }
 
+std::optional<std::string> value_now(const Editor& editor, const TextPath& path) {
+    if (!is_sun(path) || !editor.shown_scene || editor.shown_scene->sun_path.empty()) return std::nullopt;
+    const Sun sun = sun_now(editor);
+    if (path[1].name == "colour") return colour_toml(sun.colour);
+    return number_text(path[1].name == "azimuth_deg" ? sun.azimuth_deg : sun.elevation_deg);
+}
+
 void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dragging) {
     const TextPath sun = text_path("sun");
     if (!editor.shown_scene || !editor.document->problems().empty()) return;
+    if (is_recorded(editor, text_path("sun.elevation_deg")))
+        return record_sun(editor, {0, elevation_deg, azimuth_deg, sun_now(editor).colour});
     if (editor.shown_scene->render.sun.date.empty()) {
         set_values(editor, sun,
                    {{"elevation_deg", number_text(elevation_deg)}, {"azimuth_deg", number_text(azimuth_deg)}},
@@ -168,6 +254,17 @@ void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dra
 
 bool record_live(Editor& editor, const TextPath& path, const std::string& edited) {
     if (!editor.shown_scene || !editor.document->problems().empty()) return false;
+    if (is_sun(path)) {
+        const std::optional<Scene> wanted = scene_of(editor, edited);
+        if (!wanted) return false;
+        const Sun now = sun_now(editor);
+        SunKey key{0, now.elevation_deg, now.azimuth_deg, now.colour};
+        if (path[1].name == "elevation_deg") key.elevation_deg = wanted->render.sun.elevation_deg;
+        if (path[1].name == "azimuth_deg") key.azimuth_deg = wanted->render.sun.azimuth_deg;
+        if (path[1].name == "colour") key.colour = wanted->render.sun.colour;
+        record_sun(editor, key);
+        return true;
+    }
     const std::size_t length = wind_length(path);
     if (length > 0 && path.size() > length + 1 && path.back().name != "time_s") {
         return record_wind(editor, TextPath(path.begin(), path.begin() + std::ptrdiff_t(length)), path,

@@ -219,7 +219,8 @@ void view_options_panel(Editor& editor) {
         toggle(editor, "cld", editor.view.cld, "Cells with cloud, red");
         float slab[2] = {float(100 * editor.view.slab_low), float(100 * editor.view.slab_high)};
         ImGui::SetNextItemWidth(-1);
-        if (ImGui::DragFloatRange2("##slab", &slab[0], &slab[1], 0.5f, 0, 100, "slab from %.0f %%", "to %.0f %%")) {
+        if (ImGui::DragFloatRange2("##slab", &slab[0], &slab[1], 0.5f, 0, 100, "slab from %.0f %%",
+                                   "to %.0f %%")) {
             editor.view.slab_low = std::clamp(double(slab[0]) / 100, 0.0, 0.99);
             editor.view.slab_high = std::clamp(double(slab[1]) / 100, editor.view.slab_low + 0.01, 1.0);
         }
@@ -243,17 +244,18 @@ void view_options_panel(Editor& editor) {
     ImGui::SetNextItemWidth(-1);
     if (ImGui::BeginCombo("##slice of", kSliceNames[int(editor.slice_of)])) {
         for (int kind = 0; kind < int(std::size(kSliceNames)); ++kind) {
-            if (ImGui::Selectable(kSliceNames[kind], int(editor.slice_of) == kind)) editor.slice_of = SliceOf(kind);
+            if (ImGui::Selectable(kSliceNames[kind], int(editor.slice_of) == kind))
+                editor.slice_of = SliceOf(kind);
             editor.controls.note(std::string("choice ") + kSliceNames[kind]);
         }
         ImGui::EndCombo();
     }
     editor.controls.note("slice of");
     tooltip_of_last(
-        "A slice of the automaton at one height: its bits, hum green, act orange, cld red, as in the plots; or the "
+        "A slice of the automaton at one height: its bits, hum green, act orange, cld red, as in the plots; "
+        "or the "
         "probabilities of its field, from blue to red for the largest in the slice");
-    if (editor.slice_of >= SliceOf::p_hum)
-        ImGui::TextDisabled("red: %.4g per step", editor.slice_most);
+    if (editor.slice_of >= SliceOf::p_hum) ImGui::TextDisabled("red: %.4g per step", editor.slice_most);
     if (editor.slice_of != SliceOf::nothing && editor.shown_scene) {
         const Scene& scene = *editor.shown_scene;
         const int height = scene.layers.empty() ? scene.automaton.extent.z : scene.layers.front().extent.z;
@@ -281,7 +283,8 @@ void view_options_panel(Editor& editor) {
     ImGui::TextDisabled("LIVE CHANGES");
     toggle(
         editor, "Record as key frames", editor.record,
-        "Changes of wind and climate then act from the present step on, and are written into the scene as "
+        "Changes of wind, climate and sun then act from the present step on, and are written into the scene "
+        "as "
         "key "
         "frames: the saved scene repeats what was seen, bit for bit. Otherwise the scene is simulated anew.");
     if (editor.shown_scene && !editor.shown_scene->layers.empty()) {

@@ -113,7 +113,13 @@ bool plain_rows(Editor& editor, const Section& section, const TextPath& path, co
         if (key.kind == KeyKind::table || key.kind == KeyKind::tables) continue;
         const TextPath at = joined_path(path, key.name);
         const Node* node = value_node(editor.document->values(), at);
-        const ValueRow row{key, at, node != nullptr ? node : default_node(editor, key, at), node != nullptr};
+        const bool present = node != nullptr;
+        Node now;  // of a key that key frames stand for
+        if (const std::optional<std::string> value = value_now(editor, at)) {
+            now = parsed_value(*value);
+            node = &now;
+        }
+        const ValueRow row{key, at, node != nullptr ? node : default_node(editor, key, at), present};
         if (!matches(filter, row)) continue;
         if (!any) {
             open = ImGui::BeginTable("keys", 3, ImGuiTableFlags_SizingStretchProp);

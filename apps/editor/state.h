@@ -112,7 +112,7 @@ inline constexpr const char* kSliceNames[] = {"no slice", "bits", "probability o
 
 // A question before something is overwritten or broken off.
 struct Question {
-    std::string text, yes;      // label of the button that lets `act` be done
+    std::string text, yes;  // label of the button that lets `act` be done
     std::function<void()> act;
 };
 
@@ -218,10 +218,12 @@ bool attempt(Editor& editor, const std::function<void()>& act);
 // Changes of the document reach the live scene; `what` names the step for undo. `edit` returns the new text. A change
 // that fails, and one of a text with a syntax error, in which nothing has its place, is said and changes nothing.
 using TextEdit = std::function<std::string(const std::string& text)>;
-bool change_text(Editor& editor, const TextEdit& edit, const std::string& what, const std::string& merge = {});
+bool change_text(Editor& editor, const TextEdit& edit, const std::string& what,
+                 const std::string& merge = {});
 void set_value(Editor& editor, const TextPath& path, const std::string& value, bool dragging = false);
 // Several keys of a table as one step of the history.
-void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries, bool dragging = false);
+void set_values(Editor& editor, const TextPath& table, const std::vector<TextEntry>& entries,
+                bool dragging = false);
 void open_document(Editor& editor, std::unique_ptr<SceneDocument> document);
 // Ends what waited for an answer about unsaved edits.
 void do_pending(Editor& editor);
@@ -324,13 +326,18 @@ void slice_over_picture(Editor& editor);
 // live_changes.cpp: writes a change of a key that was made while the scene runs as key frames at the present step;
 // `edited`: the text as it would be without recording. Returns false for keys that cannot be recorded.
 bool record_live(Editor& editor, const TextPath& path, const std::string& edited);
-// Moves the sun; one that follows a date stands still then.
+// Whether a change of a key is to be recorded: while the user records, and always of a sun with key frames, which
+// stand in the place of the key.
+bool is_recorded(const Editor& editor, const TextPath& path);
+// The value of a key that key frames stand for, at the step that is shown; nothing for other keys.
+std::optional<std::string> value_now(const Editor& editor, const TextPath& path);
+// Moves the sun: from the present step on when that is_recorded(), otherwise for good.
 void move_sun(Editor& editor, double elevation_deg, double azimuth_deg, bool dragging);
 Sun sun_now(const Editor& editor);  // at the step that is shown
 // From the present step on the climate goes to a state, 0..1, within a time.
 void record_climate(Editor& editor, double final_state, double duration_s);
 void add_flash(Editor& editor, const Vec3& at_m);  // lightning at the step that is shown
-void keep_camera(Editor& editor);  // writes it into the scene
+void keep_camera(Editor& editor);                  // writes it into the scene
 
 // theme.cpp
 void apply_theme(Editor& editor);

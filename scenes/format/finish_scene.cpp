@@ -164,8 +164,11 @@ void finish_wind_fields(const SectionReader& reader, Scene& scene) {
         if (std::isinf(field.bottom_m)) field.bottom_m = placement.origin_m.z;
         if (std::isinf(field.top_m)) field.top_m = top_m;
         if (field.kind == WindFieldKind::grid || field.bottom_m < field.top_m) continue;
-        const SectionReader item{reader.document, reader.find("wind_field")->value.items[n], indexed("wind_field", n), {}};
-        item.report("kind", "the field ends at " + number_text(field.top_m) + " m and begins at " + number_text(field.bottom_m) + " m",
+        const SectionReader item{
+            reader.document, reader.find("wind_field")->value.items[n], indexed("wind_field", n), {}};
+        item.report("kind",
+                    "the field ends at " + number_text(field.top_m) + " m and begins at " +
+                        number_text(field.bottom_m) + " m",
                     "expected `bottom_m` below `top_m`; what is missing is that of `[lattice]`");
     }
     for (LayerOptions& layer : scene.layers)
@@ -180,7 +183,8 @@ void place_sun(const SectionReader& reader, Scene& scene) {
     const Entry* given = reader.find("sun");
     const auto has = [&](const char* name) { return given != nullptr && given->value.find(name) != nullptr; };
     Sun& sun = scene.render.sun;
-    const bool own_height = sun.date.empty() && (has("elevation_deg") || has("azimuth_deg"));
+    const bool own_height =
+        sun.date.empty() && (has("elevation_deg") || has("azimuth_deg") || !scene.sun_path.empty());
     if (own_height) return;
     if (sun.date.empty()) {
         if (place.start_utc.empty()) return;
@@ -203,8 +207,9 @@ void check_velocity_name(const SectionReader& reader, const Scene& scene) {
     const SectionReader density = below(reader, "density");
     const bool good = !name.empty() && name.size() <= 60 && std::all_of(name.begin(), name.end(), allowed);
     if (!good || name == "density" || name == "hum" || name == "act" || name == "cld") {
-        density.report("velocity_name", "`density.velocity_name` is \"" + shortened(name) + "\"",
-                       "expected up to 60 letters, digits or `_` that name no other grid, such as \"velocity\"");
+        density.report(
+            "velocity_name", "`density.velocity_name` is \"" + shortened(name) + "\"",
+            "expected up to 60 letters, digits or `_` that name no other grid, such as \"velocity\"");
     }
     if (!scene.density_files.per_layer && !scene.density_files.combined && !scene.layers.empty()) {
         density.report("combined", "neither `density.per_layer` nor `density.combined` is true",

@@ -44,9 +44,9 @@ int frame_count(const Scene& scene) {
     return fit;
 }
 
-Sun turned_sun_at(const Sun& sun, double heading_deg, double time_s) {
-    Sun now = sun_at(sun, time_s);
-    const bool from_date = !sun.date.empty();
+Sun turned_sun_at(const Sun& sun, std::span<const SunKey> path, double heading_deg, double time_s) {
+    Sun now = sun_at(sun, path, time_s);
+    const bool from_date = path.empty() && !sun.date.empty();
     if (from_date && heading_deg != 0) {
         const double azimuth = now.azimuth_deg - heading_deg;
         now.azimuth_deg = azimuth - 360 * std::floor(azimuth / 360);
@@ -56,7 +56,7 @@ Sun turned_sun_at(const Sun& sun, double heading_deg, double time_s) {
 
 Sun scene_sun_at(const Scene& scene, double time_s) {
     const Georeference& place = scene.georeference;
-    return turned_sun_at(scene.render.sun, place.given ? place.heading_deg : 0, time_s);
+    return turned_sun_at(scene.render.sun, scene.sun_path, place.given ? place.heading_deg : 0, time_s);
 }
 
 }  // namespace nephos

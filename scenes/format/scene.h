@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "density/options.h"
 #include "render/options/device_options.h"
 #include "render/options/options.h"
+#include "render/options/sun_path.h"
 #include "scenes/format/layers.h"
 #include "seeds/ground_cover.h"
 #include "seeds/model.h"
@@ -41,8 +43,8 @@ struct FrameOptions {
 
 // Which density files a run writes, and what they have beside density.
 struct DensityFileOptions {
-    bool per_layer = true;  // of a scene with layers: a file for each, with its own voxels
-    bool combined = true;   // of a scene with layers: one of all together; of others always
+    bool per_layer = true;              // of a scene with layers: a file for each, with its own voxels
+    bool combined = true;               // of a scene with layers: one of all together; of others always
     std::string velocity_name = "vel";  // of the grid of the wind: letters, digits and '_'
     bool operator==(const DensityFileOptions&) const = default;
 };
@@ -67,6 +69,7 @@ struct Scene {
     DensityFileOptions density_files;
     Georeference georeference;
     RenderOptions render;
+    std::vector<SunKey> sun_path;  // key frames of render.sun, which then has no date; empty: none
     FrameOptions frames;
     bool operator==(const Scene&) const = default;
 };
@@ -107,12 +110,12 @@ std::uint64_t steps_up_to(const Moment& moment);
 // at most kMaxFrames.
 int frame_count(const Scene& scene);
 
-// Returns the sun of the scene at a simulated time, its azimuth relative to the world's y axis: that of its date and
-// place, turned by the georeference's heading, or as the scene says. Throws as sun_at(). Pure.
+// Returns the sun of the scene at a simulated time, its azimuth relative to the world's y axis: that of its key frames;
+// of its date and place, turned by the georeference's heading; or as the scene says. Throws as sun_at(). Pure.
 Sun scene_sun_at(const Scene& scene, double time_s);
 
 // The same for a sun of its own: `heading_deg` is the true bearing of the y axis.
-Sun turned_sun_at(const Sun& sun, double heading_deg, double time_s);
+Sun turned_sun_at(const Sun& sun, std::span<const SunKey> path, double heading_deg, double time_s);
 
 inline constexpr int kMaxFrames = 1'000'000;
 

@@ -50,8 +50,30 @@ void finish_camera(const SectionReader& reader, void* owner) {
     check_camera_path(reader, camera);
 }
 
+// Keys without a colour have that of the sun.
+void finish_sun_path(const SectionReader& reader, const Sun& sun, std::vector<SunKey>& path) {
+    if (path.empty()) return;
+    if (!sun.date.empty()) {
+        reader.report("path", "the sun has key frames and a date",
+                      "expected either `path` or `date` and `time`");
+        return;
+    }
+    const std::vector<Node>& items = reader.find("path")->value.items;
+    for (std::size_t n = 0; n < path.size(); ++n) {
+        const SectionReader key{reader.document, items[n], indexed(reader.path + ".path", n), {}};
+        if (key.find("colour") == nullptr) path[n].colour = sun.colour;
+        if (n == 0 || path[n].time_s > path[n - 1].time_s) continue;
+        key.report("time_s",
+                   key.quoted("time_s") + " is " + number_text(path[n].time_s) +
+                       ", not after the key before it at " + number_text(path[n - 1].time_s),
+                   "expected times that rise from key to key, in seconds");
+    }
+}
+
 void finish_sun(const SectionReader& reader, void* owner) {
-    const Sun& sun = static_cast<const Scene*>(owner)->render.sun;
+    auto& scene = *static_cast<Scene*>(owner);
+    const Sun& sun = scene.render.sun;
+    finish_sun_path(reader, sun, scene.sun_path);
     const bool with_date = !sun.date.empty(), with_time = !sun.time.empty();
     if (with_date != with_time) {
         const char* given = with_date ? "date" : "time";
@@ -109,13 +131,16 @@ const Section& density_section() {
              [](const void* owner) {
                  return static_cast<const Scene*>(owner)->density_files.velocity_name != "vel";
              }),
-         written_if(key<&Scene::density_files, &DensityFileOptions::per_layer>(
-                        "per_layer", "", kAny, "Write a file of each layer with its own voxels."),
-                    [](const void* owner) { return !static_cast<const Scene*>(owner)->density_files.per_layer; }),
-         written_if(key<&Scene::density_files, &DensityFileOptions::combined>(
-                        "combined", "", kAny,
-                        "Write a file of all layers together. Off: layers alone; a scene without layers has it always."),
-                    [](const void* owner) { return !static_cast<const Scene*>(owner)->density_files.combined; })},
+         written_if(
+             key<&Scene::density_files, &DensityFileOptions::per_layer>(
+                 "per_layer", "", kAny, "Write a file of each layer with its own voxels."),
+             [](const void* owner) { return !static_cast<const Scene*>(owner)->density_files.per_layer; }),
+         written_if(
+             key<&Scene::density_files, &DensityFileOptions::combined>(
+                 "combined", "", kAny,
+                 "Write a file of all layers together. Off: layers alone; a scene without layers has it "
+                 "always."),
+             [](const void* owner) { return !static_cast<const Scene*>(owner)->density_files.combined; })},
         nullptr};
     return section;
 }
@@ -184,12 +209,14 @@ const Section& camera_section() {
              "exposure_ev", "stops", between(-30, 30), "Each stop doubles the brightness of the picture."),
          word<&Scene::render, &RenderOptions::camera, &Camera::exposure>(
              "exposure", {"manual", "automatic"},
-             "`manual`: `exposure_ev`. `automatic`: by a histogram of each picture, to which `exposure_ev` is "
+             "`manual`: `exposure_ev`. `automatic`: by a histogram of each picture, to which `exposure_ev` "
+             "is "
              "added. EXR files are not changed by it.",
              "Reinhard et al. 2002"),
          render_key<&RenderOptions::camera, &Camera::adaptation_s>(
              "adaptation_s", "s", between(0, 60),
-             "Time constant with which an automatic exposure follows from frame to frame of a run, in seconds "
+             "Time constant with which an automatic exposure follows from frame to frame of a run, in "
+             "seconds "
              "of film; 0: at once."),
          word<&Scene::render, &RenderOptions::camera, &Camera::tone_curve>(
              "tone_curve", {"exponential", "neutral"},
@@ -201,14 +228,36 @@ const Section& camera_section() {
              "Light that lens and eye scatter around what is bright, relative to the human eye; a clean lens "
              "has about 0.1. Above 0 the sun's disc has its own brightness, else a bounded one.",
              "Spencer et al. 1995"),
-         written_if(render_key<&RenderOptions::camera, &Camera::above_ground>(
-                        "above_ground", "", kAny,
-                        "Whether the heights of `position_m`, `target_m` and those of the path are counted from the ground "
-                        "below them (`ground.height_m`, `ground.height_map`); false: from world height 0."),
-                    [](const void* scene) { return static_cast<const Scene*>(scene)->render.camera.above_ground; }),
+         written_if(
+             render_key<&RenderOptions::camera, &Camera::above_ground>(
+                 "above_ground", "", kAny,
+                 "Whether the heights of `position_m`, `target_m` and those of the path are counted from the "
+                 "ground "
+                 "below them (`ground.height_m`, `ground.height_map`); false: from world height 0."),
+             [](const void* scene) { return static_cast<const Scene*>(scene)->render.camera.above_ground; }),
          tables<&Scene::render, &RenderOptions::camera, &Camera::path>("path", camera_path_section(), 0,
                                                                        10'000)},
         &finish_camera};
+    return section;
+}
+
+const Section& sun_path_section() {
+    static const Section section{
+        "Sun path",
+        "Where the sun stands at which simulated time, in the place of `elevation_deg`, `azimuth_deg` and "
+        "`colour`: it "
+        "goes evenly from key to key, the shorter way round, and stands still before the first and after the "
+        "last. The "
+        "editor writes such keys when the sun is moved while a scene runs.",
+        {required(key<&SunKey::time_s>("time_s", "s", between(0, 1e15), "Simulated time; rises.")),
+         required(key<&SunKey::elevation_deg>("elevation_deg", "deg", between(-18, 90),
+                                              "Its height above the horizon then.",
+                                              "T, 3.3: the light is moved anywhere")),
+         required(key<&SunKey::azimuth_deg>("azimuth_deg", "deg", between(-360, 360),
+                                            "Where it stands then, clockwise from north.")),
+         default_is(key<&SunKey::colour>("colour", "", kLight, "Its linear colour and strength then."),
+                    "that of `[sun]`")},
+        nullptr};
     return section;
 }
 
@@ -235,6 +284,7 @@ const Section& sun_section() {
                                                               "Place for `date`; east is positive."),
          render_key<&RenderOptions::sun, &Sun::moves>(
              "moves", "", kAny, "Move the sun with simulated time, which begins at `date` and `time`."),
+         tables<&Scene::sun_path>("path", sun_path_section(), 0, 100'000),
          render_key<&RenderOptions::shadow_map_size>(
              "shadow_map_size", "texels", between(16, 8192),
              "Side of the map of the clouds' shadow; larger is sharper.", "D, step 1")},
@@ -301,7 +351,8 @@ namespace {
 void finish_ground(const SectionReader& reader, void* owner) {
     const TerrainOptions& terrain = static_cast<const Scene*>(owner)->render.terrain;
     if (terrain.height_map && terrain.relief != Relief::none)
-        reader.report("relief", reader.quoted("relief") + " is given beside `height_map`", "expected one of the two");
+        reader.report("relief", reader.quoted("relief") + " is given beside `height_map`",
+                      "expected one of the two");
 }
 
 }  // namespace
@@ -309,7 +360,8 @@ void finish_ground(const SectionReader& reader, void* owner) {
 const Section& ground_section() {
     static const Section section{
         "Ground",
-        "What wears the clouds' shadow: a plane, and under the physical sky the sphere of the Earth below the eye.",
+        "What wears the clouds' shadow: a plane, and under the physical sky the sphere of the Earth below "
+        "the eye.",
         {render_key<&RenderOptions::ground, &Ground::height_m>("height_m", "m", between(-1e5, 1e5),
                                                                "Its height."),
          render_key<&RenderOptions::ground, &Ground::albedo>(
@@ -317,20 +369,25 @@ const Section& ground_section() {
              "D, step 2"),
          word<&Scene::render, &RenderOptions::ground, &Ground::pattern>(
              "pattern", {"plain", "country", "water"},
-             "`plain`: `albedo` everywhere. `country`: fields, hedges and woods of noise, whose mean is `albedo`. "
-             "`water`: a sea with waves (`water`), `albedo` being that below its surface, such as 0.02, 0.05, 0.06. "
+             "`plain`: `albedo` everywhere. `country`: fields, hedges and woods of noise, whose mean is "
+             "`albedo`. "
+             "`water`: a sea with waves (`water`), `albedo` being that below its surface, such as 0.02, "
+             "0.05, 0.06. "
              "See docs/ground.md."),
          render_key<&RenderOptions::ground, &Ground::field_m>("field_m", "m", between(20, 5000),
                                                               "Size of a field of the country."),
          default_is(key<&Scene::render, &RenderOptions::terrain, &TerrainOptions::height_map>(
                         "height_map", "", kAny,
-                        "File of heights that stand on the plane, north up: PNG of 16 bits of grey, raw 16-bit numbers "
-                        "(`.raw`, `.r16`, little-endian) or EXR in metres. Relative to the scene's folder. See `terrain`.",
+                        "File of heights that stand on the plane, north up: PNG of 16 bits of grey, raw "
+                        "16-bit numbers "
+                        "(`.raw`, `.r16`, little-endian) or EXR in metres. Relative to the scene's folder. "
+                        "See `terrain`.",
                         "S, atmosphere"),
                     "level ground"),
          written_if(word<&Scene::render, &RenderOptions::terrain, &TerrainOptions::relief>(
                         "relief", {"none", "hills", "ridges"},
-                        "Heights that are generated instead: rounded hills, or mountains with crests and valleys that rivers "
+                        "Heights that are generated instead: rounded hills, or mountains with crests and "
+                        "valleys that rivers "
                         "have cut. See `terrain`."),
                     [](const void* scene) {
                         return static_cast<const Scene*>(scene)->render.terrain.relief != Relief::none;
@@ -368,11 +425,12 @@ const Section& detail_section() {
              "Mean free path of light in cloud where half of the space is cloud; 0: three quarters of a "
              "cell, or in thin "
              "clouds that at 0.7 of the density that they have in the mean, lest they be torn. Smaller makes "
-             "crisper, denser clouds of the same mass; in real cumulus it is 10 to 20 m. Even sheets want more."),
-         key<&DetailOptions::to_horizon>(
-             "to_horizon", "", kAny,
-             "Pictures: a lattice with periodic sides in x and y goes on to the horizon, with its shadows. Off: there is "
-             "nothing beyond it."),
+             "crisper, denser clouds of the same mass; in real cumulus it is 10 to 20 m. Even sheets want "
+             "more."),
+         key<&DetailOptions::to_horizon>("to_horizon", "", kAny,
+                                         "Pictures: a lattice with periodic sides in x and y goes on to the "
+                                         "horizon, with its shadows. Off: there is "
+                                         "nothing beyond it."),
          key<&DetailOptions::apron_cells>(
              "apron_cells", "cells", between(0, 64),
              "How far from an open side cloud begins to thin out, so that no side cuts it straight.")},

@@ -3,9 +3,13 @@
 
 #include "render/options/sun_position.h"
 
+#include <cmath>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "render/options/options.h"
+#include "render/options/sun_path.h"
 
 namespace nephos {
 namespace {
@@ -49,6 +53,34 @@ TEST(SunPosition, TakesOnlyMoments) {
         EXPECT_FALSE(days_since_2000(date, "12:00")) << date;
     for (const char* time : {"", "24:00", "12:60", "1200", "12:00:60", "12.00", "12:00:00 "})
         EXPECT_FALSE(days_since_2000("2026-06-21", time)) << time;
+}
+
+// Key frames of the sun: exactly its values at their times, evenly between them and the shorter way round, standing still
+// outside. At any time a picture can be drawn with it.
+TEST(SunPath, GoesEvenlyFromKeyToKey) {
+    Sun sun;
+    sun.elevation_deg = 77;
+    const std::vector<SunKey> path{
+        {10, 8, 350, {1, 1, 1}}, {20, -18, 20, {1, 0.5, 0}}, {30, 90, 300, {0.2, 0.2, 0.2}}};
+    for (const SunKey& key : path) {
+        const Sun at = sun_at(sun, path, key.time_s);
+        EXPECT_EQ(at.elevation_deg, key.elevation_deg);
+        EXPECT_EQ(at.azimuth_deg, key.azimuth_deg);
+        EXPECT_EQ(at.colour, key.colour);
+    }
+    EXPECT_EQ(sun_at(sun, path, 0), sun_at(sun, path, 10));
+    EXPECT_EQ(sun_at(sun, path, 1e9), sun_at(sun, path, 30));
+    const Sun middle = sun_at(sun, path, 15);
+    EXPECT_DOUBLE_EQ(middle.elevation_deg, -5);
+    EXPECT_NEAR(std::remainder(middle.azimuth_deg - 5, 360.0), 0, 1e-9);  // over north, by 30 degrees
+    EXPECT_DOUBLE_EQ(middle.colour[1], 0.75);
+    EXPECT_NEAR(std::remainder(sun_at(sun, path, 25).azimuth_deg - 340, 360.0), 0, 1e-9);
+    for (double t = 0; t < 40; t += 0.1) {
+        RenderOptions now;
+        now.sun = sun_at(sun, path, t);
+        EXPECT_NO_THROW(check(now)) << t;
+    }
+    EXPECT_EQ(sun_at(sun, {}, 15), sun);
 }
 
 }  // namespace

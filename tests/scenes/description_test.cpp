@@ -59,9 +59,11 @@ std::size_t keys_at(const std::vector<std::string>& path) {
 // A field that somebody adds to an option struct must become a key, too. Whoever comes here: add it to
 // scenes/format/schema_automaton.cpp or scenes/format/schema_output.cpp and build the target scene_descriptions.
 TEST(Description, EveryOptionHasAKey) {
-    EXPECT_EQ(keys_at({"density"}),
-              member_count<DensityOptions>() - 1 + member_count<DensityFileOptions>());  // the other is [detail]
-    EXPECT_EQ(keys_at({"georeference"}), member_count<Georeference>() - 1);  // given: that the section is there
+    EXPECT_EQ(
+        keys_at({"density"}),
+        member_count<DensityOptions>() - 1 + member_count<DensityFileOptions>());  // the other is [detail]
+    EXPECT_EQ(keys_at({"georeference"}),
+              member_count<Georeference>() - 1);  // given: that the section is there
     EXPECT_EQ(keys_at({"detail"}), member_count<DetailOptions>());
     EXPECT_EQ(keys_at({"density", "smoothing"}), member_count<SmoothingOptions>());
     EXPECT_EQ(keys_at({"frames"}), member_count<FrameOptions>());
@@ -81,8 +83,9 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"fog"}), member_count<Fog>());
     EXPECT_EQ(keys_at({"lightning"}), member_count<LightningFlash>());
     EXPECT_EQ(keys_at({"debug_view"}), member_count<DebugView>());
-    // [sun] also holds the size of the shadow map, the one plain member of RenderOptions.
-    EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 1);
+    // [sun] also holds the size of the shadow map, the one plain member of RenderOptions, and the key frames.
+    EXPECT_EQ(keys_at({"sun"}), member_count<Sun>() + 2);
+    EXPECT_EQ(keys_at({"sun", "path"}), member_count<SunKey>());
     EXPECT_EQ(keys_at({"precipitation"}), member_count<PrecipitationOptions>());
     EXPECT_EQ(keys_at({"level_of_detail"}), member_count<LevelOfDetailOptions>());
     EXPECT_EQ(keys_at({"camera", "path"}), member_count<CameraKey>());
@@ -94,9 +97,11 @@ TEST(Description, EveryOptionHasAKey) {
     EXPECT_EQ(keys_at({"field", "scatters", "thermals"}), member_count<ThermalPlume>());
     EXPECT_EQ(keys_at({"field", "profile"}), member_count<BackgroundKeyframe>());
     // A level's background has three keys.
-    EXPECT_EQ(keys_at({"field", "profile", "levels"}), member_count<BackgroundLevel>() - 1 + member_count<Probabilities>());
-    EXPECT_EQ(keys_at({"field", "grids"}), member_count<ProbabilityGrid>() - 1);  // the samples are the file's
-    EXPECT_EQ(keys_at({"wind_field"}), member_count<WindField>() - 1);            // likewise
+    EXPECT_EQ(keys_at({"field", "profile", "levels"}),
+              member_count<BackgroundLevel>() - 1 + member_count<Probabilities>());
+    EXPECT_EQ(keys_at({"field", "grids"}),
+              member_count<ProbabilityGrid>() - 1);                     // the samples are the file's
+    EXPECT_EQ(keys_at({"wind_field"}), member_count<WindField>() - 1);  // likewise
     EXPECT_EQ(keys_at({"wind"}), member_count<WindKeyframe>());
     // A level's velocity has two keys.
     EXPECT_EQ(keys_at({"wind", "levels"}), member_count<WindLevel>() - 1 + member_count<Velocity>());
@@ -105,11 +110,12 @@ TEST(Description, EveryOptionHasAKey) {
     // The others of AutomatonOptions: time.step_s, seed, field, wind.
     EXPECT_EQ(member_count<AutomatonOptions>(), 8u);
     EXPECT_EQ(keys_at({"time"}), 2u);
-    EXPECT_EQ(member_count<Scene>(), 15u);
+    EXPECT_EQ(member_count<Scene>(), 16u);
 }
 
 TEST(Description, EveryOptionOfCloudsHasAKey) {
-    EXPECT_EQ(keys_at({"model"}), member_count<BaseModel>() - 2);  // whether it has a centre and a rim of its own
+    EXPECT_EQ(keys_at({"model"}),
+              member_count<BaseModel>() - 2);  // whether it has a centre and a rim of its own
     EXPECT_EQ(keys_at({"model", "seeds"}), member_count<Seed>());
     EXPECT_EQ(keys_at({"model", "seeds", "roots"}), member_count<Root>());
     EXPECT_EQ(keys_at({"sky"}), member_count<NamedSky>());
@@ -122,7 +128,8 @@ TEST(Description, EveryOptionOfCloudsHasAKey) {
     EXPECT_EQ(keys_at({"layer", "slab", "two_samples"}), member_count<TwoSampleLight>());
     EXPECT_EQ(keys_at({"layer", "metamorphoses"}), member_count<NamedMetamorphosis>());
     EXPECT_EQ(keys_at({"layer", "coupling", "genera"}), member_count<GenusCoupling>());
-    EXPECT_EQ(keys_at({"layer", "veil"}), member_count<VeilOptions>() - 2);  // the seed is the layer's, the period the tile's
+    EXPECT_EQ(keys_at({"layer", "veil"}),
+              member_count<VeilOptions>() - 2);  // the seed is the layer's, the period the tile's
     EXPECT_EQ(keys_at({"layer", "veil", "area"}), member_count<VeilArea>());
     EXPECT_EQ(keys_at({"layer", "veil", "octave"}), member_count<VeilOctave>());
     EXPECT_EQ(keys_at({"layer", "lattice"}), 5u);
@@ -321,7 +328,8 @@ void for_every_value(const Section& section, void* owner, const std::string& pat
 // What names something else: changed alone, the scene is no longer valid, but its hash is another one.
 bool is_reference(const std::string& path) {
     return path.ends_with("/name") || path.ends_with("/models") || path.ends_with("/skies") ||
-           path.ends_with("/model") || path.ends_with("/from") || path.ends_with("/to") || path.ends_with("/initial_state");
+           path.ends_with("/model") || path.ends_with("/from") || path.ends_with("/to") ||
+           path.ends_with("/initial_state");
 }
 
 // What must fit its neighbours.

@@ -413,6 +413,64 @@ class Story(Case):
                 window = image.convert("RGB")
             self.assertTrue(self.replayed(scene, step, window.size).tobytes() == window.tobytes(), f"step {step}")
 
+    def test_a_sun_that_is_moved_is_replayed(self):
+        """The sun is dragged on its dial and typed while the scene runs and stands, below the horizon too, with clouds that
+        follow it in turn: the saved scene has key frames of it, and the window's pictures before, at and after each."""
+        scene = self.folder / "sun.toml"
+        scene.write_text(LIVE_SCENE + "[light]\ncfa_clouds_per_frame = 2\n", encoding="utf-8")
+        self.edit(scene, "--validation", size="1100x900", script="""
+            wait-step 1
+            click tab View
+            click "Record as key frames"
+            wait-step 8
+            click-at "sun dial in view" 0.9 0.5
+            wait-step 14
+            key SPACE
+            wait-picture
+            click tab Properties
+            click sun
+            set sun.elevation_deg 4
+            wait-picture
+            click-at "sun dial" 0.2 0.45
+            wait-picture
+            picture shown-%.png
+            key .
+            wait-picture
+            set sun.elevation_deg -9
+            wait-picture
+            picture shown-%.png
+            key SPACE
+            wait-step 24
+            key SPACE
+            wait-picture
+            picture shown-%.png
+            set time 7
+            wait-picture
+            picture shown-%.png
+            hashes seen.txt
+            screenshot sun.png
+            key CTRL+S
+            wait 0.5
+            """)
+        saved = tomllib.loads(scene.read_text(encoding="utf-8"))
+        self.assertEqual(saved["sun"]["elevation_deg"], 30)  # as before the first change
+        path = saved["sun"]["path"]
+        self.assertGreaterEqual(len(path), 5, path)
+        self.assertEqual(path[0]["elevation_deg"], 30)
+        self.assertEqual(path[-1]["elevation_deg"], -9)
+        self.assertEqual(path[-1]["time_s"] % 10, 0)
+        self.assertEqual(len({key["azimuth_deg"] for key in path}), 3, path)
+        seen = (self.folder / "seen.txt").read_text(encoding="utf-8").splitlines()
+        replay = subprocess.run([NEPHOS, "hash", str(scene), "--steps", str(len(seen) - 1)], capture_output=True, text=True,
+                                check=True).stdout.splitlines()
+        self.assertEqual(replay, seen)
+        shown = {int(path.stem.split("-")[1]): path for path in self.folder.glob("shown-*.png")}
+        self.assertGreaterEqual(len(shown), 4, shown)
+        for step, path in sorted(shown.items()):
+            with Image.open(path) as image:
+                window = image.convert("RGB")
+            self.assertTrue(self.replayed(scene, step, window.size).tobytes() == window.tobytes(), f"step {step}")
+
     def test_save_keeps_what_was_not_touched(self):
         """One slider and a save: one line of the file differs."""
         scene = self.scene("cumulus.toml")

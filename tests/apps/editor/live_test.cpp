@@ -253,6 +253,8 @@ TEST(LiveScene, OnlySomeChangesNeedAnotherSimulation) {
     other.render.sun.elevation_deg = 3;
     other.density.extinction_per_m = 0.3;
     EXPECT_EQ(change_between(scene, other), SceneChange::picture);
+    other.sun_path = {{0, 3, 90, {1, 1, 1}}};
+    EXPECT_EQ(change_between(scene, other), SceneChange::picture);
     other.automaton.seed = 4;
     EXPECT_EQ(change_between(scene, other), SceneChange::simulation);
 }
