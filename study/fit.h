@@ -103,6 +103,7 @@ struct FitOptions {
     SweepOptions base;  // scene, steps, overrides; no axes
     FitProblem problem;
 };
-FitOptions read_fit_file(const std::filesystem::path& path);
+// Reads one; `runs` in place of those that it asks for. Throws SceneErrors naming line and column, and Error(io).
+FitOptions read_fit_file(const std::filesystem::path& path, std::optional<std::uint64_t> runs = {});
 
 }  // namespace nephos

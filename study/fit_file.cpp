@@ -65,7 +65,7 @@ void read_target_mask(TomlTable& target, const std::filesystem::path& folder, Fi
 
 }  // namespace
 
-FitOptions read_fit_file(const std::filesystem::path& path) {
+FitOptions read_fit_file(const std::filesystem::path& path, std::optional<std::uint64_t> runs) {
     constexpr double kLargest = std::numeric_limits<double>::max();
     FitOptions options;
     options.base.replicates = 1;
@@ -109,6 +109,7 @@ FitOptions read_fit_file(const std::filesystem::path& path) {
         });
         if (options.problem.parameters.empty())
             table.report("parameter", "the fit has no parameter", "expected a table [[parameter]]");
+        if (runs) options.problem.runs = *runs;
         const std::uint64_t fewest = fewest_runs(options.problem.parameters.size());
         if (options.problem.runs < fewest)
             table.report("runs",

@@ -192,8 +192,8 @@ std::optional<double> default_fill(std::uint32_t type) {
     }
 }
 
-// NetCDF classic has no unsigned types but in CDF-5: the attribute _Unsigned says that a variable is meant so, and with it its
-// attributes of the same type (NetCDF Users Guide, "Attribute Conventions").
+// NetCDF classic has no unsigned types but in CDF-5: the attribute _Unsigned says that a variable is meant so, and with it those
+// of its attributes of the same type that are values of it (NetCDF Users Guide, "Attribute Conventions").
 void take_as_unsigned(FoundVariable& variable) {
     const auto found = variable.attributes.find("_Unsigned");
     if (found == variable.attributes.end()) return;
@@ -207,8 +207,11 @@ void take_as_unsigned(FoundVariable& variable) {
     if (variable.attributes.find("_FillValue") == variable.attributes.end())
         if (const std::optional<double> usual = default_fill(type))
             variable.attributes["_FillValue"] = {type, {*usual}, {}};
-    for (auto& [name, attribute] : variable.attributes) {
-        if (attribute.type != type) continue;
+    // Those that hold packed values; what packs them, scale_factor and add_offset, has a sign of its own.
+    for (const char* name : {"_FillValue", "missing_value", "valid_min", "valid_max", "valid_range"}) {
+        const auto at = variable.attributes.find(name);
+        if (at == variable.attributes.end() || at->second.type != type) continue;
+        Attribute& attribute = at->second;
         attribute.type = variable.type;
         for (double& value : attribute.values) value = without_sign(value, type);
     }

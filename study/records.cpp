@@ -99,8 +99,7 @@ RunRecord record_of(const Json& json) {
     result.snapshots = json.at("snapshots").get<std::uint64_t>();
     if (const auto tracks = json.find("tracks"); tracks != json.end())
         for (std::size_t n = 0; n < kTrackColumns.size(); ++n)
-            // Records of earlier versions have fewer columns.
-            result.tracks.push_back(n < tracks->size() ? number_of(tracks->at(n)) : std::nan(""));
+            result.tracks.push_back(number_of(tracks->at(n)));
     result.state_hash = json.at("state_hash").get<std::string>();
     record.series_offset = json.at("series_offset").get<std::uint64_t>();
     record.series_bytes = json.at("series_bytes").get<std::uint64_t>();
@@ -302,7 +301,7 @@ void remove_shards(const std::filesystem::path& folder, std::uint32_t number, st
         std::erase_if(files, [&](const auto& path) { return path != shard_path(folder, number, of); });
     std::vector<Descriptor> locks;
     for (const std::filesystem::path& path : files) {
-        locks.push_back(open_regular_file(path, O_RDONLY));
+        locks.push_back(open_regular_file(path, O_RDWR));
         lock(path, locks.back());
     }
     for (const std::filesystem::path& path : files) {
@@ -320,21 +319,19 @@ FolderGuard::FolderGuard(const std::filesystem::path& folder) : folder_(folder) 
     std::error_code error;
     std::filesystem::create_directories(shards, error);
     if (error) throw Error(ErrorCode::io, shards.string() + ": cannot make the folder: " + error.message());
-    shards_ = ::open(shards.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (shards_ < 0)
-        throw Error(ErrorCode::io, shards.string() + ": cannot open the folder: " + std::strerror(errno));
+    // A file that is open for writing: NFS locks no folders, and no others exclusively.
+    file_ = open_regular_file(shards / "lock", O_RDWR | O_CREAT).release();
     // Where a file system has no locks, nothing is kept apart, as with those of shards.
-    while (::flock(shards_, LOCK_EX) != 0 && errno == EINTR) {
+    while (::flock(file_, LOCK_EX) != 0 && errno == EINTR) {
     }
 }
 
-FolderGuard::~FolderGuard() { ::close(shards_); }
+FolderGuard::~FolderGuard() { ::close(file_); }
 
-void FolderGuard::require_no_other_writer(std::uint32_t number, std::uint32_t of) const {
+void FolderGuard::require_no_writer() const {
     for (const std::filesystem::path& path : files_of_shards(folder_)) {
-        if (path == shard_path(folder_, number, of)) continue;
         const Descriptor file = open_regular_file(path, O_RDONLY);
-        if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        if (::flock(file.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK)
             throw Error(ErrorCode::io,
                         path.string() +
                             ": a sweep of another plan is writing into this folder: wait for its "

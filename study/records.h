@@ -73,16 +73,17 @@ void remove_shards(const std::filesystem::path& folder, std::uint32_t number, st
 class FolderGuard {
   public:
     explicit FolderGuard(const std::filesystem::path& folder);
+
     ~FolderGuard();
     FolderGuard(const FolderGuard&) = delete;
     FolderGuard& operator=(const FolderGuard&) = delete;
 
-    // Throws Error(io) when another process writes a shard of the folder, whichever but that of the number.
-    void require_no_other_writer(std::uint32_t number, std::uint32_t of) const;
+    // Throws Error(io) when a process writes a shard of the folder, also this one.
+    void require_no_writer() const;
 
   private:
     std::filesystem::path folder_;
-    int shards_ = -1;  // descriptor of the folder of shards
+    int file_ = -1;  // descriptor of the file that is locked
 };
 
 // A shard while its process appends to it.

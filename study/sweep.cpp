@@ -82,14 +82,16 @@ bool has_content(const std::filesystem::path& path, const std::string& content) 
 }
 
 // A folder whose plan is another one may get this one as soon as nobody makes runs of that; none has plans side by side.
-void replace_plan(const SweepPlan& plan, const FolderGuard& guard, const SweepJob& job) {
-    const std::filesystem::path scene = job.folder / "scene.toml", sweep = job.folder / "sweep.toml";
+// Throws Error(io) before anything is changed.
+void require_place_for(const SweepPlan& plan, const FolderGuard& guard, const std::filesystem::path& folder) {
     std::error_code error;
-    const bool is_new = !std::filesystem::exists(sweep, error);
-    if (!is_new && !(has_content(scene, plan.scene_text()) && has_content(sweep, plan.to_toml())))
-        guard.require_no_other_writer(job.shard, job.shards);
-    write_atomically(scene, plan.scene_text());
-    write_atomically(sweep, plan.to_toml());
+    const bool is_new = !std::filesystem::exists(folder / "sweep.toml", error);
+    if (!is_new && !is_plan_of(plan, folder)) guard.require_no_writer();
+}
+
+void place_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
+    write_atomically(folder / "scene.toml", plan.scene_text());
+    write_atomically(folder / "sweep.toml", plan.to_toml());
 }
 
 // Counts what is there. Goes over all runs, but keeps none.
@@ -121,7 +123,13 @@ SweepReport status_of(const SweepPlan& plan, const SweepJob& job, const Records&
 
 void write_plan(const SweepPlan& plan, const std::filesystem::path& folder) {
     const FolderGuard guard(folder);
-    replace_plan(plan, guard, {.folder = folder, .shards = 0});
+    require_place_for(plan, guard, folder);
+    place_plan(plan, folder);
+}
+
+bool is_plan_of(const SweepPlan& plan, const std::filesystem::path& folder) {
+    return has_content(folder / "scene.toml", plan.scene_text()) &&
+           has_content(folder / "sweep.toml", plan.to_toml());
 }
 
 SweepReport sweep_status(const SweepPlan& plan, const SweepJob& job) {
@@ -132,10 +140,9 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<void(const SweepProgress&)>& progress,
                       const std::function<bool()>& stop) {
     const Clock::time_point begin = Clock::now();
-    if (job.overwrite) {
-        const FolderGuard guard(job.folder);
-        remove_shards(job.folder, job.shard, job.shards);
-    }
+    std::optional<FolderGuard> guard(job.folder);
+    require_place_for(plan, *guard, job.folder);
+    if (job.overwrite) remove_shards(job.folder, job.shard, job.shards);
     // Whoever overwrites does not ask what other shards have done: they may be of another version.
     const Records records = job.overwrite ? Records() : Records::read({job.folder});
     SweepReport report = status_of(plan, job, records);
@@ -152,11 +159,9 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
         report.failures.clear();
     }
     std::optional<Shard> opened;
-    {
-        const FolderGuard guard(job.folder);
-        if (count.done < count.in_all) opened.emplace(job.folder, job.shard, job.shards);
-        replace_plan(plan, guard, job);
-    }
+    if (count.done < count.in_all) opened.emplace(job.folder, job.shard, job.shards);
+    place_plan(plan, job.folder);
+    guard.reset();
     if (!opened) return report;
     Shard& shard = *opened;
     std::uint64_t at = 0;

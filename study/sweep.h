@@ -60,6 +60,9 @@ SweepReport run_sweep(const SweepPlan& plan, const SweepJob& job,
                       const std::function<void(const SweepProgress&)>& progress,
                       const std::function<bool()>& stop);
 
+// Returns whether the folder has this plan.
+bool is_plan_of(const SweepPlan& plan, const std::filesystem::path& folder);
+
 // Reads the plan of a folder from its sweep file. Throws SceneErrors and Error(io).
 SweepPlan plan_of_folder(const std::filesystem::path& folder);
 

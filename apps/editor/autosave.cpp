@@ -11,6 +11,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/atomic_file.h"
@@ -29,20 +30,24 @@ constexpr std::string_view kEnd = ".autosave";
     throw Error(ErrorCode::io, path.string() + ": " + what + ": " + std::strerror(error));
 }
 
-// Returns 0, EWOULDBLOCK when another has it, or why locks are not to be had here.
-int lock(int file) {
+// Returns 0, EWOULDBLOCK when another has it, or why locks are not to be had here. NFS gives exclusive locks to files that
+// are open for writing alone, and shared ones to the others.
+int lock(int file, int kind = LOCK_EX) {
     int result;
-    do result = ::flock(file, LOCK_EX | LOCK_NB);
+    do result = ::flock(file, kind | LOCK_NB);
     while (result != 0 && errno == EINTR);
     return result == 0 ? 0 : errno;
 }
 
 // Returns the file with its lock. On a file system without locks the file alone: nothing says that another has it.
-Descriptor locked(const fs::path& path) {
-    Descriptor file(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-    if (file.get() < 0) fail(path, "cannot be opened", errno);
-    if (lock(file.get()) == EWOULDBLOCK || !is_same_file(file.get(), path))
-        throw Error(ErrorCode::io, path.string() + ": another editor has it now");
+Descriptor locked(const LeftAutosave& left) {
+    Descriptor file(::open(left.path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    if (file.get() < 0) fail(left.path, "cannot be opened", errno);
+    struct stat status {};
+    const bool is_found =
+        ::fstat(file.get(), &status) == 0 && status.st_dev == left.device && status.st_ino == left.inode;
+    if (!is_found || lock(file.get()) == EWOULDBLOCK || !is_same_file(file.get(), left.path))
+        throw Error(ErrorCode::io, left.path.string() + ": another editor has it now");
     return file;
 }
 
@@ -53,14 +58,28 @@ fs::path numbered(const fs::path& folder, const std::string& name, int attempt) 
     return folder / ("." + name + middle + std::string(kEnd));
 }
 
-// Returns whether a file name is one of those of numbered().
-bool is_of(const std::string& file, const std::string& name) {
-    const std::string begin = "." + name;
-    if (file.size() < begin.size() + kEnd.size() || !file.starts_with(begin) || !file.ends_with(kEnd))
-        return false;
-    const std::string middle = file.substr(begin.size(), file.size() - begin.size() - kEnd.size());
-    return middle.empty() || (middle[0] == '.' && middle.size() > 1 &&
-                              middle.find_first_not_of("0123456789-", 1) == std::string::npos);
+// Takes `what` and the digits behind it from the front of a text. Returns whether there were any.
+bool take_number(std::string_view& text, char what) {
+    if (text.empty() || text.front() != what) return false;
+    const std::size_t end = std::min(text.find_first_not_of("0123456789", 1), text.size());
+    if (end < 2) return false;
+    text.remove_prefix(end);
+    return true;
+}
+
+// Returns the scene that a file of one of the names of numbered() belongs to: `name`, or a copy of it, "NAME-2.toml".
+// Empty: it belongs to neither.
+std::string scene_of(std::string_view file, const fs::path& name) {
+    const std::string begin = "." + name.stem().string(), extension = name.extension().string();
+    if (!file.starts_with(begin) || !file.ends_with(kEnd)) return {};
+    file.remove_suffix(kEnd.size());
+    std::string_view rest = file.substr(begin.size());
+    take_number(rest, '-');
+    if (!rest.starts_with(extension)) return {};
+    rest.remove_prefix(extension.size());
+    const std::string_view scene = file.substr(1, file.size() - rest.size() - 1);
+    if (take_number(rest, '.')) take_number(rest, '-');
+    return rest.empty() ? std::string(scene) : std::string();
 }
 
 }  // namespace
@@ -98,7 +117,7 @@ void AutosaveFile::write(const fs::path& folder, const std::string& name, std::s
 }
 
 void AutosaveFile::adopt(const LeftAutosave& left) {
-    Descriptor file = locked(left.path);
+    Descriptor file = locked(left);
     remove();
     file_ = std::move(file);
     path_ = left.path;
@@ -116,13 +135,17 @@ std::vector<LeftAutosave> left_autosaves(const fs::path& folder, const std::stri
     for (auto at = fs::directory_iterator(folder, error); !error && at != fs::directory_iterator();
          at.increment(error)) {
         std::error_code ignored;
-        if (!is_of(at->path().filename().string(), name) || at->is_symlink(ignored) ||
-            !at->is_regular_file(ignored))
-            continue;
-        LeftAutosave left{at->path(), at->last_write_time(ignored), {}, {}};
+        const std::string scene = scene_of(at->path().filename().string(), name);
+        if (scene.empty() || at->is_symlink(ignored) || !at->is_regular_file(ignored)) continue;
+        if (scene != name && fs::exists(folder / scene, ignored)) continue;  // it is asked about with that
+        LeftAutosave left{at->path(), at->last_write_time(ignored), {}, {}, scene};
         const Descriptor file(::open(left.path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
         if (file.get() < 0 && errno == ENOENT) continue;
-        if (file.get() >= 0 && lock(file.get()) == EWOULDBLOCK) continue;
+        if (file.get() >= 0 && lock(file.get(), LOCK_SH) == EWOULDBLOCK) continue;
+        if (struct stat status{}; file.get() >= 0 && ::fstat(file.get(), &status) == 0) {
+            left.device = status.st_dev;
+            left.inode = status.st_ino;
+        }
         try {
             left.text = read_text_file(left.path, kMaxSceneBytes);
             if (left.text.size() > kMaxSceneBytes)
@@ -140,12 +163,12 @@ std::vector<LeftAutosave> left_autosaves(const fs::path& folder, const std::stri
 }
 
 void delete_autosave(const LeftAutosave& left) {
-    const Descriptor file = locked(left.path);
+    const Descriptor file = locked(left);
     if (::unlink(left.path.c_str()) != 0) fail(left.path, "cannot be removed", errno);
 }
 
 fs::path keep_autosave(const LeftAutosave& left, const fs::path& name) {
-    const Descriptor file = locked(left.path);
+    const Descriptor file = locked(left);
     for (int number = 1;; ++number) {
         const std::string end = number == 1 ? "-recovered" : "-recovered-" + std::to_string(number);
         const fs::path kept =

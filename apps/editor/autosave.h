@@ -5,6 +5,7 @@
 // as long as it lives, so that no other takes it for that of a crashed session. A name that another file has, whose ever
 // it is, is left alone: then the file is ".sky.toml.PID.autosave". Not thread-safe.
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -20,6 +21,8 @@ struct LeftAutosave {
     std::filesystem::file_time_type time;
     std::string text;
     std::string problem;  // why it cannot be read; empty: it was
+    std::string scene;    // file name of the scene, or of a copy of it that was never saved
+    std::uint64_t device = 0, inode = 0;  // of the file, whose name another may get
 };
 
 // The file of a document while there are unsaved edits. Its end lets the file be, unlocked.
@@ -46,11 +49,11 @@ class AutosaveFile {
     Descriptor file_;
 };
 
-// Returns the files in `folder` that ended editors left for the scene file `name`, the newest first. Locked and empty ones
-// are none. One that cannot be read is one with a problem.
+// Returns the files in `folder` that ended editors left for the scene file `name`, and for copies of it ("sky-2.toml") that
+// are no files themselves; the newest first. Locked and empty ones are none. One that cannot be read is one with a problem.
 std::vector<LeftAutosave> left_autosaves(const std::filesystem::path& folder, const std::string& name);
 
-// Removes such a file. Throws Error(io) when another editor has it.
+// Removes such a file. Throws Error(io) when another editor has it, or has written it anew.
 void delete_autosave(const LeftAutosave& left);
 
 // Moves it into a scene file of its own beside it, whose name no file has, and returns that name: "{NAME}-recovered.toml"

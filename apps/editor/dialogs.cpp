@@ -123,6 +123,7 @@ void file_dialog(Editor& editor) {
     bool open = true;
     if (!ImGui::BeginPopupModal(title, &open, ImGuiWindowFlags_NoSavedSettings)) {
         editor.dialog = FileDialog::none;
+        editor.opens_beside = false;
         return;
     }
     bool accepted = false;
@@ -186,6 +187,7 @@ void file_dialog(Editor& editor) {
         editor.dialog_problem.clear();
         editor.replaced.clear();
         ImGui::CloseCurrentPopup();
+        if (editor.pending == Pending::none) editor.opens_beside = false;  // cancelled, or done
         if (before_pending && editor.pending != Pending::none) do_pending(editor);
     }
     ImGui::EndPopup();
@@ -262,12 +264,36 @@ void open_dialog(Editor& editor, FileDialog dialog) {
 }
 
 void ask_before(Editor& editor, Pending what, fs::path path) {
+    const bool beside = what == Pending::open && editor.opens_beside;
+    forget_pending(editor);  // what was asked before is asked anew
+    editor.opens_beside = beside;
     editor.pending = what;
     editor.pending_path = std::move(path);
     if (editor.opens_beside || !editor.document->is_modified()) do_pending(editor);
 }
 
+void forget_pending(Editor& editor) {
+    editor.pending = Pending::none;
+    editor.opens_beside = false;
+    for_each_scene(editor, [](OpenScene& scene) { scene.is_answered = false; });
+}
+
+bool is_asking(const Editor& editor) {
+    return editor.pending != Pending::none || editor.question || editor.dialog != FileDialog::none ||
+           !editor.left_autosaves.empty();
+}
+
 void do_pending(Editor& editor) {
+    if (editor.pending == Pending::close && editor.exported) {
+        editor.question = {"A grid is being written: " + editor.exported->path.filename().string() + ".",
+                           "Wait for it and quit", [&editor] {
+                               finish_export(editor);
+                               editor.pending = Pending::close;
+                               do_pending(editor);
+                           }};
+        editor.pending = Pending::none;
+        return;
+    }
     if (editor.pending == Pending::close && editor.run && !editor.run->done) {
         editor.question = {
             "A run into files is under way: out/" + editor.run->folder.filename().string() + ".",

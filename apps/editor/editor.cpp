@@ -66,6 +66,20 @@ void take_new_results(Editor& editor) {
     }
 }
 
+// Writes the unsaved edits of all scenes down, of each whatever becomes of the others. Returns what could not be kept;
+// empty: all was.
+std::string autosave_all(Editor& editor) {
+    std::string failures;
+    for_each_scene(editor, [&](OpenScene& scene) {
+        try {
+            scene.document->autosave(editor.folder);
+        } catch (const std::exception& error) {
+            failures += (failures.empty() ? "" : "; ") + scene.document->title() + ": " + error.what();
+        }
+    });
+    return failures;
+}
+
 void look_after_files(Editor& editor) {
     const Clock::time_point now = Clock::now();
     if (now - editor.last_disk_look > std::chrono::milliseconds(700)) {
@@ -85,15 +99,13 @@ void look_after_files(Editor& editor) {
     }
     if (now - editor.last_autosave > std::chrono::seconds(5)) {
         editor.last_autosave = now;
-        try {
-            editor.document->autosave(editor.folder);
-        } catch (const std::exception& error) {
-            say(editor, std::string("Not autosaved: ") + error.what(), true);
-        }
+        const std::string failures = autosave_all(editor);
+        if (!failures.empty()) say(editor, "Not autosaved: " + failures, true);
     }
 }
 
 void shortcuts(Editor& editor) {
+    if (is_asking(editor)) return;
     const ImGuiIO& io = ImGui::GetIO();
     const auto pressed = [](int key) { return ImGui::IsKeyPressed(key, false); };
     if (io.KeyCtrl) {
@@ -181,7 +193,8 @@ int loop(Editor& editor, Report& report) {
     bool screenshot_due = !editor.options.screenshot.empty();
     while (!editor.quit) {
         if (const int signal = pending_signal(); signal != 0) {
-            for_each_scene(editor, [&](OpenScene& scene) { scene.document->autosave(editor.folder); });
+            const std::string failures = autosave_all(editor);
+            if (!failures.empty()) fmt::print(stderr, "unsaved edits could not be kept: {}\n", failures);
             return 128 + signal;
         }
         if (!editor.window->is_minimised()) {
@@ -258,11 +271,8 @@ std::string kept_edits(Editor& editor) {
     bool any = false;
     for_each_scene(editor, [&](const OpenScene& scene) { any |= scene.document->is_modified(); });
     if (!any) return {};
-    try {
-        for_each_scene(editor, [&](OpenScene& scene) { scene.document->autosave(editor.folder); });
-    } catch (const std::exception& error) {
-        return std::string("; unsaved edits could not be kept: ") + error.what();
-    }
+    const std::string failures = autosave_all(editor);
+    if (!failures.empty()) return "; unsaved edits could not be kept: " + failures;
     return "; unsaved edits are kept, and are offered at the next start with this scene";
 }
 
@@ -360,6 +370,7 @@ int run_editor(const EditorOptions& options) {
     } catch (const std::exception& error) {
         throw Error(ErrorCode::io, error.what() + kept_edits(editor));
     }
+    finish_export(editor);
     if (options.report) report.print(editor);
     if (status != 0) return status;  // by a signal: edits were kept
     for_each_scene(editor, [](OpenScene& scene) { scene.document->remove_autosave(); });

@@ -134,13 +134,15 @@ void start_export(Editor& editor, const fs::path& path) {
 
 void watch_export(Editor& editor) {
     if (!editor.exported || !editor.exported->done) return;
+    attempt(editor, [&] { finish_export(editor); });
+}
+
+void finish_export(Editor& editor) {
+    if (!editor.exported) return;
     const std::unique_ptr<BackgroundExport> done = std::move(editor.exported);
     done->thread.join();
-    if (done->failure.empty()) {
-        say(editor, "Grid of step " + std::to_string(done->step) + ": " + done->path.string());
-    } else {
-        say(editor, "No grid was written: " + done->failure, true);
-    }
+    if (!done->failure.empty()) throw Error(ErrorCode::io, "no grid was written: " + done->failure);
+    say(editor, "Grid of step " + std::to_string(done->step) + ": " + done->path.string());
 }
 
 void file_button(Editor& editor, const std::string& name, const std::string& extension,

@@ -80,12 +80,25 @@ SceneChange change_between(const Scene& before, const Scene& after) {
     return same == after ? SceneChange::picture : SceneChange::simulation;
 }
 
+namespace {
+std::size_t bytes_of(const Checkpoint& checkpoint) {
+    return checkpoint.automaton.size() + checkpoint.history.size();
+}
+}  // namespace
+
 LiveScene::LiveScene(DeviceOptions device) : device_(std::move(device)) {
     simulation_thread_ = std::thread([this] { simulate(); });
-    drawing_thread_ = std::thread([this] { draw(); });
+    try {
+        drawing_thread_ = std::thread([this] { draw(); });
+    } catch (...) {  // there is no second thread to be had
+        end_threads();
+        throw;
+    }
 }
 
-LiveScene::~LiveScene() {
+LiveScene::~LiveScene() { end_threads(); }
+
+void LiveScene::end_threads() {
     {
         const std::scoped_lock lock(mutex_);
         ended_ = true;
@@ -94,7 +107,7 @@ LiveScene::~LiveScene() {
     simulation_due_.notify_all();
     drawing_due_.notify_all();
     simulation_thread_.join();
-    drawing_thread_.join();
+    if (drawing_thread_.joinable()) drawing_thread_.join();
 }
 
 void LiveScene::start(const Scene& scene, std::uint64_t goal) {
@@ -198,6 +211,8 @@ void LiveScene::show(bool shown) {
 void LiveScene::keep_at_most(std::size_t checkpoint_bytes) {
     const std::scoped_lock lock(mutex_);
     most_checkpoint_bytes_ = checkpoint_bytes;
+    thins_ = true;
+    simulation_due_.notify_all();
 }
 
 std::shared_ptr<const LivePicture> LiveScene::picture(std::uint64_t than) const {
@@ -245,7 +260,7 @@ void LiveScene::simulate() {
     Clock::time_point next_step = Clock::now();
     while (true) {
         const auto has_work = [this] {
-            return ended_ || hold_ || new_scene_ || clear_ ||
+            return ended_ || hold_ || new_scene_ || clear_ || thins_ ||
                    (simulation_ && (running_ || !frame_ || goal_ != status_.step));
         };
         simulation_due_.wait(lock, has_work);
@@ -269,6 +284,8 @@ void LiveScene::simulate() {
         try {
             if (new_scene_) {
                 take_scene(lock);
+            } else if (std::exchange(thins_, false)) {
+                thin_checkpoints();
             } else if (goal_ != status_.step || !frame_) {
                 advance(lock, goal_);
                 next_step = Clock::now();
@@ -311,8 +328,11 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     simulation_ = std::move(simulation);
     ++simulation_number_;
     if (keeps_state) {
-        const auto later = checkpoints_.upper_bound(simulation_->next_step());
-        checkpoints_.erase(later, checkpoints_.end());
+        std::erase_if(checkpoints_, [this](const auto& entry) {
+            const bool goes = entry.first > simulation_->next_step();
+            if (goes) checkpoint_bytes_ -= bytes_of(entry.second);
+            return goes;
+        });
         if (rows_.size() > simulation_->next_step()) {
             rows_.resize(simulation_->next_step());
             ++status_.rows_version;
@@ -343,13 +363,18 @@ void LiveScene::keep_checkpoint() {
     const std::uint64_t step = simulation_->next_step();
     if (checkpoints_.contains(step) || step % checkpoint_every_ != 0) return;
     Checkpoint checkpoint = simulation_->save();
-    checkpoint_bytes_ += checkpoint.automaton.size() + checkpoint.history.size();
+    checkpoint_bytes_ += bytes_of(checkpoint);
     checkpoints_.emplace(step, std::move(checkpoint));
+    thin_checkpoints();
+}
+
+// Leaves out every other checkpoint until they keep to their memory.
+void LiveScene::thin_checkpoints() {
     while (checkpoint_bytes_ > most_checkpoint_bytes_ && checkpoints_.size() > 2) {
         checkpoint_every_ *= 2;
         std::erase_if(checkpoints_, [this](const auto& entry) {
             const bool goes = entry.first % checkpoint_every_ != 0;
-            if (goes) checkpoint_bytes_ -= entry.second.automaton.size() + entry.second.history.size();
+            if (goes) checkpoint_bytes_ -= bytes_of(entry.second);
             return goes;
         });
     }

@@ -150,6 +150,8 @@ class LiveScene {
     void advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal);
     void go_back(std::uint64_t step);
     void keep_checkpoint();
+    void thin_checkpoints();
+    void end_threads();
     void fail(const std::string& what);
     void forget_simulation();
 
@@ -159,6 +161,7 @@ class LiveScene {
 
     // Shared, under the mutex.
     bool ended_ = false, running_ = false, hold_ = false, is_held_ = false, shown_ = true;
+    bool thins_ = false;  // checkpoints are above what they may have now
     std::size_t most_checkpoint_bytes_ = std::size_t(512) << 20;
     std::optional<Scene> new_scene_;  // to simulate
     bool keeps_state_ = false;        // new_scene_ goes on from the present state

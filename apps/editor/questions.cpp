@@ -4,6 +4,9 @@
 #include <chrono>
 #include <ctime>
 #include <filesystem>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include <imgui.h>
 
@@ -55,13 +58,28 @@ void unsaved_dialog(Editor& editor) {
     }
     ImGui::SameLine();
     if (button(editor, "Go on editing") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) {
-        editor.pending = Pending::none;
-        editor.opens_beside = false;
-        for_each_scene(editor, [](OpenScene& scene) { scene.is_answered = false; });
+        forget_pending(editor);
         ImGui::CloseCurrentPopup();
     }
     ImGui::EndPopup();
 }
+
+namespace {
+
+// Takes the edits that an ended session left, into the scene, or those of a copy of it into a simulation beside it.
+void take_edits(Editor& editor, const LeftAutosave& found) {
+    if (found.scene != editor.document->title()) {
+        auto copy = std::make_unique<SceneDocument>(editor.document->saved_text(), found.scene,
+                                                    editor.document->folder());
+        if (!add_scene(editor, std::move(copy))) return;
+        std::erase_if(editor.left_autosaves,
+                      [&](const LeftAutosave& one) { return one.path == found.path; });  // it is being taken
+    }
+    editor.document->take_autosave(found);
+    say(editor, "Edits recovered; save to keep them, undo to go back");
+}
+
+}  // namespace
 
 // One file after the other; what the user decides is done to the file that was found, or said to be gone.
 void recovery_dialog(Editor& editor) {
@@ -72,8 +90,9 @@ void recovery_dialog(Editor& editor) {
                                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings))
         return;
     const LeftAutosave found = editor.left_autosaves.front();
-    const std::string title = editor.document->title();
-    bool answered = false;
+    const std::string& title = found.scene;
+    const bool is_copy = title != editor.document->title();
+    bool answered = false, takes = false;
     if (!found.problem.empty()) {
         ImGui::Text("An earlier session with %s left edits that cannot be read:", title.c_str());
         ImGui::PushTextWrapPos(34 * ImGui::GetFontSize());
@@ -83,17 +102,16 @@ void recovery_dialog(Editor& editor) {
         ImGui::Spacing();
     } else {
         ImGui::Text("An earlier session with %s ended before its edits were saved.", title.c_str());
+        if (is_copy) ImGui::Text("It is a copy of %s that has no file.", editor.document->title().c_str());
         ImGui::TextDisabled("The edits are of %s.", time_text(found.time).c_str());
-        if (const auto newer = editor.document->file_newer_than(found)) {
+        if (const auto newer = editor.document->file_newer_than(found); newer && !is_copy) {
             ImGui::Text("The file itself is newer: it was written on %s.", time_text(*newer).c_str());
             editor.controls.note("the file is newer");
         }
         ImGui::Spacing();
-        if (button(editor, "Take them", "In place of what the file has; undo goes back to that")) {
-            if (attempt(editor, [&] { editor.document->take_autosave(found); }))
-                say(editor, "Edits recovered; save to keep them, undo to go back");
-            answered = true;
-        }
+        takes = button(editor, "Take them",
+                       is_copy ? "As a simulation beside this one"
+                               : "In place of what the file has; undo goes back to that");
         ImGui::SameLine();
     }
     if (button(editor, "Keep them in a file", "As a scene beside this one, to look at later")) {
@@ -107,10 +125,11 @@ void recovery_dialog(Editor& editor) {
     }
     ImGui::SameLine();
     if (button(editor, "Ask again next time", "They stay where they are")) answered = true;
-    if (answered) {
+    if (answered || takes) {
         editor.left_autosaves.erase(editor.left_autosaves.begin());
         ImGui::CloseCurrentPopup();
     }
+    if (takes) attempt(editor, [&] { take_edits(editor, found); });
     ImGui::EndPopup();
 }
 
@@ -130,7 +149,7 @@ void question_dialog(Editor& editor) {
         const Question question = std::move(*editor.question);
         editor.question.reset();
         ImGui::CloseCurrentPopup();
-        if (no) editor.pending = Pending::none;
+        if (no) forget_pending(editor);
         if (yes) attempt(editor, question.act);
     }
     ImGui::EndPopup();

@@ -182,7 +182,8 @@ void SceneDocument::take_from_disk(FileText now) {
 }
 
 fs::path SceneDocument::autosave_folder(const fs::path& folder) const {
-    return has_file_ ? this->folder() : folder;
+    if (has_file_) return this->folder();
+    return folder_.empty() ? folder : folder_;
 }
 
 void SceneDocument::autosave(const fs::path& folder) {
@@ -200,8 +201,12 @@ std::vector<LeftAutosave> SceneDocument::left_autosaves(const fs::path& folder) 
 }
 
 void SceneDocument::take_autosave(const LeftAutosave& left) {
-    autosave_.adopt(left);
-    edit(read_file(left.path).text, "Recover");  // nobody else writes it now
+    AutosaveFile taken;  // where reading fails it is let be
+    taken.adopt(left);
+    const std::string text = read_file(left.path).text;  // nobody else writes it now
+    autosave_.remove();
+    autosave_ = std::move(taken);
+    edit(text, "Recover");
 }
 
 std::optional<fs::file_time_type> SceneDocument::file_newer_than(const LeftAutosave& left) const {

@@ -31,6 +31,8 @@ class SceneDocument {
     explicit SceneDocument(const std::filesystem::path& path);
 
     const std::string& text() const { return history_[at_].text; }
+    // As it was opened or saved last.
+    const std::string& saved_text() const { return saved_text_; }
     const TomlNode& tree() const { return tree_; }
     // The values of the text, of its last version without syntax errors.
     const Node& values() const { return values_; }

@@ -140,9 +140,9 @@ bool add_scene(Editor& editor, std::unique_ptr<SceneDocument> document) {
             true);
         return false;
     }
+    auto live = std::make_unique<LiveScene>(DeviceOptions{.splatting = Splatting::cpu});  // may fail
+    editor.scenes.emplace_back().live = std::move(live);
     put_away(editor);
-    editor.scenes.emplace_back().live =
-        std::make_unique<LiveScene>(DeviceOptions{.splatting = Splatting::cpu});
     take_out(editor, editor.scenes.size() - 1);
     share_memory(editor);
     open_document(editor, std::move(document));
@@ -159,9 +159,11 @@ void copy_scene(Editor& editor) {
     const std::string title = unused_title(editor, editor.document->title());
     const bool runs = editor.running;
     const std::uint64_t step = editor.live->status().step;
-    if (!add_scene(editor, std::make_unique<SceneDocument>(editor.document->text(), title,
-                                                           editor.document->folder())))
-        return;
+    // Edits that are not saved are not saved in the copy either.
+    auto copy =
+        std::make_unique<SceneDocument>(editor.document->saved_text(), title, editor.document->folder());
+    copy->edit(editor.document->text(), "Copy");
+    if (!add_scene(editor, std::move(copy))) return;
     editor.start_step = step;
     editor.live->run(editor.running = runs);
 }
@@ -197,9 +199,11 @@ void layers_list(Editor& editor) {
     const std::vector<LayerOptions>& layers = editor.shown_scene->layers;
     editor.view.hidden.resize(layers.size(), false);
     const LiveStep* step = nullptr;
-    if (editor.picture && editor.picture->step < editor.steps.size()) step = &editor.steps[editor.picture->step];
+    if (editor.picture && editor.picture->step < editor.steps.size())
+        step = &editor.steps[editor.picture->step];
     if (!ImGui::BeginTable("layers", 5, ImGuiTableFlags_SizingStretchProp)) return;
-    for (const char* heading : {"layer", "state", "clouds", "cover", "rain"}) ImGui::TableSetupColumn(heading);
+    for (const char* heading : {"layer", "state", "clouds", "cover", "rain"})
+        ImGui::TableSetupColumn(heading);
     ImGui::TableHeadersRow();
     for (std::size_t n = 0; n < layers.size(); ++n) {
         ImGui::TableNextRow();

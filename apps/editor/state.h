@@ -228,6 +228,10 @@ void open_document(Editor& editor, std::unique_ptr<SceneDocument> document);
 // Ends what waited for an answer about unsaved edits.
 void do_pending(Editor& editor);
 void ask_before(Editor& editor, Pending what, std::filesystem::path path = {});
+// Ends it without doing it: the user goes on.
+void forget_pending(Editor& editor);
+// Returns whether a question or a file dialog waits for an answer: keys have no other meaning then.
+bool is_asking(const Editor& editor);
 // Asks first when another program has written the file. Returns whether it was saved.
 bool save_document(Editor& editor);
 // Writes window, panels, theme and recent files down; what goes wrong is said.
@@ -300,6 +304,8 @@ void sun_dial(Editor& editor, const char* name);
 // files.cpp: writes the density that is shown, beside the window; what it says of it over the picture.
 void start_export(Editor& editor, const std::filesystem::path& path);
 void watch_export(Editor& editor);
+// Waits for the writing's end. Throws Error(io) when it failed.
+void finish_export(Editor& editor);
 // A button that opens a dialog of files with an ending, and gives their path, relative to the scene where that is
 // shorter, to `take`.
 void file_button(Editor& editor, const std::string& name, const std::string& extension,

@@ -27,8 +27,7 @@ struct FitArguments {
 
 int fit(const FitArguments& a) {
     const ThreadLimit limit(1);  // workers are forked from one thread
-    FitOptions options = read_fit_file(a.file);
-    if (a.runs) options.problem.runs = *a.runs;
+    const FitOptions options = read_fit_file(a.file, a.runs);
     SweepJob job;
     job.folder = a.out.empty() ? "out/fit-" + std::filesystem::path(a.file).stem().string() : a.out;
     job.workers = a.workers > 0 ? a.workers : int(std::max(1u, std::thread::hardware_concurrency()));
@@ -50,7 +49,8 @@ int fit(const FitArguments& a) {
         [] { return pending_signal() != 0; });
     bar.reset();
     if (!result) {
-        print_note("stopped; the same command goes on");
+        print_note(a.overwrite ? "stopped; the same command without --overwrite goes on"
+                               : "stopped; the same command goes on");
         return 128 + pending_signal();
     }
     if (a.work.quiet) return 0;

@@ -237,11 +237,16 @@ int sweep(const SweepArguments& a) {
     if (a.work.json) output.line(json_text(report_json(plan, report, folder)));
     const bool quiet = a.work.quiet || a.work.json;
     if (pending_signal() != 0) {
-        print_note(fmt::format("stopped after {} of {} runs; the same command goes on", report.progress.done,
-                               report.progress.in_all));
+        print_note(fmt::format("stopped after {} of {} runs; the same command{} goes on",
+                               report.progress.done, report.progress.in_all,
+                               a.overwrite ? " without --overwrite" : ""));
         return 128 + pending_signal();
     }
     if (job.shards == 1) {
+        const FolderGuard guard(job.folder);
+        if (!is_plan_of(plan, job.folder))
+            throw Error(ErrorCode::io,
+                        folder + ": another plan took the place of this one: no tables are written");
         write_and_print_tables(plan, Records::read({job.folder}), folder, quiet);
     } else if (!quiet) {
         output.line(fmt::format("shard {} of {} is done; when all are, `nephos merge {}` makes the tables",

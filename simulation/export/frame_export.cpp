@@ -164,17 +164,21 @@ void FrameExporter::write_dense(const std::filesystem::path& path, ExportFormat 
     }
 }
 
-// Each frame takes its grid, its voxels as floats and their codes.
+// Each frame takes its grid, its voxels as floats, those of the box with its levels as floats, and their codes.
 std::size_t frames_at_once(const ExportOptions& options, const ExportSequence& s) {
     constexpr std::uint64_t kMemory = std::uint64_t(256) << 20;
     const std::size_t threads =
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     if (threads <= 1) return 1;
-    std::uint64_t voxels = 1, codes = 0;
+    std::uint64_t voxels = 1, floats = 0, codes = 0;
     for (const int side : {s.extent.x, s.extent.y, s.extent.z}) voxels *= std::uint64_t(side);
-    for (const ExportFormat format : all_formats(options))
+    for (const ExportFormat format : all_formats(options)) {
+        if (!is_dense(format) && format != ExportFormat::flightgear) continue;
         if (is_dense(format)) codes += dense_bytes(options, s, format);
-    return std::size_t(std::clamp<std::uint64_t>(kMemory / (8 * voxels + codes), 1, threads + 1));
+        for (const auto& [x, y, z] : level_sizes(s, format))
+            floats += 4 * std::uint64_t(x) * std::uint64_t(y) * std::uint64_t(z);
+    }
+    return std::size_t(std::clamp<std::uint64_t>(kMemory / (8 * voxels + floats + codes), 1, threads + 1));
 }
 
 }  // namespace nephos

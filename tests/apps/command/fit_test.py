@@ -96,6 +96,9 @@ class Fit(Case):
                 file = self.write("bad.toml", FIT.replace(old, new))
                 self.assertIn(says, self.call("fit", file, "--out", "bad", status=2).stderr)
                 self.assertFalse((self.folder / "bad").exists())
+        said = self.call("fit", self.write("bad.toml", FIT), "--runs", "9", "--out", "bad", status=2).stderr
+        self.assertRegex(said, r"bad.toml:\d+:\d+: .*9 runs are too few")
+        self.call("fit", self.write("bad.toml", FIT.replace("runs = 32", "runs = 9")), "--runs", "16", "--out", "cured", "-j", "2")
 
 
 if __name__ == "__main__":

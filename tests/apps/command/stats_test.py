@@ -104,6 +104,8 @@ class Stats(Case):
                 (numpy.where(gone, -1, mask * -56), "i1", {"_Unsigned": "true", "_FillValue": numpy.int8(-1)}),
                 (numpy.where(gone, -1, mask * -56), "i1", {"_Unsigned": "true", "valid_range": numpy.array([0, -6], dtype="i1")}),
                 (numpy.where(gone, -32767, mask * -20), "i2", {"_Unsigned": "true", "scale_factor": 1e-6}),
+                # What packs them has a sign of its own.
+                (numpy.where(gone, -32767, mask * 20 + 100), "i2", {"_Unsigned": "true", "add_offset": numpy.int16(-100)}),
                 (numpy.where(gone, -2, mask * -20), "i4", {"_Unsigned": "true", "missing_value": numpy.int32(-2)}),
                 (numpy.where(gone, 99, packed), "i2", {"_Unsigned": "false", "scale_factor": 1e-6, "_FillValue": numpy.int16(99)}),
                 (numpy.where(gone, 99, packed + 5), "i2", {"scale_factor": 1e-6, "add_offset": -5e-6,

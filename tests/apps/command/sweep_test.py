@@ -232,7 +232,7 @@ direction_deg = 90
     def test_overwriting_a_shard_leaves_the_others(self):
         for shard in range(3):
             self.sweep("three", "--shard", f"{shard}/3")
-        kept = {path: path.read_bytes() for path in (self.folder / "three/shards").iterdir() if not path.name.startswith("0001")}
+        kept = {path: path.read_bytes() for path in (self.folder / "three/shards").glob("*-of-*") if not path.name.startswith("0001")}
         self.assertEqual(len(kept), 4)
         said = self.sweep("three", "--shard", "1/3", "--overwrite", "--json").stdout
         self.assertIn('"before": 0', said)
@@ -271,12 +271,16 @@ direction_deg = 90
         """Its runs would be in no table of the other plan."""
         process = self.started("shared", "--shard", "0/2")
         plan = {name: (self.folder / "shared" / name).read_bytes() for name in ("scene.toml", "sweep.toml")}
+        shards = self.folder / "shared/shards"
+        (shards / "0001-of-0002.jsonl").write_bytes(b"")  # which has done nothing yet
+        files = sorted(shards.iterdir())
         for arguments in ([], ["--shard", "0/2"], ["--shard", "1/2"], ["--shard", "1/2", "--overwrite"], ["--emit", "slurm"]):
             said = self.sweep("shared", *arguments, status=3).stderr
             self.assertIn("0000-of-0002.jsonl: a", said)
             self.assertIn("wait for its end", said)
             for name, content in plan.items():
                 self.assertEqual((self.folder / "shared" / name).read_bytes(), content)
+            self.assertEqual(sorted(shards.iterdir()), files)
         self.assertEqual(self.call("sweep", "shared/sweep.toml", "--out", "shared", "--status").returncode, 0)
         process.send_signal(signal.SIGTERM)
         process.wait(timeout=60)
@@ -309,6 +313,8 @@ direction_deg = 90
         process = self.started("busy", "--shard", "0/2")
         for arguments in (["--shard", "0/2"], []):
             said = self.sweep("busy", "--overwrite", *arguments, status=3).stderr
+            self.assertIn("a sweep of another plan is writing into this folder", said)
+            said = self.call("sweep", "busy/sweep.toml", "--out", "busy", "--overwrite", *arguments, status=3).stderr
             self.assertIn("another sweep is writing this shard", said)
         process.send_signal(signal.SIGTERM)
         process.wait(timeout=60)

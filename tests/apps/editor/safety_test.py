@@ -114,6 +114,82 @@ class Safety(Case):
             """)
         self.assertEqual(other.read_text(encoding="utf-8"), MODELS)
 
+    def test_a_dialog_that_is_cancelled_answers_nothing(self):
+        """Open beside, cancelled: closing asks about unsaved edits as before. Keys do nothing while it asks, and a
+        "Go back" at a later question takes the answers of before back."""
+        scene = self.models()
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            click "open simulation"
+            wait 0.3
+            click Cancel
+            key CTRL+Q
+            wait 0.3
+            expect-control "unsaved models.toml"
+            key CTRL+N
+            wait 0.3
+            expect-control "unsaved models.toml"
+            click "Go on editing"
+            wait 0.3
+            key CTRL+N
+            wait 0.3
+            expect-control "unsaved models.toml"
+            click "Save them"
+            wait 0.5
+            """)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+
+    def test_closing_asks_about_scenes_that_are_not_shown(self):
+        """A scene with edits and a copy of it, which has them too: each is asked about, the copy although it was never edited
+        itself. What was answered before one goes on is asked again."""
+        scene = self.models()
+        self.edit(scene, "--validation", script="""
+            wait-step 1
+            click sun
+            set sun.elevation_deg 21
+            click "copy simulation"
+            wait-step 1
+            click "new simulation"
+            wait-step 1
+            key CTRL+Q
+            wait 0.3
+            expect-control "unsaved models.toml"
+            click "Discard them"
+            wait 0.3
+            expect-control "unsaved models-2.toml"
+            click "Go on editing"
+            wait 0.3
+            key CTRL+Q
+            wait 0.3
+            expect-control "unsaved models-2.toml"
+            click "Discard them"
+            wait 0.3
+            expect-control "unsaved models.toml"
+            click "Save them"
+            wait 0.5
+            """)
+        self.assertIn("elevation_deg = 21", scene.read_text(encoding="utf-8"))
+        self.assertEqual([path.name for path in self.folder.glob(".*autosave")], [])
+
+    def test_edits_of_a_copy_come_back(self):
+        """A copy that was never saved, of an editor that was killed: offered with its scene, and taken beside it."""
+        scene = self.models()
+        (self.folder / ".models-2.toml.autosave").write_text(MODELS.replace("seed = 4", "seed = 12"), encoding="utf-8")
+        self.edit(scene, "--validation", script="""
+            wait 0.5
+            click "Take them"
+            wait-step 1
+            expect-control "simulation 2"
+            key CTRL+S
+            set "file name" copy.toml
+            wait 0.5
+            """)
+        self.assertEqual(scene.read_text(encoding="utf-8"), MODELS)
+        self.assertIn("seed = 12", (self.folder / "copy.toml").read_text(encoding="utf-8"))
+        self.assertFalse((self.folder / ".models-2.toml.autosave").exists())
+
     def test_a_picture_that_cannot_be_saved(self):
         """A picture of the window into a folder that cannot be made: said, and the program goes on."""
         scene = self.models()

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "apps/editor/schema_values.h"
@@ -271,7 +272,9 @@ TEST(SceneDocument, TwoEditorsKeepTheirOwnEdits) {
     a.edit("seed = 4\n", "edit");
     a.autosave(folder.path);
     EXPECT_EQ(content(own), "seed = 4\n");
-    LeftAutosave live{own, {}, "seed = 4\n", {}};
+    struct stat status {};
+    ASSERT_EQ(::stat(own.c_str(), &status), 0);
+    LeftAutosave live{own, {}, "seed = 4\n", {}, "a.toml", status.st_dev, status.st_ino};
     EXPECT_THROW(b.take_autosave(live), Error);
     EXPECT_THROW(delete_autosave(live), Error);
     EXPECT_THROW(keep_autosave(live, "a.toml"), Error);
@@ -290,6 +293,59 @@ TEST(SceneDocument, TwoEditorsKeepTheirOwnEdits) {
     d.autosave(folder.path);
     EXPECT_EQ(content(folder.path / ".untitled.toml.autosave"), "seed = 6\n");
     EXPECT_TRUE(SceneDocument(std::string("seed = 5\n")).left_autosaves(folder.path).empty());
+}
+
+// A copy of a scene that was never saved leaves its edits beside the scene, which offers them; not those of a scene that
+// is a file itself, or whose name only begins alike.
+TEST(SceneDocument, EditsOfACopyAreOfferedWithTheScene) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml";
+    write(path, "seed = 1\n");
+    for (const char* name : {"a-2.toml", "a-3.toml", "a-b.toml", "a-.toml", "ab.toml"}) {
+        SceneDocument copy("seed = 1\n", name, folder.path);
+        EXPECT_FALSE(copy.is_modified());
+        copy.edit("seed = 2\n", "edit");
+        copy.autosave(folder.path / "settings");
+        EXPECT_TRUE(std::filesystem::exists(folder.path / (std::string(".") + name + ".autosave"))) << name;
+    }
+    write(folder.path / "a-3.toml", "seed = 3\n");
+    const auto left = SceneDocument(path).left_autosaves(folder.path / "settings");
+    ASSERT_EQ(left.size(), 1u);
+    EXPECT_EQ(left[0].scene, "a-2.toml");
+    SceneDocument again("seed = 1\n", left[0].scene, folder.path);
+    again.take_autosave(left[0]);
+    EXPECT_EQ(again.text(), "seed = 2\n");
+    EXPECT_TRUE(SceneDocument(path).left_autosaves(folder.path).empty());
+}
+
+// Two editors are asked about the same file. One takes it, edits and ends by a crash: what the other decides is not done
+// to the newer edits, which it has never shown. Nor are edits lost that cannot be read.
+TEST(SceneDocument, NewerEditsOfTheSameNameAreNotTouched) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "a.toml", own = folder.path / ".a.toml.autosave";
+    write(path, "seed = 1\n");
+    write(own, "seed = 2\n");
+    const auto asked = SceneDocument(path).left_autosaves(folder.path);
+    ASSERT_EQ(asked.size(), 1u);
+    {
+        SceneDocument first(path);
+        first.take_autosave(asked[0]);
+        first.edit("seed = 3\n", "edit");
+        first.autosave(folder.path);
+    }
+    EXPECT_THROW(delete_autosave(asked[0]), Error);
+    EXPECT_THROW(keep_autosave(asked[0], "a.toml"), Error);
+    SceneDocument second(path);
+    EXPECT_THROW(second.take_autosave(asked[0]), Error);
+    second.autosave(folder.path);
+    EXPECT_EQ(content(own), "seed = 3\n");
+    std::filesystem::resize_file(own, kMaxSceneBytes + 1);
+    const auto large = SceneDocument(path).left_autosaves(folder.path);
+    ASSERT_EQ(large.size(), 1u);
+    EXPECT_THROW(second.take_autosave(large[0]), Error);
+    EXPECT_FALSE(second.is_modified());
+    second.autosave(folder.path);
+    EXPECT_TRUE(std::filesystem::exists(own));
 }
 
 // Files that are there stay: those of crashed sessions until somebody answers, and one that cannot be read, which is
