@@ -49,7 +49,7 @@ class AutosaveFile {
     Descriptor file_;
 };
 
-// Returns the files in `folder` that ended editors left for the scene file `name`, and for copies of it ("sky-2.toml") that
+// Returns the files in `folder` that ended editors left for the scene file `name`, and for copies of it ("{NAME}-2.toml") that
 // are no files themselves; the newest first. Locked and empty ones are none. One that cannot be read is one with a problem.
 std::vector<LeftAutosave> left_autosaves(const std::filesystem::path& folder, const std::string& name);
 
