@@ -67,7 +67,7 @@ bool take_number(std::string_view& text, char what) {
     return true;
 }
 
-// Returns the scene that a file of one of the names of numbered() belongs to: `name`, or a copy of it, "NAME-2.toml".
+// Returns the scene that a file of one of the names of numbered() belongs to: `name`, or a copy of it, "{NAME}-2.toml".
 // Empty: it belongs to neither.
 std::string scene_of(std::string_view file, const fs::path& name) {
     const std::string begin = "." + name.stem().string(), extension = name.extension().string();
