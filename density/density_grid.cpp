@@ -88,6 +88,39 @@ int Block::positive_count() const {
     return int(std::count_if(values, values + kBlockVoxels, [](float v) { return v > 0; }));
 }
 
+void Block::copy_to(float* to, const std::array<std::size_t, 3>& stride, Extent extent) const {
+    const int x = origin.x(), y = origin.y(), z = origin.z();
+    const int nx = std::min(kBlock, extent.x - x), ny = std::min(kBlock, extent.y - y),
+              nz = std::min(kBlock, extent.z - z);
+    float* first =
+        to + std::size_t(x) * stride[0] + std::size_t(y) * stride[1] + std::size_t(z) * stride[2];
+    if (leaf == nullptr) {
+        for (int k = 0; k < nz; ++k)
+            for (int j = 0; j < ny; ++j)
+                for (int i = 0; i < nx; ++i)
+                    first[std::size_t(i) * stride[0] + std::size_t(j) * stride[1] + std::size_t(k) * stride[2]] =
+                        tile;
+        return;
+    }
+    const float* values = leaf->buffer().data();
+    if (stride[0] == 1 && nx == kBlock) {
+        // Rows of the array, whose length the compiler knows.
+        for (int k = 0; k < nz; ++k) {
+            for (int j = 0; j < ny; ++j) {
+                float* row = first + std::size_t(j) * stride[1] + std::size_t(k) * stride[2];
+                const float* from = values + leaf_offset(0, j, k);
+                for (int i = 0; i < kBlock; ++i) row[i] = from[leaf_offset(i, 0, 0)];
+            }
+        }
+        return;
+    }
+    for (int i = 0; i < nx; ++i)
+        for (int j = 0; j < ny; ++j)
+            for (int k = 0; k < nz; ++k)
+                first[std::size_t(i) * stride[0] + std::size_t(j) * stride[1] + std::size_t(k) * stride[2]] =
+                    values[leaf_offset(i, j, k)];
+}
+
 NewBlock NewBlock::from(std::unique_ptr<FloatLeaf> leaf) {
     const float* values = leaf->buffer().data();
     openvdb::util::NodeMask<3> mask;
@@ -199,15 +232,25 @@ VoxelBox DensityGrid::bounding_box() const {
     return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
 }
 
+// The largest of a leaf's values, in lanes that the compiler makes vectors of.
+static float largest_of(const float* values) {
+    constexpr int kLanes = 16;
+    float lanes[kLanes] = {};
+    for (int n = 0; n < kBlockVoxels; n += kLanes)
+        for (int lane = 0; lane < kLanes; ++lane)
+            lanes[lane] = lanes[lane] < values[n + lane] ? values[n + lane] : lanes[lane];
+    return *std::max_element(lanes, lanes + kLanes);
+}
+
 float DensityGrid::max_value() const {
     float largest = 0;
-    for (const Block& block : blocks_of(*this)) {
-        if (!block.leaf) {
-            largest = std::max(largest, block.tile);
-            continue;
+    const auto& root = impl_->grid->tree().root();
+    for (auto node2 = root.cbeginChildOn(); node2; ++node2) {
+        for (auto node1 = node2->cbeginChildOn(); node1; ++node1) {
+            for (auto leaf = node1->cbeginChildOn(); leaf; ++leaf)
+                largest = std::max(largest, largest_of(leaf->buffer().data()));
+            for (auto tile = node1->cbeginValueOn(); tile; ++tile) largest = std::max(largest, *tile);
         }
-        const float* values = block.leaf->buffer().data();
-        largest = std::max(largest, *std::max_element(values, values + kBlockVoxels));
     }
     return largest;
 }
@@ -240,19 +283,10 @@ std::vector<float> DensityGrid::to_dense() const {
     std::vector<float> dense(impl_->extent.cells(), 0.0f);
     const auto blocks = blocks_of(*this);
     const Extent extent = impl_->extent;
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t n) {
-        const Block& block = blocks[n];
-        const openvdb::Coord o = block.origin;
-        const int nx = std::min(kBlock, extent.x - o.x());
-        const int ny = std::min(kBlock, extent.y - o.y());
-        const int nz = std::min(kBlock, extent.z - o.z());
-        for (int z = 0; z < nz; ++z) {
-            for (int y = 0; y < ny; ++y) {
-                float* row = &dense[linear_index(extent, o.x(), o.y() + y, o.z() + z)];
-                for (int x = 0; x < nx; ++x) row[x] = block.value(leaf_offset(x, y, z));
-            }
-        }
-    });
+    const std::array<std::size_t, 3> stride{1, std::size_t(extent.x),
+                                            std::size_t(extent.x) * std::size_t(extent.y)};
+    tbb::parallel_for(std::size_t{0}, blocks.size(),
+                      [&](std::size_t n) { blocks[n].copy_to(dense.data(), stride, extent); });
     return dense;
 }
 

@@ -10,6 +10,7 @@
 // - tiles are exactly one leaf large (8x8x8), so that a tree is a set of blocks;
 // - a block of one value is a tile.
 
+#include <array>
 #include <memory>
 #include <tuple>
 #include <vector>
@@ -35,6 +36,9 @@ struct Block {
 
     float value(int offset) const { return leaf ? leaf->buffer().data()[offset] : tile; }
     int positive_count() const;  // values above 0
+    // Copies the voxels that lie inside of `extent` into a dense array: `to` is that of voxel (0, 0, 0), `stride` the
+    // array's steps along x, y and z.
+    void copy_to(float* to, const std::array<std::size_t, 3>& stride, Extent extent) const;
 };
 
 // Assembles a tree from finished blocks. Not thread-safe: blocks are computed in parallel and added in a

@@ -165,18 +165,45 @@ void compare_layers(const ListedFrame& frame, const DensityGrid& whole,
 }
 
 // How much a sequence moves from frame to frame.
+// Sums and maxima in so many lanes that the compiler makes vectors of them, as their order is fixed.
+constexpr std::size_t kLanes = 16;
+
+// The sum of the differences between neighbours along x.
+double sum_of_gradients(const std::vector<float>& values, std::size_t nx) {
+    double total = 0;
+    for (std::size_t row = 0; row < values.size(); row += nx) {
+        const float* v = values.data() + row;
+        float lanes[kLanes] = {};
+        std::size_t n = 0;
+        for (; n + kLanes < nx; n += kLanes)
+            for (std::size_t lane = 0; lane < kLanes; ++lane)
+                lanes[lane] += std::abs(v[n + lane + 1] - v[n + lane]);
+        for (; n + 1 < nx; ++n) lanes[0] += std::abs(v[n + 1] - v[n]);
+        for (const float lane : lanes) total += double(lane);
+    }
+    return total;
+}
+
+float largest_change(const std::vector<float>& before, const std::vector<float>& now) {
+    float lanes[kLanes] = {};
+    std::size_t n = 0;
+    for (; n + kLanes <= now.size(); n += kLanes) {
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            const float change = std::abs(now[n + lane] - before[n + lane]);
+            lanes[lane] = lanes[lane] < change ? change : lanes[lane];
+        }
+    }
+    for (; n < now.size(); ++n) lanes[0] = std::max(lanes[0], std::abs(now[n] - before[n]));
+    return *std::ranges::max_element(lanes);
+}
+
 class Motion {
   public:
     void add(const DensityGrid& grid) {
         std::vector<float> now = grid.to_dense();
-        double gradients = 0;
-        const std::size_t nx = std::size_t(grid.extent().x);
-        for (std::size_t row = 0; row < now.size(); row += nx)
-            for (std::size_t n = row + 1; n < row + nx; ++n) gradients += double(std::abs(now[n] - now[n - 1]));
+        const double gradients = sum_of_gradients(now, std::size_t(grid.extent().x));
         if (before_.size() == now.size()) {
-            float change = 0;
-            for (std::size_t n = 0; n < now.size(); ++n) change = std::max(change, std::abs(now[n] - before_[n]));
-            change_ = std::max(change_, double(change));
+            change_ = std::max(change_, double(largest_change(before_, now)));
             if (sharpness_ > 0)
                 sharpness_change_ = std::max(sharpness_change_, std::abs(gradients / sharpness_ - 1));
         }

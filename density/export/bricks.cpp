@@ -46,6 +46,7 @@ Volume brick_of(const Volume& level, const std::array<int, 3>& first, const Bric
                            z = places(first[2], options.edge, level.nz, options.periodic[2]);
     Volume brick{side, side, side,
                  std::vector<float>(std::size_t(side) * std::size_t(side) * std::size_t(side), 0.0f)};
+    const auto inner = std::size_t(std::min(options.edge, level.nx - first[0]));  // of a row, side by side in both
     float* out = brick.values.data();
     for (const int k : z) {
         for (const int j : y) {
@@ -53,12 +54,36 @@ Volume brick_of(const Volume& level, const std::array<int, 3>& first, const Bric
                 const float* row =
                     level.values.data() +
                     (std::size_t(k) * std::size_t(level.ny) + std::size_t(j)) * std::size_t(level.nx);
-                for (std::size_t n = 0; n < x.size(); ++n) out[n] = x[n] >= 0 ? row[x[n]] : 0.0f;
+                if (x.front() >= 0) out[0] = row[x.front()];
+                std::memcpy(out + kBorder, row + first[0], inner * sizeof(float));
+                for (std::size_t n = kBorder + inner; n < x.size(); ++n)
+                    if (x[n] >= 0) out[n] = row[x[n]];
             }
             out += side;
         }
     }
     return brick;
+}
+
+// The least and the largest value, in lanes that the compiler makes vectors of.
+std::pair<float, float> range_of(const std::vector<float>& values) {
+    constexpr std::size_t kLanes = 16;
+    float low[kLanes], high[kLanes];
+    std::fill_n(low, kLanes, values.front());
+    std::fill_n(high, kLanes, values.front());
+    std::size_t n = 0;
+    for (; n + kLanes <= values.size(); n += kLanes) {
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            const float value = values[n + lane];
+            low[lane] = value < low[lane] ? value : low[lane];
+            high[lane] = high[lane] < value ? value : high[lane];
+        }
+    }
+    for (; n < values.size(); ++n) {
+        low[0] = std::min(low[0], values[n]);
+        high[0] = std::max(high[0], values[n]);
+    }
+    return {*std::min_element(low, low + kLanes), *std::max_element(high, high + kLanes)};
 }
 
 }  // namespace
@@ -87,16 +112,16 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
                 for (int i = 0; i < bricks_along(level.nx, options.edge); ++i) {
                     const Volume brick =
                         brick_of(level, {i * options.edge, j * options.edge, k * options.edge}, options);
-                    const auto [min, max] = std::ranges::minmax_element(brick.values);
+                    const auto [min, max] = range_of(brick.values);
                     Entry entry{std::uint32_t(n),
                                 std::uint32_t(i),
                                 std::uint32_t(j),
                                 std::uint32_t(k),
                                 0,
                                 0,
-                                *min,
-                                *max};
-                    data.push_back(*max > 0 ? encode(brick, options.type, options.scale)
+                                min,
+                                max};
+                    data.push_back(max > 0 ? encode(brick, options.type, options.scale)
                                             : std::vector<std::byte>());
                     entry.bytes = data.back().size();
                     entries.push_back(entry);

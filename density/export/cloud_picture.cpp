@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 
 #include <png.h>
 
 #include "core/atomic_file.h"
+#include "density/export/png_bytes.h"
 #include "density/export/whole_file.h"
 
 namespace nephos {
@@ -27,7 +29,11 @@ struct Member {
 class Clouds {
   public:
     Clouds(const Volume& v, const std::array<bool, 3>& periodic, float scale)
-        : volume_(v), size_{v.nx, v.ny, v.nz}, periodic_(periodic), unseen_(v.values.size()) {
+        : volume_(v),
+          size_{v.nx, v.ny, v.nz},
+          stride_{1, std::size_t(v.nx), std::size_t(v.nx) * std::size_t(v.ny)},
+          periodic_(periodic),
+          unseen_(v.values.size()) {
         least_ = 0.5f / 255 * scale;
         const float most = v.values.empty() ? 0 : *std::ranges::max_element(v.values);
         mark(std::max(least_, kDense * most));
@@ -35,42 +41,41 @@ class Clouds {
 
     // The voxels of the cloud of the greatest mass, of equal ones the first.
     std::vector<Member> largest() {
-        std::vector<Member> best;
+        std::vector<Member> best, cloud;
         double most = 0;
-        for (std::size_t n = 0; n < unseen_.size(); ++n) {
-            if (!unseen_[n]) continue;
-            std::vector<Member> cloud = cloud_from(n);
+        for (std::size_t n = 0; (n = next_unseen(n)) < unseen_.size();) {
+            gather_cloud(n, cloud);
             double mass = 0;
             for (const Member& member : cloud) mass += double(volume_.values[member.index]);
             if (mass <= most) continue;
             most = mass;
-            best = std::move(cloud);
+            std::swap(best, cloud);
         }
         add_edge(best);
         return best;
     }
 
   private:
-    std::size_t index_of(const std::array<int, 3>& at) const {
-        return (std::size_t(at[2]) * std::size_t(size_[1]) + std::size_t(at[1])) * std::size_t(size_[0]) +
-               std::size_t(at[0]);
-    }
-
     void mark(float least) {
-        for (std::size_t n = 0; n < unseen_.size(); ++n) unseen_[n] = volume_.values[n] >= least;
+        for (std::size_t n = 0; n < unseen_.size(); ++n) unseen_[n] = volume_.values[n] >= least ? 1 : 0;
     }
 
-    std::vector<Member> cloud_from(std::size_t first) {
+    // The first of the marked voxels from `n` on; their number where there is none.
+    std::size_t next_unseen(std::size_t n) const {
+        const void* found = n < unseen_.size() ? std::memchr(unseen_.data() + n, 1, unseen_.size() - n) : nullptr;
+        return found != nullptr ? std::size_t(static_cast<const std::uint8_t*>(found) - unseen_.data()) : unseen_.size();
+    }
+
+    void gather_cloud(std::size_t first, std::vector<Member>& cloud) {
         const auto nx = std::size_t(size_[0]), ny = std::size_t(size_[1]);
-        std::vector<Member> cloud{{first, {int(first % nx), int(first / nx % ny), int(first / nx / ny)}}};
-        unseen_[first] = false;
+        cloud.assign(1, {first, {int(first % nx), int(first / nx % ny), int(first / nx / ny)}});
+        unseen_[first] = 0;
         for (std::size_t n = 0; n < cloud.size(); ++n) add_neighbours(n, cloud);
-        return cloud;
     }
 
     void add_edge(std::vector<Member>& cloud) {
         mark(least_);
-        for (const Member& member : cloud) unseen_[member.index] = false;
+        for (const Member& member : cloud) unseen_[member.index] = 0;
         for (std::size_t ring = 0, begin = 0; ring < std::size_t(kEdge); ++ring) {
             const std::size_t end = cloud.size();
             for (std::size_t n = begin; n < end; ++n) add_neighbours(n, cloud);
@@ -80,26 +85,30 @@ class Clouds {
 
     // Adds the marked voxels beside one of a cloud to it.
     void add_neighbours(std::size_t n, std::vector<Member>& cloud) {
+        const Member member = cloud[n];
         for (std::size_t axis = 0; axis < 3; ++axis) {
+            const int size = size_[axis];
+            const auto stride = std::ptrdiff_t(stride_[axis]);
+            const int at = int(member.index / stride_[axis] % std::size_t(size));  // in the box
             for (const int step : {-1, 1}) {
-                std::array<int, 3> place = cloud[n].place;
-                place[axis] += step;
-                std::array<int, 3> at = place;
-                for (std::size_t a = 0; a < 3; ++a)
-                    if (periodic_[a]) at[a] = ((at[a] % size_[a]) + size_[a]) % size_[a];
-                if (at[axis] < 0 || at[axis] >= size_[axis]) continue;
-                const std::size_t index = index_of(at);
-                if (!unseen_[index]) continue;
-                unseen_[index] = false;
-                cloud.push_back({index, place});
+                std::ptrdiff_t index = std::ptrdiff_t(member.index) + step * stride;
+                if (at + step < 0 || at + step >= size) {
+                    if (!periodic_[axis]) continue;
+                    index -= step * stride * size;
+                }
+                if (unseen_[std::size_t(index)] == 0) continue;
+                unseen_[std::size_t(index)] = 0;
+                cloud.push_back({std::size_t(index), member.place});
+                cloud.back().place[axis] += step;
             }
         }
     }
 
     const Volume& volume_;
     const std::array<int, 3> size_;
+    const std::array<std::size_t, 3> stride_;
     const std::array<bool, 3> periodic_;
-    std::vector<bool> unseen_;  // marked, and in no cloud yet
+    std::vector<std::uint8_t> unseen_;  // 1: marked, and in no cloud yet
     float least_ = 0;           // what is cloud at all
 };
 
@@ -135,27 +144,22 @@ CloudVoxels largest_cloud(const Volume& volume, const std::array<bool, 3>& perio
 
 void write_cloud_picture(const std::filesystem::path& path, const CloudVoxels& cloud, double type) {
     const auto side = std::size_t(cloud.side), width = side * std::size_t(cloud.height);
-    std::vector<std::uint8_t> pixels(width * side * kChannels);
     const auto green = std::uint8_t(std::lround(255 * std::clamp(type, 0.0, 1.0)));
-    for (std::size_t k = 0; k < std::size_t(cloud.height); ++k)
-        for (std::size_t j = 0; j < side; ++j)
-            for (std::size_t i = 0; i < side; ++i) {
-                const std::uint8_t code = cloud.codes[(k * side + j) * side + i];
-                std::uint8_t* pixel = pixels.data() + ((side - 1 - j) * width + k * side + i) * kChannels;
-                pixel[1] = code > 0 ? green : 0;
-                pixel[2] = code;
-                pixel[3] = 255;
+    const PngShape shape{std::uint32_t(width), std::uint32_t(side), 8, int(kChannels)};
+    const std::string png = png_bytes(path, shape, [&](std::uint32_t line, std::span<std::byte> row) {
+        const std::size_t j = side - 1 - line;
+        std::byte* pixel = row.data();
+        for (std::size_t k = 0; k < std::size_t(cloud.height); ++k) {
+            const std::uint8_t* codes = cloud.codes.data() + (k * side + j) * side;
+            for (std::size_t i = 0; i < side; ++i, pixel += kChannels) {
+                pixel[0] = std::byte{0};
+                pixel[1] = std::byte(codes[i] > 0 ? green : 0);
+                pixel[2] = std::byte(codes[i]);
+                pixel[3] = std::byte{255};
             }
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    image.width = png_uint_32(width);
-    image.height = png_uint_32(side);
-    image.format = PNG_FORMAT_RGBA;
-    png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
-    std::vector<std::byte> file(bytes);
-    if (png_image_write_to_memory(&image, file.data(), &bytes, 0, pixels.data(), 0, nullptr) == 0)
-        throw Error(ErrorCode::io, path.string() + ": libpng cannot encode the cloud: " + image.message);
-    write_atomically(path, std::span<const std::byte>(file).first(bytes));
+        }
+    });
+    write_atomically(path, std::string_view(png));
 }
 
 CloudVoxels read_cloud_picture(const std::filesystem::path& path) {

@@ -14,6 +14,7 @@
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "density/export/containers.h"
+#include "density/export/png_bytes.h"
 #include "density/export/whole_file.h"
 
 namespace nephos {
@@ -95,14 +96,6 @@ std::string_view attribute(std::string_view xml, std::string_view name) {
     if (at == xml.npos) throw Error(ErrorCode::io, "its attribute " + std::string(name) + " is missing");
     const std::size_t begin = at + key.size();
     return xml.substr(begin, xml.find('"', begin) - begin);
-}
-
-struct PngWriting {
-    std::string bytes;
-};
-
-void append_png(png_structp png, png_bytep data, png_size_t size) {
-    static_cast<PngWriting*>(png_get_io_ptr(png))->bytes.append(reinterpret_cast<const char*>(data), size);
 }
 
 }  // namespace
@@ -200,40 +193,24 @@ void write_slices(const std::filesystem::path& path, const EncodedVolume& volume
     const std::size_t bytes = volume.type == VoxelType::r8 ? 1 : 2;
     const int rows = (top.nz + columns - 1) / columns;
     const std::size_t row_bytes = std::size_t(top.nx) * bytes;
-    std::vector<std::byte> row(row_bytes * std::size_t(columns));
-    PngWriting writing;
-    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-    png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
-    if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {  // NOLINT: libpng reports by longjmp
-        png_destroy_write_struct(&png, &info);
-        throw Error(ErrorCode::io, path.string() + ": libpng cannot encode the slices");
-    }
-    png_set_write_fn(png, &writing, append_png, nullptr);
-    png_set_IHDR(png, info, png_uint_32(top.nx * columns), png_uint_32(top.ny * rows), int(8 * bytes),
-                 PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-                 PNG_FILTER_TYPE_DEFAULT);
-    png_set_compression_level(png, 1);
-    png_write_info(png, info);
-    if (bytes == 2) png_set_swap(png);  // PNG is big-endian
-    for (int r = 0; r < rows; ++r) {
-        for (int y = 0; y < top.ny; ++y) {
-            for (int c = 0; c < columns; ++c) {
-                const int k = r * columns + c;
-                std::byte* to = row.data() + std::size_t(c) * row_bytes;
-                if (k >= top.nz)
-                    std::fill_n(to, row_bytes, std::byte{0});
-                else
-                    std::memcpy(to,
-                                top.bytes.data() +
-                                    (std::size_t(k) * std::size_t(top.ny) + std::size_t(y)) * row_bytes,
-                                row_bytes);
-            }
-            png_write_row(png, reinterpret_cast<png_const_bytep>(row.data()));
+    PngShape shape;
+    shape.width = std::uint32_t(top.nx) * std::uint32_t(columns);
+    shape.height = std::uint32_t(top.ny) * std::uint32_t(rows);
+    shape.bits = int(8 * bytes);
+    const std::string png = png_bytes(path, shape, [&](std::uint32_t line, std::span<std::byte> row) {
+        const int r = int(line) / top.ny, y = int(line) % top.ny;
+        for (int c = 0; c < columns; ++c) {
+            const int k = r * columns + c;
+            std::byte* to = row.data() + std::size_t(c) * row_bytes;
+            if (k >= top.nz)
+                std::fill_n(to, row_bytes, std::byte{0});
+            else
+                std::memcpy(
+                    to, top.bytes.data() + (std::size_t(k) * std::size_t(top.ny) + std::size_t(y)) * row_bytes,
+                    row_bytes);
         }
-    }
-    png_write_end(png, nullptr);
-    png_destroy_write_struct(&png, &info);
-    write_atomically(path, std::string_view(writing.bytes));
+    });
+    write_atomically(path, std::string_view(png));
 }
 
 namespace {

@@ -77,19 +77,18 @@ Volume lay_out(const DensityGrid& density, const VolumeLayout& layout) {
     const int f = layout.factor;
     const float weight = 1.0f / (float(f) * float(f) * float(f));
     for (const Block& block : blocks_of(density)) {
+        if (f == 1) {
+            block.copy_to(volume.values.data() + first, stride, extent);
+            continue;
+        }
         const int x = block.origin.x(), y = block.origin.y(), z = block.origin.z();
         for (int i = 0; i < std::min(kBlock, extent.x - x); ++i) {
             for (int j = 0; j < std::min(kBlock, extent.y - y); ++j) {
                 float* column = volume.values.data() + first + std::size_t((x + i) / f) * stride[0] +
                                 std::size_t((y + j) / f) * stride[1];
-                for (int k = 0; k < std::min(kBlock, extent.z - z); ++k) {
-                    const float value = block.value(leaf_offset(i, j, k));
-                    float& to = column[std::size_t((z + k) / f) * stride[2]];
-                    if (f == 1)
-                        to = value;
-                    else
-                        to += weight * value;
-                }
+                for (int k = 0; k < std::min(kBlock, extent.z - z); ++k)
+                    column[std::size_t((z + k) / f) * stride[2]] +=
+                        weight * block.value(leaf_offset(i, j, k));
             }
         }
     }

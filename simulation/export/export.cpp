@@ -145,12 +145,13 @@ class GridReader {
 };
 
 // The summaries of a run's layers, in all forms that are wanted.
-void write_weather(const ExportOptions& options, ExportList& list) {
+void write_weather(const ExportOptions& options, ExportList& list, std::vector<std::string>& notes) {
     const RunListing run = read_run(options.source);
     std::vector<WeatherSummary> frames;
     for (const ListedFrame& frame : run.frames) {
         if (is_wanted(options, frame.number, 1)) frames.push_back(summarise(run, frame));
     }
+    std::ranges::move(limit_notes(options.weather, frames), std::back_inserter(notes));
     const auto write = [&](WeatherFormat format, std::span<const std::byte> content) {
         for (const NamedWeather& named : weather_formats()) {
             if (named.format != format) continue;
@@ -187,8 +188,9 @@ void write_weather(const ExportOptions& options, ExportList& list) {
 }
 
 void write_texts(const ExportOptions& options, const std::vector<ExportSequence>& sequences,
-                 const std::vector<std::vector<FrameFigures>>& figures, ExportList& list) {
-    if (!options.weather.empty()) write_weather(options, list);
+                 const std::vector<std::vector<FrameFigures>>& figures, ExportList& list,
+                 std::vector<std::string>& notes) {
+    if (!options.weather.empty()) write_weather(options, list, notes);
     const auto write = [&](const std::string& name, const std::string& text) {
         write_atomically(options.folder / name, std::string_view(text));
         list.add_written(list.written_file(name, {}, {}));
@@ -291,7 +293,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
                 return report;
             }
         }
-        write_texts(options, sequences, figures, list);
+        write_texts(options, sequences, figures, list, notes);
         lock.require_in_place();
         std::ranges::move(list.remove_left_over(), std::back_inserter(notes));
         list.write(true);

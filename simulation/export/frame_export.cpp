@@ -9,10 +9,12 @@
 
 #include <tbb/global_control.h>
 
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "density/combine.h"
 #include "density/export/bricks.h"
 #include "density/export/cloud_picture.h"
+#include "density/export/whole_file.h"
 #include "simulation/simulation.h"
 
 namespace nephos {
@@ -53,6 +55,13 @@ void write_vdb_file(const std::filesystem::path& path, const ExportOptions& opti
         content.wind_name = options.velocity_name;
     }
     write_vdb(path, content, metadata);
+}
+
+// Returns whether the VDB file of a frame would have the grid and metadata of its source: then its bytes are copied.
+bool is_copy(const ExportOptions& options, const ExportSequence& s, const SourceFrame& frame,
+             const ExportSource& source) {
+    return frame.plain && *frame.plain == source.digest && s.layout.factor == 1 && !options.half_voxel_shift &&
+           options.velocity_name.empty() && options.type != VoxelType::r16f;
 }
 
 std::vector<Volume> levels_of(const DensityGrid& density, const ExportSequence& s) {
@@ -113,7 +122,9 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
             continue;
         }
         const std::filesystem::path path = options_.folder / name;
-        if (format == ExportFormat::vdb) {
+        if (format == ExportFormat::vdb && is_copy(options_, s, frame, source)) {
+            write_atomically(path, whole_file(frame.file));
+        } else if (format == ExportFormat::vdb) {
             write_vdb_file(path, options_, s, loaded);
         } else if (format == ExportFormat::flightgear) {
             VolumeLayout layout;
@@ -137,6 +148,7 @@ ExportedFrame FrameExporter::write(const ExportSequence& s, const SourceFrame& f
             }
         }
         result.written.push_back(list_.written_file(name, source, name_of(format)));
+        require_unchanged(frame);  // what was copied is what was read
     }
     return result;
 }

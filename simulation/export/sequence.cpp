@@ -52,6 +52,16 @@ std::vector<WindTable> wind_of(const Scene& scene, std::optional<std::size_t> la
     return tables;
 }
 
+// The digest of a file that has no grid but its density, of 32-bit floats.
+std::optional<FileDigest> plain_digest(const RunListing& run, const ListedFrame& frame,
+                                       const std::filesystem::path& file) {
+    const DensityOptions& density = run.scene.density;
+    if (density.half || density.write_state || density.write_velocity) return {};
+    for (const FileRecord& record : frame.files)
+        if (run.folder / record.path == file) return record.digest;
+    return {};
+}
+
 void read_first(const ExportOptions& options, ExportSequence& s) {
     VdbReadOptions reading;
     reading.grid = options.grid;
@@ -72,8 +82,8 @@ ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& r
     for (const ListedFrame& frame : run.frames) {
         if (!is_wanted(options, frame.number, 1)) continue;
         const std::filesystem::path file = density_file(run, frame, layer);
-        s.frames.push_back(
-            {file, frame.number, frame.time_s, utc_at(run.scene.georeference, frame.time_s), stamp_of(file)});
+        s.frames.push_back({file, frame.number, frame.time_s, utc_at(run.scene.georeference, frame.time_s),
+                            stamp_of(file), plain_digest(run, frame, file)});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, run.folder.string() + ": has no frame of this range");
     read_first(options, s);
@@ -99,7 +109,7 @@ ExportSequence sequence_of_files(const ExportOptions& options) {
             throw Error(ErrorCode::usage,
                         file.string() + ": its number does not follow that of the file before");
         next = number + 1;
-        if (is_wanted(options, number, least)) s.frames.push_back({file, number, 0, {}, stamp_of(file)});
+        if (is_wanted(options, number, least)) s.frames.push_back({file, number, 0, {}, stamp_of(file), {}});
     }
     if (s.frames.empty()) throw Error(ErrorCode::usage, "no file has a number of this range");
     read_first(options, s);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/digest.h"
 #include "density/vdb/vdb_file.h"
 #include "simulation/export/export.h"
 
@@ -29,6 +30,8 @@ struct SourceFrame {
     double time_s = 0;
     std::string utc;    // empty without a start
     FileStamp stamp{};  // when it was listed, before its voxels were read
+    // Of a run's file that holds nothing but its density as 32-bit floats: what its manifest says of its bytes.
+    std::optional<FileDigest> plain{};
 };
 
 // A moment and the wind by height at it.

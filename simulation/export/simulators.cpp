@@ -85,8 +85,7 @@ std::string xplane_text(const RunListing& run, const std::vector<WeatherSummary>
                               {"alt_top", s.columns.top_m + w.elevation_m},
                               {"alt_base", s.columns.cloud_base_m + w.elevation_m}});
         }
-        for (const auto& [height, v] : w.wind) {
-            if (winds.size() == 13) break;
+        for (const auto& [height, v] : xplane_winds(w.wind)) {
             winds.push_back({{"alt_msl", height + w.elevation_m},
                              {"speed", std::hypot(v.east_m_per_s, v.north_m_per_s)},
                              {"direction", bearing_from(v, w.heading_deg)},

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -181,8 +182,9 @@ std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
     Metar m;
     const std::string& name = run.scene.name;
     const auto is_letter = [](char c) { return c >= 'A' && c <= 'Z'; };
-    const bool station = name.size() == 4 && is_letter(name[0]) &&
-                         std::ranges::all_of(name, [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); });
+    const bool station = name.size() == 4 && is_letter(name[0]) && std::ranges::all_of(name, [&](char c) {
+                             return is_letter(c) || (c >= '0' && c <= '9');
+                         });
     m.station = station ? name : "ZZZZ";
     m.day = 1;
     if (!weather.utc.empty()) {
@@ -204,7 +206,8 @@ std::string metar_of(const RunListing& run, const WeatherSummary& weather) {
         if (!amount) continue;
         MetarCloud c;
         c.amount = *amount;
-        c.height_ft = 100 * int(std::lround(std::clamp(layer.columns.cloud_base_m / kFoot_m / 100, 0.0, 999.0)));
+        c.height_ft =
+            100 * int(std::lround(std::clamp(layer.columns.cloud_base_m / kFoot_m / 100, 0.0, 999.0)));
         if (layer.genus == "Cb") c.type = "CB";
         if (layer.towering) c.type = "TCU";
         if (layer.genus == "VV") c.amount = CloudAmount::obscured;
@@ -279,6 +282,47 @@ std::vector<LayerSummary> three_layers(std::vector<LayerSummary> layers) {
         layers.erase(layers.begin() + std::ptrdiff_t(nearest) + 1);
     }
     return layers;
+}
+
+std::vector<std::pair<double, Velocity>> xplane_winds(const std::vector<std::pair<double, Velocity>>& wind) {
+    if (wind.size() <= kXplaneWinds) return wind;
+    std::vector<std::pair<double, Velocity>> chosen;
+    for (std::size_t n = 0; n < kXplaneWinds; ++n)
+        chosen.push_back(wind[(n * (wind.size() - 1) + (kXplaneWinds - 1) / 2) / (kXplaneWinds - 1)]);
+    return chosen;
+}
+
+std::vector<std::string> limit_notes(const std::vector<WeatherFormat>& formats,
+                                     const std::vector<WeatherSummary>& frames) {
+    std::size_t merged = 0, most_layers = 0, most_winds = 0;
+    for (const WeatherSummary& frame : frames) {
+        if (frame.layers.size() > 3) ++merged;
+        most_layers = std::max(most_layers, frame.layers.size());
+        most_winds = std::max(most_winds, frame.wind.size());
+    }
+    std::string three;
+    for (const NamedWeather& named : weather_formats()) {
+        const bool limited = named.format == WeatherFormat::xplane || named.format == WeatherFormat::wpr ||
+                             named.format == WeatherFormat::cigi;
+        if (limited && std::ranges::count(formats, named.format) > 0)
+            three += (three.empty() ? "" : ", ") + std::string(named.name);
+    }
+    std::vector<std::string> notes;
+    if (merged > 0 && !three.empty())
+        notes.push_back(fmt::format(
+            "{}: up to {} layers of clouds, but there is room for three: the nearest are merged in "
+            "{} of {} frames (`layers` has all)",
+            three, most_layers, merged, frames.size()));
+    if (most_winds > kXplaneWinds && std::ranges::count(formats, WeatherFormat::xplane) > 0)
+        notes.push_back(
+            fmt::format("xplane: the wind is told at {} heights, but there is room for {}: those evenly from "
+                        "the lowest to the highest",
+                        most_winds, kXplaneWinds));
+    if (frames.size() > 1 && std::ranges::count(formats, WeatherFormat::wpr) > 0)
+        notes.push_back(
+            fmt::format("wpr: a preset has one moment: that of frame {} (--frames chooses another)",
+                        frames.front().number));
+    return notes;
 }
 
 }  // namespace nephos

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "density/optical_columns.h"
+#include "simulation/export/export.h"
 #include "simulation/run_listing.h"
 
 namespace nephos {
@@ -77,5 +78,14 @@ std::vector<std::byte> cigi_capture(const std::vector<WeatherSummary>& frames);
 
 // Returns at most three layers: the two nearest are merged until so many are left.
 std::vector<LayerSummary> three_layers(std::vector<LayerSummary> layers);
+
+// Returns the number of winds of X-Plane's structure, and at most so many of a profile: the lowest, the highest and those
+// evenly between them.
+inline constexpr std::size_t kXplaneWinds = 13;
+std::vector<std::pair<double, Velocity>> xplane_winds(const std::vector<std::pair<double, Velocity>>& wind);
+
+// Returns what the limits of `formats` leave out of the frames, a sentence each.
+std::vector<std::string> limit_notes(const std::vector<WeatherFormat>& formats,
+                                     const std::vector<WeatherSummary>& frames);
 
 }  // namespace nephos

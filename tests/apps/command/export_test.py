@@ -176,6 +176,31 @@ class Export(Case):
                 self.assertIn(f"{number}: @./layered_{layer}_{number:04}.vdb@", text)
                 self.assertTrue((self.folder / f"usd/layered_{layer}_{number:04}.vdb").is_file())
 
+    def test_plain_vdb_files_are_copied(self):
+        """Of a run, where nothing is to be changed: the same bytes. What is not as the run wrote it is encoded anew."""
+        import pyopenvdb
+        def exported(run, *arguments):
+            folder = self.export_of(run, *arguments)
+            return [(folder / f"tiny_000{n}.vdb").read_bytes() == (self.folder / run / f"density/tiny_000{n}.vdb").read_bytes()
+                    for n in (1, 2, 3)]
+        settings = {"plain": ["density.write_state=false"], "state": [], "half": ["density.write_state=false", "density.half=true"]}
+        for name, values in settings.items():
+            self.call("run", self.scene, "--no-render", "--out", name, *(word for value in values for word in ("--set", value)))
+            self.assertEqual(exported(name, "--to", "usd"), [name == "plain"] * 3)
+            self.assertEqual([grid.name for grid in pyopenvdb.readAll(str(self.folder / "exported/tiny_0002.vdb"))[0]], ["density"])
+        self.assertEqual(exported("plain", "--to", "vdb", "--type", "r16f"), [False] * 3)
+        self.assertEqual(exported("plain", "--to", "vdb", "--voxel", "200"), [False] * 3)
+        before = dense(self.folder / "plain/density/tiny_0003.vdb")[0]
+        shutil.copy(self.folder / "plain/density/tiny_0003.vdb", self.folder / "plain/density/tiny_0002.vdb")
+        self.assertEqual(exported("plain", "--to", "vdb"), [True, False, True])
+        self.assertTrue((dense(self.folder / "exported/tiny_0002.vdb")[0] == before).all())
+
+    def export_of(self, run, *arguments):
+        shutil.rmtree(self.folder / "exported", ignore_errors=True)
+        self.call("export", run, "-o", "exported", *arguments)
+        self.call("verify", "exported")
+        return self.folder / "exported"
+
     def test_an_interrupted_export_goes_on(self):
         folder = self.export("out", "--to", "raw")
         listing = json.loads((folder / "export.json").read_text())

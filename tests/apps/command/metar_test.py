@@ -211,6 +211,23 @@ class Weather(Case):
         self.assertEqual([cloud["cloud_type"] for cloud in xplane["cloud_layers"]], [2, 2, 0])
         subprocess.run(["xmllint", "--noout", self.folder / "weather/EGLL.wpr"], check=True)
 
+    def test_limits_of_simulators_are_told(self):
+        """Three layers of clouds, 13 winds, one moment: what is merged or left out is a note."""
+        self.call("metar", "EDDM 211350Z 24010KT 9999 FEW010 SCT020 BKN080 OVC200 20/15 Q1013", "-o", "four.toml", "-q")
+        winds = ", ".join(f"{{ height_m = {200 * n}, from_deg = {240 + n}, speed_m_per_s = {5 + n} }}" for n in range(31))
+        text = re.sub(r"levels = \[.*?\n\]", f"levels = [{winds}]", (self.folder / "four.toml").read_text(), count=1, flags=re.S)
+        self.call("run", self.write("four.toml", text), "--no-render", "--frames", "1..2", "--out", "four", "-q")
+        said = self.call("export", "four", "--to", "xplane", "--to", "cigi", "--to", "wpr", "--to", "layers", "-o", "limits").stderr
+        self.assertIn("xplane, wpr, cigi: up to 4 layers of clouds, but there is room for three", said.replace("cigi, wpr, xplane", "xplane, wpr, cigi"))
+        self.assertIn("xplane: the wind is told at 31 heights, but there is room for 13", said)
+        self.assertIn("wpr: a preset has one moment: that of frame 1", said)
+        frame = json.loads((self.folder / "limits/EDDM.xplane.json").read_text())["frames"][0]
+        self.assertEqual([wind["alt_msl"] for wind in frame["wind_layers"]], [1000 * (n // 2) + 600 * (n % 2) for n in range(13)])
+        self.assertEqual(len(frame["cloud_layers"]), 3)
+        said = self.call("export", "four", "--to", "layers", "--to", "metar", "-o", "all").stderr
+        self.assertNotIn("room for", said)
+        self.assertEqual(len(json.loads((self.folder / "all/EDDM.layers.json").read_text())["frames"][0]["layers"]), 4)
+
     def cigi(self, run, folder):
         """The Weather Controls of the first frame by their layer, as Wireshark names their fields; and all that it says."""
         self.call("export", run, "--for", "cigi", "--frames", "1", "-o", folder)
