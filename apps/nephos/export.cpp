@@ -21,7 +21,7 @@ namespace {
 struct ExportArguments {
     std::vector<std::string> sources;
     std::vector<std::string> formats;
-    std::string target, out;
+    std::string target, out = "export";
     ExportOptions options;
     bool plan = false;
     WorkArguments work;
@@ -96,7 +96,8 @@ ExportOptions options_of(const ExportArguments& a) {
         preset->apply(options);
     }
     refuse_unused(given, options);
-    options.folder = a.out.empty() ? std::filesystem::path("export") : std::filesystem::path(a.out);
+    if (a.out.empty()) throw Error(ErrorCode::usage, "--out is empty: expected a folder to write to");
+    options.folder = a.out;
     return options;
 }
 

@@ -113,6 +113,10 @@ int metar(const MetarArguments& a) {
         report.station = taf->station;
     } else {
         report = parse_metar(text, a.lenient);
+        if (tells_nothing(report))
+            throw Error(ErrorCode::usage,
+                        "the report tells nothing but place and time: expected wind, visibility, weather or clouds\n  " +
+                            report.text + "\n  " + std::string(report.text.size(), ' ') + "^");
     }
     if (a.explain) {
         taf ? explain(a, *taf) : explain(a, report);

@@ -67,10 +67,12 @@ void write_nanovdb(const std::filesystem::path& path, const DensityGrid& density
     openvdb::initialize();
     constexpr nanovdb::io::Codec kCodecs[] = {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP,
                                               nanovdb::io::Codec::BLOSC};
-    // The library seeks over the header before there are bytes, which a string stream refuses. No file is smaller.
-    std::ostringstream stream(std::string(1024, '\0'), std::ios::binary);
+    const auto grid = described(density);
+    // The library seeks over what precedes the voxels before there are bytes, which a string stream refuses.
+    const std::size_t head =
+        sizeof(nanovdb::io::Header) + sizeof(nanovdb::io::MetaData) + grid->getName().size() + 1;
+    std::ostringstream stream(std::string(head, '\0'), std::ios::binary);
     try {
-        const auto grid = described(density);
         nanovdb::io::writeGrid(stream, converted(*grid, quantise), kCodecs[std::size_t(codec)]);
     } catch (const Error&) {
         throw;

@@ -64,6 +64,9 @@ struct Metar {
 // clouds, two winds, NIL) is an error in both cases.
 Metar parse_metar(std::string_view text, bool lenient = false);
 
+// Returns true of a report that ends behind its time, but for remarks and a trend.
+bool tells_nothing(const Metar& metar);
+
 // Returns the report of these values: station, time, wind, visibility, weather, clouds.
 std::string metar_text(const Metar& metar);
 

@@ -60,7 +60,7 @@ class Reader {
         if (done() || words_[at_].text.size() != 4 || !std::all_of(word().begin(), word().end(), [](char c) {
                 return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
             }))
-            fail("expected the four letters of an aerodrome, such as EGLL");
+            fail("expected the four capital letters of an aerodrome, such as EGLL");
         metar_.station = word();
         take("aerodrome");
         read_time();
@@ -105,9 +105,17 @@ class Reader {
     }
 
     Metar finished() {
-        if (metar_.cavok && (!metar_.clouds.empty() || !metar_.weather.empty()))
+        if (metar_.cavok && (!metar_.clouds.empty() || !metar_.weather.empty())) {
+            const auto excluded = std::ranges::find_if(metar_.groups, [](const MetarGroup& group) {
+                return group.meaning.starts_with("cloud") || group.meaning.starts_with("weather") ||
+                       group.meaning.starts_with("sky obscured");
+            });
+            std::string caret;
+            if (excluded != metar_.groups.end())
+                caret = "\n  " + std::string(excluded->column, ' ') + std::string(excluded->text.size(), '^');
             throw Error(ErrorCode::usage,
-                        "CAVOK excludes clouds and weather, but the report has them:\n  " + metar_.text);
+                        "CAVOK excludes clouds and weather, but the report has them:\n  " + metar_.text + caret);
+        }
         return std::move(metar_);
     }
 
@@ -171,6 +179,13 @@ class Reader {
             gust = speed.substr(g + 1);
             speed.resize(g);
         }
+        // P99KT: 100 kt or more.
+        bool beyond = false;
+        for (std::string* amount : {&speed, &gust}) {
+            if (amount->size() != 3 || amount->front() != 'P' || !all_digits(amount->substr(1))) continue;
+            amount->erase(0, 1);
+            beyond = true;
+        }
         const bool known_direction = all_digits(direction), slashes = all_slashes(direction);
         if (!(known_direction || slashes || direction == "VRB")) return false;
         if (!(all_digits(speed) || all_slashes(speed)) || speed.size() > 3 || speed.size() < 2) return false;
@@ -189,7 +204,8 @@ class Reader {
         take(!wind.known ? "wind unknown"
              : wind.speed_m_per_s == 0
                  ? "calm"
-                 : "wind at 10 m" + std::string(wind.gust_m_per_s ? ", gusts are not simulated" : ""),
+                 : "wind at 10 m" + std::string(beyond ? ", as told or stronger" : "") +
+                       std::string(wind.gust_m_per_s ? ", gusts are not simulated" : ""),
              wind.known, words);
         return true;
     }
@@ -447,6 +463,15 @@ class Reader {
 }  // namespace
 
 Metar parse_metar(std::string_view text, bool lenient) { return Reader(text, lenient).read(); }
+
+bool tells_nothing(const Metar& metar) {
+    const auto time = std::ranges::find(metar.groups, "day and time, UTC", &MetarGroup::meaning);
+    return time == metar.groups.end() ||
+           std::all_of(time + 1, metar.groups.end(), [](const MetarGroup& group) {
+               return group.meaning == "automatic station" || group.meaning == "corrected" ||
+                      group.meaning == "remarks" || group.meaning == "trend";
+           });
+}
 
 bool is_precipitation(std::string_view code) {
     constexpr std::string_view kFalling[] = {"DZ", "RA", "SN", "SG", "PL", "GR", "GS", "UP"};

@@ -84,7 +84,7 @@ class TafReader {
         while (at_ < words_.size() && (words_[at_] == "TAF" || words_[at_] == "AMD" || words_[at_] == "COR"))
             ++at_;
         if (at_ >= words_.size() || words_[at_].size() != 4)
-            fail("expected the four letters of an aerodrome, such as EGLL");
+            fail("expected the four capital letters of an aerodrome, such as EGLL");
         taf_.station = words_[at_++];
         // The moment of issue may be missing.
         if (at_ < words_.size() && words_[at_].size() == 7 && words_[at_].back() == 'Z') ++at_;

@@ -267,23 +267,28 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
             bool stopped = false;
             FramesAtWork work(frames_at_once(options, s),
                               [&](ExportedFrame&& frame) { take(s, figures[n], std::move(frame)); });
-            reader.read(s.frames, false, [&](std::size_t index, std::shared_ptr<const LoadedDensity> read) {
-                const LoadedDensity& loaded = *read;
-                lock.require_in_place();
-                SourceFrame& frame = s.frames[index];
-                if (loaded.metadata) {
-                    frame.time_s = loaded.metadata->time_s;
-                    frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
-                }
-                for (const std::string& note : loaded.notes)
-                    notes.push_back(frame.file.string() + ": " + note);
-                work.add([&, read] {
+            try {
+                reader.read(s.frames, false, [&](std::size_t index, std::shared_ptr<const LoadedDensity> read) {
+                    const LoadedDensity& loaded = *read;
                     lock.require_in_place();
-                    return exporter.write(s, frame, *read);
+                    SourceFrame& frame = s.frames[index];
+                    if (loaded.metadata) {
+                        frame.time_s = loaded.metadata->time_s;
+                        frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
+                    }
+                    for (const std::string& note : loaded.notes)
+                        notes.push_back(frame.file.string() + ": " + note);
+                    work.add([&, read] {
+                        lock.require_in_place();
+                        return exporter.write(s, frame, *read);
+                    });
+                    stopped = progress && !progress(done, frames);
+                    return !stopped;
                 });
-                stopped = progress && !progress(done, frames);
-                return !stopped;
-            });
+            } catch (...) {
+                work.finish_quietly();
+                throw;
+            }
             work.finish();
             if (progress && !stopped) progress(done, frames);
             lock.require_in_place();

@@ -4,6 +4,7 @@
 // The files of frames, several frames at a time (not installed).
 
 #include <deque>
+#include <exception>
 #include <functional>
 #include <future>
 #include <utility>
@@ -57,6 +58,14 @@ class FramesAtWork {
     }
     void finish() {
         while (!frames_.empty()) finish_first();
+    }
+    // After a failure, whose message is the one to show: what was whole before is taken all the same, up to the first frame
+    // that failed, too.
+    void finish_quietly() noexcept {
+        try {
+            finish();
+        } catch (const std::exception&) {
+        }
     }
 
   private:

@@ -76,6 +76,10 @@ void read_first(const ExportOptions& options, ExportSequence& s) {
 
 ExportSequence sequence_of_run(const ExportOptions& options, const RunListing& run,
                                const std::optional<std::string>& layer) {
+    if (run.frames.empty())
+        throw Error(ErrorCode::usage, run.folder.string() +
+                                          ": has no frames to export: it was run with --statistics-only, or ended "
+                                          "before its first frame");
     ExportSequence s;
     s.name = run.scene.name + (layer ? "_" + *layer : "");
     s.layer = layer.value_or("");

@@ -323,6 +323,38 @@ class Export(Case):
         shutil.rmtree(self.folder / "out")
         self.export("out", "--to", "flightgear", "--range", "auto")
 
+    def test_small_and_empty_runs(self):
+        """One cell, and no cloud at all, in every format: also where a packed file is smaller than a kilobyte."""
+        one = self.write("one.toml", SCENE.replace("cells = [32, 24, 12]", "cells = [1, 1, 1]").replace("write_state = true", "half = false"))
+        empty = self.write("empty.toml", SCENE.split("[field")[0].replace("cells = [32, 24, 12]", 'cells = [9, 5, 3]\ninitial = "empty"')
+                           + "[frames]\nper_second = 1\ntime_scale = 15\n")
+        every = [word for name in ("raw", "bricks", "vti", "dds", "ktx2", "nvdb", "usd", "slices", "vdb", "flightgear", "layers", "cigi",
+                                   "wpr", "xplane", "metar") for word in ("--to", name)]
+        for name, scene in (("one", one), ("empty", empty)):
+            self.call("run", scene, "--no-render", "--out", name)
+            self.call("verify", name)
+            for number, arguments in enumerate((every, [*every, "--mips", "--border", "wrap", "--range", "auto", "--zip"],
+                                                ["--to", "nvdb", "--zip", "--quantise", "fp8"], ["--to", "nvdb", "--zip", "--quantise", "fp16"])):
+                with self.subTest(run=name, arguments=arguments):
+                    folder = f"{name}{number}"
+                    self.call("export", name, *arguments, "-o", folder)
+                    self.call("verify", folder)
+                    for file in (self.folder / folder).glob("*.nvdb"):
+                        self.tool("nanovdb_validate", file)
+
+    def test_what_was_whole_before_a_failure_is_kept(self):
+        """A damaged frame ends the export; those before it are in the list, and are not made again."""
+        whole = (self.folder / "run/density/placed_0004.vdb").read_bytes()
+        (self.folder / "run/density/placed_0004.vdb").write_bytes(whole[:1000])
+        self.refused(3, "export", "run", "--to", "raw", "-o", "out", says="placed_0004.vdb: it is truncated")
+        checks = {check["name"]: check for check in json.loads(self.call("verify", "out", "--json", status=1).stdout)["checks"]}
+        self.assertEqual([name for name, check in checks.items() if not check["passed"]], ["complete"])
+        self.assertEqual(sorted(path.name for path in (self.folder / "out").glob("*.raw")), [f"placed_000{n}.raw" for n in (1, 2, 3)])
+        (self.folder / "run/density/placed_0004.vdb").write_bytes(whole)
+        report = json.loads(self.call("export", "run", "--to", "raw", "-o", "out", "--json").stdout)
+        self.assertEqual(report["kept"], 3)
+        self.call("verify", "out")
+
     def test_one_export_at_a_time(self):
         import fcntl
         folder = self.export("out", "--to", "raw")
@@ -549,6 +581,9 @@ class Export(Case):
             with self.subTest(arguments=arguments):
                 self.refused(2, "export", "run", *arguments, "-o", "bad", says=says)
                 self.assertFalse((self.folder / "bad").exists())
+        self.refused(2, "export", "run", "--to", "raw", "-o", "", says="--out is empty")
+        self.call("run", self.scene, "--statistics-only", "--out", "numbers")
+        self.refused(2, "export", "numbers", "--to", "raw", "-o", "bad", says="it was run with --statistics-only")
         plan = json.loads(self.call("export", "run", "--for", "vulkan", "--plan", "--json").stdout)
         self.assertEqual(plan["sequences"][0]["frames"], 5)
         self.assertFalse((self.folder / "export").exists())

@@ -85,10 +85,23 @@ class Metar(Case):
             caret = next(n for n, line in enumerate(lines) if set(line.strip()) == {"^"})
             begin = lines[caret].index("^")
             self.assertEqual(lines[caret - 1][begin:begin + len(word)], word, error)
-        self.assertIn("CAVOK", self.call("metar", "EGLL 211350Z 24012KT CAVOK FEW020", status=2).stderr)
+        said = self.call("metar", "EGLL 211350Z 24012KT CAVOK FEW020", status=2).stderr.splitlines()
+        self.assertEqual(said[-1], "  " + " " * len("EGLL 211350Z 24012KT CAVOK ") + "^" * len("FEW020"), said)
+        for nothing in ("EGLL 211350Z", "METAR KXYZ 211350Z AUTO RMK AO2"):
+            self.assertIn("tells nothing but place and time", self.call("metar", nothing, status=2).stderr)
         self.assertIn("empty", self.call("metar", "", status=2).stderr)
         self.assertIn("left out", self.call("metar", "EGLL 211350Z 24012KT 9999 FEWO20", "--lenient", "--explain").stderr)
         self.assertIn("does not fit", self.call("metar", REAL[0], "--date", "2024-06-22", status=2).stderr)
+
+    def test_storms_of_100_knots(self):
+        """P99KT stands for all that is stronger."""
+        for report, meaning in (("EGLL 211350Z 240P99KT 9999 FEW020", "wind at 10 m, as told or stronger"),
+                                ("EGLL 211350Z 24080GP99KT 9999 FEW020", "wind at 10 m, as told or stronger, gusts are not simulated"),
+                                ("EGLL 211350Z 240120KT 9999 FEW020", "wind at 10 m")):
+            groups = self.explained(report)["groups"]
+            self.assertEqual((groups[2]["meaning"], groups[2]["used"]), (meaning, True))
+        text = self.call("metar", "EGLL 211350Z 240P99KT 9999 FEW020", "-q").stdout
+        self.assertIn("{ height_m = 10, from_deg = 240, speed_m_per_s = 50.93 }", text)
 
     def test_groups_of_no_effect_say_so(self):
         groups = {group["group"]: group for group in self.explained("EGLL 211350Z 24012KT 200V280 4000 8000 FEW020")["groups"]}
