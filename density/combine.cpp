@@ -2,6 +2,7 @@
 #include "density/combine.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -98,65 +99,81 @@ std::vector<Coord> reached_blocks(const DensityGrid& grid, const Mapping& map, c
     return origins;
 }
 
-// Reads one grid in the common box.
-class Sampler {
-  public:
-    Sampler(const DensityGrid& grid, const Mapping& map, const Boundaries& boundaries)
-        : map_(map),
-          extent_(grid.extent()),
-          boundaries_(boundaries),
-          accessor_(OpenvdbAccess::grid(grid).getConstAccessor()) {}
+// The two voxels around a place on an axis and their weights; of a periodic axis none beyond its sides.
+struct Neighbours {
+    std::array<int, 2> index;
+    std::array<double, 2> weight;
 
-    float at(int x, int y, int z) {
-        if (map_.exact) return accessor_.getValue(Coord(x, y, z) - map_.shift);
-        return between(
-            {map_.scale * x + map_.offset.x, map_.scale * y + map_.offset.y, map_.scale * z + map_.offset.z});
+    Neighbours(double p, int voxels, Boundary boundary) {
+        const double below = std::floor(p);
+        const bool inside = p >= -0.5 - kWhole && p < voxels - 0.5 - kWhole;
+        const bool nothing = boundary == Boundary::periodic && !inside;
+        index = {repeated(int(below), voxels, boundary), repeated(int(below) + 1, voxels, boundary)};
+        weight = {nothing ? 0 : 1 - (p - below), nothing ? 0 : p - below};
     }
-
-  private:
-    // The two voxels around a place on an axis and their weights; of a periodic axis none beyond its sides.
-    struct Neighbours {
-        int index[2];
-        double weight[2];
-
-        Neighbours(double p, int voxels, Boundary boundary) {
-            const double below = std::floor(p);
-            const bool inside = p >= -0.5 - kWhole && p < voxels - 0.5 - kWhole;
-            const bool nothing = boundary == Boundary::periodic && !inside;
-            index[0] = repeated(int(below), voxels, boundary);
-            index[1] = repeated(int(below) + 1, voxels, boundary);
-            weight[0] = nothing ? 0 : 1 - (p - below);
-            weight[1] = nothing ? 0 : p - below;
-        }
-    };
-
-    float between(const Vec3& p) {
-        const Neighbours x(p.x, extent_.x, boundaries_.x), y(p.y, extent_.y, boundaries_.y),
-            z(p.z, extent_.z, boundaries_.z);
-        double sum = 0;
-        for (int n = 0; n < 8; ++n) {
-            const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
-            const double weight = x.weight[dx] * y.weight[dy] * z.weight[dz];
-            if (weight > 0)
-                sum += weight * double(accessor_.getValue({x.index[dx], y.index[dy], z.index[dz]}));
-        }
-        return float(sum);
-    }
-
-    const Mapping& map_;
-    const Extent extent_;
-    const Boundaries boundaries_;
-    FloatGrid::ConstAccessor accessor_;
 };
+
+// What a block of the common box reads of a grid along an axis: its voxels, and for each voxel of the block its two
+// neighbours as indices of these.
+struct BlockAxis {
+    std::vector<int> voxels;
+    std::array<std::array<std::size_t, 2>, kBlock> index;
+    std::array<std::array<double, 2>, kBlock> weight;
+
+    BlockAxis(const Axis& axis, int first) {
+        for (std::size_t n = 0; n < kBlock; ++n) {
+            const Neighbours at(axis.scale * (first + int(n)) + axis.offset, axis.voxels, axis.boundary);
+            weight[n] = at.weight;
+            for (std::size_t side = 0; side < 2; ++side) {
+                const auto known = std::ranges::find(voxels, at.index[side]);
+                index[n][side] = std::size_t(known - voxels.begin());
+                if (known == voxels.end()) voxels.push_back(at.index[side]);
+            }
+        }
+    }
+};
+
+// Adds a grid that is resampled to the values of a block.
+void add_resampled(float* values, const FloatGrid& grid, const Axis& x_axis, const Axis& y_axis,
+                   const Axis& z_axis, const Coord& origin) {
+    const BlockAxis x(x_axis, origin.x()), y(y_axis, origin.y()), z(z_axis, origin.z());
+    auto accessor = grid.getConstAccessor();
+    const std::size_t row = z.voxels.size(), slice = row * y.voxels.size();
+    std::vector<double> read;
+    read.reserve(slice * x.voxels.size());
+    for (const int i : x.voxels)
+        for (const int j : y.voxels)
+            for (const int k : z.voxels) read.push_back(double(accessor.getValue({i, j, k})));
+    for (int n = 0; n < kBlockVoxels; ++n) {
+        const std::size_t i = std::size_t(n >> 6), j = std::size_t(n >> 3 & 7), k = std::size_t(n & 7);
+        if (origin.x() + int(i) >= x_axis.common || origin.y() + int(j) >= y_axis.common ||
+            origin.z() + int(k) >= z_axis.common)
+            continue;
+        double sum = 0;
+        for (std::size_t c = 0; c < 8; ++c) {
+            const std::size_t dx = c & 1, dy = c >> 1 & 1, dz = c >> 2;
+            const double weight = x.weight[i][dx] * y.weight[j][dy] * z.weight[k][dz];
+            sum += weight * read[x.index[i][dx] * slice + y.index[j][dy] * row + z.index[k][dz]];
+        }
+        values[n] = std::min(1.0f, values[n] + float(sum));
+    }
+}
 
 // Adds one grid to the values of a block of the common box.
 void add_to_block(float* values, const DensityGrid& grid, const Mapping& map, const Boundaries& boundaries,
                   const Coord& origin, const Extent& extent) {
-    Sampler sampler(grid, map, boundaries);
+    const FloatGrid& source = OpenvdbAccess::grid(grid);
+    if (!map.exact) {
+        const Extent own = grid.extent();
+        return add_resampled(values, source, {map.scale, map.offset.x, own.x, extent.x, boundaries.x},
+                             {map.scale, map.offset.y, own.y, extent.y, boundaries.y},
+                             {map.scale, map.offset.z, own.z, extent.z, boundaries.z}, origin);
+    }
+    auto accessor = source.getConstAccessor();
     for (int n = 0; n < kBlockVoxels; ++n) {
-        const int x = origin.x() + (n >> 6), y = origin.y() + (n >> 3 & 7), z = origin.z() + (n & 7);
-        if (x >= extent.x || y >= extent.y || z >= extent.z) continue;
-        values[n] = std::min(1.0f, values[n] + sampler.at(x, y, z));
+        const Coord at(origin.x() + (n >> 6), origin.y() + (n >> 3 & 7), origin.z() + (n & 7));
+        if (at.x() >= extent.x || at.y() >= extent.y || at.z() >= extent.z) continue;
+        values[n] = std::min(1.0f, values[n] + accessor.getValue(at - map.shift));
     }
 }
 
@@ -254,7 +271,8 @@ DensityGrid scaled(const DensityGrid& grid, double factor) {
 
 DensityGrid placed_at(const DensityGrid& grid, const Placement& placement) {
     const auto tree = OpenvdbAccess::grid(grid).treePtr();
-    return OpenvdbAccess::wrap(FloatGrid::create(openvdb::ConstPtrCast<FloatTree>(tree)), grid.extent(), placement);
+    return OpenvdbAccess::wrap(FloatGrid::create(openvdb::ConstPtrCast<FloatTree>(tree)), grid.extent(),
+                               placement);
 }
 
 }  // namespace nephos

@@ -36,6 +36,9 @@ struct WindowAxis {
 
 template <int voxels_across>
 using LevelWindow = std::array<std::array<float, voxels_across>, voxels_across>;  // [y][x]
+// The same of the eight levels of a leaf: [y][x][z], as a leaf has them.
+template <int voxels_across>
+using BlockWindow = std::array<std::array<std::array<float, kBlock>, voxels_across>, voxels_across>;
 
 // The leaves that a window lies in, of any level of theirs.
 template <int voxels_across>
@@ -76,11 +79,36 @@ class WindowLeaves {
         }
     }
 
+    // The same of one level, or of all of them.
+    void read(int level, BlockWindow<voxels_across>& window) const {
+        each_column(window, [level](const Source& source, int offset, std::array<float, kBlock>& column) {
+            column[std::size_t(level)] = source.values ? source.values[offset + level] : source.tile;
+        });
+    }
+    void read(BlockWindow<voxels_across>& window) const {
+        each_column(window, [](const Source& source, int offset, std::array<float, kBlock>& column) {
+            if (source.values) {
+                std::copy_n(source.values + offset, kBlock, column.data());
+            } else {
+                column.fill(source.tile);
+            }
+        });
+    }
+
   private:
     struct Source {
         const float* values;
         float tile;
     };
+    template <typename Each>
+    void each_column(BlockWindow<voxels_across>& window, const Each& each) const {
+        for (std::size_t j = 0; j < voxels_across; ++j) {
+            const auto& row = sources_[std::size_t(y_.leaf[j])];
+            for (std::size_t i = 0; i < voxels_across; ++i)
+                each(row[std::size_t(x_.leaf[i])], leaf_offset(x_.inside[i], y_.inside[j], 0), window[j][i]);
+        }
+    }
+
     const Axis &x_, &y_;
     std::array<std::array<Source, Axis::kMostLeaves>, Axis::kMostLeaves> sources_;
     bool any_ = false;
