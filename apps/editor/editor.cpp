@@ -21,6 +21,7 @@ namespace {
 using Clock = Report::Clock;
 
 constexpr double kFrameSeconds = 1.0 / 60, kIdleSeconds = 0.1;
+constexpr std::chrono::milliseconds kRowsAlone{200};
 
 // Sends what the document became to the live scene.
 void follow_document(Editor& editor) {
@@ -49,13 +50,17 @@ void follow_document(Editor& editor) {
     if (camera_changed) take_scene_camera(editor);
 }
 
-void take_new_results(Editor& editor) {
+// The rows of steps are taken with a picture, so that plots and picture change in one frame, or after a while without.
+void take_new_results(Editor& editor, Clock::time_point& taken) {
     const std::uint64_t known = editor.picture ? editor.picture->number : 0;
     if (std::shared_ptr<const LivePicture> next = editor.live->picture(known)) {
         editor.window->set_picture(next->width, next->height, next->rgba.data());
         editor.picture = std::move(next);
         ++editor.pictures;
+    } else if (editor.running && Clock::now() - taken < kRowsAlone) {
+        return;
     }
+    taken = Clock::now();
     const LiveStatus status = editor.live->status();
     if (status.rows_version != editor.steps_version || status.rows < editor.steps.size())
         editor.steps.clear();
@@ -189,7 +194,7 @@ int loop(Editor& editor, Report& report) {
     Script script = editor.options.script.empty() ? Script() : Script(editor.options.script);
     const bool scripted = script.is_active();
     std::string title;
-    Clock::time_point last_frame = Clock::now(), last_input = Clock::now();
+    Clock::time_point last_frame = Clock::now(), last_input = Clock::now(), last_results;
     bool screenshot_due = !editor.options.screenshot.empty();
     while (!editor.quit) {
         if (const int signal = pending_signal(); signal != 0) {
@@ -223,7 +228,7 @@ int loop(Editor& editor, Report& report) {
             last_input = Clock::now();
         }
         follow_document(editor);
-        take_new_results(editor);
+        take_new_results(editor, last_results);
         report.watch(editor);
         look_after_files(editor);
         watch_export(editor);

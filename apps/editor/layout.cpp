@@ -10,10 +10,12 @@
 namespace nephos {
 namespace {
 
+// Without a background: the window itself has the panels' colour, and filling large rectangles is what a software driver
+// takes longest for.
 ImGuiWindowFlags panel_flags() {
     return ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
            ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
-           ImGuiWindowFlags_NoBringToFrontOnFocus;
+           ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoBackground;
 }
 
 // A bar between two panels that the mouse moves; `size` is in points at scale 1.
@@ -99,7 +101,7 @@ void layout(Editor& editor, float scale) {
     ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
     panel("Picture", {left + (left > 0 ? bar : 0), top},
           {size.x - right - (right > 0 ? bar : 0), bottom > 0 ? middle : low},
-          ImGuiWindowFlags_NoBackground | ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse,
+          ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse,
           [&] { view_panel(editor); });
     ImGui::PopStyleVar();
     if (left > 0)

@@ -14,8 +14,8 @@
 namespace nephos {
 namespace {
 
-// A picture is drawn with its detail when nothing has moved for so long.
-constexpr std::chrono::milliseconds kRest{180};
+// Steps from one checkpoint to the next while there is memory: a step that is gone to is at most so many away.
+constexpr std::uint64_t kCheckpointSteps = 4;
 // Checkpoints are compared by this name alone: which scene they belong to is known here.
 const std::string kLive = "live";
 
@@ -90,7 +90,8 @@ LiveScene::LiveScene(DeviceOptions device) : device_(std::move(device)) {
     simulation_thread_ = std::thread([this] { simulate(); });
     try {
         drawing_thread_ = std::thread([this] { draw(); });
-    } catch (...) {  // there is no second thread to be had
+        refining_thread_ = std::thread([this] { refine(); });
+    } catch (...) {  // there is no more thread to be had
         end_threads();
         throw;
     }
@@ -108,6 +109,7 @@ void LiveScene::end_threads() {
     drawing_due_.notify_all();
     simulation_thread_.join();
     if (drawing_thread_.joinable()) drawing_thread_.join();
+    if (refining_thread_.joinable()) refining_thread_.join();
 }
 
 void LiveScene::start(const Scene& scene, std::uint64_t goal) {
@@ -256,6 +258,7 @@ void LiveScene::forget_simulation() {
 }
 
 void LiveScene::simulate() {
+    yield_to_window();
     std::unique_lock lock(mutex_);
     Clock::time_point next_step = Clock::now();
     while (true) {
@@ -340,7 +343,7 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     } else {
         checkpoints_.clear();
         checkpoint_bytes_ = 0;
-        checkpoint_every_ = 8;
+        checkpoint_every_ = kCheckpointSteps;
         rows_.clear();
         ++status_.rows_version;
         status_.step = 0;
@@ -348,6 +351,7 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
         const auto most = std::uint64_t(kMaxFrames - 2);
         goal_ = std::min(goal_, most);
         keep_checkpoint();
+        thin_checkpoints();
     }
     status_.steps_taken = simulation_->steps_taken();
     if (!new_scene_ && next_drawn_) {  // otherwise it belongs to a scene that is taken next
@@ -359,16 +363,17 @@ void LiveScene::take_scene(std::unique_lock<std::mutex>& lock) {
     }
 }
 
-void LiveScene::keep_checkpoint() {
+// Without the mutex, whose holder must not wait for a state that is written. Returns whether there is one more.
+bool LiveScene::keep_checkpoint() {
     const std::uint64_t step = simulation_->next_step();
-    if (checkpoints_.contains(step) || step % checkpoint_every_ != 0) return;
+    if (checkpoints_.contains(step) || step % checkpoint_every_ != 0) return false;
     Checkpoint checkpoint = simulation_->save();
     checkpoint_bytes_ += bytes_of(checkpoint);
     checkpoints_.emplace(step, std::move(checkpoint));
-    thin_checkpoints();
+    return true;
 }
 
-// Leaves out every other checkpoint until they keep to their memory.
+// With the mutex: leaves out every other checkpoint until they keep to their memory, and tells how many there are.
 void LiveScene::thin_checkpoints() {
     while (checkpoint_bytes_ > most_checkpoint_bytes_ && checkpoints_.size() > 2) {
         checkpoint_every_ *= 2;
@@ -412,8 +417,9 @@ void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) 
         const std::uint64_t reached = std::uint64_t(simulation_->next_frame() - 1);
         if (reached > done) {
             done = reached;
+            const bool kept = keep_checkpoint();
             lock.lock();
-            keep_checkpoint();
+            if (kept) thin_checkpoints();
             const bool interrupted = ended_ || hold_ || new_scene_ || clear_ || goal_ != goal || stops_here_;
             lock.unlock();
             if (interrupted || Clock::now() - begin > std::chrono::milliseconds(is_first ? 0 : 150)) break;
@@ -439,59 +445,6 @@ void LiveScene::advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal) 
     status_.step_ms += 0.2 * (spent_ms / steps - status_.step_ms);
     frame_ = std::move(frame);
     drawing_due_.notify_all();
-}
-
-void LiveScene::draw() {
-    std::unique_lock lock(mutex_);
-    std::unique_ptr<FramePainter> painter;
-    std::uint64_t painted_simulation = 0;
-    LivePictureMaker maker;
-    while (true) {
-        const auto is_new = [&] {
-            return ended_ || (frame_ && shown_ &&
-                              (frame_ != maker.frame() || !(view_ == maker.view()) || scene_to_draw_));
-        };
-        const auto rests = [&] {
-            const bool stands = !running_ || !status_.failure.empty();
-            return frame_ && shown_ && maker.is_draft() && stands && goal_ == status_.step;
-        };
-        drawing_due_.wait(lock, [&] { return is_new() || rests(); });
-        bool refine = false;
-        if (!is_new()) {  // nothing moves: after a moment the picture gets its detail
-            drawing_due_.wait_for(lock, kRest, [&] { return is_new() || !rests(); });
-            refine = !is_new() && rests();
-            if (!is_new() && !refine) continue;
-        }
-        if (ended_) return;
-        const std::shared_ptr<const LiveFrame> frame = frame_;
-        const LiveView view = view_;
-        const Scene scene = drawn_scene_;
-        const std::uint64_t clears = clears_, scene_number = drawn_number_;
-        scene_to_draw_ = false;
-        lock.unlock();
-        std::shared_ptr<LivePicture> made;
-        std::string failure, device;
-        try {
-            if (!painter) painter = std::make_unique<FramePainter>(scene, device_);
-            const bool same = painted_simulation == frame->simulation_number;
-            painted_simulation = frame->simulation_number;
-            made = maker.draw(*painter, scene, frame, view, refine, same);
-            device = painter->device_name();
-        } catch (const std::exception& error) {
-            failure = error.what();
-            maker.skip(frame, view);
-            painter.reset();  // a device that failed is opened anew
-        }
-        lock.lock();
-        if (clears != clears_) continue;  // of a scene that is gone
-        if (made) {
-            made->number = ++pictures_;
-            made->scene_number = scene_number;
-            picture_ = std::move(made);
-            status_.device = device;
-        }
-        draw_failure_ = failure;
-    }
 }
 
 }  // namespace nephos

@@ -6,6 +6,9 @@
 //     window --(scene, speed, goal)--> simulation thread --(newest frame)--> drawing thread --(picture)--> window
 //            --(camera, size)--------------------------------------------->
 //
+// Pictures while something moves are small drafts without detail. When nothing does, another thread draws the picture
+// with its detail: that takes long, and a draft of the next change does not wait for it.
+//
 // One frame a step. Frames and pictures that nobody has taken are replaced by newer ones. Steps that are asked for
 // again are simulated from the nearest of the checkpoints that are kept in memory.
 
@@ -146,10 +149,15 @@ class LiveScene {
 
     void simulate();
     void draw();
+    void refine();
+    struct Shown;
+    Shown shown_now() const;
+    void publish(std::shared_ptr<LivePicture> picture, const Shown& what, const std::string& device,
+                 const std::string& failure);
     void take_scene(std::unique_lock<std::mutex>& lock);
     void advance(std::unique_lock<std::mutex>& lock, std::uint64_t goal);
     void go_back(std::uint64_t step);
-    void keep_checkpoint();
+    bool keep_checkpoint();
     void thin_checkpoints();
     void end_threads();
     void fail(const std::string& what);
@@ -178,6 +186,10 @@ class LiveScene {
     LiveView view_;
     std::shared_ptr<const LiveFrame> frame_;
     std::shared_ptr<const LivePicture> picture_;
+    std::shared_ptr<const LiveFrame> drafted_frame_;  // what the last draft showed
+    LiveView drafted_view_;
+    bool draft_waits_ = false;  // for its detail
+    std::uint64_t drafts_ = 0;
     std::vector<LiveStep> rows_;
     LiveStatus status_;
     std::uint64_t pictures_ = 0;
@@ -186,10 +198,10 @@ class LiveScene {
     Scene scene_;
     std::shared_ptr<Simulation> simulation_;
     std::map<std::uint64_t, Checkpoint> checkpoints_;  // by the next step that they report
-    std::uint64_t checkpoint_every_ = 8, simulation_number_ = 0;
+    std::uint64_t checkpoint_every_ = 1, simulation_number_ = 0;
     std::size_t checkpoint_bytes_ = 0;
 
-    std::thread simulation_thread_, drawing_thread_;
+    std::thread simulation_thread_, drawing_thread_, refining_thread_;
 };
 
 }  // namespace nephos

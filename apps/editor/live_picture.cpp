@@ -131,20 +131,11 @@ std::shared_ptr<LivePicture> LivePictureMaker::draw(FramePainter& painter, const
     made->view = view;
     made->refined = refine;
     made->draw_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-    frame_ = frame;
-    view_ = view;
-    is_draft_ = !refine;
     if (!refine) {
         const double wanted = draft_scale_ * std::sqrt(kDraftMs / std::max(made->draw_ms, 1.0));
         draft_scale_ = std::clamp(0.7 * draft_scale_ + 0.3 * wanted, kSmallestScale, 1.0);
     }
     return made;
-}
-
-void LivePictureMaker::skip(const std::shared_ptr<const LiveFrame>& frame, const LiveView& view) {
-    frame_ = frame;
-    view_ = view;
-    is_draft_ = false;
 }
 
 }  // namespace nephos

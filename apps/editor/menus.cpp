@@ -193,15 +193,21 @@ void status_bar(Editor& editor) {
         ImGui::TextDisabled(
             "%s", editor.document->has_file() ? editor.document->path().string().c_str() : "not saved yet");
     }
-    char text[160];
-    std::snprintf(text, sizeof text, "%.0f ms a picture   %.1f ms a step   %.0f frames/s",
-                  editor.picture ? editor.picture->draw_ms : 0.0, status.step_ms,
-                  double(ImGui::GetIO().Framerate));
-    const float width = ImGui::CalcTextSize(text).x;
+    const auto now = std::chrono::steady_clock::now();
+    if (now - editor.rates_time > std::chrono::milliseconds(500)) {
+        editor.rates_time = now;
+        char text[160];
+        std::snprintf(text, sizeof text, "%.0f ms a picture   %.1f ms a step   %.0f frames/s",
+                      editor.picture ? editor.picture->draw_ms : 0.0, status.step_ms,
+                      double(ImGui::GetIO().Framerate));
+        editor.rates = text;
+    }
+    const float width = ImGui::CalcTextSize(editor.rates.c_str()).x;
     const float at = ImGui::GetWindowWidth() - width - 10;
     if (at < 0.4f * ImGui::GetWindowWidth()) return;
     ImGui::SameLine(at);
-    ImGui::TextDisabled("%s", text);
+    ImGui::TextDisabled("%s", editor.rates.c_str());
+    editor.controls.note("rates");
     tooltip_of_last("Where the time goes: drawing, simulating, and the window itself");
 }
 
@@ -284,9 +290,8 @@ void view_options_panel(Editor& editor) {
     toggle(
         editor, "Record as key frames", editor.record,
         "Changes of wind, climate and sun then act from the present step on, and are written into the scene "
-        "as "
-        "key "
-        "frames: the saved scene repeats what was seen, bit for bit. Otherwise the scene is simulated anew.");
+        "as key frames: the saved scene repeats what was seen, bit for bit. Otherwise the scene is simulated "
+        "anew.");
     if (editor.shown_scene && !editor.shown_scene->layers.empty()) {
         ImGui::SetNextItemWidth(-1);
         ImGui::SliderFloat("##final state", &editor.final_state, 0, 1, "atmosphere to %.2f");

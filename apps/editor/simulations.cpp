@@ -80,7 +80,9 @@ void simulation_row(Editor& editor, std::size_t index, Action& chosen) {
     editor.controls.note("simulation " + number);
     tooltip_of_last(scene.document->has_file() ? scene.document->path().string().c_str() : "not saved yet");
     ImGui::SameLine(end - 4.2f * ImGui::GetFontSize());
-    ImGui::TextDisabled("%llu", static_cast<unsigned long long>(status.step));
+    const bool shows_picture = index == editor.shown && scene.running && scene.picture;
+    ImGui::TextDisabled("%llu",
+                        static_cast<unsigned long long>(shows_picture ? scene.picture->step : status.step));
     tooltip_of_last("The step that it is at");
     if (editor.scenes.size() > 1) {
         ImGui::SameLine(end);

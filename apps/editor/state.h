@@ -199,6 +199,8 @@ struct Editor : OpenScene {
     std::string message;  // in the status bar
     bool message_is_bad = false;
     std::chrono::steady_clock::time_point message_time, last_disk_look, last_autosave;
+    std::string rates;  // in the status bar, from time to time: one that changes in every frame cannot be read
+    std::chrono::steady_clock::time_point rates_time;
     std::unique_ptr<BackgroundRun> run;
     std::unique_ptr<BackgroundExport> exported;
     bool quit = false, theme_changed = false;

@@ -171,7 +171,8 @@ void timeline_panel(Editor& editor) {
     ImGui::SameLine();
     const float from = ImGui::GetCursorScreenPos().x, width = ImGui::GetContentRegionAvail().x;
     ImGui::SetNextItemWidth(-1);
-    std::uint64_t step = editor.running ? status.step : status.goal;
+    // The step of the picture while it runs: with each of them, not between two, the window is drawn anew.
+    std::uint64_t step = editor.running && editor.picture ? editor.picture->step : status.goal;
     const std::uint64_t first = 0;
     if (ImGui::SliderScalar("##step", ImGuiDataType_U64, &step, &first, &last, "step %llu")) {
         editor.live->run(editor.running = false);

@@ -115,6 +115,8 @@ std::optional<std::string> edit_numbers(Editor& editor, const ValueRow& row, std
             numbers[0] = infinite ? INFINITY : 1000;
             changed = true;
         }
+        editor.controls.note(path_text(row.path) + " infinite");
+        tooltip_of_last("No end");
         ImGui::SameLine();
         if (infinite) {
             ImGui::TextDisabled("no end");

@@ -132,6 +132,7 @@ void captions(Editor& editor, const LiveStatus& status) {
                            IM_COL32(120, 180, 245, 230));
     }
     if (!editor.picture) {
+        list.AddRectFilled(editor.view_min, editor.view_max, IM_COL32(20, 23, 26, 255));
         write(corner, "Preparing the first picture\u2026", white);
         return;
     }

@@ -350,13 +350,12 @@ void PictureImage::upload(vk::CommandBuffer commands) {
 }
 
 void PictureImage::draw(vk::CommandBuffer commands, vk::Image to, vk::Extent2D extent,
-                        const vk::Rect2D& place) {
+                        const vk::Rect2D& place, const std::array<float, 4>& colour) {
     using Stage = vk::PipelineStageFlagBits;
     using Access = vk::AccessFlagBits;
     barrier(commands, to, vk::ImageLayout::eUndefined, vk::ImageLayout::eTransferDstOptimal,
             Stage::eColorAttachmentOutput | Stage::eTransfer, {}, Stage::eTransfer, Access::eTransferWrite);
-    const vk::ClearColorValue colour(std::array<float, 4>{0.08f, 0.09f, 0.1f, 1.0f});
-    commands.clearColorImage(to, vk::ImageLayout::eTransferDstOptimal, colour,
+    commands.clearColorImage(to, vk::ImageLayout::eTransferDstOptimal, vk::ClearColorValue(colour),
                              vk::ImageSubresourceRange(vk::ImageAspectFlagBits::eColor, 0, 1, 0, 1));
     const std::int32_t right = std::min(place.offset.x + std::int32_t(place.extent.width),
                                         std::int32_t(extent.width)),

@@ -4,6 +4,7 @@
 // The parts of Vulkan that a window needs: device, swap chain, commands of a frame, and the picture of the clouds.
 // For window.cpp alone. Functions throw vk::SystemError, or Error(gpu) where a user can help.
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -111,7 +112,8 @@ struct PictureImage {
     void clear() { due_ = filled_ = false; }
     void upload(vk::CommandBuffer commands);
     // Fills an image of the window with a colour and puts the picture into a rectangle of it, scaled.
-    void draw(vk::CommandBuffer commands, vk::Image to, vk::Extent2D extent, const vk::Rect2D& place);
+    void draw(vk::CommandBuffer commands, vk::Image to, vk::Extent2D extent, const vk::Rect2D& place,
+              const std::array<float, 4>& colour);
 
     const Gpu& gpu;
 

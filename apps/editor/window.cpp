@@ -8,6 +8,7 @@
 #include <cmath>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -17,6 +18,7 @@
 #include <dlfcn.h>
 
 #include "apps/editor/vulkan_parts.h"
+#include "core/digest.h"
 #include "core/error.h"
 
 namespace nephos {
@@ -103,6 +105,22 @@ struct Interface {
     Interface& operator=(const Interface&) = delete;
 };
 
+// The checksum of all that the interface draws: two frames with the same one look the same.
+std::string digest_of(const ImDrawData& data) {
+    Digest digest;
+    const auto add = [&](const auto* values, std::size_t count) {
+        digest.add(std::as_bytes(std::span(values, count)));
+    };
+    add(&data.DisplaySize, 1);
+    add(&data.FramebufferScale, 1);
+    for (const ImDrawList* list : std::span(data.CmdLists, std::size_t(data.CmdListsCount))) {
+        add(list->CmdBuffer.Data, std::size_t(list->CmdBuffer.Size));
+        add(list->IdxBuffer.Data, std::size_t(list->IdxBuffer.Size));
+        add(list->VtxBuffer.Data, std::size_t(list->VtxBuffer.Size));
+    }
+    return digest.hex();
+}
+
 // Exceptions of the Vulkan binding as those of nephos.
 template <typename Function>
 auto checked(const Function& function) {
@@ -128,6 +146,9 @@ struct Window::Impl {
         glfwSetDropCallback(handle.window, [](GLFWwindow* window, int count, const char** paths) {
             auto& self = *static_cast<Impl*>(glfwGetWindowUserPointer(window));
             for (int n = 0; n < count; ++n) self.dropped.emplace_back(paths[n]);
+        });
+        glfwSetWindowRefreshCallback(handle.window, [](GLFWwindow* window) {
+            static_cast<Impl*>(glfwGetWindowUserPointer(window))->shown.clear();
         });
         ImGui_ImplGlfw_InitForVulkan(handle.window, true);
         chain.create(framebuffer_size());
@@ -172,21 +193,33 @@ struct Window::Impl {
         frame.run_once([](vk::CommandBuffer commands) { ImGui_ImplVulkan_CreateFontsTexture(commands); });
         ImGui_ImplVulkan_DestroyFontUploadObjects();
         fonts_loaded = true;
+        shown.clear();
     }
 
-    void show(ImDrawData* data) {
+    // Draws and shows the frame, unless that is what the window shows already: on a machine without a card each frame
+    // that is drawn takes time from the clouds.
+    void show_changed(ImDrawData* data) {
+        std::string due = digest_of(*data);
+        if (due == shown && framebuffer_size() == chain.extent && !chain.is_old && !captures) return;
+        shown.clear();
+        if (show(data)) shown = std::move(due);
+    }
+
+    // Returns whether it is shown: not in a window without size, nor when the window changed meanwhile.
+    bool show(ImDrawData* data) {
         const vk::Extent2D size = framebuffer_size();
-        if (size.width == 0 || size.height == 0) return;
+        if (size.width == 0 || size.height == 0) return false;
         if (size != chain.extent || chain.is_old) {
             gpu.device.waitIdle();
             chain.create(size);
         }
         frame.wait();
         const std::optional<std::uint32_t> index = chain.acquire(*frame.acquired);
-        if (!index) return;
+        if (!index) return false;
         const vk::CommandBuffer commands = frame.begin();
         picture.upload(commands);
-        picture.draw(commands, chain.images[*index], chain.extent, place);
+        const ImVec4& panels = ImGui::GetStyleColorVec4(ImGuiCol_WindowBg);
+        picture.draw(commands, chain.images[*index], chain.extent, place, {panels.x, panels.y, panels.z, 1});
         commands.beginRenderPass({*chain.pass, *chain.framebuffers[*index], {{0, 0}, chain.extent}, {}},
                                  vk::SubpassContents::eInline);
         ImGui_ImplVulkan_RenderDrawData(data, commands);
@@ -199,6 +232,7 @@ struct Window::Impl {
             captures = false;
         }
         chain.present(*index);
+        return !chain.is_old;
     }
 
     Glfw glfw;
@@ -210,6 +244,7 @@ struct Window::Impl {
     PictureImage picture;
     vk::Rect2D place;
     bool fonts_loaded = false, captures = false;
+    std::string shown;  // digest of what the window shows; empty: to be drawn anew
     WindowImage image;
     std::vector<std::filesystem::path> dropped;
 };
@@ -235,7 +270,7 @@ bool Window::begin_frame(double wait_s) {
 
 void Window::end_frame() {
     ImGui::Render();
-    checked([&] { impl_->show(ImGui::GetDrawData()); });
+    checked([&] { impl_->show_changed(ImGui::GetDrawData()); });
 }
 
 void Window::ask_to_close(bool asked) {
@@ -246,17 +281,22 @@ void Window::set_picture(int width, int height, const unsigned char* rgba) {
     checked([&] {
         impl_->frame.wait();
         impl_->picture.set(width, height, rgba);
+        impl_->shown.clear();
     });
 }
 
-void Window::clear_picture() { impl_->picture.clear(); }
+void Window::clear_picture() {
+    impl_->picture.clear();
+    impl_->shown.clear();
+}
 
 void Window::place_picture(const ImVec2& min, const ImVec2& max) {
     const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
     const auto pixel = [](float at) { return std::int32_t(std::lround(std::max(at, 0.0f))); };
     const std::int32_t left = pixel(min.x * scale.x), top = pixel(min.y * scale.y);
-    impl_->place = vk::Rect2D({left, top}, {std::uint32_t(std::max(0, pixel(max.x * scale.x) - left)),
-                                            std::uint32_t(std::max(0, pixel(max.y * scale.y) - top))});
+    const vk::Rect2D place({left, top}, {std::uint32_t(std::max(0, pixel(max.x * scale.x) - left)),
+                                         std::uint32_t(std::max(0, pixel(max.y * scale.y) - top))});
+    if (place != std::exchange(impl_->place, place)) impl_->shown.clear();
 }
 
 void Window::capture_next() { impl_->captures = true; }
