@@ -170,7 +170,7 @@ class LiveScene {
     // Shared, under the mutex.
     bool ended_ = false, running_ = false, hold_ = false, is_held_ = false, shown_ = true;
     bool thins_ = false;  // checkpoints are above what they may have now
-    std::size_t most_checkpoint_bytes_ = std::size_t(512) << 20;
+    std::size_t most_checkpoint_bytes_ = std::size_t(1024) << 20;
     std::optional<Scene> new_scene_;  // to simulate
     bool keeps_state_ = false;        // new_scene_ goes on from the present state
     bool is_advancing_ = false;       // steps are under way

@@ -57,6 +57,12 @@ std::string label_of(const Node& element, const Key& list, std::size_t index) {
     return element_name(list.name) + " " + std::to_string(index + 1);
 }
 
+// What is chosen in the outline has its keys in the properties.
+void choose(Editor& editor, const TextPath& path) {
+    editor.selected = path;
+    editor.wanted_tab = 0;
+}
+
 void add_element(Editor& editor, const Key& list, const TextPath& path) {
     const std::optional<Scene>& scene = editor.document->scene();
     // Seeds and roots stand in their model's own space.
@@ -69,8 +75,7 @@ void add_element(Editor& editor, const Key& list, const TextPath& path) {
             text, path, new_element(list, editor.document->values(), path, scene ? &*scene : nullptr, place));
     };
     if (!change_text(editor, added, "New " + path_text(element_path(path, index)))) return;
-    editor.selected = element_path(path, index);
-    editor.wanted_tab = 0;
+    choose(editor, element_path(path, index));
 }
 
 void copy_element(Editor& editor, const TextPath& array, std::size_t index) {
@@ -115,7 +120,7 @@ void element_row(Editor& editor, const Key& list, const TextPath& array, const N
     if (has_lists && leads_to_new_selection(editor, at)) ImGui::SetNextItemOpen(true);
     const bool open = ImGui::TreeNodeEx("element", flags, "%s", label.c_str());
     editor.controls.note(path_text(at));
-    if (ImGui::IsItemClicked() || ImGui::IsItemClicked(ImGuiMouseButton_Right)) editor.selected = at;
+    if (ImGui::IsItemClicked() || ImGui::IsItemClicked(ImGuiMouseButton_Right)) choose(editor, at);
     if (ImGui::BeginPopupContextItem()) {
         if (ImGui::MenuItem("Copy", "Ctrl+D")) copy_element(editor, array, index);
         if (ImGui::MenuItem("Delete", "Del")) delete_element(editor, array, index);
@@ -148,7 +153,7 @@ void list_row(Editor& editor, const Key& key, const TextPath& at) {
     ImGui::SameLine(ImGui::GetContentRegionMax().x - 1.3f * ImGui::GetFontSize());
     if (ImGui::SmallButton("+")) add_element(editor, key, at);
     editor.controls.note("new " + name);
-    if (clicked && !ImGui::IsItemHovered()) editor.selected = at;
+    if (clicked && !ImGui::IsItemHovered()) choose(editor, at);
     if (ImGui::IsItemHovered()) {
         ImGui::SetTooltip("New %s", element_name(key.name).c_str());
     } else if (hovered) {
@@ -194,7 +199,7 @@ void outline_keys(Editor& editor, const Section& section, const TextPath& path, 
         if (!present) ImGui::PopStyleColor();
         editor.controls.note(path_text(at));
         tooltip_of_last(key.section->effect.c_str());
-        if (ImGui::IsItemClicked() && !ImGui::IsItemToggledOpen()) editor.selected = at;
+        if (ImGui::IsItemClicked() && !ImGui::IsItemToggledOpen()) choose(editor, at);
         if (open) {
             if (has_lists) outline_keys(editor, *key.section, at, false);
             ImGui::TreePop();
@@ -211,7 +216,7 @@ void outline_panel(Editor& editor) {
         (editor.selected.empty() ? ImGuiTreeNodeFlags_Selected : ImGuiTreeNodeFlags_None);
     if (ImGui::TreeNodeEx("scene", flags, "%s", editor.document->title().c_str())) ImGui::TreePop();
     editor.controls.note("scene");
-    if (ImGui::IsItemClicked()) editor.selected.clear();
+    if (ImGui::IsItemClicked()) choose(editor, {});
     const TextPath selected = editor.selected;
     outline_keys(editor, scene_section(), {}, true);
     editor.revealed = selected;

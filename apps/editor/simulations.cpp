@@ -14,7 +14,7 @@ namespace nephos {
 namespace {
 
 // Limits the checkpoints of all simulations together.
-constexpr std::size_t kCheckpointBytes = std::size_t(512) << 20;
+constexpr std::size_t kCheckpointBytes = std::size_t(1024) << 20;
 
 OpenScene& scene_at(Editor& editor, std::size_t index) {
     return index == editor.shown ? editor : editor.scenes[index];

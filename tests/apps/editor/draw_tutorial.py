@@ -14,6 +14,40 @@ from PIL import Image
 HERE = pathlib.Path(__file__).resolve().parent
 SOURCE = HERE.parents[2]
 PICTURES = SOURCE / "docs/pictures"
+PARCELS = """
+click tab Properties
+wait-step 80
+key SPACE
+click field.scatters
+click field.scatters[0]
+wait-picture
+screenshot editor.png
+"""
+MODEL = """
+click tab Properties
+wait-step 20
+key SPACE
+key F
+click model
+click model[0]
+click open model[0].seeds
+click model[0].seeds[3]
+wait-picture
+screenshot editor-model.png
+"""
+LIVE = """
+wait-step 60
+click tab View
+click "Record as key frames"
+click "Start the change now"
+click-at "sun dial in view" 0.22 0.62
+wait-step 75
+click-at "sun dial in view" 0.14 0.58
+wait-step 85
+key SPACE
+wait-picture
+screenshot editor-climate.png
+"""
 VOXELS = """
 click tab View
 wait-step 60
@@ -24,6 +58,7 @@ wait-picture
 screenshot editor-voxels.png
 """
 SIMULATIONS = """
+click tab Properties
 wait-step 30
 click "copy simulation"
 wait-step 34
@@ -62,12 +97,12 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         walk(nephos, HERE / "tutorial.txt", folder)
-        (folder / "voxels.txt").write_text(VOXELS, encoding="utf-8")
-        walk(nephos, folder / "voxels.txt", folder, str(SOURCE / "scenes/cumulus.toml"))
-        (folder / "simulations.txt").write_text(SIMULATIONS, encoding="utf-8")
-        walk(nephos, folder / "simulations.txt", folder, str(SOURCE / "scenes/cumulus.toml"))
-        (folder / "grid.txt").write_text(GRID, encoding="utf-8")
-        walk(nephos, folder / "grid.txt", folder, str(SOURCE / "scenes/torchelsen/cloud-4.toml"))
+        for number, (script, scene) in enumerate([
+                (PARCELS, "cumulus"), (MODEL, "torchelsen/cloud-4"), (LIVE, "climate"), (VOXELS, "cumulus"),
+                (SIMULATIONS, "cumulus"), (GRID, "torchelsen/cloud-4")]):
+            path = folder / f"walk-{number}.txt"
+            path.write_text(script, encoding="utf-8")
+            walk(nephos, path, folder, str(SOURCE / f"scenes/{scene}.toml"))
         for picture in sorted(folder.glob("*.png")):
             with Image.open(picture) as image:
                 image.convert("RGB").save(PICTURES / (picture.stem + ".jpg"), quality=88)
