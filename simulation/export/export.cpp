@@ -152,13 +152,14 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
         if (is_wanted(options, frame.number, 1)) frames.push_back(summarise(run, frame));
     }
     std::ranges::move(limit_notes(options.weather, frames), std::back_inserter(notes));
+    const auto write_file = [&](std::string_view extension, std::span<const std::byte> content) {
+        const std::string name = run.scene.name + std::string(extension);
+        write_atomically(options.folder / name, content);
+        list.add_written(list.written_file(name, {}, {}));
+    };
     const auto write = [&](WeatherFormat format, std::span<const std::byte> content) {
-        for (const NamedWeather& named : weather_formats()) {
-            if (named.format != format) continue;
-            const std::string name = run.scene.name + std::string(named.extension);
-            write_atomically(options.folder / name, content);
-            list.add_written(list.written_file(name, {}, {}));
-        }
+        for (const NamedWeather& named : weather_formats())
+            if (named.format == format) write_file(named.extension, content);
     };
     const auto write_text = [&](WeatherFormat format, const std::string& text) {
         write(format, std::as_bytes(std::span(text.data(), text.size())));
@@ -180,9 +181,14 @@ void write_weather(const ExportOptions& options, ExportList& list, std::vector<s
             case WeatherFormat::wpr:
                 write_text(format, wpr_text(run, frames.front()));
                 break;
-            case WeatherFormat::cigi:
+            case WeatherFormat::cigi: {
                 write(format, cigi_capture(frames));
+                std::vector<std::byte> packets;
+                for (const WeatherSummary& frame : frames)
+                    std::ranges::copy(cigi_packets(frame), std::back_inserter(packets));
+                write_file(".cigi", packets);
                 break;
+            }
         }
     }
 }
@@ -251,9 +257,10 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
         for (ExportedFile& file : frame.kept) list.add_kept(std::move(file));
         for (ExportedFile& file : frame.written) list.add_written(std::move(file));
         if (frame.figures.max > s.scale && options.type != VoxelType::r32f)
-            notes.push_back(fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
-                                        "(--range auto keeps them)",
-                                        s.frames[of.size()].file.string(), frame.figures.max, s.scale));
+            notes.push_back(
+                fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
+                            "(--range auto keeps them)",
+                            s.frames[of.size()].file.string(), frame.figures.max, s.scale));
         of.push_back(frame.figures);
         if (++done % kListEvery != 0) return;
         lock.require_in_place();
@@ -268,23 +275,24 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
             FramesAtWork work(frames_at_once(options, s),
                               [&](ExportedFrame&& frame) { take(s, figures[n], std::move(frame)); });
             try {
-                reader.read(s.frames, false, [&](std::size_t index, std::shared_ptr<const LoadedDensity> read) {
-                    const LoadedDensity& loaded = *read;
-                    lock.require_in_place();
-                    SourceFrame& frame = s.frames[index];
-                    if (loaded.metadata) {
-                        frame.time_s = loaded.metadata->time_s;
-                        frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
-                    }
-                    for (const std::string& note : loaded.notes)
-                        notes.push_back(frame.file.string() + ": " + note);
-                    work.add([&, read] {
-                        lock.require_in_place();
-                        return exporter.write(s, frame, *read);
-                    });
-                    stopped = progress && !progress(done, frames);
-                    return !stopped;
-                });
+                reader.read(s.frames, false,
+                            [&](std::size_t index, std::shared_ptr<const LoadedDensity> read) {
+                                const LoadedDensity& loaded = *read;
+                                lock.require_in_place();
+                                SourceFrame& frame = s.frames[index];
+                                if (loaded.metadata) {
+                                    frame.time_s = loaded.metadata->time_s;
+                                    frame.utc = utc_at(loaded.metadata->georeference, frame.time_s);
+                                }
+                                for (const std::string& note : loaded.notes)
+                                    notes.push_back(frame.file.string() + ": " + note);
+                                work.add([&, read] {
+                                    lock.require_in_place();
+                                    return exporter.write(s, frame, *read);
+                                });
+                                stopped = progress && !progress(done, frames);
+                                return !stopped;
+                            });
             } catch (...) {
                 work.finish_quietly();
                 throw;

@@ -73,7 +73,8 @@ constexpr const char* kMsfs =
 
 constexpr const char* kCigi =
     "CIGI 3.3 (packets decoded by Wireshark's dissector)\n\n"
-    "{NAME}.pcap has a datagram a frame: IG Control, then Weather Control of the ground fog (layer 0) and of "
+    "{NAME}.cigi has the packets of all frames, one message after the other, each from its IG Control on.\n\n"
+    "{NAME}.pcap has them as a datagram a frame: IG Control, then Weather Control of the ground fog (layer 0) and of "
     "three "
     "layers of\n"
     "clouds (1 to 3), big-endian; what is not there is switched off. They are of region 1 around the scene's "
@@ -184,7 +185,7 @@ const std::vector<NamedWeather>& weather_formats() {
         {WeatherFormat::metar, "metar", ".metar.txt", "a METAR a frame"},
         {WeatherFormat::xplane, "xplane", ".xplane.json", "X-Plane 12, XPLMWeatherInfo_t"},
         {WeatherFormat::wpr, "wpr", ".wpr", "MSFS weather preset, first frame"},
-        {WeatherFormat::cigi, "cigi", ".pcap", "CIGI 3.3 Weather Control, UDP capture"},
+        {WeatherFormat::cigi, "cigi", ".pcap", "CIGI 3.3 packets: a file of them, and a capture of UDP"},
     };
     return formats;
 }

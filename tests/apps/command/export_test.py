@@ -74,6 +74,15 @@ class Export(Case):
         self.assertTrue((array.transpose(2, 1, 0) == self.density).all())
         self.assertEqual(back.transform.indexToWorld((1, 2, 3)), self.grid.transform.indexToWorld((1, 2, 3)))
 
+    def test_vdb_print_names_what_is_in_a_file(self):
+        """OpenVDB's own tool: the grid, its class, its box and our metadata, of the run's file and of the export's."""
+        folder = self.export("flat", "--to", "vdb")
+        for file in (self.folder / "run/density/placed_0003.vdb", folder / "placed_0003.vdb"):
+            said = self.tool("vdb_print", "-l", file)
+            for text in ("Name: density", "fog volume", "nephos_latitude_deg", "51.4775", "nephos_ecef_from_world"):
+                self.assertIn(text, said)
+            self.assertRegex(said, r"\[0, 0, 0\] -> \[31, 23, 11\]")
+
     def test_ffmpeg_decodes_bc4(self):
         folder = self.export("dds", "--to", "dds", "--mips")
         pixels = subprocess.run(["ffmpeg", "-v", "error", "-i", folder / "placed_0003.dds", "-f", "rawvideo", "-pix_fmt", "gray", "-"],

@@ -270,6 +270,54 @@ class Weather(Case):
         self.assertNotIn("Enable", fog["Weather Enable"])
         self.assertIn("Active", re.search(r"Region State: ([^\n]*)", said)[1])
 
+    def test_wireshark_decodes_every_field_of_cigi(self):
+        """Each frame against the layers that `layers` tells; and the file of packets is what the datagrams carry."""
+        self.call("export", "run", "--to", "layers", "--to", "cigi", "--frames", "1..2", "-o", "both")
+        frames = json.loads((self.folder / "both/EGLL.layers.json").read_text())["frames"]
+        said = subprocess.run(["tshark", "-r", self.folder / "both/EGLL.pcap", "-d", "udp.port==8005,cigi", "-V"],
+                              capture_output=True, text=True, check=True).stdout
+        messages = said.split("IG Control (24 bytes)")[1:]
+        self.assertEqual(len(messages), 2)
+        types = {"Ac": 1, "As": 2, "Cc": 3, "Cs": 4, "Ci": 5, "Cb": 6, "Cu": 7, "Ns": 8, "Sc": 9, "St": 10}
+        for number, (frame, message) in enumerate(zip(frames, messages), 1):
+            control, region, *weather = [
+                {name.split(" (")[0].strip(): value.strip() for name, value in re.findall(r"^ +(?:[.01 ]+= )?([^:\n]+): ([^\n]*)$", packet, re.M)}
+                for packet in re.split(r"Environmental Region Control \(48 bytes\)|Weather Control \(56 bytes\)", message)]
+            self.assertEqual((control["CIGI Version"], control["Minor Version"], control["IG Mode"], control["Byte Swap"]),
+                             ("3", "3", "Operate (1)", "Big-Endian (0x8000)"))
+            self.assertEqual((control["Host Frame Number"], control["Timestamp Valid"]), (str(number), "Invalid"))
+            numbers = {"Region ID": 1, "Latitude": 51.5, "Longitude": -0.5, "Size X": 20000, "Size Y": 20000, "Corner Radius": 0, "Rotation": 0,
+                       "Transition Perimeter": 2000}
+            for name, value in numbers.items():
+                self.assertAlmostEqual(float(region[name]), value, places=4, msg=name)
+            self.assertEqual(region["Region State"], "Active (1)")
+            self.assertEqual([region[name] for name in region if name.startswith("Merge")], ["Use Last"] * 4)
+            self.assertEqual([packet["Layer ID"] for packet in weather], ["Ground Fog (0)"] + [f"Cloud Layer {n} ({n})" for n in (1, 2, 3)])
+            for packet in weather:
+                self.assertEqual((packet["Entity ID/Region ID"], packet["Scope"], packet["Severity"]), ("1", "Regional (1)", "0"))
+                self.assertEqual((packet["Scud Enable"], packet["Random Winds Enable"], packet["Random Lightning Enable"]), ("Disabled", "Disabled", "0"))
+            for name, value in list(weather[0].items())[-12:]:
+                self.assertEqual(value, "0", name)  # there is no fog
+            for packet, layer in zip(weather[1:], frame["layers"]):
+                self.assertEqual((packet["Weather Enable"], packet["Humidity"]), ("Enabled", "95"))
+                self.assertIn(f"({types[layer['genus']]})", packet["Cloud Type"])
+                base = layer["cloud_base_m"]
+                expected = {"Air Temperature": 15 - 0.0065 * base, "Visibility Range": 100, "Scud Frequency": 0, "Coverage": 100 * layer["coverage"],
+                            "Base Elevation": base, "Thickness": layer["top_m"] - base, "Transition Band": layer["transition_m"],
+                            "Horizontal Wind Speed": layer["wind_m_per_s"], "Vertical Wind Speed": 0,
+                            "Wind Direction": (layer["wind_from_deg"] + 180) % 360 - 180,
+                            "Barometric Pressure": 1013.25 * (1 - 0.0065 / 288.15 * base) ** 5.25588, "Aerosol Concentration": 0}
+                for name, value in expected.items():
+                    self.assertAlmostEqual(float(packet[name]), value, delta=1e-5 * abs(value) + 1e-4, msg=name)
+        packets, at = (self.folder / "both/EGLL.cigi").read_bytes(), 24
+        capture, carried = (self.folder / "both/EGLL.pcap").read_bytes(), b""
+        while at < len(capture):
+            size = int.from_bytes(capture[at + 8:at + 12], "little")
+            carried += capture[at + 16 + 42:at + 16 + size]
+            at += 16 + size
+        self.assertEqual(packets, carried)
+        self.assertEqual((len(packets), packets[:3]), (2 * (24 + 48 + 4 * 56), bytes([1, 24, 3])))
+
     def test_cigi_regions_and_high_clouds(self):
         """A region's X axis points north; clouds of the stratosphere are no colder than its air."""
         self.call("run", self.write("placed.toml", PLACED), "--no-render", "--frames", "1", "--out", "placed", "-q")
