@@ -86,6 +86,15 @@ ExportReport report_of(const ExportOptions& options, const std::vector<ExportSeq
     return report;
 }
 
+// Returns whether values above the scale are cut in any of the files.
+bool cuts_values(const ExportOptions& options) {
+    return std::ranges::any_of(all_formats(options), [&](ExportFormat format) {
+        const VoxelType type = type_of(options, format);
+        const bool codes = type == VoxelType::r8 || type == VoxelType::r16 || type == VoxelType::bc4;
+        return format == ExportFormat::flightgear || (is_dense(format) && codes);
+    });
+}
+
 // The disk that holds the folder, or will; of an export that goes on, what it has written already is not counted again.
 void require_space(const std::filesystem::path& folder, std::uint64_t bytes) {
     std::error_code none;
@@ -256,7 +265,7 @@ ExportReport run_export(const ExportOptions& options, const ExportProgress& prog
     const auto take = [&](const ExportSequence& s, std::vector<FrameFigures>& of, ExportedFrame&& frame) {
         for (ExportedFile& file : frame.kept) list.add_kept(std::move(file));
         for (ExportedFile& file : frame.written) list.add_written(std::move(file));
-        if (frame.figures.max > s.scale && options.type != VoxelType::r32f)
+        if (frame.figures.max > s.scale && cuts_values(options))
             notes.push_back(
                 fmt::format("{}: values up to {:g} are above {:g}, and are cut in r8, r16 and bc4 "
                             "(--range auto keeps them)",

@@ -49,6 +49,10 @@ void write_vdb_file(const std::filesystem::path& path, const ExportOptions& opti
     if (!loaded.metadata) metadata.nephos_version = version();
     if (options.half_voxel_shift) density = shifted_by_half_a_voxel(density);
     content.density = &density;
+    // Of coarser voxels there are fewer to a cell, or a cell is less than one of them.
+    const int factor = s.layout.factor, refine = loaded.refine % factor == 0 ? loaded.refine / factor : 1;
+    content.cells = density.placement();
+    content.cells.cell_size_m *= refine;
     content.half = options.type == VoxelType::r16f;
     if (!options.velocity_name.empty() && !metadata.wind.empty()) {
         const Wind wind{{{0, metadata.wind}}};

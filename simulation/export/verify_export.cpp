@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include <fmt/format.h>
@@ -17,21 +18,24 @@ namespace {
 // Of the voxels of all files of a format to their sources.
 struct Difference {
     double largest = 0, allowed = 0, squares = 0;
-    bool passed = true;  // no voxel differs by more than its type allows
-    std::size_t voxels = 0;
+    bool passed = true;               // no voxel differs by more than its type allows
+    std::size_t voxels = 0, cut = 0;  // cut: of the source above what their type holds
 };
 
 [[noreturn]] void bad_file(const std::filesystem::path& path, const std::string& what) {
     throw Error(ErrorCode::io, path.string() + ": " + what);
 }
 
+// `most` is the greatest value that the type holds: greater ones of the source are it in the file.
 void compare(const std::filesystem::path& path, const std::vector<float>& expected,
-             const std::vector<float>& found, double allowed, Difference& d) {
+             const std::vector<float>& found, double allowed, Difference& d,
+             float most = std::numeric_limits<float>::infinity()) {
     if (expected.size() != found.size()) bad_file(path, "has another size than its source");
     double largest = 0;
     for (std::size_t n = 0; n < expected.size(); ++n) {
         if (!std::isfinite(found[n])) bad_file(path, "holds a voxel that is no finite number");
-        const double difference = std::abs(double(expected[n]) - double(found[n]));
+        if (expected[n] > most) ++d.cut;
+        const double difference = std::abs(double(std::min(expected[n], most)) - double(found[n]));
         largest = std::max(largest, difference);
         d.squares += difference * difference;
     }
@@ -41,7 +45,7 @@ void compare(const std::filesystem::path& path, const std::vector<float>& expect
     d.voxels += expected.size();
 }
 
-// A half is exact to its eleven bits; density is at most `scale`.
+// A half is exact to its eleven bits; values are at most `scale`.
 double allowed_error(VoxelType type, double scale) { return largest_error(type) * scale * 1.0001 + 1e-7; }
 
 EncodedVolume read_dense(const std::filesystem::path& path, const std::string& format, VoxelType type,
@@ -89,7 +93,9 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
         if (!(found.placement() == at)) bad_file(path, "lies at another place than its source");
         const auto type = list.types.find(file.format);
         compare(path, expected.values, found.to_dense(),
-                allowed_error(type == list.types.end() ? VoxelType::r32f : type->second, 1), d);
+                allowed_error(type == list.types.end() ? VoxelType::r32f : type->second,
+                              std::max(1.0f, source.max_value())),
+                d);
         return true;
     }
     if (file.format == "flightgear") {
@@ -97,7 +103,8 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
                           found = read_cloud_picture(path);
         if (found.side != expected.side || found.height != expected.height)
             bad_file(path, "has another size than its source's cloud");
-        compare(path, {expected.codes.begin(), expected.codes.end()}, {found.codes.begin(), found.codes.end()}, 0, d);
+        compare(path, {expected.codes.begin(), expected.codes.end()},
+                {found.codes.begin(), found.codes.end()}, 0, d);
         return true;
     }
     const auto type = list.types.find(file.format);
@@ -115,13 +122,15 @@ bool compare_file(const std::filesystem::path& folder, const ListedExport& list,
     if (encoded.levels.size() != std::size_t(one_level ? 1 : s.levels))
         bad_file(path, "has another number of levels than the list says");
     Volume expected = lay_out(source, s.layout);
+    const bool whole = encoded.type == VoxelType::r16f || encoded.type == VoxelType::r32f;
+    const float most = whole ? std::max(s.scale, source.max_value()) : s.scale;
     for (const VolumeLevel& level : encoded.levels) {
         if (&level != &top) expected = halved(expected);
         compare(path, expected.values,
                 decode(level.bytes.data(), level.bytes.size(), level.nx, level.ny, level.nz, encoded.type,
                        s.scale)
                     .values,
-                allowed_error(encoded.type, s.scale), d);
+                allowed_error(encoded.type, most), d, most);
     }
     return true;
 }
@@ -154,8 +163,9 @@ std::vector<Check> check_voxels(const std::filesystem::path& folder, const Liste
         checks.push_back(
             {format,
              d.passed,
-             fmt::format("{} files read back: largest difference {:.3g} (at most {:.3g}), rms {:.3g}",
-                         counts[format], d.largest, d.allowed, rms),
+             fmt::format("{} files read back: largest difference {:.3g} (at most {:.3g}), rms {:.3g}{}",
+                         counts[format], d.largest, d.allowed, rms,
+                         d.cut > 0 ? fmt::format("; {} voxels above the scale are cut to it", d.cut) : ""),
              {{"largest", d.largest}, {"rms", rms}}});
     }
     if (bad > 0)

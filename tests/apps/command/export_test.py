@@ -581,6 +581,44 @@ class Export(Case):
         codes = numpy.fromfile(self.folder / "smoke/smoke_0008.raw", "u1")
         self.assertEqual((len(codes), set(codes)), (200, {64}))
 
+    def test_odd_fog_volumes(self):
+        """Voxels of a metre, of half a metre and turned; values above 1; a single one: what comes out is what went in."""
+        import pyopenvdb
+        def written(name, low, high, value, matrix):
+            grid = pyopenvdb.FloatGrid()
+            grid.name = "density"
+            grid.gridClass = pyopenvdb.GridClass.FOG_VOLUME
+            grid.transform = pyopenvdb.createLinearTransform(matrix)
+            grid.fill(low, high, value)
+            pyopenvdb.write(str(self.folder / f"{name}.vdb"), [grid])
+        def edge(size, turn=False):
+            rows = [[0, size, 0, 0], [-size, 0, 0, 0]] if turn else [[size, 0, 0, 0], [0, size, 0, 0]]
+            return [*rows, [0, 0, size, 0], [0, 0, 0, 1]]
+        written("metre", (0, 0, 0), (20, 9, 5), 0.5, edge(1))
+        written("dense", (-9, -5, -3), (20, 9, 5), 7.5, edge(0.5))
+        written("turned", (0, 0, 0), (9, 4, 3), 0.3, edge(25, True))
+        written("single", (5, 5, 5), (5, 5, 5), 1, edge(50))
+        for name in ("metre", "dense", "turned", "single"):
+            for arguments in (["--to", "vdb"], ["--to", "vdb", "--type", "r16f"], ["--to", "raw", "--to", "nvdb", "--zip"], ["--to", "raw", "--type", "r16f"],
+                              ["--to", "raw", "--to", "slices", "--to", "bricks", "--type", "r8"], ["--for", "vulkan"], ["--to", "vdb", "--voxel"]):
+                with self.subTest(name=name, arguments=arguments):
+                    size = {"metre": 3, "dense": 1, "turned": 75, "single": 50}[name]
+                    said = self.call("export", f"{name}.vdb", *arguments, *([size] if arguments[-1] == "--voxel" else []), "-o", "odd").stderr
+                    cut = name == "dense" and ("vulkan" in arguments or "r8" in arguments)
+                    self.assertEqual("above 1, and are cut" in said, cut, said)
+                    self.assertEqual("voxels above the scale are cut to it" in self.call("verify", "odd").stdout, cut)
+                    for file in (self.folder / "odd").glob("*.vdb"):
+                        self.assertEqual(json.loads(self.call("info", file, "--json").stdout)["grids"][0]["metadata"]["nephos_refine"], 1)
+                    shutil.rmtree(self.folder / "odd")
+        # A run whose voxels are halves of its cells says so in what is exported.
+        self.call("run", self.scene, "--no-render", "--out", "fine", "--frames", "1", "--set", "density.refine=4")
+        for arguments, refine in (([], 4), (["--voxel", 25], 2), (["--voxel", 50], 1), (["--voxel", 37.5], 1)):
+            self.call("export", "fine", "--to", "vdb", *arguments, "-o", "odd")
+            self.call("verify", "odd")
+            found = json.loads(self.call("info", "odd/tiny_0001.vdb", "--json").stdout)
+            self.assertEqual(next(g for g in found["grids"] if g["name"] == "density")["metadata"]["nephos_refine"], refine)
+            shutil.rmtree(self.folder / "odd")
+
     def test_mistakes_are_named(self):
         for arguments, says in ((["--to", "obj"], "raw, vti"), ([], "neither --to nor --for"), (["--for", "doom"], "blender, unreal"),
                                 (["--to", "vti", "--type", "bc4"], "r8, r16 and r32f"), (["--to", "raw", "--voxel", "70"], "a multiple such as"),
