@@ -104,6 +104,10 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
     if (options.type == VoxelType::bc4)
         throw Error(ErrorCode::usage, "--type bc4: bricks with a border have r8, r16, r16f or r32f");
     std::vector<Entry> entries;
+    // Codes precede the table's end in time and follow it in the file: those of the first bricks are kept, others are made
+    // again when they are written.
+    constexpr std::size_t kMostKept = std::size_t(16) << 20;
+    std::size_t kept = 0;
     std::vector<std::vector<std::byte>> data;
     for (std::size_t n = 0; n < levels.size(); ++n) {
         const Volume& level = levels[n];
@@ -121,9 +125,13 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
                                 0,
                                 min,
                                 max};
-                    data.push_back(max > 0 ? encode(brick, options.type, options.scale)
-                                            : std::vector<std::byte>());
-                    entry.bytes = data.back().size();
+                    const std::size_t bytes =
+                        max > 0 ? encoded_bytes(brick.nx, brick.ny, brick.nz, options.type) : 0;
+                    const bool keep = bytes > 0 && kept + bytes <= kMostKept;
+                    data.push_back(keep ? encode(brick, options.type, options.scale)
+                                        : std::vector<std::byte>());
+                    if (keep) kept += bytes;
+                    entry.bytes = bytes;
                     entries.push_back(entry);
                 }
             }
@@ -151,7 +159,15 @@ void write_bricks(const std::filesystem::path& path, const std::vector<Volume>& 
             append({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
         };
         piece(head.bytes());
-        for (const std::vector<std::byte>& brick : data) piece(brick);
+        for (std::size_t n = 0; n < entries.size(); ++n) {
+            const Entry& e = entries[n];
+            if (e.bytes == 0) continue;
+            const std::array<int, 3> first{int(e.i) * options.edge, int(e.j) * options.edge, int(e.k) * options.edge};
+            if (!data[n].empty())
+                piece(data[n]);
+            else
+                piece(encode(brick_of(levels[e.level], first, options), options.type, options.scale));
+        }
     });
 }
 
