@@ -258,7 +258,7 @@ void LiveScene::forget_simulation() {
 }
 
 void LiveScene::simulate() {
-    yield_to_window();
+    yield_to_window(kNicer);
     std::unique_lock lock(mutex_);
     Clock::time_point next_step = Clock::now();
     while (true) {

@@ -13,8 +13,6 @@ namespace {
 
 // A picture is drawn with its detail when nothing has moved for so long.
 constexpr std::chrono::milliseconds kRest{180};
-// The niceness that simulating and drawing add to that of the window.
-constexpr int kNicer = 10;
 
 // Draws one picture after the other.
 struct Artist {
@@ -45,7 +43,7 @@ struct Artist {
 
 }  // namespace
 
-void yield_to_window() { ::setpriority(PRIO_PROCESS, 0, ::getpriority(PRIO_PROCESS, 0) + kNicer); }
+void yield_to_window(int steps) { ::setpriority(PRIO_PROCESS, 0, ::getpriority(PRIO_PROCESS, 0) + steps); }
 
 // What is to be drawn.
 struct LiveScene::Shown {
@@ -71,7 +69,7 @@ void LiveScene::publish(std::shared_ptr<LivePicture> picture, const Shown& what,
 }
 
 void LiveScene::draw() {
-    yield_to_window();
+    yield_to_window(kNicer);
     Artist artist{device_, nullptr, 0, {}, {}, {}};
     std::unique_lock lock(mutex_);
     while (true) {
@@ -96,7 +94,7 @@ void LiveScene::draw() {
 }
 
 void LiveScene::refine() {
-    yield_to_window();
+    yield_to_window(kNicest);
     Artist artist{device_, nullptr, 0, {}, {}, {}};
     std::unique_lock lock(mutex_);
     while (true) {

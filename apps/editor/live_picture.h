@@ -22,8 +22,10 @@ class LivePictureMaker {
 };
 
 // On a machine whose cores are all busy the window's thread, and the driver's that draw the window, go before the thread
-// that calls this and those that it starts: Linux has a niceness for each thread, and new ones inherit it.
-void yield_to_window();
+// that calls this and those that it starts: Linux has a niceness for each thread, and new ones inherit it. `steps`: how
+// much nicer, 0..19.
+void yield_to_window(int steps);
+inline constexpr int kNicer = 10, kNicest = 15;  // what waits for a picture; the detail of one that is seen already
 
 // Wall time that a draft may take, which its size is adapted to.
 inline constexpr double kDraftMs = 45;
