@@ -81,7 +81,7 @@ struct Renderer::Impl {
     AirCache air;
     SkyLights sky_lights;
     std::span<const DrawnVeil> veils;  // of the picture that is being drawn
-    VeilDepth veil_depth;              // likewise: their shade, where something is below them
+    AddedDepth veil_depth;             // likewise: their shade, where something is below them
     PrecipitationPainter painter;      // of rain that the back-end leaves to the processor
 };
 

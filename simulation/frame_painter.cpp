@@ -167,8 +167,11 @@ PendingFrame FramePainter::begin(FrameResult frame) {
                               detailed};
     std::vector<DrawnVeil> veils = veils_of(frame);
     std::vector<SkyLayer> layers;
-    for (const LayerFrame& layer : frame.layers) {
-        if (layer.sky != nullptr) layers.push_back({layer.sky, layer.clouds, layer.direct});
+    for (std::size_t n = 0; n < frame.layers.size(); ++n) {
+        const LayerFrame& layer = frame.layers[n];
+        if (layer.sky != nullptr)
+            layers.push_back({layer.sky, layer.clouds, layer.direct,
+                              absorbs_in_voxels(scene_, n) ? &scene_.layers[n] : nullptr});
     }
     std::optional<GroundCoverView> ground;
     if (frame.ground) ground = view_of(*frame.ground);

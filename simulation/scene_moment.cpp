@@ -23,6 +23,8 @@ struct FrameKeeper : SimulationSink {
 bool shows_more_than_voxels(const Scene& scene) {
     if (scene.ground_cover.enabled) return true;
     if (scene.layers.empty()) return false;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n)
+        if (absorbs_in_voxels(scene, n)) return true;
     return scene.render.precipitation.enabled || scene.render.debug_view.any() ||
            !std::ranges::all_of(scene.layers, [](const LayerOptions& layer) { return has_density(layer); });
 }

@@ -7,11 +7,13 @@
 #include <unordered_map>
 #include <utility>
 
+#include "automaton/checkpoint.h"
 #include "core/vec.h"
 #include "render/ground/wet_ground.h"
 #include "render/options/camera.h"
 #include "render/terrain/height_map.h"
 #include "seeds/light_schedule.h"
+#include "seeds/parcel_absorption.h"
 #include "simulation/debug_view.h"
 #include "simulation/memory.h"
 
@@ -179,6 +181,37 @@ std::size_t SkyBillboards::append(const SkySimulation& sky, std::span<const SkyC
     return computed;
 }
 
+namespace {
+
+constexpr double kLeastLeft = 1e-30;  // of the light, so that depths stay finite
+
+// What clouds take of the light in the voxels that they drive.
+AddedDepth depth_in_voxels(std::span<const SkyLayer> layers, const Sun& sun, double time_s) {
+    std::vector<AbsorbingCloud> clouds;
+    for (const SkyLayer& layer : layers) {
+        if (layer.voxels == nullptr) continue;
+        const WorldRectangle& world = layer.sky->options().world;
+        const Boundaries& sides = layer.voxels->boundaries;
+        const ParcelLight light{layer.voxels->light_absorption,
+                                {sides.x == Boundary::periodic ? world.max_x_m - world.min_x_m : 0,
+                                 sides.y == Boundary::periodic ? world.max_y_m - world.min_y_m : 0}};
+        append_absorbing(clouds, *layer.sky, layer.clouds, layer.voxels->coupling, light, time_s);
+    }
+    const auto absorption = std::make_shared<const ParcelAbsorption>(clouds, direction_to_sun(sun));
+    if (absorption->empty()) return {};
+    const std::vector<double> content = absorption->content();
+    const StateHash hash = hash_of_bytes(std::as_bytes(std::span(content)));
+    AddedDepth depth;
+    depth.key = {hash.high, hash.low};
+    depth.at = [absorption](const Vec3& place_m) {
+        const double left = absorption->sunlight_at(place_m);
+        return left < 1 ? float(-std::log(std::max(left, kLeastLeft))) : 0.0f;
+    };
+    return depth;
+}
+
+}  // namespace
+
 Picture SkyPainter::draw(Renderer& renderer, const MetaballCloud& voxels, std::span<const SkyLayer> layers,
                          const RenderOptions& moving, double time_s, bool depth,
                          const std::optional<GroundCoverView>& ground_cover, const Weather& weather,
@@ -225,7 +258,8 @@ PendingSkyPicture SkyPainter::begin(Renderer& renderer, const MetaballCloud& vox
     }
     PendingPicture picture =
         renderer.begin({drawn.clouds, drawn.billboards, voxels, flash, time_s, all || !veils.empty(), all,
-                        ground_cover, textures_ ? textures_->pictures : nullptr, drawn.unseen, terrain_},
+                        ground_cover, textures_ ? textures_->pictures : nullptr, drawn.unseen,
+                        depth_in_voxels(layers, options.sun, time_s), terrain_},
                        options, veils, std::move(rainfall));
     return {std::move(picture), std::move(options), std::move(lines), std::move(drawn)};
 }

@@ -104,6 +104,8 @@ struct SkyLayer {
     const SkySimulation* sky = nullptr;  // not null; has the shapes of `clouds`
     std::span<const SkyCloud> clouds;
     bool direct = true;  // draw them; false: only the debug view shows them
+    // Of a layer with an automaton, whose voxels lose light to these clouds (absorbs_in_voxels()); null: they lose none.
+    const LayerOptions* voxels = nullptr;
 };
 
 // A picture that was begun, and what is drawn over it.

@@ -76,7 +76,7 @@ void complete_light_on_host(LitCloud& cloud, std::span<const std::uint8_t> balls
         if (balls[i] == 0) return;
         const Vec3 centre = centre_of(cloud.cloud, i);
         for (const CloudVolume& volume : cloud.volumes) cloud.sun_depths[i] += sun_depth_at(volume, centre);
-        if (cloud.screen) cloud.sun_depths[i] += cloud.screen->depth_at(centre);
+        if (cloud.screen) cloud.sun_depths[i] += cloud.screen->depth_in_voxels_at(centre);
         cloud.drawn_depths[i] = cloud.sun_depths[i];
         if (!cloud.cloud.is_detailed(i)) return;
         for (const CloudVolume& volume : cloud.volumes) {
@@ -101,7 +101,7 @@ void complete_light_on_host(LitCloud& cloud, StageTimes& times) {
 void add_screen(LitCloud& cloud) {
     if (!cloud.screen) return;
     for (std::size_t i = 0; i < cloud.sun_depths.size(); ++i)
-        cloud.sun_depths[i] += cloud.screen->depth_at(centre_of(cloud.cloud, i));
+        cloud.sun_depths[i] += cloud.screen->depth_in_voxels_at(centre_of(cloud.cloud, i));
     cloud.screen->billboards.cast(cloud.frame, cloud.shadow_size, cloud.shadow);
 }
 

@@ -13,6 +13,7 @@
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
 
+#include "render/cloud/dimmed_volumes.h"
 #include "render/cloud/light_below.h"
 #include "render/frame/frame_data.h"
 #include "render/frame/tile_bins.h"
@@ -115,9 +116,11 @@ float SunScreen::depth_at(const Vec3& place_m, std::uint32_t but_for_cloud) cons
 
 CacheKey key_of_numbers(std::span<const float> numbers) { return key_of(hash_of(std::as_bytes(numbers)), {}); }
 
-void cache_screen(LitCloud& cached, const Splats& splats, const VeilDepth& veils, const RenderOptions& options) {
+void cache_screen(LitCloud& cached, const Splats& splats, const AddedDepth& veils,
+                  const RenderOptions& options) {
     const bool shines = daylight(options.sun.elevation_deg).sun > 0;
-    if (!shines || (splats.billboards.empty() && splats.unseen.empty() && !veils.any())) {
+    if (!shines ||
+        (splats.billboards.empty() && splats.unseen.empty() && !veils.any() && !splats.in_voxels.any())) {
         cached.screen = nullptr;
         cached.screen_key = {};
         return;
@@ -126,13 +129,15 @@ void cache_screen(LitCloud& cached, const Splats& splats, const VeilDepth& veils
     std::vector<double> words{to_sun.x, to_sun.y, to_sun.z, double(splats.billboards.size()),
                               splats.pictures ? double(reinterpret_cast<std::uintptr_t>(splats.pictures.get())) : 0.0,
                               std::bit_cast<double>(veils.key[0]), std::bit_cast<double>(veils.key[1])};
+    if (splats.in_voxels.any())
+        for (const std::uint64_t word : splats.in_voxels.key) words.push_back(std::bit_cast<double>(word));
     words.reserve(words.size() + 10 * (splats.billboards.size() + splats.unseen.size()));
     for (const CloudBillboard& each : splats.billboards) append_words(each, words);
     for (const CloudBillboard& each : splats.unseen) append_words(each, words);
     const CacheKey key = key_of(hash_of(std::as_bytes(std::span(words))), {});
     if (cached.screen && key == cached.screen_key) return;
-    cached.screen = std::make_shared<const SunScreen>(
-        SunScreen{BillboardShade(splats.billboards, splats.unseen, splats.pictures, to_sun), veils});
+    cached.screen = std::make_shared<const SunScreen>(SunScreen{
+        BillboardShade(splats.billboards, splats.unseen, splats.pictures, to_sun), veils, splats.in_voxels});
     cached.screen_key = key;
 }
 
@@ -168,8 +173,11 @@ void cache_volumes(LitCloud& cached, const MetaballCloud& cloud, const RenderOpt
     }
     if (cached.light_key == cached.volumes_light_key) return;
     DepthOfOthers others;
-    if (cached.screen) others = [&](const Vec3& place_m) { return cached.screen->depth_at(place_m); };
+    const SunScreen* const screen = cached.screen.get();
+    if (screen != nullptr && (screen->veils.any() || !screen->billboards.empty()))
+        others = [screen](const Vec3& place_m) { return screen->depth_at(place_m); };
     light_volumes(cached.volumes, direction_to_sun(options.sun), options.light, are_new, others);
+    if (screen != nullptr && screen->in_voxels.any()) dim_volumes(cached.volumes, screen->in_voxels.at);
     cached.volumes_key = key;  // only now: if light fails, all is new again
     cached.volumes_light_key = cached.light_key;
     cached.volumes_light = next_version();

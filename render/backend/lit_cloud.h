@@ -27,20 +27,18 @@ namespace nephos {
 // Hash of 128 bits of what a cached value was computed from. A few 10 microseconds per 10,000 metaballs.
 using CacheKey = std::array<std::uint64_t, 2>;
 
-// The optical depth of veils between a place of the world and the sun.
-struct VeilDepth {
-    CacheKey key{};  // of all that the depth depends on
-    DepthOfOthers at;
-    bool any() const { return bool(at); }
-};
-
 // What shades a cloud of voxels beside itself.
 struct SunScreen {
     BillboardShade billboards;
-    VeilDepth veils;
+    AddedDepth veils;
+    AddedDepth in_voxels;  // Splats::in_voxels
 
     // Returns the optical depth towards the sun of everything, but for the billboards of one cloud.
     float depth_at(const Vec3& place_m, std::uint32_t but_for_cloud = BillboardShade::kNoCloud) const;
+    // The same for voxels at the place.
+    float depth_in_voxels_at(const Vec3& place_m) const {
+        return depth_at(place_m) + (in_voxels.any() ? in_voxels.at(place_m) : 0);
+    }
 };
 
 struct LitCloud {
@@ -106,8 +104,10 @@ struct LitCloud {
 // Returns the key of some numbers.
 CacheKey key_of_numbers(std::span<const float> numbers);
 
-// Makes cached.screen that of billboards and veils; none while the sun is below the horizon. Before cache_cloud().
-void cache_screen(LitCloud& cached, const Splats& splats, const VeilDepth& veils, const RenderOptions& options);
+// Makes cached.screen that of billboards, veils and what voxels lose; none while the sun is below the horizon. Before
+// cache_cloud().
+void cache_screen(LitCloud& cached, const Splats& splats, const AddedDepth& veils,
+                  const RenderOptions& options);
 
 // Makes `cached` that of a cloud as it is drawn from a view, without its light, unless it is already. `cloud`
 // must live as long as `cached` is read. Another view keeps the light if it merges the same metaballs, as it

@@ -5,6 +5,7 @@
 // docs/sources.md), which are sorted and composited together. Plain data in world metres; the memory behind
 // spans must not change until the frame is finished (Renderer::finish(); draw_splats() finishes it itself).
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -87,6 +88,14 @@ inline constexpr std::size_t kMostBillboardPictures = 200;
 std::shared_ptr<const BillboardPictures> billboard_pictures(std::size_t count,
                                                             const std::function<AlphaImage(std::size_t)>& image_of);
 
+// Sunlight that voxels lose by their place, beside what clouds in the picture take away: an optical depth >= 0 between a
+// place of the world and the sun. `at` is thread-safe and does not change.
+struct AddedDepth {
+    std::array<std::uint64_t, 2> key{};  // of all that the depth depends on
+    std::function<float(const Vec3& place_m)> at;
+    bool any() const { return bool(at); }
+};
+
 struct Splats {
     std::span<const BillboardCloud> clouds;
     std::span<const CloudBillboard> billboards;
@@ -102,6 +111,7 @@ struct Splats {
     std::shared_ptr<const BillboardPictures> pictures{};  // of billboards; null: none has one
     // Billboards of clouds that the camera does not see: they are not drawn but cast shadows. `cloud` has no meaning.
     std::span<const CloudBillboard> unseen{};
+    AddedDepth in_voxels{};                      // that metaballs and their detail have; it casts no shadow
     std::shared_ptr<const HeightMap> terrain{};  // ground that is not level (render/terrain/height_map.h); null: it is
 };
 

@@ -2,6 +2,7 @@
 #include "scenes/format/layers.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/random.h"
@@ -86,6 +87,19 @@ WorldRectangle whole_world(const Scene& scene) {
         first = false;
     }
     return world;
+}
+
+bool absorbs_in_voxels(const Scene& scene, std::size_t layer) {
+    const LayerOptions& given = scene.layers[layer];
+    if (!given.automaton || given.light_absorption <= 0 || given.coupling.strength <= 0) return false;
+    const auto absorbs = [&](const std::string& model) {
+        return std::isfinite(scene.models[index_of(scene.models, model, "base model")].light_distance_m);
+    };
+    return std::ranges::any_of(given.metamorphoses, absorbs, &NamedMetamorphosis::to) ||
+           std::ranges::any_of(given.skies, [&](const std::string& name) {
+               const NamedSky& sky = scene.skies[index_of(scene.skies, name, "sky")];
+               return sky.clouds > 0 && std::ranges::any_of(sky.models, absorbs);
+           });
 }
 
 SkyOptions sky_options(const Scene& scene, std::size_t layer) {

@@ -119,6 +119,8 @@ struct LayerOptions {
     std::vector<NamedMetamorphosis> metamorphoses;
     double shear_s = 0;  // as in SkyOptions
     CouplingOptions coupling;
+    double light_absorption =
+        1;  // 0..1, part of the base models' absorption that voxels have (parcel_absorption.h)
     LayerRain rain;
     bool own_detail = false;  // true: `detail` holds for this layer instead of the scene's
     DetailOptions detail;
@@ -150,6 +152,10 @@ VeilOptions veil_options(const Scene& scene, std::size_t layer);
 // Returns the factor of a layer's density at a time: its opacity, of a veil times its presence, linear in the state of the
 // climate between its points and constant beyond them. 0..1; pure.
 double opacity_at(const LayerOptions& layer, const ClimateOptions& climate, double time_s);
+
+// Returns whether the light distances of base models act on the voxels of a layer: it has an automaton that its clouds drive,
+// `light_absorption` above 0, and a base model, or one that others turn into, with a finite light distance. Pure.
+bool absorbs_in_voxels(const Scene& scene, std::size_t layer);
 
 // Returns the bounding rectangle of the worlds of all layers, which the map of the ground covers. Pure.
 WorldRectangle whole_world(const Scene& scene);

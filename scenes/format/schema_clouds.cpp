@@ -97,25 +97,34 @@ const Section& model_section() {
                                        "The genus of the clouds, by its WMO abbreviation; rain may be "
                                        "attached to it.",
                                        "T, 2"),
-         key<&BaseModel::light_distance_m>(
-             "light_distance_m", "m", or_infinite(above(0, 0)),
-             "Way of light in the cloud after which it is absorbed, for billboards.", "T, CFA"),
-         default_is(written_if(key<&BaseModel::textures>(
-                                   "textures", "", kAny,
-                                   "PNG files with transparency, relative to the scene's folder: each billboard is one of "
-                                   "them, upright, in place of its seed's `texture`. Alpha is opacity, luminance scales "
-                                   "the light.",
-                                   "T, 3.1"),
-                               [](const void* model) { return !static_cast<const BaseModel*>(model)->textures.empty(); }),
-                    "those of the seeds' `texture`"),
-         default_is(written_if(table<&BaseModel::centre>(
-                                   "centre", probabilities_section(),
-                                   "Probabilities at the centre of its boxes' ellipsoids, in every layer's automaton."),
-                               [](const void* model) { return static_cast<const BaseModel*>(model)->own_centre; }),
-                    "that of `layer.coupling`"),
-         default_is(written_if(table<&BaseModel::rim>("rim", probabilities_section(), "The same at their rim."),
-                               [](const void* model) { return static_cast<const BaseModel*>(model)->own_rim; }),
-                    "that of `layer.coupling`"),
+         key<&BaseModel::light_distance_m>("light_distance_m", "m", or_infinite(above(0, 0)),
+                                           "Way of light in the cloud after which it is absorbed: of "
+                                           "billboards in the cloud's boxes, of the voxels of an "
+                                           "automaton in the ellipsoids that the boxes are there "
+                                           "(`layer.light_absorption`). Short: dark rain clouds; "
+                                           "infinite: bright ones.",
+                                           "T, CFA"),
+         default_is(
+             written_if(
+                 key<&BaseModel::textures>(
+                     "textures", "", kAny,
+                     "PNG files with transparency, relative to the scene's folder: each billboard is one of "
+                     "them, upright, in place of its seed's `texture`. Alpha is opacity, luminance scales "
+                     "the light.",
+                     "T, 3.1"),
+                 [](const void* model) { return !static_cast<const BaseModel*>(model)->textures.empty(); }),
+             "those of the seeds' `texture`"),
+         default_is(
+             written_if(
+                 table<&BaseModel::centre>(
+                     "centre", probabilities_section(),
+                     "Probabilities at the centre of its boxes' ellipsoids, in every layer's automaton."),
+                 [](const void* model) { return static_cast<const BaseModel*>(model)->own_centre; }),
+             "that of `layer.coupling`"),
+         default_is(
+             written_if(table<&BaseModel::rim>("rim", probabilities_section(), "The same at their rim."),
+                        [](const void* model) { return static_cast<const BaseModel*>(model)->own_rim; }),
+             "that of `layer.coupling`"),
          required(tables<&BaseModel::seeds>("seeds", seed_section(), 1, 10'000))},
         &finish_model};
     return section;

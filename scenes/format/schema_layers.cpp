@@ -440,6 +440,12 @@ const Section& layer_section() {
                                          "sheared by its wind.",
                                          "T, 5"),
              table<&LayerOptions::coupling>("coupling", coupling_section(), coupling_section().effect),
+             key<&LayerOptions::light_absorption>(
+                 "light_absorption", "", between(0, 1),
+                 "How much of the absorption of light that `model.light_distance_m` means the voxels of its "
+                 "automaton "
+                 "have; 0: none.",
+                 "T, CFA"),
              table<&LayerOptions::rain>("rain", rain_section(), rain_section().effect),
              default_is(table<&LayerOptions::detail>("detail", detail_section(), detail_section().effect),
                         "that of `[detail]`; a veil has none"),
@@ -466,6 +472,11 @@ const Section& layer_section() {
                     const auto& layer = *static_cast<const LayerOptions*>(owner);
                     return !layer.is_veil && layer.shear_s != 0;
                 };
+            if (key.name == "light_absorption")
+                key.written = [](const void* owner) {
+                    const auto& layer = *static_cast<const LayerOptions*>(owner);
+                    return !layer.is_veil && layer.light_absorption != 1;
+                };
             if (key.name == "detail")
                 key.written = [](const void* owner) { return static_cast<const LayerOptions*>(owner)->own_detail; };
         }
@@ -476,10 +487,10 @@ const Section& layer_section() {
 
 std::span<const std::string_view> keys_of_clouds() {
     static constexpr std::string_view kKeys[] = {
-        "skies",    "automaton",   "background",    "base_height_m",      "genus",
-        "climate",  "formation_s", "dissolution_s", "formation_softness", "cross_edges_whole",
-        "coupling", "rain",        "scatters",      "ellipsoids",         "profile",
-        "entering", "metamorphoses", "shear_s"};
+        "skies",    "automaton",     "background",    "base_height_m",      "genus",
+        "climate",  "formation_s",   "dissolution_s", "formation_softness", "cross_edges_whole",
+        "coupling", "rain",          "scatters",      "ellipsoids",         "profile",
+        "entering", "metamorphoses", "shear_s",       "light_absorption"};
     return kKeys;
 }
 

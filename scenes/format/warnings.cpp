@@ -116,6 +116,24 @@ void add_slab_keys(const LayerOptions& layer, std::vector<std::string>& to) {
                                  layer.name));
 }
 
+// The base models of a layer's clouds, with those that they turn into.
+std::set<std::string> models_of(const Scene& scene, const LayerOptions& layer) {
+    std::set<std::string> used;
+    for (const NamedSky& sky : scene.skies)
+        if (std::ranges::count(layer.skies, sky.name) > 0) used.insert(sky.models.begin(), sky.models.end());
+    for (const NamedMetamorphosis& change : layer.metamorphoses) used.insert(change.to);
+    return used;
+}
+
+// Whether a base model says anything of its billboards.
+bool has_billboards(const BaseModel& model) {
+    const Seed plain;
+    return !model.textures.empty() || std::ranges::any_of(model.seeds, [&](const Seed& seed) {
+        return !(seed.billboards == plain.billboards && seed.billboard_width_m == plain.billboard_width_m &&
+                 seed.billboard_height_m == plain.billboard_height_m && seed.texture == plain.texture);
+    });
+}
+
 }  // namespace
 
 std::vector<std::string> keys_without_effect(const Scene& scene) {
@@ -131,15 +149,25 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
     if (sea && scene.ground_cover.enabled)
         result.emplace_back(
             "[wet_ground] has no effect but for its reflection: rain and snow vanish in a ground of water");
-    std::set<std::string> drawn, grown;  // base models of layers without and with an automaton
-    for (const LayerOptions& layer : scene.layers) {
+    // Base models of layers without and with an automaton, and of those that absorb the light in voxels.
+    std::set<std::string> drawn, grown, absorbing;
+    for (std::size_t n = 0; n < scene.layers.size(); ++n) {
+        const LayerOptions& layer = scene.layers[n];
         if (layer.is_slab) add_slab_keys(layer, result);
         if (layer.is_veil) continue;
-        std::set<std::string>& used = layer.automaton ? grown : drawn;
-        for (const NamedSky& sky : scene.skies)
-            if (std::ranges::count(layer.skies, sky.name) > 0)
-                used.insert(sky.models.begin(), sky.models.end());
-        for (const NamedMetamorphosis& change : layer.metamorphoses) used.insert(change.to);
+        const std::set<std::string> models = models_of(scene, layer);
+        (layer.automaton ? grown : drawn).insert(models.begin(), models.end());
+        const bool absorbs = absorbs_in_voxels(scene, n);
+        if (absorbs) absorbing.insert(models.begin(), models.end());
+        if (layer.light_absorption != 1 && layer.automaton && !absorbs && layer.light_absorption > 0)
+            result.push_back(fmt::format(
+                "layer '{}': `light_absorption` has no effect: no base model of its clouds has a finite "
+                "`light_distance_m`, or they do not drive the automaton",
+                layer.name));
+        if (layer.light_absorption != 1 && !layer.automaton)
+            result.push_back(fmt::format(
+                "layer '{}' is drawn directly: `light_absorption` has no effect without `automaton`",
+                layer.name));
         const bool field = !layer.scatters.empty() || !layer.ellipsoids.empty() || !layer.profile.empty() ||
                            !layer.coupling.genera.empty();
         if (!layer.automaton && field)
@@ -153,20 +181,17 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
                 "shears itself",
                 layer.name));
     }
-    const Seed plain;
     for (const BaseModel& model : scene.models) {
         if (!grown.contains(model.name) || drawn.contains(model.name)) continue;
-        const bool given = std::ranges::any_of(model.seeds, [&](const Seed& seed) {
-            return std::isfinite(model.light_distance_m) ||
-                   !(seed.billboards == plain.billboards &&
-                     seed.billboard_width_m == plain.billboard_width_m &&
-                     seed.billboard_height_m == plain.billboard_height_m && seed.texture == plain.texture &&
-                     model.textures.empty());
-        });
-        if (given)
+        if (has_billboards(model))
             result.push_back(fmt::format(
-                "base model '{}': `light_distance_m` and the numbers, sizes and textures of billboards "
-                "have no effect: all layers that use it have an automaton",
+                "base model '{}': the numbers, sizes and textures of billboards have no effect: all layers that use it "
+                "have an automaton",
+                model.name));
+        if (std::isfinite(model.light_distance_m) && !absorbing.contains(model.name))
+            result.push_back(fmt::format(
+                "base model '{}': `light_distance_m` has no effect: no cloud of it drives an automaton in a layer whose "
+                "`light_absorption` is above 0",
                 model.name));
     }
     return result;

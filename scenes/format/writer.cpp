@@ -255,6 +255,7 @@ std::string simulation_hash(const Scene& scene, std::string_view initial_state_h
     for (LayerOptions& layer : simulation.layers) {
         if (layer.initial_state_file) layer.initial_state_file = "state";
         layer.is_slab = false;  // only how it is drawn
+        layer.light_absorption = 1;
     }
     for (ProbabilityGrid& grid : simulation.automaton.field.grids) grid.file = "probabilities";
     for (WindField& field : simulation.automaton.wind.fields)

@@ -59,6 +59,8 @@ PICTURES = {
                                           | NO_DETAIL)]),
     "torchelsen-shade.jpg": (1, (640, 400), [("torchelsen/shade", 1, {})]),
     "torchelsen-cumulonimbus.jpg": (1, (640, 400), [("torchelsen/cumulonimbus", 1, {})]),
+    "torchelsen-dark-and-bright.jpg": (1, (640, 400), [("torchelsen/dark-and-bright", 1, {})]),
+    "torchelsen-alike.jpg": (1, (640, 400), [("torchelsen/dark-and-bright", 1, {"layer[0].light_absorption": "0"})]),
     "sapronov-shade.jpg": (1, (640, 400), [("sapronov/shade", 1, {})]),
     "debug-view.png": (1, (640, 480), [("torchelsen/cloud-1", 1, {f"debug_view.{part}": "true" for part in ("boxes", "axes", "roots", "rays")} | {"camera.vertical_fov_deg": "22"})]),
 }

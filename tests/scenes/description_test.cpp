@@ -217,6 +217,7 @@ base_height_m = [100, 150]
 climate = { schedule = [{ time_s = 10, state = 0.5 }] }
 entering = "horizon"
 shear_s = 60
+light_absorption = 0.5
 coupling = { genera = [{ genus = "Cu", centre = { act = 0.2 } }] }
 metamorphoses = [{ from = "billboard", to = "other", state = [0.3, 0.6] }]
 ellipsoids = [{ centre_m = [5, 6, 120] }]

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "scenes/format/reader.h"
+#include "scenes/format/warnings.h"
 #include "scenes/format/writer.h"
 
 namespace nephos {
@@ -223,6 +224,42 @@ TEST(Layers, HaveSeedsThatNeverRepeat) {
     }
     std::sort(seeds.begin(), seeds.end());
     EXPECT_EQ(std::adjacent_find(seeds.begin(), seeds.end()), seeds.end());
+}
+
+// Of base models whose light distance acts on nothing, and layers that absorb nothing, the author is told.
+TEST(Layers, NoteLightDistancesWithoutEffect) {
+    const std::string text = R"(
+name = "dark"
+[[model]]
+name = "Ns"
+light_distance_m = 400
+seeds = [{}]
+[[sky]]
+name = "rain"
+state = 0
+clouds = 3
+models = "Ns"
+[[layer]]
+name = "low"
+skies = "rain"
+base_height_m = 1000
+)";
+    const auto notes = [&](std::vector<std::string> overrides) {
+        std::string all;
+        for (const std::string& note : keys_without_effect(read_scene_text(text, "dark.toml", {}, overrides)))
+            all += note + "\n";
+        return all;
+    };
+    const std::string model = "base model 'Ns': `light_distance_m` has no effect",
+                      layer = "layer 'low': `light_absorption` has no effect",
+                      direct = "layer 'low' is drawn directly: `light_absorption` has no effect";
+    EXPECT_EQ(notes({}), "");
+    EXPECT_EQ(notes({"layer[0].light_absorption=0.5"}), "");
+    EXPECT_EQ(notes({"layer[0].automaton=false"}), "") << "billboards have it";
+    EXPECT_EQ(notes({"layer[0].light_absorption=0"}).find(model), 0u);
+    EXPECT_EQ(notes({"layer[0].coupling.strength=0"}).find(model), 0u);
+    EXPECT_EQ(notes({"layer[0].light_absorption=0.5", "model[0].light_distance_m=inf"}).find(layer), 0u);
+    EXPECT_EQ(notes({"layer[0].light_absorption=0.5", "layer[0].automaton=false"}).find(direct), 0u);
 }
 
 // Between two steps a cloud moves on a straight line that ends where the step puts it.
