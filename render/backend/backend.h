@@ -67,13 +67,14 @@ struct FrameDescription {
     // Returns the concentric shells of air around the eye that light shafts and fog are integrated over; none where a
     // scene has neither. Precondition: the light of `cloud` is on the host.
     AirShells shells() const { return shells(cloud.shadow); }
-    // The same without the plane of the shade map that is made of the shadow map, which may be on a device.
+    // The same without the plane of the shade map that is made of the shadow map, which may be on a device. Not with veils.
     AirShells shells_without_light() const { return shells({}); }
 
   private:
     AirShells shells(std::span<const float> shadow) const {
-        return air_shells(options, cloud.cloud, cloud.casters(), cloud.frame, shadow, cloud.shadow_size, cloud.light,
-                          splats.time_s, air.noise, air.shade);
+        const AirLight light{cloud.frame, shadow, cloud.shadow_size, cloud.light,
+                             cloud.screen ? &cloud.screen->veils : nullptr};
+        return air_shells(options, cloud.cloud, cloud.casters(), light, splats.time_s, air.noise, air.shade);
     }
     ViewSortedSplats view_sorted(const PreparedCloud& metaballs) const {
         const StageTimer timer(&times, DrawStage::view_sorting);

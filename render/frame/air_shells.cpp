@@ -22,6 +22,8 @@ float distance_of(const shader::ViewBillboard& billboard) {
     return std::sqrt(billboard.x * billboard.x + billboard.y * billboard.y + billboard.z * billboard.z);
 }
 
+constexpr double kLeastSunSine = 0.02;  // as in veil_shade.cpp
+
 // Texels of the shadow map along an edge of one of the shade map. A shaft is a mean over many shadows; single
 // texels would only be noise. The shade map has 512 texels on a side at most.
 int texels_in_one(int shadow_size) {
@@ -111,10 +113,14 @@ Along along_axis(const PreparedCloud& cloud, std::span<const ShadowCaster> other
 
 class ShadeMap {
   public:
-    ShadeMap(std::span<const float> shadow, int shadow_size)
-        : shadow_(shadow),
-          shadow_size_(shadow_size),
-          step_(texels_in_one(shadow_size)),
+    // `low_m`: a height below all veils.
+    ShadeMap(const AirLight& light, double low_m)
+        : shadow_(light.shadow),
+          shadow_size_(light.shadow_size),
+          frame_(light.frame),
+          veils_(light.veils),
+          low_m_(low_m),
+          step_(texels_in_one(light.shadow_size)),
           inner_((shadow_size_ + step_ - 1) / step_),
           columns_(inner_ + 2) {}
 
@@ -125,9 +131,8 @@ class ShadeMap {
     static double shift() { return 0.5; }
 
     std::vector<std::uint32_t> words(const PreparedCloud& cloud, std::span<const ShadowCaster> others,
-                                     const ShadowFrame& frame, const Along& along, float& first_shade) const {
-        const std::vector<std::uint32_t> light = means(),
-                                         range = ranges(cloud, others, frame, along, first_shade);
+                                     const Along& along, float& first_shade) const {
+        const std::vector<std::uint32_t> light = means(), range = ranges(cloud, others, along, first_shade);
         std::vector<std::uint32_t> words(3 * texels());
         const auto columns = std::size_t(columns_), last = texels() - 1;
         tbb::parallel_for(std::size_t{0}, columns, [&](std::size_t row) {
@@ -150,37 +155,49 @@ class ShadeMap {
         return std::uint32_t(std::clamp(value, 0.0, 1.0) * 255.0 + 0.5);
     }
 
-    // Means of the shadow map, 0..255, with a border of full light.
+    // Sunlight that veils leave to air below them on the line of light through a texel of the shade map.
+    double left_by_veils(int row, int column) const {
+        if (veils_ == nullptr || !veils_->any()) return 1;
+        const Vec3 start = frame_.origin_m + ((column - 0.5) / scale()) * frame_.u_axis_m +
+                           ((row - 0.5) / scale()) * frame_.v_axis_m;
+        const double down = std::min(frame_.direction.z, -kLeastSunSine);
+        return std::exp(-double(veils_->at(start + ((low_m_ - start.z) / down) * frame_.direction)));
+    }
+
+    // Means of the shadow map, 0..255, with a border of what veils leave.
     std::vector<std::uint32_t> means() const {
         if (shadow_.empty()) return std::vector<std::uint32_t>(texels(), 0);
-        std::vector<std::uint32_t> light(texels(), 255);
-        tbb::parallel_for(0, inner_, [&](int row) {
-            for (int column = 0; column < inner_; ++column) {
-                float sum = 0;
-                int count = 0;
-                for (int y = row * step_; y < std::min(shadow_size_, (row + 1) * step_); ++y) {
-                    for (int x = column * step_; x < std::min(shadow_size_, (column + 1) * step_);
-                         ++x, ++count)
-                        sum += shadow_[std::size_t(y) * std::size_t(shadow_size_) + std::size_t(x)];
-                }
-                light[std::size_t(row + 1) * std::size_t(columns_) + std::size_t(column + 1)] =
-                    byte_of(double(sum) / count);
-            }
+        std::vector<std::uint32_t> light(texels());
+        tbb::parallel_for(0, columns_, [&](int y) {
+            for (int x = 0; x < columns_; ++x)
+                light[std::size_t(y) * std::size_t(columns_) + std::size_t(x)] =
+                    byte_of(mean(y - 1, x - 1) * left_by_veils(y, x));
         });
         return light;
+    }
+
+    // Mean of the shadow map over one of the inner texels; 1 beyond them.
+    double mean(int row, int column) const {
+        if (row < 0 || column < 0 || row >= inner_ || column >= inner_) return 1;
+        float sum = 0;
+        int count = 0;
+        for (int y = row * step_; y < std::min(shadow_size_, (row + 1) * step_); ++y)
+            for (int x = column * step_; x < std::min(shadow_size_, (column + 1) * step_); ++x, ++count)
+                sum += shadow_[std::size_t(y) * std::size_t(shadow_size_) + std::size_t(x)];
+        return double(sum) / count;
     }
 
     // Adds each metaball to the texel of its centre, then to each texel those around it within the radius of
     // metaballs; other casters likewise.
     std::vector<Span> spans(const PreparedCloud& cloud, std::span<const ShadowCaster> others,
-                            const ShadowFrame& frame, const Along& along, int& reach) const {
+                            const Along& along, int& reach) const {
         std::vector<Span> spans(texels());
-        const Vec3& u = frame.u_axis_m;
-        const Vec3& v = frame.v_axis_m;
+        const Vec3& u = frame_.u_axis_m;
+        const Vec3& v = frame_.v_axis_m;
         const Vec3 across = (scale() / dot(u, u)) * u, down = (scale() / dot(v, v)) * v;
         double radius_sum = 0;
         const auto add = [&](const Vec3& centre, double radius, double weight) {
-            const Vec3 offset = centre - frame.origin_m;
+            const Vec3 offset = centre - frame_.origin_m;
             const int column = std::clamp(int(dot(across, offset)) + 1, 0, columns_ - 1),
                       row = std::clamp(int(dot(down, offset)) + 1, 0, columns_ - 1);
             Span& span = spans[std::size_t(row) * std::size_t(columns_) + std::size_t(column)];
@@ -216,10 +233,9 @@ class ShadeMap {
 
     // Shade increases linearly over the length of a uniform cloud with the same mean and variance.
     std::vector<std::uint32_t> ranges(const PreparedCloud& cloud, std::span<const ShadowCaster> others,
-                                      const ShadowFrame& frame, const Along& along,
-                                      float& first_shade) const {
+                                      const Along& along, float& first_shade) const {
         int reach = 0;
-        std::vector<Span> all = spans(cloud, others, frame, along, reach);
+        std::vector<Span> all = spans(cloud, others, along, reach);
         const auto columns = std::size_t(columns_);
         tbb::parallel_for(std::size_t{0}, columns,
                           [&](std::size_t row) { blur(all, row * columns, 1, columns_, reach); });
@@ -243,7 +259,11 @@ class ShadeMap {
     }
 
     std::span<const float> shadow_;
-    int shadow_size_, step_, inner_, columns_;
+    int shadow_size_;
+    const ShadowFrame& frame_;
+    const AddedDepth* veils_;
+    double low_m_;
+    int step_, inner_, columns_;
 };
 
 void set_ends(shader::Shells& data, const Shells& shells, bool far_shell) {
@@ -263,15 +283,15 @@ double shafts_strength(const RenderOptions& options) {
 }
 
 // Computes the shade map of a cloud.
-void make_shade(const PreparedCloud& cloud, std::span<const ShadowCaster> others, const ShadowFrame& frame,
-                std::span<const float> shadow, int shadow_size, Version light, ShadeCache& cache) {
+void make_shade(const PreparedCloud& cloud, std::span<const ShadowCaster> others, const AirLight& light,
+                double low_m, ShadeCache& cache) {
     if (cloud.visible.empty() && others.empty()) {  // full light
         cache.columns = 2;
         cache.words.assign(std::size_t{3} * 4, ~std::uint32_t{0});
     } else {
-        const Along along = along_axis(cloud, others, shade_axis(frame.direction));
-        const ShadeMap map(shadow, shadow_size);
-        cache.words = map.words(cloud, others, frame, along, cache.first_shade);
+        const Along along = along_axis(cloud, others, shade_axis(light.frame.direction));
+        const ShadeMap map(light, low_m);
+        cache.words = map.words(cloud, others, along, cache.first_shade);
         cache.columns = map.columns();
         cache.texels_per_map = map.scale();
         cache.along = along.row;
@@ -279,7 +299,7 @@ void make_shade(const PreparedCloud& cloud, std::span<const ShadowCaster> others
     }
     cache.shade_words = cache.words.size();
     cache.fog_seed.reset();
-    cache.light = light;
+    cache.light = light.light;
     ++cache.serial;
 }
 
@@ -347,17 +367,16 @@ bool has_shells(const RenderOptions& options, bool casts_shadow) {
 }
 
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud,
-                     std::span<const ShadowCaster> others, const ShadowFrame& frame,
-                     std::span<const float> shadow, int shadow_size, Version light, double time_s,
+                     std::span<const ShadowCaster> others, const AirLight& light, double time_s,
                      FogNoise& noise, ShadeCache& cache) {
     AirShells shells;
     const bool has_fog = options.fog.extinction_per_m > 0;
     const bool casts_shadow = !cloud.visible.empty() || !others.empty();
     if (!has_shells(options, casts_shadow)) return shells;
     shader::Shells& data = shells.data;
-    if (cache.light != light) make_shade(cloud, others, frame, shadow, shadow_size, light, cache);
+    if (cache.light != light.light) make_shade(cloud, others, light, options.ground.height_m, cache);
     add_fog_noise(options.fog, noise, cache);
-    use_shade(cache, casts_shadow, frame, options.camera.position_m, shells);
+    use_shade(cache, casts_shadow, light.frame, options.camera.position_m, shells);
     set_ends(data, options.shells, has_fog);
     data.settings.x = float(options.shells.count + (has_fog ? 1 : 0));
     data.settings.y = casts_shadow ? float(shafts_strength(options)) : 0.0f;

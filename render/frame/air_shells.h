@@ -12,8 +12,9 @@
 //
 // The light that clouds remove from a shell is computed by the shade map, a coarser shadow map with depth:
 // each texel has the mean of the shadow map over a few texels, and the heights at which shade begins and is
-// complete (with a low sun: the distances along the light), so that air above the clouds is sunlit. Private
-// to the module.
+// complete (with a low sun: the distances along the light), so that air above the clouds is sunlit. Light that veils per
+// pixel take away (render/veil/veil_shade.h) is missing in the texels likewise, and beyond the map as at its rim; so air above
+// the clouds and below a veil counts as sunlit. Private to the module.
 
 #include <array>
 #include <cstdint>
@@ -22,6 +23,7 @@
 #include <vector>
 
 #include "render/cloud/cloud_preparation.h"
+#include "render/cloud/splats.h"
 #include "render/frame/fog.h"
 #include "render/frame/versioned.h"
 #include "render/frame/view_sorting.h"
@@ -76,12 +78,19 @@ std::size_t shells_before(const shader::Shells& data, float distance);
 // sample the whole shadow map.
 bool has_shells(const RenderOptions& options, bool casts_shadow);
 
-// Returns the shells of a frame; none when the options have none or they would have no effect. `shadow`: the
-// shadow map, or empty: its plane of `shade` is left 0; `light`: version of cloud, frame and shadow; `time_s`:
-// simulated time of the picture. What is returned lives as long as `cache` is not given to another call.
+// What of a cloud's light the shells are made of.
+struct AirLight {
+    const ShadowFrame& frame;
+    std::span<const float> shadow;  // the shadow map, or empty: its plane of AirShells::shade is left 0
+    int shadow_size = 0;
+    Version light = 0;                  // of cloud, frame, shadow and veils
+    const AddedDepth* veils = nullptr;  // null: none
+};
+
+// Returns the shells of a frame; none when the options have none or they would have no effect. `time_s`: simulated time of the
+// picture. What is returned lives as long as `cache` is not given to another call.
 AirShells air_shells(const RenderOptions& options, const PreparedCloud& cloud,
-                     std::span<const ShadowCaster> others, const ShadowFrame& frame,
-                     std::span<const float> shadow, int shadow_size, Version light, double time_s,
+                     std::span<const ShadowCaster> others, const AirLight& light, double time_s,
                      FogNoise& noise, ShadeCache& cache);
 
 // Returns for each shell the number of splats in front of it; rising.

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <tbb/parallel_for.h>
+
 #include "core/math.h"
 #include "core/vec.h"
 #include "render/frame/frame_data.h"
@@ -98,6 +100,24 @@ float sunlight_of_map(const Picture& picture, const Vec3& place_m) {
 float sunlight_at(const Picture& picture, const Vec3& place_m) {
     const float left = sunlight_of_map(picture, place_m);
     return picture.sunlight_of_veils ? left * picture.sunlight_of_veils(place_m) : left;
+}
+
+std::vector<float> shadow_with_veils(const Picture& picture, double low_m) {
+    constexpr double kLeastSunSine = 0.02;  // as in veil_shade.cpp
+    if (!picture.sunlight_of_veils || picture.shadow.empty()) return {};
+    std::vector<float> shadow = picture.shadow;
+    const ShadowFrame& f = picture.shadow_frame;
+    const int size = picture.shadow_size;
+    const double down = std::min(f.direction.z, -kLeastSunSine);
+    tbb::parallel_for(0, size, [&](int row) {
+        for (int column = 0; column < size; ++column) {
+            const Vec3 start =
+                f.origin_m + ((column + 0.5) / size) * f.u_axis_m + ((row + 0.5) / size) * f.v_axis_m;
+            shadow[std::size_t(row) * std::size_t(size) + std::size_t(column)] *=
+                picture.sunlight_of_veils(start + ((low_m - start.z) / down) * f.direction);
+        }
+    });
+    return shadow;
 }
 
 Rgb particle_radiance(const PrecipitationLight& light, const Vec3& ray, const Vec3& place_m,

@@ -3,6 +3,8 @@
 
 // Radiance of rain and snow. Private to the module.
 
+#include <vector>
+
 #include "render/image/picture.h"
 #include "render/options/options.h"
 #include "render/shared/rain.h"
@@ -37,6 +39,10 @@ PictureAir air_of(const Picture& picture, const RenderOptions& options);
 // Returns the fraction of sunlight that reaches a point, by the picture's shadow map and veils. The map is for points
 // below all clouds; points between or above them count as shaded, too.
 float sunlight_at(const Picture& picture, const Vec3& place_m);
+
+// Returns the texels of the picture's shadow map times what veils leave on the same lines of light at a height below them;
+// empty: the map itself says all.
+std::vector<float> shadow_with_veils(const Picture& picture, double low_m);
 
 // Phase function of particles: the fraction kForwardFraction is Henyey-Greenstein with g = 0.85 for drops and
 // 0.6 for flakes, the rest isotropic. Drops have their bows beside it (rainbow.h).

@@ -203,6 +203,8 @@ void draw_shafts(Picture& picture, const RenderOptions& options, const CameraFra
                  std::uint64_t seed) {
     if (options.precipitation.shafts <= 0) return;
     ShaftPass pass = shaft_pass(picture, options, camera, curtains, light, time_s);
+    pass.veiled_shadow = shadow_with_veils(picture, options.ground.height_m);
+    if (!pass.veiled_shadow.empty()) pass.shadow = pass.veiled_shadow.data();
     if (pass.curtains.empty()) return;
     pass.noise = shaft_noise_cells(seed);
     tbb::parallel_for(std::size_t(0), std::size_t(picture.height), [&](std::size_t y) {

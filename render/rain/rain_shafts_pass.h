@@ -51,6 +51,7 @@ struct ShaftPass {
     const GroundLight* ground = nullptr;  // null: no cloud
     shader::vec4 ground_place{};          // of a point relative to the eye (PictureFrame::ground_light_place)
     const float* shadow = nullptr;
+    std::vector<float> veiled_shadow;  // shadow_with_veils(), where it is read instead of the picture's
     int shadow_size = 0;
     float shadow_u = 0, shadow_v = 0;  // the eye in the map, 0..1
     glm::vec3 to_u{}, to_v{};

@@ -104,7 +104,7 @@ void DeviceRain::use_noise(std::uint64_t seed) {
 }
 
 // A picture without a map has one texel, which is not read.
-void DeviceRain::use_shadow(const Picture& picture) {
+void DeviceRain::use_shadow(const Picture& picture, double ground_m) {
     flush();
     const std::vector<float> white(1, 1.0f);
     const bool some = !picture.shadow.empty();
@@ -114,7 +114,11 @@ void DeviceRain::use_shadow(const Picture& picture) {
         shadow_ = create_image(gpu_, size, size, 1, vk::Format::eR32Sfloat,
                                vk::ImageUsageFlagBits::eSampled | vk::ImageUsageFlagBits::eTransferDst);
     }
-    upload_image(gpu_, shadow_, std::as_bytes(std::span(some ? picture.shadow : white)));
+    const std::vector<float> veiled = shadow_with_veils(picture, ground_m);
+    upload_image(gpu_, shadow_,
+                 std::as_bytes(std::span(!some            ? white
+                                         : veiled.empty() ? picture.shadow
+                                                          : veiled)));
 }
 
 bool DeviceRain::begin(const RainFrame& rain, const Weather& weather, const GpuImage* shadow_map,
@@ -128,7 +132,7 @@ bool DeviceRain::begin(const RainFrame& rain, const Weather& weather, const GpuI
     use_noise(weather.seed);
     use_particles(rain.options.precipitation.kind, weather.seed, rain.particles);
     if (particles_.bytes == 0) make_storage(gpu_, particles_, sizeof(shader::RainParticle));
-    if (shadow_map == nullptr) use_shadow(picture);
+    if (shadow_map == nullptr) use_shadow(picture, rain.options.ground.height_m);
     data->uniforms.extra.y = shadow_map != nullptr || !picture.shadow.empty() ? 1.0f : 0.0f;
     const std::size_t row_bytes = 4 * sizeof(float) * std::size_t(picture.width);
     const int rows = int(std::clamp<std::size_t>(gpu_.properties.limits.maxStorageBufferRange / row_bytes, 1,

@@ -52,7 +52,7 @@ class DeviceRain {
 
     void use_particles(PrecipitationKind kind, std::uint64_t seed, std::size_t count);
     void use_noise(std::uint64_t seed);
-    void use_shadow(const Picture& picture);
+    void use_shadow(const Picture& picture, double ground_m);
     void upload_frame(const RainData& data, const Picture& picture, Slot& slot);
     void begin_strip(const RainData& data, const GpuImage& shadow_map, const Strip& strip, Picture& picture,
                      Slot& slot);

@@ -124,9 +124,11 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
         view().use_flash(fractions);
     }
     const GpuImage& shadow_map = scene_.shadow_map(cloud);
-    const AirShells shells = frame.shells_without_light();
+    const bool veiled = cloud.screen && cloud.screen->veils.any();
+    const AirShells shells = veiled ? frame.shells() : frame.shells_without_light();
     if (shells.any())
-        view().use_shade({shells.shade, shells.serial, cloud.casts_shadow() ? &shadow_map : nullptr,
+        view().use_shade({shells.shade, shells.serial,
+                          cloud.casts_shadow() && !veiled ? &shadow_map : nullptr,
                           shade_step(frame.air.shade, cloud.shadow_size)});
     shader::March march{};
     if (!cloud.volumes.empty()) {
@@ -166,8 +168,11 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
 }
 
 bool VulkanBackend::begin_rain(const RainFrame& frame, const Weather& weather, const LitCloud* cloud, Picture& picture) {
-    const GpuImage* const map =
-        cloud != nullptr && !cloud->cloud.visible.empty() && scene_.has_map(*cloud) ? &scene_.shadow_map(*cloud) : nullptr;
+    // The device's map knows nothing of veils.
+    const GpuImage* const map = cloud != nullptr && !picture.sunlight_of_veils &&
+                                        !cloud->cloud.visible.empty() && scene_.has_map(*cloud)
+                                    ? &scene_.shadow_map(*cloud)
+                                    : nullptr;
     return rain().begin(frame, weather, map, picture);
 }
 
