@@ -198,6 +198,7 @@ void Renderer::Impl::begin(Drawing& drawing) {
             PictureFrame& part = frame.parts.back().frame;
             part.terrain = drawing.terrain.distance_m.empty() ? nullptr : drawing.terrain.distance_m.data();
             part.scattering = scattering.get().data();
+            part.bows = drawing.options.light.bows > 0;
             if (!lit.volumes.empty()) use_ground_light(lit.ground_light, options.camera.position_m, part);
         }
     }

@@ -28,8 +28,9 @@ void BlendedBackend::light_all(LitCloud& cloud, StageTimes& times) {
 ViewPass& BlendedBackend::pass_for(const FrameDescription& frame, const AirShells& shells,
                                    const ViewSortedSplats& order) {
     const ShaderVariant variant{
-        .physical_sky = frame.sky != nullptr, .shells = shells.any(), .fog = shells.has_fog(), .terrain = !frame.terrain.empty()};
-    auto& pass = passes_[variant.terrain ? 1 : 0][variant.physical_sky ? 1 : 0][variant.fog ? 2 : variant.shells ? 1 : 0];
+        .physical_sky = frame.sky != nullptr, .shells = shells.any(), .fog = shells.has_fog(), .terrain = !frame.terrain.empty(),
+        .bows = frame.options.light.bows > 0};
+    auto& pass = passes_[variant.bows ? 1 : 0][variant.terrain ? 1 : 0][variant.physical_sky ? 1 : 0][variant.fog ? 2 : variant.shells ? 1 : 0];
     if (!pass) pass.emplace(scene_.gpu, variant);
     if (!attenuation_) attenuation_.emplace(upload_attenuation(scene_.gpu));
     const GpuImage& sky = frame.sky != nullptr ? scene_.sky_image(*frame.sky) : scene_.unused();

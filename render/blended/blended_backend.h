@@ -36,9 +36,9 @@ class BlendedBackend : public Backend {
 
     GpuScene scene_;
     std::optional<GpuImage> attenuation_;  // created when it is needed
-    // Created when they are needed: without and with the physical sky; without shells of air, with them, and with
-    // fog in them.
-    std::optional<ViewPass> passes_[2][2][3];
+    // Created when they are needed: without and with fogbow and glory, a ground that is not level, the physical
+    // sky; without shells of air, with them, and with fog in them.
+    std::optional<ViewPass> passes_[2][2][2][3];
 };
 
 }  // namespace nephos

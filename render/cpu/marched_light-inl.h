@@ -210,8 +210,8 @@ HWY_INLINE Floats3 marched_radiance(const ViewScene& scene, const MarchedVolume&
     Floats3 arriving = times(sky, set3(frame.ambient_top));
     arriving = times_add(ground_seen, set3(frame.ambient_base), arriving);
     arriving = times_add(scattered_in_volume(scene, volume, ray, sun_depth, here, in_brick), sunlight, arriving);
-    const Floats once = hn::Mul(scattered_once(frame, dot(to_sun, ray)), hn::Exp(d, hn::Neg(sun_depth)));
-    arriving = times_add(once, sunlight, arriving);
+    const Floats3 once = times(hn::Exp(d, hn::Neg(sun_depth)), scattered_once(frame, dot(to_sun, ray)));
+    arriving = each_times_add(once, sunlight, arriving);
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), point);
         const Floats falloff = hn::Mul(set(frame.flash.w), flash_falloff(dot(way, way)));

@@ -212,7 +212,7 @@ inline void light_balls(std::span<const shader::ViewBall> balls, const PictureFr
         const Floats ratio = hn::Div(size.drawn, size.distance);
         const Floats cosine =
             hn::NegMulAdd(hn::Mul(set(shader::kDiscSpread), ratio), ratio, dot(set3(frame.to_sun), ray));
-        const Floats3 radiance = times_add(scattered_once(frame, cosine), light.direct, light.diffuse);
+        const Floats3 radiance = each_times_add(scattered_once(frame, cosine), light.direct, light.diffuse);
         HWY_ALIGN float field[9][kMaxLanes];
         const Floats fields[] = {radiance.x,      radiance.y,      radiance.z,
                                  light.diffuse.x, light.diffuse.y, light.diffuse.z,

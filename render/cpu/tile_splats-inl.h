@@ -116,8 +116,8 @@ void add_exact(const ScreenBall& screen, const ExactBall& ball, const ViewTile& 
         const Floats3 ray{hn::Load(d, rays.x + at), hn::Load(d, rays.y + at), hn::Load(d, rays.z + at)};
         const Floats opacity = integrated_opacity(ball, ray, hn::Load(d, rays.ground + at));
         if (hn::AllFalse(d, hn::Gt(opacity, hn::Zero(d)))) continue;
-        const Floats once = scattered_once(frame, dot(set3(frame.to_sun), ray));
-        add_opacity<kColours>(sums, at, opacity, times_add(once, direct, diffuse), set(ball.distance));
+        const Floats3 once = scattered_once(frame, dot(set3(frame.to_sun), ray));
+        add_opacity<kColours>(sums, at, opacity, each_times_add(once, direct, diffuse), set(ball.distance));
     }
 }
 

@@ -38,6 +38,7 @@ Daylight daylight(double sun_elevation_deg);
 struct PictureFrame : shader::FrameUniforms {
     const float* sky = nullptr;         // SkyLight::texels; null: gradient
     const float* scattering = nullptr;  // scattering_table.h, for metaballs on the processor
+    bool bows = false;                  // whether it has rows by colours
     const AirShells* shells = nullptr;  // likewise; null: none
     // Distances at which the rays of the whole picture meet ground that is not level (terrain_view.h), row by row; null: it
     // is. Nothing is drawn beyond, and no background there.

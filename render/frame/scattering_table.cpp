@@ -10,6 +10,7 @@
 
 #include <glm/gtc/packing.hpp>
 
+#include "render/options/droplet_phase.h"
 #include "render/shared/shared.h"
 
 namespace nephos {
@@ -76,6 +77,17 @@ void add_octaves(const CloudLight& light, std::vector<float>& table) {
     }
 }
 
+void append_colours(const CloudLight& light, std::vector<float>& table) {
+    std::vector<double> cosines;
+    for (std::size_t column = 0; column < kAngles; ++column) cosines.push_back(cosine_of_column(column));
+    const auto factors = bow_factors(
+        light.phase, {.effective_diameter_um = light.phase.droplet_diameter_um, .effective_variance = light.droplet_variance},
+        light.bows, cosines);
+    for (std::size_t colour = 0; colour < 3; ++colour)
+        for (std::size_t column = 0; column < kAngles; ++column)
+            table.push_back(float(kPi * phase(light.phase, cosines[column]) * factors[column][colour]));
+}
+
 struct Between {
     std::size_t below;
     float fraction;  // of the node above
@@ -105,6 +117,7 @@ std::vector<float> scattering_table(const CloudLight& light) {
         add_diffusion(light, table);
     else
         add_octaves(light, table);
+    if (light.bows > 0) append_colours(light, table);
     return table;
 }
 

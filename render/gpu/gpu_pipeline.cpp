@@ -107,7 +107,8 @@ std::vector<ShaderConstant> constants_of(const ShaderVariant& variant) {
             {6, variant.shells},
             {7, variant.fog},
             {8, variant.billboards},
-            {9, variant.terrain}};
+            {9, variant.terrain},
+            {10, variant.bows}};
 }
 
 Pipeline create_graphics_pipeline(const GpuDevice& gpu, ShaderCode vertex, ShaderCode fragment,

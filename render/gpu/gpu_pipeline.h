@@ -49,6 +49,7 @@ struct ShaderVariant {
     bool fog = false;           // 7, likewise
     bool billboards = false;    // 8, compute shaders that draw splats: some are T's billboards
     bool terrain = false;       // 9, whatever includes ray.glsl: ground that is not level
+    bool bows = false;          // 10, whatever includes scattering.glsl: fogbow and glory
     bool march = false;         // no constant: other shaders, which march through clouds with detail
     bool operator==(const ShaderVariant&) const = default;
 };

@@ -175,6 +175,9 @@ void check(const RenderOptions& options) {
     require(within(light.phase.g, -0.99, 0.99), "light.g", "-0.99..0.99");
     require(within(light.phase.droplet_diameter_um, kMinDroplet_um, kMaxDroplet_um),
             "light.droplet_diameter_um", "5..50 micrometres");
+    require(within(light.bows, 0, 1), "light.bows", "0..1");
+    require(within(light.droplet_variance, kMinDropletVariance, kMaxDropletVariance), "light.droplet_variance",
+            "0.01..0.3");
     require(within(light.octaves.count, 1, 8), "light.octaves.count", "1..8");
     require(within(light.octaves.scattering, 0, 1), "light.octaves.scattering", "0..1");
     require(within(light.octaves.extinction, 0, 1), "light.octaves.extinction", "0..1");

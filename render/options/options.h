@@ -116,6 +116,10 @@ struct CloudLight {
     double albedo = 1.0;  // single-scattering albedo, 0..1; below 1 the whole cloud is darker
     // Forward scattering (g > 0) gives brighter rims against the sun and deeper penetration of sunlight.
     PhaseFunction phase;
+    // Fogbow and glory in sunlight that clouds and fog scatter once, 0..1: 1 is Mie's solution for droplets of
+    // phase.droplet_diameter_um behind the sun's back, whatever the phase function (droplet_phase.h); 0 none.
+    double bows = 0;
+    double droplet_variance = 0.05;  // effective variance of their radii, 0.01..0.3; smaller: more rings
     MultipleScattering multiple = MultipleScattering::diffusion;
     ScatteringOctaves octaves;
     // Strength of multiply scattered sunlight, 0..10, which reaches deeper into a cloud than the direct beam.

@@ -24,6 +24,7 @@ struct PhaseFunction {
 };
 
 inline constexpr double kMinDroplet_um = 5, kMaxDroplet_um = 50;  // the range of the fit
+inline constexpr double kMinDropletVariance = 0.01, kMaxDropletVariance = 0.3;  // of droplet_phase.h
 
 // Henyey and Greenstein 1941; -1 < g < 1:
 //     (1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^1.5)

@@ -38,6 +38,9 @@ HWY_INLINE Floats3 times_add(Floats s, const Floats3& a, const Floats3& b) {
 HWY_INLINE Floats3 each_times(const Floats3& a, const Floats3& b) {
     return {hn::Mul(a.x, b.x), hn::Mul(a.y, b.y), hn::Mul(a.z, b.z)};
 }
+HWY_INLINE Floats3 each_times_add(const Floats3& a, const Floats3& b, const Floats3& c) {
+    return {hn::MulAdd(a.x, b.x, c.x), hn::MulAdd(a.y, b.y, c.y), hn::MulAdd(a.z, b.z, c.z)};
+}
 HWY_INLINE Floats3 mix(const Floats3& a, const Floats3& b, const Floats3& fraction) {
     return {hn::MulAdd(fraction.x, hn::Sub(b.x, a.x), a.x), hn::MulAdd(fraction.y, hn::Sub(b.y, a.y), a.y),
             hn::MulAdd(fraction.z, hn::Sub(b.z, a.z), a.z)};

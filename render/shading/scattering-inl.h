@@ -13,6 +13,7 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
+#include "render/frame/scattering_table.h"
 #include "render/shading/background-inl.h"
 #include "render/shading/formulas-inl.h"
 #include "render/shared/shared.h"
@@ -47,10 +48,19 @@ HWY_INLINE Floats scattering_at(const float* HWY_RESTRICT table, hn::Vec<hn::Reb
     return hn::MulAdd(angle.fraction, hn::Sub(b, a), a);
 }
 
-// Returns pi times the phase function of the cosine.
-HWY_INLINE Floats scattered_once(const PictureFrame& frame, Floats cosine) {
+// Returns pi times the phase function of the cosine, for red, green and blue.
+HWY_INLINE Floats3 scattered_once(const PictureFrame& frame, Floats cosine) {
     const hn::RebindToSigned<Lanes> di;
-    return scattering_at(frame.scattering, hn::Zero(di), scatter_column(cosine));
+    const Between column = scatter_column(cosine);
+    if (!frame.bows) {
+        const Floats white = scattering_at(frame.scattering, hn::Zero(di), column);
+        return {white, white, white};
+    }
+    const auto of_colour = [&](std::size_t colour) {
+        const std::size_t first = (kRowsBeforeColours + colour) * shader::kScatterAngles;
+        return scattering_at(frame.scattering, hn::Set(di, int(first)), column);
+    };
+    return {of_colour(0), of_colour(1), of_colour(2)};
 }
 
 HWY_INLINE Floats scattered_often(const PictureFrame& frame, const Floats3& ray, Floats sun_depth) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sunlight that metaballs scatter, by the scattering table; needs frame.glsl.
 
+layout(constant_id = 10) const bool kBows = false;  // the table has rows by colours
+
 // scattering_table.h: kScatterAngles columns.
 layout(set = 0, binding = 12, std430) readonly buffer Scattering {
     float scattering[];
@@ -12,8 +14,14 @@ float scattering_at(uint row, float column) {
     return mix(scattering[at], scattering[at + 1u], column - float(below));
 }
 
-// Returns pi times the phase function. Sunlight travels along -to_sun before and along -ray after scattering.
-float scattered_once(float cosine) { return scattering_at(0u, scatter_column(cosine)); }
+// Returns pi times the phase function, for red, green and blue. Sunlight travels along -to_sun before and along -ray after
+// scattering.
+vec3 scattered_once(float cosine) {
+    float column = scatter_column(cosine);
+    if (!kBows) return vec3(scattering_at(0u, column));
+    uint first = 2u + kScatterDepths;
+    return vec3(scattering_at(first, column), scattering_at(first + 1u, column), scattering_at(first + 2u, column));
+}
 
 // Returns the radiance per colour of the sun.
 float scattered_often(vec3 ray, float sun_depth) {

@@ -78,13 +78,13 @@ HWY_INLINE Floats sunlight_left(const AirShells& air, const MarchedScene* endles
 struct RayAir {
     Floats3 ray;
     SunlitAir sunlit;
-    Floats once;  // scattered by fog
+    Floats3 once;  // scattered by fog
     Words angle;  // to the sun: the nearest node of the table of what is scattered often
 
     RayAir(const PictureFrame& frame, const Floats3& direction)
         : ray(direction),
           sunlit(FrameAir(frame).sunlit_air(direction)),
-          once(hn::Zero(Lanes())),
+          once{hn::Zero(Lanes()), hn::Zero(Lanes()), hn::Zero(Lanes())},
           angle(hn::Zero(hn::RebindToSigned<Lanes>())) {
         if (!frame.shells->has_fog()) return;
         const Floats cosine = dot(set3(frame.to_sun), direction);
@@ -101,11 +101,11 @@ HWY_INLINE Floats3 fog_radiance(const PictureFrame& frame, const RayAir& of, Flo
     const Floats dense = fast_exp(hn::Min(hn::Mul(above_base, set(-data.fog.y)), set(60.0f)));
     const Floats above = hn::Mul(set(data.fog.x / data.fog.y), dense);
     const Floats sun_depth = hn::Mul(above, set(1.0f / std::max(frame.to_sun.z, 0.05f)));
-    const Floats sun = hn::Mul(
-        lit, hn::MulAdd(fast_exp(hn::Neg(sun_depth)), of.once, scattered_often(frame, of.angle, sun_depth)));
+    const Floats often = scattered_often(frame, of.angle, sun_depth);
+    const Floats3 sun = times(lit, times_add(fast_exp(hn::Neg(sun_depth)), of.once, {often, often, often}));
     const Floats open = fast_exp(hn::Mul(set(-0.5f), above));
     const Floats3 ambient = mix(set3(frame.ambient_base), set3(frame.ambient_top), {open, open, open});
-    Floats3 arriving = times_add(sun, sunlight, ambient);
+    Floats3 arriving = each_times_add(sun, sunlight, ambient);
     if (frame.flash.w > 0) {
         const Floats3 way = subtract(set3(frame.flash), times(at, of.ray));
         const Floats weight = hn::Mul(fast_exp(hn::Neg(above)), flash_falloff(dot(way, way)));

@@ -101,7 +101,7 @@ vec3 fog_radiance(vec3 ray, float at, vec3 sunlight, float lit) {
     float dense = exp(min(-(shells.fog.z + ray.z * at) * shells.fog.y, 60.0));
     float above = shells.fog.x * dense / shells.fog.y;  // optical depth upwards
     float sun_depth = above / max(frame.to_sun.z, 0.05), cosine = dot(frame.to_sun.xyz, ray);
-    float sun = lit * (scattered_often(ray, sun_depth) + exp(-sun_depth) * scattered_once(cosine));
+    vec3 sun = lit * (scattered_often(ray, sun_depth) + exp(-sun_depth) * scattered_once(cosine));
     vec3 arriving = sun * sunlight + mix(frame.ambient_base.rgb, frame.ambient_top.rgb, exp(-0.5 * above));
     vec3 way = frame.flash.xyz - at * ray;  // lightning; adds nothing in the dark
     arriving += frame.flash.w * flash_falloff(dot(way, way)) * exp(-above) * frame.flash_colour.rgb;

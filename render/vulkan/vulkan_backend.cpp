@@ -142,6 +142,7 @@ bool VulkanBackend::begin(const FrameDescription& frame, Picture& picture) {
                                       .fog = shells.has_fog(),
                                       .billboards = !seen.empty(),
                                       .terrain = !frame.terrain.empty(),
+                                      .bows = frame.options.light.bows > 0,
                                       .march = march.count > 0},
                           .order = order_frame(frame.camera, frame.options.camera, frame.options.ground,
                                                !frame.lightning.empty(), footprint_scale(cloud.volumes)),

@@ -53,8 +53,20 @@ const Section& light_section() {
              "Henyey and Greenstein 1941"),
          render_key<&RenderOptions::light, &CloudLight::phase, &PhaseFunction::droplet_diameter_um>(
              "droplet_diameter_um", "um", between(kMinDroplet_um, kMaxDroplet_um),
-             "Diameter of the droplets of `hg_draine`: larger scatters more straight on.",
+             "Diameter of the droplets of `hg_draine`: larger scatters more straight on. Of `bows`: twice their effective "
+             "radius.",
              "Jendersie and d'Eon 2023"),
+         render_key<&RenderOptions::light, &CloudLight::bows>(
+             "bows", "", between(0, 1),
+             "Fogbow and glory: how much of Mie's solution for droplets of `droplet_diameter_um` is in the sunlight that "
+             "clouds and fog scatter once, opposite to the sun; 1 is all, 0 none. What `phase` scatters there is kept in "
+             "sum.",
+             "Mie 1908, after Bohren and Huffman 1983"),
+         render_key<&RenderOptions::light, &CloudLight::droplet_variance>(
+             "droplet_variance", "", between(kMinDropletVariance, kMaxDropletVariance),
+             "Of `bows`: effective variance of the droplets' radii, a gamma distribution. Smaller: more rings, in "
+             "clearer colours.",
+             "Hansen and Travis 1974"),
          word<&Scene::render, &RenderOptions::light, &CloudLight::multiple>(
              "multiple", {"diffusion", "octaves"},
              "Sunlight that arrives after many scatterings. `diffusion`: in clouds with detail the diffusion equation on "

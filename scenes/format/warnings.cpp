@@ -141,6 +141,8 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
     const bool sea = scene.render.ground.pattern == GroundPattern::water;
     if (!sea && !(scene.render.water == WaterOptions{}))
         result.emplace_back("[water] has no effect: `ground.pattern` is not \"water\"");
+    if (scene.render.light.bows == 0 && scene.render.light.droplet_variance != CloudLight{}.droplet_variance)
+        result.emplace_back("`light.droplet_variance` has no effect: `light.bows` is 0");
     TerrainOptions terrain = scene.render.terrain;
     terrain.height_map.reset();
     terrain.relief = Relief::none;

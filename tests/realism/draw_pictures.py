@@ -49,7 +49,7 @@ PICTURES = {
     "rainbow.jpg": (1, (960, 600), [("rainbow", 1, {})]),
     "painted.jpg": (1, (960, 540), [("torchelsen/painted", 1, {})]),
     **{f"sapronov-{name}.jpg": (1, (640, 400), [(f"sapronov/{name}", 1, {})])
-       for name in ("cumulus", "stratus", "cirrus", "halo")},
+       for name in ("cumulus", "stratus", "cirrus", "halo", "glory", "fogbow")},
     "storm.jpg": (3, (480, 270), [("storm", frame, {}) for frame in (1, 24, 40, 52, 66, 80)]),
     "wet-ground.jpg": (3, (400, 300), [("wet-ground", frame, {}) for frame in (2, 4, 5, 6, 7, 9)]),
     "detail.jpg": (2, (640, 400), [("cumulus", 40, view | off) for view in ({}, FROM_ABOVE, FROM_BELOW)

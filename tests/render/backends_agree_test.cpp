@@ -74,6 +74,9 @@ std::vector<NamedLight> every_light() {
     all.back().light.octaves = {8, 0.8, 0.3, 0.7};
     all.push_back({"absorbed", {}});
     all.back().light.lighting = Lighting::cfa;
+    all.push_back({"fogbow", {}});
+    all.back().light.phase = {Phase::hg_draine, 0, 12};
+    all.back().light.bows = 1;
     return all;
 }
 

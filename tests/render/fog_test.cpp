@@ -44,6 +44,10 @@ std::vector<RenderOptions> views() {
     all.back().sun.elevation_deg = 5;
     all.push_back(all[0]);
     all.back().fog.patchiness = 1;
+    all.push_back(view({0, -2500, 400}, {0, -1500, 0}));  // a glory on the fog
+    all.back().sun.azimuth_deg = 180;
+    all.back().light.phase = {Phase::hg_draine, 0, 10};
+    all.back().light.bows = 1;
     return all;
 }
 

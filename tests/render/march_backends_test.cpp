@@ -168,6 +168,25 @@ TEST_F(MarchBackends, AgreeThroughAir) {
     }
 }
 
+// The colours of a glory and a fogbow: the sun behind the eye.
+TEST_F(MarchBackends, AgreeOnFogbowAndGlory) {
+    DetailedCloud cloud;
+    cloud.add({0, 0, 1000}, 1);
+    RenderOptions options = test::view({480, -2000, 2400}, {480, 400, 1250}, 35, 96, 72);
+    options.sun.azimuth_deg = 180;
+    options.sun.elevation_deg = 26;
+    options.light.phase = {Phase::hg_draine, 0, 10};
+    const Picture plain = cpu_.draw_splats(cloud.splats(), options);
+    options.light.bows = 1;
+    expect_same(cloud.splats(), options, "glory");
+    const Picture glory = vulkan_.draw_splats(cloud.splats(), options);
+    EXPECT_GT(test::largest_difference(glory.beauty, plain.beauty), 0.02f);
+    float reddest = 0;  // of what the bows add
+    for (std::size_t i = 0; i < glory.beauty.size(); i += 3)
+        reddest = std::max(reddest, (glory.beauty[i] - plain.beauty[i]) - (glory.beauty[i + 2] - plain.beauty[i + 2]));
+    EXPECT_GT(reddest, 0.004f);
+}
+
 TEST_F(MarchBackends, AgreeBetweenBillboards) {
     DetailedCloud cloud;
     cloud.add({-480, -400, 800}, 1);
