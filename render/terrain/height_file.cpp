@@ -20,6 +20,7 @@
 #include "core/error.h"
 #include "density/vdb/sandbox.h"
 #include "render/image/exr_grid.h"
+#include "render/terrain/height_parsers.h"
 
 namespace nephos {
 namespace {
@@ -111,7 +112,9 @@ bool read_png_rows(PngSource& source, PngHeader& header, std::vector<std::uint16
     return good;
 }
 
-HeightImage parse_png(int fd) {
+}  // namespace
+
+HeightImage parse_height_png(int fd) {
     PngSource source{fd, 0, {}};
     PngHeader header;
     std::vector<std::uint16_t> rows;
@@ -133,6 +136,8 @@ HeightImage parse_png(int fd) {
     image.heights.assign(rows.begin(), rows.end());
     return image;
 }
+
+namespace {
 
 void send(SandboxWriter& writer, const HeightImage& image) {
     writer.value(image.columns);
@@ -193,7 +198,7 @@ HeightFile read_height_file(const std::filesystem::path& path, int raw_columns, 
     const std::string ending = ending_of(path);
     HeightFile file;
     if (ending == ".png") {
-        file.image = parse_confined(path, "libpng", parse_png);
+        file.image = parse_confined(path, "libpng", parse_height_png);
     } else if (ending == ".exr") {
         prepare_exr();
         file.image = parse_confined(path, "OpenEXR", [](int fd) {
