@@ -93,6 +93,7 @@ void check(const PrecipitationOptions& p) {
     require(within(p.shafts, 0, 100), "precipitation.shafts", "0..100");
     require(within(p.shaft_texture, 0, 1), "precipitation.shaft_texture", "0..1");
     require(within(p.evaporation, 0, 1), "precipitation.evaporation", "0..1");
+    require(within(p.splashes, 0, 10), "precipitation.splashes", "0..10");
 }
 
 void check(const VeilView& view) {

@@ -16,6 +16,7 @@
 #include "render/rain/rain_frame.h"
 #include "render/rain/precipitation_light.h"
 #include "render/rain/rain_shafts.h"
+#include "render/rain/splashes.h"
 
 namespace nephos {
 namespace {
@@ -127,6 +128,7 @@ std::optional<RainFrame> rain_frame(const Picture& picture, const RenderOptions&
     frame.closing = camera_frame(camera_at(options.camera, time_s + 0.5 * p.exposure_s));
     frame.light = precipitation_light(picture, frame.options, time_s);
     frame.time_s = time_s;
+    frame.splashes = streaks_of_splashes(frame, splashes_at(frame, weather));
     if (p.particles == 0 || p.visibility <= 0) return frame;
     frame.particles = std::size_t(std::ceil(kMadePerDrawn * p.particles));
     frame.passes = particle_passes(frame.options, frame.camera, weather, time_s);
@@ -139,6 +141,8 @@ void PrecipitationPainter::draw(Picture& picture, const RenderOptions& options, 
     const std::optional<RainFrame> frame = rain_frame(picture, options, weather, time_s);
     if (!frame) return;
     draw_shafts(picture, frame->options, frame->camera, weather.curtains, frame->light, time_s, weather.seed);
+    draw_streaks(picture, frame->splashes);
+    streaks_ += frame->splashes.size();
     if (frame->particles == 0) return;
     const Particles& all = particles(options.precipitation.kind, weather.seed, frame->particles);
     const StreakView view{frame->options, frame->camera,          frame->opening,         frame->closing,

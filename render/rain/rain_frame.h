@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "render/image/overlay.h"
 #include "render/image/picture.h"
 #include "render/options/camera.h"
 #include "render/options/options.h"
@@ -24,6 +25,7 @@ struct RainFrame {
     double time_s = 0;
     std::size_t particles = 0;         // in each container; 0: only shafts are drawn
     std::vector<ParticlePass> passes;  // refer to the weather's curtains
+    std::vector<Streak> splashes;      // of drops on the ground (splashes.h), drawn before the particles
 };
 
 // Returns the rain of a picture and its weather, or none. Throws as check(PrecipitationOptions).

@@ -55,6 +55,7 @@ struct DeviceRain::Slot {
     DescriptorSets sets;
     GpuBuffer uniforms, passes, bases, ground;  // read by the device
     GpuBuffer given, given_depths, result;      // copied to and from it
+    GpuBuffer splashes, splash_counts;          // copied to it
     vk::raii::CommandBuffer commands{nullptr};
     vk::raii::Fence fence;
     bool submitted = false;      // and not known to be done
@@ -127,7 +128,7 @@ bool DeviceRain::begin(const RainFrame& rain, const Weather& weather, const GpuI
     if (!data) return false;
     if (sizeof(shader::RainParticle) * rain.particles > gpu_.properties.limits.maxStorageBufferRange)
         return false;
-    if (!data->shafts && data->passes.empty()) return true;  // nothing falls in view
+    if (!data->shafts && data->passes.empty() && data->splashes.empty()) return true;  // nothing falls in view
     ++pictures;
     use_noise(weather.seed);
     use_particles(rain.options.precipitation.kind, weather.seed, rain.particles);
@@ -153,6 +154,14 @@ void DeviceRain::upload_frame(const RainData& data, const Picture& picture, Slot
     upload_some(gpu_, slot.passes, data.passes);
     upload_some(gpu_, slot.bases, data.bases);
     upload_some(gpu_, slot.ground, picture.ground_light.words);
+    if (data.splashes.empty()) return;
+    const std::size_t bytes = sizeof(shader::vec4) * data.splashes.size(),
+                      count_bytes = sizeof(shader::uint) * data.splash_counts.size();
+    reserve_staging(gpu_, slot.splashes, bytes);
+    reserve_staging(gpu_, slot.splash_counts, count_bytes);
+    std::memcpy(slot.splashes.mapped, data.splashes.data(), bytes);
+    std::memcpy(slot.splash_counts.mapped, data.splash_counts.data(), count_bytes);
+    gpu_.uploaded_bytes += bytes + count_bytes;
 }
 
 void DeviceRain::begin_strip(const RainData& data, const GpuImage& shadow_map, const Strip& strip,
@@ -214,6 +223,7 @@ void DeviceRain::record(const vk::raii::CommandBuffer& commands, const RainData&
         dispatch_groups(commands, step.tiles);
         compute_barrier(commands);
     }
+    if (!data.splashes.empty()) record_splashes(commands, resources, data, step, slot);
     for (std::size_t n = 0; n < data.passes.size(); ++n) {
         step.pass = shader::uint(n);
         record_particles(commands, resources, step, slot);
@@ -234,12 +244,36 @@ void DeviceRain::record_particles(const vk::raii::CommandBuffer& commands, const
         begin_compute(commands, streaks_of_, streaks, step);
         dispatch_groups(commands, groups_of(step.count, shader::kStreakSegment));
         compute_barrier(commands);
-        begin_compute(commands, bands_of_, bands, step);
-        dispatch_groups(commands, step.bands);
-        compute_barrier(commands);
-        begin_compute(commands, tiles_, tiles, step);
-        dispatch_groups(commands, step.tiles);
-        compute_barrier(commands);
+        record_streaks(commands, bands, tiles, step);
+    }
+}
+
+void DeviceRain::record_streaks(const vk::raii::CommandBuffer& commands, vk::DescriptorSet bands,
+                                vk::DescriptorSet tiles, const shader::RainStep& step) {
+    begin_compute(commands, bands_of_, bands, step);
+    dispatch_groups(commands, step.bands);
+    compute_barrier(commands);
+    begin_compute(commands, tiles_, tiles, step);
+    dispatch_groups(commands, step.tiles);
+    compute_barrier(commands);
+}
+
+void DeviceRain::record_splashes(const vk::raii::CommandBuffer& commands, const Resources& resources,
+                                 const RainData& data, shader::RainStep step, Slot& slot) {
+    constexpr std::size_t kStreakBytes = 3 * sizeof(shader::vec4);
+    const vk::DescriptorSet bands = slot.sets.fill(bands_of_, resources), tiles = slot.sets.fill(tiles_, resources);
+    const std::size_t count = data.splashes.size() / 3;
+    for (std::size_t first = 0; first < count; first += shader::kParticlesAtOnce) {
+        step.count = shader::uint(std::min<std::size_t>(shader::kParticlesAtOnce, count - first));
+        const std::size_t segment = first / shader::kStreakSegment;
+        full_barrier(commands);
+        commands.copyBuffer(*slot.splashes.buffer, *streaks_.buffer,
+                            vk::BufferCopy(kStreakBytes * first, 0, kStreakBytes * step.count));
+        commands.copyBuffer(*slot.splash_counts.buffer, *segment_counts_.buffer,
+                            vk::BufferCopy(sizeof(shader::uint) * segment, 0,
+                                           sizeof(shader::uint) * groups_of(step.count, shader::kStreakSegment)));
+        full_barrier(commands);
+        record_streaks(commands, bands, tiles, step);
     }
 }
 

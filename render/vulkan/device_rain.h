@@ -10,6 +10,8 @@
 //     rain_bands.comp     the streaks of each band of rows, in their order
 //     rain_tiles.comp     those of a tile, blended in their order by depth and transmittance
 //
+// The latter two also draw the streaks of splashes, which the processor makes: they are few.
+//
 // Streaks overlap, so that their order shows: it is that of the particles, without atomic counters, and two pictures have
 // the same bits. Two pictures are in flight, each with uniforms and buffers to copy of its own. Private to the module.
 
@@ -60,6 +62,10 @@ class DeviceRain {
                 Slot& slot);
     void record_particles(const vk::raii::CommandBuffer& commands, const Resources& resources,
                           shader::RainStep step, Slot& slot);
+    void record_splashes(const vk::raii::CommandBuffer& commands, const Resources& resources, const RainData& data,
+                         shader::RainStep step, Slot& slot);
+    void record_streaks(const vk::raii::CommandBuffer& commands, vk::DescriptorSet bands, vk::DescriptorSet tiles,
+                        const shader::RainStep& step);
     void complete(Slot& slot);
     void wait(Slot& slot);
 

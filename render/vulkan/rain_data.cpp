@@ -115,6 +115,16 @@ void set_bits(const std::vector<CurtainTerm>& terms, const std::map<const RainCu
     }
 }
 
+void add_splashes(const std::vector<Streak>& streaks, RainData& data) {
+    for (const Streak& streak : streaks) {
+        data.splashes.push_back({streak.x0, streak.y0, streak.x1, streak.y1});
+        data.splashes.push_back({streak.width, streak.opacity, streak.distance_m, 0});
+        data.splashes.push_back({streak.red, streak.green, streak.blue, 0});
+    }
+    for (std::size_t first = 0; first < streaks.size(); first += shader::kStreakSegment)
+        data.splash_counts.push_back(shader::uint(std::min<std::size_t>(shader::kStreakSegment, streaks.size() - first)));
+}
+
 shader::RainPass rain_pass(const RainFrame& rain, const Weather& weather, const ParticlePass& pass) {
     const PrecipitationOptions& p = rain.options.precipitation;
     const Vec3& eye = rain.camera.position_m;
@@ -176,6 +186,7 @@ std::optional<RainData> rain_data(const RainFrame& rain, const Weather& weather,
         set_bits(pass.rain, index, one.rain);
         set_bits(pass.less, index, one.rain + 2);
     }
+    add_splashes(rain.splashes, data);
     return data;
 }
 

@@ -17,6 +17,10 @@ struct RainData {
     shader::RainUniforms uniforms;
     std::vector<float> bases;  // of the curtains' clouds
     std::vector<shader::RainPass> passes;
+    // Streaks that the processor has made, of splashes, as rain_streaks.comp makes them; and how many there are in each
+    // segment of kStreakSegment.
+    std::vector<shader::vec4> splashes;
+    std::vector<shader::uint> splash_counts;
     bool shafts = false;
 };
 

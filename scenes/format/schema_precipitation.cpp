@@ -71,7 +71,12 @@ const Section& precipitation_section() {
          render_key<&RenderOptions::precipitation, &PrecipitationOptions::evaporation>(
              "evaporation", "", between(0, 1),
              "Virga: 0 lets rain reach the ground; above 0 it thins out and is gone at this share of the way "
-             "up to the cloud.")},
+             "up to the cloud."),
+         render_key<&RenderOptions::precipitation, &PrecipitationOptions::splashes>(
+             "splashes", "", between(0, 10),
+             "Crowns and droplets where drops of more than 2 mm meet level ground or water within 30 m of the eye, as a "
+             "multiple of their true number; 0: none.",
+             "S, rain; Marshall and Palmer 1948")},
         nullptr};
     return section;
 }

@@ -143,6 +143,11 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
         result.emplace_back("[water] has no effect: `ground.pattern` is not \"water\"");
     if (scene.render.light.bows == 0 && scene.render.light.droplet_variance != CloudLight{}.droplet_variance)
         result.emplace_back("`light.droplet_variance` has no effect: `light.bows` is 0");
+    const PrecipitationOptions& rain = scene.render.precipitation;
+    if (rain.splashes > 0 && (!rain.enabled || rain.kind == PrecipitationKind::snow || scene.render.terrain.any()))
+        result.emplace_back(
+            "`precipitation.splashes` has no effect: it needs rain (`enabled`, `kind`) and level ground, without a "
+            "`relief` or `height_map`");
     TerrainOptions terrain = scene.render.terrain;
     terrain.height_map.reset();
     terrain.relief = Relief::none;

@@ -22,6 +22,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 FROM_ABOVE = {"camera.position_m": "[0, -2500, 3200]", "camera.target_m": "[0, 1500, 1100]"}
 FROM_BELOW = {"camera.position_m": "[0, -900, 2]", "camera.target_m": "[0, 2600, 1150]"}
 HIGH = {"camera.position_m": "[0, -9000, 10000]", "camera.target_m": "[0, 16000, 0]"}
+SPLASHES = {"precipitation.splashes": "1", "camera.path": "[]", "camera.position_m": "[0, 1000, 1.7]",
+            "camera.target_m": "[6, 1012, 0.2]"}
 NO_DETAIL = {"detail.enabled": "false"}
 GENERA = ["Ci", "Cc", "Cs", "Ac", "As", "Ns", "Sc", "St", "Cu", "Cb", "St-fra", "Cu-fra"]
 
@@ -50,6 +52,7 @@ PICTURES = {
     "painted.jpg": (1, (960, 540), [("torchelsen/painted", 1, {})]),
     **{f"sapronov-{name}.jpg": (1, (640, 400), [(f"sapronov/{name}", 1, {})])
        for name in ("cumulus", "stratus", "cirrus", "halo", "glory", "fogbow")},
+    "splashes.jpg": (1, (960, 600), [("rain", 205, SPLASHES)]),
     "storm.jpg": (3, (480, 270), [("storm", frame, {}) for frame in (1, 24, 40, 52, 66, 80)]),
     "wet-ground.jpg": (3, (400, 300), [("wet-ground", frame, {}) for frame in (2, 4, 5, 6, 7, 9)]),
     "detail.jpg": (2, (640, 400), [("cumulus", 40, view | off) for view in ({}, FROM_ABOVE, FROM_BELOW)

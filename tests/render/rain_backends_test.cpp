@@ -152,6 +152,11 @@ std::vector<RainView> views() {
         all.back().name += ", wet ground";
         all.back().wet = true;
     }
+    for (const bool wet : {false, true}) {
+        all.push_back(rain_at("splashes", kWithin, {0, 10, -2}));
+        all.back().options.precipitation.splashes = 1;
+        all.back().wet = wet;
+    }
     return all;
 }
 
