@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <span>
 
@@ -97,6 +98,16 @@ inline void find_rows(const StepPlanes& planes, int by, int bz, Segment& segment
     }
 }
 
+// Removes what a part left that ended with an exception in the midst of a segment: other parts would run it.
+inline void empty_queues(BirthScratch& s) {
+    s.accepted_count = s.job_count = s.counter_count = s.tie_count = 0;
+    for (std::size_t draw = 0; draw < 3; ++draw) {
+        if (s.dense_words[draw] == 0) continue;
+        std::memset(s.dense_events[draw], 0, sizeof s.dense_events[draw]);
+        s.dense_words[draw] = 0;
+    }
+}
+
 // Returns the memory of this thread, for any number of parts: a part of a small lattice takes less time than making it.
 // Parts that a thread begins while it waits within another part would share it; nothing in a part waits.
 inline BirthScratch& scratch_of_thread() {
@@ -105,6 +116,7 @@ inline BirthScratch& scratch_of_thread() {
     for (UniformDraws& draws : scratch->uniform) draws.table = nullptr;
     for (auto& table : scratch->dense_tables) table.reset();
     scratch->initial_table.reset();
+    empty_queues(*scratch);
     return *scratch;
 }
 
