@@ -161,11 +161,17 @@ class Levels {
     std::vector<Coord> blocks_;
 };
 
-// One step of Newton's method from gains of 0. Sums that are above what is wanted already stay.
+// One step of Newton's method from gains of 0. Sums that are above what is wanted already stay. A level without structure
+// along one axis, as those of a lattice of one row, has a gain along the other alone.
 Gains gains_for(const LevelSums& sums, const Vec2& wanted) {
     const double x = std::max(0.0, wanted.x - sums.gradients[0]),
                  y = std::max(0.0, wanted.y - sums.gradients[1]);
     const auto& g = sums.growth;
+    const auto alone = [](double missing, double growth) {
+        return float(std::clamp(missing / growth, 0.0, 1.0));
+    };
+    if (g[0][0] > 0 && g[1][1] == 0) return {alone(x, g[0][0]), 0};
+    if (g[1][1] > 0 && g[0][0] == 0) return {0, alone(y, g[1][1])};
     const double determinant = g[0][0] * g[1][1] - g[0][1] * g[1][0];
     if (!(determinant > 1e-9 * g[0][0] * g[1][1]) || !(g[0][0] > 0)) return {};
     return {float(std::clamp((x * g[1][1] - y * g[0][1]) / determinant, 0.0, 1.0)),

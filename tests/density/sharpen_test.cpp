@@ -103,6 +103,29 @@ TEST(Sharpen, GivesBackWhatAMeanHasLost) {
     }
 }
 
+// Lattices of one row or column, or without structure along one axis: the other is sharpened alone.
+TEST(Sharpen, OneAxisIsSharpenedAlone) {
+    for (const Extent extent : {Extent{40, 1, 3}, Extent{1, 40, 3}, Extent{40, 16, 3}, Extent{16, 40, 3}}) {
+        const bool along_x = extent.x == 40;
+        const auto waves = [&](double moved) {
+            std::vector<float> values;
+            for (int k = 0; k < extent.z; ++k)
+                for (int j = 0; j < extent.y; ++j)
+                    for (int i = 0; i < extent.x; ++i)
+                        values.push_back(
+                            float(0.5 + 0.3 * std::sin(2 * 3.14159265 * ((along_x ? i : j) + moved) / 5)));
+            return DensityGrid::from_dense(values, extent, kPlacement);
+        };
+        const DensityGrid a = waves(0), mean = mix(a, waves(1), 0.5);
+        const std::vector<Vec2> wanted = gradients_of(a, kPeriodic);
+        EXPECT_LT(sum_of(gradients_of(mean, kPeriodic)), 0.85 * sum_of(wanted));
+        const DensityGrid sharp = sharpened(mean, wanted, kPeriodic);
+        EXPECT_NEAR(sum_of(gradients_of(sharp, kPeriodic)), sum_of(wanted), 0.02 * sum_of(wanted))
+            << extent.x;
+        EXPECT_NEAR(sharp.sum(), mean.sum(), 1e-4 * mean.sum());
+    }
+}
+
 TEST(Sharpen, WhatIsSharpEnoughStays) {
     const DensityGrid grid = clouds(4, true);
     std::vector<Vec2> wanted = gradients_of(grid, kPeriodic);
