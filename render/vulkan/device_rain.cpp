@@ -164,6 +164,20 @@ void DeviceRain::upload_frame(const RainData& data, const Picture& picture, Slot
     gpu_.uploaded_bytes += bytes + count_bytes;
 }
 
+// Makes the buffers of all pictures large enough. Each is tested: one may be missing since memory ran out.
+void DeviceRain::reserve_shared(std::size_t pixels, std::size_t bands) {
+    const struct {
+        GpuBuffer& buffer;
+        std::size_t bytes;
+    } all[] = {{pixels_, 4 * sizeof(float) * pixels},
+               {depths_, sizeof(float) * pixels},
+               {band_counts_, sizeof(shader::uint) * bands},
+               {band_lists_, sizeof(shader::uint) * bands * shader::kParticlesAtOnce}};
+    if (std::ranges::all_of(all, [](const auto& each) { return each.buffer.bytes >= each.bytes; })) return;
+    flush();
+    for (const auto& each : all) reserve_storage(gpu_, each.buffer, each.bytes);
+}
+
 void DeviceRain::begin_strip(const RainData& data, const GpuImage& shadow_map, const Strip& strip,
                              Picture& picture, Slot& slot) {
     const std::size_t width = std::size_t(picture.width), pixels = width * std::size_t(strip.rows),
@@ -172,13 +186,7 @@ void DeviceRain::begin_strip(const RainData& data, const GpuImage& shadow_map, c
     reserve_staging(gpu_, slot.given, 4 * sizeof(float) * pixels);
     reserve_staging(gpu_, slot.given_depths, sizeof(float) * pixels);
     reserve_copy(gpu_, slot.result, 4 * sizeof(float) * pixels);
-    if (pixels_.bytes < 4 * sizeof(float) * pixels || band_counts_.bytes < sizeof(shader::uint) * bands) {
-        flush();
-        reserve_storage(gpu_, pixels_, 4 * sizeof(float) * pixels);
-        reserve_storage(gpu_, depths_, sizeof(float) * pixels);
-        reserve_storage(gpu_, band_counts_, sizeof(shader::uint) * bands);
-        reserve_storage(gpu_, band_lists_, sizeof(shader::uint) * bands * shader::kParticlesAtOnce);
-    }
+    reserve_shared(pixels, bands);
     float* const to = reinterpret_cast<float*>(slot.given.mapped);
     tbb::parallel_for(0, strip.rows, [&](int row) {
         for (std::size_t i = std::size_t(row) * width; i < std::size_t(row + 1) * width; ++i) {

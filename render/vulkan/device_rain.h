@@ -56,6 +56,7 @@ class DeviceRain {
     void use_noise(std::uint64_t seed);
     void use_shadow(const Picture& picture, double ground_m);
     void upload_frame(const RainData& data, const Picture& picture, Slot& slot);
+    void reserve_shared(std::size_t pixels, std::size_t bands);
     void begin_strip(const RainData& data, const GpuImage& shadow_map, const Strip& strip, Picture& picture,
                      Slot& slot);
     void record(const vk::raii::CommandBuffer& commands, const RainData& data, const GpuImage& shadow_map,

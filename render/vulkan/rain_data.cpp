@@ -125,7 +125,8 @@ void add_splashes(const std::vector<Streak>& streaks, RainData& data) {
         data.splash_counts.push_back(shader::uint(std::min<std::size_t>(shader::kStreakSegment, streaks.size() - first)));
 }
 
-shader::RainPass rain_pass(const RainFrame& rain, const Weather& weather, const ParticlePass& pass) {
+shader::RainPass rain_pass(const RainFrame& rain, const Weather& weather, const ParticlePass& pass,
+                           const Picture& picture) {
     const PrecipitationOptions& p = rain.options.precipitation;
     const Vec3& eye = rain.camera.position_m;
     const PassShape shape = pass_shape(rain.particles, pass, p, eye);
@@ -144,7 +145,9 @@ shader::RainPass rain_pass(const RainFrame& rain, const Weather& weather, const 
                float(pixels_per_unit(rain.options.camera, rain.camera)),
                p.kind == PrecipitationKind::snow ? 1.0f : 0.0f};
     set_shutter(rain, to);
-    to.sunlight = to_vec4(shape.lit_m - eye, 0);
+    // The map has the veils' shade, too, but as it is on the ground.
+    const double below_veils = picture.sunlight_of_veils ? double(sunlight_at(picture, shape.lit_m)) : -1;
+    to.sunlight = to_vec4(shape.lit_m - eye, below_veils);
     set_sway(rain.time_s, to);
     return to;
 }
@@ -182,7 +185,7 @@ std::optional<RainData> rain_data(const RainFrame& rain, const Weather& weather,
         index[&curtain] = n++;
     }
     for (const ParticlePass& pass : rain.passes) {
-        shader::RainPass& one = data.passes.emplace_back(rain_pass(rain, weather, pass));
+        shader::RainPass& one = data.passes.emplace_back(rain_pass(rain, weather, pass, picture));
         set_bits(pass.rain, index, one.rain);
         set_bits(pass.less, index, one.rain + 2);
     }

@@ -205,7 +205,7 @@ Streak streak_of(uint i, RainParticle of) {
     float opacity = present * min(kMostDropOpaque, the_pass.box_high.w * shadow / (width * length(ends.zw - ends.xy)));
     if (opacity < kLeastDropOpaque) return none;
     vec3 ray = way / distance_m;
-    float sunlight = sunlight_at(the_pass.sunlight.xyz);
+    float sunlight = the_pass.sunlight.w >= 0.0 ? the_pass.sunlight.w : sunlight_at(the_pass.sunlight.xyz);
     // Drops oscillate and show now more of the sky, now more of the ground.
     float turn = 1.0 + kDropFlicker * (2.0 * fract(kDropFlickers * of.z) - 1.0);
     vec3 light = turn * particle_radiance(ray, place, sun_of_drops(ray), sunlight);

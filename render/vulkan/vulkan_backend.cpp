@@ -174,7 +174,12 @@ bool VulkanBackend::begin_rain(const RainFrame& frame, const Weather& weather, c
                                         !cloud->cloud.visible.empty() && scene_.has_map(*cloud)
                                     ? &scene_.shadow_map(*cloud)
                                     : nullptr;
-    return rain().begin(frame, weather, map, picture);
+    try {
+        return rain().begin(frame, weather, map, picture);
+    } catch (...) {
+        rain().abandon(picture);  // strips of it may be on the device
+        throw;
+    }
 }
 
 void VulkanBackend::finish(Picture& picture) {

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,7 +29,7 @@ struct RainView {
     RenderOptions options;
     Weather weather;
     double time_s = 3;
-    bool cloud = false, wet = false;
+    bool cloud = false, wet = false, veil = false;
 };
 
 constexpr Vec3 kWithin{100, 900, 2}, kAtTheEdge{100, 380, 3}, kAfar{0, -3500, 60};
@@ -141,6 +143,13 @@ std::vector<RainView> views() {
         v.options.camera.path = {{0, kWithin, kWithin + Vec3{0, 100, 10}},
                                  {10, kWithin + Vec3{150, 250, 4}, kWithin + Vec3{150, 350, 10}}};
     });
+    for (const bool snow : {false, true})
+        add(snow ? "snow below a veil" : "below a veil", kWithin, north, [&](RainView& v) {
+            if (snow) snows(v);
+            v.options.sun.azimuth_deg = 0;
+            v.options.sun.elevation_deg = 20;
+            v.veil = true;
+        });
     const std::size_t dry = all.size();
     for (std::size_t n : {0u, 2u, 4u}) {  // before and behind a cloud, in its shadow
         all.push_back(all[n]);
@@ -178,6 +187,20 @@ Splats splats_of(const RainView& view) {
     return splats;
 }
 
+// A thin sheet high above the rain, without structure.
+std::span<const DrawnVeil> veils_of(const RainView& view) {
+    static const std::vector<DrawnVeil> sheet = [] {
+        VeilOptions options;
+        options.form = VeilForm::stratus;
+        options.coverage = 1;
+        options.base_m = 3000;
+        options.top_m = 3600;
+        return std::vector<DrawnVeil>{
+            {std::make_shared<VeilSlab>(options, Wind{}, 0, 0, std::nullopt), 0.004, {}}};
+    }();
+    return view.veil ? std::span(sheet) : std::span<const DrawnVeil>();
+}
+
 RenderOptions at_time(const RainView& view) {
     RenderOptions options = view.options;
     options.camera = camera_at(view.options.camera, view.time_s);
@@ -187,7 +210,7 @@ RenderOptions at_time(const RainView& view) {
 Picture draw(Renderer& renderer, const RainView& view, bool rains = true) {
     std::optional<Rainfall> rain;
     if (rains) rain = Rainfall{view.options, view.weather, view.time_s};
-    return renderer.draw_splats(splats_of(view), at_time(view), {}, std::move(rain));
+    return renderer.draw_splats(splats_of(view), at_time(view), veils_of(view), std::move(rain));
 }
 
 // Numbers that differ by more than 1/255 of white, or of what is brighter.
@@ -224,6 +247,26 @@ TEST_F(RainBackends, Agree) {
     }
 }
 
+// What a sheet leaves of the sun is all that rain against it has: the device's rain loses as much as the processor's.
+TEST_F(RainBackends, VeilsShadeRain) {
+    for (const std::string name : {"below a veil", "snow below a veil"}) {
+        const std::vector<RainView> all = views();
+        RainView view = *std::ranges::find(all, name, &RainView::name);
+        const auto light = [&](Renderer& renderer) {
+            const Picture dry = draw(renderer, view, false), rainy = draw(renderer, view);
+            double sum = 0;
+            for (std::size_t i = 0; i < dry.beauty.size(); ++i)
+                sum += std::max(0.0, double(rainy.beauty[i]) - double(dry.beauty[i]));
+            return sum;
+        };
+        const double shaded = light(vulkan_), by_processor = light(cpu_);
+        view.veil = false;
+        const double sunlit = light(vulkan_);
+        EXPECT_LT(shaded, 0.8 * sunlit) << name;
+        EXPECT_NEAR(shaded, by_processor, 0.01 * by_processor) << name;
+    }
+}
+
 // Whatever was drawn before, and what else is in flight.
 TEST_F(RainBackends, HaveTheBitsOfThoseDrawnOneByOne) {
     std::vector<RainView> all;
@@ -234,11 +277,11 @@ TEST_F(RainBackends, HaveTheBitsOfThoseDrawnOneByOne) {
     for (std::size_t n = all.size(); n-- > 0;) expected[n] = draw(other, all[n]);
     std::vector<PendingPicture> pending;
     for (std::size_t n = 0; n < all.size(); ++n) {
-        pending.push_back(vulkan_.begin(splats_of(all[n]), at_time(all[n]), {},
+        pending.push_back(vulkan_.begin(splats_of(all[n]), at_time(all[n]), veils_of(all[n]),
                                         Rainfall{all[n].options, all[n].weather, all[n].time_s}));
         EXPECT_TRUE(pending.back().is_pending()) << all[n].name;
         if (n % 7 == 6)
-            pending.back() = vulkan_.begin(splats_of(all[n]), at_time(all[n]), {},
+            pending.back() = vulkan_.begin(splats_of(all[n]), at_time(all[n]), veils_of(all[n]),
                                            Rainfall{all[n].options, all[n].weather, all[n].time_s});
         if (n == 0) continue;
         const Picture picture = vulkan_.finish(std::move(pending[n - 1]));

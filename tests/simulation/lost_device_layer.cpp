@@ -3,7 +3,8 @@
 // that pictures are drawn by shaders, and after NEPHOS_LOSE_DEVICE_AFTER submissions (all of the process)
 // each further one fails with VK_ERROR_DEVICE_LOST. So do waits for fences after NEPHOS_LOSE_WAIT_AFTER of
 // them, counted while that variable is there; what they wait for is done all the same. Submissions fail also from the
-// moment on when the file NEPHOS_LOSE_DEVICE_WHEN is there. For one instance and one device in one thread at a time.
+// moment on when the file NEPHOS_LOSE_DEVICE_WHEN is there. After NEPHOS_REFUSE_MEMORY_AFTER allocations of memory, counted
+// while that variable is there, each further one fails with VK_ERROR_OUT_OF_DEVICE_MEMORY. For one instance and one device in one thread at a time.
 
 #include <atomic>
 #include <cstdlib>
@@ -21,7 +22,8 @@ PFN_vkGetPhysicalDeviceProperties next_properties = nullptr;
 PFN_vkQueueSubmit2 next_submit = nullptr;
 PFN_vkQueueSubmit next_old_submit = nullptr;
 PFN_vkWaitForFences next_wait = nullptr;
-std::atomic<long> submissions{0}, waits{0};
+PFN_vkAllocateMemory next_allocate = nullptr;
+std::atomic<long> submissions{0}, waits{0}, allocations{0};
 
 // What the loader hands to a layer in the chain of a create info.
 template <typename Link, typename CreateInfo>
@@ -61,6 +63,14 @@ VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice device, std::uint32_t count, const 
     return after != nullptr && waits++ >= std::atol(after) ? VK_ERROR_DEVICE_LOST : result;
 }
 
+VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice device, const VkMemoryAllocateInfo* info,
+                                        const VkAllocationCallbacks* allocator, VkDeviceMemory* memory) {
+    const char* after = std::getenv("NEPHOS_REFUSE_MEMORY_AFTER");
+    if (after == nullptr) allocations = 0;
+    if (after != nullptr && allocations++ >= std::atol(after)) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
+    return next_allocate(device, info, allocator, memory);
+}
+
 VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo* info,
                                                const VkAllocationCallbacks* allocator, VkInstance* instance) {
     auto* link = link_of<VkLayerInstanceCreateInfo>(info, VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO);
@@ -88,6 +98,7 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const Vk
     next_submit = reinterpret_cast<PFN_vkQueueSubmit2>(next_of_device(*device, "vkQueueSubmit2"));
     next_old_submit = reinterpret_cast<PFN_vkQueueSubmit>(next_of_device(*device, "vkQueueSubmit"));
     next_wait = reinterpret_cast<PFN_vkWaitForFences>(next_of_device(*device, "vkWaitForFences"));
+    next_allocate = reinterpret_cast<PFN_vkAllocateMemory>(next_of_device(*device, "vkAllocateMemory"));
     return result;
 }
 
@@ -97,6 +108,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_function(VkDevice device, const 
     if (std::strcmp(name, "vkQueueSubmit2") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&submit);
     if (std::strcmp(name, "vkQueueSubmit") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&old_submit);
     if (std::strcmp(name, "vkWaitForFences") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&wait);
+    if (std::strcmp(name, "vkAllocateMemory") == 0) return reinterpret_cast<PFN_vkVoidFunction>(&allocate);
     return next_of_device(device, name);
 }
 

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "render/renderer.h"
+#include "tests/render/rain_scene.h"
 
 namespace nephos {
 namespace {
@@ -22,7 +23,7 @@ class LostPictures : public testing::Test {
         splats_.metaballs = {balls_, 0.002, 0.7};
     }
     void TearDown() override {
-        for (const char* name : {"VK_LAYER_PATH", "VK_INSTANCE_LAYERS", kWaits}) ::unsetenv(name);
+        for (const char* name : {"VK_LAYER_PATH", "VK_INSTANCE_LAYERS", kWaits, kMemory}) ::unsetenv(name);
     }
 
     // A lattice that fills the picture from within, and the same from far away.
@@ -53,7 +54,7 @@ class LostPictures : public testing::Test {
         }
     }
 
-    static constexpr const char* kWaits = "NEPHOS_LOSE_WAIT_AFTER";
+    static constexpr const char *kWaits = "NEPHOS_LOSE_WAIT_AFTER", *kMemory = "NEPHOS_REFUSE_MEMORY_AFTER";
     const std::vector<Metaball> balls_ = lattice();
     Splats splats_;
     Renderer renderer() const { return Renderer({.splatting = Splatting::vulkan}); }
@@ -87,6 +88,40 @@ TEST_F(LostPictures, AreWaitedForBeforeOthersTakeTheirPlace) {
     ::unsetenv(kWaits);
     for (int n = 0; n < 3; ++n)
         EXPECT_EQ(drawing.draw_splats(splats_, seen_from(-40000)).beauty, expected.beauty);
+}
+
+// Rain over a picture of three strips, with one allocation after the other refused: each picture is larger than all before,
+// so that it wants all of its memory anew. What comes after it is as if it had never been.
+TEST_F(LostPictures, OfRainThatMemoryRunsOutForLeaveNoTrace) {
+    const auto seen = [](int width, int height) {
+        return test::rain_view({100, 380, 3}, {100, 480, 13}, width, height, 300);
+    };
+    Weather weather;
+    weather.curtains = {test::rain_area()};
+    const auto draw = [&](Renderer& drawing, const RenderOptions& options) {
+        return drawing.draw_splats({}, options, {}, Rainfall{options, weather, 3});
+    };
+    Renderer drawing = renderer();
+    const RenderOptions small = seen(40, 30);
+    const Picture expected = draw(drawing, small);
+    int refused = 0;
+    for (bool again = true; again && refused < 200;) {
+        ::setenv(kMemory, std::to_string(refused).c_str(), 1);
+        try {
+            draw(drawing, seen(8 + refused, 8200));
+            again = false;
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::gpu) << error.what();
+            ++refused;
+        }
+        ::unsetenv(kMemory);
+        EXPECT_EQ(draw(drawing, small).beauty, expected.beauty) << refused;
+    }
+    EXPECT_GT(refused, 8);
+    EXPECT_LT(refused, 200);
+    const RenderOptions tall = seen(8, 8200);
+    Renderer other = renderer();
+    EXPECT_EQ(draw(drawing, tall).beauty, draw(other, tall).beauty);
 }
 
 }  // namespace
