@@ -27,6 +27,7 @@ struct TileRays {
     HWY_ALIGN float per_square[kTilePixels];  // 1 / |direction|^2
     HWY_ALIGN float x[kTilePixels], y[kTilePixels], z[kTilePixels], ground[kTilePixels];
     HWY_ALIGN float shell_offset[kTilePixels];  // where in shells of air these pixels sample them
+    HWY_ALIGN float open[kTilePixels];          // 0 where a ray ends at ground that is not level, else 1
 
     TileRays(const PictureFrame& frame, const ViewTile& tile, bool whole) {
         const Lanes d;
@@ -46,6 +47,7 @@ struct TileRays {
                 hn::Store(ray.y, d, y + at);
                 hn::Store(ray.z, d, z + at);
                 hn::Store(ground_distance(frame, ray.z), d, ground + at);
+                hn::Store(set(1.0f), d, open + at);
             }
         }
         if (whole && frame.terrain != nullptr) end_at_terrain(frame, tile);
@@ -64,8 +66,11 @@ struct TileRays {
                     const std::size_t column = left + pixel % shader::kTileWidth,
                                       line = top + row + pixel / shader::kTileWidth;
                     if (column >= width || line >= height) continue;
-                    float& end = ground[row * shader::kTileWidth + block * layout.lanes + lane];
-                    end = std::min(end, frame.terrain[line * width + column]);
+                    const std::size_t at = row * shader::kTileWidth + block * layout.lanes + lane;
+                    const float end = frame.terrain[line * width + column];
+                    if (!(end < kNowhere)) continue;
+                    ground[at] = end;
+                    open[at] = 0;
                 }
             }
         }

@@ -22,8 +22,8 @@
 #include <hwy/highway.h>
 
 #include "render/cpu/billboard_pixels-inl.h"
-#include "render/cpu/screen_ball.h"
 #include "render/cpu/march-inl.h"
+#include "render/cpu/screen_ball.h"
 #include "render/cpu/tile_air-inl.h"
 #include "render/cpu/view_scene.h"
 #include "render/shading/background-inl.h"
@@ -137,7 +137,8 @@ HWY_INLINE float distance_of(const ScreenBall& ball, const ViewScene& scene) {
 // Hides the pixels of a tile from splats beyond ground that is not level: their transmittance is 0 while one is drawn.
 class TerrainMask {
   public:
-    TerrainMask(const PictureFrame& frame, const TileRays& rays) : rays_(rays), any_(frame.terrain != nullptr) {
+    TerrainMask(const PictureFrame& frame, const TileRays& rays)
+        : rays_(rays), any_(frame.terrain != nullptr) {
         if (!any_) return;
         nearest_ = *std::min_element(rays.ground, rays.ground + kTilePixels);
         farthest_ = *std::max_element(rays.ground, rays.ground + kTilePixels);
@@ -227,14 +228,6 @@ inline TileWork find_visible_balls(const ViewScene& scene, const ViewTile& tile,
     return add_some<false>(scene, tile, sums);
 }
 
-// Returns 0 where a ray ends at ground that is not level, which is drawn later, else 1.
-HWY_INLINE Floats before_terrain(const PictureFrame& frame, const TileRays& ends, const Floats3& ray, std::size_t at) {
-    // Terrain is nearer than the plane by more than this (terrain_caster.cpp); rays differ by their rounding.
-    const Floats level_m = hn::Mul(set(0.999f), ground_distance(frame, ray.z));
-    const auto level = hn::Ge(hn::Load(Lanes(), ends.ground + at), level_m);
-    return hn::IfThenElseZero(level, set(1.0f));
-}
-
 // Adds what is seen of the background behind the clouds; distances become means.
 inline void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& sums, MarchState* march) {
     const Lanes d;
@@ -267,7 +260,7 @@ inline void finish_tile(const ViewScene& scene, const ViewTile& tile, TileSums& 
                                 hn::Add(hn::Load(d, first.y), set(float(tile.y) + float(row))));
             const Floats3 ray = times(hn::Div(set(1.0f), hn::Sqrt(dot(direction, direction))), direction);
             Floats3 behind = background(*scene.frame, map, ray);
-            if (ends) behind = times(before_terrain(*scene.frame, *ends, ray, at), behind);
+            if (ends) behind = times(hn::Load(d, ends->open + at), behind);  // terrain is drawn later
             hn::Store(hn::MulAdd(seen, behind.x, hn::Load(d, sums.red + at)), d, sums.red + at);
             hn::Store(hn::MulAdd(seen, behind.y, hn::Load(d, sums.green + at)), d, sums.green + at);
             hn::Store(hn::MulAdd(seen, behind.z, hn::Load(d, sums.blue + at)), d, sums.blue + at);

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "render/options/camera.h"
 #include "render/options/device_options.h"
+#include "render/options/height_format.h"
 #include "render/options/sun_position.h"
 #include "render/options/veil_view.h"
 #include "render/shared/shared.h"
@@ -137,6 +138,15 @@ void check(const Fog& fog) {
             "three numbers, -1000..1000 metres per second");
 }
 
+HeightFormat height_format(const std::filesystem::path& file) {
+    std::string ending = file.extension().string();
+    std::ranges::transform(ending, ending.begin(),
+                           [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
+    if (ending == ".png") return HeightFormat::png;
+    if (ending == ".exr") return HeightFormat::exr;
+    return ending == ".raw" || ending == ".r16" ? HeightFormat::raw : HeightFormat::none;
+}
+
 void check(const TerrainOptions& terrain) {
     require(!terrain.height_map || terrain.relief == Relief::none, "ground.height_map", "a height map or relief, not both");
     require(finite({terrain.x_m, terrain.y_m, 0}), "terrain.x_m", "finite metres");
@@ -145,6 +155,8 @@ void check(const TerrainOptions& terrain) {
     require(within(terrain.height_scale_m, 0, 20000), "terrain.height_scale_m", "0..20,000 metres");
     require(within(terrain.offset_m, -1e5, 1e5), "terrain.offset_m", "-1e5..1e5 metres");
     require(within(terrain.edge, 0, 0.5), "terrain.edge", "0..0.5");
+    require(within(terrain.raw_columns, 0, 4096), "terrain.raw_columns", "0..4096 heights");
+    require(within(terrain.raw_rows, 0, 4096), "terrain.raw_rows", "0..4096 heights");
     require(terrain.cells >= 16 && terrain.cells <= 4096, "terrain.cells", "16..4096 heights on a side");
     require(within(terrain.feature_m, 100, 1e5), "terrain.feature_m", "100..1e5 metres");
     require(within(terrain.rock_slope_deg, 0, 90), "terrain.rock_slope_deg", "0..90 degrees");

@@ -43,6 +43,6 @@ vec3 ground(vec3 ray, float distance) {
 
 vec3 background(vec3 ray) {
     float distance = level_distance(ray);
-    if (kTerrain && terrain_end < distance) return vec3(0.0);  // it is drawn later
+    if (kTerrain && terrain_end < 1.0e30) return vec3(0.0);  // it is drawn later
     return distance < 1.0e30 ? ground(ray, distance) : sky(ray);
 }

@@ -36,5 +36,5 @@ float level_distance(vec3 ray) {
 // Returns the distance at which the ray of this invocation's pixel ends.
 float ground_distance(vec3 ray) {
     float level = level_distance(ray);
-    return kTerrain ? min(level, terrain_end) : level;
+    return kTerrain && terrain_end < 1.0e30 ? terrain_end : level;
 }

@@ -104,8 +104,7 @@ struct RainPass {
     // The camera at the opening and the closing of the shutter: from the eye; axes over half the extent of the picture.
     vec4 opening, opening_right, opening_up, opening_forward;
     vec4 closing, closing_right, closing_up, closing_forward;
-    vec4
-        sunlight;  // xyz: from the eye to the place whose sunlight all particles have; w: what veils leave of it there
+    vec4 sunlight;  // xyz: from the eye to the place whose sunlight all particles have; w: that, -1: the map has it
     // Curtains with rain, and those whose rain is in another pass: a bit each.
     Words4 rain;    // xy; zw: less
     vec4 sway[kSwaySpeeds];  // of flakes: angle and its harmonic by the speed of turning, -pi..pi

@@ -20,6 +20,7 @@
 #include "core/error.h"
 #include "density/vdb/sandbox.h"
 #include "render/image/exr_grid.h"
+#include "render/options/height_format.h"
 #include "render/terrain/height_parsers.h"
 
 namespace nephos {
@@ -32,7 +33,9 @@ constexpr SandboxLimits kLimits{
     throw Error(ErrorCode::io, path.string() + ": " + reason);
 }
 
-std::string size_text(long long columns, long long rows) { return std::to_string(columns) + " x " + std::to_string(rows); }
+std::string size_text(long long columns, long long rows) {
+    return std::to_string(columns) + " x " + std::to_string(rows);
+}
 
 // Throws what is wrong with a size, for the child's message.
 void require_size(long long columns, long long rows) {
@@ -81,8 +84,10 @@ struct PngHeader {
     int depth = 0, colour = 0;
 };
 
-bool read_png_rows(PngSource& source, PngHeader& header, std::vector<std::uint16_t>& rows, const std::function<void()>& begin) {
-    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, keep_png_error, ignore_png_warning);
+bool read_png_rows(PngSource& source, PngHeader& header, std::vector<std::uint16_t>& rows,
+                   const std::function<void()>& begin) {
+    png_structp png =
+        png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, keep_png_error, ignore_png_warning);
     if (png == nullptr) throw std::bad_alloc();
     png_infop info = png_create_info_struct(png);
     volatile bool good = false;
@@ -103,7 +108,9 @@ bool read_png_rows(PngSource& source, PngHeader& header, std::vector<std::uint16
             png_read_update_info(png, info);
             for (int pass = 0; pass < passes; ++pass)
                 for (unsigned y = 0; y < header.height; ++y)
-                    png_read_row(png, reinterpret_cast<png_bytep>(rows.data() + std::size_t(y) * header.width), nullptr);
+                    png_read_row(png,
+                                 reinterpret_cast<png_bytep>(rows.data() + std::size_t(y) * header.width),
+                                 nullptr);
             png_read_end(png, nullptr);
         }
         good = true;
@@ -127,7 +134,9 @@ HeightImage parse_height_png(int fd) {
     if (!good) throw std::runtime_error(std::string("cannot be read as PNG: ") + source.message);
     require_size(header.width, header.height);
     if (rows.empty()) {
-        const int channels = header.colour == PNG_COLOR_TYPE_GRAY ? 1 : header.colour == PNG_COLOR_TYPE_GRAY_ALPHA ? 2 : 3;
+        const int channels = header.colour == PNG_COLOR_TYPE_GRAY         ? 1
+                             : header.colour == PNG_COLOR_TYPE_GRAY_ALPHA ? 2
+                                                                          : 3;
         throw std::runtime_error("is a PNG of " + std::to_string(header.depth) + " bits" +
                                  (channels == 1 ? " of grey" : " with colours or transparency") +
                                  "; expected 16 bits of grey alone");
@@ -166,56 +175,56 @@ HeightImage parse_confined(const std::filesystem::path& path, const char* parser
 }
 
 HeightImage read_raw(const std::filesystem::path& path, int columns, int rows) {
-    if (columns < 2 || rows < 2) {
-        throw Error(ErrorCode::usage, path.string() + ": a raw file does not say its size; expected `raw_columns` and "
-                                                      "`raw_rows` in [terrain], 2 to " +
-                                          std::to_string(kMostHeights));
+    if (columns < 2 || rows < 2 || columns > kMostHeights || rows > kMostHeights) {
+        throw Error(ErrorCode::usage, path.string() +
+                                          ": a raw file does not say its size; expected `raw_columns` and "
+                                          "`raw_rows` in [terrain], 2 to " +
+                                          std::to_string(kMostHeights) + ", not " + size_text(columns, rows));
     }
     const Descriptor opened = open_regular_file(path, O_RDONLY);
     struct stat facts {};
     if (::fstat(opened.get(), &facts) != 0) fail(path, std::strerror(errno));
-    std::vector<std::uint8_t> bytes(2 * std::size_t(columns) * std::size_t(rows));
-    if (facts.st_size != off_t(bytes.size())) {
-        fail(path, "has " + std::to_string(facts.st_size) + " bytes; expected " + std::to_string(bytes.size()) + ", " +
-                       size_text(columns, rows) + " numbers of 16 bits");
+    const std::size_t expected = 2 * std::size_t(columns) * std::size_t(rows);
+    if (facts.st_size != off_t(expected)) {
+        fail(path, "has " + std::to_string(facts.st_size) + " bytes; expected " + std::to_string(expected) +
+                       ", " + size_text(columns, rows) + " numbers of 16 bits");
     }
+    std::vector<std::uint8_t> bytes(expected);
     if (!read_at(opened.get(), 0, bytes.data(), bytes.size())) fail(path, "cannot be read to its end");
     HeightImage image{columns, rows, {}};
     image.heights.reserve(bytes.size() / 2);
-    for (std::size_t n = 0; n < bytes.size(); n += 2) image.heights.push_back(float(bytes[n] | bytes[n + 1] << 8));
+    for (std::size_t n = 0; n < bytes.size(); n += 2)
+        image.heights.push_back(float(bytes[n] | bytes[n + 1] << 8));
     return image;
-}
-
-std::string ending_of(const std::filesystem::path& path) {
-    std::string ending = path.extension().string();
-    std::ranges::transform(ending, ending.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
-    return ending;
 }
 
 }  // namespace
 
 HeightFile read_height_file(const std::filesystem::path& path, int raw_columns, int raw_rows) {
-    const std::string ending = ending_of(path);
+    const HeightFormat format = height_format(path);
     HeightFile file;
-    if (ending == ".png") {
+    if (format == HeightFormat::png) {
         file.image = parse_confined(path, "libpng", parse_height_png);
-    } else if (ending == ".exr") {
+    } else if (format == HeightFormat::exr) {
         prepare_exr();
         file.image = parse_confined(path, "OpenEXR", [](int fd) {
             ExrGrid grid = parse_exr_grid(fd, kMostHeights);
             return HeightImage{grid.columns, grid.rows, std::move(grid.values)};
         });
         file.metres = true;
-    } else if (ending == ".raw" || ending == ".r16") {
+    } else if (format == HeightFormat::raw) {
         file.image = read_raw(path, raw_columns, raw_rows);
     } else {
-        throw Error(ErrorCode::usage, path.string() + ": is no height map by its name; expected .png, .exr, .raw or .r16");
+        throw Error(ErrorCode::usage,
+                    path.string() + ": is no height map by its name; expected .png, .exr, .raw or .r16");
     }
-    const auto bad = std::ranges::find_if_not(file.image.heights, [](float z) { return std::isfinite(z) && std::abs(z) <= 1e5f; });
+    const auto bad = std::ranges::find_if_not(
+        file.image.heights, [](float z) { return std::isfinite(z) && std::abs(z) <= 1e5f; });
     if (bad != file.image.heights.end()) {
         const auto n = bad - file.image.heights.begin();
-        fail(path, "has a height of " + std::to_string(double(*bad)) + " in column " + std::to_string(n % file.image.columns + 1) +
-                       ", row " + std::to_string(n / file.image.columns + 1) + "; expected -100,000 to 100,000 m");
+        fail(path, "has a height of " + std::to_string(double(*bad)) + " in column " +
+                       std::to_string(n % file.image.columns + 1) + ", row " +
+                       std::to_string(n / file.image.columns + 1) + "; expected -100,000 to 100,000 m");
     }
     return file;
 }

@@ -11,6 +11,8 @@
 
 #include "core/error.h"
 #include "core/math.h"
+#include "render/options/camera.h"
+#include "render/options/height_format.h"
 #include "render/terrain/erosion.h"
 
 namespace nephos {
@@ -29,6 +31,15 @@ void check_image(const HeightImage& image) {
     }
     if (!std::ranges::all_of(image.heights, [](float z) { return std::isfinite(z); }))
         throw Error(ErrorCode::usage, "a height map has a height that is not finite");
+}
+
+// Sides that go down to the ground leave nothing of a map that has sides alone.
+void require_inner_heights(const HeightImage& image, double edge) {
+    if (edge <= 0 || std::min(image.columns, image.rows) > 2) return;
+    throw Error(ErrorCode::usage,
+                "a height map of " + std::to_string(image.columns) + " x " + std::to_string(image.rows) +
+                    " heights has nothing but sides, which `edge` in [terrain] leads down to the ground: "
+                    "expected 3 or more heights on a side, or `edge` = 0");
 }
 
 // Takes the rows from the south, and leads the sides down to the ground.
@@ -211,7 +222,9 @@ double interpolated(const std::vector<float>& nodes, int columns, int rows, doub
 }
 
 HeightMap height_map(const HeightImage& world_m, const TerrainOptions& options, double ground_m) {
+    check(options);
     check_image(world_m);
+    require_inner_heights(world_m, options.edge);
     HeightMap map;
     map.columns = world_m.columns;
     map.rows = world_m.rows;
@@ -240,17 +253,25 @@ double ground_height_at(const HeightMap* map, const Ground& ground, double x_m, 
     return map == nullptr ? ground.height_m : std::max(ground.height_m, height_at(*map, x_m, y_m));
 }
 
-Camera standing_camera(const Camera& camera, const HeightMap* map, const Ground& ground) {
-    Camera out = camera;
+Camera standing_camera(const Camera& camera, const HeightMap* map, const Ground& ground, double time_s) {
+    Camera out = camera_at(camera, time_s);
     if (!camera.above_ground) return out;
-    const auto stand = [&](Vec3& point) { point.z += ground_height_at(map, ground, point.x, point.y); };
-    stand(out.position_m);
-    stand(out.target_m);
-    for (CameraKey& key : out.path) {
-        stand(key.position_m);
-        stand(key.target_m);
-    }
+    for (Vec3* point : {&out.position_m, &out.target_m})
+        point->z += ground_height_at(map, ground, point->x, point->y);
     out.above_ground = false;
+    return out;
+}
+
+Camera standing_camera(const Camera& camera, const HeightMap* map, const Ground& ground,
+                       std::span<const double> times_s) {
+    if (!camera.above_ground) return camera;
+    Camera out = camera;
+    out.above_ground = false;
+    out.path.clear();
+    for (const double time_s : times_s) {
+        const Camera at = standing_camera(camera, map, ground, time_s);
+        out.path.push_back({time_s, at.position_m, at.target_m});
+    }
     return out;
 }
 

@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/vec.h"
@@ -66,7 +67,7 @@ struct HeightMap {
 };
 
 // Makes a map of heights in world metres; towards its sides it goes down to `ground_m`. Throws Error(usage) on an image whose
-// size or numbers are not as stated. Deterministic; in parallel.
+// size or numbers are not as stated, one that its sides leave nothing of, and as check(options). Deterministic; in parallel.
 HeightMap height_map(const HeightImage& world_m, const TerrainOptions& options, double ground_m);
 
 // Returns the height of the map's surface at a place, bilinear; below any ground outside of it. Pure.
@@ -75,8 +76,15 @@ double height_at(const HeightMap& map, double x_m, double y_m);
 // Returns the height of the ground: that of the map where it is above Ground::height_m, else that; `map` may be null.
 double ground_height_at(const HeightMap* map, const Ground& ground, double x_m, double y_m);
 
-// Returns the camera with all its heights, which are above the ground there, as world heights (Camera::above_ground). Pure.
-Camera standing_camera(const Camera& camera, const HeightMap* map, const Ground& ground);
+// Returns the camera at a time (camera_at()), with world heights if its own are above the ground there
+// (Camera::above_ground). Heights above the ground are interpolated between key frames: the camera follows the relief and
+// never enters it. `map` may be null. Pure.
+Camera standing_camera(const Camera& camera, const HeightMap* map, const Ground& ground, double time_s);
+
+// Returns a camera with world heights that is where standing_camera() is at these times, which rise; between them it is
+// interpolated as any path. A camera whose heights are of the world is returned as it is. Pure.
+Camera standing_camera(const Camera& camera, const HeightMap* map, const Ground& ground,
+                       std::span<const double> times_s);
 
 // Interpolates nodes of a grid that spans the map at fractions of it, bilinear; clamped to its sides.
 double interpolated(const std::vector<float>& nodes, int columns, int rows, double across, double up);

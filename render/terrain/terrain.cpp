@@ -5,6 +5,7 @@
 #include <mutex>
 #include <vector>
 
+#include "render/options/height_format.h"
 #include "render/terrain/height_file.h"
 #include "render/terrain/relief.h"
 
@@ -28,6 +29,7 @@ std::shared_ptr<const HeightMap> terrain_of(HeightImage&& image, double scale, c
 
 std::shared_ptr<const HeightMap> make_terrain(const TerrainOptions& options, const Ground& ground) {
     if (!options.any()) return nullptr;
+    check(options);
     if (options.height_map) {
         HeightFile file = read_height_file(*options.height_map, options.raw_columns, options.raw_rows);
         const double scale = file.metres ? 1 : options.height_scale_m / 65535;

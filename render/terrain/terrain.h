@@ -10,7 +10,7 @@
 namespace nephos {
 
 // Returns null when the options have neither a height map nor relief. Relief that is in use already is shared: to generate
-// it takes seconds. Thread-safe. Throws as read_height_file(), and Error(usage) as height_map().
+// it takes seconds. Thread-safe. Throws as check(options), read_height_file() and height_map().
 std::shared_ptr<const HeightMap> make_terrain(const TerrainOptions& options, const Ground& ground);
 
 }  // namespace nephos

@@ -14,7 +14,8 @@ constexpr double kFarthest_m = 600'000;
 
 // Returns the distance at which a ray passes a height, coming from above or from below; kFarthest_m when it does not.
 double passes(const TerrainRay& ray, double z_m) {
-    const double a = ray.bend * (1 - ray.direction.z * ray.direction.z), b = ray.direction.z, c = ray.from_m.z - z_m;
+    const double a = ray.bend * (1 - ray.direction.z * ray.direction.z), b = ray.direction.z,
+                 c = ray.from_m.z - z_m;
     const double square = b * b - 4 * a * c;
     if (square < 0) return kFarthest_m;
     // The nearer of the roots ahead, without cancellation.
@@ -38,9 +39,11 @@ TerrainCaster::TerrainCaster(const HeightMap& map, const RenderOptions& options,
 float TerrainCaster::distance(double px, double py) const {
     const TerrainRay ray{camera_.position_m, pixel_ray(frame_, camera_, px, py), bend_};
     const double plane = passes(ray, ground_m_);
-    const double met = mirrored_ ? terrain_distance(map_, ray, plane, kFarthest_m) : terrain_distance(map_, ray, 0, plane);
-    // What is hardly nearer than the plane is the plane: back-ends find that in single precision.
-    constexpr double kNearer = 1 - 2e-3;
+    const double met =
+        mirrored_ ? terrain_distance(map_, ray, plane, kFarthest_m) : terrain_distance(map_, ray, 0, plane);
+    // What lies on the plane but for rounding is the plane. Seen from above, a share h / H of the way is a height h below an
+    // eye at the height H: 10 cm below one at 10 km.
+    constexpr double kNearer = 1 - 1e-5;
     if (!mirrored_ && met > kNearer * plane) return kNoTerrain;
     return met < kFarthest_m ? float(met) : kNoTerrain;
 }

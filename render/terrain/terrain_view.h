@@ -13,7 +13,7 @@ namespace nephos {
 inline constexpr float kNoTerrain = 1.0e30f;  // as the ground where a ray does not meet it
 
 // A distance for each pixel, metres from the eye through its middle; kNoTerrain where the ray meets the plane of the ground
-// first, or nothing.
+// first, or nothing. Back-ends take a ray with a distance to end there, wherever their own rounding puts the plane.
 struct TerrainView {
     int width = 0, height = 0;
     std::vector<float> distance_m;

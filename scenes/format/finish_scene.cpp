@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "render/options/height_format.h"
 #include "scenes/format/schema_sections.h"
 #include "scenes/format/text.h"
 
@@ -231,6 +232,30 @@ void repeat_lattice(const SectionReader& reader, Scene& scene) {
     }
 }
 
+// What a height map's name says of its file, before anybody reads it.
+void check_height_map(const SectionReader& reader, const TerrainOptions& terrain) {
+    if (!terrain.height_map || !reader.sound({"ground", "terrain"})) return;
+    const SectionReader ground = below(reader, "ground"), about = below(reader, "terrain");
+    const HeightFormat format = height_format(*terrain.height_map);
+    if (format == HeightFormat::none) {
+        ground.report("height_map",
+                      ground.quoted("height_map") + " is \"" +
+                          shortened(terrain.height_map->filename().string()) +
+                          "\", which is no height map by its name",
+                      "expected a file that ends in .png, .exr, .raw or .r16");
+    }
+    if (format != HeightFormat::raw || (terrain.raw_columns >= 2 && terrain.raw_rows >= 2)) return;
+    const char* const wrong = terrain.raw_columns < 2 ? "raw_columns" : "raw_rows";
+    const bool given = reader.find("terrain") != nullptr && about.find(wrong) != nullptr;
+    const std::string expected =
+        "expected `terrain.raw_columns` and `terrain.raw_rows`, integers from 2 to 4096";
+    if (given)
+        about.report(wrong, about.quoted(wrong) + " is too small for a height map", expected);
+    else
+        ground.report("height_map",
+                      ground.quoted("height_map") + " is a raw file, which does not say its size", expected);
+}
+
 void finish_scene(const SectionReader& reader, void* owner) {
     auto& scene = *static_cast<Scene*>(owner);
     repeat_lattice(reader, scene);
@@ -242,6 +267,7 @@ void finish_scene(const SectionReader& reader, void* owner) {
     check_frames(reader, scene);
     place_sun(reader, scene);
     check_velocity_name(reader, scene);
+    check_height_map(reader, scene.render.terrain);
     const AutomatonOptions& automaton = scene.automaton;
     fill_in_centres(scene.automaton.field.scatters, automaton.extent, automaton.placement);
     finish_layers(reader, scene);

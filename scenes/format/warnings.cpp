@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "automaton/options.h"
+#include "render/options/height_format.h"
 
 namespace nephos {
 namespace {
@@ -134,6 +135,29 @@ bool has_billboards(const BaseModel& model) {
     });
 }
 
+// Keys of [terrain] that are of another kind of ground.
+void add_terrain_keys(const TerrainOptions& terrain, std::vector<std::string>& to) {
+    const TerrainOptions plain;
+    TerrainOptions other = terrain;
+    other.height_map.reset();
+    other.relief = Relief::none;
+    if (!terrain.any()) {
+        if (!(other == plain))
+            to.emplace_back("[terrain] has no effect: [ground] has neither `height_map` nor `relief`");
+        return;
+    }
+    const HeightFormat format = terrain.height_map ? height_format(*terrain.height_map) : HeightFormat::none;
+    if (format != HeightFormat::raw && (terrain.raw_columns != 0 || terrain.raw_rows != 0))
+        to.emplace_back("`raw_columns` and `raw_rows` of [terrain] have no effect: they are of raw files");
+    if (format == HeightFormat::exr && terrain.height_scale_m != plain.height_scale_m)
+        to.emplace_back("`height_scale_m` of [terrain] has no effect: the heights of an EXR file are metres");
+    const bool generates =
+        terrain.cells != plain.cells || terrain.feature_m != plain.feature_m || terrain.seed != plain.seed;
+    if (terrain.height_map && generates)
+        to.emplace_back(
+            "`cells`, `feature_m` and `seed` of [terrain] have no effect: they are of `ground.relief`");
+}
+
 }  // namespace
 
 std::vector<std::string> keys_without_effect(const Scene& scene) {
@@ -148,11 +172,7 @@ std::vector<std::string> keys_without_effect(const Scene& scene) {
         result.emplace_back(
             "`precipitation.splashes` has no effect: it needs rain (`enabled`, `kind`) and level ground, without a "
             "`relief` or `height_map`");
-    TerrainOptions terrain = scene.render.terrain;
-    terrain.height_map.reset();
-    terrain.relief = Relief::none;
-    if (!scene.render.terrain.any() && !(terrain == TerrainOptions{}))
-        result.emplace_back("[terrain] has no effect: [ground] has neither `height_map` nor `relief`");
+    add_terrain_keys(scene.render.terrain, result);
     if (sea && scene.ground_cover.enabled)
         result.emplace_back(
             "[wet_ground] has no effect but for its reflection: rain and snow vanish in a ground of water");

@@ -106,6 +106,34 @@ TEST(TerrainPicture, BackendsAgree) {
     }
 }
 
+// Low hills from high up: nearer than the plane by less than a thousandth of the way, which is below what back-ends know of
+// it in the distance.
+TEST(TerrainPicture, LowHillsFromHighUpAreDrawnOnce) {
+    HeightImage image{41, 41, std::vector<float>(41 * 41, 0.0f)};
+    for (int j = 12; j < 30; ++j)
+        for (int i = 12; i < 30; ++i) image.heights[std::size_t(41 * j + i)] = 8;
+    TerrainOptions place;
+    place.y_m = 20'000;
+    place.width_m = place.length_m = 60'000;
+    Splats splats;
+    splats.terrain = std::make_shared<const HeightMap>(height_map(image, place, 0));
+    RenderOptions options = view();
+    options.camera.position_m = {0, 0, 10'000};
+    options.camera.target_m = {0, 30'000, 0};
+    for (const bool physical : {false, true}) {
+        options.atmosphere.model = physical ? AirModel::physical : AirModel::gradient;
+        const auto drawn = [&](Splatting way) { return test::renderer(way).draw_splats(splats, options); };
+        const Picture processor = drawn(Splatting::cpu);
+        EXPECT_GT(std::ranges::count_if(processor.terrain_m, [](float m) { return m < 1e30f; }), 1000);
+        EXPECT_LE(difference(processor, drawn(Splatting::vulkan)), 1.0 / 255) << physical;
+        EXPECT_LE(difference(processor, drawn(Splatting::blended)), 1.0 / 255) << physical;
+        // About as bright as the plane: drawn neither twice nor not at all.
+        Splats plane;
+        const Picture level = test::renderer(Splatting::cpu).draw_splats(plane, options);
+        EXPECT_LE(difference(processor, level), 0.1) << physical;
+    }
+}
+
 TEST(TerrainPicture, SunAndCloudsShadeIt) {
     RenderOptions options = view();
     options.air.extinction_per_m = {0, 0, 0};

@@ -3,6 +3,7 @@
 // Height maps: rays against small steps along them, the Earth's curve, drainage, files and what is wrong with them.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -20,6 +21,7 @@
 #include <png.h>
 
 #include "core/error.h"
+#include "render/options/camera.h"
 #include "render/terrain/erosion.h"
 #include "render/terrain/height_file.h"
 #include "render/terrain/relief.h"
@@ -174,6 +176,33 @@ TEST(HeightMap, RefusesHeightsThatAreNone) {
     EXPECT_THROW(height_map(image, small_options(), 0), Error);
 }
 
+TEST(HeightMap, RefusesSidesThatLeaveNothingOfIt) {
+    TerrainOptions options = small_options();
+    options.edge = 0.1;
+    EXPECT_THROW(height_map({2, 5, std::vector<float>(10, 80.0f)}, options, 0), Error);
+    EXPECT_EQ(height_at(height_map({3, 3, std::vector<float>(9, 80.0f)}, options, 0), 0, 0), 80);
+}
+
+// Options that no scene's reader has seen.
+TEST(Terrain, RefusesOptionsBeyondTheirRanges) {
+    const auto reason = [](const TerrainOptions& options) -> std::string {
+        try {
+            make_terrain(options, {});
+        } catch (const Error& error) {
+            return error.what();
+        }
+        return "";
+    };
+    TerrainOptions none = small_options(0, 0);
+    none.relief = Relief::hills;
+    EXPECT_NE(reason(none).find("terrain.width_m"), std::string::npos) << reason(none);
+    EXPECT_THROW(height_map({3, 3, std::vector<float>(9)}, small_options(0, 0), 0), Error);
+    TerrainOptions raw = small_options();
+    raw.height_map = "alps.raw";
+    raw.raw_columns = raw.raw_rows = 2'000'000'000;
+    EXPECT_NE(reason(raw).find("terrain.raw_columns"), std::string::npos) << reason(raw);
+}
+
 TEST(StandingCamera, CountsHeightsFromTheGround) {
     const HeightMap map = height_map({2, 2, {100, 100, 100, 100}}, small_options(), 0);
     Ground ground;
@@ -182,15 +211,40 @@ TEST(StandingCamera, CountsHeightsFromTheGround) {
     camera.position_m = {0, 0, 2};
     camera.target_m = {5000, 0, 10};
     camera.path = {{0, {10, 0, 5}, {0, 0, 6}}, {10, {9000, 0, 5}, {0, 0, 6}}};
-    EXPECT_EQ(standing_camera(camera, &map, ground), camera);
+    const std::array<double, 3> times_s{-1, 4.5, 20};
+    EXPECT_EQ(standing_camera(camera, &map, ground, times_s), camera);
+    EXPECT_EQ(standing_camera(camera, &map, ground, 5), camera_at(camera, 5));
     camera.above_ground = true;
-    const Camera standing = standing_camera(camera, &map, ground);
-    EXPECT_EQ(standing.position_m.z, 102);
-    EXPECT_EQ(standing.target_m.z, 40);  // beyond the map is the plane
-    EXPECT_EQ(standing.path[0].position_m.z, 105);
-    EXPECT_EQ(standing.path[1].position_m.z, 35);
-    EXPECT_FALSE(standing.above_ground);
-    EXPECT_EQ(standing_camera(camera, nullptr, ground).position_m.z, 32);
+    const Camera moving = standing_camera(camera, &map, ground, times_s);
+    ASSERT_EQ(moving.path.size(), 3u);
+    EXPECT_FALSE(moving.above_ground);
+    EXPECT_EQ(moving.path[0].position_m.z, 105);
+    EXPECT_EQ(moving.path[2].position_m.z, 35);
+    for (const double time_s : times_s) {
+        const Camera at = standing_camera(camera, &map, ground, time_s);
+        EXPECT_TRUE(at.path.empty() && !at.above_ground);
+        EXPECT_EQ(camera_at(moving, time_s), at);
+    }
+    camera.path.clear();
+    const Camera still = standing_camera(camera, &map, ground, 0);
+    EXPECT_EQ(still.position_m.z, 102);
+    EXPECT_EQ(still.target_m.z, 40);  // beyond the map is the plane
+    EXPECT_EQ(standing_camera(camera, nullptr, ground, 0).position_m.z, 32);
+}
+
+// A ridge between two key frames, both on the plain.
+TEST(StandingCamera, DoesNotEnterARidgeOnItsWay) {
+    const HeightMap map = height_map({3, 2, {0, 600, 0, 0, 600, 0}}, small_options(), 0);
+    Camera camera;
+    camera.above_ground = true;
+    camera.path = {{0, {-600, 0, 20}, {0, 300, 5}}, {10, {600, 0, 40}, {0, 300, 5}}};
+    for (double t = 0; t <= 10; t += 0.25) {
+        const Vec3 eye = standing_camera(camera, &map, {}, t).position_m;
+        const double above = eye.z - ground_height_at(&map, {}, eye.x, eye.y);
+        EXPECT_GE(above, 20) << t;
+        EXPECT_LE(above, 40) << t;
+    }
+    EXPECT_NEAR(standing_camera(camera, &map, {}, 5).position_m.z, 630, 1e-9);
 }
 
 TEST(TerrainView, RefusesACameraInTheGround) {
@@ -205,6 +259,25 @@ TEST(TerrainView, RefusesACameraInTheGround) {
     }
     options.camera.position_m = {0, 0, 101};
     EXPECT_NO_THROW(require_above_terrain(map, options));
+}
+
+// 3 m of ground below an eye at 10 km, and ground on the plane, which is the plane.
+TEST(TerrainView, SeesLowGroundFromHighUp) {
+    TerrainOptions wide = small_options(20'000, 20'000);
+    RenderOptions options;
+    options.camera.position_m = {0, 0, 10'000};
+    options.camera.target_m = {0, 10, 0};
+    options.camera.width = 16;
+    options.camera.height = 12;
+    const auto seen = [&](float z) {
+        const HeightMap map = height_map({3, 3, std::vector<float>(9, z)}, wide, 0);
+        return terrain_view(map, options, 0).distance_m;
+    };
+    for (const float distance : seen(3)) {
+        EXPECT_GE(distance, 9996);
+        EXPECT_LT(distance, 14'000);
+    }
+    for (const float distance : seen(0)) EXPECT_EQ(distance, kNoTerrain);
 }
 
 TEST(Drainage, LeadsAllWaterOutAndFillsHollows) {
@@ -334,6 +407,7 @@ TEST(HeightFile, SaysWhatIsWrong) {
     std::ofstream(folder.path() / "a.raw") << "12345678";
     EXPECT_NE(reason_of(folder.path() / "a.raw").find("raw_columns"), std::string::npos);
     EXPECT_NE(reason_of(folder.path() / "a.raw", 3, 2).find("has 8 bytes; expected 12"), std::string::npos);
+    EXPECT_NE(reason_of(folder.path() / "a.raw", 4097, 2).find("2 to 4096, not 4097 x 2"), std::string::npos);
     EXPECT_NE(reason_of(folder.path() / "a.tif").find(".png, .exr, .raw or .r16"), std::string::npos);
     EXPECT_NE(reason_of(folder.path() / "none.png").find("none.png"), std::string::npos);
 }

@@ -13,6 +13,7 @@
 
 #include <gtest/gtest.h>
 
+#include "scenes/format/warnings.h"
 #include "scenes/format/writer.h"
 
 namespace nephos {
@@ -384,6 +385,30 @@ TEST(ClosestWord, FindsSlipsOnly) {
     EXPECT_EQ(closest_word("qwerty", words), "");
     EXPECT_EQ(closest_word("", words), "");
     EXPECT_EQ(closest_word(std::string(1000, 'x'), words), "");
+}
+
+// Keys of [terrain] that are of relief beside a file, and of one format beside another.
+TEST(KeysWithoutEffect, NameThoseOfAnotherKindOfGround) {
+    const auto notes = [](const std::string& ground, const std::string& terrain) {
+        std::string all;
+        for (const std::string& note :
+             keys_without_effect(scene_of("[ground]\n" + ground + "\n[terrain]\n" + terrain)))
+            all += note + "\n";
+        return all;
+    };
+    const auto names = [](const std::string& text, const char* key) {
+        return text.find(key) != std::string::npos;
+    };
+    EXPECT_TRUE(names(notes("height_map = \"a.png\"", "raw_rows = 5"), "`raw_rows`"));
+    EXPECT_TRUE(names(notes("relief = \"hills\"", "raw_columns = 5"), "`raw_columns`"));
+    EXPECT_TRUE(names(notes("height_map = \"a.EXR\"", "height_scale_m = 50"), "`height_scale_m`"));
+    for (const char* const key : {"cells = 64", "feature_m = 400", "seed = 3"})
+        EXPECT_TRUE(names(notes("height_map = \"a.png\"", key), "`ground.relief`")) << key;
+    EXPECT_TRUE(names(notes("height_m = 5", "snow_line_m = 3"), "[terrain] has no effect"));
+    EXPECT_EQ(notes("height_map = \"a.png\"", "height_scale_m = 50\nsnow_line_m = 3"), "");
+    EXPECT_EQ(notes("height_map = \"a.r16\"", "raw_columns = 5\nraw_rows = 6\nheight_scale_m = 50"), "");
+    EXPECT_EQ(notes("height_map = \"a.exr\"", "offset_m = 50"), "");
+    EXPECT_EQ(notes("relief = \"ridges\"", "cells = 64\nfeature_m = 400\nseed = 3\nheight_scale_m = 9"), "");
 }
 
 // The hashes change with what they stand for, and with nothing else.
